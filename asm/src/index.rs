@@ -1,42 +1,42 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Which name means what, and where it stands: what an editor asks of a program, whether it assembles or not.
+//! Index of declarations and references for editors, whether the program assembles or not.
 //!
 //! The index is recorded while the assembler resolves names ([`check`](crate::check)), so that it knows what the assembler
 //! knows: a name in a macro's body is found for each use, a name with `{}` for each value that it takes. Code that is never
-//! expanded, as the body of a macro that nothing uses, is not resolved, and is not in it.
+//! expanded, as the body of an unused macro, is not resolved and not in the index.
 
-use crate::context::{Binding, Context, ScopeKind, Table};
+use crate::context::{Binding, Context, ParameterType, ScopeKind, Table};
 use crate::ir::{Ir, RegisterId, RegisterKind};
-use crate::report::source::Span;
-use crate::syntax::ast::{Directive, DirectiveKind};
-use crate::syntax::expr::Value;
-use crate::syntax::name::NameId;
 use std::collections::HashMap;
+use takt_diagnostics::source::Span;
 use takt_isa::program::Space;
 use takt_isa::{Register, Type};
+use takt_syntax::ast::{Directive, DirectiveKind};
+use takt_syntax::expr::Value;
+use takt_syntax::name::NameId;
 
 /// The kind of a declaration.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub enum SymbolKind {
-    /// `.reg`.
+    /// Plain register, declared by `.reg`.
     Register,
-    /// `.state`.
+    /// Register whose value outlives the period, declared by `.state`.
     State,
-    /// An array of registers.
+    /// Array of registers, declared by `.reg`.
     Array,
-    /// `.array`: an array in data memory.
+    /// Array in data memory, declared by `.array`.
     Table,
-    /// `.input`.
+    /// Input port, declared by `.input`.
     Input,
-    /// `.output`.
+    /// Output port, declared by `.output`.
     Output,
-    /// `.const`.
+    /// Named constant, declared by `.const`.
     Constant,
     /// A label of code.
     Code,
     /// A label of data.
     Data,
-    /// `.macro`.
+    /// Macro, declared by `.macro`.
     Macro,
     /// A parameter of a macro.
     Parameter,
@@ -67,70 +67,70 @@ impl SymbolKind {
 /// A name that the source declares. One declaration in a repetition or a macro declares several.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Symbol {
-    /// The name, as the symbol map has it: that of a macro's local has the use before it, `limit.2.done`.
+    /// The name in the symbol map; locals of a macro are prefixed with the use, `limit.2.done`.
     pub name: String,
-    /// Its kind.
+    /// Kind of the declaration.
     pub kind: SymbolKind,
-    /// The place of its name in its declaration.
+    /// Place of the name in the declaration.
     pub span: Span,
-    /// The type of a register, a port or an array's elements.
+    /// The type of a register, a port, an array's elements, or a macro's parameter.
     pub ty: Option<Type>,
-    /// The address that the source gives a register or port.
+    /// Address that the source gives a register or port.
     pub place: Option<Register>,
     /// The value of a constant, if it has one.
     pub value: Option<Value>,
-    /// The word of data memory of a label, or of an array's first element.
+    /// Word of data memory of a label, or of an array's first element.
     pub word: Option<u32>,
-    /// Of an array: how many elements it has in each direction.
+    /// Number of elements of an array in each dimension; empty for other symbols.
     pub sizes: Vec<u32>,
-    /// The parameters of a macro.
+    /// The parameters of a macro, each with its type if the source declares one: `x:float`.
     pub parameters: Vec<String>,
-    /// The macro of a parameter.
+    /// The macro that a parameter belongs to.
     pub of: Option<String>,
 }
 
 /// A place in the source that names a symbol; its declaration is one.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, PartialOrd, Ord)]
 pub struct Reference {
-    /// The name's place.
+    /// Place of the name.
     pub span: Span,
     /// The symbol: an index into [`Index::symbols`]. A place in a macro or a repetition may name several.
     pub symbol: u32,
 }
 
-/// A block of lines: what a directive opens and another closes.
+/// A block of lines between the directives that open and close it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Block {
-    /// `.macro`, `.rep` or `.if`; of an `.if` with branches, one block for each.
+    /// `.macro`, `.rep`, `.for` or `.if`; an `.if` with branches has a block for each.
     pub directive: Directive,
-    /// The directive that opens it.
+    /// Place of the opening directive.
     pub open: Span,
-    /// Line, from 1, of what closes it, in the same file.
+    /// Line of the closing directive, from 1, in the same file.
     pub last_line: u32,
 }
 
 /// The names of a program.
 #[derive(Clone, Debug, Default)]
 pub struct Index {
-    /// The declared symbols.
+    /// Declarations, in no particular order.
     pub symbols: Vec<Symbol>,
-    /// The references to them, by place, each once.
+    /// References to the symbols, sorted by place, without duplicates.
     pub references: Vec<Reference>,
-    /// `.include`s by place, and which of the sources each means.
+    /// `.include`s by place, each with the index of its source.
     pub includes: Vec<(Span, usize)>,
     /// Blocks of the sources.
     pub blocks: Vec<Block>,
-    /// True if all references are in it: there may be more than [`limits::REFERENCES`](crate::limits::REFERENCES).
+    /// No reference was dropped: an index keeps at most [`limits::REFERENCES`](crate::limits::REFERENCES).
     pub complete: bool,
 }
 
 impl Index {
     /// The references of the name at a place. An offset at the name's end counts.
     pub fn at(&self, offset: u32) -> &[Reference] {
-        // Names do not overlap but for those in the braces of another: the innermost begins last.
+        // Names overlap only with names in their braces: the innermost begins last.
         let end = self.references.partition_point(|reference| reference.span.start <= offset);
         let holds = |reference: &&Reference| reference.span.end >= offset;
-        // A template with its braces is at most a line; what it holds lies between.
+        // A template with its braces is at most a line, which bounds the search.
         let Some(found) = self.references[..end].iter().rev().take(256).find(holds) else { return &[] };
         self.of_span(found.span)
     }
@@ -143,7 +143,7 @@ impl Index {
     }
 }
 
-/// The index of what a program declares and names, once it is resolved.
+/// The index of a resolved program's declarations and references.
 pub(crate) fn index(context: &mut Context, ir: &Ir) -> Index {
     let Some(notes) = context.notes.take() else { return Index::default() };
     let mut builder = Builder { context, index: Index { complete: !notes.cut, ..Index::default() } };
@@ -278,7 +278,7 @@ impl Builder<'_> {
         let mut numbers = Vec::new();
         let tables: HashMap<u32, &Table> =
             self.context.declared.tables.iter().map(|table| (table.label.0, table)).collect();
-        // The assembler's own come last, and have no names.
+        // Labels of the assembler itself come last, and have no names.
         for (number, label) in (0..).zip(&ir.labels).filter(|(_, label)| !label.name.is_empty()) {
             let is_data = label.space == Space::Data;
             let kind = match tables.get(&number) {
@@ -296,7 +296,7 @@ impl Builder<'_> {
         numbers
     }
 
-    /// The blocks, and the symbols of what repetitions count with, by their directive's place.
+    /// The blocks of the sources, and the symbols of repetitions' counters, by their directive's place.
     fn blocks(&mut self) -> HashMap<Span, u32> {
         let mut counts = HashMap::new();
         for ast in &self.context.asts {
@@ -339,15 +339,22 @@ impl Builder<'_> {
             let DirectiveKind::Macro { name, parameters, .. } = &directive.kind else { continue };
             let plain = parameters
                 .iter()
-                .filter_map(|parameter| Some((parameter.name.resolve().ok()?, parameter.span)));
+                .filter_map(|parameter| Some((parameter.name.name.resolve().ok()?, parameter.name.span)));
             let plain: Vec<(NameId, Span)> = plain.collect();
             let of = scopes.text(id).to_owned();
-            let names = plain.iter().map(|(name, _)| scopes.text(*name).to_owned()).collect();
+            let declared = |asked: &Option<ParameterType>| asked.filter(|asked| asked.declared);
+            let typed =
+                plain.iter().zip(&definition.types.asked).map(|((name, _), asked)| match declared(asked) {
+                    Some(asked) => format!("{}:{}", scopes.text(*name), asked.takes.name()),
+                    None => scopes.text(*name).to_owned(),
+                });
+            let names = typed.collect();
             self.add(of.clone(), SymbolKind::Macro, name.span).parameters = names;
             macros.insert(id, self.last());
-            for (parameter, span) in plain {
+            for ((parameter, span), asked) in plain.into_iter().zip(&definition.types.asked) {
                 let text = scopes.text(parameter).to_owned();
-                self.add(text, SymbolKind::Parameter, span).of = Some(of.clone());
+                let symbol = self.add(text, SymbolKind::Parameter, span);
+                (symbol.of, symbol.ty) = (Some(of.clone()), declared(asked).and_then(|asked| asked.value()));
                 all.insert((id, parameter), self.last());
             }
         }

@@ -24,13 +24,14 @@
 //! `syntax` reads a file; `expand` writes out macros, repetitions and includes, and declares; `resolve` gives every name its
 //! meaning; `check` looks at the whole program (types, who writes what); `contract` fuses products into sums; `banks` finds
 //! each operation a slot and each value its place; `schedule` packs bundles, and chooses again among the slots that can take an operation;
-//! `emit` places registers and makes words; `output` is what can be made of the result. `context` is what the stages before
-//! `schedule` share; diagnostics are a crate of their own. A stage uses those before it, never one after it.
+//! `emit` places registers and makes words; `output` writes images, listings and source again. `context` is the state that the stages
+//! before `schedule` share; diagnostics are a crate of their own. A stage uses those before it, never one after it.
 //!
-//! `docs/language.md` is the contract of the language, `docs/image.md` that of the image. Nothing here prints, and nothing here
-//! touches the file system but [`FileLoader`]. No input makes the assembler panic; [`limits`] bounds what it takes.
+//! `docs/language.md` is the contract of the language, `docs/image.md` the contract of the image. Nothing here prints, and only
+//! [`FileLoader`] touches the file system. No input makes the assembler panic; [`limits`] bounds what it takes.
 
 mod banks;
+mod capacity;
 mod check;
 mod context;
 mod contract;
@@ -42,38 +43,32 @@ pub mod loops;
 mod output;
 pub mod plain;
 mod resolve;
-mod room;
 pub mod schedule;
 pub mod select;
 
 use banks::{copies, webs};
 use emit::{allocate, spill};
-use report::source::Sources;
 use std::sync::Arc;
+use takt_diagnostics::Sources;
 use takt_isa::{Machine, Program, T3};
-use takt_syntax as syntax;
-use takt_syntax::report;
 
 pub use banks::{Adjustment, Transfer};
 pub use contract::Contraction;
-pub use emit::spill::{Spilled, Spills};
+pub use emit::spill::{SpilledValue, Spills};
 pub use expand::load::{FileLoader, LoadError, Loader, MemoryLoader, Open, Search};
 pub use output::{disasm, format, image, listing, names};
-pub use report::diag::{Diagnostic, Diagnostics};
-pub use report::levels::Levels;
-pub use report::{diag, levels, machine, nearest, source};
-pub use syntax::ast::{Directive, Operator};
-pub use syntax::limits;
-pub use syntax::{Expression, expr, read, tokens};
+pub use takt_diagnostics::{Diagnostic, Diagnostics, Levels, diag, levels, machine, nearest, source};
+pub use takt_syntax::ast::{Directive, Operator};
+pub use takt_syntax::{Expression, expr, limits, read, tokens};
 
 /// Options of the assembler.
 #[derive(Clone, Copy, Debug)]
 pub struct Options {
     /// The machine to assemble for, unless the source names another (`.machine`).
     pub machine: &'static Machine,
-    /// Which bundles the scheduler packs.
+    /// Selection of the bundles that the scheduler packs.
     pub schedule: Schedule,
-    /// Which products are fused into sums.
+    /// Selection of the products that are fused into sums.
     pub contract: Contract,
     /// The effort of the scheduler's search; 0 is one pass.
     pub effort: u32,
@@ -81,27 +76,27 @@ pub struct Options {
     pub levels: Levels,
 }
 
-/// Which bundles the scheduler packs.
+/// Selection of the bundles that the scheduler packs.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Schedule {
-    /// Those that the source says (`.schedule on`).
+    /// Bundles under the source's `.schedule on`.
     #[default]
     AsWritten,
-    /// All.
+    /// All bundles, except idle ones in which a loop must end.
     All,
-    /// None.
+    /// No bundles: source order.
     None,
 }
 
-/// Which products are fused into the sums that alone use them, on machines that have an operation for it.
+/// Selection of the products that are fused into the sums that alone use them, on machines with an operation for it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Contract {
-    /// Those that the source says (`.contract on`).
+    /// Products under the source's `.contract on`.
     #[default]
     AsWritten,
-    /// All.
+    /// All products that can be.
     All,
-    /// None.
+    /// No products: two roundings each.
     None,
 }
 
@@ -117,28 +112,30 @@ impl Default for Options {
     }
 }
 
-/// An assembled program and what is known about it beyond its image.
+/// An assembled program with its reports: everything beyond the image.
 #[derive(Clone, Debug)]
-pub struct Assembled {
-    /// The program.
+pub struct AssembledProgram {
+    /// The program, ready for an image.
     pub program: Program,
     /// Warnings; there are no errors.
     pub warnings: Diagnostics,
-    /// The sources.
+    /// Sources, the first file and its includes.
     pub sources: Arc<Sources>,
     /// Named constants and their values, in the order of the source.
     pub constants: Vec<(String, expr::Value)>,
     /// A report of each block that the scheduler packed, in order.
     pub blocks: Vec<schedule::BlockReport>,
-    /// The counted loops of the source and what became of them, in order.
+    /// Counted loops of the source with their final form, in order.
     pub counted_loops: Vec<loops::CountedLoop>,
     /// A report of each loop that was pipelined, in order.
     pub loops: Vec<schedule::LoopReport>,
-    /// The innermost loops that were not, with the reasons.
+    /// Innermost loops that were not pipelined, with the reasons.
     pub plain_loops: Vec<schedule::PlainLoop>,
-    /// The branches that became selections, in order.
+    /// Branches that became selections, in order.
     pub selections: Vec<select::Selection>,
-    /// The timing demands on ports (`.deadline`, `.order`, `.late`) and the times that meet them.
+    /// Steps of all searches of the scheduler together, at most [`schedule::most_steps`].
+    pub steps: u64,
+    /// Timing demands on ports (`.deadline`, `.order`, `.late`) with the times that meet them.
     pub timing: Vec<schedule::TimingReport>,
     /// Products that were fused into sums (`.contract on`), in the order of the sums.
     pub contractions: Vec<Contraction>,
@@ -146,13 +143,13 @@ pub struct Assembled {
     pub adjustments: Vec<Adjustment>,
     /// The cost of high register pressure, by block.
     pub spills: Vec<Spills>,
-    /// Words that a macro, a repetition or the assembler itself made: indices into the program's code, ascending.
+    /// Words made by a macro, a repetition or the assembler itself: indices into the program's code, ascending.
     pub expanded: Vec<u32>,
-    /// The bindings of the source's names, for debuggers, bundle by bundle.
+    /// Bindings of the source's names, for debuggers, bundle by bundle.
     pub names: names::Names,
 }
 
-impl Assembled {
+impl AssembledProgram {
     /// The debugging information of the program, for [`image::write_with`].
     pub fn debug_info(&self) -> names::DebugInfo {
         let files = self.sources.files().iter();
@@ -174,7 +171,7 @@ pub fn assemble_bytes(
     bytes: Vec<u8>,
     loader: &dyn Loader,
     options: &Options,
-) -> Result<Assembled, Diagnostics> {
+) -> Result<AssembledProgram, Diagnostics> {
     assemble(name, &expand::load::First::new(name, bytes, loader), options)
 }
 
@@ -182,12 +179,17 @@ pub fn assemble_bytes(
 ///
 /// # Errors
 /// Every error of the program, and its warnings.
-pub fn assemble(path: &str, loader: &dyn Loader, options: &Options) -> Result<Assembled, Diagnostics> {
+pub fn assemble(path: &str, loader: &dyn Loader, options: &Options) -> Result<AssembledProgram, Diagnostics> {
     check_with(context::Context::new(options.machine), path, loader, options).finish()
 }
 
+/// A program that is read and checked, not yet scheduled: fast enough for an editor after each keystroke.
+pub fn check_bytes(name: &str, bytes: Vec<u8>, loader: &dyn Loader, options: &Options) -> CheckedProgram {
+    check(name, &expand::load::First::new(name, bytes, loader), options)
+}
+
 /// A program that is read and checked, not yet scheduled: what an editor can have after each keystroke.
-pub struct Checked {
+pub struct CheckedProgram {
     context: context::Context,
     ir: ir::Ir,
     /// The bank assignment and the contractions; `None` if the program cannot fit, which is reported.
@@ -196,21 +198,26 @@ pub struct Checked {
     index: index::Index,
     counted_loops: Vec<loops::CountedLoop>,
     selections: Vec<select::Selection>,
-    /// The program's straight runs, if nothing was put in or taken out since they were found.
+    /// The program's straight runs, unless bundles were inserted or removed since they were found.
     runs: Option<Vec<ir::runs::Run>>,
 }
 
 /// Reads and checks the program that begins with the source at `path`, and indexes its names. [`Checked::finish`] does the rest.
-pub fn check(path: &str, loader: &dyn Loader, options: &Options) -> Checked {
+pub fn check(path: &str, loader: &dyn Loader, options: &Options) -> CheckedProgram {
     let mut context = context::Context::new(options.machine);
     context.notes = Some(context::Notes::default());
     check_with(context, path, loader, options)
 }
 
-fn check_with(mut context: context::Context, path: &str, loader: &dyn Loader, options: &Options) -> Checked {
+fn check_with(
+    mut context: context::Context,
+    path: &str,
+    loader: &dyn Loader,
+    options: &Options,
+) -> CheckedProgram {
     context.reports.sink.levels = options.levels;
     let (mut context, flat) = expand::Expander::new(context, loader).expand(path);
-    let counted_loops = loops::reports(&context, &flat.loop_notes);
+    let counted_loops = expand::loops::reports(&context, &flat.loop_notes);
     let mut ir = resolve::resolve(&mut context, loader, flat);
     let index = index::index(&mut context, &ir);
     if options.schedule != Schedule::AsWritten {
@@ -224,7 +231,7 @@ fn check_with(mut context: context::Context, path: &str, loader: &dyn Loader, op
     check::types::check(&mut context, &ir, runs.as_deref().unwrap_or_default());
     // If the program cannot fit, further checks are not worth their time.
     let mut selections = Vec::new();
-    let assignment = if emit::is_too_long(&ir) {
+    let assignment = if ir.is_too_long() {
         emit::limits(&ir, &mut context.reports.sink);
         None
     } else {
@@ -251,16 +258,16 @@ fn check_with(mut context: context::Context, path: &str, loader: &dyn Loader, op
         Some((assignment, contracted.contractions))
     };
     let effort = options.effort;
-    Checked { context, ir, assignment, effort, index, counted_loops, selections, runs }
+    CheckedProgram { context, ir, assignment, effort, index, counted_loops, selections, runs }
 }
 
-impl Checked {
-    /// The program's names.
+impl CheckedProgram {
+    /// The target machine: the source's (`.machine`), else the machine of the options.
     pub fn index(&self) -> &index::Index {
         &self.index
     }
 
-    /// The machine that it is for: the source's (`.machine`), or else that of the options.
+    /// The target machine: the source's (`.machine`), else the machine of the options.
     pub fn machine(&self) -> &'static Machine {
         self.ir.machine
     }
@@ -270,17 +277,22 @@ impl Checked {
         self.assignment.as_ref().map_or(&[], |(_, contractions)| contractions)
     }
 
-    /// The branches that become selections.
-    pub fn selections(&self) -> &[select::Selection] {
-        &self.selections
-    }
-
-    /// The sources that were read.
+    /// Key for caching a result: everything that the assembled program depends on. `build` names this build of the assembler.
     pub fn sources(&self) -> &Sources {
         &self.context.reports.sources
     }
 
-    /// The errors and warnings so far. [`Checked::finish`] gives these, and if there is no error among them perhaps others.
+    /// All that the assembled program depends on, as the key of a result that is kept; `build` names this build of the assembler.
+    pub fn key(&self, build: &str, options: &Options) -> Vec<u8> {
+        let mut key = format!("{build}\n{options:?}\n{:?}\n", self.machine()).into_bytes();
+        for source in self.sources().files() {
+            key.extend_from_slice(format!("{} {}\n", source.name, source.text.len()).as_bytes());
+            key.extend_from_slice(source.text.as_bytes());
+        }
+        key
+    }
+
+    /// The errors and warnings so far. [`Checked::finish`] repeats these, and adds further ones if there is no error.
     pub fn diagnostics(&self) -> Diagnostics {
         let reports = &self.context.reports;
         reports.sink.clone().finish(Arc::new(reports.sources.clone()))
@@ -290,8 +302,10 @@ impl Checked {
     ///
     /// # Errors
     /// Every error of the program, and its warnings.
-    pub fn finish(self) -> Result<Assembled, Diagnostics> {
-        let Checked { mut context, mut ir, assignment, effort, counted_loops, selections, runs, .. } = self;
+    pub fn finish(self) -> Result<AssembledProgram, Diagnostics> {
+        let CheckedProgram {
+            mut context, mut ir, assignment, effort, counted_loops, selections, runs, ..
+        } = self;
         let mut sink = std::mem::take(&mut context.reports.sink);
         let sources = Arc::new(std::mem::take(&mut context.reports.sources));
         // With errors, later stages would only report consequences of these.
@@ -302,12 +316,13 @@ impl Checked {
         context.asts = Vec::new();
         // Another schedule may be tried if registers run out.
         let source = ir.scheduled.then(|| ir.clone());
-        let mut report = schedule::schedule(&mut ir, effort, schedule::Order::Free, &mut sink);
+        let mut budget = schedule::Budget::new(effort);
+        let mut report = schedule::schedule(&mut ir, &mut budget, schedule::Order::Free, &mut sink);
         if sink.errors > 0 {
             return Err(sink.finish(sources));
         }
-        spill::reduce_loops(&mut ir, &mut report, source.as_ref(), effort);
-        let (spills, why) = match spill::reduce_pressure(&mut ir, &mut report, source.as_ref(), effort) {
+        spill::reduce_loops(&mut ir, &mut report, source.as_ref(), &mut budget);
+        let (spills, why) = match spill::reduce_pressure(&mut ir, &mut report, source.as_ref(), &mut budget) {
             Ok(spills) => (spills, None),
             Err(why) => (Vec::new(), why),
         };
@@ -334,7 +349,7 @@ impl Checked {
             .into_iter()
             .filter_map(|constant| Some((constant.name, constant.value?)))
             .collect();
-        Ok(Assembled {
+        Ok(AssembledProgram {
             program: emitted.program,
             warnings: report,
             sources,
@@ -344,6 +359,7 @@ impl Checked {
             plain_loops,
             counted_loops,
             selections,
+            steps: budget.taken(),
             timing,
             contractions,
             adjustments,

@@ -1,30 +1,27 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! What became of a program's counted loops, for its report.
+//! Final form of a program's counted loops, for its report.
 
-use crate::context::Context;
-use crate::expand::loops::LoopNote;
-use crate::report::source::Lines;
 use std::fmt;
 
 /// The number of iterations of a counted loop each time it is entered.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum LoopCount {
-    /// Always so many, at least one.
+    /// A constant count, at least one.
     Exactly(u32),
-    /// Up to so many: it depends on a register, or on the iterations of the loops around. Code before the loop passes over it where
-    /// there would be none.
+    /// Upper bound of a count that depends on a register, or on the iterations of the loops around. Code before the loop skips it
+    /// if the count is zero.
     AtMost(u32),
 }
 
 impl LoopCount {
-    /// The most that there can be.
+    /// The largest possible count.
     pub const fn most(self) -> u32 {
         match self {
             LoopCount::Exactly(count) | LoopCount::AtMost(count) => count,
         }
     }
 
-    /// True if there are always as many.
+    /// The count is constant.
     pub const fn is_exact(self) -> bool {
         matches!(self, LoopCount::Exactly(_))
     }
@@ -40,29 +37,29 @@ impl fmt::Display for LoopCount {
 /// The form that a loop has in the program.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum LoopForm {
-    /// It is written out.
-    Unrolled(WrittenOut),
-    /// It runs, with so many of its iterations in one.
+    /// A copy of the body for each iteration.
+    Unrolled(UnrollReason),
+    /// A loop at run time, with this many of the source's iterations in each turn.
     Rolled(u32),
 }
 
 /// The reason why a loop is written out.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum WrittenOut {
-    /// Its body needs the index when it is assembled.
+pub enum UnrollReason {
+    /// The body needs the index when it is assembled.
     NeedsIndex,
-    /// `unroll` says so.
+    /// The source asks for it by `unroll`.
     Asked,
-    /// It has few iterations, and no loop within.
+    /// The loop has few iterations, and no loop within.
     Few,
 }
 
-impl fmt::Display for WrittenOut {
+impl fmt::Display for UnrollReason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            WrittenOut::NeedsIndex => "its body needs the index when it is assembled",
-            WrittenOut::Asked => "by `unroll`",
-            WrittenOut::Few => "it is short",
+            UnrollReason::NeedsIndex => "its body needs the index when it is assembled",
+            UnrollReason::Asked => "by `unroll`",
+            UnrollReason::Few => "it is short",
         })
     }
 }
@@ -70,15 +67,15 @@ impl fmt::Display for WrittenOut {
 /// A counted loop of the source, or an equation between slices.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct CountedLoop {
-    /// The name that counts; `None` for an equation between slices.
+    /// Name of the index variable; `None` for an equation between slices.
     pub name: Option<String>,
-    /// The file that it stands in.
+    /// Source file of the loop.
     pub file: String,
-    /// The line, from 1.
+    /// Line in the file, from 1.
     pub line: u32,
-    /// Its iterations.
+    /// Iterations each time that the loop is entered.
     pub count: LoopCount,
-    /// What became of it.
+    /// Form of the loop in the program.
     pub form: LoopForm,
 }
 
@@ -93,17 +90,4 @@ impl fmt::Display for CountedLoop {
             LoopForm::Rolled(unroll) => write!(f, ", unrolled by {unroll}"),
         }
     }
-}
-
-/// The reports of loops, in the order of the source as it is expanded.
-pub(crate) fn reports(context: &Context, notes: &[LoopNote]) -> Vec<CountedLoop> {
-    let sources = &context.reports.sources;
-    let report = |note: &LoopNote| {
-        let file = sources.files().get(sources.file_of(note.span.start))?;
-        let line = Lines::of(&file.text).index(note.span.start - file.base) as u32 + 1;
-        let name = Some(context.scopes.text(note.variable)).filter(|name| !name.starts_with(':'));
-        let (name, file) = (name.map(str::to_owned), file.name.to_string());
-        Some(CountedLoop { name, file, line, count: note.count, form: note.form })
-    };
-    notes.iter().filter_map(report).collect()
 }

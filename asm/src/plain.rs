@@ -1,37 +1,42 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The plain program: the source's operations in its order, on registers of its own, before any is fused, given a bank, moved
-//! or given an address. A checker of all that comes after starts from it (`takt-verify`).
+//! The plain program: the source's operations in source order, on registers of its own, before any is fused, given a bank,
+//! moved or given an address. A checker of the later stages starts from it (`takt-verify`).
 
 use crate::context::Context;
 use crate::expand::Expander;
-use crate::ir::{Constant, Ir, Operation, RegisterKind};
-use crate::report::diag::Diagnostics;
-use crate::report::source::Sources;
+use crate::ir::{Constant, Ir, Label, Operation, RegisterKind};
 use crate::{Contract, Loader, Options, resolve};
+use std::collections::HashMap;
 use std::sync::Arc;
-use takt_isa::program::Location;
+use takt_diagnostics::diag::Diagnostics;
+use takt_diagnostics::source::Sources;
+use takt_isa::program::{Location, Space};
 use takt_isa::{Machine, Op, Register, Type};
 
-/// A program as its source has it.
+/// A program in source order, before any transformation.
 #[derive(Clone, Debug)]
-pub struct Plain {
-    /// The machine that it is for.
+pub struct PlainProgram {
+    /// Machine that the program is for.
     pub machine: &'static Machine,
-    /// The registers; the first always reads as zero.
+    /// Registers; the first always reads as zero.
     pub registers: Vec<PlainRegister>,
-    /// The bundles, those of `once` first. All operations of a bundle read before any writes.
+    /// Bundles of `once`, then of `period`. All operations of a bundle read before any writes.
     pub bundles: Vec<PlainBundle>,
     /// Index of the first bundle of `period`.
     pub period: u32,
-    /// The arrays of data memory: name, first word, number of words. An access of an array's element never leaves the array.
+    /// Arrays of data memory: name, first word, number of words. An access of an array's element never leaves the array.
     pub arrays: Vec<(String, u32, u32)>,
-    /// Data memory.
+    /// Initial words of data memory.
     pub data: Vec<u32>,
-    /// True if inputs are latched together at the tick.
+    /// Inputs are latched together at the tick.
     pub latched: bool,
-    /// Bounds of loops: the bundle that heads each, the most iterations each time that it is entered, and of a section.
+    /// Bounds of loops: the bundle that heads each, the most iterations each time that it is entered, and the most in a section.
     pub loop_bounds: Vec<(u32, u32, Option<u32>)>,
-    /// `.deadline`: the output, the cycle in which it is written at the latest, and whether it is one of `.period`.
+    /// Labels in source order: name, memory, and the bundle or data word that each stands before.
+    pub labels: Vec<(String, Space, u32)>,
+    /// `.range`s in source order: the register, and the bits of its least and largest value.
+    pub ranges: Vec<(u32, [u32; 2])>,
+    /// `.deadline`s: the output, the last cycle in which it may be written, and whether the demand is on `.period`.
     pub deadlines: Vec<(u32, u32, bool)>,
     /// Source files that locations name.
     pub files: Vec<String>,
@@ -40,28 +45,30 @@ pub struct Plain {
 /// A register of the source.
 #[derive(Clone, Debug)]
 pub struct PlainRegister {
-    /// Its name; empty for a constant.
+    /// Name in the source; empty for a constant.
     pub name: String,
-    /// Its role.
+    /// Role of the register.
     pub kind: PlainKind,
-    /// The type as which its bits are shown.
+    /// Type as which debuggers show the bits.
     pub ty: Type,
-    /// The address that the source gives it.
+    /// Address that the source gives the register.
     pub pinned: Option<Register>,
-    /// The bits that it holds from the start.
+    /// Number that the source gives the output port.
+    pub number: Option<u16>,
+    /// Bits that the register holds from the start.
     pub preset: Option<u32>,
 }
 
 /// The role of a register.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum PlainKind {
-    /// The program's own.
+    /// Register of the program's own.
     Plain,
-    /// Its value outlives the period.
+    /// Register whose value outlives the period.
     State,
-    /// An input port.
+    /// Input port, which the host writes.
     Input,
-    /// An output port.
+    /// Output port, which the host reads.
     Output,
 }
 
@@ -70,34 +77,34 @@ pub enum PlainKind {
 pub struct PlainBundle {
     /// The operations, in the order of the source.
     pub operations: Vec<PlainOperation>,
-    /// True if products may be fused into sums here.
+    /// Products may be fused into sums here.
     pub contract: bool,
 }
 
-/// An operation.
+/// An operation on plain registers.
 #[derive(Clone, Debug)]
 pub struct PlainOperation {
-    /// The instruction.
+    /// Instruction of the operation.
     pub op: Op,
-    /// The register that it writes: an index into [`Plain::registers`].
+    /// Destination: an index into [`Plain::registers`].
     pub dest: Option<u32>,
-    /// The registers that it reads, as many as the instruction has sources; the rest is zero.
+    /// Registers that it reads, as many as the instruction has sources; the rest is zero.
     pub sources: [u32; 3],
-    /// Immediate, offset, or index of the bundle that it leads to.
+    /// Immediate, offset, or index of the target bundle.
     pub constant: u32,
-    /// The array that it accesses.
+    /// Index into [`Plain::arrays`] of the accessed array.
     pub array: Option<u32>,
-    /// True if it is a word given bit by bit: what it does is not known.
+    /// The operation is a raw word, given bit by bit, with unknown effect.
     pub raw: bool,
-    /// Its source line.
+    /// Place in the source.
     pub location: Option<Location>,
 }
 
-/// Reads the program that begins with the source at `path`, up to the point where the assembler begins to change it.
+/// Reads the program that begins with the source at `path`, up to the point where the assembler begins to transform it.
 ///
 /// # Errors
 /// Every error found so far.
-pub fn plain(path: &str, loader: &dyn Loader, options: &Options) -> Result<Plain, Diagnostics> {
+pub fn plain(path: &str, loader: &dyn Loader, options: &Options) -> Result<PlainProgram, Diagnostics> {
     let mut context = Context::new(options.machine);
     context.reports.sink.levels = options.levels;
     let (mut context, flat) = Expander::new(context, loader).expand(path);
@@ -110,7 +117,7 @@ pub fn plain(path: &str, loader: &dyn Loader, options: &Options) -> Result<Plain
     Ok(of(&ir, options.contract))
 }
 
-fn of(ir: &Ir, contract: Contract) -> Plain {
+fn of(ir: &Ir, contract: Contract) -> PlainProgram {
     let may_contract = |bundle: usize| {
         ir.contracted.get(bundle).copied().flatten().is_some_and(|on| match contract {
             Contract::AsWritten => on,
@@ -118,7 +125,8 @@ fn of(ir: &Ir, contract: Contract) -> Plain {
             Contract::None => false,
         })
     };
-    let registers = ir.registers.iter().map(|register| PlainRegister {
+    let numbers: HashMap<usize, u16> = ir.numbers.iter().map(|(number, id)| (id.index(), *number)).collect();
+    let registers = ir.registers.iter().enumerate().map(|(id, register)| PlainRegister {
         name: register.name.clone(),
         kind: match register.kind {
             RegisterKind::State => PlainKind::State,
@@ -128,6 +136,7 @@ fn of(ir: &Ir, contract: Contract) -> Plain {
         },
         ty: register.ty,
         pinned: register.pinned,
+        number: numbers.get(&id).copied(),
         preset: match register.kind {
             RegisterKind::Constant(bits) => Some(bits),
             RegisterKind::Zero => Some(0),
@@ -138,7 +147,8 @@ fn of(ir: &Ir, contract: Contract) -> Plain {
         operations: bundle.operations.iter().map(|operation| operation_of(ir, operation)).collect(),
         contract: may_contract(at),
     });
-    Plain {
+    let label = |label: &Label| (label.name.clone(), label.space, label.position);
+    PlainProgram {
         machine: ir.machine,
         registers: registers.collect(),
         bundles: bundles.collect(),
@@ -147,6 +157,8 @@ fn of(ir: &Ir, contract: Contract) -> Plain {
         data: ir.data.clone(),
         latched: ir.latched,
         loop_bounds: ir.loop_bounds.iter().map(|bound| (bound.position, bound.most, bound.total)).collect(),
+        labels: ir.labels.iter().filter(|label| !label.name.is_empty()).map(label).collect(),
+        ranges: ir.ranges.iter().map(|(id, ends)| (id.index() as u32, *ends)).collect(),
         deadlines: ir.demands.iter().flat_map(deadlines).collect(),
         files: ir.files.clone(),
     }

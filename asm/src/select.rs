@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Short forward branches become selections (if-conversion, Allen, Kennedy and others, 1983): what they pass over is always computed,
-//! and selected by their condition. A branch ends a block and costs refills; a selection is an operation like others, so that a loop
+//! If-conversion of short forward branches (Allen, Kennedy and others, 1983): the skipped operations are always computed, and the
+//! condition selects their results. A branch ends a block and costs refills; a selection is an ordinary operation, so that a loop
 //! with such a branch can be pipelined.
 //!
-//! Only operations that raise no flags and cannot fault are passed over so, and only into registers that something has written on every
-//! way: no bit changes that can be seen.
+//! Only operations that raise no flags and cannot fault are converted, and only for registers that are written on every path: no
+//! visible bit changes.
 
 use crate::ir::flow::{self, Flow};
 use crate::ir::runs::{self, Run};
@@ -16,7 +16,7 @@ use std::collections::{BTreeMap, HashSet};
 use takt_isa::program::{Location, Space};
 use takt_isa::{Effect, Op, Slots, Type};
 
-/// Registers that a branch may pass over, and with the operations that it passes over the most of them.
+/// The most registers that a converted branch may write, and the most operations, selections included.
 const REGISTERS: usize = 2;
 const OPERATIONS: usize = 6;
 
@@ -25,15 +25,15 @@ const OPERATIONS: usize = 6;
 pub struct Selection {
     /// The source line of the branch.
     pub location: Option<Location>,
-    /// The registers that are selected.
+    /// Number of registers that are selected.
     pub registers: u32,
-    /// The branch in the plain program ([`crate::plain`]): its bundle.
+    /// Bundle of the branch in the plain program ([`crate::plain`]).
     pub at: u32,
 }
 
-/// Replaces every branch that can be, in code that the scheduler may change.
+/// Replaces every convertible branch in code that the scheduler may change.
 pub(crate) fn select(ir: &mut Ir) -> Vec<Selection> {
-    let Some(selecting) = Selecting::of(ir) else { return Vec::new() };
+    let Some(selecting) = SelectInstruction::of(ir) else { return Vec::new() };
     let has_branch = |operation: &Operation| operation.row().effect.is_conditional();
     if !ir.scheduled || runs::jumps_to_numbers(ir) || !ir.operations().any(has_branch) {
         return Vec::new();
@@ -85,21 +85,21 @@ pub(crate) fn select(ir: &mut Ir) -> Vec<Selection> {
 }
 
 /// The instruction that selects.
-struct Selecting {
+struct SelectInstruction {
     op: Op,
-    /// Its sources: the condition, the value if it is not zero, the value if it is.
+    /// Source positions of the condition, the value if it is nonzero, and the value if it is zero.
     sources: [usize; 3],
     slots: Slots,
 }
 
-impl Selecting {
-    /// `None` if the machine has none.
-    fn of(ir: &Ir) -> Option<Selecting> {
+impl SelectInstruction {
+    /// `None` if the machine has no such instruction.
+    fn of(ir: &Ir) -> Option<SelectInstruction> {
         let (op, sources) = with_form(ir.machine, "?:", Type::B)?;
-        Some(Selecting { op, sources, slots: ir.machine.hosts(op.row().function) })
+        Some(SelectInstruction { op, sources, slots: ir.machine.hosts(op.row().function) })
     }
 
-    /// The bundles that take the place of a branch at the end of a run, and the bundle that it leads to.
+    /// The bundles that replace a branch at the end of a run, and the bundle that it leads to.
     fn replace(&self, ir: &mut Ir, runs: &[Run], flow: &Flow, index: usize) -> Option<(usize, Vec<Bundle>)> {
         let (before, passed) = (runs[index], *runs.get(index + 1)?);
         let [branch] = ir.bundles[before.end - 1].operations[..] else { return None };
@@ -146,7 +146,7 @@ impl Selecting {
         if !is_short || !written.iter().all(can_be_selected) {
             return None;
         }
-        // The register that holds the value which each register would have.
+        // Maps each written register to the register that holds its new value.
         let mut now: BTreeMap<RegisterId, RegisterId> = BTreeMap::new();
         let mut new = Vec::new();
         let bundle =
@@ -157,7 +157,7 @@ impl Selecting {
                 *source = now.get(source).copied().unwrap_or(*source);
             }
             let Some(dest) = operation.dest else { continue };
-            // A copy of what stays as it is needs no operation of its own.
+            // A copy of an unchanged register needs no operation.
             if operation.row().copies() && !written.contains(&operation.sources[0]) {
                 now.insert(dest, operation.sources[0]);
                 continue;
@@ -188,7 +188,7 @@ impl Selecting {
         Some((passed.end, new))
     }
 
-    /// True if all that writes a register can do so from a slot that selects.
+    /// Every writer of a register can move to a slot that hosts the selection.
     fn writes(&self, ir: &Ir, dest: RegisterId) -> bool {
         let register = ir.register(dest);
         let is_plain = matches!(register.kind, RegisterKind::Plain | RegisterKind::State);
@@ -201,7 +201,7 @@ impl Selecting {
     }
 }
 
-/// True if an operation raises no flag and cannot fault: executed too often, it does nothing but write its register.
+/// An operation raises no flag and cannot fault: executed needlessly, it only writes its register.
 fn is_harmless(operation: &Operation) -> bool {
     let row = operation.row();
     matches!(row.effect, Effect::Compute | Effect::Immediate)
@@ -210,7 +210,7 @@ fn is_harmless(operation: &Operation) -> bool {
         && !matches!(operation.constant, Constant::Raw(_))
 }
 
-/// True if a register has been written on every way to the end of a run.
+/// A register has been written on every path to the end of a run.
 fn is_written(ir: &Ir, runs: &[Run], flow: &Flow, at: usize, register: RegisterId) -> bool {
     if ir.register(register).preset.is_some() {
         return true;

@@ -7,7 +7,7 @@ use crate::random_source::Random;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use takt_asm::diag::{Diagnostics, Severity};
-use takt_asm::{Assembled, MemoryLoader, Options, Schedule, assemble};
+use takt_asm::{AssembledProgram, MemoryLoader, Options, Schedule, assemble};
 use takt_emu::Emulator;
 use takt_isa::{F1, F3, MACHINES, Machine};
 
@@ -176,7 +176,7 @@ fn source(statements: &[Statement], depth: usize, numbers: &mut Vec<i64>, text: 
 struct Generator<'r> {
     random: &'r mut Random,
     arrays: BTreeMap<char, Vec<i64>>,
-    /// The loops around: index, first, last, step, and what the program may take the last for.
+    /// The loops around: index, first, last (at run time, a greater declared maximum), step.
     around: Vec<(char, Affine, Affine, i64)>,
 }
 
@@ -311,7 +311,7 @@ impl Generator<'_> {
         let run_time = step == 1 && last.1.is_empty() && self.below(3) == 0;
         let unroll = [0, 0, 1, 2, 4, 3]
             [self.below(if run_time || !first.1.is_empty() || !last.1.is_empty() { 5 } else { 6 }) as usize];
-        // What may be counted to is more than what is.
+        // The declared maximum is greater than the count.
         let most = if run_time { (last.0.max(0) + 1, Vec::new()) } else { last.clone() };
         self.around.push((variable, first.clone(), most, step));
         let body = self.statements(depth + 1);
@@ -320,7 +320,7 @@ impl Generator<'_> {
     }
 }
 
-fn program(text: &str, machine: &'static Machine, schedule: Schedule) -> Option<Assembled> {
+fn program(text: &str, machine: &'static Machine, schedule: Schedule) -> Option<AssembledProgram> {
     let options = Options { machine, schedule, effort: 0, ..Options::default() };
     let assembled = assemble("random.s", &MemoryLoader::of("random.s", text), &options);
     let fits = |errors: &Diagnostics| {
@@ -334,7 +334,7 @@ fn program(text: &str, machine: &'static Machine, schedule: Schedule) -> Option<
 }
 
 #[test]
-fn nests_compute_what_they_say() {
+fn loop_nests_compute_the_expected_values() {
     let (mut steps, mut programs, most) = (0, 0, crate::common::programs(40, 400));
     for seed in 0..most {
         let random = &mut Random::new(seed);
@@ -472,4 +472,68 @@ fn subscripts_in_registers() {
     // The index as a number, in a loop that runs and in one that is written out.
     check(" .for i, 1, 4 unroll 1\n  y[i] = itof(2*i+1)\n .endfor", "y", &[3., 5., 7., 9.]);
     check(" .for i, 1, 4\n  y[i] = itof(2*i+1)\n .endfor", "y", &[3., 5., 7., 9.]);
+}
+
+/// A program beside a file of numbers.
+fn with_file(array: &str, numbers: &str) -> Result<takt_asm::AssembledProgram, String> {
+    let text =
+        format!("{array}\n.output y, k:int\n.once\n wait p\n.period\np: ld y, A+1\n ld k, A+1\n wait p\n");
+    let mut files = takt_asm::MemoryLoader::of("main/test.s", text);
+    files.add("main/data/A.csv", numbers.as_bytes());
+    let assembled = takt_asm::assemble("main/test.s", &files, &takt_asm::Options::default());
+    assembled.map_err(|report| report.render(false))
+}
+
+#[test]
+fn files_of_numbers_are_the_values_of_arrays() {
+    let floats = |values: &[f32]| values.iter().map(|value| value.to_bits()).collect::<Vec<u32>>();
+    let data = |array: &str, numbers: &str| {
+        with_file(array, numbers).unwrap_or_else(|report| panic!("{report}")).program.data
+    };
+    let listed = floats(&[1.0, -2.5, 0.001, 4.0, 5.0, 0.1]);
+    for numbers in [
+        "1, -2.5, 1e-3\n4,5,0.1\n",
+        "\u{feff}# a comment\r\n\r\na, b, \"c\"\r\n1,-2.5,1e-3\r\n4,5,0.1",
+        "1;-2.5;1e-3\n4;5;0.1\n",
+        "1\t-2.5\t1e-3\n 4 \t5\t0.1\n",
+        "  1 -2.5   1e-3\n4 5 0.1\n\n",
+    ] {
+        assert_eq!(data(".array A = \"data/A.csv\"", numbers), listed, "{numbers}");
+        assert_eq!(data(".array A[2,3] = \"data/A.csv\"", numbers), listed, "{numbers}");
+    }
+    assert_eq!(data(".array A:int = \"data/A.csv\"", "1\n-2\n"), [1, 2u32.wrapping_neg()]);
+    assert_eq!(data(".array A[3] = \"data/A.csv\"", "1\n2\n3\n"), floats(&[1.0, 2.0, 3.0]));
+    assert_eq!(data(".array A[1,2] = \"data/A.csv\"", "inf, 2\n"), floats(&[f32::INFINITY, 2.0]));
+    assert_eq!(data(".array B[2], A = \"data/A.csv\"", "7 8\n"), floats(&[0.0, 0.0, 7.0, 8.0]));
+    // The shape comes from the file.
+    let text = ".array A = \"data/A.csv\"\n.array c = \"data/A.csv\"\n.const D = A + 0\n.period\np: y = A[2,3] + c[1,1]\n wait p\n.output y\n";
+    let mut files = takt_asm::MemoryLoader::of("t.s", text);
+    files.add("data/A.csv", b"1,2,3\n4,5,6\n".to_vec());
+    assert!(takt_asm::assemble("t.s", &files, &takt_asm::Options::default()).is_ok());
+}
+
+#[test]
+fn mistakes_in_files_of_numbers_have_their_place() {
+    let array = ".array A = \"data/A.csv\"";
+    for (array, numbers, words) in [
+        (array, "1,2\n3,x4\n", "`x4` is no number"),
+        (array, "1,2\n3,x4\n", "main/data/A.csv:2:3"),
+        (array, "1;2\n3;4,5\n", "the decimal point is a `.`"),
+        (array, "1,2\n3\n", "1 number in this row, and 2 in the first"),
+        (array, "1,2,\n", "a number is missing"),
+        (array, "# none\n", "has no numbers"),
+        (array, "1e39, 2\n", "main/data/A.csv:1:1"),
+        (".array A:int = \"data/A.csv\"", "1, 2.5\n", "2.5 is not an integer"),
+        (
+            ".array A[3,2] = \"data/A.csv\"",
+            "1,2,3\n4,5,6\n",
+            "`A` is `A[3,2]`, and the file has 2 rows of 3 numbers",
+        ),
+        (".array A = \"data/B.csv\"", "1\n", "`main/data/B.csv` cannot be read"),
+        (".array A = \"../../B.csv\"", "1\n", "not a path within the project"),
+        (".array A", "1\n", "`A` has no size"),
+    ] {
+        let report = with_file(array, numbers).expect_err(numbers);
+        assert!(report.contains(words), "{array}, {numbers:?}: no `{words}` in\n{report}");
+    }
 }

@@ -5,7 +5,7 @@ use crate::common::{self, assemble, bad, bundles, good};
 use crate::random_source::Random;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use takt_asm::{Assembled, MemoryLoader, Options, Schedule, Transfer, listing};
+use takt_asm::{AssembledProgram, MemoryLoader, Options, Schedule, Transfer, listing};
 use takt_emu::{Emulator, Event};
 use takt_isa::spec::units::MAX_LATENCY;
 use takt_isa::timing::Cycle;
@@ -100,16 +100,16 @@ fn source(seed: u64) -> String {
     text
 }
 
-fn assembled(text: &str, machine: &'static Machine, schedule: Schedule) -> Assembled {
+fn assembled(text: &str, machine: &'static Machine, schedule: Schedule) -> AssembledProgram {
     let options = Options { machine, schedule, effort: 1, ..Options::default() };
     let assembled = takt_asm::assemble("test.s", &MemoryLoader::of("test.s", text), &options);
     assembled.unwrap_or_else(|errors| panic!("{text}\n{}", errors.render(false)))
 }
 
 /// Values written to each port, the memory, and the flags.
-type Seen = (BTreeMap<String, Vec<u32>>, Vec<u32>, u8);
+type RunResult = (BTreeMap<String, Vec<u32>>, Vec<u32>, u8);
 
-fn run(program: &Program, seed: u64) -> Seen {
+fn run(program: &Program, seed: u64) -> RunResult {
     let random = &mut Random::new(seed + 77);
     let mut emulator = Emulator::new(program).expect("it fits");
     emulator.set_cycle_limit(1_000_000);
@@ -164,7 +164,7 @@ fn every_machine_gives_the_same_values() {
 }
 
 /// The bundles of the period of a program for f3, which f1 takes too.
-fn period(text: &str) -> (Vec<String>, Assembled) {
+fn period(text: &str) -> (Vec<String>, AssembledProgram) {
     assert!(assemble(text, &F1).is_ok_and(|assembled| assembled.adjustments.is_empty()), "{text}");
     let assembled = good(text);
     let start =
@@ -173,7 +173,7 @@ fn period(text: &str) -> (Vec<String>, Assembled) {
 }
 
 #[test]
-fn what_copies_bits_is_told_from_the_table() {
+fn table_tells_bit_copies_from_arithmetic() {
     let copies: Vec<&str> = ROWS.iter().filter(|row| row.copies()).map(|row| row.mnemonic).collect();
     assert_eq!(copies, ["mov"]);
 }
@@ -204,7 +204,7 @@ fn a_preset_may_come_before_its_register() {
 }
 
 #[test]
-fn an_initial_value_that_may_be_wanted_again_is_no_preset() {
+fn reused_initial_values_are_no_presets() {
     // Control comes back to the beginning.
     let text = ".input x, n:int\n.output y\n.state s\n.once\nagain: mov s, zero\n wait period\n.period\nperiod: fadd s, s, x\n mov y, s\n bnz n, again\n wait period\n";
     let (_, assembled) = period(text);
@@ -212,7 +212,7 @@ fn an_initial_value_that_may_be_wanted_again_is_no_preset() {
         assembled.adjustments.iter().map(|a| &a.transfer).collect::<Vec<_>>(),
         [&Transfer::Rematerialised("fadd")]
     );
-    // Something reads the register before.
+    // An operation reads the preset value before the write.
     let text = ".input x\n.output y\n.state s\n.preset s = 2.0\n.once\n mov y, s\n mov s, zero\n wait period\n.period\nperiod: fadd s, s, x\n mov y, s\n wait period\n";
     let (_, assembled) = period(text);
     assert_eq!(
@@ -245,7 +245,7 @@ fn accumulators_and_resets() {
     );
     assert_eq!(lines[1], "fadd s, zero, zero");
     assert_eq!(assembled.adjustments.len(), 2);
-    // A copy that nothing hides is told, with its line and its cycles.
+    // A copy in a bundle of its own is reported, with its line and its cycles.
     let (lines, assembled) = period(
         ".input x\n.output y\n.state s\n.once\n mov s, x\n wait period\n.period\nperiod: fadd s, s, x\n wait period\n",
     );
@@ -261,7 +261,7 @@ fn accumulators_and_resets() {
 }
 
 #[test]
-fn a_value_that_nothing_reads_again_is_not_copied() {
+fn dead_values_are_not_copied() {
     let (lines, assembled) = period(
         ".input x, n:int\n.output F, G\n.reg t\n.period\nperiod: fmul t, x, x\n fadd F, t, 0.5\n bz n, over\n fadd t, x, x\n fmul G, t, t\nover: mov t, F\n mov F, t\n wait period\n",
     );
@@ -288,13 +288,13 @@ fn a_port_shows_every_value_in_order() {
 }
 
 #[test]
-fn mends_that_the_help_names_work() {
+fn suggested_fixes_assemble() {
     let program = |declaration: &str, body: &str| {
         format!(
             ".input x, n:int\n.output y\n{declaration}\n.once\n li s, 1.5\n wait period\n.period\nperiod: {body}\nover: mov y, s\n wait period\n"
         )
     };
-    // A place out of reach of who copies.
+    // A place out of reach of a copy.
     let pinned = program(".state s @ a3", "fadd s, s, x\n ld s, [n]");
     let help = |text: &str| bad(text, &F3).messages()[0].help.clone().expect("it has a help");
     assert_eq!(help(&pinned), "leave its place to the assembler, or place it in bank x");
@@ -312,7 +312,7 @@ fn mends_that_the_help_names_work() {
 
 #[test]
 fn a_jump_to_a_number_is_a_way_in() {
-    // Bundle 2 reads what bundle 1 computed, or what it computed itself.
+    // Bundle 2 reads the result of bundle 1, or its own.
     let text = ".input x, n:int\n.output F\n.reg t\n.once\n wait 1\n.period\n fmul t, x, x\n fadd t, t, 1.0\n mov F, t\n bnz n, 2\n wait 1\n";
     let report = bad(text, &F3);
     assert_eq!(report.messages()[0].code, "two-slots", "{}", report.render(false));
@@ -323,7 +323,7 @@ fn a_jump_to_a_number_is_a_way_in() {
 
 #[test]
 fn two_values_of_a_branching_bundle() {
-    // Both are home before control leaves.
+    // The values are both in their registers before control leaves.
     let text = ".input x, n:int\n.output F, G\n.state s, t\n.once\n mov s, x\n mov t, x\n wait period\n.period\nperiod: fadd s, s, x || fmul t, t, x || bz n, over\n mov F, s\nover: mov G, t\n wait period\n";
     let (lines, assembled) = period(text);
     let place = |what: &str| lines.iter().position(|line| line.contains(what)).expect(what);

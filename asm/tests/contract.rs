@@ -1,23 +1,28 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! `.contract on`: which products are fused into sums, and that nothing but the rounding changes.
+//! `.contract on` fuses products into sums, and changes nothing but the rounding.
 
 use crate::common::{bad, bundles};
 use crate::random_source::Random;
 use crate::rows;
 use std::collections::HashMap;
 use std::fmt::Write as _;
-use takt_asm::{Assembled, Contract, MemoryLoader, Options, Schedule, Search, listing};
+use takt_asm::{AssembledProgram, Contract, MemoryLoader, Options, Schedule, Search, listing};
 use takt_emu::{Emulator, Event};
 use takt_isa::{F1, F3, Function, Machine};
 
-fn assembled(text: &str, machine: &'static Machine, schedule: Schedule, contract: Contract) -> Assembled {
+fn assembled(
+    text: &str,
+    machine: &'static Machine,
+    schedule: Schedule,
+    contract: Contract,
+) -> AssembledProgram {
     let options = Options { machine, schedule, contract, effort: 1, ..Options::default() };
     let assembled = takt_asm::assemble("test.s", &MemoryLoader::of("test.s", text), &options);
     assembled.unwrap_or_else(|errors| panic!("{text}\n{}", errors.render(false)))
 }
 
-/// On a machine with one slot that fuses.
-fn on_one(text: &str) -> Assembled {
+/// Assembles a text for a machine with one slot that fuses.
+fn on_one(text: &str) -> AssembledProgram {
     assembled(text, rows::named("fused"), Schedule::AsWritten, Contract::AsWritten)
 }
 
@@ -34,7 +39,7 @@ fn becomes(period: &str, by_hand: &str) {
     let whole = |contract: &str, body: &str| format!("{HEAD}{contract}\n.period\np:\n{body}\n wait p\n");
     let (fused, hand) = (on_one(&whole(".contract on", period)), on_one(&whole("", by_hand)));
     assert_eq!(bundles(&fused), bundles(&hand), "{period}");
-    // Nothing is said of the names that are no more.
+    // Contraction adds no warning of the names that it removes.
     let plain = on_one(&whole("", period)).warnings.render(false);
     assert_eq!(fused.warnings.render(false), plain, "{period}");
     let lines = |text: &str| text.lines().filter(|line| !line.trim_end().ends_with(':')).count();
@@ -71,9 +76,9 @@ fn equations() {
     assert!(period("off", " F = a*b + c").starts_with("fmul"));
 }
 
-/// One name for several values, a factor that has the product's own name, operations between.
+/// Reused names: several values of one name, a factor that has the product's own name, operations between.
 #[test]
-fn names_that_are_used_again() {
+fn does_not_fuse_products_used_twice() {
     becomes(
         " fmul t, a, b\n fadd u, t, c\n fmul t, c, d\n fadd F, u, t\n fmul t, t, t\n mov G, t",
         " fma u, a, b, c\n fmul t, c, d\n fadd F, u, t\n fmul t, t, t\n mov G, t",
@@ -82,7 +87,7 @@ fn names_that_are_used_again() {
     becomes(" mov t, a\n fmul t, t, b\n fadd t, t, c\n mov F, t", " mov t, a\n fma t, t, b, c\n mov F, t");
 }
 
-/// A chain that takes longer than everything else: beside it there is time.
+/// A chain that takes longer than everything else, and leaves time beside it.
 const LONG: &str = "\n fsqrt v, d\n fsqrt G, v";
 
 #[track_caller]
@@ -90,16 +95,16 @@ fn becomes_beside(period: &str, by_hand: &str) {
     becomes(&format!("{period}{LONG}"), &format!("{by_hand}{LONG}"));
 }
 
-/// A sum that waits for what is added would be there later: it is fused where the run takes no longer for it.
+/// A sum whose other operand comes late would end later if it were fused: it is fused where the run takes no longer for it.
 #[test]
-fn sums_that_wait_for_something_else() {
+fn does_not_fuse_sums_that_wait_for_another_operand() {
     stays(" fsqrt u, c\n fmul t, a, b\n fadd F, t, u");
     becomes_beside(" fsqrt u, c\n fmul t, a, b\n fadd F, t, u", " fsqrt u, c\n fma F, a, b, u");
     // But not where it waits for the product too.
     becomes(" fadd u, c, d\n fmul t, a, b\n fadd F, t, u", " fadd u, c, d\n fma F, a, b, u");
 }
 
-/// Of two products in one sum the one whose factors come later, else the second.
+/// In a sum of two products, the product whose factors come later is fused, or else the second.
 #[test]
 fn two_products_in_one_sum() {
     stays(" fmul t, a, b\n fmul u, c, d\n fadd F, t, u");
@@ -111,7 +116,7 @@ fn two_products_in_one_sum() {
 }
 
 #[test]
-fn what_others_use_stays() {
+fn keeps_products_with_other_uses() {
     // Two sums, one sum twice, another operation, an output, a state.
     stays(" fmul t, a, b\n fadd F, t, c\n fadd G, t, d");
     stays(" fmul t, a, b\n fadd F, t, t");
@@ -130,9 +135,9 @@ fn what_others_use_stays() {
     stays(" fmul t, a, b\n fadd @a7, t, c\n mov F, @a7");
 }
 
-/// Only where both stand under it, and only on request.
+/// Contraction needs `.contract on` at the product and at the sum, or the caller's request.
 #[test]
-fn where_it_is_on() {
+fn fuses_where_contract_is_on() {
     let text = |before: &str, between: &str| {
         format!("{HEAD}.period\np:\n{before} fmul t, a, b\n{between} fadd F, t, c\n wait p\n")
     };
@@ -159,9 +164,9 @@ fn where_it_is_on() {
     }
 }
 
-/// Programs whose bundles must keep their places, or of which not everything is known, are left alone.
+/// Programs whose bundles must keep their places, or that hold unknown words, are left alone.
 #[test]
-fn where_nothing_can_be_taken_out() {
+fn keeps_bundles_with_branches_intact() {
     for last in [" wait 0\n", " .raw mul 0x020000000000\n wait p\n"] {
         let text = format!("{HEAD}.contract on\n.period\np: fmul t, a, b\n fadd F, t, c\n{last}");
         assert_eq!(on_one(&text).contractions, [], "{text}");
@@ -169,7 +174,7 @@ fn where_nothing_can_be_taken_out() {
 }
 
 #[test]
-fn what_is_said_of_it() {
+fn reports_fused_products() {
     let text = format!(
         "{HEAD}.contract on\n.period\np: fmul t, a, b\n fadd F, t, c\n fmul u, a, a\n fsub G, u, d\n wait p\n"
     );
@@ -189,7 +194,7 @@ fn what_is_said_of_it() {
     assert!(wrong.contains("`.contract` is `on` or `off`, not `yes`"), "{wrong}");
 }
 
-/// A file of the library that says so keeps its operations, and with them its error bounds, wherever its macros are used.
+/// A library file with `.contract off` keeps its operations, and with them its error bounds, wherever its macros are used.
 #[test]
 fn the_library_speaks_for_itself() {
     let body = ".macro muladd d, a, b, c\n.reg t\n fmul t, a, b\n fadd d, t, c\n.endm\n";
@@ -246,7 +251,7 @@ fn source(seed: u64) -> String {
 }
 
 /// The writes to ports over some periods; and true if every sum and product was an integer that binary32 holds.
-fn run(assembled: &Assembled, seed: u64) -> (Vec<Vec<u32>>, bool) {
+fn run(assembled: &AssembledProgram, seed: u64) -> (Vec<Vec<u32>>, bool) {
     let random = &mut Random::new(seed + 5);
     let program = &assembled.program;
     let mut emulator = Emulator::new(program).expect("it fits");
@@ -333,9 +338,10 @@ fn dynamics() {
             .unwrap_or_else(|errors| panic!("{}", errors.render(false)))
     };
     let [plain, contracted] = [Contract::None, Contract::All].map(with);
-    let chain = |assembled: &Assembled| assembled.blocks.iter().map(|block| block.bound.critical_path).max();
+    let chain =
+        |assembled: &AssembledProgram| assembled.blocks.iter().map(|block| block.bound.critical_path).max();
     let operations =
-        |assembled: &Assembled| assembled.blocks.iter().map(|block| block.operations).sum::<u32>();
+        |assembled: &AssembledProgram| assembled.blocks.iter().map(|block| block.operations).sum::<u32>();
     assert_eq!((chain(&plain), operations(&plain)), (Some(296), 676));
     assert_eq!((chain(&contracted), operations(&contracted)), (Some(267), 510));
     assert_eq!(contracted.contractions.len(), 166);

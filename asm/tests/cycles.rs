@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The cycles of this repository's programs on the machines, measured: no change makes them longer unseen. The one table of such
-//! figures in tests; documents have theirs from `cargo xtask docs`.
+//! The cycles of this repository's programs on the machines, measured: no change makes them longer unseen. No other test has a
+//! table of such figures; documents have theirs from `cargo xtask docs`.
 
 use crate::common;
 use std::path::Path;
@@ -18,7 +18,7 @@ fn cycles(folder: &str, name: &str, machine: &'static Machine, contract: Contrac
     period.map(|block| block.cycles).or(longest).expect("it has a scheduled block")
 }
 
-/// A test for each figure, so that each stands alone where one of them is longer.
+/// A test for each figure, so that a longer figure fails alone.
 macro_rules! no_longer {
     ($($name:ident: $folder:literal $file:literal $machine:ident $contract:ident $most:literal;)*) => {$(
         #[test]

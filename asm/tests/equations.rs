@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Equations compute what they say: random ones on the emulator against their evaluation here, operation by operation in the order
-//! written; and what becomes of equal parts, of names that are written in between, of limits.
+//! Values of equations: random equations on the emulator against their evaluation here, operation by operation in the order
+//! written; equal parts, names that are written in between, limits.
 
 use crate::common;
 use crate::common::{assemble, bad, bundles, good};
@@ -11,12 +11,12 @@ use takt_emu::Emulator;
 use takt_isa::fp::Host;
 use takt_isa::{F1, F3, MACHINES, Op, Program, Type, compute};
 
-/// An expression, as the test has it.
+/// An expression as a tree.
 #[derive(Clone, Debug)]
 enum Tree {
-    /// A literal, as it is written.
+    /// A literal, in its spelling.
     Literal(&'static str),
-    /// A register.
+    /// A register, by its name.
     Name(&'static str),
     Prefix(&'static str, Box<Tree>),
     Infix(&'static str, Box<Tree>, Box<Tree>),
@@ -41,7 +41,7 @@ fn level(tree: &Tree) -> u8 {
     }
 }
 
-/// The expression as it is written, with no more parentheses than it needs.
+/// The text of an expression, with no more parentheses than it needs.
 fn text(tree: &Tree) -> String {
     let at = |tree: &Tree, least: u8| {
         if level(tree) < least { format!("({})", text(tree)) } else { text(tree) }
@@ -60,7 +60,7 @@ fn text(tree: &Tree) -> String {
 
 /// A value while an expression is evaluated.
 #[derive(Clone, Copy, Debug)]
-enum Seen {
+enum ExpectedValue {
     Constant(Value),
     Float(u32),
     Int(u32),
@@ -73,19 +73,19 @@ fn is_int(name: &str) -> bool {
     matches!(name, "n" | "k" | "j")
 }
 
-/// The reason why there is no value: a constant part has none, which the assembler says.
+/// No value: a constant part has none, which the assembler reports.
 struct NoValue;
 
-fn bits(seen: Seen, ty: Type) -> Result<u32, NoValue> {
+fn bits(seen: ExpectedValue, ty: Type) -> Result<u32, NoValue> {
     match seen {
-        Seen::Constant(value) => value.bits(ty).map_err(|_| NoValue),
-        Seen::Float(bits) | Seen::Int(bits) => Ok(bits),
+        ExpectedValue::Constant(value) => value.bits(ty).map_err(|_| NoValue),
+        ExpectedValue::Float(bits) | ExpectedValue::Int(bits) => Ok(bits),
     }
 }
 
 /// Evaluates an expression: constant parts in binary64, all else by one operation each, in the order written.
-fn evaluate(tree: &Tree, registers: &Registers) -> Result<Seen, NoValue> {
-    let run = |op, sources: &[Seen], ty: Type| -> Result<u32, NoValue> {
+fn evaluate(tree: &Tree, registers: &Registers) -> Result<ExpectedValue, NoValue> {
+    let run = |op, sources: &[ExpectedValue], ty: Type| -> Result<u32, NoValue> {
         let mut all = [0; 3];
         for (bits_of, source) in all.iter_mut().zip(sources) {
             *bits_of = bits(*source, ty)?;
@@ -101,22 +101,22 @@ fn evaluate(tree: &Tree, registers: &Registers) -> Result<Seen, NoValue> {
         }
         Choice(condition, a, b) => {
             let condition = evaluate(condition, registers)?;
-            if let Seen::Constant(value) = condition {
+            if let ExpectedValue::Constant(value) = condition {
                 return evaluate(if value.is_zero() { b } else { a }, registers);
             }
             vec![condition, evaluate(a, registers)?, evaluate(b, registers)?]
         }
     };
-    let constant = |operand: &Seen| matches!(operand, Seen::Constant(_));
+    let constant = |operand: &ExpectedValue| matches!(operand, ExpectedValue::Constant(_));
     let folds = !matches!(tree, Name(_) | Choice(..) | Call("sat" | "sign" | "itof" | "ftoi", _));
     if folds && operands.iter().all(constant) {
-        // Of the operands' values: of a choice that is made, the other alternative does not count.
+        // Computed from the operands' values: a decided choice drops its other alternative.
         let written: Vec<String> = operands
             .iter()
             .map(|operand| match operand {
-                Seen::Constant(Value::Int(value)) => format!("({value})"),
-                Seen::Constant(Value::Real(value)) => format!("({value:?})"),
-                Seen::Float(_) | Seen::Int(_) => String::new(),
+                ExpectedValue::Constant(Value::Int(value)) => format!("({value})"),
+                ExpectedValue::Constant(Value::Real(value)) => format!("({value:?})"),
+                ExpectedValue::Float(_) | ExpectedValue::Int(_) => String::new(),
             })
             .collect();
         let folded = match tree {
@@ -126,26 +126,28 @@ fn evaluate(tree: &Tree, registers: &Registers) -> Result<Seen, NoValue> {
             _ => text(tree),
         };
         let parsed = Expression::parse(&folded).map_err(|_| NoValue)?;
-        return parsed.evaluate(|_| None).map(Seen::Constant).map_err(|_| NoValue);
+        return parsed.evaluate(|_| None).map(ExpectedValue::Constant).map_err(|_| NoValue);
     }
-    let is_int_one = |seen: &Seen| matches!(seen, Seen::Int(_));
+    let is_int_one = |seen: &ExpectedValue| matches!(seen, ExpectedValue::Int(_));
     Ok(match tree {
         Literal(_) => return Err(NoValue),
-        Name(name) if is_int(name) => Seen::Int(registers[name]),
-        Name(name) => Seen::Float(registers[name]),
+        Name(name) if is_int(name) => ExpectedValue::Int(registers[name]),
+        Name(name) => ExpectedValue::Float(registers[name]),
         Choice(..) => {
             let ty = if operands[1..].iter().any(is_int_one) { Type::I } else { Type::F };
             let chosen = operands[if bits(operands[0], Type::I)? != 0 { 1 } else { 2 }];
             let value = bits(chosen, ty)?;
-            if ty == Type::I { Seen::Int(value) } else { Seen::Float(value) }
+            if ty == Type::I { ExpectedValue::Int(value) } else { ExpectedValue::Float(value) }
         }
-        Prefix("!", _) => Seen::Int(u32::from(bits(operands[0], Type::I)? == 0)),
-        Prefix(_, _) if is_int_one(&operands[0]) => Seen::Int(bits(operands[0], Type::I)?.wrapping_neg()),
-        Prefix(..) => Seen::Float(run(Op::fneg, &operands, Type::F)?),
+        Prefix("!", _) => ExpectedValue::Int(u32::from(bits(operands[0], Type::I)? == 0)),
+        Prefix(_, _) if is_int_one(&operands[0]) => {
+            ExpectedValue::Int(bits(operands[0], Type::I)?.wrapping_neg())
+        }
+        Prefix(..) => ExpectedValue::Float(run(Op::fneg, &operands, Type::F)?),
         Infix(operator, ..) if operands.iter().any(is_int_one) => {
             let (a, b) = (bits(operands[0], Type::I)?, bits(operands[1], Type::I)?);
             let (x, y) = (a.cast_signed(), b.cast_signed());
-            Seen::Int(match *operator {
+            ExpectedValue::Int(match *operator {
                 "+" => a.wrapping_add(b),
                 "-" => a.wrapping_sub(b),
                 "&" => a & b,
@@ -164,12 +166,12 @@ fn evaluate(tree: &Tree, registers: &Registers) -> Result<Seen, NoValue> {
         Infix(operator, ..) => {
             let (a, b) =
                 (f32::from_bits(bits(operands[0], Type::F)?), f32::from_bits(bits(operands[1], Type::F)?));
-            let truth = |condition: bool| Seen::Int(condition.into());
+            let truth = |condition: bool| ExpectedValue::Int(condition.into());
             match *operator {
-                "+" => Seen::Float(run(Op::fadd, &operands, Type::F)?),
-                "-" => Seen::Float(run(Op::fsub, &operands, Type::F)?),
-                "*" => Seen::Float(run(Op::fmul, &operands, Type::F)?),
-                "/" => Seen::Float(run(Op::fdiv, &operands, Type::F)?),
+                "+" => ExpectedValue::Float(run(Op::fadd, &operands, Type::F)?),
+                "-" => ExpectedValue::Float(run(Op::fsub, &operands, Type::F)?),
+                "*" => ExpectedValue::Float(run(Op::fmul, &operands, Type::F)?),
+                "/" => ExpectedValue::Float(run(Op::fdiv, &operands, Type::F)?),
                 "==" => truth(a == b),
                 "!=" => truth(a != b),
                 "<" => truth(a < b),
@@ -179,9 +181,9 @@ fn evaluate(tree: &Tree, registers: &Registers) -> Result<Seen, NoValue> {
                 _ => return Err(NoValue),
             }
         }
-        Call("xor", _) => Seen::Int(bits(operands[0], Type::I)? ^ bits(operands[1], Type::I)?),
-        Call("itof", _) => Seen::Float(run(Op::itof, &operands, Type::I)?),
-        Call("ftoi", _) => Seen::Int(run(Op::ftoi, &operands, Type::F)?),
+        Call("xor", _) => ExpectedValue::Int(bits(operands[0], Type::I)? ^ bits(operands[1], Type::I)?),
+        Call("itof", _) => ExpectedValue::Float(run(Op::itof, &operands, Type::I)?),
+        Call("ftoi", _) => ExpectedValue::Int(run(Op::ftoi, &operands, Type::F)?),
         Call(name, _) => {
             let op = match *name {
                 "sqrt" => Op::fsqrt,
@@ -194,7 +196,7 @@ fn evaluate(tree: &Tree, registers: &Registers) -> Result<Seen, NoValue> {
                 "cos" => Op::fcos,
                 _ => return Err(NoValue),
             };
-            Seen::Float(run(op, &operands, Type::F)?)
+            ExpectedValue::Float(run(op, &operands, Type::F)?)
         }
     })
 }
@@ -265,7 +267,7 @@ impl Choices<'_> {
     }
 }
 
-/// Some equations: what each writes, and what.
+/// Some equations: targets and values.
 fn equations(choices: &[u8]) -> Vec<(&'static str, Tree)> {
     let mut choices = Choices(choices.iter());
     (0..6)
@@ -305,7 +307,7 @@ proptest! {
 
     /// On every machine, bit for bit, with NaNs and infinities among the values.
     #[test]
-    fn equations_compute_what_is_written(choices in prop::collection::vec(any::<u8>(), 1..160), latched in any::<bool>()) {
+    fn equations_compute_the_written_values(choices in prop::collection::vec(any::<u8>(), 1..160), latched in any::<bool>()) {
         let equations = equations(&choices);
         let source = source(&equations, if latched { "latched" } else { "direct" });
         let mut expected: Registers = [("t", 1.0f32), ("u", 2.0), ("v", 3.0)].map(|(name, value)| (name, value.to_bits())).into();
@@ -329,7 +331,7 @@ proptest! {
             outputs.push(Some(expected.clone()));
         }
         for machine in MACHINES {
-            // The search for short schedules is not what is asked about.
+            // The search for short schedules is not under test.
             let options = takt_asm::Options { effort: 0, ..common::options(machine) };
             let assembled = takt_asm::assemble("test.s", &takt_asm::MemoryLoader::of("test.s", source.as_str()), &options);
             let assembled = match assembled {
@@ -376,11 +378,11 @@ fn equal_parts_are_computed_once() {
     assert_eq!(once("", " a = t*u + 1\n b = t*u - 1"), 1);
     // If the part is a whole equation, its register has the value.
     assert_eq!(once("", " v = t*u\n a = t*u - 1\n b = v"), 1);
-    // Not once a source is written, nor once what has the value is.
+    // A value is not reused once a source of it, or its register, is written.
     assert_eq!(once("", " a = t*u + 1\n t = x\n b = t*u - 1"), 2);
     assert_eq!(once("", " a = t*u + 1\n fadd t, x, y\n b = t*u - 1"), 2);
     assert_eq!(once("", " v = t*u\n v = x\n a = t*u - 1\n b = v"), 2);
-    // Not across a label, a branch, a loop's head, or what sees the flags.
+    // Not across a label, a branch, a loop's head, or an operation on the flags.
     assert_eq!(once("", " a = t*u + 1\nhere:\n b = t*u - 1"), 2);
     assert_eq!(once("", " a = t*u + 1\n bz n, period\n b = t*u - 1"), 2);
     assert_eq!(once("", " a = t*u + 1\n clrflags\n b = t*u - 1"), 2);
@@ -392,9 +394,9 @@ fn equal_parts_are_computed_once() {
     assert_eq!(once("", " a = t*u*v\n b = u*v*t"), 4);
 }
 
-/// A jump by number into what counts on the line above would skip the computation.
+/// A jump by number between a shared computation and its use would skip the computation.
 #[test]
-fn jumps_by_number_do_not_skip_what_is_shared() {
+fn jumps_by_number_do_not_skip_shared_subexpressions() {
     let text = |target: u32| {
         format!(
             ".input x, n:int\n.output a, b\n.reg t\n.once\n t = x\n wait period\n.period\nperiod: bz n, {target}\n a = t*t + 1\n b = t*t - 1\n wait period\n"
@@ -420,9 +422,10 @@ fn constants_are_folded_where_they_are_a_part() {
     assert_eq!((products(" a = x/3"), count(&period("", " a = x/3\n b = t"), "fdiv")), (0, 1));
 }
 
-/// A machine that lacks an instruction says so at the operator; a choice by `has.` computes only what it has.
+/// An instruction that the machine lacks is an error at the operator; a choice by `has.` computes only instructions of the
+/// machine.
 #[test]
-fn what_a_machine_lacks() {
+fn reports_operations_that_the_machine_lacks() {
     let lacks = |row: &&takt_isa::Row| F1.host(row.function).is_none() && !row.forms.is_empty();
     for row in takt_isa::ROWS.iter().filter(lacks) {
         let form = row.forms[0];
@@ -504,7 +507,7 @@ fn limits_are_finite() {
 
 /// `.fast` allows rewrites that round otherwise; without it nothing changes.
 #[test]
-fn fast_allows_what_it_names() {
+fn fast_allows_only_the_named_rewrites() {
     let lines = " a = x + t - u + 3 - v + w - 5 + y\n b = x/3*t";
     let text = |fast: &str| {
         format!(
@@ -548,7 +551,7 @@ fn fast_allows_what_it_names() {
     assert_eq!(report.list[0].code, "fast");
 }
 
-/// Of an array some element has to be used, not each; and not each value of one.
+/// An array counts as used if any value of any element is used.
 #[test]
 fn arrays_are_used_as_a_whole() {
     let warnings = |lines: &str| {
@@ -620,7 +623,7 @@ fn placed_registers_are_written_by_their_slot() {
 
 /// A load has the type of its table's words, with an index or without; a store of another type is counted.
 #[test]
-fn what_is_loaded_has_the_type_of_its_table() {
+fn loads_have_the_type_of_their_table() {
     let source = |load: &str, equation: &str| {
         format!(
             ".input x, i:int\n.output y\n.reg d\n.data\nV: .float 1.5, 2.5\nW: .word 1, 2\nS: .space 4\n.period\np: {load}\n y = {equation}\n wait p\n"
@@ -642,7 +645,7 @@ fn what_is_loaded_has_the_type_of_its_table() {
     for place in ["V[i]", "V+1", "V"] {
         refused(&format!("ld d, {place}"), "itof(d)", "`d` is a float");
     }
-    // The words of a table that has both may be either; so may those of one that something else is stored in.
+    // The words of a table with floats and integers may be either; so may the words of a table that another type is stored in.
     good(&source("ld d, V[i]", "d*x").replace(".float 1.5, 2.5", ".float 1.5\n .word 2"));
     good(&source("st V[i], i\n ld d, V[i]", "itof(d)"));
     good(&source("ld d:int, V[i]", "itof(d)"));

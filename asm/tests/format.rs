@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Laying sources out: what is assembled stays the same, and doing it twice is doing it once.
+//! Laying sources out: the assembled program stays the same, and a second pass changes nothing.
 
 use crate::common::{options, root, sources};
 use crate::random_source;
 use proptest::prelude::*;
 use std::path::{Path, PathBuf};
 use takt_asm::format::format;
-use takt_asm::{Assembled, Diagnostics, MemoryLoader, Options, Schedule};
+use takt_asm::{AssembledProgram, Diagnostics, MemoryLoader, Options, Schedule};
 use takt_isa::{F3, Machine};
 
-/// The shipped sources.
+/// The paths and texts of the shipped sources.
 fn shipped() -> Vec<(PathBuf, String)> {
     let programs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../programs");
     let mut found = Vec::new();
@@ -26,7 +26,7 @@ fn shipped() -> Vec<(PathBuf, String)> {
     found
 }
 
-fn assemble(text: &str, machine: &'static Machine) -> Result<Assembled, Diagnostics> {
+fn assemble(text: &str, machine: &'static Machine) -> Result<AssembledProgram, Diagnostics> {
     let options = Options { schedule: Schedule::None, ..options(machine) };
     takt_asm::assemble("test.s", &MemoryLoader::of("test.s", text), &options)
 }
@@ -67,7 +67,7 @@ fn shipped_sources_are_laid_out() {
 }
 
 #[test]
-fn what_is_wrong_stays_as_wrong() {
+fn formatting_preserves_mistakes() {
     for (folder, prefix) in [("mistakes", "err_"), ("mistakes", "warn_"), ("accepted", "ok_")] {
         for (name, machine) in sources(folder, prefix) {
             let Ok(text) = std::fs::read_to_string(root(folder).join(&name)) else { continue };
@@ -99,7 +99,7 @@ proptest! {
     #[test]
     fn random_programs_are_the_same(seed in 0u64..1 << 40) {
         let text = random_source::source(seed);
-        // Other blanks than the generator's: each gap of one, two, or a tab.
+        // Blanks other than the generator's: each gap is one blank, two, or a tab.
         let mut random = random_source::Random::new(seed);
         let messy: String = text.chars().map(|c| match c {
             ' ' => [" ", "  ", "\t", " "][random.below(4) as usize].to_owned(),
@@ -110,7 +110,7 @@ proptest! {
         prop_assert_eq!(format(&format(&text)), format(&text));
     }
 
-    /// Of any text, tokens remain as they are.
+    /// Tokens of any text stay the same.
     #[test]
     fn random_lines_are_the_same(pieces in prop::collection::vec(
         prop::sample::select(vec![

@@ -2,7 +2,7 @@
 //! The places in which `.include` looks: beside the file, in the folders given, in the library.
 
 use crate::common;
-use takt_asm::{Assembled, MemoryLoader, Search, diag::Diagnostics, listing};
+use takt_asm::{AssembledProgram, MemoryLoader, Search, diag::Diagnostics, listing};
 use takt_isa::F3;
 
 const LIBRARY: &[(&str, &str)] = &[
@@ -35,7 +35,7 @@ impl Drop for Folder {
     }
 }
 
-fn assemble(text: &str, folders: &[&Folder]) -> Result<Assembled, Diagnostics> {
+fn assemble(text: &str, folders: &[&Folder]) -> Result<AssembledProgram, Diagnostics> {
     let mut project = MemoryLoader::of("a.s", text);
     project.add("beside.s", ".const HERE = 3\n");
     project.add("sub/b.s", ".include \"c.s\"\n");
@@ -55,7 +55,7 @@ fn fails(text: &str, folders: &[&Folder]) -> String {
 }
 
 #[test]
-fn the_library_is_asked_by_angle_brackets_only() {
+fn only_angle_brackets_search_the_library() {
     assert_eq!(data(".include <first.s>\n.data\n.word FIRST, SECOND\n", &[]), [1, 2]);
     assert_eq!(data(".include <sub/deep.s>\n.data\n.word DEEP\n", &[]), [5]);
     let text = fails(".include \"second.s\"\n", &[]);
@@ -65,13 +65,13 @@ fn the_library_is_asked_by_angle_brackets_only() {
 }
 
 #[test]
-fn a_macro_of_the_library_is_told_where_it_is() {
+fn suggests_the_include_of_a_library_macro() {
     let text = fails(".input x\n.output y\n.period\np: twice y, x\n wait p\n", &[]);
     assert!(text.contains("help: the library defines it: `.include <second.s>`"), "{text}");
 }
 
-/// A file that is missing is the one mistake that counts: names that it would have declared are not asked for, nor are macros, and
-/// warnings about what is unused stay away. Mistakes of syntax, and other files that are missing, stand beside it.
+/// A missing file is the only mistake that counts: names and macros that it would have declared are not asked for, and warnings of
+/// unused names stay away. Mistakes of syntax, and further missing files, stand beside it.
 #[test]
 fn a_missing_file_stops_the_cascade() {
     let uses: String = (0..120).map(|i| format!(" twice y, K{i}\n fadd y{i}, x, K{i}\n")).collect();
@@ -93,7 +93,7 @@ fn a_missing_file_stops_the_cascade() {
 }
 
 #[test]
-fn an_unknown_library_file_is_told_what_there_is() {
+fn unknown_library_file_lists_the_existing_ones() {
     let text = fails(".include <secnd.s>\n", &[]);
     assert!(text.contains("error[load]: there is no `<secnd.s>`"), "{text}");
     let all = "there are <broken.s>, <first.s>, <round.s>, <second.s>, <sub/deep.s>, <sub/deeper.s>";
@@ -111,7 +111,7 @@ fn an_unknown_library_file_is_told_what_there_is() {
 }
 
 #[test]
-fn the_library_is_read_once_however_often_it_is_asked_for() {
+fn library_is_read_once_per_assembly() {
     let twice = ".include <second.s>\n.include <first.s>\n.include <second.s>\n.data\n.word SECOND\n";
     let text = fails(twice, &[]);
     assert!(text.contains("`SECOND` is declared already"), "by `\"\"` it is read again: {text}");
@@ -137,7 +137,7 @@ fn folders_are_searched_in_their_order_after_the_file_s_own_and_before_the_libra
     let both = [&first, &second];
     assert_eq!(data(".include \"beside.s\"\n.data\n.word HERE\n", &both), [3]);
     assert_eq!(data(".include <beside.s>\n.data\n.word HERE\n", &both), [13]);
-    // `first/mine.s` is found, and what it includes is in neither its folder nor the project.
+    // `first/mine.s` is found, and the file that it includes is in neither its folder nor the project.
     assert_eq!(data(".include \"mine.s\"\n.data\n.word MINE\n", &both), [22]);
     assert_eq!(data(".include <mine.s>\n.data\n.word MINE\n", &[&second, &first]), [21]);
     assert_eq!(data(".include <second.s>\n.data\n.word SECOND\n", &both), [23]);

@@ -31,7 +31,7 @@ fn zero_needs_no_register() {
 }
 
 #[test]
-fn a_value_becomes_what_the_operand_is() {
+fn value_takes_the_type_of_its_operand() {
     // float operand, integer operand, any operand; integers round to binary32 in one step.
     assert_eq!(constants(".input x\n.output F\n.period\n fadd F, x, 2\n"), [2.0f32.to_bits()]);
     assert_eq!(constants(".input x:int\n.output k:int\n.period\n iadd k, x, 8.0/4\n"), [2]);
@@ -159,7 +159,7 @@ fn operations_go_to_their_slots_in_any_order() {
     assert_eq!(one.program.bundles(), 1);
 }
 
-/// Names that two uses of a macro declare between each other's, in whatever way they are kept.
+/// Names that two uses of a macro declare in turn stay apart, few or many.
 #[test]
 fn uses_keep_their_many_locals_apart() {
     let locals: String = (0..20).map(|i| format!(".const K{i} = BASE + {i}\n")).collect();
@@ -174,7 +174,7 @@ fn uses_keep_their_many_locals_apart() {
 
 /// Types are followed in the order of the source, and a value may come from further down.
 #[test]
-fn types_from_below_are_warned_of() {
+fn warns_of_types_from_later_lines() {
     let text =
         ".input n:int\n.output F\n.reg b\n.period\nagain:\n fadd F, b, 1\nlow:\n mov b, n\n wait again\n";
     let warnings = good(text).warnings;
@@ -200,12 +200,12 @@ fn macro_locals_are_of_each_use() {
 }
 
 #[test]
-fn names_that_the_assembler_makes_are_nobody_elses() {
+fn generated_names_do_not_clash() {
     let assembled = good(".macro m\nx: nop\n.endm\n.period\nm.1.x: nop\n m\n");
     let names: Vec<&str> = assembled.program.symbols.iter().map(|symbol| symbol.name.as_str()).collect();
     assert_eq!(names.len(), 2);
     assert_ne!(names[0], names[1]);
-    // However long the names they are made of are.
+    // Names made of the longest names stay within the limit.
     let long = "n".repeat(255);
     let assembled = good(&format!(".macro {long}\n{long}: nop\n.endm\n.period\n {long}\n {long}\n"));
     let names: Vec<&str> = assembled.program.symbols.iter().map(|symbol| symbol.name.as_str()).collect();
@@ -360,7 +360,7 @@ fn expressions() {
 }
 
 #[test]
-fn expressions_that_are_none() {
+fn rejects_invalid_expressions() {
     for text in
         ["", "1 +", "(1", "1 2", "1 = 2", "f(", "a:b", "1\n2", "1 || 2", "x[1]", "@m3", ".reg", "\"x\"", "5x"]
     {
@@ -375,7 +375,7 @@ fn expressions_that_are_none() {
     assert!(fault("1/0").contains("division by zero"));
 }
 
-/// An output's number is its place among the outputs, or what the source says; the slot that writes it only chooses the bank.
+/// An output's number is its place among the outputs, or the source's number; the slot that writes it only chooses the bank.
 #[test]
 fn an_output_has_one_number() {
     let numbers = |text: &str, machine: &'static takt_isa::Machine| -> Vec<(String, u16)> {
@@ -406,10 +406,10 @@ fn an_output_has_one_number() {
         ".const K = 3\n.input x @ 1, y, z @ K, w\n.rep i, 1, 2\n.output F{i} @ i*2-2, G{i} @ i\n.endr\n.output H, J @ 31\n.period\n".replace("G{i} @ i\n", "G{i} @ i + 10\n").as_str(),
         &[("x", 1), ("y", 0), ("z", 3), ("w", 2), ("F1", 0), ("G1", 11), ("F2", 2), ("G2", 12), ("H", 1), ("J", 31)],
     );
-    // A register's place has its number; what has no name takes it too.
+    // A port at a register's place takes the place's number; a nameless register takes its number, too.
     let text = ".input x\n.output F @ x230, G, H\n.period\n mov F, x\n fadd @a224, x, x\n fmul G, x, x\n";
     assert_eq!(numbers(text, &F3)[1..], [("F".to_owned(), 6), ("G".to_owned(), 1), ("H".to_owned(), 2)]);
-    // As many as there are, and not one more.
+    // The machine's number of ports is accepted, and not one more.
     let ports = |kind: &str, count: u16| (0..count).map(|i| format!(".{kind} p{i}\n")).collect::<String>();
     for (kind, most) in [("output", 32), ("input", 255)] {
         let all = numbers(&format!("{}.period\n nop\n", ports(kind, most)), &F3);
@@ -429,8 +429,8 @@ fn ports_may_be_latched() {
 }
 
 #[test]
-fn a_name_asks_what_the_machine_has() {
-    // Machines differ in the instructions they execute: take whatever they do differ in from the tables.
+fn predefined_names_query_the_machine() {
+    // Machines differ in the instructions that they execute: the tables tell the differences.
     let text = |mnemonic: &str| format!(".if has.{mnemonic}\n.data\n.word has.{mnemonic} + 1\n.endif\n");
     let mut answers = [0; 2];
     for machine in takt_isa::MACHINES {
@@ -449,7 +449,7 @@ fn a_name_asks_what_the_machine_has() {
 }
 
 #[test]
-fn a_name_asks_whether_there_is_a_macro() {
+fn predefined_names_query_macros() {
     let asked = ".if macro.extra\n.data\n.word 1\n.else\n.data\n.word 0\n.endif\n";
     let macro_ = ".macro extra\n nop\n.endm\n";
     assert_eq!(good(asked).program.data, [0]);

@@ -1,26 +1,20 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Unreasonable sources: each gets one clear error, soon.
+//! Unreasonable sources: each gets one clear error. The named limits count steps (statements, nodes, files, depth), and none of these
+//! sources ends without them; an algorithm that is quadratic in its source takes hours, which stops the run of the tests.
 
 use crate::common;
 use crate::common::{bad, good};
-use std::time::{Duration, Instant};
 use takt_asm::{FileLoader, LoadError, Loader, MemoryLoader, diag::Diagnostics, limits};
 use takt_isa::{F1, F3};
 
-/// Far more than any of these takes, even on a busy machine; a quadratic algorithm takes hours.
-const SOON: Duration = Duration::from_secs(60);
-
 #[track_caller]
 fn error(text: &str, code: &str) -> Diagnostics {
-    let start = Instant::now();
     let report = bad(text, &F3);
-    assert!(start.elapsed() < SOON, "took {:?}", start.elapsed());
     let first = report.list.iter().find(|diagnostic| diagnostic.code == code);
     let rendered = report.render(false);
     assert!(first.is_some(), "no `{code}`:\n{}", &rendered[..rendered.len().min(4000)]);
-    // However long the lines of the source are, those of the report are not.
+    // The report's lines are short, however long the source's lines are.
     assert!(rendered.len() < 200_000, "{} bytes of report", rendered.len());
-    assert!(start.elapsed() < SOON, "took {:?}", start.elapsed());
     report
 }
 
@@ -63,13 +57,13 @@ fn long_lines() {
     error(&format!(".data\n .word {}\n", "1,".repeat(limits::LINE_BYTES)), "limit");
     error(&format!(".error \"{long}\""), "limit");
     error(&format!(" nop {}", "|| nop ".repeat(100_000)), "limit");
-    // As long as a file may be, without a line break; of tokens, and of one token.
+    // A file of the greatest length without a line break: many tokens, and a single token.
     error(&format!(".data\n .word {}", ",".repeat(limits::FILE_BYTES - 20)), "limit");
     error(&"x".repeat(limits::FILE_BYTES), "token");
     error(&" nop ||\n".repeat(limits::FILE_BYTES / 8), "limit");
     // A comment may be as long as it likes.
     good(&format!("; {long}{long}\n"));
-    // Of a long line the report shows the part around the mistake, with the right column.
+    // For a long line the report shows the part around the mistake, with the right column.
     let text = format!(".data\n .word {}mistake, {}1\n", "1, ".repeat(10_000), "1, ".repeat(1_000));
     let report = error(&text, "unknown-name");
     let messages = report.messages();
@@ -111,7 +105,7 @@ fn macros_without_end() {
         text += &format!(".macro m{level} x\n m{} x+x\n.endm\n", level - 1);
     }
     good(&format!("{text} m59 1\n"));
-    // As names that depend on names.
+    // Names that depend on names, to the greatest depth.
     let depth = limits::EXPRESSION_DEPTH;
     error(&format!(".const X = {}1{}\n", "x{".repeat(depth), "}".repeat(depth)), "unknown-name");
 }
@@ -148,7 +142,7 @@ fn errors_without_end() {
     error(&".const A = 1/0\n".repeat(50_000), "expression");
     error(&"§\n".repeat(50_000), "token");
     error(&(0..50_000).map(|i| format!(" mov a{i}, b{i}\n")).collect::<String>(), "unknown-name");
-    // Each compared with all declared names.
+    // Each name is compared with all declared names.
     let names: String = (0..50_000).map(|i| format!(".const name{i} = 1\n")).collect();
     error(&(names + &(0..2_000).map(|i| format!(" mov nane{i}, 1\n")).collect::<String>()), "unknown-name");
     let warnings = good(&(0..50_000).map(|i| format!(".reg r{i}\n")).collect::<String>()).warnings;
@@ -156,7 +150,7 @@ fn errors_without_end() {
 }
 
 #[test]
-fn large_things_that_are_many() {
+fn rejects_many_large_items() {
     // Parameters, arguments, names of one scope.
     let parameters: Vec<String> = (0..20_000).map(|i| format!("p{i}")).collect();
     let arguments = vec!["1"; 20_000].join(", ");
@@ -182,7 +176,7 @@ fn large_things_that_are_many() {
 }
 
 #[test]
-fn files_that_are_too_large_or_no_text() {
+fn rejects_large_files_and_binary_files() {
     let fails = |bytes: Vec<u8>| {
         let report = takt_asm::assemble("a.s", &MemoryLoader::of("a.s", bytes), &common::options(&F3));
         report.expect_err("it is refused").render(false)

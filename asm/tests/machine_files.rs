@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Machines of files: what is printed reads back as the same machine, each mistake has its place and mend, images carry the row.
+//! Machines of files: a printed file reads back as the same machine, each mistake has its place and mend, images carry the row.
 
+use crate::changed::changed;
 use crate::rows;
 use std::fmt::Write as _;
 use takt_asm::machine::{about, machine_file, read};
 use takt_asm::{MemoryLoader, Options, assemble, image};
-use takt_isa::{F1, F3, MACHINES, Machine, RowPlace};
+use takt_isa::{F1, F3, Function, MACHINES, Machine, RowPlace, T3};
 
 /// The fixture's file with another name and one part replaced.
 fn file(from: &str, to: &str) -> String {
     let text = F3.to_toml().replace("name = \"f3\"", "name = \"mine\"");
-    assert!(text.contains(from), "{from}");
-    text.replacen(from, to, 1)
+    changed(&text, from, to)
 }
 
 fn good(text: &str) -> &'static Machine {
@@ -52,6 +52,27 @@ fn one_name_may_have_two_rows() {
     assert_ne!(deep(one), deep(two));
     assert_eq!((deep(two).row(), deep(two).name), (two, "mine,data=4096"));
     assert_eq!(deep(two).with_options([("data", "1024")]).unwrap(), two);
+}
+
+/// A machine that counts no loops has a sequencer without them, whether its file states that once or twice.
+#[test]
+fn a_depth_of_no_loops_leaves_them_out() {
+    let text =
+        T3.to_toml().replace("name = \"t3\"", "name = \"plain\"").replace("loop_depth = 4", "loop_depth = 0");
+    assert!(text.contains("    \"sequencer\","), "{text}");
+    let machine = good(&text);
+    assert!(machine.hosts(Function::Loop).is_empty() && machine.loop_depth == 0);
+    assert!(std::ptr::eq(good(&machine.to_toml()), machine), "{}", machine.to_toml());
+    // Functions that the file lists are kept: a sequencer's loops without a depth are a mistake.
+    let listed = text
+        .replace("    \"sequencer\",", "    { unit = \"sequencer\", functions = [\"control\", \"loop\"] },");
+    let mistake = read("my.toml", &listed).expect_err("it counts loops and does not").render(false);
+    assert!(mistake.contains("loop_depth is 0"), "{mistake}");
+    let source =
+        ".array A[9]\n.output y\n.period\np:\n .for i, 1, 9\n A[i] = 2.5\n .endfor\n y = A[9]\n wait p\n";
+    let options = Options { machine, ..Options::default() };
+    let program = assemble("a.s", &MemoryLoader::of("a.s", source), &options);
+    assert!(program.is_ok_and(|assembled| !assembled.program.loop_bounds.is_empty()));
 }
 
 #[test]
@@ -115,7 +136,7 @@ fn a_later_stage_points_into_the_file() {
     assert_eq!(line(&place(RowPlace::Unit("aux", "divroot"))), "    \"divroot\",");
     assert_eq!(line(&place(RowPlace::Bank("x"))), "bank = \"x\"");
     assert_eq!(line(&place(RowPlace::Field("refill"))), "refill = 6");
-    // Other tests read files whose row is called `t3`.
+    // A machine of the table has no file. (Other tests read files whose row is called `t3`.)
     assert!(about("t1", RowPlace::Name, "", "").is_none());
 }
 

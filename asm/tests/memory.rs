@@ -14,8 +14,8 @@ fn program(text: &str, machine: &'static Machine, schedule: Schedule) -> Program
     assembled.unwrap_or_else(|errors| panic!("{text}\n{}", errors.render(false))).program
 }
 
-/// A block of loads and stores at constant addresses, at offsets from bases that stay, that change and that are copied, and of the
-/// arithmetic that uses what they bring.
+/// A block of loads and stores at constant addresses, at offsets from bases that stay, that change and that are copied, and of
+/// arithmetic on the loaded values.
 fn source(seed: u64) -> String {
     let random = &mut Random::new(seed);
     let mut text = String::from(
@@ -34,7 +34,7 @@ fn source(seed: u64) -> String {
             0..=3 => writeln!(text, " ld {value}, {place}"),
             4..=7 => writeln!(text, " st {place}, {value}"),
             8 => writeln!(text, " iadd {value}, {value}, v{}", random.below(6)),
-            // Within the memory, whatever comes: 0 to 15.
+            // Within the memory for any value: 0 to 15.
             9 => writeln!(text, " iand {}, {value}, 15", random.pick(&["p", "q", "r"])),
             10 => writeln!(text, " mov {}, {}", random.pick(&["p", "q"]), random.pick(&["q", "r", "fixed"])),
             _ => writeln!(text, " mov y, {value}"),
@@ -44,11 +44,11 @@ fn source(seed: u64) -> String {
     text
 }
 
-/// The memory, what each name holds, and cycles.
-type Left = (Vec<u32>, Vec<(String, Option<u32>)>, u64);
+/// The memory, the value of each name, and the cycles.
+type RunResult = (Vec<u32>, Vec<(String, Option<u32>)>, u64);
 
-/// The memory, what each name that outlives the period holds, and the cycles, after some periods.
-fn run(program: &Program, seed: u64) -> Left {
+/// The memory, the value of each name that outlives the period, and the cycles, after some periods.
+fn run(program: &Program, seed: u64) -> RunResult {
     let random = &mut Random::new(seed + 5);
     let mut emulator = Emulator::new(program).expect("it fits");
     let mut cycles = 0;
@@ -64,7 +64,7 @@ fn run(program: &Program, seed: u64) -> Left {
 }
 
 #[test]
-fn memory_and_registers_are_those_of_the_source() {
+fn memory_and_registers_equal_the_sources() {
     let (mut before, mut after) = (0, 0);
     for seed in 0..common::programs(100, 1000) {
         let text = source(seed);
@@ -103,7 +103,7 @@ fn cycles(body: &str) -> u32 {
 }
 
 #[test]
-fn only_what_may_be_the_same_word_is_ordered() {
+fn only_possibly_aliasing_accesses_are_ordered() {
     // The store waits for a product; a load that need not wait for it ends long before.
     let body = |store: &str, load: &str| {
         cycles(&format!(
@@ -132,8 +132,8 @@ fn only_what_may_be_the_same_word_is_ordered() {
 }
 
 #[test]
-fn ports_keep_their_order_with_what_may_fault() {
-    // Of two loads neither waits for the other: the port must come after both, and before the next two.
+fn port_writes_keep_their_order_with_faulting_operations() {
+    // Neither of two loads waits for the other: the port must come after both, and before the next two.
     let text = "\
 .schedule on
 .input x, n:int, far:int

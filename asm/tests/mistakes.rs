@@ -3,7 +3,7 @@
 
 use crate::common;
 use takt_asm::diag::{Diagnostics, Severity};
-use takt_asm::levels::{WARNINGS, Wish};
+use takt_asm::levels::{LevelSetting, WARNINGS};
 use takt_asm::{MemoryLoader, Options};
 
 #[test]
@@ -41,12 +41,12 @@ fn warnings_do_not_stop() {
     }
 }
 
-/// The caller chooses what becomes of warnings, not how many there are.
+/// Options choose the level of warnings, not their number.
 #[test]
 fn warnings_can_be_errors_or_nothing() {
     let text = "; machine f3\n.input x, n:int\n.output F\n.reg a\n.once\n wait p\n.period\np: fadd F, x, n\n wait p\n";
     let assemble = |wishes: &[&str]| {
-        let levels = wishes.iter().map(|wish| wish.parse::<Wish>().expect("it is one")).collect();
+        let levels = wishes.iter().map(|wish| wish.parse::<LevelSetting>().expect("it is one")).collect();
         let options = Options { levels, ..common::options(&takt_isa::F3) };
         takt_asm::assemble("test.s", &MemoryLoader::of("test.s", text), &options)
     };
@@ -62,9 +62,9 @@ fn warnings_can_be_errors_or_nothing() {
     assert_eq!(failed(&["error=types"]), [(Warning, "unused"), (Error, "types")]);
     assert_eq!(failed(&["error", "allow=unused"]), [(Error, "types")]);
     assert_eq!(warned(&["error", "allow=unused", "allow=types"]), []);
-    // Beyond those that are shown they are counted as what they are.
+    // Beyond the shown diagnostics, a warning that counts as an error is counted as one.
     let many = format!("{text}.reg {}\n", (0..150).map(|i| format!("r{i} ")).collect::<String>());
-    let levels = ["error=unused".parse::<Wish>().expect("it is one")].into_iter().collect();
+    let levels = ["error=unused".parse::<LevelSetting>().expect("it is one")].into_iter().collect();
     let options = Options { levels, ..common::options(&takt_isa::F3) };
     let report = takt_asm::assemble("test.s", &MemoryLoader::of("test.s", many), &options);
     let report = report.expect_err("a warning is an error");
@@ -81,7 +81,7 @@ fn the_documentation_lists_every_warning() {
 }
 
 #[test]
-fn json_says_the_same() {
+fn json_equals_the_text() {
     let report = common::bad(".reg a\n.period\n fad a, 1, 2 ; é\n/* é */ \n mov a, bé\n", &takt_isa::F3);
     insta::assert_snapshot!("json", report.to_json());
     let messages = report.messages();

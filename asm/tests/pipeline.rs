@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Software pipelining: a pipelined loop computes, bit for bit, what the loop as written computes.
+//! Software pipelining: a pipelined loop computes the same bits as the loop as written.
 
 use proptest::prelude::*;
 use std::fmt::Write as _;
-use takt_asm::{Assembled, MemoryLoader, Options, Schedule, assemble};
+use takt_asm::{AssembledProgram, MemoryLoader, Options, Schedule, assemble};
 use takt_emu::{Emulator, Stop};
 use takt_isa::{MACHINES, Machine, Op, T4};
 
-fn assembled(source: &str, machine: &'static Machine, schedule: Schedule) -> Assembled {
-    // The search for short blocks is not what is tested here.
+fn assembled(source: &str, machine: &'static Machine, schedule: Schedule) -> AssembledProgram {
+    // The search for short blocks is not under test.
     let options = Options { machine, schedule, effort: 1, ..Options::default() };
     match assemble("loop.s", &MemoryLoader::of("loop.s", source), &options) {
         Ok(assembled) => assembled,
@@ -17,7 +17,7 @@ fn assembled(source: &str, machine: &'static Machine, schedule: Schedule) -> Ass
 }
 
 /// Memory and outputs where the program halts, and the cycle in which it does.
-fn outcome(assembled: &Assembled) -> (Vec<u32>, Vec<Option<u32>>, u64) {
+fn outcome(assembled: &AssembledProgram) -> (Vec<u32>, Vec<Option<u32>>, u64) {
     let mut emulator = Emulator::new(&assembled.program).expect("it fits");
     emulator.set_cycle_limit(1_000_000);
     assert_eq!(emulator.run(), Ok(Stop::Halted));
@@ -42,8 +42,8 @@ fn operation_text((kind, d, a, b, c): (u8, u8, u8, u8, u8), steps: [i32; 2], tex
     };
 }
 
-/// Two loops over tables of 64 words with two pointers. Their count is a constant or, if it is not `known`, loaded. What comes behind
-/// the first one is repeated `again` and again, from the label at its end.
+/// Two loops over tables of 64 words with two pointers. Their count is a constant or, if it is not `known`, loaded. The code behind
+/// the first loop runs `again` times, from the label at its end.
 fn source(count: u32, known: bool, again: u8, steps: [i32; 2], body: &[(u8, u8, u8, u8, u8)]) -> String {
     let mut text = String::from(
         ".output y, z\n.reg f0 f1 f2 f3 f4 f5 i:int j:int n:int left:int\n.data\nguard: .space 200\nt: .rep k, 1, 64\n.float k/3\n.endr\nu: .rep k, 1, 64\n.float 1/k\n.endr\nend: .space 200\n",
@@ -69,7 +69,7 @@ fn source(count: u32, known: bool, again: u8, steps: [i32; 2], body: &[(u8, u8, 
 proptest! {
     #![proptest_config(ProptestConfig { cases: crate::common::programs(25, 100) as u32, ..ProptestConfig::default() })]
 
-    /// Values and memory are those of the loop as written, on every machine that counts loops.
+    /// Values and memory are the same as after the loop as written, on every machine that counts loops.
     #[test]
     fn as_written(
         count in 1u32..20,
@@ -82,7 +82,7 @@ proptest! {
         for machine in MACHINES.iter().filter(|machine| machine.loop_depth > 0) {
             let written = outcome(&assembled(&source, machine, Schedule::None));
             let pipelined = assembled(&source, machine, Schedule::All);
-            // Of the iterations, some are outside of the kernel.
+            // Some iterations lie outside of the kernel.
             prop_assert!(pipelined.program.loop_bounds.iter().all(|bound| bound.most <= 20), "{}", source);
             let pipelined = outcome(&pipelined);
             prop_assert_eq!((&written.0, &written.1), (&pipelined.0, &pipelined.1), "{}\n{}", machine.name, source);
@@ -113,7 +113,7 @@ fn memory_is_the_bound() {
         let pipelined = assembled(&text, machine, Schedule::All);
         assert_eq!(outcome(&written).1, outcome(&pipelined).1);
         assert!(2 * outcome(&pipelined).2 < outcome(&written).2, "{}", machine.name);
-        // One slot is full without overlap, too.
+        // A single slot is full without overlap, too.
         if machine.slots.len() > 1 {
             let report = pipelined.loops.first().expect("it is pipelined");
             assert!(report.interval <= report.bound.cycles() + 2, "{}: {report:?}", machine.name);
@@ -125,8 +125,8 @@ fn memory_is_the_bound() {
 const POINTER: &str = ".data\nt: .rep k, 1, 40\n.float k/3\n.endr\nu: .space 40\n.reg f i:int\n.once\nli i, 0\nloop 40, done\n\
                        ld f, (t)[i]\nfmul f, f, 0.5\nfadd f, f, 1.0\nst (u)[i], f\niadd i, i, 1\ndone:\nhalt\n";
 
-/// No access waits for an advance of its pointer, for another offset makes up for that: an iteration waits only for the slowest value of
-/// the one before, until it is written and read.
+/// No access waits for an advance of its pointer, since another offset makes up for it: an iteration waits only for the slowest value of
+/// the previous iteration, until that is written and read.
 #[test]
 fn a_pointer_is_no_recurrence() {
     for machine in MACHINES.iter().filter(|machine| machine.loop_depth > 0) {
@@ -163,10 +163,10 @@ fn a_prologue_is_no_row_of_bundles() {
     assert!(cycles <= 264, "{cycles} cycles, 264 before");
 }
 
-/// A recurrence over several iterations: the load of an iteration waits for the store of the iteration that many before. Between the
-/// two there is a longer way than the interval of a loop that did not wait.
+/// A recurrence over several iterations: the load of an iteration waits for the store of an iteration a fixed number before. The way
+/// from load to store is longer than the interval of a loop that did not wait.
 #[test]
-fn what_is_stored_is_loaded_iterations_later() {
+fn stored_values_are_loaded_iterations_later() {
     let data = ".data\nt: .rep k, 1, 64\n.float k/3\n.endr\n.reg f i:int j:int\n.once\n";
     let array = ".array x[64]\n.reg f\n.once\n.for k, 1, 64\nx[k] = itof(k)\n.endfor\n";
     let chain = "fmul f, f, 0.5\nfadd f, f, 1.0\nfmul f, f, f\nfsub f, f, 3.0\n";
@@ -198,9 +198,10 @@ fn what_is_stored_is_loaded_iterations_later() {
     }
 }
 
-/// A count that is known at run time only: the loop is there twice, and pays for many iterations, of which an interval is the cost of one.
+/// A count that is known only at run time: the loop is there twice, and pipelining pays for many iterations, where an iteration
+/// costs an interval.
 #[test]
-fn a_count_at_run_time_pays_for_many_iterations() {
+fn run_time_counts_are_pipelined_for_many_iterations() {
     let data = "count: .word COUNT\n.reg n:int ";
     let varying = POINTER
         .replace(".reg ", data)
@@ -278,7 +279,7 @@ fn sets_of_slots_bound_the_interval() {
     }
 }
 
-/// The cycle of a port with a demand is known, and in a loop it has as many as there are iterations.
+/// A port with a demand has one known cycle; in a loop it would have a cycle for each iteration.
 #[test]
 fn a_loop_with_a_demanded_port_stays_as_written() {
     let text = POINTER.replace(".reg", ".input x\n.reg").replace("fadd f, f, 1.0", "fadd f, f, x");

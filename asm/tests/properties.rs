@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Whatever the input: no panic; and what the disassembler writes, the assembler reads back.
+//! No input causes a panic, and the assembler reads back the disassembler's text.
 
 use crate::common;
 use crate::rows;
@@ -130,7 +130,7 @@ fn machine() -> impl Strategy<Value = &'static Machine> {
     prop::sample::select([MACHINES, &shared].concat())
 }
 
-/// Whatever comes out can be rendered and goes through image and disassembly.
+/// Any result can be rendered, and goes through image and disassembly.
 fn exercise(text: &str, machine: &'static Machine) -> Result<(), TestCaseError> {
     match common::assemble(text, machine) {
         Ok(assembled) => {
@@ -154,7 +154,7 @@ fn exercise(text: &str, machine: &'static Machine) -> Result<(), TestCaseError> 
     }
 }
 
-/// An image names its machine, so its reader must know that.
+/// The machine is in the table: an image names its machine, and the reader must know the name.
 fn has_images(machine: &Machine) -> bool {
     Machine::from_name(machine.name).is_ok()
 }
@@ -178,7 +178,7 @@ fn round_trip(program: &Program) -> Result<(), TestCaseError> {
     }
 }
 
-/// Any register.
+/// Any register of the register space.
 fn register() -> impl Strategy<Value = Register> + Clone {
     (0..Register::COUNT).prop_map(|number| Register::new(number).expect("in range"))
 }

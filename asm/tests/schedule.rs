@@ -6,7 +6,7 @@ use crate::common;
 use crate::random_source::{Random, source, source_with_loops};
 use crate::rows;
 use std::collections::BTreeMap;
-use takt_asm::Assembled;
+use takt_asm::AssembledProgram;
 use takt_asm::diag::{Diagnostics, Message, Severity};
 use takt_asm::schedule::DemandKind;
 use takt_asm::schedule::TimingReport;
@@ -21,9 +21,9 @@ fn program(text: &str, machine: &'static Machine, schedule: Schedule, effort: u3
 }
 
 /// Values written to each port, the memory, the flags, and the cycles of each period.
-type Seen = (BTreeMap<String, Vec<u32>>, Vec<u32>, u8);
+type RunResult = (BTreeMap<String, Vec<u32>>, Vec<u32>, u8);
 
-fn run(program: &Program, seed: u64) -> (Seen, Vec<u64>) {
+fn run(program: &Program, seed: u64) -> (RunResult, Vec<u64>) {
     let random = &mut Random::new(seed + 77);
     let mut emulator = Emulator::new(program).expect("it fits");
     emulator.set_cycle_limit(1_000_000);
@@ -65,12 +65,12 @@ fn scheduled_programs_compute_the_same() {
             after += cycles.iter().sum::<u64>();
         }
     }
-    // It is also of use.
+    // Scheduling saves a fifth of the cycles.
     assert!(10 * after < 8 * before, "{after} cycles scheduled, {before} as written");
 }
 
-/// Whatever slots host a function: the values are those of f3, the cycles those that the scheduler says and no fewer than its
-/// bound; the disassembly of what it chose is the program.
+/// Slots that share functions give the values of f3, in the cycles that the scheduler states and no fewer than its bound; the
+/// disassembly, with the chosen slots, is the program.
 #[test]
 fn slots_that_share_functions_compute_the_same() {
     let mut machines: Vec<&'static Machine> = rows::all().iter().collect();
@@ -143,7 +143,7 @@ fn straight(seed: u64) -> String {
 }
 
 #[test]
-fn predicted_cycles_are_those_of_the_machine() {
+fn predicted_cycles_equal_the_machines() {
     for seed in 0..common::programs(10, 40) {
         let text = straight(seed);
         for machine in MACHINES {
@@ -164,7 +164,7 @@ fn machines() -> impl Iterator<Item = &'static Machine> {
 }
 
 /// Assembles a source whose period has demands on ports.
-fn demanding(text: &str, demand: &str, machine: &'static Machine) -> Result<Assembled, Diagnostics> {
+fn demanding(text: &str, demand: &str, machine: &'static Machine) -> Result<AssembledProgram, Diagnostics> {
     let text = text.replace("period:\n", &format!("{demand}\nperiod:\n"));
     let options = Options { machine, effort: 1, ..Options::default() };
     assemble("random.s", &MemoryLoader::of("random.s", text), &options)
@@ -221,7 +221,7 @@ fn deadlines_are_met_or_refused() {
             let free = demanding(&text, ".deadline oa = 100000", machine).expect("it has all the time");
             let [report] = &free.timing[..] else { panic!("one demand, one report") };
             agrees(report, &free.program, &text);
-            // From far too early to what the scheduler does anyway.
+            // From far too early to the cycle without a deadline.
             let freely = report.ports[0].2;
             for earlier in [0, 1, random.below(8), random.below(16)] {
                 let limit = freely.saturating_sub(earlier as u32).max(1);
@@ -238,7 +238,7 @@ fn deadlines_are_met_or_refused() {
                     Err(errors) => {
                         refused += 1;
                         let message = &refusal(&errors);
-                        // No schedule is better than what is said to be the bound.
+                        // No schedule is better than the stated bound.
                         if let Some((_, bound)) =
                             message.message.split_once("cannot be written before cycle ")
                         {
@@ -294,7 +294,7 @@ fn orders_are_kept_or_refused() {
 
 /// The source writes the ports the other way round.
 #[test]
-fn an_order_other_than_the_source_has_is_kept() {
+fn keeps_a_demanded_order_against_the_source() {
     let text = ".input x, y\n.output first, second\n.schedule on\n.period\nperiod:\n fabs first, x\n fabs second, y\n wait period\n";
     for machine in machines() {
         let assembled = demanding(text, ".order second, first", machine).expect("nothing is in its way");
@@ -304,7 +304,8 @@ fn an_order_other_than_the_source_has_is_kept() {
     }
 }
 
-/// One slot has all the loads and computes quickly; the other has nothing to do, but takes longer. A deadline counts on the quick one.
+/// A slot has all the loads and computes quickly; another slot has nothing to do, but takes longer. A deadline counts on the
+/// quick slot.
 #[test]
 fn a_port_is_written_from_the_quickest_slot() {
     let mut text = String::from(
@@ -321,13 +322,13 @@ fn a_port_is_written_from_the_quickest_slot() {
 }
 
 #[test]
-fn late_reads_come_later_and_cost_what_they_may() {
+fn late_reads_come_later_within_their_cost() {
     let (mut before, mut after) = (0, 0);
     for seed in 0..common::programs(3, 12) {
         let text = straight(seed);
         for machine in machines() {
             let values = run(&program(&text, machine, Schedule::None, 0), seed).0;
-            let block = |assembled: &Assembled| {
+            let block = |assembled: &AssembledProgram| {
                 let start = assembled.program.sections[1].start;
                 let block = assembled.blocks.iter().find(|block| block.address == start);
                 block.map(|block| (block.cycles, block.cycles == block.bound.cycles()))
@@ -339,7 +340,7 @@ fn late_reads_come_later_and_cost_what_they_may() {
                 let Some(report) = late.timing.first() else { continue };
                 agrees(report, &late.program, &text);
                 assert_eq!(run(&late.program, seed).0, values, "seed {seed}, {demand}:\n{text}");
-                // Two searches that prove nothing may differ by a cycle: what is allowed is beyond what this one found.
+                // Two searches without a proof may differ by a cycle, which is allowed here.
                 let (length, allowed) = (block(&late), block(&plain));
                 let allowed = allowed.map(|(cycles, shortest)| cycles + cost + u32::from(!shortest));
                 assert!(
@@ -365,7 +366,8 @@ fn late_reads_come_later_and_cost_what_they_may() {
     assert!(2 * after > 3 * before, "first reads in cycles {before} in all, late in {after}");
 }
 
-/// Three sums, one after another, and what waits for none of them: the bound is the sums', up to the wait for the last.
+/// Three sums, one after another, and an operation that waits for none of them: the bound is the sums', up to the wait for the
+/// last.
 #[test]
 fn a_block_is_no_shorter_than_its_chain() {
     let text = ".input x\n.output y, z\n.reg t\n.schedule on\n.period\nperiod:\n fadd t, x, x\n fadd t, t, x\n fadd y, t, x\n fabs z, x\n \
@@ -378,7 +380,7 @@ fn a_block_is_no_shorter_than_its_chain() {
     }
 }
 
-/// A small kernel packed by hand, once: the scheduler needs no more cycles, and the values are the same.
+/// A small kernel packed by hand: the scheduler needs no more cycles, and the values are the same.
 #[test]
 fn as_good_as_by_hand() {
     let kernel = |name: &str, text: &str| {
@@ -399,10 +401,10 @@ fn as_good_as_by_hand() {
     assert_eq!(sorted(values), sorted(expected));
 }
 
-/// Cycles of the periods of random sources, all together: what the first passes find, and what a short search makes of it. No change
-/// makes them longer unseen.
+/// Cycles of the periods of random sources, all together: after the first passes, and after a short search. No change makes them
+/// longer unseen.
 #[test]
-fn short_searches_find_what_they_found_before() {
+fn short_searches_keep_their_results() {
     let most = [(0, 23_608), (1, 5561)];
     let found = most.map(|(effort, _)| {
         let mut cycles = 0;
@@ -435,7 +437,7 @@ fn adders() -> impl Iterator<Item = (&'static Machine, u32)> {
     single.filter_map(move |machine| Some((machine, machine.host(adder)?.1.latency + 1)))
 }
 
-/// Of two deadlines of one port, in whatever order, the earlier one counts.
+/// The earlier of two deadlines of one port counts, in whatever order they stand.
 #[test]
 fn the_earlier_of_two_deadlines_counts() {
     for (machine, limit) in adders() {
@@ -450,7 +452,7 @@ fn the_earlier_of_two_deadlines_counts() {
     }
 }
 
-/// The bound of a block is that of all its schedules, not only of those that meet the deadlines.
+/// The bound of a block holds for all its schedules, not only for schedules that meet the deadlines.
 #[test]
 fn a_deadline_is_no_bound_of_the_block() {
     for (machine, limit) in adders() {
@@ -466,8 +468,8 @@ fn a_deadline_is_no_bound_of_the_block() {
     }
 }
 
-/// An input that is read by the operation that writes a port: from the read to the write there is that operation's latency, no less and
-/// no more, and that is the bound.
+/// An operation reads an input and writes a port: the window from read to write is the operation's latency, no less and no more, which
+/// is the bound.
 #[test]
 fn the_least_window_is_its_bound() {
     let text = ".input x, a\n.output y\n.reg t\n.schedule on\n.period\nperiod:\n fsqrt t, a\n fadd y, t, x\n wait period\n";
@@ -483,7 +485,7 @@ fn the_least_window_is_its_bound() {
     }
 }
 
-/// Two ports, each of which can be written in a cycle in which not both can: the search goes on until it is spent, and says so.
+/// Two ports that can each be written in a cycle, but not both: the search goes on until its effort is spent, and says so.
 #[test]
 fn deadlines_that_exclude_one_another_are_refused() {
     let text = ".input x\n.output y, z\n.schedule on\n.period\nperiod:\n fadd y, x, x\n fadd z, x, 1.0\n wait period\n";

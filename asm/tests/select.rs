@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Short branches that become selections, and those that must not.
+//! Short branches that become selections, and short branches that must not.
 
-use takt_asm::{Assembled, MemoryLoader, Options, Schedule, assemble};
+use takt_asm::{AssembledProgram, MemoryLoader, Options, Schedule, assemble};
 use takt_emu::{Emulator, Stop};
 use takt_isa::{MACHINES, Machine};
 
-fn assembled(source: &str, machine: &'static Machine, schedule: Schedule) -> Assembled {
+fn assembled(source: &str, machine: &'static Machine, schedule: Schedule) -> AssembledProgram {
     let options = Options { machine, schedule, ..Options::default() };
     match assemble("select.s", &MemoryLoader::of("select.s", source), &options) {
         Ok(assembled) => assembled,
@@ -14,7 +14,7 @@ fn assembled(source: &str, machine: &'static Machine, schedule: Schedule) -> Ass
 }
 
 /// The outputs when the program halts, and the cycle in which it does.
-fn outcome(assembled: &Assembled) -> (Vec<Option<u32>>, u64) {
+fn outcome(assembled: &AssembledProgram) -> (Vec<Option<u32>>, u64) {
     let mut emulator = Emulator::new(&assembled.program).expect("it fits");
     emulator.set_cycle_limit(1_000_000);
     assert_eq!(emulator.run(), Ok(Stop::Halted));
@@ -36,7 +36,7 @@ fn a_search_is_pipelined() {
             (assembled(&source, machine, Schedule::None), assembled(&source, machine, Schedule::All));
         assert_eq!((plain.selections.len(), selected.selections.len()), (0, 1), "{}", machine.name);
         assert_eq!(selected.selections[0].registers, 2);
-        // One slot is full without overlap.
+        // A single slot is full without overlap.
         let pipelined = usize::from(machine.slots.len() > 1);
         assert_eq!(selected.loops.len(), pipelined, "{}: {:?}", machine.name, selected.plain_loops);
         assert_eq!(outcome(&plain).0, outcome(&selected).0);
@@ -47,7 +47,7 @@ fn a_search_is_pipelined() {
     }
 }
 
-/// Two registers change places: no selection reads what one before it has written.
+/// Two registers change places: no selection reads the result of an earlier one.
 #[test]
 fn registers_may_change_places() {
     for condition in [0, 1] {
@@ -77,7 +77,7 @@ fn registers_may_change_places() {
 
 /// An operation whose effect can be seen, or that can fault, stays behind the branch.
 #[test]
-fn what_can_be_seen_stays_behind_a_branch() {
+fn observable_operations_stay_behind_a_branch() {
     let passed = [
         ("mov v, x", true),
         ("iadd n, n, 1", true),
@@ -95,7 +95,7 @@ fn what_can_be_seen_stays_behind_a_branch() {
             ".input x\n.output y z\n.reg v n:int m:int w:int late\n.data\nd: .space 4\n.schedule on\n.once\n mov v, zero\n li n, 0\n li m, 1\n\
              wait period\n.period\nperiod: ilt w, m, n\n bz w, skip\n {operations}\nskip: mov late, v\n fadd z, v, late\n itof y, n\n wait period\n"
         );
-        // A value of one period is none of the next: on the first way to it, `late` has none.
+        // A value does not outlive its period: on the first way to its read, `late` has no value.
         let assembled = assembled(&source, &takt_isa::T3, Schedule::AsWritten);
         assert_eq!(assembled.selections.len(), usize::from(is_selected), "{operations}");
     }

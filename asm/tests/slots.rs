@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Slots that share functions, as who writes a program sees them: which slot takes what, the slots that the source names, and what
-//! is said when there are not enough.
+//! Slots that share functions, as a program's author sees them: the slot of each operation, the slots that the source names, and
+//! the messages if slots do not suffice.
 
 use crate::common::{assemble, bad, bundles};
 use crate::rows;
 use std::path::Path;
 use takt_asm::diag::Message;
 use takt_asm::schedule::Resources;
-use takt_asm::{Assembled, FileLoader, MemoryLoader, Options, disasm, listing};
+use takt_asm::{AssembledProgram, FileLoader, MemoryLoader, Options, disasm, listing};
 use takt_emu::Emulator;
 use takt_isa::{F1, F3, Machine, Program, SlotIndex};
 
 /// Assembles a text without mistakes for a row.
 #[track_caller]
-fn good(text: &str, row: &str) -> Assembled {
+fn good(text: &str, row: &str) -> AssembledProgram {
     assemble(text, rows::named(row)).unwrap_or_else(|report| panic!("{}", report.render(false)))
 }
 
@@ -26,7 +26,7 @@ fn mistake(text: &str, row: &str) -> Message {
 }
 
 /// The bank in which a name's register lies.
-fn bank(assembled: &Assembled, name: &str) -> char {
+fn bank(assembled: &AssembledProgram, name: &str) -> char {
     let program = &assembled.program;
     let mut ports = program.registers.iter().chain(&program.outputs);
     let port = ports.find(|port| port.name == name).expect("it has a register");
@@ -56,7 +56,7 @@ fn a_bundle_uses_every_slot_that_can_take_an_operation() {
 
 #[test]
 fn a_register_keeps_its_bank_whichever_bundle_decides() {
-    // `b` shares a bundle with what only `aux` executes, so it is in the bank of `add`, and `a` is not.
+    // `b` shares a bundle with an operation that only `aux` executes, so it is in the bank of `add`, and `a` is not.
     let lines = "fadd a, x, y || fadd b, y, x\n fmul c, x, y\n fadd b, b, b || fabs t, x\n fadd a, a, b";
     let assembled = good(&period(lines), "second_adder");
     assert_eq!((bank(&assembled, "a"), bank(&assembled, "b")), ('x', 'a'));
@@ -71,7 +71,7 @@ fn a_register_keeps_its_bank_whichever_bundle_decides() {
     );
 }
 
-/// The same, one operation after another. (No operation of a bundle here reads what the bundle writes but itself.)
+/// The operations of bundles one after another. (In these bundles, an operation reads no result of the bundle but its own.)
 fn serial(text: &str) -> String {
     text.replace(" || ", "\n ")
 }
@@ -107,7 +107,7 @@ fn the_source_names_a_slot() {
 }
 
 #[test]
-fn what_cannot_have_its_slot_says_so() {
+fn reports_slots_that_an_operation_cannot_have() {
     let error =
         mistake(&period("fadd.mul a, x, y\n fadd b, x, y\n fmul c, x, y\n fabs t, x"), "second_adder");
     assert_eq!((error.code, &*error.message), ("no-unit", "slot `mul` has no unit for `fadd`"));
@@ -132,7 +132,7 @@ fn what_cannot_have_its_slot_says_so() {
 }
 
 #[test]
-fn has_asks_for_a_slot() {
+fn has_queries_a_slot() {
     let asked = |machine: &'static Machine, name: &str| {
         let text = format!(".const K = {name}\n.output o\n.period\nstart: fadd o, zero, K\n wait start\n");
         let assembled = assemble(&text, machine).unwrap_or_else(|report| panic!("{}", report.render(false)));
@@ -162,7 +162,7 @@ fn the_listing_and_the_disassembly_name_the_slot() {
     assert!(text.contains("       fabs t, x"), "what has one slot only says nothing of it:\n{text}");
     let text = disasm::disassemble(&assembled.program);
     assert!(text.contains("fmul c, x, y || fadd.add a, x, y || fsub.aux b, x, y"), "{text}");
-    // Nothing of that on f3.
+    // No slot is named on f3.
     let assembled =
         assemble(&period("fadd a, x, y || fmul c, x, y\n fadd b, x, y\n fabs t, x"), &F3).expect("good");
     assert!(!disasm::disassemble(&assembled.program).contains("fadd."));
@@ -265,7 +265,7 @@ fn resources_have_their_names() {
 }
 
 #[test]
-fn what_asks_for_no_schedule_stays_as_written() {
+fn unscheduled_code_stays_as_written() {
     let work = " fadd y, x, x\n fmul z, x, x\n wait period\n";
     let text =
         format!(".input x\n.output y, z\n.schedule on\n.once\n{work}.schedule off\n.period\nperiod:\n{work}");

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Blocks of equations with more values at a time than a bank has registers.
 
-use takt_asm::{Assembled, Diagnostics, MemoryLoader, Options, assemble};
+use takt_asm::{AssembledProgram, Diagnostics, MemoryLoader, Options, assemble};
 use takt_emu::{Emulator, Number};
 use takt_isa::{F3, Function, MACHINES, Machine};
 
-/// A chain of so many values, all of which are read again, the last first: in any order they are all needed at a time.
+/// A chain of `values` values, all of them read again, the last first: in any order they are all needed at a time.
 fn source(values: usize) -> String {
     let mut text = ".schedule on\n.input a, b\n.output y, z\n".to_owned();
     for i in 0..values {
@@ -22,7 +22,7 @@ fn source(values: usize) -> String {
     text + " y = s0\n z = v1*s1\n wait p\n"
 }
 
-/// The same in binary32.
+/// The outputs of [`source`], computed in binary32.
 fn expected(values: usize, a: f32, b: f32) -> [u32; 2] {
     let mut v = vec![a * b];
     for i in 1..values {
@@ -41,12 +41,12 @@ fn registers(machine: &Machine) -> usize {
     usize::from(machine.slot(slot).bank.depth - machine.outputs_per_bank)
 }
 
-fn assembled(text: &str, machine: &'static Machine) -> Result<Assembled, Diagnostics> {
+fn assembled(text: &str, machine: &'static Machine) -> Result<AssembledProgram, Diagnostics> {
     let options = Options { machine, effort: 1, ..Options::default() };
     assemble("spill.s", &MemoryLoader::of("spill.s", text), &options)
 }
 
-fn run(assembled: &Assembled, a: f32, b: f32) -> ([u32; 2], u64) {
+fn run(assembled: &AssembledProgram, a: f32, b: f32) -> ([u32; 2], u64) {
     let mut emulator = Emulator::new(&assembled.program).unwrap();
     emulator.set_input("a", Number::Float(a)).unwrap();
     emulator.set_input("b", Number::Float(b)).unwrap();
@@ -94,7 +94,7 @@ fn values_without_a_register_keep_every_bit() {
     }
 }
 
-/// Words that the program uses are left alone; where it is not known which these are, nothing is kept there.
+/// Words that the program uses are left alone; if these words are unknown, no value is kept in memory.
 #[test]
 fn words_of_the_program_are_left_alone() {
     let declared = source(300).replace(".once\n", ".data\ntable: .float 1, 2, 3\n.once\n");
@@ -112,7 +112,7 @@ fn words_of_the_program_are_left_alone() {
 
 /// A value that a hand-written operation writes stays in its register.
 #[test]
-fn registers_that_the_source_names_are_left_alone() {
+fn named_registers_are_not_spilled() {
     let names: Vec<String> = (0..300).map(|i| format!("v{i}")).collect();
     let mut text = ".schedule on\n.input a, b\n.output y\n".to_owned();
     for names in names.chunks(20) {
@@ -133,12 +133,12 @@ fn registers_that_the_source_names_are_left_alone() {
 }
 
 #[test]
-fn what_is_too_large_is_refused_with_the_numbers() {
+fn rejects_oversized_programs_with_figures() {
     let errors = assembled(&source(900), &F3).unwrap_err().render(false);
     assert!(errors.contains("and f3 has 1024"), "{errors}");
 }
 
-/// Values of which few are needed at a time in the source's order, and many in the order in which they are ready.
+/// Values with few needed at a time in the source's order, and many in the order in which they are ready.
 #[test]
 fn an_order_near_to_the_source_may_be_enough() {
     let (mut text, mut names) = (".schedule on\n.output y\n.reg s0\n".to_owned(), String::new());
@@ -165,7 +165,7 @@ fn an_order_near_to_the_source_may_be_enough() {
     assert_eq!(emulator.output("y").unwrap(), Some(Number::Float(expected)));
 }
 
-/// Sums of products of constants, each of which has a register, by hand-written operations.
+/// Sums of products of constants in registers, by hand-written operations.
 fn products(constants: usize) -> String {
     let mut text = ".schedule on\n.input x\n.output y\n.reg s v\n.state g h\n.preset g = 1\n.preset h = 2\n.once\n wait p\n.period\np:\n mov s, x\n"
         .to_owned();
@@ -177,10 +177,10 @@ fn products(constants: usize) -> String {
     text + " fadd g, g, h\n fadd h, h, g\n mov y, s\n wait p\n"
 }
 
-/// If registers do not suffice for a short schedule, length is given for them, in the end all of it: what fits without the
-/// scheduler fits with it.
+/// A short schedule that lacks registers gives way to longer schedules, in the end to the source's order: a program that
+/// fits without the scheduler fits with it.
 #[test]
-fn what_fits_without_the_scheduler_fits_with_it() {
+fn scheduling_needs_no_more_registers() {
     for machine in MACHINES {
         let all: usize =
             machine.slots.iter().map(|slot| usize::from(slot.bank.depth - machine.outputs_per_bank)).sum();
@@ -206,7 +206,7 @@ fn what_fits_without_the_scheduler_fits_with_it() {
     }
 }
 
-fn output(assembled: &Assembled) -> (Option<Number>, u64) {
+fn output(assembled: &AssembledProgram) -> (Option<Number>, u64) {
     let mut emulator = Emulator::new(&assembled.program).unwrap();
     emulator.set_input("x", Number::Float(0.7)).unwrap();
     emulator.run_period(&[]).unwrap();
@@ -216,7 +216,7 @@ fn output(assembled: &Assembled) -> (Option<Number>, u64) {
 
 /// A full bank says what fills it, and points there.
 #[test]
-fn a_full_bank_says_what_fills_it() {
+fn full_bank_error_names_its_contents() {
     let report = |text: &str, machine| assembled(text, machine).unwrap_err().render(false);
     insta::assert_snapshot!("constants", report(&products(500), &takt_isa::F1));
     // Room for all constants and names, and for one value where two are needed.

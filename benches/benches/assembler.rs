@@ -5,10 +5,10 @@
 use criterion::Criterion;
 use std::fmt::Write as _;
 use takt_asm::{MemoryLoader, Options};
-use takt_benches::{DEEP, Measured, source};
+use takt_benches::{DEEP, FastestTimes, source};
 
-/// A block of this many operations in straight line, with chains of dependence as a controller has them; if it is to use
-/// `memory`, every third loads or stores, at addresses that are known only when it runs.
+/// A straight-line block of this many operations, with dependence chains as in a controller. `memory`: every third operation loads or
+/// stores at an address known only at run time.
 fn block(operations: usize, memory: bool) -> String {
     let mut text = String::from(
         ".input x, y, n:int\n.output F\n.schedule on\n.data\ntable: .space 64\n.period\nperiod:\n",
@@ -35,7 +35,7 @@ fn block(operations: usize, memory: bool) -> String {
 
 fn main() {
     let mut criterion = Criterion::default().configure_from_args();
-    let mut group = Measured::new(&mut criterion, "assembler");
+    let mut group = FastestTimes::new(&mut criterion, "assembler");
     let mut rows = Vec::new();
     for lines in [10_000, 100_000, 1_000_000] {
         let loader = MemoryLoader::of("source.s", source(lines));

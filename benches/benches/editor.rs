@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The language server: from a keystroke in 10,000 lines to the diagnostics, beside what assembling those lines takes. On a machine
-//! that does other things too, the processor's time says more than the clock's.
+//! Language server: time from a keystroke in 10,000 lines to the diagnostics, compared with the assembly of these lines. On a busy machine,
+//! processor time says more than wall-clock time.
 #![allow(missing_docs, clippy::print_stdout)]
 
 use crossbeam_channel::RecvTimeoutError;
@@ -12,13 +12,13 @@ use takt_asm::{MemoryLoader, Options};
 use takt_editor::lsp::{Settings, serve};
 use takt_isa::{Machine, T3};
 
-/// t3 with room for the program: the machine is data.
+/// t3 with a larger program memory.
 static DEEP: Machine = Machine { name: "t3-deep", code_depth: 1 << 21, ..T3 };
 const LINES: usize = 10_000;
 const KEYS: usize = 60;
 const URI: &str = "untitled:bench";
 
-/// A source of this many lines, in the mix of a real one.
+/// A source of this many lines, in a realistic mix.
 fn source(lines: usize) -> String {
     let mut text = String::from(
         ".const k = 2*pi*80\n.input n:int, x, y\n.output F\n.reg a b c d t\n.macro scale to, by\n fmul to, to, by\n.endm\n\
@@ -40,34 +40,34 @@ fn source(lines: usize) -> String {
     text
 }
 
-/// Milliseconds, in the middle and the longest.
+/// Median and maximum, in milliseconds.
 fn shown(mut times: Vec<f64>) -> (f64, f64) {
     times.sort_by(f64::total_cmp);
     (1e3 * times[times.len() / 2], 1e3 * times[times.len() - 1])
 }
 
-/// Seconds of the clock, and of the processor in all threads of this process, where the system counts them.
+/// Wall-clock seconds, and processor seconds of all threads of this process, where the system counts them.
 #[derive(Clone, Copy)]
-struct Spent {
+struct ElapsedTime {
     clock: f64,
     processor: Option<f64>,
 }
 
-/// A point in time, from which to count.
-struct Begin(Instant, Option<f64>);
+/// Start of a measurement.
+struct StartTime(Instant, Option<f64>);
 
-impl Begin {
-    fn now() -> Begin {
-        Begin(Instant::now(), processor())
+impl StartTime {
+    fn now() -> StartTime {
+        StartTime(Instant::now(), processor())
     }
 
-    fn spent(&self) -> Spent {
+    fn spent(&self) -> ElapsedTime {
         let processor = self.1.zip(processor()).map(|(begin, end)| end - begin);
-        Spent { clock: self.0.elapsed().as_secs_f64(), processor }
+        ElapsedTime { clock: self.0.elapsed().as_secs_f64(), processor }
     }
 }
 
-/// Seconds that the threads there are have had a processor: Linux counts them in nanoseconds.
+/// Processor seconds of the live threads, from Linux's nanosecond counters.
 fn processor() -> Option<f64> {
     let tasks = std::fs::read_dir("/proc/self/task").ok()?;
     let of = |task: std::fs::DirEntry| {
@@ -77,8 +77,8 @@ fn processor() -> Option<f64> {
     Some(1e-9 * tasks.flatten().filter_map(of).sum::<u64>() as f64)
 }
 
-/// A line of the table; whole: what assembling takes.
-fn print(what: &str, times: &[Spent], whole: f64) {
+/// Prints a row of the table. `whole`: seconds of a complete assembly.
+fn print(what: &str, times: &[ElapsedTime], whole: f64) {
     let (median, longest) = shown(times.iter().map(|spent| spent.clock).collect());
     let processor: Option<Vec<f64>> = times.iter().map(|spent| spent.processor).collect();
     let processor = processor.map_or("-".to_owned(), |times| format!("{:.1}", shown(times).0));
@@ -108,12 +108,12 @@ fn main() {
     let line = text.lines().position(|line| line == "step400:").expect("there is one") + 1;
     let mut keys = Vec::new();
     for key in 0..KEYS {
-        // A letter of a mnemonic, wrong and right in turn.
+        // Alternately misspells and corrects a mnemonic.
         let letter = if key % 2 == 0 { "k" } else { "l" };
         let range =
             json!({ "start": { "line": line, "character": 11 }, "end": { "line": line, "character": 12 } });
         let change = json!({ "range": range, "text": letter });
-        let begin = Begin::now();
+        let begin = StartTime::now();
         notify(
             "textDocument/didChange",
             json!({ "textDocument": { "uri": URI, "version": key + 2 }, "contentChanges": [change] }),
@@ -127,9 +127,9 @@ fn main() {
 
     let loader = MemoryLoader::of("bench.s", text.as_str());
     let options = Options { machine: &DEEP, ..Options::default() };
-    let spent = |run: &dyn Fn()| -> Vec<Spent> {
+    let spent = |run: &dyn Fn()| -> Vec<ElapsedTime> {
         let one = || {
-            let begin = Begin::now();
+            let begin = StartTime::now();
             run();
             begin.spent()
         };

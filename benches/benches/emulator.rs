@@ -4,7 +4,7 @@
 
 use criterion::Criterion;
 use takt_asm::{MemoryLoader, Options};
-use takt_benches::Measured;
+use takt_benches::FastestTimes;
 use takt_emu::Emulator;
 use takt_isa::{MACHINES, Register};
 use takt_programs::hybrid::closed_loop::{ClosedLoop, Inputs};
@@ -12,7 +12,7 @@ use takt_programs::hybrid::{Controller, ports};
 use takt_programs::trajectory::Trajectory;
 use takt_programs::{AGH, SOURCES, gcode};
 
-/// Periods of a sample.
+/// Number of periods in a sample.
 const PERIODS: usize = 4000;
 
 /// Inputs recorded in closed loop with the binary64 controller.
@@ -28,12 +28,12 @@ fn recorded() -> Vec<Inputs> {
 fn main() {
     let mut criterion = Criterion::default().configure_from_args();
     let inputs = recorded();
-    let mut group = Measured::new(&mut criterion, "tracking");
+    let mut group = FastestTimes::new(&mut criterion, "tracking");
 
     let native = group.seconds("native binary32", PERIODS as u64, || {
         let mut controller = Controller::<f32>::new();
         for inputs in &inputs {
-            // All outputs are wanted, or the compiler leaves out what computes the others.
+            // Use all outputs; otherwise the compiler removes their computation.
             std::hint::black_box(controller.step(inputs.counts, &inputs.reference));
         }
     });

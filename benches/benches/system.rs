@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A system beside its cores alone: the three-processor controller as its robot begins a motion, and each of its cores with
-//! the same inputs in the same cycles, one after the other. What the links and running ahead by turns cost is the difference.
+//! Cost of links and of taking turns: a whole system (the three-processor controller at the start of a motion) compared with each of its
+//! cores run alone on the same inputs in the same cycles.
 #![allow(missing_docs, clippy::print_stdout)]
 
 use criterion::Criterion;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
-use takt_benches::Measured;
+use takt_benches::FastestTimes;
 use takt_emu::Emulator;
 use takt_isa::Register;
 use takt_isa::timing::Cycle;
@@ -15,10 +15,10 @@ use takt_robot::level::{NoFiles, Session};
 use takt_robot::plant::Plant;
 use takt_system::{Description, HostAction, System};
 
-/// The host's commands: joints move, and come back.
+/// Commands of the host: a motion of the joints and back.
 const MOTION: &str = "via move joints(12, 82, 4, 4, -40, 4)\nmove joints(0, 90, 0, 0, -45, 0)\nwait 0.05\n";
 
-/// A core's inputs: the cycle in which each counts, its port, its value.
+/// Inputs of a core: cycle of effect, port, value.
 type Inputs = Vec<(Cycle, Register, u32)>;
 
 fn system(description: &Description, actions: &[(Cycle, HostAction)], end: Cycle) -> System {
@@ -35,7 +35,7 @@ fn drive(system: &mut System, actions: &[(Cycle, HostAction)], end: Cycle) {
     system.run_until(end).expect("it has no fault");
 }
 
-/// A core by itself, with the inputs and ticks that it has in the system.
+/// Runs a core alone, with its inputs and ticks from the system.
 fn alone(description: &Description, core: usize, inputs: &Inputs, start: Cycle, end: Cycle) -> Emulator {
     let known = &description.cores[core];
     let mut emulator = Emulator::new(&known.program).expect("it fits the machine");
@@ -67,7 +67,7 @@ fn main() {
     let ran = session.host().robot().system();
     let (actions, end) = (ran.host_actions().to_vec(), ran.now());
 
-    // Once more for the inputs of each core.
+    // A second run records the inputs of each core.
     let mut recorded = System::new(&description).expect("it fits the machines");
     recorded.keep_core_events();
     let mut inputs = vec![Inputs::new(); description.cores.len()];
@@ -83,7 +83,7 @@ fn main() {
     }
 
     let mut criterion = Criterion::default().configure_from_args();
-    let mut group = Measured::new(&mut criterion, "system");
+    let mut group = FastestTimes::new(&mut criterion, "system");
     let together = group.seconds("three cores in a system", end, || system(&description, &actions, end));
     let cores: Vec<f64> = (0..description.cores.len())
         .map(|core| {

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""Counts the cycles of kernels.c on processors that others wrote: run.py CORE FOLDER prints {kernel: {column: cycles}}.
+"""Counts the cycles of kernels.c on other processors: run.py CORE FOLDER prints {kernel: {column: cycles}}.
 
 CORE is the folder of CV32E40P's sources, FOLDER is for what is built.
 
@@ -27,7 +27,7 @@ CORTEX = ["--target=armv7em-none-eabihf", "-mcpu=cortex-m7", "-mfloat-abi=hard"]
 RISCV = ["-march=rv32imfc_zicsr", "-mabi=ilp32f"]
 FREE = ["-O3", "-ffast-math", "-fno-math-errno", "-fomit-frame-pointer", "-ffreestanding", "-nostdlib", "-static"]
 
-# How far results may lie from the host's, relative to the greatest: sums in another order.
+# Tolerance of results against the host, relative to the largest: sums are formed in another order.
 TOLERANCE = 1e-4
 
 # Repetitions of a block in the model.
@@ -35,7 +35,7 @@ REPEATED = 100
 
 
 def run(*command, **options):
-    """Runs a program, and returns what it prints."""
+    """Runs a program, and returns its output."""
     done = subprocess.run([str(word) for word in command], capture_output=True, **options)
     if done.returncode != 0:
         said = (done.stderr or done.stdout).decode(errors="replace")
@@ -48,14 +48,14 @@ def floats(data):
 
 
 def native(kernel, folder):
-    """The kernel's results, as the host computes them without reordering."""
+    """Results of the kernel on the host, computed without reordering."""
     program = folder / f"{kernel}-native"
     run("gcc", "-O1", "-fno-math-errno", "-ffp-contract=off", f"-DKERNEL_{kernel}", HERE / "kernels.c", "-o", program)
     return floats(run(program))
 
 
 def compare(kernel, what, results, expected):
-    """Ends the run if results are not the expected ones."""
+    """Exits with a message if results differ from the expected ones."""
     scale = max(abs(value) for value in expected)
     if len(results) != len(expected) or any(
         not abs(a - b) <= TOLERANCE * scale for a, b in zip(results, expected)
@@ -64,7 +64,7 @@ def compare(kernel, what, results, expected):
 
 
 def simulator(core, folder):
-    """CV32E40P in Verilator."""
+    """Simulator of CV32E40P, built with Verilator."""
     sources = core / "rtl"
     files = [
         "--cc", "--exe", "--build", "-O3", "-Wno-fatal", "-Wno-lint", "-Wno-style", "-Wno-MULTIDRIVEN", "-Wno-UNOPTFLAT",
@@ -76,7 +76,7 @@ def simulator(core, folder):
 
 
 def riscv(kernel, program, folder, expected):
-    """The kernel's cycles on the simulated core."""
+    """Cycles of the kernel on the simulated core."""
     work = folder / kernel
     work.mkdir(parents=True, exist_ok=True)
     linked = work / "program.elf"
@@ -94,7 +94,7 @@ def riscv(kernel, program, folder, expected):
 
 
 def executed(program, log):
-    """How often each block of the kernel was executed: {(addresses of its instructions): times}."""
+    """Execution counts of the kernel's blocks: {(addresses of its instructions): count}."""
     run("qemu-arm", "-cpu", "max", "-d", "in_asm,exec,nochain", "-D", log, program)
     blocks, times, own = {}, Counter(), None
     for line in log.read_text(errors="replace").splitlines():
@@ -111,7 +111,7 @@ def executed(program, log):
 
 
 def arm(kernel, folder, expected):
-    """The kernel's cycles by the model of a Cortex-M7."""
+    """Cycles of the kernel in the model of a Cortex-M7."""
     program = folder / f"{kernel}-arm"
     run(CLANG, *CORTEX, *FREE, "-fuse-ld=lld", f"-DKERNEL_{kernel}", HERE / "kernels.c", "-o", program)
     compare(kernel, "the Cortex-M7's program", floats(run("qemu-arm", "-cpu", "max", program)), expected)
@@ -122,7 +122,7 @@ def arm(kernel, folder, expected):
             function = found[1]
         elif found := re.match(r"\s*([0-9a-f]+):\s+(\S.*)", line):
             text = found[2].split("@")[0].split("<")[0].strip()
-            # A branch goes anywhere: the model knows no targets.
+            # Drop the branch target, which the model does not know.
             text = re.sub(r"^(b\w*|cbn?z)(\.\w)?(\s.*?)?0x[0-9a-f]+$", lambda m: f"{m[1]}{m[2] or ''}{m[3] or ' '}.", text)
             instructions[int(found[1], 16)] = (function, text)
     blocks = executed(program, folder / f"{kernel}.log")
@@ -145,7 +145,7 @@ def mnemonic(instruction):
 
 
 def bare(block):
-    """A block without IT and without the conditions of the instructions that it covers: the model knows neither."""
+    """A block without IT instructions and the conditions that they imply: the model supports neither."""
     left, covered = [], 0
     for instruction in block:
         if found := re.match(r"i(t[te]*)\s", instruction):
@@ -161,7 +161,7 @@ def bare(block):
 
 
 def modelled(blocks, unknown, source):
-    """Cycles of each block. None if the model lacks an instruction, which then is among the unknown: each takes a cycle."""
+    """Cycles of each block. None if the model lacks an instruction, which is added to `unknown`: each then counts one cycle."""
     text = ""
     for number, block in enumerate(blocks):
         lines = "\n".join(line for line in block if mnemonic(line) not in unknown)

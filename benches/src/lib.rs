@@ -1,31 +1,31 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The benchmarks' common part: measuring through criterion while keeping the times, so that a run ends with ratios.
+//! Common part of the benchmarks: measures through criterion and keeps the times, so that a run can end with ratios.
 //!
-//! The machines that this runs on are shared and noisy: a time alone says little, and no test asserts one. Each benchmark
-//! prints ratios of things measured in the same run, from the fastest sample of each.
+//! Benchmarks run on shared, noisy machines: an absolute time says little, and no test asserts one. Each benchmark prints ratios of fastest
+//! samples within one run.
 
 use criterion::{BenchmarkGroup, Criterion, Throughput, measurement::WallTime};
 use std::fmt::Write as _;
 use std::time::{Duration, Instant};
 use takt_isa::{Machine, T3};
 
-/// A group of measurements that keeps the fastest time of each.
-pub struct Measured<'c> {
+/// Group of measurements that keeps the fastest time of each.
+pub struct FastestTimes<'c> {
     group: BenchmarkGroup<'c, WallTime>,
 }
 
-impl<'c> Measured<'c> {
-    /// A group of this name.
-    pub fn new(criterion: &'c mut Criterion, name: &str) -> Measured<'c> {
+impl<'c> FastestTimes<'c> {
+    /// Opens a group with this name.
+    pub fn new(criterion: &'c mut Criterion, name: &str) -> FastestTimes<'c> {
         let mut group = criterion.benchmark_group(name);
         group
             .sample_size(10)
             .warm_up_time(Duration::from_millis(500))
             .measurement_time(Duration::from_secs(3));
-        Measured { group }
+        FastestTimes { group }
     }
 
-    /// Measures `work`, which does `elements` of something; returns the seconds of its fastest sample.
+    /// Measures `work` on `elements` elements; returns the seconds of its fastest sample.
     pub fn seconds<T>(&mut self, name: &str, elements: u64, mut work: impl FnMut() -> T) -> f64 {
         let mut fastest = f64::INFINITY;
         self.group.throughput(Throughput::Elements(elements));
@@ -44,10 +44,10 @@ impl<'c> Measured<'c> {
     }
 }
 
-/// t3 with room for a million bundles: the machine is data.
+/// t3 with room for a million bundles.
 pub static DEEP: Machine = Machine { name: "t3-deep", code_depth: 1 << 21, ..T3 };
 
-/// A source of this many lines, in the mix of a real one: comments, blank lines, labels, bundles, macros' uses, constants.
+/// A source of this many lines in a realistic mix: comments, blank lines, labels, bundles, uses of macros, constants.
 pub fn source(lines: usize) -> String {
     let mut text = String::from(
         ".const k = 2*pi*80\n.input n:int, x, y\n.output F\n.reg a b c d t\n.macro scale to, by\n fmul to, to, by\n.endm\n\
@@ -56,7 +56,7 @@ pub fn source(lines: usize) -> String {
     let mut line = text.lines().count();
     let mut label = 0;
     while line + 12 < lines {
-        // Each value takes a register: as many as there is room for.
+        // Each constant occupies a register: limit them to the free registers.
         let constant = label % 64;
         let _ = write!(
             text,

@@ -6,10 +6,10 @@
 //! nearly always empty. [`Cache`] is keyed by entry address and that list. [`compile`] runs the bundles through the scoreboard
 //! once and keeps the outcome: offsets, stalls, counts, and the operations as a flat list of [`crate::micro`]s.
 
-use crate::code::{Code, Decoded};
+use crate::code::{Code, DecodedBundle};
 use crate::jit;
 use crate::machine::RegisterSet;
-use crate::micro::{Check, Emitter, Late, Micro};
+use crate::micro::{Check, Emitter, LateResult, Micro};
 use crate::statistics::Tally;
 use std::collections::HashMap;
 use takt_isa::spec::units::MAX_LATENCY;
@@ -25,10 +25,10 @@ const MAX_BLOCKS: usize = 1 << 14;
 /// Limit on the successors that a block remembers; others are looked up every time.
 const MAX_EDGES: usize = 8;
 
-/// Runs that a block's compiled code may always leave to the interpreter, however large a share of the runs they are.
+/// Limit on the runs that a block's compiled code may leave to the interpreter, whatever their share of all runs.
 const MAX_LEFT: u64 = 16;
 
-/// A remembered successor: the block for `target`, delivered `distance` cycles after the last issue of this one.
+/// Remembered successor: the block for `target`, delivered `distance` cycles after the last issue of this one.
 #[derive(Clone, Copy, Debug)]
 struct Edge {
     target: BundleAddress,
@@ -37,21 +37,21 @@ struct Edge {
     id: u32,
 }
 
-/// The extent of a block with respect to breakpoints.
+/// Extent of a block with respect to breakpoints.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Extent {
-    /// Across breakpoints, for a time in which runs do not pause. After a bundle that enables breakpoints again ([`Decoded::acts`]),
-    /// only up to the next breakpoint.
+    /// Across breakpoints, while runs do not pause. After a bundle that enables breakpoints again ([`Decoded::acts`]), up to the next
+    /// breakpoint.
     Whole,
     /// Up to the first breakpoint.
     ToPause,
 }
 
-/// The code from which blocks are made, and the extent to which they go.
+/// Code from which blocks are made, and their extent.
 #[derive(Clone, Copy)]
-pub(crate) struct Stretch<'a> {
+pub(crate) struct BlockSource<'a> {
     pub(crate) code: &'a Code,
-    /// Breakpoints, ascending.
+    /// Breakpoints by ascending address.
     pub(crate) pauses: &'a [BundleAddress],
     pub(crate) extent: Extent,
 }
@@ -59,86 +59,86 @@ pub(crate) struct Stretch<'a> {
 /// Recently issued bundles, in order, each with its age: the cycles since its issue.
 pub(crate) type Ages = Box<[(BundleAddress, u8)]>;
 
-/// The state of a block's compilation to the host's instructions.
+/// State of a block's compilation to the host's instructions.
 #[derive(Debug)]
-pub(crate) enum Compiled<Code> {
-    /// The block has not run often enough to be compiled.
+pub(crate) enum CompilationState<Code> {
+    /// The block has run too seldom to be compiled.
     NotYet,
-    /// The compiled code, and the number of runs that it has left to the interpreter.
+    /// Compiled code, and the number of runs that it has left to the interpreter.
     Code(Code, u64),
-    /// The block is never compiled: the compiler cannot, or its code left too many runs to the interpreter.
+    /// Never compiled: the compiler does not support the block, or its code left too many runs to the interpreter.
     Never,
 }
 
-impl<Code> Compiled<Code> {
-    fn from_code(code: Option<Code>) -> Compiled<Code> {
-        code.map_or(Compiled::Never, |code| Compiled::Code(code, 0))
+impl<Code> CompilationState<Code> {
+    fn from_code(code: Option<Code>) -> CompilationState<Code> {
+        code.map_or(CompilationState::Never, |code| CompilationState::Code(code, 0))
     }
 
-    /// Counts a run that the code has left to the interpreter, of `runs` in all. Code that does so often costs more than it
-    /// saves, and is dropped.
-    pub(crate) fn left(&mut self, runs: u64) {
-        if let Compiled::Code(_, times) = self {
+    /// Counts a run that the code has left to the interpreter, of `runs` in all. Code that leaves too many costs more than it saves, and is
+    /// dropped.
+    pub(crate) fn count_exits(&mut self, runs: u64) {
+        if let CompilationState::Code(_, times) = self {
             *times += 1;
             if *times > MAX_LEFT && *times > runs / 4 {
-                *self = Compiled::Never;
+                *self = CompilationState::Never;
             }
         }
     }
 }
 
-/// A block: straight-line code with its timing. Offsets are in cycles from the entry, which is the first cycle in which the
-/// first bundle may issue.
+/// Block: straight-line code with its timing. Offsets are in cycles from the entry, which is the first cycle in which the first bundle may
+/// issue.
 #[derive(Debug)]
 pub(crate) struct Block {
     pub(crate) entry: BundleAddress,
-    /// The number of its bundles, at consecutive addresses from `entry` on.
+    /// Number of bundles, at consecutive addresses from `entry` on.
     pub(crate) bundles: u32,
     pub(crate) micros: Box<[Micro]>,
-    /// The index of the first micro with a late result, that is, one written back after the block's last issue.
+    /// Index of the first micro with a late result: a result written back after the block's last issue.
     pub(crate) split: usize,
     /// Offset of the first bundle's issue.
     pub(crate) first: u32,
     /// Offset of the last bundle's issue.
     pub(crate) last: u32,
-    /// Offset of the issue of its last bundle with a breakpoint; `None` if there is none.
+    /// Issue offset of the last bundle with a breakpoint; `None` without breakpoints.
     pub(crate) pause: Option<u32>,
-    /// True if one of its bundles enables breakpoints again ([`Decoded::acts`]).
+    /// A bundle enables breakpoints again ([`Decoded::acts`]).
     pub(crate) acts: bool,
-    /// The control flow of its last bundle; [`Flow::Next`] if the code was cut, or the next bundle is illegal. The results of the last
-    /// bundle are late, so that a branch's register still has its old value when the micros have run.
+    /// Control flow of the last bundle; [`Flow::Next`] if the code was cut, or the next bundle is illegal. The results of the last bundle
+    /// are late, so that a branch's register still has its old value when the micros have run.
     pub(crate) flow: Flow,
-    /// True if a loop may end with its last bundle.
+    /// A loop may end with the last bundle.
     pub(crate) ends_loop: bool,
-    /// Registers that it reads before it writes them: they must have been written before it runs.
+    /// Registers read before they are written: they must have been written before the block runs.
     pub(crate) required: RegisterSet,
-    /// Registers that it writes, without those of late results.
+    /// Registers written, without the destinations of late results.
     pub(crate) writes: RegisterSet,
-    /// True once it has run: then all registers that it requires or writes have been written, and a register never becomes
-    /// unwritten again.
+    /// Set by the first run: then all registers that the block requires or writes have been written, and a register never becomes unwritten
+    /// again.
     pub(crate) verified: bool,
-    /// The registers to restore after a fault, if it can fault in the middle.
+    /// Registers to restore after a fault, if the block can fault in the middle.
     pub(crate) restore: Option<Box<[Register]>>,
-    pub(crate) late: Box<[Late]>,
+    pub(crate) late: Box<[LateResult]>,
     pub(crate) checks: Box<[Check]>,
-    /// The recent bundles at the cycle of its last issue.
+    /// Recent bundles at the cycle of the last issue.
     recent: Ages,
     edges: Vec<Edge>,
 
-    /// The number of its runs.
+    /// Number of runs so far.
     pub(crate) runs: u64,
-    pub(crate) compiled: Compiled<jit::Code>,
-    /// Its compilation for the lanes of a batch.
-    pub(crate) compiled_lanes: Compiled<jit::LaneCode>,
-    /// The stalls that each run adds to the statistics.
+    pub(crate) compiled: CompilationState<jit::Code>,
+    /// Compilation for the lanes of a batch.
+    pub(crate) compiled_lanes: CompilationState<jit::LaneCode>,
+    /// Stalls that each run adds to the statistics.
     stalls: Box<[(BundleAddress, Cause, u32)]>,
     operations: Box<[(Op, u32)]>,
-    /// Cycles of waiting for the front end before its entry, by the bundle that redirected.
+    /// Cycles of waiting for the front end before the entry, by the bundle that redirected.
     entered: Vec<(BundleAddress, u64)>,
 }
 
 impl Block {
-    /// Charges cycles before its entry to the front end, refilling after bundle `from`.
+    /// Charges cycles before the entry to the front end, refilling after bundle `from`.
     #[inline]
     pub(crate) fn enter(&mut self, from: BundleAddress, cycles: u64) {
         if cycles == 0 {
@@ -150,25 +150,26 @@ impl Block {
         }
     }
 
-    /// The bundle after the last.
+    /// Address after the last bundle.
     #[inline]
     pub(crate) fn end(&self) -> BundleAddress {
         self.entry.offset(self.bundles)
     }
 
-    /// Compiles it once it has run `after` times.
+    /// Compiles the block once it has run `after` times.
     #[inline]
     pub(crate) fn compile_after(&mut self, after: u64, depth: u32) {
-        if self.runs >= after && matches!(self.compiled, Compiled::NotYet) {
-            self.compiled = Compiled::from_code(jit::compile(&self.micros, &self.late, depth));
+        if self.runs >= after && matches!(self.compiled, CompilationState::NotYet) {
+            self.compiled = CompilationState::from_code(jit::compile(&self.micros, &self.late, depth));
         }
     }
 
-    /// Compiles it for the lanes of a batch once it has run `after` times.
+    /// Compiles the block for the lanes of a batch once it has run `after` times.
     #[inline]
     pub(crate) fn compile_lanes_after(&mut self, after: u64, depth: u32) {
-        if self.runs >= after && matches!(self.compiled_lanes, Compiled::NotYet) {
-            self.compiled_lanes = Compiled::from_code(jit::compile_lanes(&self.micros, &self.late, depth));
+        if self.runs >= after && matches!(self.compiled_lanes, CompilationState::NotYet) {
+            self.compiled_lanes =
+                CompilationState::from_code(jit::compile_lanes(&self.micros, &self.late, depth));
         }
     }
 
@@ -189,7 +190,7 @@ impl Block {
     }
 }
 
-/// The blocks compiled so far.
+/// Blocks compiled so far, by entry, recent bundles and extent.
 #[derive(Default)]
 pub(crate) struct Cache {
     pub(crate) blocks: Vec<Block>,
@@ -198,7 +199,7 @@ pub(crate) struct Cache {
 }
 
 impl Cache {
-    /// The bundles that were recent when a block's last bundle issued.
+    /// Recent bundles at the issue of a block's last bundle.
     pub(crate) fn recent(&self, id: u32) -> &[(BundleAddress, u8)] {
         &self.blocks[id as usize].recent
     }
@@ -208,16 +209,16 @@ impl Cache {
         self.blocks.iter().for_each(|block| block.count(tally));
     }
 
-    /// True if it must be emptied.
+    /// A limit of the cache is reached: it must be emptied.
     pub(crate) fn is_full(&self) -> bool {
         self.micros >= MAX_MICROS || self.blocks.len() >= MAX_BLOCKS
     }
 
-    /// The block that follows block `id`, whose last bundle issued in cycle `last`.
+    /// Successor of block `id`, whose last bundle issued in cycle `last`.
     #[inline]
     pub(crate) fn successor(
         &mut self,
-        of: Stretch<'_>,
+        of: BlockSource<'_>,
         id: u32,
         last: Cycle,
         entry: BundleAddress,
@@ -241,10 +242,10 @@ impl Cache {
         Some(next)
     }
 
-    /// The block that begins at `entry`, to be entered in cycle `at` after the bundles `recent`.
+    /// Block that begins at `entry`, to be entered in cycle `at` after the bundles `recent`.
     pub(crate) fn after(
         &mut self,
-        of: Stretch<'_>,
+        of: BlockSource<'_>,
         recent: &[(BundleAddress, Cycle)],
         entry: BundleAddress,
         at: Cycle,
@@ -253,7 +254,7 @@ impl Cache {
         self.find(of, entry, ages(of.code, recent))
     }
 
-    fn find(&mut self, of: Stretch<'_>, entry: BundleAddress, recent: Ages) -> Option<u32> {
+    fn find(&mut self, of: BlockSource<'_>, entry: BundleAddress, recent: Ages) -> Option<u32> {
         // No block begins at a breakpoint: there the stepper has to find the cycle in which to pause.
         if of.extent == Extent::ToPause && of.pauses.binary_search(&entry).is_ok() {
             return None;
@@ -271,24 +272,24 @@ impl Cache {
     }
 }
 
-/// Selects the bundles that can still stall one that issues now.
+/// Selects the bundles that can still stall a bundle that issues now.
 pub(crate) fn ages(code: &Code, recent: impl Iterator<Item = (BundleAddress, u8)>) -> Ages {
     recent
         .filter(|&(address, age)| code.legal(address).is_some_and(|decoded| decoded.reach > age.into()))
         .collect()
 }
 
-/// A bundle of a block with its offset.
-struct Placed<'a> {
+/// Bundle of a block with its offset.
+struct BlockBundle<'a> {
     address: BundleAddress,
     offset: u32,
-    decoded: &'a Decoded,
+    decoded: &'a DecodedBundle,
 }
 
-/// Makes the block that begins at `entry`, entered after the bundles `recent`; `None` if the first bundle is illegal.
-fn compile(of: Stretch<'_>, entry: BundleAddress, recent: &Ages) -> Option<Block> {
-    let Stretch { code, pauses, extent } = of;
-    // The scoreboard's cycle that is offset 0, so late that bundles in flight can have issued before it.
+/// Compiles the block that begins at `entry`, entered after the bundles `recent`; `None` if the first bundle is illegal.
+fn compile(of: BlockSource<'_>, entry: BundleAddress, recent: &Ages) -> Option<Block> {
+    let BlockSource { code, pauses, extent } = of;
+    // Cycle of the scoreboard for offset 0, late enough that bundles in flight can have issued before it.
     const BASE: Cycle = MAX_LATENCY as Cycle;
     let mut scoreboard = Scoreboard::new(code.machine);
     for &(address, age) in recent {
@@ -307,15 +308,16 @@ fn compile(of: Stretch<'_>, entry: BundleAddress, recent: &Ages) -> Option<Block
     };
     let mut acts = false;
     while let Some(decoded) = code.legal(address).filter(|_| !ends(address, placed.len(), acts)) {
-        // The count of a loop is checked before its block runs, which therefore must not compute it.
-        let counts = |register| placed.iter().any(|earlier: &Placed<'_>| earlier.decoded.writes(register));
+        // A loop's count is checked before its block runs, so that the block must not compute it.
+        let counts =
+            |register| placed.iter().any(|earlier: &BlockBundle<'_>| earlier.decoded.writes(register));
         if matches!(decoded.flow, Flow::Loop { count, .. } if counts(count)) {
             break;
         }
         acts |= decoded.acts;
         let issue = scoreboard.issue(&decoded.timing, address, earliest);
         stalls.extend(issue.stalls().iter().map(|&(cause, cycles)| (address, cause, cycles)));
-        placed.push(Placed { address, offset: (issue.cycle - BASE) as u32, decoded });
+        placed.push(BlockBundle { address, offset: (issue.cycle - BASE) as u32, decoded });
         if decoded.flow != Flow::Next {
             break;
         }
@@ -328,7 +330,7 @@ fn compile(of: Stretch<'_>, entry: BundleAddress, recent: &Ages) -> Option<Block
     let mut required = RegisterSet::default();
     let mut defined = RegisterSet::default();
     let mut counts = [0; ROWS.len()];
-    for Placed { decoded, .. } in &placed {
+    for BlockBundle { decoded, .. } in &placed {
         for operation in &decoded.operations {
             operation.reads().iter().filter(|&&r| !defined.contains(r)).for_each(|&r| required.insert(r));
             counts[operation.op as usize] += 1;
@@ -337,10 +339,10 @@ fn compile(of: Stretch<'_>, entry: BundleAddress, recent: &Ages) -> Option<Block
     }
 
     let mut emitter = Emitter::new(last, code.machine.data_depth);
-    for Placed { address, offset, decoded } in &placed {
+    for BlockBundle { address, offset, decoded } in &placed {
         emitter.bundle(*address, *offset, &decoded.operations);
     }
-    let Decoded { flow, ends_loop, .. } = *placed.last()?.decoded;
+    let DecodedBundle { flow, ends_loop, .. } = *placed.last()?.decoded;
     let Emitter { micros, late, checks, split, writes, can_fault, .. } = emitter;
 
     let age = |offset: u32| u8::try_from(last - offset).unwrap_or(u8::MAX);
@@ -366,8 +368,8 @@ fn compile(of: Stretch<'_>, entry: BundleAddress, recent: &Ages) -> Option<Block
         recent: ages(code, inherited.chain(own)),
         edges: Vec::new(),
         runs: 0,
-        compiled: Compiled::NotYet,
-        compiled_lanes: Compiled::NotYet,
+        compiled: CompilationState::NotYet,
+        compiled_lanes: CompilationState::NotYet,
         stalls: stalls.into(),
         operations: ROWS
             .iter()

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A program prepared for execution: every word decoded and checked once.
+//! Program prepared for execution: every word decoded and checked once.
 
 use crate::fault::LoadError;
 use crate::machine::RegisterSet;
@@ -8,7 +8,7 @@ use takt_isa::spec::check::MAX_SLOTS;
 use takt_isa::timing::Bundle;
 use takt_isa::{BundleAddress, Effect, Flow, Machine, Op, Program, Register, SlotIndex, Type, Unit};
 
-/// An operation in its slot, decoded, with the properties of its unit and its operands.
+/// Decoded operation in its slot, with the properties of its unit and its operands.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Operation {
     pub(crate) slot: SlotIndex,
@@ -19,11 +19,11 @@ pub(crate) struct Operation {
     pub(crate) dest: Option<Register>,
     pub(crate) latency: u32,
     pub(crate) constant: u32,
-    /// True if the destination is an output port.
+    /// The destination is an output port.
     pub(crate) output: bool,
-    /// True if that port carries binary32, so that a NaN is to be reported.
+    /// The destination is a port that carries binary32: report NaNs.
     pub(crate) float: bool,
-    /// True if every write to that port is recorded ([`crate::Emulator::set_watched`]).
+    /// Writes of the destination are recorded ([`crate::Emulator::set_watched`]).
     pub(crate) watched: bool,
 }
 
@@ -33,36 +33,36 @@ impl Operation {
     }
 }
 
-/// A bundle that can execute. Operations that do nothing are left out.
+/// Legal bundle. Operations without effect are left out.
 #[derive(Clone, Debug)]
-pub(crate) struct Decoded {
+pub(crate) struct DecodedBundle {
     pub(crate) operations: Box<[Operation]>,
     pub(crate) flow: Flow,
-    /// True if a loop may end with it.
+    /// A loop may end with this bundle.
     pub(crate) ends_loop: bool,
     pub(crate) timing: Bundle,
-    /// True if it writes an acting port, after which runs pause again ([`crate::Emulator::set_acting`]).
+    /// Writes an acting port, after which runs pause again ([`crate::Emulator::set_acting`]).
     pub(crate) acts: bool,
-    /// Cycles from its issue for which it can stall others: its longest latency or interval.
+    /// Cycles from the issue for which the bundle can stall others: its longest latency or interval.
     pub(crate) reach: u32,
 }
 
-impl Decoded {
-    /// True if it writes a register.
+impl DecodedBundle {
+    /// An operation of the bundle writes this register.
     pub(crate) fn writes(&self, register: Register) -> bool {
         self.operations.iter().any(|operation| operation.dest == Some(register))
     }
 }
 
-/// The bundles of a program, decoded. For an illegal one, there are the slot and the reason instead.
+/// Decoded bundles of a program. An illegal bundle has a slot and a reason instead.
 #[derive(Clone)]
 pub(crate) struct Code {
     pub(crate) machine: &'static Machine,
-    /// The machine's input ports.
+    /// Input ports of the machine.
     pub(crate) inputs: RegisterSet,
-    /// The acting output ports: after a write to one of them, runs pause again.
+    /// Acting output ports: after a write to one of them, runs pause again.
     pub(crate) acting: RegisterSet,
-    bundles: Vec<Result<Decoded, (SlotIndex, IllegalWord)>>,
+    bundles: Vec<Result<DecodedBundle, (SlotIndex, IllegalWord)>>,
     /// Loops with a bound, whose iterations (turns) are counted, by ascending address of their heads.
     pub(crate) loops: Vec<LoopBound>,
 }
@@ -101,7 +101,7 @@ impl Code {
             }
             let (flow, timing) = (Flow::of(&instructions), Bundle::new(machine, &instructions));
             let flow = if ends_loop { flow.at_loop_end() } else { flow };
-            Ok(Decoded { operations: operations.into(), flow, ends_loop, timing, acts: false, reach })
+            Ok(DecodedBundle { operations: operations.into(), flow, ends_loop, timing, acts: false, reach })
         });
         let mut inputs = RegisterSet::default();
         Register::all().filter(|&register| machine.is_input(register)).for_each(|port| inputs.insert(port));
@@ -126,17 +126,20 @@ impl Code {
         }
     }
 
-    /// Bundles in the program.
+    /// Number of bundles in the program.
     pub(crate) fn len(&self) -> usize {
         self.bundles.len()
     }
 
-    /// The bundle at an address; `None` past the end.
-    pub(crate) fn get(&self, address: BundleAddress) -> Option<&Result<Decoded, (SlotIndex, IllegalWord)>> {
+    /// Bundle at an address; `None` past the end.
+    pub(crate) fn get(
+        &self,
+        address: BundleAddress,
+    ) -> Option<&Result<DecodedBundle, (SlotIndex, IllegalWord)>> {
         self.bundles.get(address.index())
     }
 
-    /// The index of the counted loop that the bundle at an address heads.
+    /// Index of the counted loop whose head is the bundle at an address.
     #[inline]
     pub(crate) fn head(&self, address: BundleAddress) -> Option<usize> {
         if self.loops.is_empty() {
@@ -145,8 +148,8 @@ impl Code {
         self.loops.binary_search_by_key(&address, |bound| bound.address).ok()
     }
 
-    /// The bundle at an address, if it can execute.
-    pub(crate) fn legal(&self, address: BundleAddress) -> Option<&Decoded> {
+    /// Bundle at an address, if it is legal.
+    pub(crate) fn legal(&self, address: BundleAddress) -> Option<&DecodedBundle> {
         self.get(address)?.as_ref().ok()
     }
 }

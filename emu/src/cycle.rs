@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The stepper: cycle-by-cycle execution, with the scoreboard of `takt_isa::timing`. It is slow and handles every case;
-//! blocks (`fast`) are the fast path.
+//! Stepper: cycle-by-cycle execution, with the scoreboard of `takt_isa::timing`. It is slow and handles every case; blocks (`fast`) are the
+//! fast path.
 //!
 //! Each cycle has three steps, in this order: the machine sees the tick; results are written back; the next bundle issues or is
 //! charged a stall.
 
-use crate::emulator::{Emulator, Recent, Sink, Status, Step, Upcoming, emit};
+use crate::emulator::{Emulator, PredictedIssue, Recent, Sink, Status, Step, emit};
 use crate::event::Event;
 use crate::execute;
 use crate::fault::{Fault, FaultKind};
@@ -16,11 +16,11 @@ use takt_isa::spec::units::MAX_LATENCY;
 use takt_isa::timing::{self, Cause, Cycle, Scoreboard};
 use takt_isa::{BundleAddress, Flow};
 
-/// The length at which the list of recent bundles is purged of those that can no longer stall any other.
+/// Length at which the list of recent bundles is purged of bundles that can no longer stall others.
 const RECENT: usize = 4 * MAX_LATENCY as usize;
 
 impl Emulator {
-    /// Lets one cycle pass.
+    /// Advances by one cycle.
     pub(crate) fn cycle(&mut self, sink: &mut Sink<'_>) -> Result<Step, Fault> {
         let now = self.now;
         let waiting = match self.status {
@@ -62,7 +62,7 @@ impl Emulator {
         }
     }
 
-    /// The cause of the stall in this cycle; `None` if the next bundle issues.
+    /// Cause of the stall in this cycle; `None` if the next bundle issues.
     fn stall(&mut self, address: BundleAddress, sink: &mut Sink<'_>) -> Result<Option<Cause>, Fault> {
         let (now, delivered) = (self.now, self.front.delivered);
         if now < delivered {
@@ -82,7 +82,7 @@ impl Emulator {
             self.plan(address);
         }
         let Some(issue) = self.planned else { return Ok(None) };
-        Ok(Upcoming { address, delivered, from: self.front.from, issue }.cause(now))
+        Ok(PredictedIssue { address, delivered, from: self.front.from, issue }.cause(now))
     }
 
     /// Plans the issue of the next bundle on the scoreboard.
@@ -94,13 +94,13 @@ impl Emulator {
         }
     }
 
-    /// The scoreboard; rebuilt from the recent bundles if blocks have run since it was last used.
+    /// Scoreboard; rebuilt from the recent bundles if blocks have run since its last use.
     pub(crate) fn scoreboard(&mut self) -> &mut Scoreboard {
         let scoreboard = self.scoreboard.take().unwrap_or_else(|| {
             self.list_recent();
             let mut scoreboard = Box::new(Scoreboard::new(self.code.machine));
             if let Recent::List(recent) = &self.recent {
-                // Each issues again in its old cycle: everything that can still matter is in the list.
+                // Issue each bundle again in its old cycle: the list has all bundles that can still matter.
                 for &(address, cycle) in recent {
                     if let Some(decoded) = self.code.legal(address) {
                         scoreboard.issue(&decoded.timing, address, cycle);
@@ -154,12 +154,12 @@ impl Emulator {
                 self.continue_at(target, redirected, address);
             }
             Flow::Return => {
-                // The stack is not empty: that fault has been checked.
+                // The stack is not empty: an empty one has been reported as a fault.
                 let target = self.state.stack.pop().unwrap_or(address.next());
                 self.continue_at(target, redirected, address);
             }
             Flow::Loop { count, end } => {
-                // Between 1 and 65,535: any other count is a fault, which has been checked.
+                // The count is 1 to 65,535: other counts have been reported as faults.
                 let left = self.state.get(count) as u16;
                 self.state.loops.push(Loop { start: address.next(), end, left });
                 let delivered = timing::after_loop(machine, address, end, cycle);
@@ -191,7 +191,7 @@ impl Emulator {
         }
     }
 
-    /// Continues at a bundle, not by a back edge: if the bundle heads a counted loop, this is the first iteration of a run.
+    /// Continues at a bundle, without a back edge: if the bundle is the head of a counted loop, this is the first iteration of a run.
     pub(crate) fn continue_at(&mut self, next: BundleAddress, delivered: Cycle, from: BundleAddress) {
         (self.front.next, self.front.delivered, self.front.from) = (next, delivered, from);
         if let Some(head) = self.code.head(next) {
@@ -210,7 +210,7 @@ impl Emulator {
         }
     }
 
-    /// The fault of the loop that the next bundle heads, if this iteration exceeds its bound.
+    /// Fault of the loop whose head is the next bundle, if this iteration exceeds its bound.
     pub(crate) fn beyond_bound(&self) -> Option<FaultKind> {
         let head = self.code.head(self.front.next)?;
         let (LoopBound { most, total, .. }, turns) = (self.code.loops[head], self.turns[head]);
@@ -219,7 +219,7 @@ impl Emulator {
         run.or(beyond.map(|total| FaultKind::LoopTotal { total }))
     }
 
-    /// Stops the machine. Results in flight are written back at once, since nothing else can happen before their cycles.
+    /// Stops the machine. Results in flight are written back at once, since no other event can precede their cycles.
     pub(crate) fn halt_issued(&mut self, cycle: Cycle, address: BundleAddress, sink: &mut Sink<'_>) {
         self.status = Status::Halted { cycle, address };
         self.front.next = address;
@@ -260,7 +260,7 @@ impl Emulator {
         }
     }
 
-    /// The recent bundles, each with its cycle of issue.
+    /// Recent bundles with their cycles of issue.
     pub(crate) fn recent_issues(&self) -> Vec<(BundleAddress, Cycle)> {
         match &self.recent {
             Recent::List(recent) => recent.clone(),
@@ -269,7 +269,7 @@ impl Emulator {
                 let mut recent: Vec<_> =
                     recent.map(|&(address, age)| (address, cycle - Cycle::from(age))).collect();
                 if recent.is_empty() {
-                    // The last bundle of the block can stall nothing, but is listed as proof that one has issued.
+                    // The block's last bundle can stall nothing, but is listed as proof that a bundle has issued.
                     recent.push((self.cache.blocks[*id as usize].end().previous(), *cycle));
                 }
                 recent

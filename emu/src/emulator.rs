@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The emulator's public interface: a machine loaded with a program.
+//! Public interface of the emulator: a machine loaded with a program.
 //!
 //! Further methods of [`Emulator`] are in `cycle` (the stepper), `fast` (execution of blocks), `io` (ports, ticks, periods) and
 //! `restore` (saved states), which is why these modules and this one import one another.
@@ -7,7 +7,7 @@
 use crate::block::{Cache, Extent};
 use crate::code::Code;
 use crate::event::{Event, PortWrite, Retire};
-use crate::fast::{Fast, Journal};
+use crate::fast_path::{Fast, Journal};
 use crate::fault::{Fault, FaultKind, LoadError};
 use crate::io::{Period, PeriodReport, Ticks};
 use crate::jit;
@@ -20,52 +20,52 @@ use takt_isa::program::LoopBound;
 use takt_isa::timing::{self, Cause, Cycle, Issue, Scoreboard};
 use takt_isa::{BundleAddress, Machine, Program, Register, SlotIndex};
 
-/// The upper limit on cycles, so that cycle arithmetic cannot overflow: a thousand years at 125 MHz.
+/// Upper limit on cycles, so that cycle arithmetic cannot overflow: a thousand years at 125 MHz.
 pub const MAX_CYCLE: Cycle = 1 << 62;
 
-/// Runs after which a block is compiled: they take about as long as its compilation.
+/// Number of runs after which a block is compiled: they take about as long as its compilation.
 const COMPILE_AFTER: u64 = 10_000;
 
-/// The state of the machine.
+/// State of the machine.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Status {
-    /// It executes the program.
+    /// Executes the program's bundles.
     Running,
-    /// It waits for the tick.
+    /// Waits for the tick.
     Waiting {
-        /// The cycle in which `wait` issued.
+        /// Cycle in which `wait` issued.
         since: Cycle,
-        /// Its bundle.
+        /// Bundle with the `wait`.
         address: BundleAddress,
     },
-    /// It was stopped by `halt`.
+    /// Stopped by a `halt`.
     Halted {
-        /// The cycle in which it issued.
+        /// Cycle in which `halt` issued.
         cycle: Cycle,
-        /// Its bundle.
+        /// Bundle with the `halt`.
         address: BundleAddress,
     },
-    /// It was stopped by a fault.
+    /// Stopped by a fault.
     Faulted(Fault),
 }
 
-/// The outcome of one cycle.
+/// Outcome of one cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
-    /// A bundle issued.
+    /// A bundle issued in the cycle.
     Issued {
-        /// The cycle.
+        /// Number of the cycle.
         cycle: Cycle,
-        /// The bundle.
+        /// Address of the bundle.
         address: BundleAddress,
     },
-    /// Nothing issued.
+    /// No bundle issued in the cycle.
     Stalled {
-        /// The cycle.
+        /// Number of the cycle.
         cycle: Cycle,
-        /// The bundle that could not issue; for [`Cause::Wait`], the one with the `wait`.
+        /// Bundle that could not issue; for [`Cause::Wait`], the bundle with the `wait`.
         address: BundleAddress,
-        /// The cause.
+        /// Cause of the stall.
         cause: Cause,
     },
     /// The machine had already halted; no cycle passed.
@@ -75,54 +75,54 @@ pub enum Step {
 /// Counts of runs of compiled blocks ([`Emulator::set_compile_after`]).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct CompiledRuns {
-    /// Runs that the compiled code completed.
+    /// Runs completed by the compiled code.
     pub done: u64,
-    /// Runs that it handed to the interpreter, because of an infinity, a NaN, a flag or a fault.
+    /// Runs that the compiled code left to the interpreter, because of an infinity, a NaN, a flag or a fault.
     pub left: u64,
 }
 
-/// The reason why a run ended.
+/// Reason why a run ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stop {
     /// A bundle issued ([`Emulator::step_bundle`]).
     Issued {
-        /// The cycle.
+        /// Cycle of the issue.
         cycle: Cycle,
-        /// The bundle.
+        /// Address of the bundle.
         address: BundleAddress,
     },
     /// A `wait` issued ([`Emulator::run_to_wait`]).
     Wait {
-        /// The cycle.
+        /// Cycle in which the `wait` issued.
         cycle: Cycle,
-        /// Its bundle.
+        /// Bundle with the `wait`.
         address: BundleAddress,
     },
     /// The program waits, and no tick is scheduled.
     Idle,
     /// The machine has halted.
     Halted,
-    /// The cycle asked for is reached ([`Emulator::run_until`]).
+    /// The run has reached its final cycle ([`Emulator::run_until`]).
     Reached,
     /// A bundle with a breakpoint issues in the next cycle ([`Emulator::set_pauses`]).
     Paused,
 }
 
-/// The predicted issue of the next bundle.
+/// Predicted issue of the next bundle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Upcoming {
-    /// The bundle.
+pub struct PredictedIssue {
+    /// Address of the bundle.
     pub address: BundleAddress,
-    /// The first cycle in which the front end delivers it.
+    /// First cycle in which the front end delivers the bundle.
     pub delivered: Cycle,
-    /// The bundle that redirected the fetch to it; the cycles before `delivered` are charged to that bundle.
+    /// Bundle that redirected the fetch; the cycles before `delivered` are charged to it.
     pub from: BundleAddress,
-    /// Its cycle of issue, and the stalls from `delivered` on.
+    /// Cycle of issue, and the stalls from `delivered` on.
     pub issue: Issue,
 }
 
-impl Upcoming {
-    /// The cause of the stall in `cycle`; `None` from the cycle of issue on.
+impl PredictedIssue {
+    /// Cause of the stall in `cycle`; `None` from the cycle of issue on.
     pub fn cause(&self, cycle: Cycle) -> Option<Cause> {
         if cycle < self.delivered {
             return Some(Cause::Branch { from: self.from });
@@ -136,14 +136,14 @@ impl Upcoming {
     }
 }
 
-/// The instruction fetch.
+/// State of the instruction fetch.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Front {
-    /// The bundle that issues next.
+    /// Bundle that issues next.
     pub(crate) next: BundleAddress,
-    /// The first cycle in which it may issue.
+    /// First cycle in which the bundle may issue.
     pub(crate) delivered: Cycle,
-    /// The bundle that redirected the fetch to it.
+    /// Bundle that redirected the fetch.
     pub(crate) from: BundleAddress,
 }
 
@@ -154,47 +154,47 @@ impl Front {
     }
 }
 
-/// The recently issued bundles, which may still stall others.
+/// Recently issued bundles, which may still stall others.
 #[derive(Clone, Debug)]
 pub(crate) enum Recent {
-    /// A list of bundles with their cycles of issue, in ascending order.
+    /// Bundles with their cycles of issue, in ascending order.
     List(Vec<(BundleAddress, Cycle)>),
-    /// The recent bundles at the end of a block whose last bundle issued in `cycle`.
+    /// Recent bundles at the end of a block whose last bundle issued in `cycle`.
     Block { id: u32, cycle: Cycle },
 }
 
-/// A machine loaded with a program. A clone is a snapshot to return to: it starts with empty caches of blocks and compiled
-/// code, which are filled again as it runs.
+/// Machine loaded with a program. A clone is a snapshot to return to: it starts with empty caches of blocks and compiled code, which are
+/// filled again as it runs.
 pub struct Emulator {
     pub(crate) program: Arc<Program>,
     pub(crate) code: Arc<Code>,
     pub(crate) state: State,
     pub(crate) status: Status,
-    /// The number of the next cycle, which is also the number of cycles passed.
+    /// Number of the next cycle, which is also the number of cycles passed.
     pub(crate) now: Cycle,
     pub(crate) front: Front,
-    /// For each loop with a bound, its iterations so far.
-    pub(crate) turns: Vec<Turns>,
+    /// Iterations so far of each loop with a bound.
+    pub(crate) turns: Vec<IterationCounts>,
     pub(crate) recent: Recent,
-    /// The scoreboard after the last issue; `None` if blocks have run since, so that it must be rebuilt.
+    /// Scoreboard after the last issue; `None` if blocks have run since, so that it must be rebuilt.
     pub(crate) scoreboard: Option<Box<Scoreboard>>,
-    /// The planned issue of the next bundle; set only while the bundle stalls for a cause other than the front end.
+    /// Planned issue of the next bundle; set only while the bundle stalls for a cause other than the front end.
     pub(crate) planned: Option<Issue>,
     pub(crate) ticks: Ticks,
     pub(crate) period: Option<Period>,
-    /// The report of the last period to end, until the host takes it.
+    /// Report of the last period to end, until the host takes it.
     pub(crate) report: Option<PeriodReport>,
     pub(crate) tally: Tally,
     pub(crate) cache: Cache,
     pub(crate) journal: Journal,
     pub(crate) cycle_limit: Cycle,
     pub(crate) blocks_enabled: bool,
-    /// The number of runs after which a block is compiled; `None` means never.
+    /// Number of runs after which a block is compiled; `None` means never.
     pub(crate) compile_after: Option<u64>,
     pub(crate) compiled_runs: CompiledRuns,
     /// Breakpoints: bundles before whose issue runs pause, ascending.
     pub(crate) pauses: Arc<[BundleAddress]>,
-    /// The cycle from which on runs pause there.
+    /// First cycle in which runs pause at breakpoints.
     pub(crate) pause_from: Cycle,
 }
 
@@ -229,7 +229,7 @@ impl Clone for Emulator {
     }
 }
 
-/// The receiver of events, if there is an observer.
+/// Receiver of events, if an observer is attached.
 pub(crate) type Sink<'a> = Option<&'a mut dyn FnMut(&Event)>;
 
 #[inline]
@@ -239,10 +239,10 @@ pub(crate) fn emit(sink: &mut Sink<'_>, event: impl FnOnce() -> Event) {
     }
 }
 
-/// The goal at which a run ends, unless a halt or fault ends it first.
+/// Goal at which a run ends, unless a halt or fault ends it first.
 #[derive(Clone, Copy)]
 pub(crate) struct Goal {
-    /// The cycle in which the run began. It does not pause there, or it could never leave a breakpoint.
+    /// Cycle in which the run began. The run does not pause in it, or it could never leave a breakpoint.
     pub(crate) start: Cycle,
     /// The run ends before this cycle.
     pub(crate) until: Cycle,
@@ -252,26 +252,31 @@ pub(crate) struct Goal {
     pub(crate) bundle: bool,
 }
 
-/// The iterations (turns) of a loop so far.
+/// Iterations (turns) of a loop so far.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Turns {
-    /// Since it was entered.
+pub(crate) struct IterationCounts {
+    /// Iterations since the loop was entered.
     pub(crate) run: u32,
-    /// Since its section began.
+    /// Iterations since the section began.
     pub(crate) section: u32,
 }
 
-/// The iteration counts after reset, which enters bundle 0 and with it a loop that begins there.
-fn first_turns(program: &Program) -> Vec<Turns> {
+/// Iteration counts after reset, which enters bundle 0 and with it a loop that begins there.
+fn first_turns(program: &Program) -> Vec<IterationCounts> {
     let first = |bound: &LoopBound| u32::from(bound.address == BundleAddress::RESET);
-    program.loop_bounds.iter().map(first).map(|turns| Turns { run: turns, section: turns }).collect()
+    program
+        .loop_bounds
+        .iter()
+        .map(first)
+        .map(|turns| IterationCounts { run: turns, section: turns })
+        .collect()
 }
 
 impl Emulator {
     /// Loads a program and resets the machine.
     ///
     /// # Errors
-    /// If the machine's memories cannot hold it. Illegal words are no error here; executing one is a fault.
+    /// If the machine's memories cannot hold the program. Illegal words are no error here; executing one is a fault.
     pub fn new(program: &Program) -> Result<Emulator, LoadError> {
         let code = Code::new(program)?;
         Ok(Emulator {
@@ -300,8 +305,7 @@ impl Emulator {
         })
     }
 
-    /// Reloads the program and resets the machine. Everything is as [`Emulator::new`] made it, except the settings
-    /// (cycle limit, tick period, pauses).
+    /// Reloads the program and resets the machine, as after [`Emulator::new`]; keeps the settings (cycle limit, tick period, pauses).
     pub fn reset(&mut self) {
         self.state = State::new(&self.program);
         self.status = Status::Running;
@@ -340,7 +344,7 @@ impl Emulator {
         }
     }
 
-    /// True if this build, on this host, can compile blocks: feature `jit`, on x86-64.
+    /// This build, on this host, can compile blocks: feature `jit`, on x86-64.
     pub fn compiles() -> bool {
         jit::is_available()
     }
@@ -350,7 +354,7 @@ impl Emulator {
         jit::switch_off();
     }
 
-    /// The number of runs of compiled blocks since loading.
+    /// Number of runs of compiled blocks since loading.
     pub fn compiled_runs(&self) -> CompiledRuns {
         self.compiled_runs
     }
@@ -362,7 +366,7 @@ impl Emulator {
         self.pause_from = 0;
         if !self.pauses.iter().eq(&bundles) {
             self.pauses = bundles.into_iter().collect();
-            // Blocks end before breakpoints, so that those made before are of no use.
+            // Blocks end before breakpoints, so that older blocks are invalid.
             self.drop_blocks();
         }
     }
@@ -407,7 +411,7 @@ impl Emulator {
         self.cache = Cache::default();
     }
 
-    /// True if a bundle with a breakpoint issues in the next cycle.
+    /// A bundle with a breakpoint issues in the next cycle.
     fn pauses_here(&mut self) -> bool {
         let Front { next, delivered, .. } = self.front;
         if self.now < self.pause_from.max(delivered) || self.pauses.binary_search(&next).is_err() {
@@ -416,22 +420,22 @@ impl Emulator {
         if let Some(issue) = self.planned {
             return issue.cycle == self.now;
         }
-        // The block has the issue that the stepper would find, without planning it again in every cycle.
-        let block = self.block_along(Extent::Whole).map(|id| &self.cache.blocks[id as usize]);
+        // The block gives the same issue as the stepper, without planning it again in every cycle.
+        let block = self.block_at_next(Extent::Whole).map(|id| &self.cache.blocks[id as usize]);
         block.is_some_and(|block| delivered + Cycle::from(block.first) == self.now)
     }
 
     // ---- Running.
 
-    /// The goal of a run from here without end.
+    /// Goal of an endless run from here.
     pub(crate) fn goal(&self) -> Goal {
         Goal { start: self.now, until: Cycle::MAX, wait: false, bundle: false }
     }
 
-    /// Lets one cycle pass.
+    /// Advances by one cycle.
     ///
     /// # Errors
-    /// A fault. Every further call returns the same one.
+    /// A fault, which every further call returns again.
     pub fn step_cycle(&mut self) -> Result<Step, Fault> {
         self.cycle(&mut None)
     }
@@ -439,7 +443,7 @@ impl Emulator {
     /// Runs until a bundle has issued.
     ///
     /// # Errors
-    /// A fault. Every further call returns the same one.
+    /// A fault, which every further call returns again.
     pub fn step_bundle(&mut self) -> Result<Stop, Fault> {
         self.drive(Goal { bundle: true, ..self.goal() }, &mut None)
     }
@@ -447,7 +451,7 @@ impl Emulator {
     /// Runs until `cycle` cycles have passed since reset.
     ///
     /// # Errors
-    /// A fault. Every further call returns the same one.
+    /// A fault, which every further call returns again.
     pub fn run_until(&mut self, cycle: Cycle) -> Result<Stop, Fault> {
         self.drive(Goal { until: cycle, ..self.goal() }, &mut None)
     }
@@ -455,7 +459,7 @@ impl Emulator {
     /// Runs until a `wait` has issued.
     ///
     /// # Errors
-    /// A fault. Every further call returns the same one.
+    /// A fault, which every further call returns again.
     pub fn run_to_wait(&mut self) -> Result<Stop, Fault> {
         self.drive(Goal { wait: true, ..self.goal() }, &mut None)
     }
@@ -463,7 +467,7 @@ impl Emulator {
     /// Runs until a `wait` has issued, or `cycle` cycles have passed since reset.
     ///
     /// # Errors
-    /// A fault. Every further call returns the same one.
+    /// A fault, which every further call returns again.
     pub fn run_to_wait_until(&mut self, cycle: Cycle) -> Result<Stop, Fault> {
         self.drive(Goal { until: cycle, wait: true, ..self.goal() }, &mut None)
     }
@@ -471,14 +475,14 @@ impl Emulator {
     /// Runs until the machine halts, or waits while no tick is scheduled.
     ///
     /// # Errors
-    /// A fault. Every further call returns the same one.
+    /// A fault, which every further call returns again.
     pub fn run(&mut self) -> Result<Stop, Fault> {
         self.drive(self.goal(), &mut None)
     }
 
     /// Attaches an observer: the result can be run in the same ways, and passes every [`Event`] to `sink`.
-    pub fn observed<'a>(&'a mut self, sink: &'a mut dyn FnMut(&Event)) -> Observed<'a> {
-        Observed { emulator: self, sink }
+    pub fn observed<'a>(&'a mut self, sink: &'a mut dyn FnMut(&Event)) -> ObservedEmulator<'a> {
+        ObservedEmulator { emulator: self, sink }
     }
 
     pub(crate) fn drive(&mut self, goal: Goal, sink: &mut Sink<'_>) -> Result<Stop, Fault> {
@@ -497,9 +501,17 @@ impl Emulator {
                         return Ok(Stop::Idle);
                     }
                     let end = tick.unwrap_or(Cycle::MAX).min(goal.until).min(self.cycle_limit);
-                    if end > self.now && self.state.pending.is_empty() {
-                        self.tally.wait(address, end - self.now);
-                        self.now = end;
+                    // Without an observer, results in flight and the tick need no cycles of their own.
+                    let is_seen = fast && tick == Some(end) && end < goal.until.min(self.cycle_limit);
+                    let passed = end + Cycle::from(is_seen);
+                    if passed > self.now && (fast || self.state.pending.is_empty()) {
+                        self.begin_cycle();
+                        while is_seen && self.ticks.take(end) {
+                            self.see_tick(end, sink);
+                        }
+                        self.state.write_back_until(passed - 1);
+                        self.tally.wait(address, passed - self.now);
+                        self.now = passed;
                         continue;
                     }
                 }
@@ -532,7 +544,7 @@ impl Emulator {
 
     // ---- Inspection.
 
-    /// The program.
+    /// Program on the machine.
     pub fn program(&self) -> &Program {
         &self.program
     }
@@ -542,25 +554,25 @@ impl Emulator {
         self.program.machine
     }
 
-    /// Cycles that have passed since reset; the next one has this number.
+    /// Cycles that have passed since reset, which is also the number of the next cycle.
     pub fn now(&self) -> Cycle {
         self.now
     }
 
-    /// The state of the machine. (The cycle limit, which is the host's, does not change it.)
+    /// State of the machine. (The cycle limit, a setting of the host, does not change it.)
     pub fn status(&self) -> &Status {
         &self.status
     }
 
-    /// The bundle that issues next; while the program waits, the one that issues after the tick; once the machine has
-    /// stopped, the bundle that halted or faulted.
+    /// Bundle that issues next; while the program waits, the bundle after the tick; once the machine has stopped, the bundle that halted or
+    /// faulted.
     pub fn next_address(&self) -> BundleAddress {
         self.front.next
     }
 
-    /// The predicted issue of the next bundle; `None` if the machine does not run, or if there is no legal bundle. (A fault at
-    /// the issue itself is not predicted.)
-    pub fn upcoming(&mut self) -> Option<Upcoming> {
+    /// Predicted issue of the next bundle; `None` if the machine does not run, or if there is no legal bundle. (A fault at the issue itself
+    /// is not predicted.)
+    pub fn upcoming(&mut self) -> Option<PredictedIssue> {
         let Front { next: address, delivered, from } = self.front;
         if self.status != Status::Running {
             return None;
@@ -572,10 +584,10 @@ impl Emulator {
                 self.scoreboard().plan(&code.legal(address)?.timing, delivered)
             }
         };
-        Some(Upcoming { address, delivered, from, issue })
+        Some(PredictedIssue { address, delivered, from, issue })
     }
 
-    /// The bundle that issued last; `None` if none has since reset.
+    /// Bundle that issued last; `None` if no bundle has issued since reset.
     pub fn last_issued(&self) -> Option<BundleAddress> {
         match self.status {
             Status::Waiting { address, .. } | Status::Halted { address, .. } => Some(address),
@@ -587,8 +599,8 @@ impl Emulator {
         !matches!(&self.recent, Recent::List(recent) if recent.is_empty())
     }
 
-    /// A register's bits; `None` if it was never written. A result appears in the cycle of its writeback. The value that an
-    /// output port shows to the outside is [`Emulator::output_bits`].
+    /// Bits of a register; `None` if it was never written. A result appears in the cycle of its writeback. The visible value of an output
+    /// port is [`Emulator::output_bits`].
     pub fn register(&self, register: Register) -> Option<u32> {
         self.state.written.contains(register).then(|| self.state.get(register))
     }
@@ -609,33 +621,32 @@ impl Emulator {
         exists
     }
 
-    /// The data memory.
+    /// Data memory, from word 0.
     pub fn memory(&self) -> &[u32] {
         &self.state.memory
     }
 
-    /// The data memory, for a debugger to change.
+    /// Mutable data memory, for a debugger.
     pub fn memory_mut(&mut self) -> &mut [u32] {
         &mut self.state.memory
     }
 
-    /// The return stack, oldest entry first.
+    /// Return stack, oldest entry first.
     pub fn stack(&self) -> &[BundleAddress] {
         &self.state.stack
     }
 
-    /// The counted loops that are under way, the innermost last: the first bundle, the last one, and the iterations left, the present one
-    /// included.
+    /// Active counted loops, innermost last: the first bundle, the last bundle, and the iterations left, the present one included.
     pub fn loops(&self) -> impl DoubleEndedIterator<Item = (BundleAddress, BundleAddress, u16)> {
         self.state.loops.iter().map(|one| (one.start, one.end.previous(), one.left))
     }
 
-    /// The sticky exception flags.
+    /// Sticky exception flags of the machine.
     pub fn flags(&self) -> Flags {
         self.state.flags
     }
 
-    /// The operations in flight, each with the cycle of its writeback.
+    /// Operations in flight, each with the cycle of its writeback.
     pub fn in_flight(&self) -> impl Iterator<Item = &Retire> {
         self.state.pending.iter().map(|pending| &pending.retire)
     }
@@ -653,7 +664,7 @@ impl Emulator {
         self.report.take()
     }
 
-    /// The statistics since reset: cycles by cause, issues, ticks.
+    /// Statistics since reset: cycles by cause, issues, ticks.
     pub fn statistics(&self) -> Statistics {
         let mut tally = self.tally.clone();
         self.cache.count(&mut tally);
@@ -687,13 +698,13 @@ impl Emulator {
     }
 }
 
-/// A machine with an observer; see [`Emulator::observed`].
-pub struct Observed<'a> {
+/// Machine with an observer; see [`Emulator::observed`].
+pub struct ObservedEmulator<'a> {
     emulator: &'a mut Emulator,
     sink: &'a mut dyn FnMut(&Event),
 }
 
-impl Observed<'_> {
+impl ObservedEmulator<'_> {
     /// Runs like [`Emulator::step_cycle`], observed.
     ///
     /// # Errors

@@ -1,97 +1,97 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Events for an observer: plain data, in the order in which they happen.
 //!
-//! Events come by cycle. Within a cycle: the tick and what it entails, then writebacks in slot order (each followed by its
-//! port's event), then the issue of a bundle with what it does at once (operations without a destination, in slot order).
+//! Events are in the order of cycles. Within a cycle: the tick and its effects, then writebacks in slot order (each followed by its port's
+//! event), then the issue of a bundle with its immediate effects (operations without a destination, in slot order).
 
 use crate::fault::Fault;
 use takt_isa::fp::Flags;
 use takt_isa::timing::Cycle;
 use takt_isa::{BundleAddress, Op, Register, SlotIndex};
 
-/// One event.
+/// Event of the machine.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Event {
-    /// A bundle issued.
+    /// A bundle issued, with all its operations.
     Issue {
-        /// The cycle.
+        /// Cycle of the issue.
         cycle: Cycle,
-        /// The bundle.
+        /// Address of the bundle.
         address: BundleAddress,
     },
-    /// An operation completed.
+    /// An operation completed, at its writeback or issue.
     Retire(Retire),
     /// An output port took a value. If ports are latched, the outside sees it from the next [`Event::Wait`] on.
     PortWrite(PortWrite),
-    /// The tick was seen.
+    /// The machine saw the tick.
     Tick {
-        /// The cycle.
+        /// Cycle of the tick.
         cycle: Cycle,
     },
-    /// The tick was seen before the program waited: it is remembered.
+    /// The tick came before the program waited, and is remembered.
     DeadlineMissed {
-        /// The tick's cycle.
+        /// Cycle of the tick.
         cycle: Cycle,
     },
-    /// The tick was seen while an earlier one was remembered: it is lost.
+    /// The tick came while an earlier one was remembered, and is lost.
     TickLost {
-        /// The tick's cycle.
+        /// Cycle of the tick.
         cycle: Cycle,
     },
-    /// The period's end was reached; latched outputs are published.
+    /// The period ended; latched outputs are published.
     Wait {
-        /// The cycle in which `wait` issued.
+        /// Cycle in which `wait` issued.
         cycle: Cycle,
-        /// Its bundle.
+        /// Bundle with the `wait`.
         address: BundleAddress,
     },
     /// The machine stopped for good.
     Halt {
-        /// The cycle in which `halt` issued.
+        /// Cycle in which `halt` issued.
         cycle: Cycle,
-        /// Its bundle.
+        /// Bundle with the `halt`.
         address: BundleAddress,
     },
     /// The machine stopped with a fault.
     Fault(Fault),
 }
 
-/// A completed operation.
+/// Completed operation with its result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Retire {
-    /// The cycle of its writeback; of its issue, for an operation that writes no register.
+    /// Cycle of the writeback; for an operation that writes no register, of the issue.
     pub cycle: Cycle,
-    /// The cycle of its issue.
+    /// Cycle of the issue.
     pub issued: Cycle,
-    /// Its bundle.
+    /// Bundle of the operation.
     pub address: BundleAddress,
-    /// Its slot.
+    /// Slot of the operation.
     pub slot: SlotIndex,
-    /// The operation.
+    /// Operation in the table of instructions.
     pub op: Op,
-    /// The register that it wrote.
+    /// Destination register, if any.
     pub register: Option<Register>,
-    /// The value that it wrote to the register or, if it is a store, to memory; otherwise 0.
+    /// Value written to the register or, by a store, to memory; otherwise 0.
     pub value: u32,
-    /// The flags that it raised.
+    /// Exception flags raised by the operation.
     pub flags: Flags,
-    /// The data word that it read or wrote.
+    /// Address of the data word read or written, if any.
     pub memory: Option<u32>,
 }
 
-/// A value written to an output port.
+/// Value written to an output port.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct PortWrite {
-    /// The cycle of the writeback.
+    /// Cycle of the writeback.
     pub cycle: Cycle,
-    /// The slot whose bank the port belongs to.
+    /// Slot whose bank has the port.
     pub slot: SlotIndex,
-    /// The bundle that computed the value.
+    /// Bundle that computed the value.
     pub address: BundleAddress,
-    /// The port's register.
+    /// Register of the port.
     pub register: Register,
-    /// The value's bits.
+    /// Value as 32 bits.
     pub value: u32,
-    /// True if the value is a NaN on a port that carries binary32.
+    /// NaN on a port that carries binary32.
     pub nan: bool,
 }

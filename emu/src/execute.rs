@@ -1,24 +1,24 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Execution of an issued bundle, driven by the effects of its operations and `takt_isa::compute`; no instruction is named.
 
-use crate::code::{Decoded, Operation};
+use crate::code::{DecodedBundle, Operation};
 use crate::event::Retire;
 use crate::fault::FaultKind;
-use crate::machine::{Pending, State};
+use crate::machine::{PendingResult, State};
 use takt_isa::fp::{Flags, Host, Value};
 use takt_isa::timing::Cycle;
 use takt_isa::{BundleAddress, Effect, Flow, Machine, SlotIndex, compute};
 
-/// The effective address of a load or store, in words: the sum of an unsigned offset and a signed base. The memory is far
-/// smaller than 2^31 words, so that the sum modulo 2^32 lies in it exactly if the true sum does.
+/// Effective address of a load or store, in words: the sum of an unsigned offset and a signed base. The memory is far smaller than 2^31
+/// words, so that the sum modulo 2^32 lies in it exactly if the true sum does.
 #[inline(always)]
 pub(crate) fn data_address(offset: u32, base: u32) -> usize {
     offset.wrapping_add(base) as usize
 }
 
-/// The first fault, in slot order, that a bundle would raise if it issued now.
+/// First fault, in slot order, that a bundle would raise if it issued now.
 pub(crate) fn check(
-    decoded: &Decoded,
+    decoded: &DecodedBundle,
     state: &State,
     machine: &Machine,
     address: BundleAddress,
@@ -31,7 +31,7 @@ pub(crate) fn check(
 
 fn check_operation(
     operation: &Operation,
-    decoded: &Decoded,
+    decoded: &DecodedBundle,
     state: &State,
     machine: &Machine,
     address: BundleAddress,
@@ -48,7 +48,7 @@ fn check_operation(
             let outside = data_address(operation.constant, base) >= state.memory.len();
             outside.then_some(FaultKind::DataAddress { address, depth, store })
         }
-        // The bundle's flow is that of this operation: a bundle has at most one.
+        // A bundle has at most one operation with control flow, so that the bundle's flow is this operation's.
         Effect::Call
         | Effect::Return
         | Effect::Loop
@@ -62,7 +62,7 @@ fn check_operation(
     }
 }
 
-/// The fault that a bundle's flow would raise on the return stack or on the loops that are under way.
+/// Fault that a bundle's flow would raise on the return stack or on the active loops.
 #[inline]
 pub(crate) fn flow_fault(
     flow: Flow,
@@ -100,14 +100,14 @@ pub(crate) fn flow_fault(
 /// Results are added to `state.pending`; operations that write no register complete at once and are passed to `retired`, in
 /// slot order.
 pub(crate) fn issue(
-    decoded: &Decoded,
+    decoded: &DecodedBundle,
     state: &mut State,
     address: BundleAddress,
     cycle: Cycle,
     mut retired: impl FnMut(Retire),
 ) {
-    // Results are written back later, so that operations can be executed one after another and still all read the old
-    // values. For the same reason, flags are cleared only after the last operation.
+    // Results are written back later, so that operations can be executed one after another and still all read the old values. For the same
+    // reason, flags are cleared only after the last operation.
     let mut flags = state.flags;
     for operation in &decoded.operations {
         let [a, b, c] = operation.sources.map(|register| state.get(register));
@@ -133,7 +133,7 @@ pub(crate) fn issue(
                 flags = Flags::NONE;
                 Value::exact(0)
             }
-            // These are control flow, which is handled for the whole bundle.
+            // Control flow is handled for the whole bundle.
             Effect::Jump | Effect::BranchZero | Effect::BranchNonzero => Value::exact(0),
             Effect::Call | Effect::Return | Effect::Loop => Value::exact(0),
             Effect::Wait | Effect::Halt | Effect::Nothing => Value::exact(0),
@@ -153,7 +153,7 @@ pub(crate) fn issue(
         match operation.dest {
             Some(register) => {
                 let Operation { output, float, watched, .. } = *operation;
-                state.pending.push(Pending { retire, register, output, float, watched });
+                state.pending.push(PendingResult { retire, register, output, float, watched });
             }
             None => retired(retire),
         }

@@ -5,87 +5,86 @@ use takt_isa::program::{IllegalWord, Location};
 use takt_isa::timing::Cycle;
 use takt_isa::{BundleAddress, Program, Register, SlotIndex};
 
-/// A fault. The bundle that it names has not executed, and the state before it can be inspected.
+/// Fault of a bundle. The bundle has not executed, and the state before it can be inspected.
 ///
-/// It is plain data. [`Fault::show`] puts it into words with the names and places of the program; its own `Display` has numbers
-/// in their place.
+/// Plain data: [`Fault::show`] renders it with the names and places of the program; its own `Display` has numbers instead.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Fault {
-    /// The cycle in which the bundle would have issued; for [`FaultKind::CycleLimit`] the limit.
+    /// Cycle in which the bundle would have issued; for [`FaultKind::CycleLimit`] the limit.
     pub cycle: Cycle,
-    /// The bundle.
+    /// Address of the bundle.
     pub address: BundleAddress,
-    /// The slot whose operation is at fault, if it is the fault of one operation.
+    /// Slot of the operation at fault, if a single operation is at fault.
     pub slot: Option<SlotIndex>,
-    /// The kind of fault, with its details.
+    /// Kind of fault, with its details.
     pub kind: FaultKind,
 }
 
-/// The kinds of a [`Fault`].
+/// Kinds of a [`Fault`].
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum FaultKind {
-    /// A word of the bundle is no instruction, or none that its slot can execute.
+    /// A word of the bundle encodes no instruction, or an instruction that its slot cannot execute.
     IllegalWord(Box<IllegalWord>),
     /// Execution left the program.
     ProgramCounter {
-        /// Bundles in the program.
+        /// Number of bundles in the program.
         bundles: u32,
     },
     /// A load or store outside the data memory.
     DataAddress {
-        /// The word address, offset and signed register added.
+        /// Word address: the sum of offset and signed register.
         address: i64,
-        /// Words in the data memory.
+        /// Number of words in the data memory.
         depth: u32,
-        /// True if it is a store.
+        /// Store; otherwise a load.
         store: bool,
     },
     /// An operation reads a register that neither the loader, nor the host, nor an operation has written.
     UnwrittenRegister {
-        /// The register.
+        /// Address of the register.
         register: Register,
     },
     /// A call with the return stack full.
     StackOverflow {
-        /// Entries of the stack.
+        /// Capacity of the stack in entries.
         depth: u32,
     },
     /// A return with the return stack empty.
     StackUnderflow,
-    /// A `loop` inside as many others as the sequencer counts.
+    /// A `loop` nested deeper than the sequencer counts.
     LoopOverflow {
-        /// The loops that it counts.
+        /// Nesting depth that the sequencer supports.
         depth: u32,
     },
     /// A `loop` whose count is not 1 to 65,535.
     LoopCount {
-        /// The count, as a signed integer.
+        /// Count as a signed integer.
         count: i32,
     },
     /// A `loop` in whose body the loop around it ends, or an operation that redirects in the last bundle of a loop.
     LoopNesting {
-        /// The last bundle of the loop around it.
+        /// Last bundle of the loop around it.
         last: BundleAddress,
     },
     /// A loop iterates more often in one run than its bound in the source promises.
     LoopBound {
-        /// The bound on iterations.
+        /// Bound on the iterations of a run.
         most: u32,
     },
     /// A loop iterates more often in one section than the total in the source promises.
     LoopTotal {
-        /// The bound on iterations.
+        /// Bound on the iterations in a section.
         total: u32,
     },
-    /// The limit on cycles was reached.
+    /// A run reached the limit on cycles.
     CycleLimit {
-        /// The limit.
+        /// Limit in cycles since reset.
         limit: Cycle,
     },
 }
 
 impl FaultKind {
-    /// Its name, in a word or two.
+    /// Short name of the kind, for tables.
     pub const fn name(&self) -> &'static str {
         match self {
             FaultKind::IllegalWord(_) => "illegal word",
@@ -104,12 +103,12 @@ impl FaultKind {
 }
 
 impl Fault {
-    /// The fault in words, for the program that was running.
-    pub fn show<'a>(&'a self, program: &'a Program) -> ShownFault<'a> {
-        ShownFault { fault: self, program: Some(program) }
+    /// Renders the fault with the names of the program that was running.
+    pub fn show<'a>(&'a self, program: &'a Program) -> FaultDisplay<'a> {
+        FaultDisplay { fault: self, program: Some(program) }
     }
 
-    /// The source location of the operation at fault, or else that of its bundle, if the program knows it.
+    /// Source location of the operation at fault, or else of its bundle, if the program knows it.
     pub fn location(&self, program: &Program) -> Option<Location> {
         let own = self.slot.and_then(|slot| program.operation_location(self.address, slot));
         own.or_else(|| program.location(self.address))
@@ -118,21 +117,21 @@ impl Fault {
 
 impl std::fmt::Display for Fault {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        ShownFault { fault: self, program: None }.fmt(f)
+        FaultDisplay { fault: self, program: None }.fmt(f)
     }
 }
 
 impl std::error::Error for Fault {}
 
-/// A [`Fault`] in words, as one line, `FILE:LINE: PLACE: MESSAGE`, or in parts.
+/// A [`Fault`] as text: one line, `FILE:LINE: PLACE: MESSAGE`, or its parts.
 #[derive(Clone, Copy, Debug)]
-pub struct ShownFault<'a> {
+pub struct FaultDisplay<'a> {
     fault: &'a Fault,
     program: Option<&'a Program>,
 }
 
-impl ShownFault<'_> {
-    /// The kind of fault, in words.
+impl FaultDisplay<'_> {
+    /// Message of the kind, without the place.
     pub fn message(&self) -> String {
         match &self.fault.kind {
             FaultKind::IllegalWord(reason) => format!("illegal word: {reason}"),
@@ -178,13 +177,13 @@ impl ShownFault<'_> {
         }
     }
 
-    /// The place in the source: `pd.s:12`.
+    /// Place in the source, like `pd.s:12`.
     fn source(&self, program: &Program) -> Option<String> {
         let own = self.fault.slot.and_then(|slot| program.operation_place(self.fault.address, slot));
         own.or_else(|| program.bundle_place(self.fault.address))
     }
 
-    /// The place and the cycle: `bundle 12, slot add, cycle 44`.
+    /// Place and cycle, like `bundle 12, slot add, cycle 44`.
     pub fn place(&self) -> String {
         let Fault { cycle, address, slot, .. } = *self.fault;
         let slot = match (slot, self.program) {
@@ -196,7 +195,7 @@ impl ShownFault<'_> {
     }
 }
 
-impl std::fmt::Display for ShownFault<'_> {
+impl std::fmt::Display for FaultDisplay<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         if let Some(program) = self.program
             && let Some(place) = self.source(program)
@@ -207,65 +206,65 @@ impl std::fmt::Display for ShownFault<'_> {
     }
 }
 
-/// The reason why a program cannot be loaded.
+/// Reason why a program cannot be loaded.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum LoadError {
     /// More bundles than the program memory holds.
     #[error("program of {bundles} bundles; {machine} holds {depth}")]
     Code {
-        /// Bundles in the program.
+        /// Number of bundles in the program.
         bundles: usize,
-        /// The machine.
+        /// Name of the machine.
         machine: &'static str,
-        /// Bundles that it holds.
+        /// Number of bundles that the machine holds.
         depth: u32,
     },
-    /// The last bundle lacks words.
+    /// The last bundle is incomplete.
     #[error("{words} words are no whole number of bundles of {slots}")]
     Bundle {
-        /// Words in the program.
+        /// Number of words in the program.
         words: usize,
-        /// Slots of the machine.
+        /// Number of the machine's slots.
         slots: usize,
     },
     /// More data than the data memory holds.
     #[error("{words} words of data; {machine} holds {depth}")]
     Data {
-        /// Words in the program.
+        /// Number of words in the program's data.
         words: usize,
-        /// The machine.
+        /// Name of the machine.
         machine: &'static str,
-        /// Words that it holds.
+        /// Number of words that the machine holds.
         depth: u32,
     },
     /// A constant for a register that the loader cannot set.
     #[error("constant for register address {register}, which {machine} {}", if *.register == Register::ZERO { "keeps at zero" } else { "does not have" })]
     Constant {
-        /// The register.
+        /// Address of the register.
         register: Register,
-        /// The machine.
+        /// Name of the machine.
         machine: &'static str,
     },
-    /// A port at an address where the machine has none of its kind.
+    /// A port at an address where the machine has no port of its kind.
     #[error("port {name} at register address {register}, where {machine} has no {kind} port")]
     Port {
-        /// The port's name.
+        /// Name of the port.
         name: String,
-        /// The register.
+        /// Address of the register.
         register: Register,
-        /// The machine.
+        /// Name of the machine.
         machine: &'static str,
-        /// `input` or `output`.
+        /// Direction of the port: `input` or `output`.
         kind: &'static str,
     },
     /// A machine with more slots than the emulator handles.
     #[error("{machine} has {slots} slots; the emulator handles 1 to {most}")]
     Slots {
-        /// The machine.
+        /// Name of the machine.
         machine: &'static str,
-        /// Its slots.
+        /// Number of the machine's slots.
         slots: usize,
-        /// The limit.
+        /// Limit on the slots.
         most: usize,
     },
 }

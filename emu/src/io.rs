@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The core's environment: ports, ticks and periods.
+//! Environment of the core: ports, ticks and periods.
 
 use crate::emulator::{Emulator, Goal, Sink, Status, Stop, emit};
 use crate::event::{Event, PortWrite};
@@ -10,26 +10,26 @@ use takt_isa::program::Port;
 use takt_isa::timing::{self, Cycle};
 use takt_isa::{BundleAddress, Program, Register, Type};
 
-/// The inputs of one period: registers of input ports, each with its bits.
+/// Inputs of one period: registers of input ports, each with its bits.
 pub type Row = Vec<(Register, u32)>;
-/// The inputs of successive periods.
+/// Inputs of successive periods.
 pub type Rows = Vec<Row>;
 
-/// The longest time between ticks that commands and packages offer: well within the 10⁹ cycles in which a period must end.
+/// Limit on the time between ticks that commands and packages offer: well within the 10⁹ cycles in which a period must end.
 pub const LONGEST_TICK: Cycle = 100_000_000;
 
-/// The schedule of future ticks, and counts of past ones.
+/// Schedule of future ticks, and counts of past ones.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Ticks {
     /// Single ticks that the host has scheduled, ascending: a queue.
     asked: VecDeque<Cycle>,
-    /// The interval of regular ticks.
+    /// Interval of regular ticks, in cycles.
     every: Option<NonZeroU64>,
-    /// The next regular tick; there is none before the first `wait`.
+    /// Cycle of the next regular tick; `None` before the first `wait`.
     regular: Option<Cycle>,
-    /// A tick that came before the `wait` and is remembered for it.
+    /// Tick that came before the `wait` and is remembered for it.
     remembered: Option<Cycle>,
-    /// The last cycle in which a `wait` issued.
+    /// Last cycle in which a `wait` issued.
     pub(crate) waited: Option<Cycle>,
     pub(crate) seen: u64,
     pub(crate) missed: u64,
@@ -41,7 +41,7 @@ impl Ticks {
         *self = Ticks { every: self.every, ..Ticks::default() };
     }
 
-    /// The cycle of the next tick.
+    /// Cycle of the next tick.
     #[inline]
     pub(crate) fn next(&self) -> Option<Cycle> {
         match (self.asked.front().copied(), self.regular) {
@@ -50,8 +50,8 @@ impl Ticks {
         }
     }
 
-    /// True if there is a tick in this cycle; it is then removed from the schedule. A regular and a single tick in the same
-    /// cycle count as one.
+    /// Removes the tick of this cycle from the schedule; returns false without one. A regular and a single tick in the same cycle count as
+    /// one.
     #[inline]
     pub(crate) fn take(&mut self, cycle: Cycle) -> bool {
         // No scheduled tick is earlier than this cycle.
@@ -66,14 +66,18 @@ impl Ticks {
         asked || regular
     }
 
+    #[inline]
     fn ask(&mut self, cycle: Cycle) {
+        if self.asked.is_empty() {
+            return self.asked.push_back(cycle);
+        }
         let place = self.asked.partition_point(|&asked| asked < cycle);
         if self.asked.get(place) != Some(&cycle) {
             self.asked.insert(place, cycle);
         }
     }
 
-    /// The same ticks, each `by` cycles later.
+    /// Ticks shifted by `by` cycles; negative is earlier.
     pub(crate) fn shifted(&self, by: i64) -> Ticks {
         let shift = |cycle: Cycle| cycle.wrapping_add_signed(by);
         Ticks {
@@ -85,7 +89,7 @@ impl Ticks {
         }
     }
 
-    /// True if the future ticks, and a remembered one, are the same.
+    /// The future ticks, and a remembered one, are equal.
     pub(crate) fn agree(&self, other: &Ticks) -> bool {
         let to_come = |ticks: &Ticks| (ticks.every, ticks.regular, ticks.remembered, ticks.waited.is_some());
         to_come(self) == to_come(other) && self.asked == other.asked
@@ -97,7 +101,7 @@ impl Ticks {
     }
 }
 
-/// The current period.
+/// Period that is under way.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Period {
     tick: Cycle,
@@ -107,35 +111,34 @@ pub(crate) struct Period {
 }
 
 impl Period {
-    /// The same period, `by` cycles later.
+    /// Period shifted by `by` cycles; negative is earlier.
     pub(crate) fn shifted(self, by: i64) -> Period {
         let shift = |cycle: Cycle| cycle.wrapping_add_signed(by);
         Period { tick: shift(self.tick), start: shift(self.start), ..self }
     }
 }
 
-/// A period that has ended.
+/// Report of a completed period.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PeriodReport {
-    /// The cycle of the tick that started it.
+    /// Cycle of the tick that started the period.
     pub tick: Cycle,
-    /// The cycle after which its cycles count: that of the tick or, if the tick came before the previous `wait` (a missed
-    /// deadline), that of the `wait`.
+    /// Cycle after which cycles count: of the tick or, if the tick came before the previous `wait` (a missed deadline), of that `wait`.
     pub start: Cycle,
-    /// The cycle in which its `wait` issued.
+    /// Cycle in which the period's `wait` issued.
     pub wait: Cycle,
-    /// The cycles that it took: `wait - start`. In each, a bundle issued or a stall was charged.
+    /// Cycles of the period: `wait - start`. In each, a bundle issued or a stall was charged.
     pub cycles: Cycle,
-    /// True if the next tick came before the `wait` had issued.
+    /// The next tick came before the `wait` had issued: the deadline is missed.
     pub missed: bool,
-    /// Ticks lost during the period.
+    /// Number of ticks lost during the period.
     pub lost: u64,
     /// NaNs written to output ports since the last report.
     pub nan_writes: Vec<PortWrite>,
 }
 
 impl PeriodReport {
-    /// The same report, `by` cycles later, with other NaNs.
+    /// Report shifted by `by` cycles (negative is earlier), with other NaNs.
     pub(crate) fn shifted(&self, by: i64, nan_writes: &[PortWrite]) -> PeriodReport {
         let shift = |cycle: Cycle| cycle.wrapping_add_signed(by);
         let (tick, start, wait) = (shift(self.tick), shift(self.start), shift(self.wait));
@@ -144,14 +147,14 @@ impl PeriodReport {
     }
 }
 
-/// A value for an input port.
+/// Value for an input port.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Number {
-    /// A binary32, for a port that carries these.
+    /// Value of a port that carries binary32.
     Float(f32),
-    /// An integer, for a port that carries these.
+    /// Value of a port that carries integers.
     Integer(i32),
-    /// Any 32 bits, for any port.
+    /// Arbitrary 32 bits, for any port.
     Bits(u32),
 }
 
@@ -183,7 +186,7 @@ impl Number {
         }
     }
 
-    /// The value's bits.
+    /// Value as 32 bits.
     pub fn bits(self) -> u32 {
         match self {
             Number::Float(value) => value.to_bits(),
@@ -192,7 +195,7 @@ impl Number {
         }
     }
 
-    /// True if it is a valid value for a port of this type.
+    /// The value is valid for a port of this type.
     pub(crate) fn fits(self, ty: Type) -> bool {
         matches!(
             (self, ty),
@@ -201,48 +204,48 @@ impl Number {
     }
 }
 
-/// The reason why a port cannot be set or read.
+/// Reason why a port cannot be set or read.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PortError {
-    /// The program has no port of this name.
+    /// A name without a port in the program.
     #[error("the program has no {kind} port {name}")]
     Unknown {
-        /// The name.
+        /// Name in the request.
         name: String,
-        /// `input` or `output`.
+        /// Direction of the port: `input` or `output`.
         kind: &'static str,
     },
-    /// The port carries values of another type.
+    /// A value of another type than the port's.
     #[error("port {name} carries {} values", match .ty { Type::F => "binary32", Type::I => "integer", Type::B => "32-bit" })]
     Type {
-        /// The port.
+        /// Name of the port.
         name: String,
-        /// The type that it carries.
+        /// Type of the port.
         ty: Type,
     },
     /// The number of values differs from the batch's number of lanes ([`crate::Batch`]).
     #[error("{given} values for {lanes} lanes")]
     Lanes {
-        /// Values given.
+        /// Number of values in the request.
         given: usize,
-        /// Lanes of the batch.
+        /// Number of the batch's lanes.
         lanes: usize,
     },
-    /// The machine has no input port at this address.
+    /// An address without an input port of the machine.
     #[error("register address {register} is no input port")]
     NoInput {
-        /// The address.
+        /// Address in the request.
         register: Register,
     },
 }
 
-/// The reason why a period did not end with a `wait`.
+/// Reason why a period did not end with a `wait`.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PeriodError {
-    /// The program faulted.
+    /// The program faulted during the period.
     #[error("{0}")]
     Fault(#[from] Fault),
-    /// An input could not be set; nothing has run.
+    /// An input could not be set; the period has not begun.
     #[error(transparent)]
     Port(#[from] PortError),
     /// The machine has halted.
@@ -250,7 +253,7 @@ pub enum PeriodError {
     Halted,
 }
 
-/// The register of a program's input port; checks that the port's type allows these values.
+/// Register of a program's input port; checks that the port's type allows these values.
 pub(crate) fn input_for(
     program: &Program,
     name: &str,
@@ -265,7 +268,7 @@ pub(crate) fn input_for(
     Ok(port.register)
 }
 
-/// A program's output port.
+/// Output port of a program, by name.
 pub(crate) fn output_for<'p>(program: &'p Program, name: &str) -> Result<&'p Port, PortError> {
     let port = program.outputs.iter().find(|port| port.name == name);
     port.ok_or_else(|| PortError::Unknown { name: name.to_owned(), kind: "output" })
@@ -274,18 +277,18 @@ pub(crate) fn output_for<'p>(program: &'p Program, name: &str) -> Result<&'p Por
 impl Emulator {
     // ---- Ports.
 
-    /// The input port of this name.
+    /// Input port by name.
     pub fn input_port(&self, name: &str) -> Option<&Port> {
         self.program.inputs.iter().find(|port| port.name == name)
     }
 
-    /// The output port of this name.
+    /// Output port by name.
     pub fn output_port(&self, name: &str) -> Option<&Port> {
         self.program.outputs.iter().find(|port| port.name == name)
     }
 
-    /// Sets an input port. Bundles that issue from now on read the value. If ports are latched, those of the next period do:
-    /// its tick is in the next cycle at the earliest. Before the first cycle, the section that runs once reads it.
+    /// Sets an input port. Bundles that issue from now on read the value; with latched ports, the bundles of the next period, whose tick is
+    /// in the next cycle at the earliest. Before the first cycle, the section that runs once reads it.
     ///
     /// # Errors
     /// If the program has no such port, or one of another type.
@@ -308,13 +311,13 @@ impl Emulator {
         Ok(())
     }
 
-    /// The visible value of an output port, by its register: the last value written or, if ports are latched, published.
-    /// `None` before the first one, or if there is no such port.
+    /// Visible value of an output port, by its register: the last value written or, if ports are latched, published. `None` before the
+    /// first one, or if there is no such port.
     pub fn output_bits(&self, register: Register) -> Option<u32> {
         self.machine().is_output(register).then(|| self.state.output(register))?
     }
 
-    /// The visible value of an output port, by name; `None` before the first one.
+    /// Visible value of an output port, by name; `None` before the first one.
     ///
     /// # Errors
     /// If the program has no such port.
@@ -345,26 +348,26 @@ impl Emulator {
         to_come
     }
 
-    /// The cycle of the next scheduled tick, if there is one.
+    /// Cycle of the next scheduled tick, if any.
     pub fn next_tick(&self) -> Option<Cycle> {
         self.ticks.next()
     }
 
-    /// The cycle of the tick that the program waits for: the next scheduled one or, if there is none, the one that
-    /// [`Emulator::run_period`] would schedule, in the first cycle in which the front end has refilled. `None` if it does not wait.
+    /// Cycle of the tick that the program waits for: the next scheduled tick or, without one, the tick that [`Emulator::run_period`] would
+    /// schedule, in the first cycle in which the front end has refilled. `None` if the program does not wait.
     pub fn due_tick(&self) -> Option<Cycle> {
         let Status::Waiting { since, .. } = self.status else { return None };
         let earliest = || self.now.max(since + Cycle::from(self.code.machine.refill));
         Some(self.ticks.next().unwrap_or_else(earliest))
     }
 
-    /// True if a deadline was missed since reset: a tick came before the program waited.
+    /// A tick came before the program waited: a deadline was missed since reset.
     pub fn deadline_missed(&self) -> bool {
         self.ticks.missed > 0
     }
 
-    /// Handles the tick that the machine sees in `cycle`, before anything else in that cycle. A tick starts the waiting program; the
-    /// first one that comes before the `wait` is remembered (a missed deadline), any others are lost.
+    /// Handles the tick that the machine sees in `cycle`, before all else in that cycle. A tick starts the waiting program; the first tick
+    /// that comes before the `wait` is remembered (a missed deadline), any others are lost.
     pub(crate) fn see_tick(&mut self, cycle: Cycle, sink: &mut Sink<'_>) {
         self.ticks.seen += 1;
         emit(sink, || Event::Tick { cycle });
@@ -430,7 +433,7 @@ impl Emulator {
     /// A fault, or an input that cannot be set, or a machine that has halted.
     pub fn run_period(&mut self, inputs: &[(&str, Number)]) -> Result<PeriodReport, PeriodError> {
         self.set_inputs(inputs)?;
-        // Without a bound on cycles, only a pause ends a run without a report.
+        // With no bound on cycles, only a pause ends a run without a report.
         loop {
             if let Some(report) = self.period(Cycle::MAX, &mut None)? {
                 return Ok(report);
@@ -473,7 +476,7 @@ impl Emulator {
             match self.drive(goal, sink)? {
                 Stop::Halted => return Err(PeriodError::Halted),
                 Stop::Reached | Stop::Paused => return Ok(None),
-                // If there is no report, this was the `wait` before the first period.
+                // Without a report, this was the `wait` before the first period.
                 _ => {
                     if let Some(mut report) = self.report.take() {
                         report.nan_writes = self.take_nan_writes();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The machine's architectural state, and the results in flight.
+//! Architectural state of the machine, and the results in flight.
 
 use crate::event::{PortWrite, Retire};
 use takt_isa::fp::{Flags, is_nan};
@@ -10,10 +10,9 @@ use takt_isa::{BundleAddress, Machine, Program, Register, SlotIndex};
 
 /// Words of the register array: the register space, followed by temporary words for blocks (`block`).
 pub(crate) const WORDS: usize = 2 * Register::COUNT;
-/// The first scratch word. There is one for each slot, for bundles that exchange registers.
+/// First scratch word. There is one for each slot, for bundles that exchange registers.
 const SCRATCH: u16 = Register::COUNT as u16;
-/// The first word for late results. [`MAX_LATENCY`] words for each slot are enough, since each bank is written at most once per
-/// cycle.
+/// First word for late results. [`MAX_LATENCY`] words for each slot are enough, since each bank is written at most once per cycle.
 const LATE: u16 = SCRATCH + MAX_SLOTS as u16;
 const _: () = assert!(WORDS.is_power_of_two(), "the mask of an index is all ones");
 const _: () = assert!(
@@ -23,28 +22,28 @@ const _: () = assert!(
 /// Limit on the NaNs on output ports that are kept until the host takes them; more are only counted.
 pub const MAX_NAN_WRITES: usize = 256;
 
-/// A word of the register array: a register or a temporary word.
+/// Word of the register array: a register or a temporary word.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Word(u16);
 
 impl Word {
-    /// The scratch word of a slot, for a bundle that exchanges registers.
+    /// Scratch word of a slot, for a bundle that exchanges registers.
     pub(crate) const fn scratch(slot: SlotIndex) -> Word {
         Word(SCRATCH + slot.get() as u16)
     }
 
-    /// The word of a block's late result of this number, which is below `MAX_SLOTS * MAX_LATENCY`.
+    /// Word of a block's late result of this number, which is below `MAX_SLOTS * MAX_LATENCY`.
     pub(crate) const fn late(number: usize) -> Word {
         Word(LATE + number as u16)
     }
 
-    /// The number of the late result that the word holds; `None` if it is for something else.
+    /// Number of the late result in this word; `None` for other words.
     #[inline(always)]
     pub(crate) const fn late_number(self) -> Option<usize> {
         if self.0 >= LATE { Some((self.0 - LATE) as usize) } else { None }
     }
 
-    /// The word's index into the register array. (The mask changes nothing; it lets the compiler omit the bounds check.)
+    /// Index into the register array. (The mask changes nothing; it lets the compiler omit the bounds check.)
     #[inline(always)]
     pub(crate) const fn index(self) -> usize {
         self.0 as usize & (WORDS - 1)
@@ -58,7 +57,7 @@ impl From<Register> for Word {
     }
 }
 
-/// A set of registers.
+/// Set of registers, as a bit map.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(crate) struct RegisterSet([u64; Register::COUNT / 64]);
 
@@ -73,7 +72,7 @@ impl RegisterSet {
         self.0[register.index() / 64] >> (register.index() % 64) & 1 != 0
     }
 
-    /// The number of words.
+    /// Number of registers in the set.
     pub(crate) fn len(&self) -> u32 {
         self.0.iter().map(|word| word.count_ones()).sum()
     }
@@ -87,16 +86,16 @@ impl RegisterSet {
     }
 }
 
-/// A result between issue and writeback.
+/// Result between issue and writeback.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Pending {
-    /// The event of its retirement; `register` is always set.
+pub(crate) struct PendingResult {
+    /// Event of its retirement; `register` is always set.
     pub(crate) retire: Retire,
     pub(crate) register: Register,
     pub(crate) output: bool,
-    /// True if a NaN is to be reported.
+    /// Reports a NaN on writeback, since the port carries binary32.
     pub(crate) float: bool,
-    /// True if the write is recorded for [`crate::Emulator::take_port_writes`].
+    /// The write is recorded for [`crate::Emulator::take_port_writes`].
     pub(crate) watched: bool,
 }
 
@@ -116,53 +115,52 @@ impl NanWrites {
     }
 }
 
-/// A loop that is under way.
+/// Active loop of the sequencer.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Loop {
-    /// Its first bundle.
+    /// First bundle of the body.
     pub(crate) start: BundleAddress,
-    /// The bundle after its last.
+    /// Address after the last bundle of the body.
     pub(crate) end: BundleAddress,
-    /// The iterations left, this one included.
+    /// Iterations left, the present one included.
     pub(crate) left: u16,
 }
 
-/// Everything that operations read and write.
+/// Architectural state: everything that operations read and write.
 #[derive(Clone, Debug)]
 pub(crate) struct State {
     pub(crate) registers: Box<[u32; WORDS]>,
     pub(crate) written: RegisterSet,
     pub(crate) memory: Vec<u32>,
     pub(crate) stack: Vec<BundleAddress>,
-    /// The loops that are under way, the innermost last.
+    /// Active loops, innermost last.
     pub(crate) loops: Vec<Loop>,
     pub(crate) flags: Flags,
     /// Results in flight, in the order of issue.
-    pub(crate) pending: Vec<Pending>,
+    pub(crate) pending: Vec<PendingResult>,
     pub(crate) nan_writes: NanWrites,
     /// Writes to watched ports that the host has not taken yet.
     pub(crate) port_writes: Vec<PortWrite>,
-    /// The second buffers of latched ports; the first ones are the registers. `None` if ports are not latched.
+    /// Host's side of latched ports; the program's side is in the registers. `None` if ports are not latched.
     pub(crate) latches: Option<Box<Latches>>,
 }
 
-/// The buffers of latched ports on the host's side. The registers are those on the program's side: the inputs as last latched, the
-/// outputs as written.
+/// Buffers of latched ports on the host's side. The registers are the program's side: the inputs as last latched, the outputs as written.
 #[derive(Clone, Debug)]
 pub(crate) struct Latches {
-    /// The inputs as the host has set them.
+    /// Inputs as the host has set them.
     pub(crate) inputs: [u32; Register::COUNT],
-    /// The outputs as they were published, and which of them were ever written.
+    /// Outputs as last published, and the set of outputs ever published.
     pub(crate) outputs: [u32; Register::COUNT],
     pub(crate) published: RegisterSet,
-    /// Inputs that were set since they were last taken.
+    /// Inputs set since they were last latched.
     pub(crate) changed: Vec<Register>,
-    /// True if the inputs must be latched at the beginning of the next cycle.
+    /// The inputs must be latched at the beginning of the next cycle.
     pub(crate) take: bool,
 }
 
 impl Latches {
-    /// The buffers after reset: outputs show the values that the loader wrote, and inputs are latched before the first cycle.
+    /// Buffers after reset: outputs show the values that the loader wrote, and inputs are latched before the first cycle.
     fn new(state: &State, machine: &Machine) -> Latches {
         let mut latches = Latches {
             inputs: [0; Register::COUNT],
@@ -186,7 +184,7 @@ impl Latches {
 }
 
 impl State {
-    /// The state after loading and reset.
+    /// State after loading and reset.
     pub(crate) fn new(program: &Program) -> State {
         let mut memory = program.data.clone();
         memory.resize(program.machine.data_depth as usize, 0);
@@ -212,7 +210,7 @@ impl State {
         state
     }
 
-    /// Sets an input port, as the host does.
+    /// Sets an input port for the host.
     #[inline]
     pub(crate) fn set_input(&mut self, register: Register, bits: u32) {
         let Some(latches) = &mut self.latches else { return self.set(register, bits) };
@@ -247,7 +245,7 @@ impl State {
         }
     }
 
-    /// The visible value of an output port; `None` if nothing was ever written there.
+    /// Visible value of an output port; `None` before its first write.
     pub(crate) fn output(&self, register: Register) -> Option<u32> {
         match &self.latches {
             None => self.written.contains(register).then(|| self.get(register)),
@@ -260,15 +258,18 @@ impl State {
         self.registers[word.into().index()]
     }
 
-    /// Writes a register.
+    /// Writes a register and marks it written.
     #[inline]
     pub(crate) fn set(&mut self, register: Register, bits: u32) {
         self.registers[register.index()] = bits;
-        self.written.insert(register);
+        // Avoid the store for registers already written, which are nearly all: a later read of the set need not wait for it.
+        if !self.written.contains(register) {
+            self.written.insert(register);
+        }
     }
 
     /// Writes back one result. Returns the write to an output port, if it is one.
-    pub(crate) fn write_back(&mut self, pending: &Pending) -> Option<PortWrite> {
+    pub(crate) fn write_back(&mut self, pending: &PendingResult) -> Option<PortWrite> {
         let Retire { cycle, slot, address, value, flags, .. } = pending.retire;
         self.set(pending.register, value);
         self.flags |= flags;
@@ -286,32 +287,34 @@ impl State {
         Some(write)
     }
 
-    /// The registers of the results that are on their buses in cycle `last` or before.
+    /// Registers of the results that are on their buses in cycle `last` or before.
     pub(crate) fn due(&self, last: Cycle) -> impl Iterator<Item = Register> {
         let due = self.pending.iter().filter(move |pending| pending.retire.cycle <= last);
         due.map(|pending| pending.register)
     }
 
-    /// True if a result for a register is in flight.
+    /// A result for the register is in flight.
     pub(crate) fn is_pending(&self, register: Register) -> bool {
         self.pending.iter().any(|pending| pending.register == register)
     }
 
-    /// Writes back every result that is on its bus in cycle `last` or before. (The order does not matter to the state: no
-    /// two pending results go to one register.)
+    /// Writes back every result that is on its bus in cycle `last` or before. (The order does not matter to the state: no two pending
+    /// results have the same register.)
     #[inline]
     pub(crate) fn write_back_until(&mut self, last: Cycle) {
         if self.pending.is_empty() {
             return;
         }
-        let mut i = 0;
-        while i < self.pending.len() {
-            if self.pending[i].retire.cycle <= last {
-                let pending = self.pending.remove(i);
+        let mut kept = 0;
+        for i in 0..self.pending.len() {
+            let pending = self.pending[i];
+            if pending.retire.cycle <= last {
                 self.write_back(&pending);
             } else {
-                i += 1;
+                self.pending[kept] = pending;
+                kept += 1;
             }
         }
+        self.pending.truncate(kept);
     }
 }

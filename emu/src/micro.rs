@@ -1,35 +1,35 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Micro-operations: the operations of a block as a flat list, to be executed sequentially.
 //!
-//! A micro writes its register at once, without the latency. Within a block, this makes no difference: the interlocks keep
-//! every operation from reading or overwriting a register with a result in flight. At the end of the block it would, since
-//! the state can be inspected there. Therefore results still in flight at that time (*late* results) go to temporary words
-//! of the register array, from which they become [`crate::machine::Pending`].
+//! A micro writes its register at once, without the latency. Within a block, this makes no difference: the interlocks keep every operation
+//! from reading or overwriting a register with a result in flight. At the end of the block it would, since the state can be inspected
+//! there. Therefore results still in flight at that time (*late* results) go to temporary words of the register array, from which they
+//! become [`crate::machine::PendingResult`].
 
 use crate::code::Operation;
 use crate::event::{PortWrite, Retire};
 use crate::execute::data_address;
-use crate::machine::{Pending, RegisterSet, WORDS, Word};
+use crate::machine::{PendingResult, RegisterSet, WORDS, Word};
 use takt_isa::fp::{Flags, Host, Value, is_nan};
 use takt_isa::timing::Cycle;
 use takt_isa::{BundleAddress, Effect, Op, Register, SlotIndex, compute};
 
-/// The kinds of micro-operations.
+/// Kinds of micro-operations, with their effects.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Kind {
-    /// `dest = compute(op, a, b, c)`
+    /// Computation: `dest = compute(op, a, b, c)`
     Compute,
-    /// `dest = constant`
+    /// Constant: `dest = constant`
     Immediate,
-    /// `dest = a`
+    /// Copy: `dest = a`
     Move,
-    /// `dest = memory[constant + a]`
+    /// Load: `dest = memory[constant + a]`
     Load,
-    /// `memory[constant + a] = b`
+    /// Store: `memory[constant + a] = b`
     Store,
-    /// `dest = flags`
+    /// Read of the flags: `dest = flags`
     ReadFlags,
-    /// `flags = 0`
+    /// Reset of the flags: `flags = 0`
     ClearFlags,
     /// Reports register `a` to check number `constant`, if it holds a NaN.
     Check,
@@ -37,7 +37,7 @@ pub(crate) enum Kind {
     Watch,
 }
 
-/// A pre-decoded operation.
+/// Pre-decoded operation of a block.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Micro {
     pub(crate) kind: Kind,
@@ -56,20 +56,20 @@ impl Micro {
     }
 }
 
-/// A late result: one that is in flight at the block's end.
+/// Late result: in flight at the block's end.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Late {
+pub(crate) struct LateResult {
     pub(crate) operation: Operation,
     pub(crate) register: Register,
     pub(crate) address: BundleAddress,
-    /// The cycle of its issue, relative to the block's entry.
+    /// Cycle of the issue, relative to the block's entry.
     pub(crate) offset: u32,
 }
 
-impl Late {
-    /// The result, for a block entered in cycle `entered`.
-    pub(crate) fn pending(&self, entered: Cycle, value: Value, memory: Option<u32>) -> Pending {
-        let Late { operation, register, address, offset } = *self;
+impl LateResult {
+    /// Result in flight, for a block entered in cycle `entered`.
+    pub(crate) fn pending(&self, entered: Cycle, value: Value, memory: Option<u32>) -> PendingResult {
+        let LateResult { operation, register, address, offset } = *self;
         let issued = entered + Cycle::from(offset);
         let retire = Retire {
             cycle: issued + Cycle::from(operation.latency),
@@ -82,7 +82,7 @@ impl Late {
             flags: value.flags,
             memory,
         };
-        Pending {
+        PendingResult {
             retire,
             register,
             output: operation.output,
@@ -92,20 +92,20 @@ impl Late {
     }
 }
 
-/// A write to an output port that carries binary32 or is watched.
+/// Write to an output port that carries binary32 or is watched.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Check {
     slot: SlotIndex,
     register: Register,
     address: BundleAddress,
-    /// The cycle of its writeback, relative to the block's entry.
+    /// Cycle of the writeback, relative to the block's entry.
     offset: u32,
     float: bool,
     watched: bool,
 }
 
 impl Check {
-    /// The event, for a block entered in cycle `entered`.
+    /// Event of the write, for a block entered in cycle `entered`.
     pub(crate) fn write(&self, entered: Cycle, value: u32) -> PortWrite {
         let Check { slot, register, address, offset, float, .. } = *self;
         let nan = float && is_nan(value);
@@ -118,21 +118,21 @@ impl Check {
 pub(crate) struct Emitter {
     /// Offset of the last bundle's issue.
     last: u32,
-    /// Words of the data memory.
+    /// Number of words in the data memory.
     depth: u32,
     pub(crate) micros: Vec<Micro>,
-    /// The index of the first micro with a late result.
+    /// Index of the first micro with a late result.
     pub(crate) split: Option<usize>,
-    pub(crate) late: Vec<Late>,
+    pub(crate) late: Vec<LateResult>,
     pub(crate) checks: Vec<Check>,
     /// Registers that micros write.
     pub(crate) writes: RegisterSet,
-    /// True if a load or store may leave the memory.
+    /// A load or store may leave the memory.
     pub(crate) can_fault: bool,
 }
 
 impl Emitter {
-    /// An empty translation, for a block whose last bundle issues at offset `last`, and a data memory of `depth` words.
+    /// Empty translation, for a block whose last bundle issues at offset `last`, and a data memory of `depth` words.
     pub(crate) fn new(last: u32, depth: u32) -> Emitter {
         Emitter { last, depth, ..Emitter::default() }
     }
@@ -151,7 +151,7 @@ impl Emitter {
             let dest = match operation.dest {
                 Some(register) if late => {
                     self.split.get_or_insert(start);
-                    self.late.push(Late { operation: *operation, register, address, offset });
+                    self.late.push(LateResult { operation: *operation, register, address, offset });
                     Word::late(self.late.len() - 1)
                 }
                 Some(register) => {
@@ -172,7 +172,7 @@ impl Emitter {
                 Effect::Store => Kind::Store,
                 Effect::ReadFlags => Kind::ReadFlags,
                 Effect::ClearFlags => Kind::ClearFlags,
-                // These end the block: they are its control flow.
+                // Control flow ends the block, and is handled by its caller.
                 Effect::Jump | Effect::BranchZero | Effect::BranchNonzero => continue,
                 Effect::Call | Effect::Return | Effect::Loop => continue,
                 Effect::Wait | Effect::Halt | Effect::Nothing => continue,
@@ -194,11 +194,11 @@ impl Emitter {
         }
     }
 
-    /// Appends the micros of a bundle in an order in which none writes what a later one reads (a parallel move, sequentialised). If
-    /// there is no such order, because the bundle exchanges registers, a scratch word breaks the cycle.
+    /// Appends the micros of a bundle in an order in which no micro writes a register that a later one reads (a parallel move,
+    /// sequentialised). If there is no such order, because the bundle exchanges registers, a scratch word breaks the cycle.
     fn order(&mut self, mut bundle: Vec<(&Operation, Micro)>) {
-        // Flags are first read, then cleared; only then do the operations of this bundle raise theirs. Loads read what was there
-        // before the bundle's store.
+        // Flags are first read, then cleared; only then do the operations of this bundle raise theirs. Loads precede the bundle's store,
+        // since they read the old memory.
         let stores = bundle.iter().any(|(_, micro)| micro.kind == Kind::Store);
         let turn = |micro: &Micro| match micro.kind {
             Kind::ReadFlags => 0,
@@ -230,28 +230,28 @@ impl Emitter {
     }
 }
 
-/// The state on which micros operate, and the records that they leave for their caller.
+/// State on which micros operate, and the records that they leave for their caller.
 pub(crate) struct Context<'a> {
     pub(crate) registers: &'a mut [u32; WORDS],
     pub(crate) memory: &'a mut [u32],
     pub(crate) flags: Flags,
-    /// For each late result, its flags and the data word from which it was loaded.
+    /// Flags of each late result, and the data word from which it was loaded.
     pub(crate) late: &'a mut [(Flags, Option<u32>)],
-    /// Words of memory overwritten, with their old values.
+    /// Undo log: overwritten words of memory, with their old values.
     pub(crate) stored: &'a mut Vec<(u32, u32)>,
     /// Checks that found a NaN, with its bits.
     pub(crate) nans: &'a mut Vec<(u32, u32)>,
-    /// Checks of ports that are watched, with the bits written.
+    /// Checks of watched ports, with the bits written.
     pub(crate) writes: &'a mut Vec<(u32, u32)>,
 }
 
-/// The error of a load or store outside of the memory. The caller must undo the changes that the block has made.
-pub(crate) struct Outside;
+/// Error of a load or store outside of the memory. The caller must undo the changes that the block has made.
+pub(crate) struct AddressError;
 
-/// Runs micros sequentially. With `TAIL`, there may be late results among them.
+/// Runs micros sequentially. `TAIL` permits late results among them.
 #[inline]
-pub(crate) fn run<const TAIL: bool>(micros: &[Micro], context: &mut Context<'_>) -> Result<(), Outside> {
-    // In a local the flags stay in a machine register.
+pub(crate) fn run<const TAIL: bool>(micros: &[Micro], context: &mut Context<'_>) -> Result<(), AddressError> {
+    // Keep the flags in a machine register.
     let mut flags = context.flags;
     let registers = &mut *context.registers;
     for micro in micros {
@@ -262,13 +262,13 @@ pub(crate) fn run<const TAIL: bool>(micros: &[Micro], context: &mut Context<'_>)
             Kind::Move => Value::exact(a),
             Kind::Load => match context.memory.get(data_address(micro.constant, a)) {
                 Some(&word) => Value::exact(word),
-                None => return Err(Outside),
+                None => return Err(AddressError),
             },
             Kind::Store => {
                 let address = data_address(micro.constant, a);
                 match context.memory.get_mut(address) {
                     Some(word) => context.stored.push((address as u32, std::mem::replace(word, b))),
-                    None => return Err(Outside),
+                    None => return Err(AddressError),
                 }
                 continue;
             }

@@ -6,34 +6,34 @@ use std::collections::BTreeMap;
 use takt_isa::fp::Flags;
 use takt_isa::{BundleAddress, Flow, Register};
 
-/// The known state of a machine with nothing in flight. Its return stack is unknown, and assumed to be empty.
+/// Known state of a machine with nothing in flight. Its return stack is unknown, and assumed to be empty.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MachineState {
-    /// The position of its execution.
+    /// Position at which execution stands.
     pub at: Position,
-    /// Registers with their bits, and input ports as the host has set them. A register that is not here was never written.
+    /// Registers with their bits, and input ports as the host has set them. Registers that are left out were never written.
     pub registers: BTreeMap<Register, u32>,
-    /// The data memory, from word 0.
+    /// Data memory, from word 0.
     pub memory: Vec<u32>,
-    /// The sticky exception flags.
+    /// Sticky exception flags of the machine.
     pub flags: Flags,
 }
 
-/// The position of a machine's execution.
+/// Position of a machine's execution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Position {
-    /// At its beginning, after a reset.
+    /// Before the first cycle, after a reset.
     Reset,
-    /// The `wait` of this bundle has issued.
+    /// After the issue of this bundle's `wait`.
     Wait(BundleAddress),
-    /// It has stopped at this bundle.
+    /// Stopped at this bundle.
     Stopped(BundleAddress),
 }
 
 impl Emulator {
-    /// Resets the machine and sets it to a known state. Cycles count from here.
+    /// Resets the machine and sets it to a known state, from which cycles count.
     ///
-    /// Returns false, and leaves it reset, if the state is that of waiting at a bundle that has no `wait`.
+    /// Returns false, and leaves the machine reset, if the state is that of waiting at a bundle without a `wait`.
     pub fn restore(&mut self, saved: &MachineState) -> bool {
         self.reset();
         let state = &mut self.state;

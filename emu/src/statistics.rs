@@ -5,27 +5,26 @@ use std::collections::{BTreeMap, HashMap};
 use takt_isa::timing::{Cause, Cycle};
 use takt_isa::{BundleAddress, Op, ROWS};
 
-/// Everything counted since reset. `cycles = bundles + stalled()`, always.
+/// Counts since reset. `cycles = bundles + stalled()`, always.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Statistics {
-    /// Cycles that have passed.
+    /// Number of cycles passed.
     pub cycles: Cycle,
-    /// Bundles issued.
+    /// Number of bundles issued.
     pub bundles: u64,
-    /// Operations issued, by [`Op`] (`operations[op as usize]`); those that do nothing are not counted.
+    /// Operations issued, by [`Op`] (`operations[op as usize]`), without operations that do nothing.
     pub operations: [u64; ROWS.len()],
-    /// The number of issues of each bundle of the program, by address.
+    /// Number of issues of each bundle of the program, by address.
     pub visits: Vec<u64>,
-    /// Stalled cycles, by the bundle that could not issue and the cause. For [`Cause::Wait`] that is the waiting bundle
-    /// itself.
+    /// Stalled cycles, by the bundle that could not issue and the cause. For [`Cause::Wait`], the bundle is the waiting one.
     pub causes: BTreeMap<(BundleAddress, Cause), u64>,
-    /// Ticks seen.
+    /// Number of ticks seen.
     pub ticks: u64,
     /// Ticks that came before the program waited and were remembered: missed deadlines.
     pub missed: u64,
     /// Ticks that came while another was remembered, and were lost.
     pub lost: u64,
-    /// NaNs written to output ports that carry binary32.
+    /// Number of NaNs written to output ports that carry binary32.
     pub nan_writes: u64,
 }
 
@@ -44,18 +43,18 @@ impl Statistics {
         self.causes.values().sum()
     }
 
-    /// Operations issued, those that do nothing not counted.
+    /// Number of operations issued, without operations that do nothing.
     pub fn total_operations(&self) -> u64 {
         self.operations.iter().sum()
     }
 
-    /// The number of issues of an operation.
+    /// Number of issues of an operation.
     pub fn operation(&self, op: Op) -> u64 {
         self.operations[op as usize]
     }
 }
 
-/// The running counts. Those of blocks are added only on demand, since each block counts its own runs.
+/// Running counts. Counts of blocks are added only on demand, since each block counts its own runs.
 #[derive(Clone, Debug)]
 pub(crate) struct Tally {
     pub(crate) bundles: u64,
@@ -95,7 +94,7 @@ impl Tally {
         }
     }
 
-    /// The causes as a sorted table, waiting included.
+    /// Sorted table of the causes, waiting included.
     pub(crate) fn causes(&self) -> BTreeMap<(BundleAddress, Cause), u64> {
         let addresses = (0..).map(BundleAddress::new);
         let waits = addresses.zip(&self.waits).filter(|&(_, &cycles)| cycles > 0);

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Generator of random programs from a seed, for tests of the emulator, and of the circuit against it.
 //!
-//! Programs use few registers, so that hazards are frequent: nearly every bundle stalls. A unit is drawn before an instruction
-//! of it, so that rare units occur as often as common ones. Instructions are taken from the specification's table; only the
-//! loop counter's decrement is named.
+//! Programs use few registers, so that hazards are frequent: nearly every bundle stalls. A unit is drawn before an instruction of it, so
+//! that rare units occur as often as common ones. Instructions are taken from the specification's table; only the loop counter's decrement
+//! is named.
 
 use takt_isa::program::{LoopBound, Port, Section};
 use takt_isa::shape::WORD_BITS;
@@ -12,38 +12,43 @@ use takt_isa::{
     Register, Row, SlotIndex, Type,
 };
 
-/// The shape of a random program.
+/// Shape of a random program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Options {
-    /// Bundles of the period, roughly.
+    /// Approximate number of the period's bundles.
     pub bundles: u32,
-    /// True if there are branches, loops, calls; otherwise the period is a straight line.
+    /// Contains branches, loops and calls; otherwise the period is a straight line.
     pub control: bool,
-    /// True if the program may do what no sane one does: illegal words, jumps and addresses anywhere, unwritten registers,
-    /// unbalanced calls. Such a program may fault, or never wait.
+    /// May contain what no sane program does: illegal words, jumps and addresses anywhere, unwritten registers, unbalanced calls. Such a
+    /// program may fault, or never wait.
     pub wild: bool,
-    /// True if instructions with three sources are to be frequent: on some machines there is one, among dozens.
+    /// Prefers instructions with three sources: some machines have one among dozens.
     pub three: bool,
+    /// Directs programs to rare cases: calls as deep as the return stack, and operands whose sums tie, cancel, or are decided by bits far
+    /// below their last place.
+    pub directed: bool,
 }
 
 impl Options {
-    /// A program that runs without fault: `.once` part, `wait`, a period, `wait`, subroutines.
-    pub const TAME: Options = Options { bundles: 40, control: true, wild: false, three: false };
-    /// A program that may do anything.
-    pub const WILD: Options = Options { bundles: 40, control: true, wild: true, three: false };
+    /// Programs that run without fault: `.once` part, `wait`, a period, `wait`, subroutines.
+    pub const TAME: Options =
+        Options { bundles: 40, control: true, wild: false, three: false, directed: false };
+    /// Programs that may do anything.
+    pub const WILD: Options =
+        Options { bundles: 40, control: true, wild: true, three: false, directed: false };
 }
 
-/// A small random number generator (SplitMix64).
+/// Small random number generator (SplitMix64).
 #[derive(Clone, Debug)]
 pub struct Random(u64);
 
 impl Random {
-    /// A generator with this seed.
+    /// Generator with this seed.
     pub const fn new(seed: u64) -> Random {
         Random(seed)
     }
 
-    /// 64 random bits.
+    /// Next 64 random bits.
     pub const fn bits(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
@@ -52,12 +57,12 @@ impl Random {
         z ^ (z >> 31)
     }
 
-    /// A number below `end`, which is not 0.
+    /// Random number below `end`, which is not 0.
     pub const fn below(&mut self, end: u32) -> u32 {
         (((self.bits() >> 32) * end as u64) >> 32) as u32
     }
 
-    /// True once in `n` times.
+    /// Returns true once in `n` times.
     pub const fn once_in(&mut self, n: u32) -> bool {
         self.below(n) == 0
     }
@@ -66,7 +71,7 @@ impl Random {
         &from[self.below(from.len() as u32) as usize]
     }
 
-    /// A random operand: often a special binary32 value or a small integer.
+    /// Random operand: often a special binary32 value or a small integer.
     pub fn word(&mut self) -> u32 {
         const SPECIAL: [u32; 16] = [
             0x0000_0000, // zeros
@@ -90,52 +95,73 @@ impl Random {
             0 | 1 => *self.pick(&SPECIAL),
             2 => self.below(64),
             3 => self.bits() as u32,
-            // Of moderate size, so that sums and products stay numbers for a while.
+            // Moderate size, so that sums and products stay finite for a while.
             _ => (self.bits() as u32) & 0x807f_ffff | (120 + self.below(14)) << 23,
         }
     }
+
+    /// Operand with few ones or few zeros, and an exponent from a range of 3 or of 61: sums of two such operands tie, cancel, or are decided
+    /// by bits far below their last place.
+    pub fn addend(&mut self) -> u32 {
+        let (bits, place, other) = (self.bits() as u32, self.below(23), self.below(23));
+        let fraction = match self.below(4) {
+            0 => 1 << place,
+            1 => 1 << place | 1 << other,
+            2 => u32::MAX << place,
+            _ => bits & (u32::MAX >> (9 + place)),
+        };
+        let exponent = if self.once_in(3) { 127 + self.below(3) } else { 97 + self.below(61) };
+        bits & 0x8000_0000 | exponent << 23 | fraction & 0x007f_ffff
+    }
 }
 
-/// Registers that random operations read and write, of each bank; and how many of its output ports.
+/// Limits on the registers of each bank that random operations read and write, and on its output ports.
 const POOL: u32 = 8;
 const OUTPUTS: usize = 2;
-/// Data words that differ from the other seeds', at most.
+/// Limit on the data words in which programs of different seeds differ.
 const OWN_DATA: u32 = 64;
-/// The number of input ports that random programs read.
+/// Number of input ports that random programs read.
 pub const INPUTS: usize = 4;
 /// Registers at the start of the first slot's bank that hold word addresses and are never written.
 const BASES: usize = 4;
-/// Registers there that hold iterations of loops and are never written.
+/// Registers after these that hold iterations of loops and are never written.
 const COUNTS: usize = 4;
 
-/// The random program of a seed: the same for the same arguments. The host is to set its inputs before it runs.
+/// Chains of calls: least bundles of a program with a chain, number of programs per chain, most bundles of each subroutine.
+const LONG: u32 = 20;
+const CHAINS: u32 = 6;
+const LEVEL: u32 = 4;
+/// Approximate limit on the bundles of all other subroutines.
+const SUBROUTINES: u32 = 60;
+
+/// Random program of a seed: equal arguments give equal programs. The host must set its inputs before it runs.
 pub fn random_program(seed: u64, machine: &'static Machine, options: Options) -> Program {
     Generator::new(seed, machine, options).program()
 }
 
-/// The loops around the next bundle.
+/// Loops around the next bundle.
 #[derive(Clone, Copy)]
-struct Around {
-    /// Those that the sequencer counts, callers' included.
+struct LoopNesting {
+    /// Depth of sequencer-counted loops, callers' included.
     counted: u32,
-    /// Those that branches close.
+    /// Depth of loops closed by branches.
     repeats: usize,
-    /// The product of their iterations, of callers' too.
+    /// Product of the loops' iterations, callers' included.
     turns: u32,
 }
 
-impl Around {
-    const NONE: Around = Around { counted: 0, repeats: 0, turns: 1 };
+impl LoopNesting {
+    const NONE: LoopNesting = LoopNesting { counted: 0, repeats: 0, turns: 1 };
 }
 
-/// The most iterations of loops inside one another, all taken together, roughly.
+/// Approximate limit on the product of nested loops' iterations.
 const TURNS: u32 = 8;
 
 struct Generator {
     random: Random,
     machine: &'static Machine,
     options: Options,
-    /// Readable registers.
+    /// Registers that operations may read.
     sources: Vec<Register>,
     /// Registers of each slot that operations may write.
     dests: Vec<Vec<BankIndex>>,
@@ -143,12 +169,19 @@ struct Generator {
     counts: Vec<(Register, u32)>,
     constants: Vec<(Register, u32)>,
     bundles: Vec<Vec<u64>>,
-    /// Calls to be patched with the address of a subroutine: bundle, slot, what is around it.
-    calls: Vec<(usize, SlotIndex, Around)>,
-    /// `loop` operations, as bundle and slot.
+    /// Calls to be patched with the address of a subroutine: bundle, slot, loops around it.
+    calls: Vec<(usize, SlotIndex, LoopNesting)>,
+    /// Places of `loop` operations, as bundle and slot.
     loops: Vec<(usize, SlotIndex)>,
-    around: Around,
+    around: LoopNesting,
     loop_bounds: Vec<LoopBound>,
+}
+
+impl Options {
+    /// Draws a random operand.
+    fn word(self, random: &mut Random) -> u32 {
+        if self.directed && random.once_in(4) { random.addend() } else { random.word() }
+    }
 }
 
 impl Generator {
@@ -159,10 +192,10 @@ impl Generator {
         let mut dests = Vec::new();
         let pool = 1 + random.below(POOL) as usize;
         for slot in machine.slots {
-            // The first registers are spared for bases, counters and counts.
+            // Reserve the first registers for bases, counters and counts.
             let ordinary = slot.bank.registers().skip(2 * BASES + COUNTS).take(pool);
             let all: Vec<Register> = ordinary.chain(machine.output_registers(slot).take(OUTPUTS)).collect();
-            constants.extend(all.iter().map(|&register| (register, random.word())));
+            constants.extend(all.iter().map(|&register| (register, options.word(&mut random))));
             sources.extend(&all);
             dests.push(all.iter().filter_map(|&register| slot.bank.index(register)).collect());
         }
@@ -190,7 +223,7 @@ impl Generator {
             bundles: Vec::new(),
             calls: Vec::new(),
             loops: Vec::new(),
-            around: Around::NONE,
+            around: LoopNesting::NONE,
             loop_bounds: Vec::new(),
         }
     }
@@ -205,19 +238,23 @@ impl Generator {
         let period = self.bundles.len() as u32;
         self.control(first_wait, Effect::Wait, period, None);
         self.body(self.options.bundles);
+        let chain = self.deep().map(|length| (self.bundles.len(), length));
+        if chain.is_some() {
+            self.plain();
+        }
         let last = self.bundles.len();
         self.plain();
         let ending = if self.random.once_in(16) { Effect::Halt } else { Effect::Wait };
         self.control(last, ending, period, None);
         let end = self.bundles.len() as u32;
-        // Subroutines call only what comes after them.
+        // Subroutines call only later ones.
         let mut depth = 0;
         while !self.calls.is_empty() && depth < 3 {
             depth += 1;
             let callers = std::mem::take(&mut self.calls);
             let address = self.bundles.len() as u32;
             let outside = callers.iter().map(|(_, _, around)| around);
-            self.around = Around {
+            self.around = LoopNesting {
                 counted: outside.clone().map(|around| around.counted).max().unwrap_or(0),
                 turns: outside.map(|around| around.turns).max().unwrap_or(1),
                 repeats: 0,
@@ -226,7 +263,7 @@ impl Generator {
                 self.retarget(bundle, slot, address);
             }
             self.body(4);
-            self.around = Around::NONE;
+            self.around = LoopNesting::NONE;
             let last = self.bundles.len();
             self.plain();
             self.control(last, Effect::Return, 0, None);
@@ -234,13 +271,16 @@ impl Generator {
         for (bundle, slot, _) in std::mem::take(&mut self.calls) {
             self.bundles[bundle][slot.index()] = filler();
         }
+        if let Some((caller, length)) = chain {
+            self.chain(caller, length);
+        }
         if self.options.wild {
             self.derange();
         }
         let port = |name: String, register, ty| Port { name, register, ty };
         let inputs = input_ports(machine).enumerate();
         let inputs = inputs.map(|(i, register)| port(format!("in{i}"), register, Type::B)).collect();
-        // The second port of a bank is an integer's: no NaN there.
+        // A bank's second port carries integers: no NaN there.
         let outputs = machine.slots.iter().flat_map(|slot| {
             let ports = machine.output_registers(slot).take(OUTPUTS).zip([Type::F, Type::I]);
             ports.map(|(register, ty)| port(format!("out{register}"), register, ty))
@@ -249,11 +289,11 @@ impl Generator {
             let (start, end) = (BundleAddress::new(start), BundleAddress::new(end));
             Section { name: name.to_owned(), start, end }
         };
-        // Nearly the same for every seed: a circuit that has run another program need not be given most of it again.
+        // Data are nearly the same for every seed: a circuit that has run another program needs only the differences.
         let mut common = Random::new(0);
-        let mut data: Vec<u32> = (0..machine.data_depth).map(|_| common.word()).collect();
+        let mut data: Vec<u32> = (0..machine.data_depth).map(|_| self.options.word(&mut common)).collect();
         for _ in 0..OWN_DATA.min(machine.data_depth) {
-            data[self.random.below(machine.data_depth) as usize] = self.random.word();
+            data[self.random.below(machine.data_depth) as usize] = self.options.word(&mut self.random);
         }
         self.constants.sort_unstable();
         self.loop_bounds.sort_unstable_by_key(|bound| bound.address);
@@ -290,12 +330,47 @@ impl Generator {
         }
     }
 
-    /// Generates a call of a subroutine that is not generated yet.
+    /// Generates a call of a subroutine that does not exist yet.
     fn call(&mut self) {
         let at = self.bundles.len();
         self.plain();
         if let Some(slot) = self.control(at, Effect::Call, 0, None) {
             self.calls.push((at, slot, self.around));
+        }
+    }
+
+    /// Draws the length of a chain of calls, if there is to be one: often as deep as the return stack, in a wild program beyond.
+    fn deep(&mut self) -> Option<u32> {
+        let Options { bundles, control, wild, .. } = self.options;
+        if !self.options.directed || !control || bundles < LONG || !self.random.once_in(CHAINS) {
+            return None;
+        }
+        let deepest = self.machine.stack_depth;
+        let length = match self.random.below(4) {
+            0 => 1 + self.random.below(deepest),
+            1 if wild => deepest + 1 + self.random.below(2),
+            _ => deepest,
+        };
+        let room = self.machine.most_bundles().saturating_sub(self.bundles.len() as u32 + SUBROUTINES);
+        (length * LEVEL <= room).then_some(length)
+    }
+
+    /// Generates a chain of subroutines, in which each calls the next, and a call of the first.
+    fn chain(&mut self, mut caller: usize, length: u32) {
+        for _ in 0..length {
+            self.control(caller, Effect::Call, self.bundles.len() as u32, None);
+            if self.random.once_in(4) {
+                self.plain();
+            }
+            // In the last subroutine, this bundle calls nothing.
+            caller = self.bundles.len();
+            self.plain();
+            if self.random.once_in(2) {
+                self.plain();
+            }
+            let last = self.bundles.len();
+            self.plain();
+            self.control(last, Effect::Return, 0, None);
         }
     }
 
@@ -312,8 +387,8 @@ impl Generator {
         self.control(at, effect, at as u32 + 1 + over, Some(source));
     }
 
-    /// The registers of the slot that computes integers: two counters, one for each loop around another that branches close, the number
-    /// 1, a count.
+    /// Registers of the slot that computes integers: the counters of the outer and the inner loop closed by branches, the number 1, a
+    /// count.
     fn counters(&self) -> Option<(SlotIndex, [BankIndex; 4])> {
         let (slot, _) = self.machine.host(Op::isub.row().function)?;
         let [Some(outer), Some(one), Some(inner), Some(count)] =
@@ -344,13 +419,13 @@ impl Generator {
         self.bundles.push(bundle);
     }
 
-    /// Draws the iterations of a loop, `most` unless it is in loops of many.
+    /// Draws the iterations of a loop, at most `most`, and fewer inside of loops with many.
     fn rounds(&mut self, most: u32) -> u32 {
         let left = (TURNS / self.around.turns.max(1)).clamp(1, most);
         1 + self.random.below(left)
     }
 
-    /// Generates a loop of a few iterations that a branch closes, with branches and perhaps other loops in it.
+    /// Generates a loop of a few iterations closed by a branch, with branches and perhaps other loops in it.
     fn repeat(&mut self) {
         let Some((slot, [outer, inner, one, _])) = self.counters() else { return };
         let Some(&counter) = [outer, inner].get(self.around.repeats) else { return self.plain() };
@@ -358,7 +433,7 @@ impl Generator {
         self.set(slot, counter, rounds);
         self.set(slot, one, 1);
         let start = self.bundles.len() as u32;
-        // A wild program may promise too little.
+        // Wild programs may state too low a bound.
         let most = if self.options.wild { 1 + self.random.below(5) } else { rounds };
         self.loop_bounds.push(LoopBound { address: BundleAddress::new(start), most, total: None });
         let outside = self.around;
@@ -380,9 +455,9 @@ impl Generator {
         self.control(at, Effect::BranchNonzero, start, counter);
     }
 
-    /// Generates a loop that the sequencer counts. Its body has 1 to 12 bundles, and what is nested in it.
+    /// Generates a loop that the sequencer counts. Its body has 1 to 12 bundles, nested code not counted.
     fn counted(&mut self) {
-        // A wild program may nest too deep.
+        // Wild programs may nest too deep.
         let deepest = self.machine.loop_depth + if self.options.wild { 2 } else { 0 };
         let Some((slot, [.., one, count])) = self.counters().filter(|_| self.around.counted < deepest) else {
             return self.plain();
@@ -390,7 +465,7 @@ impl Generator {
         let (register, rounds) = *self.random.pick(&self.counts);
         let few =
             self.around.turns.saturating_mul(rounds) <= TURNS || self.options.wild && self.random.once_in(8);
-        // Of many iterations, and then of one bundle or two.
+        // Loops of many iterations have one or two bundles.
         let many = self.around.turns == 1 && self.random.once_in(8);
         let (source, rounds) = if few && !many && self.random.once_in(2) {
             (register, rounds)
@@ -408,7 +483,7 @@ impl Generator {
         let at = self.bundles.len();
         self.plain();
         let start = self.bundles.len();
-        // A bound must be there unless the count is a constant. A wild program may promise too little.
+        // A bound is required unless the count is a constant. Wild programs may state too low a bound.
         if self.random.once_in(4) || !self.counts.contains(&(source, rounds)) {
             let less = self.options.wild && self.random.once_in(4);
             let most = if less { 1 + self.random.below(5) } else { rounds };
@@ -426,7 +501,7 @@ impl Generator {
                 0 | 1 => self.skip(),
                 2 => self.counted(),
                 3 => self.repeat(),
-                // A subroutine uses the counters.
+                // Subroutines use the counters themselves.
                 4 if self.around.repeats == 0 => self.call(),
                 _ => self.plain(),
             }
@@ -459,7 +534,7 @@ impl Generator {
     fn operation(&mut self, slot: usize) -> u64 {
         let hosted: Vec<Function> =
             self.machine.slots[slot].units.iter().flat_map(|unit| unit.functions.iter().copied()).collect();
-        // Where a slot both loads and stores, these count as one: else all others would be rarer.
+        // A slot's loads and stores count as one function: otherwise all others would be rarer.
         let access = [Function::Load, Function::Store];
         let both = access.iter().all(|function| hosted.contains(function));
         let functions: Vec<Function> =
@@ -477,7 +552,7 @@ impl Generator {
         if row.effect.drains() && !self.random.once_in(4) {
             row = *self.random.pick(&rows);
         }
-        // But not too rare, so that reading and clearing flags is tested.
+        // Draining operations must not be too rare, so that reading and clearing flags is tested.
         let draining: Vec<&Row> = rows.iter().copied().filter(|row| row.effect.drains()).collect();
         if !draining.is_empty() && self.random.once_in(24) {
             row = *self.random.pick(&draining);
@@ -491,7 +566,7 @@ impl Generator {
             match *operand {
                 Operand::Dest => instruction.dest = *self.random.pick(&self.dests[slot]),
                 Operand::Source(n) => instruction.sources[n] = *self.random.pick(&self.sources),
-                Operand::Immediate => instruction.constant = self.random.word(),
+                Operand::Immediate => instruction.constant = self.options.word(&mut self.random),
                 Operand::Target => {}
                 Operand::Memory => {
                     let (base, value) = *self.random.pick(&self.bases);
@@ -566,7 +641,7 @@ impl Generator {
         }
     }
 
-    /// Lets a loop end elsewhere, repeats it by any value, or puts an operation that redirects where it ends.
+    /// Breaks a loop: changes its end, its count's register, or puts an operation that redirects at its end.
     fn unloop(&mut self, target: u32) {
         if self.loops.is_empty() {
             return;
@@ -607,7 +682,7 @@ impl Generator {
             let (mut target, register) =
                 (self.random.below(bundles + 2), self.random.below(Register::COUNT as u32) as usize);
             if self.random.once_in(8) {
-                // A program memory that ignored an address's upper bits would find a bundle there.
+                // Targets beyond the memory: a program memory that ignored an address's upper bits would find a bundle there.
                 target += self.machine.code_depth << self.random.below(4);
                 target &= Field::Target.bits().max();
             }
@@ -631,10 +706,10 @@ impl Generator {
                 }
                 14..=16 => self.unloop(target),
                 17 | 18 => self.bundles[bundle][slot] ^= 1 << self.random.below(WORD_BITS),
-                // In a second or third operand, which many instructions do not have.
+                // Inverts a bit of a second or third operand, which many instructions do not have.
                 19 | 20 => self.bundles[bundle][slot] ^= 1 << self.random.below(22),
                 _ => {
-                    // Another source, or base: unwritten, or any value at all.
+                    // Replaces a source or base by another register: unwritten, or of any value.
                     let source = match Register::new(register).filter(|_| self.random.once_in(2)) {
                         Some(register) => register,
                         None => *self.random.pick(&self.sources),
@@ -657,7 +732,7 @@ impl Generator {
     }
 }
 
-/// The input ports that random programs read, and that are to be set: `in0`, ….
+/// Input ports that random programs read, and that the host must set: `in0`, ….
 pub fn input_ports(machine: &Machine) -> impl Iterator<Item = Register> {
     machine.inputs.registers().take(INPUTS)
 }
@@ -666,17 +741,17 @@ fn filler() -> u64 {
     word(&Instruction::NOP)
 }
 
-/// True if a machine has more data memory than its row: then programs use both of its ends.
+/// Data memory of more than 1024 words: programs then use both of its ends.
 fn is_large(machine: &Machine) -> bool {
     machine.data_depth > 1024
 }
 
-/// An instruction's word. Those made here fit; one that did not would be unwritten memory, and fault.
+/// Word of an instruction. Instructions made here fit; one that does not would be unwritten memory, and fault.
 fn word(instruction: &Instruction) -> u64 {
     instruction.encode().unwrap_or(0)
 }
 
-/// The instruction with an effect that only one has.
+/// Instruction with an effect that is unique to it.
 fn op_with(effect: Effect) -> Op {
     ROWS.iter().find(|row| row.effect == effect).map_or(Op::nop, |row| row.op)
 }

@@ -14,7 +14,7 @@ const PERIODS: u32 = 8;
 
 /// The events that were met in a run.
 #[derive(Default)]
-struct Met {
+struct EventCounts {
     /// Periods of lanes, and those of them that were run apart.
     periods: u64,
     apart: u64,
@@ -27,7 +27,7 @@ struct Met {
 }
 
 /// Runs a program with random inputs in a batch and in an emulator for each lane.
-fn compare(seed: u64, program: &Program, met: &mut Met) {
+fn compare(seed: u64, program: &Program, met: &mut EventCounts) {
     let mut random = Random::new(!seed);
     // A group that is full and one that is not.
     let lanes = Batch::WIDTH + 1 + random.below(4) as usize;
@@ -81,8 +81,8 @@ fn compare(seed: u64, program: &Program, met: &mut Met) {
     }
 }
 
-fn compare_all(options: Options) -> Met {
-    let mut met = Met::default();
+fn compare_all(options: Options) -> EventCounts {
+    let mut met = EventCounts::default();
     for machine in machines() {
         for seed in 0..PROGRAMS {
             let program = random_program(seed, machine, Options { bundles: 12, ..options });
@@ -92,7 +92,7 @@ fn compare_all(options: Options) -> Met {
     // Otherwise the comparison says nothing.
     let together = met.periods - met.apart;
     assert!(met.apart > met.periods / 50 && together > met.periods / 20, "{} of {}", met.apart, met.periods);
-    let Met { joined, nan_writes, flags, .. } = met;
+    let EventCounts { joined, nan_writes, flags, .. } = met;
     assert!(joined > 3 && nan_writes > 100 && flags > 100, "{joined}, {nan_writes}, {flags}");
     met
 }
@@ -109,7 +109,7 @@ fn lanes_of_wild_programs_are_as_alone() {
 
 #[test]
 fn lanes_of_straight_programs_stay_together() {
-    let mut met = Met::default();
+    let mut met = EventCounts::default();
     for machine in MACHINES {
         for seed in 0..PROGRAMS / 2 {
             let program = random_program(seed, machine, Options { control: false, ..Options::TAME });

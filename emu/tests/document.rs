@@ -166,7 +166,7 @@ fn render(example: &Example) -> String {
 }
 
 #[test]
-fn examples_are_what_happens() {
+fn documented_examples_equal_the_emulators_timing() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/timing.md");
     let document = std::fs::read_to_string(&path).unwrap();
     let mut expected = String::new();

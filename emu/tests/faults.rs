@@ -21,7 +21,7 @@ fn fault(program: &Program) -> (Fault, Emulator) {
 }
 
 #[test]
-fn faults_say_where_and_what() {
+fn faults_name_place_and_cause() {
     let refill = u64::from(F3.refill);
     // Source; cycle of the fault from the first issue; what it says after "test.s:line".
     let cases: &[(&str, u64, &str)] = &[
@@ -74,7 +74,7 @@ fn faults_say_where_and_what() {
 
 /// A loop counts from 1 to 65,535, both included.
 #[test]
-fn loops_have_the_counts_that_are_promised() {
+fn loops_keep_their_promised_counts() {
     for (count, may) in [(-1, false), (0, false), (1, true), (65_535, true), (65_536, false)] {
         let source = format!(".preset a0 {count}\nloop a0, end\niadd x0, i0, zero\nend: halt");
         let mut emulator = Emulator::new(&program(&T3, &source)).unwrap();
@@ -144,7 +144,7 @@ fn a_faulting_bundle_does_nothing() {
 
 /// A block that ran ahead is undone: registers, memory, flags, NaNs that went out.
 #[test]
-fn a_fault_in_a_block_undoes_what_came_after() {
+fn fault_in_a_block_undoes_later_operations() {
     // The block counts in memory, then divides by i1 and loads from i0: run twice, it would count twice; and when the
     // load faults, the flag of the division is still in flight.
     let source = ".output F x224

@@ -4,10 +4,10 @@
 mod agreement;
 mod batch;
 mod common;
-mod compiled;
+mod compiled_blocks;
 mod document;
 mod faults;
-mod latched;
+mod latched_ports;
 mod periods;
 mod restore;
 mod slices;

@@ -114,7 +114,7 @@ fn missed_deadlines_are_remembered_once() {
 }
 
 #[test]
-fn events_tell_the_story_of_a_period() {
+fn events_describe_a_period_completely() {
     let mut emulator = Emulator::new(&square()).unwrap();
     emulator.run_to_wait().unwrap();
     let mut events = Vec::new();

@@ -20,9 +20,9 @@ fn saved(emulator: &Emulator, at: Position) -> MachineState {
 }
 
 /// Registers, memory, flags, outputs.
-type Seen = (BTreeMap<Register, u32>, Vec<u32>, u8, Vec<Option<u32>>);
+type MachineSnapshot = (BTreeMap<Register, u32>, Vec<u32>, u8, Vec<Option<u32>>);
 
-fn seen(emulator: &Emulator) -> Seen {
+fn seen(emulator: &Emulator) -> MachineSnapshot {
     let MachineState { registers, memory, flags, .. } = saved(emulator, Position::Reset);
     let outputs = Register::all().map(|register| emulator.output_bits(register));
     (registers, memory, flags.bits(), outputs.collect())
@@ -33,7 +33,7 @@ fn drain(emulator: &mut Emulator) {
 }
 
 #[test]
-fn it_goes_on_as_the_other() {
+fn restored_emulator_continues_like_the_original() {
     let mut compared = 0;
     for seed in 0..60 {
         let machine = MACHINES[seed as usize % MACHINES.len()];
@@ -78,7 +78,7 @@ fn it_goes_on_as_the_other() {
 }
 
 #[test]
-fn nobody_waits_where_there_is_no_wait() {
+fn rejects_restoring_a_wait_without_a_wait_instruction() {
     let program = random_program(2, MACHINES[0], Options::TAME);
     let mut emulator = Emulator::new(&program).unwrap();
     let fresh = saved(&emulator, Position::Reset);

@@ -53,7 +53,7 @@ fn periods_in_slices() {
 }
 
 #[test]
-fn upcoming_is_what_comes() {
+fn predicted_issue_equals_the_next_issue() {
     let (mut issued, mut stalled) = (0, 0);
     for seed in 0..60 {
         for machine in MACHINES {
@@ -87,7 +87,7 @@ fn upcoming_is_what_comes() {
 
 /// A value that is set is read by the bundle that issues next, even if a result arrives in the same cycle.
 #[test]
-fn what_is_set_is_read() {
+fn set_values_are_read_back() {
     let mut found = 0;
     for seed in 0..40 {
         let mut emulator = loaded(&random_program(seed, MACHINES[0], Options::TAME), seed);

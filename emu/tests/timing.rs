@@ -488,7 +488,7 @@ fn a_bundle_that_halts_writes_its_results() {
 
 /// The report of an operation has the value that it wrote to a register or to memory, and 0 if it wrote none.
 #[test]
-fn operations_that_write_nothing_tell_zero() {
+fn operations_without_result_report_zero() {
     let source = ".preset m0 7.0
                       .preset x3 2
                       st 9[zero], m0

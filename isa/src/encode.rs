@@ -13,13 +13,13 @@ pub const WORD_MASK: u64 = (1 << WORD_BITS) - 1;
 /// A decoded instruction. Fields that its shape does not have are zero.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub struct Instruction {
-    /// The operation.
+    /// Instruction of the table.
     pub op: Op,
     /// Destination: index into the bank of the slot that holds the instruction.
     pub dest: BankIndex,
     /// Source registers: addresses in the register space.
     pub sources: [Register; 3],
-    /// Immediate, bundle address or word offset, whichever the shape has.
+    /// Immediate, bundle address or word offset, by the shape.
     pub constant: u32,
 }
 
@@ -42,7 +42,7 @@ pub enum DecodeError {
     /// No instruction has this opcode.
     #[error("opcode 0x{opcode:02x} is no instruction")]
     UnknownOpcode {
-        /// Bits 47..41.
+        /// Bits 47..41 of the word.
         opcode: u8,
     },
     /// A bit is set that the instruction's shape does not use.
@@ -56,7 +56,7 @@ pub enum DecodeError {
     /// The value has more than 48 bits.
     #[error("0x{word:x} is longer than a word of 48 bits")]
     TooLong {
-        /// The value.
+        /// The value given as a word.
         word: u64,
     },
 }
@@ -64,40 +64,40 @@ pub enum DecodeError {
 /// The reason why a slot of a machine cannot execute an instruction.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum PlacementError {
-    /// The slot has no unit for it.
+    /// The slot has no unit for the instruction.
     #[error("slot {slot} of {machine} has no unit for {mnemonic}{}", match .host { Some(host) => format!(" (slot {host} has)"), None => String::new() })]
     NoUnit {
-        /// The machine.
+        /// Name of the machine.
         machine: &'static str,
-        /// The slot.
+        /// Name of the slot.
         slot: &'static str,
-        /// The instruction.
+        /// Mnemonic of the instruction.
         mnemonic: &'static str,
-        /// A slot that has one.
+        /// A slot of the machine that has such a unit.
         host: Option<&'static str>,
     },
     /// The destination lies past the end of the slot's bank.
     #[error("destination {index} is out of reach: slot {slot} of {machine} writes {bank}0 to {bank}{}", depth - 1)]
     DestOutOfReach {
-        /// The machine.
+        /// Name of the machine.
         machine: &'static str,
-        /// The slot.
+        /// Name of the slot.
         slot: &'static str,
-        /// The slot's bank.
+        /// Name of the slot's bank.
         bank: &'static str,
-        /// Its depth.
+        /// Number of registers in the bank.
         depth: u16,
-        /// The destination.
+        /// Destination of the instruction.
         index: BankIndex,
     },
-    /// A source address is that of no register.
+    /// A source address names no register of the machine.
     #[error("source {} at address {address} is in no bank of {machine}", field.name())]
     NoRegister {
-        /// The machine.
+        /// Name of the machine.
         machine: &'static str,
-        /// The operand.
+        /// Field of the operand.
         field: Field,
-        /// The register address.
+        /// Address in the word.
         address: Register,
     },
 }
@@ -113,7 +113,7 @@ impl Instruction {
         }
     }
 
-    /// The operation of an empty slot.
+    /// The idle operation, for empty slots.
     pub const NOP: Instruction = Instruction::bare(Op::nop);
 
     /// The value of a field.
@@ -154,7 +154,7 @@ impl Instruction {
             let value = self.field(field);
             if value > field.bits().max() {
                 return Err(match field {
-                    // Of an offset in two parts the whole is too large.
+                    // Report the whole offset, not its upper part.
                     Field::OffsetHigh => EncodeError { field: Field::Offset, value: self.constant },
                     _ => EncodeError { field, value },
                 });
@@ -164,7 +164,7 @@ impl Instruction {
         Ok(word)
     }
 
-    /// Decodes a word.
+    /// Decodes a word into its instruction.
     ///
     /// # Errors
     /// If the word encodes no instruction: see [`DecodeError`]. A legal word, decoded and encoded again, gives the same word.
@@ -189,13 +189,14 @@ impl Instruction {
         Ok(instruction)
     }
 
-    /// The source registers that it reads.
+    /// Source registers that the instruction reads.
     #[inline]
     pub fn reads(&self) -> &[Register] {
         &self.sources[..self.op.row().shape.sources()]
     }
 
-    /// The register that it writes if it issues from `slot`; `None` if it writes none, or if the slot's bank has no such register.
+    /// The register that the instruction writes if it issues from `slot`; `None` if it writes none, or if the slot's bank has no
+    /// such register.
     #[inline]
     pub fn writes(&self, slot: &Slot) -> Option<Register> {
         slot.bank.register(self.dest).filter(|_| self.op.row().shape.has_dest())

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Control flow of a bundle: the address at which execution continues. This is the only place that says what an [`Effect`] means
-//! for the order of execution; emulator, blocks and analysis match on [`Flow`].
+//! Control flow of a bundle: the address at which execution continues. Only this module interprets an [`Effect`] for the order
+//! of execution; emulator, blocks and analysis match on [`Flow`].
 
 use crate::encode::Instruction;
 use crate::number::{BundleAddress, Register};
@@ -11,22 +11,23 @@ use crate::spec::instructions::Effect;
 pub enum Flow {
     /// At the next bundle.
     Next,
-    /// At the target.
+    /// At the target, always.
     Jump(BundleAddress),
     /// At the target if all 32 bits of the register are zero (or, if `zero` is false, not all); else at the next bundle.
     Branch {
         /// The register, as the bundle reads it.
         register: Register,
-        /// True if it is taken on zero.
+        /// The branch is taken on zero.
         zero: bool,
-        /// The bundle to which it leads if it is taken.
+        /// Bundle of a taken branch.
         target: BundleAddress,
     },
     /// At the target; the address of the next bundle is pushed on the return stack.
     Call(BundleAddress),
     /// At the address popped from the return stack.
     Return,
-    /// At the next bundle, which heads a loop: the bundles up to the one before `end` are repeated as often as the register says.
+    /// At the next bundle, which heads a loop: the bundles from there to before `end` repeat as often as the register
+    /// says.
     Loop {
         /// The register that holds the count, as the bundle reads it.
         count: Register,
@@ -37,7 +38,7 @@ pub enum Flow {
     LoopEnd,
     /// At the target, on the tick.
     Wait(BundleAddress),
-    /// Nowhere: execution ends.
+    /// Nowhere: execution ends here.
     Halt,
 }
 
@@ -48,7 +49,7 @@ impl Flow {
         instructions.into_iter().map(Instruction::flow).find(|flow| *flow != Flow::Next).unwrap_or(Flow::Next)
     }
 
-    /// The control flow of the same bundle as the last one of a loop. A loop may end only where nothing redirects.
+    /// The control flow of the bundle as the last bundle of a loop. A loop may end only where nothing redirects.
     #[must_use]
     pub fn at_loop_end(self) -> Flow {
         if self == Flow::Next { Flow::LoopEnd } else { self }

@@ -3,12 +3,12 @@
 
 use crate::Program;
 
-/// The memory into which the loader writes.
+/// The memory of a load record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Space {
-    /// Program memory.
+    /// Program memory, by bundle and slot.
     Program,
-    /// Data memory.
+    /// Data memory, by word.
     Data,
     /// Registers except inputs, by address.
     Register,
@@ -19,13 +19,13 @@ pub enum Space {
 /// A word that the loader writes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LoadRecord {
-    /// The memory.
+    /// Memory to write to.
     pub space: Space,
-    /// The slot, in program memory.
+    /// Slot of a word in program memory; 0 for other memories.
     pub slot: u8,
-    /// The address.
+    /// Address in the memory.
     pub address: u16,
-    /// The word.
+    /// Bits of the word; 48 in program memory, 32 elsewhere.
     pub value: u64,
 }
 

@@ -2,6 +2,7 @@
 //! Generator of the manual from the tables of the specification: text for the terminal, Markdown for `docs/isa.md`, plain
 //! data for JSON.
 
+use crate::memory::{BlockRam, KBIT_18};
 use crate::shape::{Field, OPCODE, Shape, WORD_BITS};
 use crate::spec::configuration::OPTIONS;
 use crate::spec::instructions::{Function, ROWS, Row, Type};
@@ -15,43 +16,43 @@ use std::fmt::Write as _;
 pub struct Manual {
     /// Bits in a word.
     pub word_bits: u32,
-    /// One entry for each instruction.
+    /// Entries of all instructions, in the order of the table.
     pub instructions: Vec<Entry>,
-    /// The units.
+    /// Units of the table.
     pub units: &'static [Unit],
-    /// The machines.
+    /// Machines of the table, without fixtures.
     pub machines: &'static [&'static Machine],
 }
 
-/// An instruction's entry.
+/// Manual entry of an instruction.
 #[derive(Debug, Serialize)]
 pub struct Entry {
-    /// Mnemonic.
+    /// Name in the source.
     pub mnemonic: &'static str,
     /// Operands as they are written.
     pub syntax: &'static str,
-    /// Opcode.
+    /// Bits 47..41 of the word.
     pub opcode: u8,
     /// The function that the unit must offer.
     pub function: Function,
     /// Type of the result, if any, then of the sources.
     pub types: &'static [Type],
-    /// Meaning in symbols.
+    /// Meaning in symbols, one line.
     pub summary: &'static str,
     /// Special cases, flags, error bound.
     pub text: &'static str,
-    /// The forms in which equations write it, its sources being `a`, `b` and `c`.
+    /// Forms in equations; the letters `a`, `b` and `c` are the sources.
     pub forms: &'static [&'static str],
     /// Bit fields: name, least significant bit, width.
     pub fields: Vec<(&'static str, u32, u32)>,
-    /// Its latency and interval: one entry for each slot, on each machine, that hosts a unit for it.
+    /// Latency and interval, for each slot of each machine that hosts a unit for the instruction.
     pub timing: Vec<Timing>,
 }
 
 /// A slot in which an instruction issues on a machine, and its latency and interval in cycles.
 #[derive(Debug, Serialize)]
 pub struct Timing {
-    /// The machine.
+    /// Name of the machine.
     pub machine: &'static str,
     /// The slot; `any` for idle operations.
     pub slot: &'static str,
@@ -82,7 +83,7 @@ pub fn timings(row: &Row, machine: &'static Machine) -> Vec<Timing> {
     machine.slots.iter().filter_map(timing).collect()
 }
 
-/// The manual.
+/// Builds the manual from the tables.
 pub fn manual() -> Manual {
     let entry = |row: &Row| Entry {
         mnemonic: row.mnemonic,
@@ -185,9 +186,9 @@ pub fn memories_text(machine: &Machine) -> String {
     format!(
         "{} bundles of program memory ({} block RAMs), {} words of data memory ({} block RAMs)",
         machine.code_depth,
-        machine.code_block_rams(),
+        machine.code_block_rams(&KBIT_18),
         machine.data_depth,
-        machine.data_block_rams()
+        machine.data_block_rams(&KBIT_18)
     )
 }
 
@@ -202,7 +203,7 @@ pub fn machines_text() -> String {
     out
 }
 
-/// Some machines as text.
+/// Describes some machines as text.
 pub fn machines_as_text(machines: &[&Machine]) -> String {
     let mut out = String::new();
     for machine in machines {
@@ -320,8 +321,9 @@ pub fn markdown() -> String {
 /// A capacity: its name, and its amount on a machine.
 type Capacity = (&'static str, fn(&Machine) -> String);
 
-/// The capacities of the machines as Markdown, for `docs/what-fits.md`.
-pub fn capacities() -> String {
+/// The capacities of the machines as Markdown, for `docs/what-fits.md`. Memories are counted in blocks of a device; `devices` states the
+/// blocks of each device.
+pub fn capacities(block: &BlockRam, devices: &str) -> String {
     let mut out = String::from(
         "# What fits\n\n\
          Generated from the table of machines (`isa/src/spec/machines.rs`) by `cargo xtask docs`; do not edit.\n\n\
@@ -359,11 +361,13 @@ pub fn capacities() -> String {
         }
         out.push_str(" |\n");
     }
-    out.push_str(
+    let kbit = block.bits() / 1024;
+    let _ = write!(
+        out,
         "\n## Larger memories\n\n\
          The first line of a program, `.machine t3 code=4096 data=32768`, or `-m t3,code=4096,data=32768` on the command line sets the\n\
-         depths of its memories ([language.md](language.md#the-machine)). They take so many block RAMs of 18 kbit, as an ECP5 has them\n\
-         (the LFE5U-85F has 208, the LFE5U-25F 56), beside those of registers and units ([synthesis.md](synthesis.md)):\n\n\
+         depths of its memories ([language.md](language.md#the-machine)). They take so many block RAMs of {kbit} kbit\n\
+         ({devices}), beside those of registers and units ([synthesis.md](synthesis.md)):\n\n\
          | bundles or words | data |",
     );
     for machine in machines {
@@ -373,9 +377,9 @@ pub fn capacities() -> String {
     out.push_str(&"---|".repeat(machines.len()));
     for depth in (10..=16).map(|bits| 1_u32 << bits) {
         let of = |machine: &Machine| Machine { code_depth: depth, data_depth: depth, ..*machine };
-        let _ = write!(out, "\n| {depth} | {} |", of(machines[0]).data_block_rams());
+        let _ = write!(out, "\n| {depth} | {} |", of(machines[0]).data_block_rams(block));
         for machine in machines {
-            let _ = write!(out, " {} |", of(machine).code_block_rams());
+            let _ = write!(out, " {} |", of(machine).code_block_rams(block));
         }
     }
     out.push('\n');

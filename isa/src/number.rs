@@ -2,7 +2,7 @@
 //! Newtypes for the numbers of a machine's registers, bank indices, slots and bundles.
 //!
 //! A [`Register`], [`BankIndex`] or [`SlotIndex`] is checked against its range when it is made, so that its users need no check.
-//! Only [`Register::index`] and its like convert them to array indices.
+//! Only [`Register::index`] and similar methods convert them to array indices.
 
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -32,7 +32,7 @@ macro_rules! below {
                 $name((bits & (Self::COUNT as u32 - 1)) as $inner)
             }
 
-            /// The number.
+            /// The wrapped number, below [`Self::COUNT`].
             #[inline]
             pub const fn get(self) -> $inner {
                 self.0
@@ -45,7 +45,7 @@ macro_rules! below {
                 self.0 as usize & (Self::COUNT - 1)
             }
 
-            /// All values, ascending.
+            /// Every value, in ascending order.
             pub fn all() -> impl DoubleEndedIterator<Item = $name> + ExactSizeIterator + Clone {
                 (0..Self::COUNT).map(|number| $name(number as $inner))
             }
@@ -74,12 +74,12 @@ below! {
 }
 
 below! {
-    /// The index of a register in its bank, from 0. The destination of an instruction word is one.
+    /// The index of a register in its bank, from 0, as in the destination of an instruction word.
     BankIndex(u16) 1024
 }
 
 below! {
-    /// An issue slot, by its position in a bundle, from 0. ([`crate::Machine::slot`] requires one that the machine has.)
+    /// An issue slot, by its position in a bundle, from 0. ([`crate::Machine::slot`] requires a slot of the machine.)
     SlotIndex(u8) 8
 }
 
@@ -109,7 +109,7 @@ impl BundleAddress {
         BundleAddress(number)
     }
 
-    /// The number.
+    /// The number of the bundle, from 0.
     #[inline]
     pub const fn get(self) -> u32 {
         self.0

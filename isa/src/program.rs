@@ -12,23 +12,23 @@ use std::collections::BTreeSet;
 /// A program for one machine.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Program {
-    /// The machine that it is for.
+    /// Machine that the program is for.
     pub machine: &'static Machine,
     /// Program memory: for each bundle, one word for each slot, in slot order.
     pub code: Vec<u64>,
     /// Data memory, from word 0; the rest of the memory is zero.
     pub data: Vec<u32>,
-    /// Constants: registers that the loader sets, by ascending address. All others are unwritten at the start.
+    /// Constants: registers that the loader sets, by ascending address. All other registers are unwritten at the start.
     pub constants: Vec<(Register, u32)>,
     /// Input ports, in the order of their declaration.
     pub inputs: Vec<Port>,
     /// Output ports, in the order of their declaration.
     pub outputs: Vec<Port>,
-    /// True if the ports are latched: inputs are taken together at the tick, outputs published together at `wait`.
+    /// Ports are latched: inputs are taken together at the tick, outputs published together at `wait`.
     pub latched: bool,
     /// Registers that the source names.
     pub registers: Vec<Port>,
-    /// Labels, by address.
+    /// Labels, by ascending address.
     pub symbols: Vec<Symbol>,
     /// The sections: code that runs once and code that runs every period.
     pub sections: Vec<Section>,
@@ -40,20 +40,20 @@ pub struct Program {
     pub files: Vec<String>,
     /// The source location of each operation, parallel to `code`; `None` for filler.
     pub lines: Vec<Option<Location>>,
-    /// For each word that computes a part of an equation: its index into `code`, ascending, and the columns of that part in its line.
+    /// Words that compute a part of an equation: index into `code`, ascending, and the columns of the part in its line.
     pub parts: Vec<(u32, Columns)>,
 }
 
 /// The cycles of a section, as a host needs them.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct SectionCycles {
-    /// Its label, or `once`.
+    /// Label of the section's first bundle, or `once`.
     pub name: String,
-    /// Its first bundle.
+    /// First bundle of the section.
     pub address: BundleAddress,
-    /// True if it runs once, from reset to its `wait`; else it runs from each tick.
+    /// The section runs once, from reset to its `wait`; otherwise from each tick.
     pub once: bool,
-    /// Cycles to the issue of its `wait`; for a period, if its tick comes in time.
+    /// Cycles to the issue of the `wait`; for a period, if its tick comes in time.
     pub cycles: Span,
     /// Cycles of a period whose tick came before the previous period's `wait`.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -63,27 +63,27 @@ pub struct SectionCycles {
 /// Columns of a line: its characters from `first` to `last`, from 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Columns {
-    /// The first.
+    /// First column, from 1.
     pub first: u32,
-    /// The last.
+    /// Last column, from 1, included.
     pub last: u32,
 }
 
 /// A named register: a port or a register of the source.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Port {
-    /// Its name in the source.
+    /// Name in the source.
     pub name: String,
-    /// Its address.
+    /// Address in the register space.
     pub register: Register,
-    /// The type by which its bits are read and shown.
+    /// Type by which tools read and show the bits.
     pub ty: Type,
 }
 
-/// A label.
+/// A label of code or data.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Symbol {
-    /// Its name.
+    /// Name in the source.
     pub name: String,
     /// The memory into which it points.
     pub space: Space,
@@ -104,9 +104,9 @@ pub enum Space {
 /// A range of bundles with a name: `once` or `period`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Section {
-    /// Its name.
+    /// Name of the section.
     pub name: String,
-    /// First bundle.
+    /// First bundle of the section.
     pub start: BundleAddress,
     /// Bundle after the last.
     pub end: BundleAddress,
@@ -165,19 +165,19 @@ impl Range {
 /// A place in a source.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Location {
-    /// Index into [`Program::files`].
+    /// Index of the file in [`Program::files`].
     pub file: u32,
-    /// Line, from 1.
+    /// Line in the file, from 1.
     pub line: u32,
 }
 
 /// The reason why a word of a program cannot run.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum IllegalWord {
-    /// It encodes no instruction.
+    /// The word encodes no instruction.
     #[error(transparent)]
     Decode(#[from] DecodeError),
-    /// The machine cannot execute it in that slot.
+    /// The machine cannot execute the instruction in that slot.
     #[error(transparent)]
     Placement(#[from] PlacementError),
 }
@@ -193,11 +193,11 @@ impl Program {
         let read = instructions.flat_map(|instruction| instruction.reads().to_vec());
         let declared = self.inputs.iter().map(|port| port.register);
         let numbers = read.chain(declared).filter_map(|register| self.machine.input_number(register));
-        // At least two, since a multiplexer of one input is none.
+        // At least two: a multiplexer needs more than one input.
         numbers.max().map_or(2, |last| (last + 1).next_power_of_two().max(2))
     }
 
-    /// The last bundles of its loops, ascending: those before the targets of `loop` operations.
+    /// Last bundles of the program's loops, ascending: the bundles before the targets of `loop` operations.
     pub fn loop_ends(&self) -> Vec<BundleAddress> {
         let flows = self.code.iter().filter_map(|&word| Some(Instruction::decode(word).ok()?.flow()));
         let ends = flows.filter_map(|flow| match flow {
@@ -208,7 +208,7 @@ impl Program {
         ends.into_iter().collect()
     }
 
-    /// Bundles in the program.
+    /// Number of bundles in the program.
     pub fn bundles(&self) -> u32 {
         (self.code.len() / self.machine.slots.len()) as u32
     }
@@ -239,7 +239,7 @@ impl Program {
         BundleAddress::RESET.until(BundleAddress::new(self.bundles()))
     }
 
-    /// The source locations of a bundle's operations, in slot order; none past the end.
+    /// The source locations of a bundle's operations, in slot order; empty past the end.
     pub fn locations(&self, address: BundleAddress) -> &[Option<Location>] {
         self.lines.chunks(self.machine.slots.len()).nth(address.index()).unwrap_or_default()
     }
@@ -249,7 +249,7 @@ impl Program {
         *self.locations(address).get(slot.index())?
     }
 
-    /// The source location of a bundle: that of its first operation that has one.
+    /// The source location of a bundle: taken from its first operation with a location.
     pub fn location(&self, address: BundleAddress) -> Option<Location> {
         self.locations(address).iter().copied().flatten().next()
     }
@@ -260,7 +260,7 @@ impl Program {
         format!("{file}:{}", location.line)
     }
 
-    /// The columns that a word computes, if it computes a part of an equation.
+    /// Columns of the part of an equation that a word computes.
     pub fn part(&self, word: usize) -> Option<Columns> {
         let found = self.parts.binary_search_by_key(&word, |(index, _)| *index as usize);
         found.ok().map(|index| self.parts[index].1)
@@ -275,12 +275,12 @@ impl Program {
         Some(place)
     }
 
-    /// The word's place as in [`Program::word_place`], or its number if it has none.
+    /// The word's place as in [`Program::word_place`], or else its number.
     pub fn word_text(&self, word: usize) -> String {
         self.word_place(word).unwrap_or_else(|| format!("word {word}"))
     }
 
-    /// The place of a bundle, as text: that of its first operation that has one.
+    /// The place of a bundle as text, taken from its first operation with a place.
     pub fn bundle_place(&self, address: BundleAddress) -> Option<String> {
         let start = address.index().checked_mul(self.machine.slots.len())?;
         (0..self.locations(address).len()).find_map(|slot| self.word_place(start + slot))

@@ -14,16 +14,16 @@
 //! +----------+------------+--------------------------------------------+
 //! ```
 //!
-//! A source is an address in the machine's register space of 1,024. A destination is an index into the bank of the slot
-//! that holds the word. A store has no destination and two sources: the upper four bits of its offset are where the
-//! destination's low bits would be. Bits that a shape does not use are zero; a word in which they are not is illegal.
+//! A source is an address in the machine's register space of 1,024. A destination is an index into the bank of the slot that
+//! holds the word. A store has no destination and two sources: the upper four bits of its offset take the place of the
+//! destination's low bits. Bits that a shape does not use are zero; any other word is illegal.
 
 /// A contiguous bit field of a word.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, serde::Serialize)]
 pub struct Bits {
     /// Position of the least significant bit.
     pub low: u32,
-    /// Number of bits.
+    /// Number of bits, 1 to 48.
     pub width: u32,
 }
 
@@ -32,7 +32,7 @@ impl Bits {
         Bits { low, width: high - low + 1 }
     }
 
-    /// The largest value that fits.
+    /// The largest value that fits the field.
     pub const fn max(self) -> u32 {
         if self.width >= 32 { u32::MAX } else { (1 << self.width) - 1 }
     }
@@ -74,13 +74,13 @@ pub enum Field {
     C,
     /// 32 bits of immediate.
     Immediate,
-    /// Bundle address.
+    /// Bundle address of a redirection.
     Target,
     /// Unsigned word offset of a load.
     Offset,
     /// The low bits of a store's offset.
     OffsetLow,
-    /// The bits of a store's offset above them.
+    /// Bits of a store's offset above [`Field::OffsetLow`].
     OffsetHigh,
 }
 
@@ -104,7 +104,7 @@ impl Field {
         BITS[self as usize]
     }
 
-    /// Its name in the manual.
+    /// Name of the field in the manual.
     pub const fn name(self) -> &'static str {
         match self {
             Field::Dest => "d",
@@ -127,7 +127,7 @@ pub enum Operand {
     Dest,
     /// A register that the instruction reads: 0 = a, 1 = b, 2 = c.
     Source(usize),
-    /// A 32-bit constant.
+    /// A constant of 32 bits.
     Immediate,
     /// The address of a bundle.
     Target,
@@ -138,30 +138,30 @@ pub enum Operand {
 /// An instruction format, named by its operands.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Hash, serde::Serialize)]
 pub enum Shape {
-    /// No operand.
+    /// No operand at all.
     None,
-    /// `op d`
+    /// `op d`: a destination alone.
     D,
-    /// `op d, a`
+    /// `op d, a`: a destination and a source.
     Da,
-    /// `op d, a, b`
+    /// `op d, a, b`: a destination and two sources.
     Dab,
-    /// `op d, a, b, c`
+    /// `op d, a, b, c`: a destination and three sources.
     Dabc,
-    /// `op d, immediate`
+    /// `op d, immediate`: a destination and an immediate.
     Dimm,
-    /// `op target`
+    /// `op target`: a target alone.
     T,
-    /// `op a, target`
+    /// `op a, target`: a source and a target.
     At,
-    /// `op d, offset[a]`
+    /// `op d, offset[a]`: a load, with `a` as the base.
     Load,
-    /// `op offset[a], b`
+    /// `op offset[a], b`: a store of `b`.
     Store,
 }
 
 impl Shape {
-    /// Every shape.
+    /// Every shape, in the order of the manual.
     pub const ALL: [Shape; 10] = [
         Shape::None,
         Shape::D,
@@ -175,7 +175,7 @@ impl Shape {
         Shape::Store,
     ];
 
-    /// The operands in the order in which the source has them.
+    /// The operands in source order.
     pub const fn operands(self) -> &'static [Operand] {
         use Operand::*;
         match self {
@@ -220,12 +220,12 @@ impl Shape {
         mask
     }
 
-    /// True if an instruction of this shape writes a register.
+    /// An instruction of this shape writes a register.
     pub const fn has_dest(self) -> bool {
         matches!(self, Shape::D | Shape::Da | Shape::Dab | Shape::Dabc | Shape::Dimm | Shape::Load)
     }
 
-    /// The number of source registers that it reads (a, then b, then c).
+    /// The number of source registers (a, then b, then c).
     pub const fn sources(self) -> usize {
         match self {
             Shape::None | Shape::D | Shape::Dimm | Shape::T => 0,
@@ -252,7 +252,7 @@ impl Shape {
     }
 }
 
-// Check that loads and stores reach as far.
+// Check that loads and stores have offsets of equal width.
 const _: () = assert!(
     Field::OffsetLow.bits().width + Field::OffsetHigh.bits().width == Field::Offset.bits().width,
     "the offsets of a load and a store differ in width"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Description of a multi-core system, as plain data: the cores, and the links between their ports. `takt-system` parses and checks
-//! its file.
+//! such files.
 
 use crate::timing::{Cycle, ENDED_DELAY, INPUT_DELAY, LATCHED_INPUT_DELAY};
 use crate::{Program, Register, Type};
@@ -10,7 +10,7 @@ use std::sync::Arc;
 pub const MAX_CORES: usize = 16;
 /// Limit on the entries of a FIFO.
 pub const MAX_DEPTH: u32 = 4096;
-/// The least latency of a link: [`INPUT_DELAY`] cycles from a core's pins to its bundles, and one in the gate before the pins.
+/// The least latency of a link: [`INPUT_DELAY`] cycles from a core's pins to its bundles, plus one in the gate before the pins.
 pub const MIN_LATENCY: Cycle = INPUT_DELAY + 1;
 /// The greatest latency of a link.
 pub const MAX_LATENCY: Cycle = 1024;
@@ -30,18 +30,18 @@ pub struct Description {
     pub links: Vec<Link>,
 }
 
-/// A core.
+/// A core of a system.
 #[derive(Clone, Debug)]
 pub struct Core {
-    /// Its name.
+    /// Name of the core, unique in the system.
     pub name: String,
-    /// The path of its program as the file has it.
+    /// Path of the program as the file has it.
     pub path: String,
-    /// The program.
+    /// Program that the core runs.
     pub program: Arc<Program>,
-    /// The divider of its ticks: it gets one at every n-th base tick.
+    /// Divider of the core's ticks: one at every n-th base tick.
     pub every: u64,
-    /// The phase of its ticks, in cycles after the base tick.
+    /// Phase of the core's ticks, in cycles after the base tick.
     pub offset: u64,
 }
 
@@ -54,53 +54,53 @@ pub enum End {
     Core(usize),
 }
 
-/// One value that a link carries.
+/// A value that a link carries.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Field {
-    /// The name of the sender's port; if the host is the sender, of the system's port.
+    /// Name of the sender's port; for the host as sender, of the system's port.
     pub from: String,
-    /// The sender's output port, if that is a core.
+    /// Output port of the sender; `None` for the host.
     pub output: Option<Register>,
-    /// The name of the receiver's port; if the host is the receiver, of the system's port.
+    /// Name of the receiver's port; for the host as receiver, of the system's port.
     pub to: String,
-    /// The receiver's input port, if that is a core.
+    /// Input port of the receiver; `None` for the host.
     pub input: Option<Register>,
-    /// The type by which its bits are read and shown.
+    /// Type by which tools read and show the bits.
     pub ty: Type,
-    /// The receiver's value before anything has arrived: what the sender's loader writes to the port, or 0.
+    /// The receiver's value before any arrival: the sender's loader's value for the port, or 0.
     pub initial: u32,
 }
 
-/// A link.
+/// A link of a system.
 #[derive(Clone, Debug)]
 pub struct Link {
-    /// Its name; a wire is called `from -> to`.
+    /// Name of the link; for a wire `from -> to`.
     pub name: String,
-    /// The sender.
+    /// End that sends the values.
     pub from: End,
-    /// The receiver.
+    /// End that receives the values.
     pub to: End,
-    /// Cycles on the way (docs/system.md).
+    /// Cycles from the sender's write to the receiver (docs/system.md).
     pub latency: Cycle,
-    /// The values that it carries; a wire carries one.
+    /// Values that the link carries; exactly one for a wire.
     pub fields: Vec<Field>,
-    /// Its kind.
+    /// Kind, with the parameters of the kind.
     pub kind: LinkKind,
 }
 
 /// The kinds of links.
 #[derive(Clone, Debug)]
 pub enum LinkKind {
-    /// It carries each value as it is written.
+    /// Carries each value upon its write.
     Wire,
-    /// It publishes all values together.
+    /// Publishes all values together.
     Snapshot {
         /// The output port whose writes publish the values; without one, the sender's `wait` does.
         strobe: Option<Register>,
     },
-    /// A queue.
+    /// A queue of entries.
     Fifo {
-        /// Entries that it holds.
+        /// Number of entries that it holds.
         depth: u32,
         /// The sender's output port whose writes push an entry; `None` if the sender is the host.
         push: Option<Register>,
@@ -116,11 +116,11 @@ pub enum LinkKind {
 /// The status values of a FIFO.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Status {
-    /// 1 if it is empty, else 0.
+    /// 1 if the FIFO is empty, else 0.
     Empty,
-    /// 1 if it is full, else 0.
+    /// 1 if the FIFO is full, else 0.
     Full,
-    /// Entries in it.
+    /// Number of entries in the FIFO.
     Count,
     /// 1 once a push was refused because the FIFO was full, else 0; sticky.
     Overflow,
@@ -129,7 +129,7 @@ pub enum Status {
 }
 
 impl Status {
-    /// All of them, in the order in which they are shown.
+    /// Every status value, in display order.
     pub const ALL: [Status; 5] =
         [Status::Empty, Status::Full, Status::Count, Status::Overflow, Status::Underflow];
 
@@ -144,7 +144,7 @@ impl Status {
         }
     }
 
-    /// Its initial value.
+    /// Value before the first push: 1 for `empty`, else 0.
     pub fn initial(self) -> u32 {
         u32::from(self == Status::Empty)
     }
@@ -155,7 +155,7 @@ impl Status {
 pub enum Side {
     /// The end at which entries are put in.
     Sender,
-    /// The end at which they are taken out.
+    /// The end at which entries are taken out.
     Receiver,
 }
 
@@ -164,24 +164,24 @@ pub enum Side {
 pub enum Source {
     /// A field of a link.
     Field {
-        /// The link.
+        /// Index of the link.
         link: usize,
-        /// The index of its field.
+        /// Index of the field in the link.
         field: usize,
     },
     /// The status of a FIFO.
     Status {
-        /// The link.
+        /// Index of the FIFO's link.
         link: usize,
-        /// The end at which it is seen.
+        /// End whose view of the status it is.
         side: Side,
-        /// The status value.
+        /// Status value shown at the port.
         status: Status,
     },
 }
 
 impl Source {
-    /// The link.
+    /// Index of the link.
     pub fn link(self) -> usize {
         match self {
             Source::Field { link, .. } | Source::Status { link, .. } => link,
@@ -192,44 +192,45 @@ impl Source {
 /// An input port of a core that a link drives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Mailbox {
-    /// The port.
+    /// Address of the port.
     pub register: Register,
-    /// The source of its values.
+    /// Source of the port's values.
     pub source: Source,
 }
 
 /// A host's end of a link.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SystemPort {
-    /// `x` for a wire, `link.x` for others.
+    /// Name: `x` for a wire, `link.x` for others.
     pub name: String,
-    /// The type by which its bits are read and shown.
+    /// Type by which tools read and show the bits.
     pub ty: Type,
-    /// The link.
+    /// Index of the link.
     pub link: usize,
-    /// The index of its field.
+    /// Index of the field in the link.
     pub field: usize,
 }
 
 impl Core {
-    /// Cycles between its ticks.
+    /// Cycles between the core's ticks.
     pub fn period(&self, tick: u64) -> u64 {
         self.every * tick
     }
 
-    /// Cycles from a value's arrival at its pins to the first cycle in which it can be read or, if latched, taken by a tick.
+    /// Cycles from a value's arrival at the core's pins to the first cycle in which it can be read or, if latched, taken by a
+    /// tick.
     pub fn input_delay(&self) -> Cycle {
         if self.program.latched { LATCHED_INPUT_DELAY } else { INPUT_DELAY }
     }
 }
 
 impl Link {
-    /// The number of registers in the link, apart from those of gate and core.
+    /// Number of registers in the link, without the registers of gate and core.
     pub fn transit(&self) -> Cycle {
         self.latency - MIN_LATENCY
     }
 
-    /// True if it is a snapshot.
+    /// The link publishes its values together.
     pub fn is_snapshot(&self) -> bool {
         matches!(self.kind, LinkKind::Snapshot { .. })
     }

@@ -4,8 +4,8 @@
 use std::borrow::Cow;
 use std::fmt::Write as _;
 
-/// True if a character is a terminal control or changes the display order of others. Line breaks and tabs, which are part of
-/// ordinary text, are not hidden.
+/// A character is a terminal control or changes the display order of others. Line breaks and tabs, as parts of ordinary
+/// text, are not hidden.
 pub const fn is_hidden(c: char) -> bool {
     match c {
         '\n' | '\t' => false,
@@ -50,16 +50,30 @@ pub fn in_script(json: &str) -> String {
     json.replace('<', "\\u003c")
 }
 
+/// Names of an array's elements, the last index counting fastest: `M[1,1]`, `M[1,2]`, …. A name for each element of `sizes`, whose
+/// indices count from 1.
+pub fn element_names(name: &str, sizes: &[u32]) -> Vec<String> {
+    let mut all = vec![String::new()];
+    for size in sizes {
+        let with = |before: &String| {
+            let comma = if before.is_empty() { "" } else { "," };
+            (1..=*size).map(|index| format!("{before}{comma}{index}")).collect::<Vec<_>>()
+        };
+        all = all.iter().flat_map(with).collect();
+    }
+    all.into_iter().map(|indices| format!("{name}[{indices}]")).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn what_a_terminal_would_obey_is_shown_instead() {
+    fn escapes_terminal_control_characters() {
         assert!(matches!(visible("a\tµ\n€"), Cow::Borrowed("a\tµ\n€")));
         assert_eq!(visible("\u{1b}]0;x\u{7}\r\u{9b}1m\u{7f}"), "\\u001b]0;x\\u0007\\u000d\\u009b1m\\u007f");
         assert_eq!(visible("a\u{202e}b\u{2028}"), "a\\u202eb\\u2028");
-        // Every control character of Unicode, except those of plain text.
+        // Unicode's control characters, except line feed and tab, are hidden.
         let hidden = |c: &char| c.is_control() && !matches!(c, '\n' | '\t');
         assert!(('\0'..=char::MAX).filter(hidden).all(is_hidden));
         assert!(('\0'..=char::MAX).filter(|c| is_hidden(*c)).all(|c| u32::from(c) <= 0xffff));

@@ -39,14 +39,14 @@ pub const ENDED_DELAY: Cycle = 2;
 /// An interval of cycle counts: best and worst case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct Span {
-    /// No run takes fewer.
+    /// Lower bound over all runs.
     pub best: Cycle,
-    /// No run takes more.
+    /// Upper bound over all runs.
     pub worst: Cycle,
 }
 
 impl Span {
-    /// Zero cycles.
+    /// An interval of zero cycles.
     pub const ZERO: Span = Span { best: 0, worst: 0 };
 
     /// The cycles of two pieces of a run in sequence: the sum.
@@ -61,7 +61,7 @@ impl Span {
         Span { best: self.best.min(other.best), worst: self.worst.max(other.worst) }
     }
 
-    /// The same interval, with `cycles` added.
+    /// The interval with `cycles` added to both ends.
     #[must_use]
     pub fn after(self, cycles: Cycle) -> Span {
         self.and(Span { best: cycles, worst: cycles })
@@ -78,16 +78,16 @@ pub enum Cause {
     },
     /// A source is not ready.
     Operand {
-        /// The register.
+        /// Address of the register.
         register: Register,
-        /// The bundle that computes it.
+        /// Bundle that computes the operand.
         producer: BundleAddress,
     },
     /// A destination still waits for an earlier result.
     Destination {
-        /// The register.
+        /// Address of the register.
         register: Register,
-        /// The bundle that computes the earlier result.
+        /// Bundle that computes the earlier result.
         producer: BundleAddress,
     },
     /// A unit accepts no operation yet.
@@ -101,7 +101,7 @@ pub enum Cause {
     Drain,
     /// The bank's write port is taken in the cycle of this operation's writeback.
     WritePort {
-        /// The slot whose bank it is.
+        /// Slot that writes the bank.
         slot: SlotIndex,
     },
     /// The program waits for the tick.
@@ -133,7 +133,7 @@ impl Cause {
         Cause::KINDS.into_iter().filter(move |&kind| kind != "unit" || iterative)
     }
 
-    /// The kind's name.
+    /// Name of the cause's kind.
     pub const fn name(self) -> &'static str {
         Cause::KINDS[self.kind()]
     }
@@ -142,7 +142,7 @@ impl Cause {
 /// A resource that at most one operation holds in a cycle.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Resource {
-    /// The issue slot.
+    /// The issue slot of an operation.
     Slot(SlotIndex),
     /// A unit: an index over all units of the machine, slot after slot.
     Unit(u16),
@@ -154,14 +154,14 @@ pub enum Resource {
 /// applies rules 2 to 6 with it, and the assembler's scheduler plans with it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Reservation {
-    /// The slot that issues it.
+    /// Slot that issues the operation.
     pub slot: SlotIndex,
-    /// The unit that executes it: an index over all units of the machine, slot after slot; `None` for an idle operation.
+    /// Unit that executes the operation: an index over all units of the machine, slot after slot; `None` for an idle operation.
     pub unit: Option<u16>,
     /// Initiation interval: cycles from the issue until the unit accepts the next operation (rule 4).
     pub interval: u32,
-    /// Latency, if it writes a register: cycles from the issue to the one in which its result is on the bus and written to the
-    /// bank. Rules 2, 3 and 5 stall other operations until then, rule 6 only in that very cycle.
+    /// Latency of an operation that writes a register: cycles from the issue to the cycle in which its result is on the bus
+    /// and written to the bank. Rules 2, 3 and 5 stall other operations until then, rule 6 only in that very cycle.
     pub writeback: Option<u32>,
 }
 
@@ -191,12 +191,12 @@ impl Reservation {
 #[derive(Clone, Copy, Debug)]
 struct Operation {
     reservation: Reservation,
-    /// Its unit, as an index into those of the slot.
+    /// Index of the unit among the slot's units.
     unit: u8,
-    /// Registers that it reads.
+    /// Registers that the operation reads.
     sources: [Register; 3],
     source_count: u8,
-    /// The register that it writes.
+    /// Register that the operation writes.
     dest: Option<Register>,
 }
 
@@ -208,7 +208,8 @@ pub struct Bundle {
 }
 
 impl Bundle {
-    /// Derives the properties from one instruction for each slot of `machine`, each of which [`Instruction::place`] must accept.
+    /// Derives the properties from instructions in slot order, one for each slot of `machine`, each accepted by
+    /// [`Instruction::place`].
     pub fn new(machine: &Machine, instructions: &[Instruction]) -> Bundle {
         let mut bundle = Bundle::default();
         for ((s, slot), instruction) in machine.numbered_slots().zip(instructions) {
@@ -274,16 +275,16 @@ impl Issue {
     }
 }
 
-/// The canonical timing state: the part of a scoreboard that still matters from some cycle on, in cycles relative to that one. Two
+/// The canonical timing state: the part of a scoreboard that still matters from some cycle on, in cycles relative to it. Two
 /// scoreboards with equal residues time every continuation alike.
 ///
 /// Pending results and busy units determine all else: `drained` is the cycle of the last pending result, and the bookings of a
-/// bank's write port are those of its registers, since rule 3 lets no register have two pending results.
+/// bank's write port follow from its registers, since rule 3 lets no register have two pending results.
 #[derive(Clone, PartialEq, Eq, Hash, PartialOrd, Ord, Debug, Default)]
 pub struct Residue {
-    /// The registers with a pending result, ascending, and the cycles until it is on the bus.
+    /// Registers with a pending result, ascending, and the cycles until it is on the bus.
     pending: Vec<(Register, u16)>,
-    /// The busy units (slot, unit), ascending, and the cycles until each accepts an operation.
+    /// Busy units (slot, unit), ascending, and the cycles until each accepts an operation.
     busy: Vec<(SlotIndex, u8, u16)>,
 }
 
@@ -298,7 +299,7 @@ impl Residue {
         }
     }
 
-    /// True if nothing is pending or busy, as after a reset.
+    /// No result is pending and no unit busy, as after a reset.
     pub fn is_empty(&self) -> bool {
         self.pending.is_empty() && self.busy.is_empty()
     }
@@ -320,7 +321,7 @@ pub struct Scoreboard {
 }
 
 impl Scoreboard {
-    /// An empty scoreboard.
+    /// The scoreboard after reset.
     pub fn new(machine: &Machine) -> Scoreboard {
         Scoreboard {
             ready: vec![(0, BundleAddress::RESET); Register::COUNT]
@@ -453,7 +454,7 @@ pub fn after_sequential(cycle: Cycle) -> Cycle {
     cycle + 1
 }
 
-/// The same after a conditional branch that is not taken.
+/// The first cycle in which a bundle may issue after a conditional branch issued in `cycle` and is not taken.
 #[inline]
 pub fn after_not_taken(machine: &Machine, cycle: Cycle) -> Cycle {
     cycle + 1 + Cycle::from(machine.resolve)
@@ -465,8 +466,8 @@ pub fn after_redirect(machine: &Machine, cycle: Cycle) -> Cycle {
     cycle + 1 + Cycle::from(machine.refill)
 }
 
-/// The same after a `loop` in bundle `at` whose body ends before `end`. A body that is shorter than the refill, or has no bundle, has been
-/// fetched past its end by then, and is fetched again; in a longer one no cycle is lost.
+/// The first cycle in which a bundle may issue after a `loop` in bundle `at` whose body ends before `end`. A body that is empty or shorter
+/// than the refill has been fetched past its end by then, and is fetched again; a longer one loses no cycle.
 #[inline]
 pub fn after_loop(machine: &Machine, at: BundleAddress, end: BundleAddress, cycle: Cycle) -> Cycle {
     let body = end.get().saturating_sub(at.get() + 1);

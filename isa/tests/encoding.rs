@@ -54,7 +54,7 @@ fn rows_are_where_their_operation_says() {
     }
 }
 
-/// But for arctangent and arccosine, which a machine may lack.
+/// Arctangent and arccosine may be missing on a machine, but not on all.
 #[test]
 fn every_row_runs_on_a_unit_and_a_machine() {
     for row in ROWS.iter().filter(|row| row.function != Function::Idle) {
@@ -72,8 +72,8 @@ fn every_row_runs_on_a_unit_and_a_machine() {
     }
 }
 
-/// The forms of instructions in equations name sources that there are, each once, and no two instructions have one form and one
-/// choice of types.
+/// Forms of instructions in equations name existing sources, each once, and no two instructions share a form and a choice of
+/// types.
 #[test]
 fn forms_of_equations_are_told_apart_by_their_types() {
     let mut seen = HashSet::new();
@@ -148,7 +148,7 @@ proptest! {
         }
     }
 
-    /// As above with legal opcodes, which random words rarely have.
+    /// Repeats the test with legal opcodes, which random words rarely have.
     #[test]
     fn encode_inverts_decode_of_rows(row in 0..ROWS.len(), payload: u64) {
         let word = OPCODE.put(ROWS[row].opcode.into()) | (payload & ROWS[row].shape.mask() & !OPCODE.mask());

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The same bits on every host: results and flags of the IEEE operations, hashed, against what Berkeley SoftFloat gave on
-//! x86-64. Where SoftFloat does not build, this stands in for `fp_host.rs` and `fp_unary.rs`.
+//! Digests of results and flags of the IEEE operations, compared with Berkeley SoftFloat's on x86-64: the same bits on every
+//! host. Where SoftFloat does not build, this test stands in for `fp_host.rs` and `fp_unary.rs`.
 
 use crate::fp_common;
 use crate::fp_common::{Pairs, special_values};
@@ -8,7 +8,7 @@ use takt_isa::fp::{Arithmetic, Host, Reference, Value};
 
 type Operation = fn(u32, u32) -> Value;
 
-/// An addend that follows from a pair: one time in four the negated product, else some bits of both.
+/// An addend derived from a pair: one time in four the negated product, else some bits of both.
 fn addend(a: u32, b: u32) -> u32 {
     match (a ^ b) & 3 {
         0 => Host::mul(a, b).bits ^ fp_common::SIGN,
@@ -16,7 +16,7 @@ fn addend(a: u32, b: u32) -> u32 {
     }
 }
 
-/// Name, host, reference, and the hash.
+/// Name, host, reference, and expected digest.
 const OPERATIONS: [(&str, Operation, Operation, u64); 11] = [
     ("add", |a, b| Host::add(a, b), Reference::add, 0xd8a8_ae3e_c724_67b9),
     ("sub", |a, b| Host::sub(a, b), Reference::sub, 0x9497_8f42_033b_8a6d),
@@ -36,7 +36,7 @@ const OPERATIONS: [(&str, Operation, Operation, u64); 11] = [
     ("le", |a, b| Host::le(a, b), Reference::le, 0xfc88_12a2_908a_fb55),
 ];
 
-/// Random pairs beside those of the special values.
+/// Random pairs beside the pairs of special values.
 const PAIRS: u64 = 200_000;
 
 /// FNV-1a over every result and its flags.

@@ -28,8 +28,8 @@ fn compare(a: u32, b: u32, c: u32) {
     );
 }
 
-/// Of the special values every triple with `TAKT_FULL=1`; else `a` and `b` are all of them and `c` every seventh, another one
-/// for each pair.
+/// Special values: every triple with `TAKT_FULL=1`; otherwise every `a` and `b` with every seventh `c`, another seventh for
+/// each pair.
 #[test]
 fn all_triples_of_special_values_agree() {
     let values = special_values();
@@ -59,7 +59,7 @@ fn random_triples_agree() {
     assert_eq!(counted.iter().sum::<u64>(), random_count());
 }
 
-/// A second oracle. It says invalid of `0 · ∞ + NaN` only if that NaN is signaling, which IEEE 754 leaves open.
+/// A second oracle. It calls `0 · ∞ + NaN` invalid only if this NaN is signaling, which IEEE 754 leaves open.
 #[test]
 fn a_second_oracle_agrees() {
     let mut triples = Triples::new(3);
@@ -81,7 +81,7 @@ fn a_second_oracle_agrees() {
     }
 }
 
-/// The random triples are worth something only if they reach the cases that matter: at least one in 500 each.
+/// Random triples must reach the cases that matter: at least one in 500 each.
 #[test]
 fn random_triples_reach_every_case() {
     const TRIPLES: u32 = 100_000;
@@ -112,7 +112,7 @@ fn random_triples_reach_every_case() {
     assert!(cases.iter().all(|&count| count >= TRIPLES / 500), "{cases:?}");
 }
 
-/// The meaning of the four instructions, written out: zeros, one rounding, who is negated.
+/// Results of the four instructions, written out: zeros, one rounding, the negated operand.
 #[test]
 fn signs_and_conventions() {
     let value = |op: Op, [a, b, c]: [f32; 3]| {
@@ -129,7 +129,7 @@ fn signs_and_conventions() {
     for (op, result) in [(Op::fma, "17"), (Op::fms, "13"), (Op::fnma, "-13"), (Op::fnms, "-17")] {
         assert_eq!(number(op, [3.0, 5.0, 2.0]), result, "{op:?}");
     }
-    // Exact cancellation is +0, whoever is negated; zeros of one sign keep it.
+    // Exact cancellation is +0, whichever operand is negated; zeros of one sign keep it.
     for (op, c) in [(Op::fma, -15.0), (Op::fms, 15.0), (Op::fnma, 15.0), (Op::fnms, -15.0)] {
         assert_eq!(number(op, [3.0, 5.0, c]), "0", "{op:?}");
     }
@@ -151,9 +151,9 @@ fn signs_and_conventions() {
     assert_eq!(flags(Op::fnms, [2.0, f32::INFINITY, f32::INFINITY]), Flags::NONE);
 }
 
-/// The instruction that does both, as the assembler's contraction takes it from the meanings.
+/// The fused instruction of each product and sum, as the assembler's contraction derives it.
 #[test]
-fn what_fuses() {
+fn fused_instructions_of_the_table() {
     let of = |sum: Op, source: usize, fused: Op| Fusion { product: Op::fmul, sum, source, fused };
     let expected = [
         of(Op::fadd, 0, Op::fma),
@@ -164,8 +164,8 @@ fn what_fuses() {
     assert_eq!(fusions(), expected);
 }
 
-/// The identities by which one unit executes products and sums too: `a · b` is `a · b` plus a zero of its sign, `a + b` is
-/// `a · 1 + b`.
+/// Identities by which one unit executes products and sums too: `a · b` is `a · b` plus a zero of its sign, `a + b` is `a ·
+/// 1 + b`.
 #[test]
 fn products_and_sums_are_fused_ones() {
     let check = |a: u32, b: u32| {

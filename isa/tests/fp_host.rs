@@ -13,7 +13,7 @@ use takt_isa::fp::{Arithmetic, Flags, Host, SoftFloat, Value, is_nan};
 
 type Operation = fn(u32, u32) -> Value;
 
-/// Name, host, definition.
+/// Name, host, and SoftFloat as the definition.
 const OPERATIONS: [(&str, Operation, Operation); 7] = [
     ("add", |a, b| Host::add(a, b), SoftFloat::add),
     ("sub", |a, b| Host::sub(a, b), SoftFloat::sub),
@@ -60,7 +60,7 @@ fn random_pairs_agree() {
     assert_eq!(counted.iter().sum::<u64>(), random_count());
 }
 
-/// The random pairs are worth something only if they reach the cases that matter: at least one pair in 500 each.
+/// Random pairs must reach the cases that matter: at least one pair in 500 each.
 #[test]
 fn random_pairs_reach_every_case() {
     const PAIRS: u32 = 100_000;
@@ -93,7 +93,7 @@ fn random_pairs_reach_every_case() {
     }
 }
 
-/// True if the exact sum, difference or product, in binary64, lies halfway between two normal binary32 numbers.
+/// The exact sum, difference or product, in binary64, lies halfway between two normal binary32 numbers.
 fn is_halfway(name: &str, a: u32, b: u32, result: u32) -> bool {
     let (x, y) = (f64::from(f32::from_bits(a)), f64::from(f32::from_bits(b)));
     let exact = match name {

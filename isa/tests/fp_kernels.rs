@@ -4,7 +4,7 @@
 use crate::fp_common::{Pairs, SIGN, parallel, random_count, special_values};
 use takt_isa::fp::{CANONICAL_NAN, Flags, Value, abs, maximum, minimum, neg, saturate, sign};
 
-/// The answer to operands of which at least one is a NaN.
+/// The result of an operation with a NaN operand; `None` without NaN.
 fn nan_out(operands: &[u32]) -> Option<Value> {
     let signaling = |&bits: &u32| f32::from_bits(bits).is_nan() && bits & (1 << 22) == 0;
     let flags = if operands.iter().any(signaling) { Flags::INVALID } else { Flags::NONE };

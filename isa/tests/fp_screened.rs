@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The arithmetic of batches: where it raises no flag it is the host's, to the bit; where the host raises one, so does it.
+//! Arithmetic of batches: without a flag it equals the host's, to the bit; it raises a flag wherever the host does.
 
 use crate::fp_common::{Pairs, random_count, special_values};
-use takt_isa::fp::{Flags, Host, Screened};
+use takt_isa::fp::{Flags, Host, ScreenedFloat};
 use takt_isa::{Effect, Op, ROWS, compute, compute_lanes};
 
 const LANES: usize = 16;
@@ -11,9 +11,9 @@ fn operations() -> impl Iterator<Item = Op> {
     ROWS.iter().filter(|row| row.effect == Effect::Compute).map(|row| row.op)
 }
 
-/// Compares; whether the value was let through.
+/// Compares a value with the host's. True if it raised no flag.
 fn compare(op: Op, a: u32, b: u32, c: u32) -> bool {
-    let (found, expected) = (compute::<Screened>(op, a, b, c), compute::<Host>(op, a, b, c));
+    let (found, expected) = (compute::<ScreenedFloat>(op, a, b, c), compute::<Host>(op, a, b, c));
     if found.flags == Flags::NONE {
         assert_eq!(found, expected, "{op:?}({a:08x}, {b:08x}, {c:08x})");
     }

@@ -18,14 +18,14 @@ const REFUSED: Value = Value { bits: CANONICAL_NAN, flags: Flags::INVALID };
 const ONE: u32 = 0x3f80_0000;
 
 #[derive(Clone, Copy, Default)]
-struct Measured {
+struct ErrorStatistics {
     operands: u64,
     max_ulp: f64,
     worst: [u32; 2],
 }
 
-impl Measured {
-    /// Takes up a result, which must have raised nothing.
+impl ErrorStatistics {
+    /// Adds a result, which must have raised no flag.
     fn take(&mut self, operands: [u32; 2], result: Value, exact: f64) {
         assert!(result.flags.is_empty(), "flags of {operands:08x?}");
         let error = (f64::from(f32::from_bits(result.bits)) - exact).abs() / ulp(exact);
@@ -36,14 +36,14 @@ impl Measured {
         }
     }
 
-    fn join(self, other: Measured) -> Measured {
+    fn join(self, other: ErrorStatistics) -> ErrorStatistics {
         let worse = if other.max_ulp > self.max_ulp { other } else { self };
-        Measured { operands: self.operands + other.operands, ..worse }
+        ErrorStatistics { operands: self.operands + other.operands, ..worse }
     }
 
-    /// At most `bound`, and, after every operand, no less than it says.
+    /// Checks the error against `bound`; `tight` requires the documented maximum itself.
     fn check(self, name: &str, bound: f64, at_least: u64, tight: bool) {
-        let Measured { operands, max_ulp, worst } = self;
+        let ErrorStatistics { operands, max_ulp, worst } = self;
         let figures = format!("{name}: {operands} operands, at most {max_ulp} ulp at {worst:08x?}");
         println!("{figures}");
         assert!(max_ulp <= bound, "{figures}");
@@ -52,20 +52,25 @@ impl Measured {
     }
 }
 
-/// The distance between binary32 numbers at `exact`.
+/// Distance between binary32 numbers at `exact`.
 fn ulp(exact: f64) -> f64 {
     let exponent = (exact.abs().to_bits() >> 52) as i64 - 1023;
     2_f64.powi((exponent.max(-126) - 23) as i32)
 }
 
-/// Over `from..=to` in steps of `stride`.
-fn measure(from: u32, to: u32, stride: u32, take: impl Fn(&mut Measured, u32) + Sync) -> Measured {
+/// Measures the operands `from..=to` in steps of `stride`.
+fn measure(
+    from: u32,
+    to: u32,
+    stride: u32,
+    take: impl Fn(&mut ErrorStatistics, u32) + Sync,
+) -> ErrorStatistics {
     let measured = parallel(u64::from((to - from) / stride) + 1, |range| {
-        let mut measured = Measured::default();
+        let mut measured = ErrorStatistics::default();
         range.for_each(|index| take(&mut measured, from + index as u32 * stride));
         measured
     });
-    measured.into_iter().fold(Measured::default(), Measured::join)
+    measured.into_iter().fold(ErrorStatistics::default(), ErrorStatistics::join)
 }
 
 fn wide(bits: u32) -> f64 {
@@ -73,26 +78,26 @@ fn wide(bits: u32) -> f64 {
 }
 
 /// A positive operand; the negative one is checked for odd symmetry.
-fn take_sin(measured: &mut Measured, x: u32) {
+fn take_sin(measured: &mut ErrorStatistics, x: u32) {
     let result = sin(x);
     assert_eq!(sin(x | SIGN), Value::exact(result.bits ^ SIGN), "sin(−x) ≠ −sin(x) for {x:08x}");
     measured.take([x, 0], result, core_math::sin(wide(x)));
 }
 
 /// A positive operand; the negative one is checked for even symmetry.
-fn take_cos(measured: &mut Measured, x: u32) {
+fn take_cos(measured: &mut ErrorStatistics, x: u32) {
     let result = cos(x);
     assert_eq!(cos(x | SIGN), result, "cos(−x) ≠ cos(x) for {x:08x}");
     measured.take([x, 0], result, core_math::cos(wide(x)));
 }
 
-fn take_acos(measured: &mut Measured, x: u32) {
+fn take_acos(measured: &mut ErrorStatistics, x: u32) {
     measured.take([x, 0], acos(x), core_math::acos(wide(x)));
     measured.take([x | SIGN, 0], acos(x | SIGN), core_math::acos(-wide(x)));
 }
 
-/// Both finite, or an angle that is not 0.
-fn take_atan2(measured: &mut Measured, y: u32, x: u32) {
+/// Measures a pair of finite operands.
+fn take_atan2(measured: &mut ErrorStatistics, y: u32, x: u32) {
     measured.take([y, x], atan2(y, x), core_math::atan2(wide(y), wide(x)));
 }
 
@@ -106,10 +111,10 @@ fn sine_and_cosine_are_within_the_documented_bounds() {
     measure(0, SIN_IDENTITY - 1, stride, take_cos).check("cos, small", 0.5, 900_000, false);
 }
 
-/// Operands at which the result cancels, and at which it is flat.
+/// Operands at which the result cancels or is flat.
 #[test]
 fn multiples_of_a_quarter_turn() {
-    let mut measured = [Measured::default(); 2];
+    let mut measured = [ErrorStatistics::default(); 2];
     for quadrant in 1..=256 {
         let centre = ((f64::from(quadrant) * FRAC_PI_2) as f32).to_bits();
         for x in centre - 3000..=(centre + 3000).min(SIN_LIMIT) {
@@ -142,7 +147,7 @@ fn sine_and_cosine_of_zeros_limits_and_nans() {
 fn the_arccosine_is_within_the_documented_bound() {
     let stride = if full() { 1 } else { 307 };
     measure(0, ONE, stride, take_acos).check("acos", ACOS_MAX_ULP, 6_000_000, full());
-    // Operands at which it is steep.
+    // Operands at which the arccosine is steep.
     measure(ONE - 1_000_000, ONE, 1, take_acos).check("acos, about 1", ACOS_MAX_ULP, 2_000_000, false);
     assert_eq!(acos(ONE), Value::exact(0));
     assert_eq!(acos(ONE | SIGN), Value::exact((PI as f32).to_bits()));
@@ -154,14 +159,14 @@ fn the_arccosine_is_within_the_documented_bound() {
     }
 }
 
-/// Angles all over the circle with operands of all sizes; small and large quotients; quotients about those where the table's row
-/// or the octant changes.
+/// Angles all over the circle with operands of all sizes; small and large quotients; quotients near changes of the table's row
+/// or of the octant.
 #[test]
 fn the_arctangent_is_within_the_documented_bound() {
     let count = if full() { 1_000_000_000 } else { 6_000_000 };
     let measured = parallel(count, |range| {
         let mut random = Random::new(range.start + 1);
-        let mut measured = Measured::default();
+        let mut measured = ErrorStatistics::default();
         for index in range {
             let (y, x) = (random.bits(), random.bits());
             let x_exponent = x & INFINITY;
@@ -177,7 +182,7 @@ fn the_arctangent_is_within_the_documented_bound() {
                     let exponent = ((x_exponent >> 23) as i32 + random.between(-2, 2)).clamp(0, 254) as u32;
                     (y & !INFINITY | exponent << 23, x)
                 }
-                // A quotient close to a short fraction, that is, to where the row changes.
+                // A quotient close to a short fraction, where the row changes.
                 _ => {
                     let denominator = f32::from_bits(x & !INFINITY | 0x4000_0000 | (x & 0x0780_0000) >> 1);
                     let quotient = random.between(0, 1 << 10) as f32 / (1 << random.between(0, 20)) as f32;
@@ -192,7 +197,7 @@ fn the_arctangent_is_within_the_documented_bound() {
         }
         measured
     });
-    let measured = measured.into_iter().fold(Measured::default(), Measured::join);
+    let measured = measured.into_iter().fold(ErrorStatistics::default(), ErrorStatistics::join);
     measured.check("atan2", ATAN2_MAX_ULP, count / 100 * 98, false);
 }
 
@@ -224,8 +229,8 @@ fn convergent(value: f64) -> [f32; 2] {
 }
 
 /// The pairs whose angle is hardest to round, found as CORE-MATH's authors found theirs (`atan2f.wc`): for each angle of 25
-/// bits, that is for binary32 numbers and the middles between them, the pair with the nearest tangent. One in 1,009
-/// angles, with `TAKT_FULL=1` all.
+/// bits, that is, binary32 numbers and the middles between them, the pair with the nearest tangent. One in 1,009 angles, all
+/// with `TAKT_FULL=1`.
 #[test]
 fn the_arctangent_where_it_is_hard_to_round() {
     let angle = |index: u32| f64::from_bits((f64::to_bits(1.0 / 128.0)) + (u64::from(index) << 28));
@@ -243,7 +248,7 @@ fn the_arctangent_where_it_is_hard_to_round() {
 fn convergents_of_known_numbers() {
     assert_eq!(convergent(PI), [5_419_351.0, 1_725_033.0]);
     assert_eq!(convergent(0.75), [3.0, 4.0]);
-    // One of CORE-MATH's list: atan2(0x1.c84ca8p21, -0x1.00b24ap23) is 0x1.5c98a9p1 and 50 more bits of zeros or ones.
+    // From CORE-MATH's list: atan2(0x1.c84ca8p21, -0x1.00b24ap23) is 0x1.5c98a9p1 and 50 more bits of zeros or ones.
     let tangent = core_math::tan(f64::from_bits(0x4005_c98a_9000_0000));
     assert_eq!((convergent(-tangent), tangent < 0.0), ([3_738_005.0, 8_411_429.0], true));
 }
@@ -251,7 +256,7 @@ fn convergents_of_known_numbers() {
 /// IEEE 754-2019, 9.2.1, for every pair of special values; and the angles of the rest.
 #[test]
 fn the_arctangent_of_zeros_infinities_and_nans() {
-    let mut measured = Measured::default();
+    let mut measured = ErrorStatistics::default();
     for y in special_values() {
         for x in special_values() {
             let (wide_y, wide_x) = (wide(y), wide(x));
@@ -276,8 +281,8 @@ fn the_arctangent_of_zeros_infinities_and_nans() {
     measured.check("atan2", ATAN2_MAX_ULP, 10_000, false);
 }
 
-/// Each stored coefficient is the nearest to that of the interpolation, recomputed here in binary64 (whose own errors
-/// are below 10⁻² of a coefficient's last place).
+/// Each stored coefficient is the nearest to the interpolation's, recomputed here in binary64 (whose own errors are below
+/// 10⁻² of a coefficient's last place).
 #[test]
 fn coefficients_are_those_of_the_interpolation() {
     let nearest = |what: &str, index: usize, stored: f64, exact: f64, places: i32| {

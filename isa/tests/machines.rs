@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Every reason for which a row is no machine, each by the message that whoever writes the row gets from the compiler.
+//! Every reason for which a row is invalid, each with the message that the compiler shows the row's author.
 
 use takt_isa::spec::configuration::OPTIONS;
 use takt_isa::spec::units::{ADD, ALU, ALU_LATE, CONVERT, MEMORY, SEQUENCER};
 use takt_isa::{Bank, F1, F3, Function, MACHINES, Machine, RowError, RowOwned, Slot, T1, T3, Unit};
 
-/// A port that only loads.
+/// A memory port that only loads.
 const PORT: Unit = Unit { functions: &[Function::Load], ..MEMORY };
 
 fn leak<T>(value: impl Into<Box<[T]>>) -> &'static [T] {
@@ -163,7 +163,7 @@ fn named(name: &str) -> &'static Machine {
     Machine::from_name(name).unwrap_or_else(|error| panic!("{name}: {error}"))
 }
 
-/// A name states depths beyond those of the row; names of the same depths are one name and one machine.
+/// Names with depths beyond the row's; names with equal depths are one name and one machine.
 #[test]
 fn machines_by_name() {
     let machine = named("t3,code=4096,data=32768");
@@ -188,7 +188,7 @@ fn machines_by_name() {
 }
 
 #[test]
-fn names_that_are_no_machine() {
+fn rejects_unknown_machine_names() {
     let cases = [
         ("", "there is no machine ``"),
         ("t5", "there is no machine `t5`"),
@@ -215,7 +215,7 @@ fn names_that_are_no_machine() {
     );
 }
 
-/// The machine of the same row that is large enough, and not larger than it must be.
+/// The smallest machine of the same row that is large enough.
 #[test]
 fn machines_that_hold_a_program() {
     let holding = |machine: &'static Machine, bundles, words| {
@@ -233,7 +233,7 @@ fn machines_that_hold_a_program() {
     assert_eq!((T3.most_bundles(), named("t3,code=65536").most_bundles()), (1024, 65535));
 }
 
-/// A row that is made at run time passes the checks that one of the table passes, with the same words.
+/// Rows made at run time pass the same checks as the table's rows, with the same messages.
 #[test]
 fn rows_of_files_are_checked_alike() {
     let of = |machine: &Machine| RowOwned { name: "mine".to_owned(), ..RowOwned::from(machine) }.machine();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Numbers that name things are in their ranges, and look to serde like the numbers they are.
+//! Newtypes of numbers stay in their ranges, and serialise as plain numbers.
 
 use takt_isa::{BankIndex, BundleAddress, Flow, Instruction, MACHINES, Operand, ROWS, Register, SlotIndex};
 
@@ -9,7 +9,7 @@ fn only_numbers_in_range_are_made() {
     assert_eq!(Register::new(1024), None);
     assert_eq!(BankIndex::new(1024), None);
     assert_eq!(SlotIndex::new(8), None);
-    // Too large for the type within, too.
+    // Numbers beyond the inner type are rejected, too.
     assert_eq!(Register::new(65536), None);
     assert_eq!(SlotIndex::new(256), None);
     for (number, register) in Register::all().enumerate() {
@@ -46,7 +46,7 @@ fn addresses_stay_within_their_type() {
     assert_eq!(address.until(BundleAddress::new(2)).count(), 0);
 }
 
-/// Whatever has a target, and nothing else, leads to it; what redirects is no [`Flow::Next`].
+/// Every instruction with a target leads to it, and no other; every redirection differs from [`Flow::Next`].
 #[test]
 fn the_flow_of_every_row() {
     for row in ROWS {
@@ -54,7 +54,7 @@ fn the_flow_of_every_row() {
         instruction.sources[0] = Register::ZERO;
         let flow = instruction.flow();
         let has_target = row.shape.operands().contains(&Operand::Target);
-        // A loop's target is where it ends.
+        // A loop's target is its end.
         let leads = has_target && !matches!(flow, Flow::Loop { .. });
         assert_eq!(flow.target(), leads.then(|| BundleAddress::new(77)), "{}", row.mnemonic);
         assert_eq!(flow != Flow::Next, row.effect.redirects(), "{}", row.mnemonic);

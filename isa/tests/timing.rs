@@ -27,7 +27,7 @@ fn operation(op: Op, dest: usize, [a, b]: [usize; 2]) -> Instruction {
     Instruction { op, dest: BankIndex::new(dest).unwrap(), sources, constant: 0 }
 }
 
-/// A bundle of f3.
+/// A bundle for the machine f3.
 fn bundle(instructions: [Instruction; 3]) -> Bundle {
     Bundle::new(&F3, &instructions)
 }
@@ -77,7 +77,7 @@ fn reservations_number_units_over_all_slots() {
     );
 }
 
-/// A result can be read in the cycle in which it is on the bus; then there is no stall, not one of no cycles.
+/// A result can be read in the cycle in which it is on the bus; then no stall is recorded, not one of zero cycles.
 #[test]
 fn operands_are_awaited_to_the_cycle() {
     let product = bundle([operation(Op::fmul, 1, [768, 768]), nop(), nop()]);
@@ -93,7 +93,7 @@ fn operands_are_awaited_to_the_cycle() {
     }
 }
 
-/// Of two causes that end together the first is named.
+/// Two causes that end together are charged to the first.
 #[test]
 fn the_first_of_two_equal_causes_is_named() {
     let mut board = Scoreboard::new(&F3);
@@ -113,7 +113,7 @@ fn the_first_of_two_equal_causes_is_named() {
     assert_eq!((cycle, stalls), (19, vec![(Cause::Unit { slot: slot(0), unit: 3 }, 8)]));
 }
 
-/// Another latency and interval: of one unit in one slot.
+/// Another latency and interval for a single unit of a single slot.
 #[test]
 fn one_unit_can_be_timed_otherwise() {
     let two = || bundle([operation(Op::fmul, 1, [768, 768]), operation(Op::fadd, 1, [768, 768]), nop()]);
@@ -122,7 +122,7 @@ fn one_unit_can_be_timed_otherwise() {
     assert_eq!(usual[0], MULTIPLY.latency);
     assert_eq!(writes(&two().with_unit(slot(0), 0, 33, 7)), [33, usual[1]]);
     assert_eq!(writes(&two().with_unit(slot(1), 0, 33, 7)), [usual[0], 33]);
-    // A unit that the bundle does not use, and one that is in another slot.
+    // A unit that the bundle does not use, and a unit in another slot.
     assert_eq!(writes(&two().with_unit(slot(0), 1, 33, 7)), usual);
     assert_eq!(writes(&two().with_unit(slot(2), 0, 33, 7)), usual);
     let mut board = Scoreboard::new(&F3);
@@ -132,7 +132,7 @@ fn one_unit_can_be_timed_otherwise() {
     assert_eq!(issue(&mut board, &next, 1, 11), (17, vec![(Cause::Unit { slot: slot(0), unit: 0 }, 6)]));
 }
 
-/// What is left of an issue so many cycles later, and a scoreboard that begins with it.
+/// The residue of an issue after some cycles, and a scoreboard resumed from it.
 #[test]
 fn residues_end_with_the_last_cycle_that_matters() {
     assert!(Scoreboard::new(&F1).residue(0).is_empty());
@@ -156,7 +156,7 @@ fn residues_end_with_the_last_cycle_that_matters() {
     }
 }
 
-/// Draining waits for the last writeback, and on an empty machine for nothing.
+/// Draining waits for the last writeback; on an empty machine it does not wait.
 #[test]
 fn draining_waits_for_the_last_result() {
     let wait = bundle([nop(), nop(), operation(Op::wait, 0, [0, 0])]);
@@ -169,9 +169,9 @@ fn draining_waits_for_the_last_result() {
     assert_eq!((cycle, stalls), (until, vec![(Cause::Drain, (until - 12) as u32)]));
 }
 
-/// When what follows may issue: `docs/timing.md`, with f3's refill of 6 and its resolve of 2 cycles.
+/// First issue after each kind of flow: `docs/timing.md`, with f3's refill of 6 and its resolve of 2 cycles.
 #[test]
-fn what_follows_issues_in_its_cycle() {
+fn next_bundle_issues_in_the_predicted_cycle() {
     assert_eq!((after_reset(&F3), after_sequential(20), after_not_taken(&F3, 20)), (6, 21, 23));
     assert_eq!((after_redirect(&F3, 20), after_tick(&F3, 20, 0)), (27, 27));
     assert_eq!((after_tick(&F3, 20, 26), after_tick(&F3, 20, 27)), (27, 28));

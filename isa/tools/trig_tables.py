@@ -45,7 +45,7 @@ def value(c0, c1, bends, h):
 
 def wave_row(function, index, more):
     q, slope, second = polynomial(function, (index + mpf(1) / 2) * WIDTH, WIDTH, 2)
-    # c0 takes up the middle of what the group's c2 leaves behind, and `more`, for what is cut off later.
+    # c0 takes up the middle of the remainder that the group's c2 leaves, and `more`, for the later truncation.
     left = second - polynomial(function, (index // 16 + mpf(1) / 2) * 16 * WIDTH, WIDTH, 2)[2]
     c0 = rounded(q + left * WIDTH**2 / 8, 29) + more
     c1 = rounded(slope, 18)

@@ -47,4 +47,11 @@ period:
         .endr
         mov     y, v{N}
         wait    period
+
+; For `takt accuracy`: a signal of full scale. Every such signal leaves the states within 5.5 (the sum of the magnitudes of their responses to
+; an impulse), with a little room.
+.range  x = -1, 1
+        .rep    i, 1, N
+.range  p{i}, q{i} = -6, 6
+        .endr
 ; SPDX-License-Identifier: MIT OR Apache-2.0

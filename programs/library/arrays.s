@@ -4,7 +4,7 @@
 ; a few. What a macro writes must be none of what it reads, unless a comment allows it.
 
 ; d = x·y, vectors of n. Eight sums, added as a tree: the order differs from that of `sum`. 8 divides n.
-.macro array_dot d, x, y, n
+.macro array_dot d:float, x:float, y:float, n:number
 .reg    s[8]
 .rep k, 1, 8
         s[k] = 0
@@ -18,7 +18,7 @@
 .endm
 
 ; y = A·x, A n×m. x stays in registers; y may be x.
-.macro array_matvec y, A, x, n, m
+.macro array_matvec y:float, A:float, x:float, n:number, m:number
 .reg    v[m]
 .rep j, 1, m
         v[j] = x[j]
@@ -29,7 +29,7 @@
 .endm
 
 ; C = A·B, A n×m, B m×p. So many rows of A at a time stay in registers, and share the loads of B: 2, 3 or 4 of those that divide n.
-.macro array_matmul C, A, B, n, m, p, rows
+.macro array_matmul C:float, A:float, B:float, n:number, m:number, p:number, rows:number
 .for i, 1, n step rows unroll 1
 .reg    a[rows,m] b[m,p]
 .rep r, 1, rows
@@ -52,27 +52,27 @@
 
 ; Activations, the last argument of a layer: linear, relu, tanh, tanh_quick, sigmoid, elu; all but the first two need `.include <math.s>`.
 ; Another one is a macro `layer_NAME d, x` of the program.
-.macro layer_linear d, x
+.macro layer_linear d:float, x:float
         d = x
 .endm
-.macro layer_relu d, x
+.macro layer_relu d:float, x:float
         d = max(x, 0)
 .endm
-.macro layer_tanh d, x
+.macro layer_tanh d:float, x:float
         d = tanh(x)
 .endm
-.macro layer_tanh_quick d, x
+.macro layer_tanh_quick d:float, x:float
         d = tanh_quick(x)
 .endm
-.macro layer_sigmoid d, x
+.macro layer_sigmoid d:float, x:float
         d = sigmoid(x)
 .endm
-.macro layer_elu d, x
+.macro layer_elu d:float, x:float
         d = elu(x)
 .endm
 
 ; y = f(y), a vector of n.
-.macro activate y, n, f
+.macro activate y:float, n:number, f:name
 .reg    s t
 .for i, 1, n unroll 4
         s = y[i]
@@ -83,7 +83,7 @@
 
 ; y = f(W·x + b), W n×m: a layer with many outputs, by rows, whose activation overlaps with the next rows. Up to 128 columns at a time,
 ; whose part of x stays in registers. A row has four sums, so that 4 divides m, and beyond 128 columns 64 does.
-.macro dense_rows y, W, b, x, n, m, f
+.macro dense_rows y:float, W:float, b:float, x:float, n:number, m:number, f:name
 .if m <= 128
 .reg    v[m]
 .rep j, 1, m
@@ -113,7 +113,7 @@
 .endm
 
 ; y = f(W·x + b), W n×m: a layer with few outputs, by columns. The sums stay in registers; y may be x. 4 divides m.
-.macro dense y, W, b, x, n, m, f
+.macro dense y:float, W:float, b:float, x:float, n:number, m:number, f:name
 .reg    s[n] t[n]
 .rep i, 1, n
         fadd    s[i], b[i], zero
@@ -137,7 +137,7 @@
 ;
 ; The lower triangle is in registers, and each column shifts what is left of it to their beginning; the loop exists three times, for
 ; fewer and fewer rows. x may be b.
-.macro array_cholesky_solve x, A, b, n
+.macro array_cholesky_solve x:float, A:float, b:float, n:number
 .array  L[2*n,n] y[n]                   ; row n + j: column j of L from its diagonal on. Rows up to n are zeros
 .reg    a[n,n] t[n]
 .rep i, 1, n
@@ -164,7 +164,7 @@
 .endm
 
 ; Columns first to last of L, and elements of y = D⁻¹·L⁻¹·b; a is the m×m matrix that is left, t the right side.
-.macro cholesky_columns a, t, L, y, n, m, first, last
+.macro cholesky_columns a:float, t:float, L:float, y:float, n:number, m:number, first:number, last:number
 .for j, first, last unroll 1
 .reg    p q u[m]
         p = 1/a[1,1]
@@ -191,7 +191,7 @@
 ;
 ; As in `array_cholesky_solve`, the matrix is in registers, b as its last column, and each step shifts what is left of it to their
 ; beginning. So many registers, n·(m + 1), have to be free. A column that depends on those before divides by zero.
-.macro array_qr_solve x, A, b, n, m
+.macro array_qr_solve x:float, A:float, b:float, n:number, m:number
 .array  R[2*m,m+1]                      ; row m + j: 1/R_jj, then row j of R from there on, and of Qᵀ·b. Rows up to m are zeros
 .reg    a[n,m+1] t[m]
 .rep i, 1, n
@@ -218,7 +218,7 @@
 .endm
 
 ; Reflections first to last; a has the rows and columns that are left, b among them.
-.macro qr_columns a, R, m, rows, columns, first, last
+.macro qr_columns a:float, R:float, m:number, rows:number, columns:number, first:number, last:number
 .for j, first, last unroll 1
 .reg    square root corner p d[columns] u[rows] v
 .rep i, 1, rows
@@ -247,7 +247,7 @@
 .endm
 
 ; The matrix's registers are all in one bank, on a machine with fused operations in that of the slot `mul`, the larger one of two.
-.macro qr_move d, x
+.macro qr_move d:float, x:float
 .if has.fnma.mul
         fmul.mul d, x, 1.0
 .else
@@ -256,7 +256,7 @@
 .endm
 
 ; d = x - p·q.
-.macro qr_less d, x, p, q
+.macro qr_less d:float, x:float, p:float, q:float
 .if has.fnma.mul
         fnma.mul d, p, q, x
 .else

@@ -6,7 +6,7 @@
 
 ; One step of a Kalman filter of n states and p measurements: prediction by x' = F·x with noise Q (n×n), correction by z = H·x
 ; with noise R (p×p). State x and covariance P are read and written.
-.macro kalman_step x, P, F, Q, H, R, z, n, p
+.macro kalman_step x:float, P:float, F:float, Q:float, H:float, R:float, z:float, n:number, p:number
 .array  m[n] N[n,n] G[n,p]
 .reg    v[n] w[n,n] h[p,n] f[n] e[p]
 .rep j, 1, n
@@ -28,7 +28,7 @@
 
 ; One step of an extended Kalman filter, whose model the program evaluates before: m = f(x) with its derivatives F by the state, and
 ; e = z - h(m) with its derivatives H by the state, all arrays in memory. State x and covariance P are written, P is read.
-.macro ekf_step x, P, m, F, Q, e, H, R, n, p
+.macro ekf_step x:float, P:float, m:float, F:float, Q:float, e:float, H:float, R:float, n:number, p:number
 .array  N[n,n] G[n,p]
 .reg    w[n,n] h[p,n] f[n] d[p]
         kalman_keep w, h, F, H, n, p
@@ -45,7 +45,7 @@
 .endm
 
 ; F and H in registers.
-.macro kalman_keep w, h, F, H, n, p
+.macro kalman_keep w:float, h:float, F:float, H:float, n:number, p:number
 .rep j, 1, n
 .rep r, 1, p
         h[r,j] = H[r,j]
@@ -57,7 +57,7 @@
 .endm
 
 ; Row i of N = F·P·Fᵀ + Q and of G = N·Hᵀ; f is that of F.
-.macro kalman_row N, G, f, w, h, P, Q, i, n, p
+.macro kalman_row N:float, G:float, f:float, w:float, h:float, P:float, Q:float, i:int, n:number, p:number
 .reg    q[n,n] t[n] u[n]
 .rep j, 1, n
 .rep k, 1, n
@@ -75,7 +75,7 @@
 .endm
 
 ; x = m + K·e, P = N - K·Gᵀ, where K = G·S⁻¹, S = H·G + R = L·D·Lᵀ. With Y = L⁻¹·Gᵀ, K·Gᵀ is Yᵀ·D⁻¹·Y, symmetric.
-.macro kalman_correct x, P, m, N, G, R, h, e, n, p
+.macro kalman_correct x:float, P:float, m:float, N:float, G:float, R:float, h:float, e:float, n:number, p:number
 .reg    S[p,p] Y[p,n] c[p] L[p,p] inverse[p]
 .rep j, 1, n
 .rep r, 1, p
@@ -109,7 +109,7 @@
 ; ---- In registers, for the macros of this file ------------------------------------------------------------------------------
 
 ; S = L·D·Lᵀ, p×p, symmetric and positive definite, of which the lower triangle is read; L without its diagonal of ones, D as its inverse.
-.macro array_factors L, inverse, S, p
+.macro array_factors L:float, inverse:float, S:float, p:number
 .reg    u[p,p]
 .rep j, 1, p
 .rep i, j, p
@@ -123,7 +123,7 @@
 .endm
 
 ; Y = L⁻¹·Y, p×n.
-.macro array_forward Y, L, p, n
+.macro array_forward Y:float, L:float, p:number, n:number
 .rep r, 2, p
 .rep j, 1, n
         Y[r,j] = Y[r,j] - sum(k, 1, r - 1, L[r,k]*Y[k,j])
@@ -135,7 +135,7 @@
 
 ; One step of the Riccati recursion of x' = A·x + B·u with costs xᵀ·Q·x + uᵀ·R·u, n states, m inputs:
 ; K = (R + Bᵀ·P·B)⁻¹·Bᵀ·P·A, and P = Q + Aᵀ·P·A - Kᵀ·Bᵀ·P·A, in place. The control law of this step is u = -K·x.
-.macro riccati_step P, K, A, B, Q, R, n, m
+.macro riccati_step P:float, K:float, A:float, B:float, Q:float, R:float, n:number, m:number
 .array  M[n,n] W[n,m] N[n,n] H[n,m]
 .reg    w[n,n] b[n,m] q[n] t[n]
 .rep j, 1, n
@@ -202,7 +202,7 @@
 ; ---- Quadratic programs with bounds, by the alternating direction method of multipliers (ADMM) ---------------------------------
 
 ; A value within ±bound, its dual, and its linear cost of penalty rho.
-.macro  admm_slack value, dual, cost, bound, rho
+.macro  admm_slack value:float, dual:float, cost:float, bound:float, rho:float
 .reg    sum within over
         sum = value + dual
         within = sat(sum, bound)
@@ -213,7 +213,7 @@
 
 ; z near the least of ½·xᵀ·H·x + qᵀ·x with low ≤ x ≤ high, vectors of n, after so many iterations from z and the dual y (warm start). M is
 ; (H + rho·1)⁻¹. z keeps the bounds; 4 divides n.
-.macro qp_box z, y, M, q, low, high, rho, n, iterations
+.macro qp_box z:float, y:float, M:float, q:float, low:float, high:float, rho:float, n:number, iterations:number
 .array  w[n]
 .for i, 1, n
         w[i] = rho*(z[i] - y[i]) - q[i]
@@ -239,7 +239,7 @@
 ;
 ; K, C = (R + Bᵀ·P·B)⁻¹ and M = (A - B·K)ᵀ are those of the infinite horizon, with the penalty rho in its costs. u, (N-1)×m, are the inputs;
 ; u[1,:] goes to the plant. Duals g, N×n, and y, (N-1)×m, and linear costs q, r of the same sizes remain from period to period: a warm start.
-.macro mpc_admm u, x, A, B, K, C, M, g, y, q, r, xb, ub, rho, n, m, N, iterations
+.macro mpc_admm u:float, x:float, A:float, B:float, K:float, C:float, M:float, g:float, y:float, q:float, r:float, xb:float, ub:float, rho:float, n:number, m:number, N:number, iterations:number
 .array  d[N-1,m]
 ; What both passes use stays in registers.
 .reg    b[n,m] k[m,n] p[n] s[n] t[m] h[m] e[n]

@@ -1,7 +1,7 @@
 ; Macros that any program may use: `.include <math.s>`.
 
 ; y = x, held between low and high.
-.macro clamp y, x, low, high
+.macro clamp y:float, x:float, low:float, high:float
         fmax    y, x, low
         fmin    y, y, high
 .endm
@@ -25,7 +25,7 @@
 
 ; What the roundings share: the operand's magnitude, whether it has both a whole part and a fraction (1 ≤ |x| < 2²³), and by
 ; how much to shift a mask of the fraction.
-.macro math.units x, a, inner, s
+.macro math.units x:float, a:int, inner:int, s:int
 .reg    e:int off:int
         iand    a, x, 0x7fffffff
         ishr    e, x, 23
@@ -35,7 +35,7 @@
 .endm
 
 ; d = x towards zero, exact.
-.macro trunc d, x
+.macro trunc d:float, x:float
 .reg    a:int inner:int s:int keep:bits whole:bits less:int sg:bits rest:bits
         math.units x, a, inner, s
         isar    keep, 0xff800000, s
@@ -47,7 +47,7 @@
 .endm
 
 ; Towards the infinity of the sign bit `side`: on that side, what has a fraction grows to the next integer.
-.macro math.toward d, x, side, one
+.macro math.toward d:float, x:float, side:int, one:float
 .reg    xb:bits a:int inner:int s:int keep:bits below:bits mine:int grow:bits whole:bits less:int sg:bits rest:bits
 .reg    y:bits some:int up:int
         math.units x, a, inner, s
@@ -68,17 +68,17 @@
 .endm
 
 ; d = the greatest integer not above x, exact.
-.macro floor d, x
+.macro floor d:float, x:float
         math.toward d, x, math.sign, -1.0
 .endm
 
 ; d = the least integer not below x, exact.
-.macro ceil d, x
+.macro ceil d:float, x:float
         math.toward d, x, 0, 1.0
 .endm
 
 ; d = the nearest integer, halves away from zero, exact.
-.macro round d, x
+.macro round d:float, x:float
 .reg    xb:bits a:int inner:int s:int keep:bits half:bits whole:bits less:int sg:bits one:bits big:int rest:bits
 .reg    y:bits
         math.units x, a, inner, s
@@ -97,7 +97,7 @@
 .endm
 
 ; d = the nearest integer, halves to even, as the machine rounds; exact.
-.macro rint d, x
+.macro rint d:float, x:float
 .reg    a:int sg:bits m y z w:bits whole:int
         iand    a, x, 0x7fffffff
         iand    sg, x, math.sign
@@ -112,7 +112,7 @@
 ; ---- Exponential and logarithm -------------------------------------------------------------------------------------------------
 
 ; e^r - 1 - r, |r| ≤ ln(2)/2.
-.macro math.exp_tail q, r
+.macro math.exp_tail q:float, r:float
 .reg    r2 p0 p1 p2 s0 s1 s2 s3
         fmul    r2, r, r
         fmul    s0, r, 0x1.55548cp-3
@@ -127,7 +127,7 @@
 .endm
 
 ; d = e^x, at most 0.81123 ulp.
-.macro exp d, x
+.macro exp d:float, x:float
 .reg    c t:bits n nh nl a r hi h lo q v y:bits k:int k1:int k2:int w:bits big:int f:bits
         fsat    c, x, 104.0
         fmul    t, c, 1/log(2)
@@ -155,8 +155,47 @@
         fmul    d, y, f
 .endm
 
+; e = unit·(e^c - 1), as (2ⁿ·unit·hi - unit) + 2ⁿ·unit·lo with the parts of `exp`; c in [-20, 89], unit 1/2 or 1.
+.macro math.less_one e:float, c:float, unit:number
+.reg    t shifted:bits n nh nl a r hi h lo q v k:int two:bits whole all part
+        fmul    t, c, 1/log(2)
+        fadd    shifted, t, math.shift
+        fsub    n, shifted, math.shift
+        fmul    nh, n, math.ln2h        ; exact
+        fsub    a, c, nh                ; exact
+        fmul    nl, n, math.ln2l
+        fsub    r, a, nl
+        fadd    hi, r, 1.0
+        fsub    h, hi, 1.0
+        fsub    lo, r, h
+        math.exp_tail q, r
+        fadd    v, lo, q
+        ishl    k, shifted, 23
+        iadd    two, k, bits(unit)      ; 2^n·unit
+        fmul    whole, hi, two          ; exact
+        fsub    all, whole, unit
+        fmul    part, v, two
+        fadd    e, all, part
+.endm
+
+; d = e^x - 1, at most 1.25283 ulp: twice its half, so that 2ⁿ⁻¹ has a number always.
+.macro expm1 d:float, x:float
+.reg    low c e size:int off:int inner:int sg:bits e0 e1
+        fmax    low, x, -20.0           ; below -17.33 the result is -1
+        fmin    c, low, 89.0            ; above 88.73 it overflows
+        math.less_one e, c, 0.5
+        ; up to 2^-25 the result is x, and so is infinity, or a NaN
+        iand    size, low, 0x7fffffff
+        isub    off, size, 0x33000000
+        iltu    inner, off, 0x4c800000
+        iand    sg, x, math.sign
+        sel     e0, inner, e, x
+        sel     e1, inner, e, sg
+        fadd    d, e0, e1
+.endm
+
 ; d = ln x, at most 0.81752 ulp.
-.macro log d, x
+.macro log d:float, x:float
 .reg    a:bits up xs:bits sub:int off:int t:int eb:int m:bits ei:int e f eh h l l1 el f2 f4 hf f3 q a0 a1 a2 a3 s0 s1
 .reg    s2 s3 s4 s5 s6 s7 num den z:bits isinf:int
         iand    a, x, 0x7fffffff
@@ -210,10 +249,27 @@
         fadd    d, h, l1
 .endm
 
+; d = ln(1 + x), at most 1.4375 ulp: ln of the sum, and what the sum lost as its part.
+.macro log1p d:float, x:float
+.reg    u l c b m lost den q s a:int null:int
+        fadd    u, x, 1.0
+        log     l, u
+        fmin    c, x, 0x1p40            ; beyond, nothing that is lost counts
+        fadd    b, c, 1.0
+        fsub    m, b, 1.0
+        fsub    lost, c, m
+        fmax    den, b, 0x1p-30         ; -1 has its pole from `log`
+        fdiv    q, lost, den
+        fadd    s, l, q
+        iand    a, x, 0x7fffffff
+        ieq     null, a, zero
+        sel     d, null, x, s           ; keeps the sign of zero
+.endm
+
 ; ---- Tangent -------------------------------------------------------------------------------------------------------------------
 
 ; d = sin x / cos x, |x| ≤ 2π·64, at most 2.16531 ulp.
-.macro tan_quick d, x
+.macro tan_quick d:float, x:float
 .reg    s c
         fsin    s, x
         fcos    c, x
@@ -223,7 +279,7 @@
 ; d = tan x, |x| ≤ 2π·64, at most 0.89898 ulp.
 ;
 ; 2·tan(r/2) = w, then w/(1 - w²/4) or, beside an odd multiple of π/2, its inverse's opposite; all in two words each.
-.macro tan d, x
+.macro tan d:float, x:float
 .reg    a:int in:int xs:bits t:bits n odd:int y1 y2 w1 v u g0 g1 r nl z z2 p0 p1 p s0 s1 s2 q wh wl:bits g wz:bits wq
 .reg    w3 dw w2 w2h k2 V:bits vl v1 mu:bits ml:bits nh:bits nlo:bits dh:bits dl:bits inv m ta:bits zt:bits vt k e k1
         iand    a, x, 0x7fffffff
@@ -297,7 +353,7 @@
 ; ---- Arcsine and arctangent ----------------------------------------------------------------------------------------------------
 
 ; d = arcsine of x, at most 0.72224 ulp.
-.macro asin d, x
+.macro asin d:float, x:float
 .reg    h l l1 q u hx:bits lx:bits base:bits corr:bits a0:bits a:bits big:int sg:bits y y2 zb zs z S S0:bits Sh:bits
 .reg    dd den sl s:bits z2 p0 p1 p s0 s1 s2 s3
         fabs    a0, x
@@ -344,7 +400,7 @@
 .endm
 
 ; The arctangent where the machine has none: atan(c) + atan((x - c)/(1 + c·x)).
-.macro math.atan d, x
+.macro math.atan d:float, x:float
 .reg    a:bits sg:bits A b1:int b2:int b3:int b4:int c:bits c1:bits c2:bits h1:bits h2:bits h3:bits hi:bits num num4
 .reg    n0:bits ca den d0:bits t z z2 e0 e1 e2 e3 e4 p1 p2 p Q u
         fabs    a, x
@@ -388,7 +444,7 @@
 .endm
 
 ; d = arctangent of x, at most 0.75 ulp as an instruction, at most 0.88751 ulp without.
-.macro atan d, x
+.macro atan d:float, x:float
         .if has.fatan2
         fatan2  d, x, 1.0
         .else
@@ -399,7 +455,7 @@
 ; ---- Hyperbolic tangent --------------------------------------------------------------------------------------------------------
 
 ; d = tanh x, at most 0.98208 ulp.
-.macro tanh d, x
+.macro tanh d:float, x:float
 .reg    c a:bits big:int sg:bits a2 t:bits n nh b nl r hi:bits h lo q v:bits k:int H h1 Hl D num:bits base:bits corr z
 .reg    z2 p1 p2 p Q s0 s1 s2 s3 s4 e0:bits e1:bits
         fsat    c, x, 10.0              ; beyond 9.02 the result is 1
@@ -457,7 +513,7 @@
 ;
 ; ±2^(y·log2 |x|), logarithm and product in two words each. What is not computed so (zeros, infinities, NaNs, roots of negative
 ; numbers) has the exponent 0 and comes out of the sign's quotient.
-.macro pow d, x, y
+.macro pow d:float, x:float, y:float
 .reg    ax:bits ay:bits sub:int up xs:bits off:int ti:int eb:int m:bits ei:int e k:int c u den v s sh:bits th:bits tl
 .reg    a0 a1 sl s2 s4 l0 r r0 ss sh2 T T0 th2:bits g0 tl2 uu vv vv0 P ph:bits g2 pl zh z0 z1 zl dh dl b0 t1:bits c0
 .reg    t2 yc ys y1:bits yl f0 f1 pl2 ph2 P1 P2 t:bits n fr w0 tt:bits x0 x1 x2 uz vz z zg w hi h lo q wv v0 yy:bits
@@ -634,7 +690,7 @@
 ; ---- Remainder -----------------------------------------------------------------------------------------------------------------
 
 ; d = x - trunc(x/y)·y, exact for |x| < 2^(11·steps)·|y|; beyond, NaN and invalid.
-.macro fmod_in d, x, y, steps
+.macro fmod_in d:float, x:float, y:float, steps:number
 .reg    ax:bits ay:bits xu yu xsub:int ysub:int xs:bits ys:bits xo:int yo:int ex:int ey:int D:int D0:int before:int
 .reg    less:int r:bits skip:int my:bits yh:bits yl inv s:int f:bits R Q t w hi lo neg:int r1 r2 e1:int e2:int f1:bits
 .reg    f2:bits o:bits sg:bits xbad:int y0:int xnan:int ynan:int nan:int bad:int nv zn z zz res:bits
@@ -712,14 +768,14 @@
 .endm
 
 ; The same for every x and y; exact.
-.macro fmod d, x, y
+.macro fmod d:float, x:float, y:float
         fmod_in d, x, y, 26
 .endm
 
 ; ---- Functions of networks, with `tanh` ------------------------------------------------------------------------------------------
 
 ; d = tanh x, at most 5.9925 ulp, and never beyond ±1: x·P(x²)/Q(x²).
-.macro tanh_quick d, x
+.macro tanh_quick d:float, x:float
 .reg    c z z2 p0 p1 p2 q0 q1 q2 s0 s1 s2 s3 s4 s5 s6 s7 p3 n den
         fsat    c, x, 8.0
         fmul    z, c, c
@@ -744,10 +800,41 @@
         fdiv    d, n, den
 .endm
 
+; d = erf x, at most 6.43092 ulp, and never beyond ±1: x·P(x²)/Q(x²).
+.macro erf d:float, x:float
+.reg    c z z2 p0 p1 p2 p3 p4 q0 q1 q2 q3 s0 s1 s2 s3 s4 s5 s6 s7 s8 s9 n den y
+        fsat    c, x, 4.0
+        fmul    z, c, c
+        fmul    z2, z, z
+        fmul    s0, z, 0x1.987048p-3
+        fadd    p0, s0, 0x1.20dd74p+0
+        fmul    s1, z, 0x1.0e4f5p-8
+        fadd    p1, s1, 0x1.b91c6ep-5
+        fmul    s2, z, 0x1.012218p-19
+        fadd    p2, s2, 0x1.2df62p-12
+        fmul    s3, z2, p2
+        fadd    p3, p1, s3
+        fmul    s4, z2, p3
+        fadd    p4, p0, s4
+        fmul    s5, z, 0x1.05288p-1
+        fadd    q0, s5, 1.0
+        fmul    s6, z, 0x1.0123d8p-6
+        fadd    q1, s6, 0x1.e2505p-4
+        fmul    s7, z, 0x1.353844p-15
+        fadd    q2, s7, 0x1.451abp-10
+        fmul    s8, z2, q2
+        fadd    q3, q1, s8
+        fmul    s9, z2, q3
+        fadd    den, q0, s9
+        fmul    n, c, p4
+        fdiv    y, n, den
+        fsat    d, y, 1.0
+.endm
+
 ; d = 1/(1 + e^-x), at most 2.40188 ulp.
 ;
 ; With e = e^-|x|, 1/(1 + e) or e/(1 + e): neither overflows, and small results have all their digits.
-.macro sigmoid d, x
+.macro sigmoid d:float, x:float
 .reg    low:bits e n:bits den negative:int
         ior     low, x, math.sign
         exp     e, low
@@ -758,28 +845,11 @@
 .endm
 
 ; d = x where x > 0, otherwise e^x - 1, at most 1.06734 ulp.
-.macro elu d, x
-.reg    c low t shifted:bits n nh nl a r hi h lo q v two:bits k:int whole all part e off:int negative:int
+.macro elu d:float, x:float
+.reg    c low e off:int negative:int
         fmin    low, x, 0
         fmax    c, low, -20.0           ; below -17.33 the result is -1
-        fmul    t, c, 1/log(2)
-        fadd    shifted, t, math.shift
-        fsub    n, shifted, math.shift
-        fmul    nh, n, math.ln2h        ; exact
-        fsub    a, c, nh                ; exact
-        fmul    nl, n, math.ln2l
-        fsub    r, a, nl
-        fadd    hi, r, 1.0
-        fsub    h, hi, 1.0
-        fsub    lo, r, h
-        math.exp_tail q, r
-        fadd    v, lo, q
-        ishl    k, shifted, 23
-        iadd    two, k, bits(1.0)       ; 2^n
-        fmul    whole, hi, two          ; exact
-        fsub    all, whole, 1.0
-        fmul    part, v, two
-        fadd    e, all, part
+        math.less_one e, c, 1.0
         isub    off, x:bits, 0x80000001
         iltu    negative, off, 0x7f800000 ; not -0, no NaN
         sel     d, negative, e, x

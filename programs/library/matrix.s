@@ -6,45 +6,45 @@
 ; ---- Functions: `d = dot(a, b, 3)` or, as an instruction, `dot d, a, b, 3` --------------------------------------------
 
 ; d = a·b, vectors of n.
-.macro dot d, a, b, n
+.macro dot d:float, a:float, b:float, n:number
         d = sum(i, 1, n, a[i]*b[i])
 .endm
 
 ; d = |a|, a vector of n.
-.macro norm d, a, n
+.macro norm d:float, a:float, n:number
         d = sqrt(sum(i, 1, n, a[i]*a[i]))
 .endm
 
 ; d = aᵀ·M·b, a of n, M n×m, b of m.
-.macro bilinear d, a, M, b, n, m
+.macro bilinear d:float, a:float, M:float, b:float, n:number, m:number
         d = sum(i, 1, n, a[i]*sum(j, 1, m, M[i,j]*b[j]))
 .endm
 
 ; ---- Vectors -------------------------------------------------------------------------------------------------------------
 
 ; y = M·x, M n×m.
-.macro matvec y, M, x, n, m
+.macro matvec y:float, M:float, x:float, n:number, m:number
 .rep i, 1, n
         y[i] = sum(j, 1, m, M[i,j]*x[j])
 .endr
 .endm
 
 ; y = Mᵀ·x, M n×m: x has n elements, y m.
-.macro matvec_t y, M, x, n, m
+.macro matvec_t y:float, M:float, x:float, n:number, m:number
 .rep j, 1, m
         y[j] = sum(i, 1, n, M[i,j]*x[i])
 .endr
 .endm
 
 ; y = a×b, in three dimensions.
-.macro cross y, a, b
+.macro cross y:float, a:float, b:float
         y[1] = a[2]*b[3] - a[3]*b[2]
         y[2] = a[3]*b[1] - a[1]*b[3]
         y[3] = a[1]*b[2] - a[2]*b[1]
 .endm
 
 ; y = x + s·a, vectors of n. y may be x or a.
-.macro axpy y, x, s, a, n
+.macro axpy y:float, x:float, s:float, a:float, n:number
 .rep i, 1, n
         y[i] = x[i] + s*a[i]
 .endr
@@ -53,7 +53,7 @@
 ; ---- Matrices ------------------------------------------------------------------------------------------------------------
 
 ; C = A·B, A n×m, B m×p.
-.macro matmul C, A, B, n, m, p
+.macro matmul C:float, A:float, B:float, n:number, m:number, p:number
 .rep i, 1, n
 .rep j, 1, p
         C[i,j] = sum(k, 1, m, A[i,k]*B[k,j])
@@ -62,7 +62,7 @@
 .endm
 
 ; C = A·Bᵀ, A n×m, B p×m.
-.macro matmul_t C, A, B, n, m, p
+.macro matmul_t C:float, A:float, B:float, n:number, m:number, p:number
 .rep i, 1, n
 .rep j, 1, p
         C[i,j] = sum(k, 1, m, A[i,k]*B[j,k])
@@ -71,7 +71,7 @@
 .endm
 
 ; C = A + s·B, n×m. C may be A or B.
-.macro matadd C, A, s, B, n, m
+.macro matadd C:float, A:float, s:float, B:float, n:number, m:number
 .rep i, 1, n
 .rep j, 1, m
         C[i,j] = A[i,j] + s*B[i,j]
@@ -80,7 +80,7 @@
 .endm
 
 ; C = s·A, n×m. C may be A.
-.macro matscale C, s, A, n, m
+.macro matscale C:float, s:float, A:float, n:number, m:number
 .rep i, 1, n
 .rep j, 1, m
         C[i,j] = s*A[i,j]
@@ -89,7 +89,7 @@
 .endm
 
 ; C = Aᵀ, A n×m.
-.macro transpose C, A, n, m
+.macro transpose C:float, A:float, n:number, m:number
 .rep i, 1, n
 .rep j, 1, m
         C[j,i] = A[i,j]
@@ -98,7 +98,7 @@
 .endm
 
 ; C = x·yᵀ, x of n, y of m.
-.macro outer C, x, y, n, m
+.macro outer C:float, x:float, y:float, n:number, m:number
 .rep i, 1, n
 .rep j, 1, m
         C[i,j] = x[i]*y[j]
@@ -107,7 +107,7 @@
 .endm
 
 ; C = 1, n×n.
-.macro identity C, n
+.macro identity C:float, n:number
 .rep i, 1, n
 .rep j, 1, n
         C[i,j] = i == j
@@ -118,7 +118,7 @@
 ; ---- Linear equations ------------------------------------------------------------------------------------------------------
 
 ; L·Lᵀ = A, A n×n, symmetric and positive definite: the lower triangle of A is read, that of L written, with 1/L_ii in r.
-.macro cholesky L, r, A, n
+.macro cholesky L:float, r:float, A:float, n:number
 .rep j, 1, n
 .if j > 1
         L[j,j] = sqrt(A[j,j] - sum(k, 1, j - 1, L[j,k]*L[j,k]))
@@ -137,7 +137,7 @@
 .endm
 
 ; L·Lᵀ·x = b, with what `cholesky` has written. x may be b.
-.macro cholesky_solve x, L, r, b, n
+.macro cholesky_solve x:float, L:float, r:float, b:float, n:number
 .reg    y[n]
 .rep i, 1, n
 .if i > 1
@@ -157,7 +157,7 @@
 
 ; A·x = b, A n×n, by elimination with partial pivoting. Rows are exchanged by selection, so that the time is the same whatever the matrix.
 ; A singular matrix divides by zero. x may be b.
-.macro lu_solve x, A, b, n
+.macro lu_solve x:float, A:float, b:float, n:number
 .reg    a[n,n+1] r[n] l g:int
 .rep i, 1, n
 .rep j, 1, n

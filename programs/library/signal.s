@@ -4,7 +4,7 @@
 
 ; y = h·(u, u one period ago, …): a filter of n taps in transposed form, whose delay line never moves. h is an array of registers, of
 ; memory, or the name of a macro's constants; s is a `.state` array of n, zero before the first period.
-.macro fir y, u, h, s, n
+.macro fir y:float, u:float, h:float, s:float, n:number
         y = s[1] + u*h[1]
 .rep i, 1, n - 2
         s[i] = s[i+1] + u*h[i+1]
@@ -14,7 +14,7 @@
 
 ; y = u through n sections of second order, (b0 + b1·z⁻¹ + b2·z⁻²)/(1 + a1·z⁻¹ + a2·z⁻²), transposed form. Row i of c has b0, b1, b2, a1, a2
 ; of section i; s is a `.state` array n×2, zero before the first period.
-.macro biquads y, u, c, s, n
+.macro biquads y:float, u:float, c:float, s:float, n:number
 .reg    v[n+1]
         v[1] = u
 .rep i, 1, n
@@ -28,7 +28,7 @@
 ; ---- The Fourier transform -------------------------------------------------------------------------------------------------
 
 ; c[i], s[i] = cos, sin of 2π·(i - 1)/256: the arrays of 192 that `fft256` takes. For `.once`.
-.macro  fft256_table c, s
+.macro  fft256_table c:float, s:float
 .for i, 1, 192
 .reg    angle
         angle = (itof(i) - 1)*(2*pi/256)
@@ -38,7 +38,7 @@
 
 ; X = Σ x·e^(-2πi·jk/256), in place: r and m are the real and imaginary parts, u and v arrays of 256 that it overwrites. Radix 4, in the
 ; order of Stockham, which needs no reversal of digits: from r, m to u, v and back, twice.
-.macro  fft256 r, m, u, v, c, s
+.macro  fft256 r:float, m:float, u:float, v:float, c:float, s:float
 .reg    k[3,3] l[3,3]
 .for p, 1, 64 unroll 4                  ; factors differ from butterfly to butterfly
         fft4    u, v, 4*p - 3, 1, r, m, p, 64, c[p], s[p], c[2*p-1], s[2*p-1], c[3*p-2], s[3*p-2]
@@ -69,7 +69,7 @@
 .endm
 
 ; A butterfly: from x[i], x[i+e], … to y[j], y[j+d], …, times the factors c - i·s.
-.macro  fft4 yr, ym, j, d, xr, xm, i, e, c1, s1, c2, s2, c3, s3
+.macro  fft4 yr:float, ym:float, j:int, d:number, xr:float, xm:float, i:int, e:number, c1:float, s1:float, c2:float, s2:float, c3:float, s3:float
 .reg    tr[4] tm[4]
         fft4_sums tr, tm, xr, xm, i, e
         yr[j], ym[j] = tr[1], tm[1]
@@ -78,7 +78,7 @@
         yr[j+3*d], ym[j+3*d] = tr[4]*c3 + tm[4]*s3, tm[4]*c3 - tr[4]*s3
 .endm
 
-.macro  fft4_plain yr, ym, j, d, xr, xm, i, e
+.macro  fft4_plain yr:float, ym:float, j:int, d:number, xr:float, xm:float, i:int, e:number
 .reg    tr[4] tm[4]
         fft4_sums tr, tm, xr, xm, i, e
 .rep h, 0, 3
@@ -86,7 +86,7 @@
 .endr
 .endm
 
-.macro  fft4_sums tr, tm, xr, xm, i, e
+.macro  fft4_sums tr:float, tm:float, xr:float, xm:float, i:int, e:number
 .reg    ar[2] am[2] br[2] bm[2]
 .rep h, 0, 1
         ar[h+1], am[h+1] = xr[i+h*e] + xr[i+h*e+2*e], xm[i+h*e] + xm[i+h*e+2*e]
@@ -101,14 +101,14 @@
 ; ---- Tables in memory ------------------------------------------------------------------------------------------------------
 
 ; y = the table T of n values at x, linear between them: T[1] at x = 0, T[2] at x = 1, … Beyond its ends it stays as it is there.
-.macro table1 y, T, x, n
+.macro table1 y:float, T:float, x:float, n:number
 .reg    part k:int
         table_place part, k, x, n
         y = T[k+1] + part*(T[k+2] - T[k+1])
 .endm
 
 ; y = the table T of n×m values at row u and column v, bilinear between them: T[1,1] at u = v = 0. Beyond its ends it stays as it is there.
-.macro table2 y, T, u, v, n, m
+.macro table2 y:float, T:float, u:float, v:float, n:number, m:number
 .reg    part right k:int l:int
         table_place part, k, u, n
         table_place right, l, v, m
@@ -119,7 +119,7 @@
 .endm
 
 ; x within 0 to n - 1 as k, 0 to n - 2, and a part of 1. NaN is 0.
-.macro table_place part, k, x, n
+.macro table_place part:float, k:int, x:float, n:number
 .reg    at
         at = min(max(x, 0), n - 1)
         at = at == at ? at : 0

@@ -11,7 +11,7 @@ found again each time, so that they make up for the rounding.
 
 import struct
 
-from mpmath import atan, asin, atanh, chop, cos, exp, expm1, findroot, linspace, log, log1p, lu_solve, matrix, mp, mpf, pi, sqrt, tan, tanh
+from mpmath import atan, asin, atanh, chop, cos, erf, exp, expm1, findroot, linspace, log, log1p, lu_solve, matrix, mp, mpf, pi, sqrt, tan, tanh
 
 mp.prec = 120
 GRID = 400
@@ -76,6 +76,47 @@ def rounded(name, f, weight, low, high, powers):
         print(f"    x^{p}: {float(c).hex()}")
 
 
+def rational(name, f, weight, low, high, above, below):
+    """P/Q for x·P(x²)/Q(x²) of an odd function f, Q(0) = 1: least squares whose weights grow where the error is large (Lawson),
+    coefficients rounded in turn, from the lowest."""
+    count = 260
+    xs = [mpf(low) + (mpf(high) - low) * (1 - cos(pi * (i + mpf(1) / 2) / count)) / 2 for i in range(count)]
+    targets = [(x * x, f(x) / x, weight(x) * x) for x in xs]
+    p, q = [], []
+
+    def solve():
+        free, lawson, last, best = above - len(p), [mpf(1)] * count, [mpf(1)] * count, None
+        total = free + below - len(q)
+        for _ in range(40):
+            rows, right = matrix(total, total), matrix(total, 1)
+            for (z, y, w), growth, divisor in zip(targets, lawson, last):
+                row = [z ** (len(p) + i) for i in range(free)] + [-y * z ** (1 + len(q) + i) for i in range(total - free)]
+                rest = y * (1 + sum(c * z ** (1 + i) for i, c in enumerate(q))) - sum(c * z**i for i, c in enumerate(p))
+                scale = growth * (w / divisor) ** 2
+                for i in range(total):
+                    right[i] += scale * row[i] * rest
+                    for j in range(total):
+                        rows[i, j] += scale * row[i] * row[j]
+            solution = lu_solve(rows, right)
+            over, under = p + list(solution[:free]), q + list(solution[free:])
+            last = [1 + sum(c * z ** (1 + i) for i, c in enumerate(under)) for z, _, _ in targets]
+            errors = [abs(w * (sum(c * z**i for i, c in enumerate(over)) / d - y)) for (z, y, w), d in zip(targets, last)]
+            if best is None or max(errors) < best[0]:
+                best = max(errors), over, under
+            mean = sum(a * b for a, b in zip(lawson, errors)) / count
+            lawson = [a * b / mean + mpf(10) ** -12 for a, b in zip(lawson, errors)]
+        return best
+
+    for place in range(max(above, below)):
+        for fixed, length, which in ((p, above, 1), (q, below, 2)):
+            if place < length:
+                fixed.append(binary32(solve()[which][place]))
+    error = max(abs(w * (sum(c * z**i for i, c in enumerate(p)) / (1 + sum(c * z ** (1 + i) for i, c in enumerate(q))) - y)) for z, y, w in targets)
+    print(f"{name}: {float(error * 2**24):.4f} ulp")
+    for side, fixed in (("P", p), ("Q", q)):
+        print(f"    {side}: {' '.join(float(c).hex() for c in fixed)}")
+
+
 def series(f, expansion, at=mpf("0.01")):
     """f, but its expansion (which cancels nothing) where x is small."""
     return lambda x: expansion(x) if abs(x) < at else f(x)
@@ -125,6 +166,8 @@ if __name__ == "__main__":
     for t in ("0.82",):
         for n in (5, 6, 7):
             rounded("tanh " + t, f, w, 0, mpf(t) ** 2, range(n))
+    # erf: x·P(x²)/Q(x²)
+    rational("erf", erf, lambda x: 1 / erf(x), 0, 4, 6, 5)
     # pow: 3/2·log((1 + s)/(1 - s)) = 3s + s³ + s⁵·L(s²)
     f = series(over(lambda s: (3 * atanh(s) - 3 * s - s**3) / s**5), sum_of(lambda k: mpf(3) / (2 * k + 5)))
     w = lambda z: z * z / 3

@@ -6,23 +6,23 @@ use std::fmt;
 /// Largest error of one output over a run.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct MaxError {
-    /// Largest `|binary32 - binary64|`, in the output's unit; NaN once a value compared was not a number.
+    /// Largest `|binary32 - binary64|`, in the output's unit; NaN once a compared value was NaN.
     pub absolute: f64,
-    /// Largest error in ulps of the binary64 value rounded to binary32. Says little of a value that passes
-    /// through 0, where ulps are tiny; [`ulps_of_largest`](Self::ulps_of_largest) does.
+    /// Largest error in ulps of the binary64 value rounded to binary32. Has little meaning for a value that passes through 0, where ulps
+    /// are tiny; see [`ulps_of_largest`](Self::ulps_of_largest).
     pub ulps: f64,
     /// Largest `|binary64|`, in the output's unit.
     pub largest: f64,
-    /// Values compared.
+    /// Number of values compared.
     pub count: u64,
-    /// The comparison, counted from 0, with the largest absolute error.
+    /// Index of the comparison, from 0, with the largest absolute error.
     pub worst: u64,
 }
 
 impl MaxError {
-    /// Takes one pair into account.
+    /// Adds a pair of values.
     pub fn add(&mut self, measured: f32, truth: f64) {
-        // Equal infinities are no error; a NaN on either side is one that must not be lost.
+        // Equal infinities have no error; a NaN on either side must stay visible as a NaN error.
         let truth_is_measured = f64::from(measured) == truth;
         let error = if truth_is_measured { 0.0 } else { (f64::from(measured) - truth).abs() };
         if worse(error, self.absolute) {
@@ -38,19 +38,19 @@ impl MaxError {
         self.count += 1;
     }
 
-    /// The largest absolute error in ulps of the largest value that the output takes.
+    /// Largest absolute error in ulps of the output's largest magnitude.
     #[must_use]
     pub fn ulps_of_largest(&self) -> f64 {
         self.absolute / f64::from(ulp(self.largest as f32))
     }
 }
 
-/// True if an error is larger, counting NaN as the largest.
+/// Orders errors with NaN as the largest.
 fn worse(error: f64, than: f64) -> bool {
     error > than || (error.is_nan() && !than.is_nan())
 }
 
-/// Weight of the last place of a binary32 value; of the smallest subnormal for zero and subnormals.
+/// Unit in the last place of a binary32 value: the distance to its neighbour; the smallest subnormal for zero and subnormals.
 ///
 /// Infinite for infinities, NaN for NaN.
 #[must_use]
@@ -60,7 +60,7 @@ pub fn ulp(value: f32) -> f32 {
         return value.abs();
     }
     let exponent = (value.to_bits() >> FRACTION_BITS) & 0xff;
-    // Below this exponent the ulp itself is subnormal.
+    // At the smallest exponents the ulp itself is subnormal.
     match exponent.max(1).checked_sub(FRACTION_BITS) {
         None | Some(0) => f32::from_bits(1 << (exponent.max(1) - 1)),
         Some(exponent) => f32::from_bits(exponent << FRACTION_BITS),
@@ -70,7 +70,7 @@ pub fn ulp(value: f32) -> f32 {
 /// Largest errors of `N` outputs over a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Accuracy<const N: usize> {
-    /// One per output, in their order.
+    /// Errors of the outputs, in their order.
     pub errors: [MaxError; N],
 }
 
@@ -81,7 +81,7 @@ impl<const N: usize> Default for Accuracy<N> {
 }
 
 impl<const N: usize> Accuracy<N> {
-    /// Takes one period into account.
+    /// Adds the outputs of a period.
     pub fn add(&mut self, measured: &[f32; N], truth: &[f64; N]) {
         for ((error, &measured), &truth) in self.errors.iter_mut().zip(measured).zip(truth) {
             error.add(measured, truth);

@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Controller programs for the Takt processor, and the binary64 models that judge them.
 //!
-//! - [`hybrid`] is the five-axis hybrid robot of the founding paper: kinematics, dynamics, the tracking
-//!   controller in binary64 and in native binary32, the plant, and the loop that joins them; its [`gcode`] reads a tool path,
-//!   its [`trajectory`] turns that into the reference of every sampling period;
-//! - [`path`] is the geometry of a tool path;
-//! - [`arm`] is the six-axis arm of the second founding paper: kinematics in binary64, and the measurement of its programs;
-//! - [`three`] is the six-joint arm of the third founding paper: what its three processors compute, in binary64;
-//! - [`listings`] finds the assembler listings of documents;
-//! - [`accuracy`] measures binary32 results against binary64.
+//! - [`hybrid`]: the five-axis hybrid robot of the founding paper: kinematics, dynamics, the tracking controller in binary64 and in native
+//!   binary32, the plant, and the closed loop; its [`gcode`] reads a tool path, its [`trajectory`] computes the reference of every sampling
+//!   period;
+//! - [`path`]: geometry of a tool path;
+//! - [`arm`]: the six-axis arm of the second founding paper: kinematics in binary64, and the measurement of its programs;
+//! - [`three`]: the six-joint arm of the third founding paper: the computations of its three processors, in binary64;
+//! - [`listings`]: assembler listings of documents;
+//! - [`accuracy`]: errors of binary32 results against binary64.
 //!
-//! Everything but the six-axis arm (mm, degrees) is in SI units (m, rad, s, kg, N, N·m), nothing here prints, and no input makes it panic.
+//! All but the six-axis arm (mm, degrees) is in SI units (m, rad, s, kg, N, N·m). The crate prints nothing, and no input makes it panic.
 
 pub mod accuracy;
 pub mod arm;
@@ -22,13 +22,13 @@ pub mod three;
 
 pub use hybrid::{gcode, trajectory};
 
-/// The test path of the paper, the letters "AGH", each in a plane of its own.
+/// Test path of the paper: the letters "AGH", each in a plane of its own.
 pub const AGH: &str = include_str!("../data/agh.ngc");
 
-/// The path that friction is identified on: every axis there and back at constant speeds.
+/// Path for the identification of friction: every axis there and back at constant speeds.
 pub const FRICTION: &str = include_str!("../data/friction.ngc");
 
-/// The assembly sources: path within this crate's folder, and text.
+/// Assembly sources: path within this crate's folder, and text.
 pub const SOURCES: &[(&str, &str)] = &[
     ("arm/arm.s", include_str!("../arm/arm.s")),
     ("arm/forward.s", include_str!("../arm/forward.s")),
@@ -45,7 +45,7 @@ pub const SOURCES: &[(&str, &str)] = &[
 /// Inputs of the tracking programs (CSV): the first 300 periods of `takt track --csv`, a row each.
 pub const TRACKING_INPUTS: &str = include_str!("../hybrid/tracking.csv");
 
-/// The three-processor controller: name and text of every file in `three/`. The system's is `controller.toml`.
+/// Files of the three-processor controller: name and text of every file in `three/`. The system is `controller.toml`.
 pub const THREE: &[(&str, &str)] = &[
     ("communication.s", include_str!("../three/communication.s")),
     ("controller.toml", include_str!("../three/controller.toml")),
@@ -59,7 +59,7 @@ pub const THREE: &[(&str, &str)] = &[
     ("ums7.s", include_str!("../three/ums7.s")),
 ];
 
-/// The examples and their inputs: name and text of every file in `examples/`.
+/// Examples and their inputs: name and text of every file in `examples/`.
 pub const EXAMPLES: &[(&str, &str)] = &[
     ("biquads.csv", include_str!("../examples/biquads.csv")),
     ("biquads.s", include_str!("../examples/biquads.s")),
@@ -78,7 +78,7 @@ pub const EXAMPLES: &[(&str, &str)] = &[
     ("table.s", include_str!("../examples/table.s")),
 ];
 
-/// Programs over arrays that the library's macros make up, with their costs in `docs/library.md`: name and text of every file in `kernels/`.
+/// Programs over arrays, built from the library's macros, with their costs in `docs/library.md`: name and text of every file in `kernels/`.
 pub const KERNELS: &[(&str, &str)] = &[
     ("activations.s", include_str!("../kernels/activations.s")),
     ("biquads.s", include_str!("../kernels/biquads.s")),
@@ -103,7 +103,7 @@ pub const KERNELS: &[(&str, &str)] = &[
     ("table2.s", include_str!("../kernels/table2.s")),
 ];
 
-/// Kernels of TACLeBench, written again from the algorithms: name and text of every file in `taclebench/`.
+/// Kernels of TACLeBench, rewritten from their algorithms: name and text of every file in `taclebench/`.
 pub const TACLEBENCH: &[(&str, &str)] = &[
     ("cosf.s", include_str!("../taclebench/cosf.s")),
     ("deg2rad.s", include_str!("../taclebench/deg2rad.s")),
@@ -115,12 +115,14 @@ pub const TACLEBENCH: &[(&str, &str)] = &[
     ("st.s", include_str!("../taclebench/st.s")),
 ];
 
-/// The library, for `.include <name>`: name and text of every file in `library/`.
+/// Library for `.include <name>`: name and text of every file in `library/`.
 pub const LIBRARY: &[(&str, &str)] = &[
     ("arrays.s", include_str!("../library/arrays.s")),
+    ("c.s", include_str!("../library/c.s")),
     ("control.s", include_str!("../library/control.s")),
     ("math.s", include_str!("../library/math.s")),
     ("matrix.s", include_str!("../library/matrix.s")),
+    ("motor.s", include_str!("../library/motor.s")),
     ("signal.s", include_str!("../library/signal.s")),
 ];
 

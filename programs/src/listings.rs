@@ -1,32 +1,32 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Assembler listings in documents: what is shown, and the whole program that it is a part of.
+//! Assembler listings in documents: the text shown, and the complete program that it belongs to.
 //!
-//! A listing is a block ```` ```asm ````. A comment right before it, which nobody sees who reads the document, completes it:
+//! A listing is a block ```` ```asm ````. Comments right before it, invisible to the document's readers, complete it:
 //!
 //! ```text
-//! <!-- listing: NAME -->      a name, for tests of what it costs
-//! <!-- around:                what stands around it; the line `...` is its place
-//! <!-- in place of ...:       what its own line `...` leaves out
+//! <!-- listing: NAME -->      name, for tests of the listing's cost
+//! <!-- around:                text around the listing, whose place is the line `...`
+//! <!-- in place of ...:       text in place of the listing's own line `...`
 //! ```
 
-/// A listing of a document.
+/// Listing of a document.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Listing<'d> {
-    /// Its name, if it has one.
+    /// Name for tests, if given.
     pub name: Option<&'d str>,
-    /// The line of the document that it begins behind, from 1.
+    /// Line of the document before the listing's text, from 1.
     pub line: usize,
-    /// The text that is shown.
+    /// Text shown in the document.
     pub text: &'d str,
-    /// The program that it is, or is a part of.
+    /// Complete program that the listing is part of.
     pub program: String,
 }
 
 const FENCE: &str = "```asm\n";
-/// The content of a line that stands for others.
+/// Content of a placeholder line.
 const DOTS: &str = "...";
 
-/// The listings of a document, in its order.
+/// Listings of a document, in its order.
 pub fn listings(document: &str) -> Vec<Listing<'_>> {
     let mut found = Vec::new();
     let mut at = 0;
@@ -40,7 +40,7 @@ pub fn listings(document: &str) -> Vec<Listing<'_>> {
         let text = &document[start..end];
         let (mut name, mut program) = (None, text.to_owned());
         let mut before = document[..fence].trim_end();
-        // From the nearest comment up.
+        // Comments from the nearest up.
         while let Some(rest) = before.strip_suffix("-->") {
             let Some(open) = rest.rfind("<!--") else { break };
             let comment = &rest[open + "<!--".len()..];
@@ -59,7 +59,7 @@ pub fn listings(document: &str) -> Vec<Listing<'_>> {
     found
 }
 
-/// A text with another in place of its lines that are dots.
+/// Replaces the placeholder lines of a text.
 fn instead(text: &str, other: &str) -> String {
     let line = |line: &str| if line.trim() == DOTS { other.to_owned() } else { format!("{line}\n") };
     text.lines().map(line).collect()

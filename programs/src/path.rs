@@ -3,7 +3,7 @@
 
 use std::f64::consts::TAU;
 
-/// Distance that one radian of a rotary axis counts as when the move mostly rotates, m/rad.
+/// Distance per radian of a rotary axis, for moves that mostly rotate, m/rad.
 pub const ROTARY_RADIUS: f64 = 0.2;
 
 /// Tool point and table angles.
@@ -15,45 +15,45 @@ pub struct Pose {
     pub angle: [f64; 2],
 }
 
-/// The kind of a move: it cuts or only positions.
+/// Kind of a move: cutting or positioning.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum MoveKind {
-    /// G0.
+    /// Positioning move at rapid speed, G0.
     Rapid,
-    /// G1, G2 or G3.
+    /// Cutting move: G1, G2 or G3.
     Cut,
 }
 
 /// Shape of a move's tool path.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Path {
-    /// Straight in all five axes.
+    /// Line, straight in all five axes.
     Line,
-    /// An arc in the XY plane; Z and the table follow it linearly.
+    /// Arc in the XY plane; Z and the table follow it linearly.
     Arc(Arc),
 }
 
-/// An arc in the XY plane.
+/// Arc in the XY plane.
 ///
-/// The radius goes linearly from the start's to the end's, so that the arc ends exactly where the program
-/// says although the centre was printed with finitely many digits.
+/// The radius changes linearly between the ends, so that the arc ends exactly at its programmed end, although the centre was printed with
+/// finitely many digits.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Arc {
     /// Centre `x y`, m.
     pub centre: [f64; 2],
     /// Radius at the start and at the end, m.
     pub radius: [f64; 2],
-    /// Direction of the start seen from the centre, rad.
+    /// Direction of the start as seen from the centre, rad.
     pub start_angle: f64,
     /// Signed angle travelled, positive counter-clockwise, rad; ±2π for a full circle.
     pub sweep: f64,
 }
 
 impl Arc {
-    /// Below this a sweep counts as a full turn: the two directions differ by rounding only.
+    /// Sweeps below this count as a full turn: the two directions differ by rounding only.
     const SAME_DIRECTION: f64 = 1e-9;
 
-    /// The arc about `centre` from one point to another (all m); a full circle if the two coincide.
+    /// Arc about `centre` from one point to another (all m); a full circle if the two coincide.
     #[must_use]
     pub fn about(centre: [f64; 2], from: [f64; 2], to: [f64; 2], clockwise: bool) -> Self {
         let polar = |point: [f64; 2]| {
@@ -63,7 +63,7 @@ impl Arc {
         let ((start_radius, start_angle), (end_radius, end_angle)) = (polar(from), polar(to));
         let turn = if clockwise { start_angle - end_angle } else { end_angle - start_angle };
         let turn = turn.rem_euclid(TAU);
-        // A difference just below zero comes out of the remainder just below a full turn, as it should.
+        // The remainder maps a difference just below zero to just below a full turn, as it should.
         let turn = if turn < Self::SAME_DIRECTION { TAU } else { turn };
         Self {
             centre,
@@ -73,7 +73,7 @@ impl Arc {
         }
     }
 
-    /// True if the arc passes a direction seen from its centre, rad.
+    /// The arc passes a direction seen from its centre, rad.
     #[must_use]
     pub fn passes(&self, direction: f64) -> bool {
         let turn = direction - self.start_angle;
@@ -82,27 +82,27 @@ impl Arc {
     }
 }
 
-/// A point of a path with its derivatives by the path fraction.
+/// Point of a path with its derivatives with respect to the path fraction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PathPoint {
-    /// Tool point, m.
+    /// Tool point `[x, y, z]`, m.
     pub position: [f64; 3],
-    /// Its first derivative by the fraction, m.
+    /// First derivative with respect to the fraction, m.
     pub first: [f64; 3],
-    /// Its second derivative by the fraction, m.
+    /// Second derivative with respect to the fraction, m.
     pub second: [f64; 3],
 }
 
-/// One move, from standstill to standstill.
+/// Move from standstill to standstill.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Move {
-    /// Cutting or positioning.
+    /// Kind: cutting or positioning.
     pub kind: MoveKind,
     /// Shape of the tool path.
     pub path: Path,
-    /// Its start.
+    /// Pose at the start.
     pub from: Pose,
-    /// Its end.
+    /// Pose at the end.
     pub to: Pose,
     /// Programmed speed along the path, m/s.
     pub feed_m_per_s: f64,
@@ -121,8 +121,7 @@ impl Move {
         }
     }
 
-    /// Length `L` that the speed refers to, m: the tool path, or the larger rotation at
-    /// [`ROTARY_RADIUS`] if that is longer.
+    /// Length `L` to which the speed refers, m: the tool path, or the larger rotation at [`ROTARY_RADIUS`] if that is longer.
     #[must_use]
     pub fn length(&self) -> f64 {
         let [tilt, rotation] = self.rotation();
@@ -139,7 +138,7 @@ impl Move {
         std::array::from_fn(|i| self.to.position[i] - self.from.position[i])
     }
 
-    /// The tool point at a fraction of the path (0 at the start, 1 at the end).
+    /// Tool point at a fraction of the path (0 at the start, 1 at the end).
     #[must_use]
     pub fn at(&self, fraction: f64) -> PathPoint {
         let offset = self.offset();
@@ -200,7 +199,7 @@ mod tests {
 
     #[test]
     fn path_derivatives_agree_with_differences() {
-        // The end is a little off the circle, so that the radius changes on the way.
+        // The end is a little off the circle, so that the radius changes along the arc.
         let piece = arc_move([0.04, 0.01], [-0.03, 0.0281], [0.0, 0.0], false);
         let h = 1e-5;
         for fraction in [0.1, 0.5, 0.9] {

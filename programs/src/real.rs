@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The arithmetic that the control algorithm needs, for binary32 and binary64 alike.
+//! Arithmetic of the control algorithm, for binary32 and binary64 alike.
 //!
-//! The tracking algorithm is written once, over [`Real`]. Instantiated with `f64` it is the golden model;
-//! with `f32` it is "the same algorithm as native binary32", which the benchmarks race the emulator against.
+//! The tracking algorithm is written once, over [`Real`]. Instantiated with `f64` it is the golden model; with `f32` it is native binary32
+//! code, whose speed the benchmarks compare with the emulator's.
 
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
 
-/// A binary floating-point type that the algorithm can be instantiated with.
+/// Binary floating-point type of the algorithm.
 pub trait Real:
     Copy
     + PartialOrd
@@ -21,26 +21,26 @@ pub trait Real:
     + Sync
     + 'static
 {
-    /// Zero.
+    /// Additive identity of the type, +0.
     const ZERO: Self;
-    /// One.
+    /// Multiplicative identity of the type, 1.
     const ONE: Self;
-    /// The nearest value to a binary64 constant.
+    /// Nearest value to a binary64 constant.
     fn from_f64(value: f64) -> Self;
-    /// The nearest value to an integer (one conversion, as the processor does it).
+    /// Nearest value to an integer (one conversion, as the processor does it).
     fn from_i32(value: i32) -> Self;
-    /// The same value in binary64; exact for both types.
+    /// Exact conversion to binary64.
     fn to_f64(self) -> f64;
     /// Square root, correctly rounded.
     #[must_use]
     fn sqrt(self) -> Self;
-    /// Sine of an angle in radians, as the host's library computes it.
+    /// Sine of an angle in radians, from the host's library.
     #[must_use]
     fn sin(self) -> Self;
-    /// Hyperbolic tangent, as the host's library computes it.
+    /// Hyperbolic tangent, from the host's library.
     #[must_use]
     fn tanh(self) -> Self;
-    /// Absolute value.
+    /// Absolute value, without rounding.
     #[must_use]
     fn abs(self) -> Self;
 }
@@ -92,7 +92,7 @@ macro_rules! real {
 real!(f32);
 real!(f64);
 
-/// An array with every element converted to another [`Real`], rounding to nearest where it must.
+/// Converts every element of an array to another [`Real`], rounding to nearest where necessary.
 #[must_use]
 pub fn convert<A: Real, B: Real, const N: usize>(values: [A; N]) -> [B; N] {
     values.map(|value| B::from_f64(value.to_f64()))

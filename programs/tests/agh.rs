@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The AGH path from end to end: the figures that the specification gives for it.
+//! AGH path end to end: the figures of the specification.
 
 use takt_programs::AGH;
 use takt_programs::accuracy::Accuracy;
@@ -62,7 +62,7 @@ fn arms_stay_in_the_specified_range() {
 #[test]
 fn binary64_controller_tracks_as_specified() {
     let errors = errors_of(Controller::<f64>::new());
-    // The specification's figures, and ours so that a change is noticed.
+    // Figures of the specification, then our own to four digits, so that a change is noticed.
     assert_near(errors.cutting, 7.9e-6, 0.03);
     assert_near(errors.overall, 8.8e-6, 0.03);
     assert_near(errors.cutting, 7.801e-6, 0.002);
@@ -86,11 +86,11 @@ fn joint_reference_in_binary32_is_close_to_the_unrounded_truth() {
     let worst = |range: std::ops::Range<usize>| {
         accuracy.errors[range].iter().map(|error| error.absolute).fold(0.0, f64::max)
     };
-    // Largest of the rows of the paper's Table 3, "FPGA1,2,3".
+    // Largest values in the rows "FPGA1,2,3" of the paper's Table 3.
     assert!(worst(0..3) < 1.8651e-6);
     assert!(worst(3..6) < 8.2634e-7);
     assert!(worst(6..9) < 2.9990e-6);
-    // The angles only pass through: half an ulp each.
+    // The angles pass through unchanged: their rounding costs half an ulp.
     assert!(accuracy.errors[9..].iter().all(|error| error.ulps <= 0.5));
     assert!(accuracy.errors.iter().all(|error| error.count == 346_666));
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The arm's programs on the emulator, against binary64: errors, cycles, round trips, and what cannot be reached.
+//! Programs of the arm on the emulator, against binary64: errors, cycles, round trips, and unreachable poses.
 #![allow(clippy::print_stdout)]
 
 use takt_asm::{MemoryLoader, Options};
@@ -11,21 +11,21 @@ use takt_programs::arm::{
     ON_AXIS, OUT_OF_REACH, Pose, STEEP, Sweep, WRIST_SINGULAR, angle_between, forward, inverse, sweep,
 };
 
-/// Errors that the programs may have, mm and degrees.
+/// Limit on the programs' errors, mm and degrees.
 const ERROR: f64 = 0.0005;
-/// Cycles that a period may take.
+/// Limits on the cycles of a period.
 const FORWARD_CYCLES: u64 = 96;
 const INVERSE_CYCLES: u64 = 195;
 
-/// A program and its ports, in the order of its source.
-struct Ported {
+/// Program with its ports in the order of its source.
+struct PortedProgram {
     emulator: Emulator,
     inputs: Vec<Register>,
     outputs: Vec<Register>,
 }
 
-impl Ported {
-    fn new(path: &str, inputs: &str, outputs: &str) -> Ported {
+impl PortedProgram {
+    fn new(path: &str, inputs: &str, outputs: &str) -> PortedProgram {
         let options = Options { machine: &T3, ..Options::default() };
         let assembled = takt_asm::assemble(path, &MemoryLoader::new(SOURCES), &options);
         let assembled = assembled.unwrap_or_else(|errors| panic!("{}", errors.render(false)));
@@ -34,7 +34,7 @@ impl Ported {
         let register = |ports: &[takt_isa::program::Port], name: &str| {
             ports.iter().find(|port| port.name == name).unwrap_or_else(|| panic!("no port {name}")).register
         };
-        Ported {
+        PortedProgram {
             inputs: inputs.split(' ').map(|name| register(&program.inputs, name)).collect(),
             outputs: outputs.split(' ').map(|name| register(&program.outputs, name)).collect(),
             emulator: Emulator::new(&program).expect("it fits"),
@@ -55,20 +55,20 @@ impl Ported {
     }
 }
 
-struct OnEmulator {
-    forward: Ported,
-    inverse: Ported,
+struct EmulatedKinematics {
+    forward: PortedProgram,
+    inverse: PortedProgram,
 }
 
-impl OnEmulator {
-    fn new() -> OnEmulator {
-        OnEmulator {
-            forward: Ported::new(
+impl EmulatedKinematics {
+    fn new() -> EmulatedKinematics {
+        EmulatedKinematics {
+            forward: PortedProgram::new(
                 "arm/forward.s",
                 "th1 th2 th3 th4 th5 th6 tx ty tz",
                 "x y z roll pitch yaw config0 config1 config2 status",
             ),
-            inverse: Ported::new(
+            inverse: PortedProgram::new(
                 "arm/inverse.s",
                 "x y z roll pitch yaw tx ty tz config0 config1 config2",
                 "th1 th2 th3 th4 th5 th6 status",
@@ -81,7 +81,7 @@ fn floats<const N: usize>(words: &[u32]) -> [f32; N] {
     std::array::from_fn(|i| f32::from_bits(words[i]))
 }
 
-impl Arm for OnEmulator {
+impl Arm for EmulatedKinematics {
     type Error = PeriodError;
 
     fn forward(&mut self, joints: [f32; 6], tool: [f32; 3]) -> Result<ForwardResult, PeriodError> {
@@ -114,15 +114,15 @@ fn narrow_pose(pose: &Pose<f64>) -> Pose<f32> {
     Pose { position: narrow(pose.position), orientation: narrow(pose.orientation) }
 }
 
-/// 10⁶ with `TAKT_FULL=1`.
+/// Number of random poses; 10⁶ with `TAKT_FULL=1`.
 fn count() -> u64 {
     if std::env::var_os("TAKT_FULL").is_some_and(|value| value == "1") { 1_000_000 } else { 5_000 }
 }
 
 #[test]
 fn random_poses() {
-    let mut arm = OnEmulator::new();
-    // The first period runs `.once` too.
+    let mut arm = EmulatedKinematics::new();
+    // Exclude the first period, which also runs `.once`.
     arm.forward([0.0; 6], [0.0; 3]).expect("no input makes the program fault");
     arm.inverse(&Pose::default(), [0.0; 3], [false; 3]).expect("no input makes the program fault");
     let found: Sweep = sweep(&mut arm, count(), 1, |_| {}).expect("no input makes the program fault");
@@ -147,7 +147,7 @@ fn random_poses() {
 
 #[test]
 fn the_papers_examples() {
-    let mut arm = OnEmulator::new();
+    let mut arm = EmulatedKinematics::new();
     let example = &FORWARD_EXAMPLE;
     let result = arm.forward(narrow(example.joints), narrow(example.tool)).expect("it runs");
     assert_eq!((result.status, result.configuration), (GOOD, [false, true, false]));
@@ -166,10 +166,10 @@ fn the_papers_examples() {
     }
 }
 
-/// A pose out of reach is told, and the joints stay.
+/// Unreachable poses are reported in the status, and the joint outputs hold.
 #[test]
-fn failures_are_told_and_outputs_held() {
-    let mut arm = OnEmulator::new();
+fn reports_failures_and_holds_outputs() {
+    let mut arm = EmulatedKinematics::new();
     let tool = [0.0; 3];
     let good = narrow_pose(&INVERSE_EXAMPLE.pose);
     let last = arm.inverse(&good, tool, [false; 3]).expect("it runs");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Speed profiles: continuity, limits, and the treatment of special moves.
+//! Speed profiles: continuity, limits, and special moves.
 
 use takt_programs::AGH;
 use takt_programs::gcode;
@@ -25,10 +25,10 @@ fn assert_continuous(trajectory: &Trajectory) {
     for sample in trajectory.samples() {
         if let Some(previous) = previous {
             for (before, after) in axes(&previous.reference).iter().zip(axes(&sample.reference)) {
-                // Off by the curvature of the velocity: jerk·Ts³/12, and up to 1400 rad/s³ on rapid turns.
+                // The trapezoidal rule errs by the curvature of the velocity: jerk·Ts³/12, and up to 1400 rad/s³ on rapid turns.
                 let mean = 0.5 * (before[1] + after[1]);
                 assert!((after[0] - before[0] - mean * TS).abs() < 2e-10, "{previous:?} {sample:?}");
-                // Off by the kink of the acceleration at a ramp's end: jerk·Ts²/8.
+                // The trapezoidal rule errs by the kink of the acceleration at a ramp's end: jerk·Ts²/8.
                 let mean = 0.5 * (before[2] + after[2]);
                 assert!((after[1] - before[1] - mean * TS).abs() < 2e-6, "{previous:?} {sample:?}");
             }
@@ -95,13 +95,13 @@ fn assert_near(measured: f64, expected: f64) {
 #[test]
 fn feed_is_reached_over_a_cosine_ramp() {
     use std::f64::consts::PI;
-    // L/V + Tr = 0.9 s + 0.03 s.
+    // Duration L/V + Tr = 0.9 s + 0.03 s.
     let cut = plan("G0 X0 Y0 Z700\nG1 X30 F2000");
     assert_eq!(cut.periods(), 9300);
     let [speed, acceleration, _] = peaks(&cut);
     assert_near(speed, 2.0 / 60.0);
     assert_near(acceleration, 0.5 * PI / 0.03 * 2.0 / 60.0);
-    // 0.15 s + 0.06 s.
+    // Duration 0.15 s + 0.06 s.
     let rapid = plan("G0 X0 Y0 Z700\nG0 X30");
     assert_eq!(rapid.periods(), 2100);
     let [speed, acceleration, _] = peaks(&rapid);
@@ -118,7 +118,7 @@ fn short_moves_only_ramp() {
 
 #[test]
 fn durations_are_stretched_to_whole_periods() {
-    // 0.0100123 m at 1/30 m/s and a ramp: 3303.69 periods.
+    // Duration of 0.0100123 m at 1/30 m/s with a ramp: 3303.69 periods.
     let stretched = plan("G0 X0 Y0 Z700\nG1 X10.0123 F2000");
     assert_eq!(stretched.periods(), 3304);
     let middle = stretched.samples().nth(1652).expect("in range").reference;
@@ -130,7 +130,7 @@ fn durations_are_stretched_to_whole_periods() {
 fn rotation_sets_the_pace_where_it_dominates() {
     use std::f64::consts::PI;
     let quarter = plan("G0 X0 Y0 Z700\nG0 X5 C90 A-20");
-    // 0.2 m per rad at 0.2 m/s: 1 rad/s.
+    // Rotary speed: 0.2 m per rad at 0.2 m/s gives 1 rad/s.
     assert_eq!(quarter.periods(), ((0.5 * PI + 0.06) / TS).ceil() as u64);
     assert_near(peaks(&quarter)[2], 1.0);
     let tool = plan("G0 X0 Y0 Z700\nG0 X50 C1");

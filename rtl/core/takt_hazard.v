@@ -7,7 +7,7 @@
 // result pending (rule 3 of docs/timing.md).
 //
 // Contract
-//   advance: all bundles move to the next stage at the end of this cycle (the one in issue issues, or there is none).
+//   advance: all bundles move to the next stage at the end of this cycle (the bundle in issue issues, or the stage is empty).
 //   r_waits: the bundle in read, if it moves to issue at the end of this cycle, cannot issue in the next one.
 //   i_waits: the bundle in issue, if it stays there, cannot issue in the next cycle.
 //   r_copy[s]: the word read from the copy of bank s, for the bundle in read, is the register's current value.
@@ -86,7 +86,7 @@ module takt_hazard #(
     // computed by the bundle now in issue (r_on_issue).
     reg [SLOTS-1:0] r_near, r_far;
     reg r_from_issue, r_on_issue, r_on_issue_early, r_on_issue_late, r_at1, r_at0;
-    // The same in issue.
+    // State of the address in issue: its result is in place 2 or beyond (i_later), or in place 1 (i_at1).
     reg i_later, i_at1;
 
     wire r_later = (|r_near) | (|r_far) | r_from_issue;

@@ -5,7 +5,7 @@
 //   The fetch delivers a bundle to decode in the second cycle after flush, and from then on in every cycle with advance.
 //   r_ready: the bundle in read meets all rules in the next cycle, if the one in issue issues now. i_ready: the bundle in issue
 //   meets all rules in the next cycle, if it does not issue now. r_illegal, i_illegal: the bundle is illegal and cannot issue.
-//   issue: the bundle in issue issues in this cycle. advance: it issues, or there is none; all stages advance.
+//   issue: the bundle in issue issues in this cycle. advance: it issues, or the stage is empty; all stages advance.
 //   refused: the next bundle to issue is illegal.
 //   block: nothing may issue in the next cycle.
 

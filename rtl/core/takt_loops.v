@@ -48,28 +48,29 @@ module takt_loops #(
         end
     endgenerate
 
-    // Levels in use, which are the lowest ones, and of these the highest: as of issue (used, top) and as of fetch (ahead, ahead_top).
-    // next: the level that a push takes.
+    // Levels in use, which are the lowest ones, and the highest of them: as of issue (used, top) and as of fetch
+    // (ahead, ahead_top). next: the level that a push takes.
     reg  [LOOPS-1:0] used, ahead;
     wire [LOOPS-1:0] top       = used & ~(used >> 1);
     wire [LOOPS-1:0] ahead_top = ahead & ~(ahead >> 1);
     wire [LOOPS-1:0] next      = ((used << 1) | FIRST) & ~used;
     assign full = used[LOOPS-1];
 
-    // The last bundle of the innermost loop, as of issue and as of fetch, which looks at addresses of the program memory only: a bundle
-    // outside is illegal. armed: there is such a loop. Its first bundle as of fetch, and whether it has an iteration left to begin: both
-    // stand in registers beside the levels, since the program memory's next address waits for them.
+    // The last bundle of the innermost loop, as of issue and as of fetch. Fetch looks at addresses of the program
+    // memory only: a bundle outside is illegal. armed: there is such a loop. Its first bundle as of fetch, and whether
+    // it has an iteration left to begin, are registered beside the levels, since they are on the path to the program
+    // memory's next address.
     reg [15:0]        innermost_last;
     reg [PROGRAM-1:0] ahead_last, ahead_first;
     reg               armed, ahead_more;
     assign cuts = used[0] & (innermost_last >= x_address) & (innermost_last < x_target);
     wire   ends = armed & (fetched == ahead_last);
 
-    // What fetch has decided on a bundle goes with it.
+    // Decisions of fetch accompany their bundle to issue.
     reg d_ends, d_again, m_ends, m_again, r_ends, r_again, i_again;
 
-    // Of each level: an iteration is left to begin if none has beyond what issue knows, as for a loop around one that has been pushed; and
-    // one will be left when another has begun.
+    // For each level, more: an iteration is left to begin if no begun one is unknown to issue, as for a loop around a
+    // pushed one; more_then: an iteration is left after another has begun.
     wire [LOOPS-1:0]         more, more_then;
     wire [PROGRAM*LOOPS-1:0] starts;
     wire [16*LOOPS-1:0]      lasts;
@@ -106,8 +107,8 @@ module takt_loops #(
         end
     endgenerate
 
-    // First and last bundle of the loop around the innermost as of fetch, and around that as of issue; the first of the innermost as of
-    // issue.
+    // First and last bundle of the loop around the innermost as of fetch; last bundle of the loop around the innermost
+    // as of issue; first bundle of the innermost as of issue.
     reg [PROGRAM-1:0] first_around, first_issued;
     reg [15:0]        ahead_around, around;
     integer j;

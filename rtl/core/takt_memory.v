@@ -88,8 +88,8 @@ module takt_memory #(
                 result <= read;
             end
         end else begin : g_two
-            // Port 0 reads what was there before it writes (the block RAM's mode READBEFOREWRITE). What port 1 reads of a word that
-            // port 0 is writing is undefined: of one address, both deliver what port 0 reads.
+            // Port 0 reads the old word when it writes (block RAM mode READBEFOREWRITE). Port 1 reads an undefined word
+            // if port 0 is writing it: for equal addresses, both ports deliver port 0's word.
             reg [31:0] words [0:DEPTH-1];
             reg [31:0] read, second;
             reg [ADDRESS-1:0] other;

@@ -49,7 +49,7 @@ module takt_sequencer #(
     input  wire             tick,
     output reg              flush,
     output wire [PROGRAM-1:0] fetch,
-    output wire             f_outside,     // what the program memory delivers is no part of it
+    output wire             f_outside,     // the address lies outside the program memory
     output wire             block,
     output reg  [15:0]      i_address,
     output reg              x_issued,
@@ -98,7 +98,7 @@ module takt_sequencer #(
     wire stack_full  = x_call & entries[LEVEL];
     wire stack_empty = x_return & ~|entries;
 
-    reg  [15:0] fetched;  // the address of what the program memory delivers
+    reg  [15:0] fetched;  // the address of the word on the program memory's output
     reg  [15:0] d_address, m_address, r_address;
     reg  [15:0] target;
     wire [15:0] next_fetch = fetched + 16'd1;
@@ -239,7 +239,7 @@ module takt_sequencer #(
     assign block = (issue & redirects) | x_if_zero | x_if_nonzero | wait_next | x_halt | halted | refused | x_refused | fault;
 
     always @(posedge clk) begin
-        if (x_halt & ~fault) halted <= 1'b1;
+        if (x_halt & ~fault & ~any_address) halted <= 1'b1;  // a load at fault may stand beside it
         // fault_* follow the bundle in execute in every cycle and freeze at a fault, so that they do not depend on its detection, which
         // would lengthen the path.
         if (~fault) begin

@@ -17,7 +17,7 @@ def main():
     docs, version, output = Path(sys.argv[1]), sys.argv[2], Path(sys.argv[3])
     text = (HERE / "datasheet.typ").read_text().replace("@VERSION@", version)
     for chapter in CHAPTERS:
-        # Without labels of headings, of which another chapter may have the same, and without links to labels.
+        # The text has no labels of headings, because chapters may have equal labels, and no links to labels.
         body = pypandoc.convert_file(str(docs / f"{chapter}.md"), "typst", format="gfm-gfm_auto_identifiers")
         text += re.sub(r"#link\(<[^>]*>\)", "#text", body) + "\n"
     with tempfile.TemporaryDirectory() as folder:

@@ -11,9 +11,28 @@ from pathlib import Path
 FORMAL = Path(__file__).resolve().parent
 UNITS = FORMAL.parent / "units"
 
+# Row of the lists of faults in tests: unit or module, text to replace, replacement.
+PLANTED = re.compile(r'^    \("(\w+)", "((?:[^"\\]|\\.)*)", "((?:[^"\\]|\\.)*)"\),$', re.M)
+
 
 class Failure(Exception):
     """A proof that failed or could not be made; the text is for the user."""
+
+
+def planted(tests, name):
+    """The faults that the tests in a folder of `rtl` plant in a unit or a module, (old, new)."""
+    text = (FORMAL.parent / tests / "faults.rs").read_text()
+    plain = lambda quoted: quoted.replace('\\"', '"').replace("\\\\", "\\")
+    return [(plain(old), plain(new)) for of, old, new in PLANTED.findall(text) if of == name]
+
+
+def changed(texts, names, fault):
+    """The texts of files by name, with a fault (old, new) in that of these names in which `old` stands, once."""
+    old, new = fault
+    places = [name for name in names if name in texts for _ in range(texts[name].count(old))]
+    if len(places) != 1:
+        raise Failure(f"the mutant's text occurs {len(places)} times, not once: {old}")
+    return texts | {places[0]: texts[places[0]].replace(old, new)}
 
 
 def sources(rows, mutant=None):
@@ -27,14 +46,10 @@ def sources(rows, mutant=None):
             texts[f"{unit}.v"] = re.sub(parameter, rf"\g<1>{value}", texts[f"{unit}.v"])
     if mutant is None:
         return texts
-    unit, old, new = mutant
+    unit, *fault = mutant
     own = [f"{unit}.v"] + [path.name for path in paths if path.parent.name == "common"]
     own += ["alu.v"] if unit == "alu_late" else []
-    places = [name for name in own if name in texts for _ in range(texts[name].count(old))]
-    if len(places) != 1:
-        raise Failure(f"{unit}: the mutant's text occurs {len(places)} times, not once: {old}")
-    texts[places[0]] = texts[places[0]].replace(old, new)
-    return texts
+    return changed(texts, own, fault)
 
 
 def instantiated(texts, module):
@@ -42,7 +57,7 @@ def instantiated(texts, module):
     homes = {name: file for file, text in texts.items() for name in re.findall(r"^module (\w+)", text, re.M)}
     needed = [homes[module]]
     for file in needed:
-        # A module that tells which latencies there are does not exist.
+        # Modules whose names state supported latencies do not exist.
         for name in re.findall(r"\btakt_\w+", re.sub(r"//.*", "", texts[file])):
             home = homes.get(name)
             if home and home not in needed:
@@ -113,7 +128,7 @@ def read_aiger(text):
         graph.registers |= {name: row[0] for name in names["l"].get(i, "").split()}
     if len(graph.inputs) != len(inputs):
         raise Failure("two inputs of the graph have one name")
-    # The operands of a gate come before it.
+    # AIGER requires the operands of a gate to precede it.
     gates = {row[0]: row[1:] for row in ands}
     done = set()
     for root in gates:
@@ -160,7 +175,7 @@ def write_units(folder, texts, module, boxed=()):
 def with_registers(folder, texts, module, kept=()):
     """The graph of a unit as it is, its registers as latches, and its table memories as gates. Registers that are kept are not optimised
     away where nothing depends on them."""
-    # A case that became a memory would take the register before it along.
+    # A case statement that became a memory would absorb the register before it.
     script = write_units(folder, texts, module)
     script += [f"hierarchy -check -top {module}", "proc -norom", "flatten"]
     script += [f"setattr -set keep 1 {module}/w:{register}" for register in kept]
@@ -181,7 +196,7 @@ def compared(folder, texts, proof, exact=False):
         texts = {file: text.replace(*proof.parameter) for file, text in texts.items()}
     script = write_units(folder, texts, proof.top, proof.boxed)
     script += [f"hierarchy -check -top {proof.top}", "proc", "flatten", "opt_clean"]
-    # Before registers become wires: what a register holds is a signal of its own only there.
+    # Done before registers become wires: only here is the value of a register a signal of its own.
     script += [f"expose -input {proof.top}/w:{wire}" for wire in proof.given if not (exact and proof.exact)]
     script += [f"expose {proof.top}/w:{wire}" for wire in proof.shown]
     script += ["techmap -map miter_nodff.v"]
@@ -203,7 +218,7 @@ def with_reference(folder, script, proof, exact=False):
     if proof.reference:
         script += [f"symfpu {proof.reference}", "chformal -remove", "opt_clean"]
         if proof.cut:
-            # Each becomes inputs and an output, called cut0, mod0 and sum0.
+            # Each cut becomes inputs and an output, called cut0, mod0 and sum0.
             script += ["read_verilog -lib miter_cut_box.v", "techmap -map miter_cut.v"]
             cut = [("cut", "takt_cut_product symfpu/t:takt_cut_quotient"), ("mod", "takt_cut_remainder")]
             if proof.exponents:

@@ -2,7 +2,7 @@
 """Compares a unit of one operand with the specification for every operand, by bit-parallel simulation of its gates.
 
 The function that a unit computes is what is left of it, unrolled over the cycles of one operation, if it depends on nothing else.
-`cargo xtask enumerate` evaluates it, for 512 operands at a time.
+`cargo evidence enumerate` evaluates it, for 512 operands at a time.
 """
 
 import hashlib
@@ -15,11 +15,11 @@ from balance import Unrolled
 from circuit import FORMAL, UNITS, Failure, Graph
 from unrolled import needed
 
-# The program that evaluates a graph beside the specification; cargo's name for xtask's own file.
+# Program that evaluates a graph beside the specification: cargo's path of the binary `evidence`.
 ENUMERATOR = os.environ.get("TAKT_ENUMERATOR")
-# The specification, and that program's part of the comparison.
+# Sources of the specification, and of that program's comparison.
 COMPARED = [FORMAL.parents[1] / "isa" / "src" / "fp", FORMAL / "src"]
-# Sign and exponent.
+# Number of combinations of sign and exponent.
 CASES = 512
 
 
@@ -60,7 +60,7 @@ class Enumeration:
 
     def __init__(self, graph, operation, path):
         if not ENUMERATOR:
-            raise Failure("the variable TAKT_ENUMERATOR does not name the program: use `cargo xtask formal --units`")
+            raise Failure("the variable TAKT_ENUMERATOR does not name the program: use `cargo evidence formal --units`")
         self.operation = operation
         self.path = path
         path.parent.mkdir(parents=True, exist_ok=True)

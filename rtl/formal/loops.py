@@ -2,7 +2,6 @@
 """Proves, by bounded model checking with CaDiCaL, that what issues around counted loops is what the program means."""
 
 import argparse
-import re
 import sys
 import time
 from pathlib import Path
@@ -10,18 +9,15 @@ from pathlib import Path
 from pysat.solvers import Solver
 
 from balance import Unrolled
-from circuit import FORMAL, Failure, read_aiger, yosys
+from circuit import FORMAL, Failure, changed, planted, read_aiger, yosys
 from solve import SOLVER, gate, literal
 
 RESET = 6
-PLANTED = re.compile(r'^    \("(\w+)", "((?:[^"\\]|\\.)*)", "((?:[^"\\]|\\.)*)"\),$', re.M)
 CORE = FORMAL.parent / "core"
 FILES = ["takt_sequencer.v", "takt_loops.v", "takt_issue.v"]
-
-
-def planted():
-    """The faults that lockstep must find in the core, (module, old, new)."""
-    return PLANTED.findall((FORMAL.parent / "cosim" / "tests" / "faults.rs").read_text())
+# A fault that lockstep need not find, since it shows only between addresses that differ in their highest bit; refuted
+# in 18 cycles.
+OWN = [("fetched == ahead_last", "fetched[PROGRAM-2:0] == ahead_last[PROGRAM-2:0]")]
 
 
 def graph(folder, mutant=None):
@@ -29,11 +25,7 @@ def graph(folder, mutant=None):
     folder.mkdir(parents=True, exist_ok=True)
     texts = {name: (CORE / name).read_text() for name in FILES}
     if mutant:
-        old, new = mutant
-        places = [name for name, text in texts.items() for _ in range(text.count(old))]
-        if len(places) != 1:
-            raise Failure(f"the mutant's text occurs {len(places)} times, not once: {old}")
-        texts[places[0]] = texts[places[0]].replace(old, new)
+        texts = changed(texts, FILES, mutant)
     for name, text in texts.items():
         (folder / name).write_text(text)
     (folder / "loops.v").write_text((FORMAL / "loops.v").read_text())
@@ -95,19 +87,20 @@ def main():
         f"a loop within another first ends in cycle {reached}; {time.monotonic() - started:.0f} s",
         flush=True,
     )
-    faults = [(old, new) for name, old, new in planted() if name == "takt_loops"]
-    faults = faults[: arguments.mutants] if arguments.mutants else faults
-    refuted = 0
+    faults = planted("cosim/tests", "takt_loops")
+    faults = [*OWN, *(faults[: arguments.mutants] if arguments.mutants else faults)]
+    refuted, missed = 0, False
     for old, new in faults:
         found, _ = check(graph(folder / "mutant", (old, new)), cycles)
+        missed |= found is None and (old, new) in OWN
         refuted += found is not None
         if found is None or arguments.verbose:
             how = f"refuted in cycle {found}" if found is not None else f"not within {cycles} cycles"
             print(f"loops: `{old}` replaced by `{new}`: {how}", flush=True)
     print(f"loops: {refuted} of {len(faults)} mutants refuted", flush=True)
-    # Some show only in longer runs, but one must.
-    if refuted == 0:
-        sys.exit("error: loops: no mutant refuted")
+    # Some faults show only in longer runs, but one must be refuted here.
+    if missed or refuted == len(OWN):
+        sys.exit("error: loops: a mutant that must be is not refuted")
 
 
 if __name__ == "__main__":

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-// takt_loops_meaning: the sequencer beside what a program means, executed one bundle after the other.
+// takt_loops_meaning: the sequencer beside the meaning of a program, executed one bundle after the other.
 //
-// The program is arbitrary: in each bundle a jump, a branch, a loop or none of these, and its target. So are the operands and the
-// cycles in which a bundle may issue. bad: a bundle issues that is not the next one, or a fault comes where there is none, or none
-// where there is one.
+// The program is arbitrary: each bundle has a jump, a branch, a loop or neither, and its target. So are the operands
+// and the cycles in which a bundle may issue. bad: a bundle issues that is not the next one, or a fault is reported
+// without a cause, or missing.
 
 module takt_loops_meaning #(
     parameter PROGRAM = 3
@@ -23,7 +23,8 @@ module takt_loops_meaning #(
     wire [PROGRAM-1:0] fetch;
     wire [15:0] i_address;
 
-    // The program moves through the pipeline as in the core: its address, and whether that is outside of the program memory.
+    // The program moves through the pipeline as in the core: its address, and whether it is outside of the program
+    // memory.
     reg [PROGRAM-1:0] fetched, d_bundle, m_bundle, r_bundle, i_bundle;
     reg d_outside, m_outside, r_outside, i_outside;
     always @(posedge clk) begin
@@ -50,7 +51,7 @@ module takt_loops_meaning #(
         .deadline_missed(), .halted(), .fault(fault), .fault_kind(), .fault_slot(), .fault_address()
     );
 
-    // The bundle in execute, and the loops that are under way: where each starts and ends, and the iterations left.
+    // The bundle in execute, and the active loops: start, end and iterations left of each.
     reg        x;
     reg [1:0]  x_kind;
     reg [15:0] x_address, x_target, expected;

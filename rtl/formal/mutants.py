@@ -21,17 +21,17 @@ from pysat.solvers import Solver
 
 from circuit import Graph, read_aiger, yosys
 
-# Conflicts after which a question is left undecided.
+# Conflicts after which the solver leaves a question undecided.
 CONFLICTS = 30_000
-# Answers of the solver to one question: what is not settled by then counts as true in some case.
+# Answers of the solver to one question; literals not settled by then count as true in some case.
 ANSWERS = 12
-# Registers that may differ: a mutant that gets so far is given up.
+# Most registers that may differ; a mutant that exceeds it is given up.
 REGISTERS = 250
-# Gates of a circuit whose constant registers are found by induction.
+# Most gates of a circuit whose constant registers are found by induction.
 SMALL = 30_000
-# Cycles of the reset that a core has had: it takes one to load each word of its program.
+# Cycles of a core's reset: loading its program takes one per word.
 RESET = 16
-# Cycles after which the registers must be the same again: more than the longest latency.
+# Cycles after which the registers must agree again: more than the longest latency.
 CYCLES = 40
 
 
@@ -115,7 +115,7 @@ class Gates:
                 left.discard(1)
                 continue
             self.tell(left)
-            # Without this clause later: it holds only if `some` does.
+            # Holds only if `some` does, so that later questions can drop the clause.
             some = self.number(self.variable())
             self.solver.add_clause([-some, *(self.number(literal) for literal in left)])
             self.solver.conf_budget(CONFLICTS)
@@ -155,7 +155,8 @@ class Circuit:
             else:
                 outputs.append(literal)
         self.outputs = outputs
-        # Of each write port the literals of enable, data, address; of each read port those of address and of the inputs for its data.
+        # Write ports: literals of enable, data and address. Read ports: literals of the address, and of the inputs for
+        # the data.
         self.writes, self.reads = [], []
         for name, bits in ports.items():
             data = {}
@@ -204,7 +205,7 @@ def cycle(gates, circuit, states, number):
     one = given | states[0] | chosen(circuit, 0)
     evaluate(gates, graph, one)
     other = given | states[1] | chosen(circuit, number)
-    # A word that is read depends on its address, so that what depends on it is computed again.
+    # A read word depends on its address, so its dependents are evaluated again until nothing changes.
     changed = True
     while changed:
         evaluate(gates, graph, other, one)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""Proves arithmetic units: `cargo xtask formal --units` runs this. README.md says how, and what is trusted."""
+"""Proves arithmetic units: `cargo evidence formal --units` runs this. README.md says how, and what is trusted."""
 
 import argparse
 import datetime
@@ -16,22 +16,15 @@ import balance
 import circuit
 import enumerated
 import solve
+import tables
 import unrolled
-from circuit import FORMAL, Failure
-from units import MUTANTS, PROOFS, SHARED_MUTANTS, SLOW, SPLITS
+from circuit import FORMAL, Failure, planted
+from units import MUTANTS, PROOFS, SHARED_MUTANTS, SLOW, SPLITS, TABLE_MUTANTS
 
-# What was proved and when, for docs/verification.md: committed, as rtl/synthesis.json is.
+# Proofs with their dates, for docs/verification.md: committed, like rtl/synthesis.json.
 RESULTS = FORMAL / "results.json"
-PLANTED = re.compile(r'^    \("(\w+)", "((?:[^"\\]|\\.)*)", "((?:[^"\\]|\\.)*)"\),$', re.M)
 # Seconds after which a mutant counts as not refuted.
 PATIENCE = 300
-
-
-def planted(unit):
-    """The faults that the simulation's tests plant in a unit, (unit, old, new)."""
-    text = (FORMAL.parent / "tests" / "faults.rs").read_text()
-    plain = lambda quoted: quoted.replace('\\"', '"').replace("\\\\", "\\")
-    return [(name, plain(old), plain(new)) for name, old, new in PLANTED.findall(text) if name == unit]
 
 
 def remember(kind, name, **what):
@@ -77,7 +70,9 @@ class Session:
         return self.exact[proof.name]
 
     def graph(self, folder, texts, proof, exact=False):
-        """The graph of a proof."""
+        """The graph of a proof; of a table, its words."""
+        if proof.table:
+            return tables.read(folder, texts, proof.table)
         if proof.enumerated:
             return enumerated.function(self.unit(texts, proof), self.rows[proof.units[0]], proof.units[0], proof.enumerated)
         if not proof.iterative:
@@ -96,7 +91,9 @@ class Session:
         return graph
 
     def question(self, folder, graph, proof):
-        """A function that asks the question of a proof: the solver's, or the enumerator's."""
+        """A function that asks the question of a proof: the solver's, the enumerator's, or that of a table's words."""
+        if proof.table:
+            return functools.partial(tables.Comparison, graph)
         if proof.enumerated:
             return functools.partial(enumerated.Enumeration, graph, proof.enumerated, folder / "function.aag")
         return functools.partial(solve.Question, graph)
@@ -131,7 +128,7 @@ class Session:
         """Proves one row of the table; raises Failure with the operands of a counterexample."""
         folder = self.folder / proof.name
         graph = self.graph(folder, self.texts, proof)
-        key = enumerated.Enumeration.key(graph) if proof.enumerated else graph.key
+        key = tables.Comparison.key(graph) if proof.table else enumerated.Enumeration.key(graph) if proof.enumerated else graph.key
         record = solve.Record(folder / "cases.json", key, self.arguments.again)
         chosen = self.arguments.cases
         started = time.monotonic()
@@ -139,7 +136,9 @@ class Session:
         if found is not None:
             number, operands = found
             cut = True
-            if not proof.exact:
+            if proof.table:
+                says, cut = "it holds another word than the specification", False
+            elif not proof.exact:
                 says = "the circuit, or what was assumed of what is cut out of it, is wrong for"
             elif proof.enumerated or self.exact_graph(proof).evaluate(operands)["bad"]:
                 says, cut = "the circuit differs", False
@@ -161,10 +160,12 @@ class Session:
         unit = mutant[0]
         texts, broken = circuit.sources(self.rows, mutant), None
         about = [proof for proof in PROOFS if unit in proof.units]
-        # A miter with cuts may differ for what there is not.
-        about = [proof for proof in about if proof.exact] or about
-        # The most general first: where a fault does not matter, the search takes long. Of a chain, the simplest.
-        for proof in sorted(about, key=lambda proof: -proof.parts if proof.exact else proof.parts):
+        # A miter with cuts may differ for values that cannot occur, so prefer exact ones.
+        tabled = [proof for proof in about if proof.table]
+        about = [proof for proof in about if proof.exact and not proof.table] or [proof for proof in about if not proof.table]
+        # The most general proof first: where a fault does not matter, the search takes long. Among miters of a chain,
+        # the simplest first.
+        for proof in [*tabled, *sorted(about, key=lambda proof: -proof.parts if proof.exact else proof.parts)]:
             boxes = {f"{name}.v" for name in proof.boxed}
             if all(texts[file] == self.texts[file] for file in circuit.instantiated(texts, proof.top) if file not in boxes):
                 continue
@@ -172,7 +173,7 @@ class Session:
             try:
                 graph = self.graph(folder, texts, proof, exact=proof.exact)
             except Failure as failure:
-                # A register that depends on itself becomes a loop of gates: for the proof of timing.
+                # A register that depends on itself becomes a loop of gates, which only the proof of timing can judge.
                 broken = failure
                 continue
             if graph.key == self.exact_graph(proof).key:
@@ -190,11 +191,14 @@ class Session:
 
     def mutants(self, unit, timing):
         """Refutes the faults planted in a unit; how many survived."""
-        faults = [fault for fault in planted(unit) if compared(unit)]
-        faults += [(unit, *fault) for fault in MUTANTS.get(unit, ())]
-        chosen = faults[: self.arguments.mutants] if self.arguments.mutants else faults
+        own = [*(planted("tests", unit) if compared(unit) else ()), *MUTANTS.get(unit, ())]
+        if self.arguments.share and unit not in SHARED_MUTANTS:
+            own = []
+        lists = [own, TABLE_MUTANTS.get(unit, [])]
+        faults = [fault for each in lists for fault in each]
+        chosen = [fault for each in lists for fault in each[: self.arguments.mutants or None]]
         survivors = 0
-        for number, fault in enumerate(chosen):
+        for number, fault in enumerate((unit, *fault) for fault in chosen):
             how = self.refuted(fault, number, timing)
             if how is None:
                 survivors += 1
@@ -269,7 +273,7 @@ def main():
             if proof.share or not arguments.share:
                 session.compared(proof)
         for unit, timing in rows.items() if only in ("mutants", None) else ():
-            if not arguments.share or unit in SHARED_MUTANTS:
+            if not arguments.share or unit in SHARED_MUTANTS or unit in TABLE_MUTANTS:
                 wrong += session.mutants(unit, timing)
     except Failure as failure:
         sys.exit(f"error: {failure}")

@@ -50,7 +50,7 @@ class Question:
 
     def beyond(self, parts):
         """The clauses that say that the inputs belong to no case of 0 to parts - 1."""
-        # The number exceeds the last case's if they agree down to a place where it has a 1 and that has a 0.
+        # The number exceeds the last case's if both agree above a place where the number has a 1 and the last case a 0.
         last, result = parts - 1, []
         more = lambda place: [bit for i, bit in enumerate(self.part) if i > place and not last >> i & 1]
         for i, bit in enumerate(self.part):

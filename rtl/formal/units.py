@@ -9,33 +9,34 @@ class Proof:
     """A unit's circuit compared with a reference, in the miter that is named."""
 
     name: str
-    units: tuple  # those that this is about; the circuit is the first one's
+    units: tuple  # units that the proof covers; the circuit is the first unit's
     miter: str = ""
-    parts: int = 512  # cases: `part` of the miter is below this; of an enumeration, sign and exponent
-    reference: str = ""  # options of yosys' symfpu
-    others: tuple = ()  # other files of the miter
-    tables: tuple = ()  # tables of the units that the miter reads, without their registers
+    parts: int = 512  # number of cases: `part` of the miter is below it; in an enumeration, of sign and exponent
+    reference: str = ""  # options for yosys' symfpu
+    others: tuple = ()  # further files of the miter
+    tables: tuple = ()  # tables of the units that the miter reads, without registers
     boxed: tuple = ()  # modules cut out of the circuit, whose results are arbitrary
-    cut: bool = False  # whether the reference's multiplication or division is cut out, too
-    exponents: bool = False  # whether the reference's sum of the factors' exponents is, too
-    given: tuple = ()  # wires and registers of the circuit that are arbitrary, but with `exact`
-    shown: tuple = ()  # wires and registers that the miter looks at
-    iterative: bool = False  # whether the unit is unrolled (unrolled.py), given registers with a cycle, such as rest_6
+    cut: bool = False  # the reference's multiplication or division is cut out, too
+    exponents: bool = False  # the reference's sum of the factors' exponents is cut out, too
+    given: tuple = ()  # wires and registers of the circuit that are arbitrary, except with `exact`
+    shown: tuple = ()  # wires and registers that the miter reads
+    iterative: bool = False  # the unit is unrolled (unrolled.py); `given` names registers with a cycle, as rest_6
     stepped: tuple = ()  # registers before and after a step
-    held: tuple = ()  # registers that a step reads, looked at before it only
-    steps: range = range(0)  # the cycles that are such steps
-    enumerated: str = ""  # the instruction whose operands are tried one after the other (enumerated.py), instead of a miter
-    exact: bool = True  # whether there is a miter in which nothing is arbitrary
+    held: tuple = ()  # registers that a step only reads, observed before it
+    steps: range = range(0)  # cycles that are steps
+    enumerated: str = ""  # instruction whose operands are enumerated (enumerated.py), instead of a miter
+    table: str = ""  # table whose words are compared with the specification's (tables.py), instead of a miter
+    exact: bool = True  # the miter also exists without arbitrary values
     defines: tuple = ()
-    parameter: tuple = ()  # the text of a parameter's default, and another
-    module: str = ""  # the circuit, if not the unit's
+    parameter: tuple = ()  # text of a parameter's default, and its replacement
+    module: str = ""  # circuit, if other than the unit's
     text: str = ""
-    share: bool = False  # whether it is part of `cargo xtask test`
+    share: bool = False  # the proof takes seconds and is part of `cargo evidence check`
 
     @property
     def top(self):
         """The module that is compared."""
-        return self.module or f"takt_{self.units[0]}"
+        return self.table or self.module or f"takt_{self.units[0]}"
 
 
 PRODUCT = "takt_significand_product"
@@ -69,7 +70,7 @@ PROOFS = [
         text="fmul, all operands",
     ),
     Proof(
-        "add", ("add",), "add.v", 56, SUM, share=True,
+        "add", ("add",), "add.v", 56, SUM,
         text="fadd, fsub, all operands",
     ),
     Proof(
@@ -151,7 +152,7 @@ PROOFS = [
         share=True, text="what the digits begin with",
     ),
     Proof(
-        "arctangent.order", ("arctangent",), "arctangent_order.v", 17, iterative=True, exact=False, share=True,
+        "arctangent.order", ("arctangent",), "arctangent_order.v", 17, iterative=True, exact=False,
         tables=("takt_arctangent_table",), given=("e_3", "dividend_3", "divisor_3", *(f"rest_{stage}" for stage in range(3, 19))),
         text="which digits there are, divisors, row of the table, quotient",
     ),
@@ -166,21 +167,31 @@ PROOFS = [
             ("last", ("digit_1",), ("rest", "divisor"), range(18, 19), "the last"),
         ]
     ),
-    Proof("sine", ("sine",), enumerated="fsin", share=True, text="fsin, all operands, one after the other"),
-    Proof("cosine", ("sine",), enumerated="fcos", share=True, text="fcos, all operands, one after the other"),
-    Proof("arccosine", ("arccosine",), enumerated="facos", share=True, text="facos, all operands, one after the other"),
+    *(
+        Proof(name, (name.partition(".")[0],), parts=1, table=table, share=True, text=text)
+        for name, table, text in [
+            ("divroot.table", "takt_reciprocal_table", "every word of its table, and the bound on the digits' error"),
+            ("sine.multiples", "takt_quarter_table", "every word of the table of multiples"),
+            ("sine.polynomials", "takt_wave_table", "every word of the tables of coefficients"),
+            ("arctangent.table", "takt_arctangent_table", "every word of its table, and their bounds"),
+            ("arccosine.table", "takt_arccosine_table", "every word of its tables"),
+        ]
+    ),
+    Proof("sine", ("sine",), enumerated="fsin", text="fsin, all operands, one after the other"),
+    Proof("cosine", ("sine",), enumerated="fcos", text="fcos, all operands, one after the other"),
+    Proof("arccosine", ("arccosine",), enumerated="facos", text="facos, all operands, one after the other"),
 ]
 
-# For the timing of a unit, a register whose values are taken one by one (balance.py).
+# Registers whose values the timing proof of a unit takes one by one (balance.py).
 SPLITS = {
     # The exponent: it chooses a row and a length of the division.
     "arctangent": ("e", 2, [*(f"00000{low:04b}" for low in range(16)), *("0" * zeros + "1" + "-" * (8 - zeros) for zeros in range(5))]),
 }
 
-# Units whose timing takes long: not in `cargo xtask test`.
+# Units whose timing proof takes long: left out of `cargo evidence check`.
 SLOW = ("arctangent", "sine")
 
-# Faults beside those of ../tests/faults.rs, most of them in the timing: (what to replace, by what).
+# Faults in addition to ../tests/faults.rs, most of them in the timing: (text to replace, replacement).
 MUTANTS = {
     "alu_late": [
         ("{out_valid, result, flags} = waiting", "{result, out_valid, flags} = waiting"),
@@ -225,5 +236,23 @@ MUTANTS = {
     ],
 }
 
-# The units whose first mutant is part of `cargo xtask test`.
+# Faults in tables: one bit of one word. `cargo evidence check` plants the first of each unit.
+TABLE_MUTANTS = {
+    "divroot": [
+        ("coarse_words[697] = 15'h1850", "coarse_words[697] = 15'h184f"),
+        ("fine_words[700] = 6'h14", "fine_words[700] = 6'h15"),
+    ],
+    "sine": [
+        ("value_words[161] = 57'h11a0f0011fa3bba", "value_words[161] = 57'h11a0f0011fa3bbb"),
+        ("coefficients_words[695] = 46'h082215c56732", "coefficients_words[695] = 46'h082215c56733"),
+        ("bend_words[700] = 8'h4a", "bend_words[700] = 8'h4b"),
+    ],
+    "arctangent": [("angle_words[161] = 31'h60ed74e2", "angle_words[161] = 31'h60ed74e3")],
+    "arccosine": [
+        ("value_words[697] = 27'h4566a88", "value_words[697] = 27'h4566a89"),
+        ("slope_words[700] = 15'h3da2", "slope_words[700] = 15'h3da3"),
+    ],
+}
+
+# Units whose first mutant is part of `cargo evidence check`.
 SHARED_MUTANTS = ("add", "alu")

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! AXI4-Lite slave around a core: the Wishbone slave behind a bridge, with the same registers at byte addresses.
+//! AXI4-Lite slave around a core: the Wishbone slave with a bridge in front, and the same registers at byte addresses.
 
 use crate::export::Design;
 use crate::template::fill;
@@ -10,7 +10,7 @@ pub fn name(design: &Design) -> String {
     format!("{}_axi", design.top)
 }
 
-/// The slave. `latched` is the default of its parameter for latched ports
+/// Generates the slave. `latched` is the default of its parameter for latched ports
 /// ([`Program::latched_inputs`](takt_isa::Program::latched_inputs)).
 pub fn wrapper(design: &Design, latched: u16) -> String {
     let (name, slave) = (name(design), wishbone::name(design));

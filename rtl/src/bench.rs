@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Generator of the files beside the core in an exported folder: file lists, memory image, test bench.
 
-use crate::export::{Design, DesignFile, INPUT_DELAY, RESET_CYCLES, synthesis_top};
+use crate::export::{Design, DesignFile, INPUT_DELAY, RESET_CYCLES, family_files, synthesis_top};
 use crate::template::fill;
 use crate::{axi, wishbone};
 use std::fmt::Write as _;
 use takt_isa::load::{LoadRecord, load_records};
 use takt_isa::{Machine, Program, Register};
 
-/// Records that the test bench takes from `inputs.hex`.
+/// Most records that the test bench reads from `inputs.hex`.
 pub const STIMULI: usize = 1 << 16;
 
-/// Cycles until the test bench gives up waiting for the program's `wait`, unless `+cycles` says otherwise.
+/// Cycles after which the test bench gives up waiting for the program's `wait`, unless `+cycles` says otherwise.
 const LIMIT: u32 = 1_000_000;
 
-/// Every file of an exported folder. The test bench runs `program.hex` and `inputs.hex`, which are empty without a program.
+/// Generates every file of an exported folder. The test bench runs `program.hex` and `inputs.hex`, which are empty without a program.
 pub fn folder(
     design: &Design,
     program: Option<&Program>,
@@ -25,26 +25,16 @@ pub fn folder(
     let latched = design.latched;
     let put = |name: String, text: String| DesignFile { name, text };
     let mut files = design.files.clone();
-    files.extend(design.ecp5.clone());
-    let list = |own: &[String], ecp5: bool| {
-        let base = |name: &str| name.rsplit('/').next().map(str::to_owned);
-        let replaced: Vec<_> = design.ecp5.iter().filter_map(|file| base(&file.name)).collect();
-        let core = design
-            .files
-            .iter()
-            .filter(|file| !ecp5 || base(&file.name).is_none_or(|name| !replaced.contains(&name)));
-        let more = design.ecp5.iter().filter(|_| ecp5);
-        own.iter()
-            .chain(core.chain(more).map(|file| &file.name))
-            .map(|name| format!("{name}\n"))
-            .collect::<String>()
+    files.extend(family_files(top, &design.files));
+    let list = |own: Option<&String>| {
+        let core = design.files.iter().map(|file| &file.name);
+        own.into_iter().chain(core).map(|name| format!("{name}\n")).collect::<String>()
     };
     let synthesis = format!("{}.v", synthesis_top(machine));
     let bench_name = format!("{top}_bench");
     let bench_file = format!("{bench_name}.v");
-    files.push(put(format!("{top}.f"), list(&[], false)));
-    files.push(put(format!("{top}_ecp5.f"), list(&[], true)));
-    files.push(put(format!("{bench_name}.f"), list(std::slice::from_ref(&bench_file), false)));
+    files.push(put(format!("{top}.f"), list(None)));
+    files.push(put(format!("{bench_name}.f"), list(Some(&bench_file))));
     files.push(put(synthesis, wishbone::on_few_pins(design)));
     files.push(put(format!("{}.v", wishbone::name(design)), wishbone::wrapper(design, latched)));
     files.push(put(format!("{}.v", axi::name(design)), axi::wrapper(design, latched)));
@@ -55,7 +45,7 @@ pub fn folder(
     files
 }
 
-/// The memory image for `$readmemh`: one record (space, slot, address, value) per line.
+/// Memory image for `$readmemh`: one record (space, slot, address, value) per line.
 pub fn image(program: &Program) -> String {
     let mut text = String::from(
         "// space, slot, address, value: what the loader writes (docs/hardware.md in Takt's repository)\n",
@@ -66,12 +56,12 @@ pub fn image(program: &Program) -> String {
     text
 }
 
-/// Stimuli of the test bench for `$readmemh`: for each period its inputs, by register, and the tick.
+/// Stimuli of the test bench for `$readmemh`: each period's inputs, by register, and its tick.
 fn stimuli(machine: &Machine, periods: &[Vec<(Register, u32)>]) -> String {
     let mut text = String::from("// 1: input port, index, value; 2: tick\n");
     for inputs in periods {
         for &(register, bits) in inputs {
-            // A register that is no input is ignored.
+            // Skips registers that are no inputs.
             let Some(index) = machine.inputs.index(register) else { continue };
             let _ = writeln!(text, "1{:03x}{bits:08x}", index.get());
         }
@@ -108,7 +98,7 @@ fn bench(machine: &Machine, top: &str, latched: u16) -> String {
         );
     }
     let count = machine.outputs_per_bank;
-    // With latched ports, those written since the last time are read one after the other, before the `wait` is reported.
+    // With latched ports, the test bench reads the ports written since the last period one by one, before it reports the `wait`.
     let published = if latched > 0 {
         fill(include_str!("templates/published.v.in"), &[("COUNT", &count)])
     } else {

@@ -25,87 +25,87 @@ use thiserror::Error;
 /// An instruction that a circuit executes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Operation {
-    /// The instruction.
+    /// Row of the table of instructions.
     pub op: Op,
-    /// The value of the circuit's `op` port.
+    /// Value of the circuit's `op` port.
     pub code: u32,
 }
 
 /// The circuit of a unit.
 #[derive(Clone, Debug)]
 pub struct Circuit {
-    /// The row that it implements.
+    /// Row of the table of units.
     pub unit: Unit,
-    /// Width of the `op` port; 0 if it has none.
+    /// Width of the `op` port; 0 without such a port.
     pub op_bits: u32,
     /// Number of operand ports.
     pub operands: usize,
-    /// The operations that it executes on its machine, in the order of the table of instructions.
+    /// Operations for this machine, in the order of the table of instructions.
     pub operations: Vec<Operation>,
-    /// True if the module has a parameter INTERVAL beside LATENCY.
+    /// The module has a parameter INTERVAL besides LATENCY.
     pub has_interval: bool,
-    /// The library's files that it needs, its own last.
+    /// Files of the library that the circuit needs, in dependency order, its own last.
     pub files: Vec<String>,
 }
 
-/// The Verilog files by their names in `rtl/units/`: `add.v`, `common/takt_product.v`.
+/// Verilog files by their names in `rtl/units/`: `add.v`, `common/takt_product.v`.
 #[derive(Clone, Debug, Default)]
 pub struct Library {
     files: BTreeMap<String, String>,
 }
 
-/// The reason why a header describes no circuit for its unit.
+/// Reason why a header describes no circuit for its unit.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum CircuitError {
-    /// The unit has no file, or names a missing one.
+    /// File of a unit that is missing: unit, then file.
     #[error("unit `{0}`: there is no circuit rtl/units/{1}: write it and list it in rtl/src/files.rs")]
     NoFile(&'static str, String),
-    /// A line that begins with `//@` cannot be read.
+    /// A line with `//@` that cannot be parsed.
     #[error(
         "`{0}`: expected `//@ op <width>'b<bits> <mnemonic> …`, `//@ op - <mnemonic> …` or `//@ as <unit>`"
     )]
     Syntax(String),
-    /// Codes of different widths.
-    #[error("`{0}`: the code is not as wide as the ones before it")]
+    /// Operation codes of different widths.
+    #[error("`{0}`: the code differs in width from the codes before it")]
     Width(String),
-    /// A name that is no instruction of this unit.
+    /// Mnemonic that is no instruction of this unit.
     #[error("`{0}` is no instruction that the unit `{1}` offers")]
     Foreign(String, &'static str),
-    /// An instruction in two lines.
+    /// An instruction with two codes.
     #[error("`{0}` has two codes")]
     Twice(&'static str),
-    /// An instruction that the unit's row offers, but the circuit does not.
+    /// Instructions that the unit's row offers, but its circuit lacks.
     #[error(
         "no circuit for {1}: unit `{0}` offers the function, but its Verilog file names no code: a line `//@ op <code> {1}` in the \
          header of rtl/units/{0}.v, and what it computes below"
     )]
     Missing(&'static str, String),
-    /// The circuit does not support a value of the row.
+    /// A value of the row that the circuit does not support.
     #[error("unit `{unit}` has {} {value}; rtl/units/{unit}.v needs {limit}", limit.quantity)]
     Limit {
-        /// The unit.
+        /// Name of the unit.
         unit: &'static str,
-        /// The value of its row.
+        /// Latency or interval in the row.
         value: u32,
-        /// The values that the circuit can have.
+        /// Values that the circuit supports.
         limit: Limit,
     },
 }
 
-/// The limit of a parameter. A Verilog module rejects unsupported parameters by instantiating a module that does not exist, whose name
-/// gives the reason, such as `takt_recurrence_has_latency_21_and_interval_15`. This is the part for one parameter.
+/// Limit of a parameter. A Verilog module rejects unsupported parameters by instantiating a missing module whose name gives the reason,
+/// such as `takt_recurrence_has_latency_21_and_interval_15`. A limit is one part of such a name.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Limit {
-    /// The parameter, in lower case: `latency`.
+    /// Parameter in lower case: `latency`.
     pub quantity: String,
-    /// The least value.
+    /// Least value that the module supports.
     pub least: u32,
-    /// The greatest value; none for an interval, which may be longer.
+    /// Greatest value; `None` for an interval, which may be longer.
     pub most: Option<u32>,
 }
 
 impl Limit {
-    /// True if a value is within the limit.
+    /// The value is within the limit.
     pub fn holds(&self, value: u32) -> bool {
         self.least <= value && self.most.is_none_or(|most| value <= most)
     }
@@ -123,7 +123,7 @@ impl fmt::Display for Limit {
     }
 }
 
-/// The limits that a module's text states by instances called `unsupported`.
+/// Limits in the text of a module, from the names of its instances called `unsupported`.
 pub fn limits(text: &str) -> Vec<Limit> {
     let refusals = text.lines().filter_map(|line| line.trim().strip_suffix(" unsupported ();"));
     let stated =
@@ -139,19 +139,19 @@ pub fn limits(text: &str) -> Vec<Limit> {
         .collect()
 }
 
-/// True if the unit's module executes an instruction: all instructions that write a register pass through it.
+/// The unit's module executes the instruction: it writes a register and is no load.
 fn computes(unit: &Unit, row: &Row) -> bool {
     unit.functions.contains(&row.function) && row.shape.has_dest() && row.effect != Effect::Load
 }
 
 impl Library {
-    /// The files that come with this crate.
+    /// Files embedded in this crate.
     pub fn builtin() -> Library {
         let files = files::UNITS.iter().map(|&(name, text)| (name.to_owned(), text.to_owned()));
         Library { files: files.collect() }
     }
 
-    /// The files of a folder and of its folder `common`.
+    /// Reads the files of a folder and of its subfolder `common`.
     ///
     /// # Errors
     /// If a file cannot be read.
@@ -170,20 +170,20 @@ impl Library {
         Ok(library)
     }
 
-    /// Adds a file or replaces it.
+    /// Adds or replaces a file.
     pub fn put(&mut self, name: &str, text: String) {
         self.files.insert(name.to_owned(), text);
     }
 
-    /// The text of a file.
+    /// Text of a file.
     pub fn text(&self, name: &str) -> Option<&str> {
         self.files.get(name).map(String::as_str)
     }
 
-    /// The circuit of a unit.
+    /// Circuit of a unit.
     ///
     /// # Errors
-    /// If its file is missing, or its header cannot be read or does not give exactly the unit's instructions.
+    /// If a file is missing, a header cannot be parsed, or does not list exactly the unit's instructions.
     pub fn circuit(&self, unit: &Unit) -> Result<Circuit, CircuitError> {
         let own = unit.name;
         let file = |unit: &str| {
@@ -214,7 +214,7 @@ impl Library {
         Ok(Circuit { unit: *unit, op_bits, operands, operations, has_interval, files })
     }
 
-    /// The files in dependency order: before each, the ones of `common/` whose modules it instantiates, transitively.
+    /// Adds the files of `common/` whose modules are instantiated, transitively, in dependency order.
     fn with_common(&self, mut files: Vec<String>) -> Vec<String> {
         let mut seen = 0;
         while seen < files.len() {
@@ -236,33 +236,33 @@ impl Library {
 }
 
 impl Circuit {
-    /// The rows that a unit must execute.
+    /// Instructions that a unit's module must execute.
     pub fn rows(unit: &Unit) -> impl Iterator<Item = &'static Row> {
         ROWS.iter().filter(move |row| computes(unit, row))
     }
 
-    /// The parameters of the module's instance, from the row.
+    /// Parameters of the module's instance, with the row's values.
     pub fn parameters(&self) -> impl Iterator<Item = (&'static str, u32)> {
         let interval = self.has_interval.then_some(("INTERVAL", self.unit.interval));
         [("LATENCY", self.unit.latency)].into_iter().chain(interval)
     }
 }
 
-/// The statements of a header.
+/// Statements of a header.
 struct Codes {
-    /// The width of the `op` port.
+    /// Width of the `op` port; 0 without such a port.
     op_bits: u32,
     /// Number of operand ports.
     operands: usize,
-    /// The operations that belong to the unit's functions.
+    /// Operations that belong to the unit's functions.
     operations: Vec<Operation>,
 }
 
-/// Reads a header.
+/// Parses the `//@` lines of a unit's file.
 fn codes(unit: &Unit, text: &str) -> Result<Codes, CircuitError> {
     let mut operations: Vec<Operation> = Vec::new();
     let (mut width, mut operands) = (None, 0);
-    // The full row of the unit, of which a machine may use a part.
+    // The table's row has all functions of the unit; a machine's row may have fewer.
     let whole = UNITS.iter().find(|row| row.name == unit.name).unwrap_or(unit);
     for line in text.lines().filter(|line| line.starts_with("//@")) {
         let syntax = || CircuitError::Syntax(line.to_owned());
@@ -296,13 +296,13 @@ fn codes(unit: &Unit, text: &str) -> Result<Codes, CircuitError> {
     Ok(Codes { op_bits: width.unwrap_or(0), operands, operations })
 }
 
-/// The number of operand ports that an instruction uses: its sources, or `a` for an immediate or the status register, which the
-/// core puts there instead of a source.
+/// Number of operand ports that an instruction uses: its sources, but at least `a`, on which the core puts an immediate or the status
+/// register.
 fn operand_ports(row: &Row) -> usize {
     row.shape.sources().max(1)
 }
 
-/// `3'b010` → (3, 2); `-` → (0, 0).
+/// Parses an operation code: `3'b010` → (3, 2); `-` → (0, 0).
 fn code(word: &str) -> Option<(u32, u32)> {
     if word == "-" {
         return Some((0, 0));
@@ -333,7 +333,7 @@ mod tests {
         assert_eq!(parse(&MULTIPLY, "//@ op - fmul"), Ok(vec![("fmul", 0)]));
     }
 
-    /// A machine that asks for a part of a unit's functions: the codes are those of the part, the ports those of the unit.
+    /// If a machine uses only some functions of a unit, the codes are limited to these, but the ports stay the unit's.
     #[test]
     fn a_part_of_a_unit() {
         let library = Library::builtin();

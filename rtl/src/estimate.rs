@@ -1,50 +1,45 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Estimates of a core's area and clock on an ECP5, for rows that nobody has placed: what its units take alone, and two lines fitted by least
-//! squares through the machines that were placed and routed (`rtl/synthesis.json`). Block RAMs and multipliers are counted.
+//! Estimates of a core's area and clock on [`MEASURED`], for rows that were never placed. The area is the sum of its units' areas plus a
+//! line over source operands; the period is a line over the area. Both lines are least-squares fits through the placed and routed machines
+//! (`rtl/synthesis.json`). Block RAMs and multipliers are counted.
 
 use crate::Library;
+use crate::memories::block_rams;
 use crate::plan::{Plan, PlanError};
 use crate::synthesis::{Synthesis, committed};
-use takt_isa::memory::block_rams;
+use takt_family::{MEASURED, REFERENCE};
 use takt_isa::{MACHINES, Machine};
 
-/// The device and the grade of the placed rows.
-const DEVICE: (&str, u8) = ("LFE5U-85F", 8);
-
-/// Units that were not placed alone: LUT4 and multipliers as yosys's `synth_ecp5` counts them (`add`, counted the same way, has 810 and,
-/// placed, 814).
-const COUNTED: [(&str, u64, u64); 3] = [("fused", 1635, 3), ("addmul", 945, 3), ("recurrence", 657, 0)];
-
-/// An estimate.
+/// Estimated area and clock of a core.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Estimate {
-    /// LUT4, those of memories in logic and the halves of carry chains included.
+    /// LUT4, including memories in logic and halves of carry chains.
     pub luts: f64,
-    /// Block RAMs of 18 kbit.
+    /// Number of 18-kbit block RAMs.
     pub block_rams: u64,
-    /// Multipliers of 18 x 18 bits.
+    /// Number of multipliers of 18 x 18 bits.
     pub multipliers: u64,
-    /// Clock.
+    /// Estimated clock in MHz.
     pub mhz: f64,
 }
 
-/// A placed machine beside its estimate.
+/// Comparison of a placed machine with its estimates.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Calibration {
-    /// The machine.
+    /// Name of the machine.
     pub machine: &'static str,
-    /// LUT4: placed, estimated, and estimated by lines through the other machines alone.
+    /// LUT4: placed, estimated, and estimated without this machine's measurement (leave-one-out).
     pub luts: [f64; 3],
-    /// Median clock in MHz, the same way.
+    /// Median clock in MHz: placed, estimated, and estimated leave-one-out.
     pub mhz: [f64; 3],
 }
 
-/// A line: what there is at 0, and how much more for each.
+/// Line: value at 0, and slope.
 #[derive(Clone, Copy, Debug)]
 struct Line(f64, f64);
 
 impl Line {
-    /// The line of least squares.
+    /// Fits a line by least squares.
     fn fit(points: &[(f64, f64)]) -> Line {
         let count = points.len().max(1) as f64;
         let mean = |of: fn(&(f64, f64)) -> f64| points.iter().map(of).sum::<f64>() / count;
@@ -60,45 +55,45 @@ impl Line {
     }
 }
 
-/// A placed machine, as the lines see it.
+/// Measurement of a placed machine, for the fit.
 #[derive(Clone, Copy)]
-struct Placed {
+struct PlacedMachine {
     machine: &'static Machine,
     counts: Counts,
     luts: f64,
     mhz: f64,
 }
 
-/// The known figures of a row, from which area and clock are estimated.
+/// Features of a row, from which area and clock are estimated.
 #[derive(Clone, Copy)]
 struct Counts {
-    /// LUT4 of the units alone.
+    /// LUT4 of all units, each placed alone.
     units: f64,
-    /// Source operands that the slots read in a cycle: most of a core beside its units is what selects and forwards them.
+    /// Source operands that all slots read in a cycle: selection and forwarding dominate the area besides the units.
     sources: f64,
-    /// The period of the slowest unit alone, in ns.
+    /// Period of the slowest unit alone, ns.
     slowest: f64,
     block_rams: u64,
     multipliers: u64,
 }
 
-/// The estimator.
+/// Estimator with the fitted lines.
 pub struct Estimator {
     library: Library,
     rows: Vec<Synthesis>,
-    placed: Vec<Placed>,
+    placed: Vec<PlacedMachine>,
     lines: [Line; 2],
 }
 
 impl Estimator {
-    /// The estimator of the committed measurements.
+    /// Fits the estimator to the committed measurements.
     ///
     /// # Errors
     /// If a machine of the table has no circuit.
     pub fn new() -> Result<Estimator, PlanError> {
         let rows: Vec<Synthesis> = committed()
             .into_iter()
-            .filter(|row| (row.device.as_str(), row.grade) == (DEVICE.0, Some(DEVICE.1)))
+            .filter(|row| (row.device.as_str(), row.grade) == (MEASURED.part, Some(MEASURED.grade)))
             .collect();
         let mut estimator =
             Estimator { library: Library::builtin(), rows, placed: Vec::new(), lines: [Line(0.0, 0.0); 2] };
@@ -106,7 +101,7 @@ impl Estimator {
         for &machine in MACHINES {
             let row = estimator.rows.iter().find(|row| row.design == machine.name);
             if let Some((luts, mhz)) = row.and_then(|row| Some((row.resources.luts as f64, row.median()?))) {
-                placed.push(Placed { machine, counts: estimator.counts(machine)?, luts, mhz });
+                placed.push(PlacedMachine { machine, counts: estimator.counts(machine)?, luts, mhz });
             }
         }
         estimator.lines = lines(&placed);
@@ -121,19 +116,16 @@ impl Estimator {
             units: 0.0,
             sources: sources as f64,
             slowest: 0.0,
-            block_rams: machine.code_block_rams() + machine.data_block_rams(),
+            block_rams: block_rams(&plan, &self.library, REFERENCE.block_ram()),
             multipliers: 0,
         };
-        // Each operand has a copy of every bank.
-        let banks: u64 = machine.banks().map(|bank| block_rams(bank.depth.into(), 32)).sum();
-        counts.block_rams += sources as u64 * banks;
         for unit in machine.slots.iter().flat_map(|slot| slot.units) {
             if let Some(row) = self.rows.iter().find(|row| row.design == unit.name) {
                 counts.units += row.resources.luts as f64;
-                counts.block_rams += row.resources.block_rams;
                 counts.multipliers += row.resources.multipliers;
                 counts.slowest = row.median().map_or(counts.slowest, |mhz| counts.slowest.max(1e3 / mhz));
-            } else if let Some((_, luts, multipliers)) = COUNTED.iter().find(|(name, ..)| *name == unit.name)
+            } else if let Some((_, luts, multipliers)) =
+                MEASURED.units.iter().find(|(name, ..)| *name == unit.name)
             {
                 counts.units += *luts as f64;
                 counts.multipliers += multipliers;
@@ -142,17 +134,17 @@ impl Estimator {
         Ok(counts)
     }
 
-    /// The estimate of a machine.
+    /// Estimates a machine from its row.
     ///
     /// # Errors
-    /// If it has no circuit.
+    /// If the machine has no circuit.
     pub fn estimate(&self, machine: &'static Machine) -> Result<Estimate, PlanError> {
         Ok(estimate(&self.counts(machine)?, self.lines))
     }
 
-    /// The placed machines beside their estimates.
+    /// Compares the placed machines with their estimates.
     pub fn calibration(&self) -> Vec<Calibration> {
-        let row = |(index, placed): (usize, &Placed)| {
+        let row = |(index, placed): (usize, &PlacedMachine)| {
             let mut others = self.placed.clone();
             others.remove(index);
             let [own, left_out] = [self.lines, lines(&others)].map(|lines| estimate(&placed.counts, lines));
@@ -166,8 +158,8 @@ impl Estimator {
     }
 }
 
-/// LUT4 beside the units over source operands, and the clock's period over LUT4.
-fn lines(placed: &[Placed]) -> [Line; 2] {
+/// Fits LUT4 besides the units as a function of source operands, and the clock's period as a function of LUT4.
+fn lines(placed: &[PlacedMachine]) -> [Line; 2] {
     let beside = placed.iter().map(|row| (row.counts.sources, row.luts - row.counts.units));
     let periods = placed.iter().map(|row| (row.luts, 1e3 / row.mhz));
     [Line::fit(&beside.collect::<Vec<_>>()), Line::fit(&periods.collect::<Vec<_>>())]
@@ -184,7 +176,7 @@ mod tests {
     use super::*;
     use crate::synthesis::of_machine;
 
-    /// Block RAMs and multipliers are those that place and route counted.
+    /// Counted block RAMs and multipliers equal the placed ones, within 2 block RAMs.
     #[test]
     fn memories_and_multipliers_are_counted() {
         let estimator = Estimator::new().expect("every machine has a circuit");
@@ -192,13 +184,13 @@ mod tests {
             let placed = of_machine(machine.name).expect("it is placed").resources;
             let estimate = estimator.estimate(machine).expect("it has a circuit");
             assert_eq!(estimate.multipliers, placed.multipliers, "{}", machine.name);
-            assert!(estimate.block_rams.abs_diff(placed.block_rams) <= 2, "{}: {estimate:?}", machine.name);
+            assert_eq!(estimate.block_rams, placed.block_rams, "{}", machine.name);
         }
     }
 
-    /// The error that docs/machines.md states; a new measurement may move it.
+    /// Estimates stay within the error that docs/machines.md states; a new measurement may change it.
     #[test]
-    fn the_lines_are_near_what_was_placed() {
+    fn fitted_lines_are_near_the_placed_machines() {
         let calibration = Estimator::new().expect("every machine has a circuit").calibration();
         assert_eq!(calibration.len(), MACHINES.len());
         for Calibration { machine, luts, mhz } in calibration {

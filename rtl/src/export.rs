@@ -1,27 +1,28 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The complete circuit of a machine, as Verilog files.
+//! Export of a machine's complete circuit as Verilog files.
 //!
-//! The fixed parts are the modules in `rtl/core/` and `rtl/units/`. The rest is generated from the tables: [`Plan`] has all sizes and
+//! The fixed parts are the modules in `rtl/core/` and `rtl/units/`. The rest is generated from the tables: [`Plan`] holds all sizes and
 //! names, and the modules in `src/parts/` write the text.
 
 use crate::circuit::Library;
-use crate::files::{CORE, ECP5};
+use crate::files::CORE;
 use crate::parts;
 use crate::plan::{Plan, PlanError};
 use crate::verilog::ModuleError;
+use takt_family::{FAMILIES, Family};
 use takt_isa::Machine;
 use thiserror::Error;
 
-pub use crate::plan::synthesis_top;
+pub use crate::plan::{RESET_CYCLES, synthesis_top};
 pub use takt_isa::timing::{ENDED_DELAY, INPUT_DELAY, LATCHED_INPUT_DELAY, TICK_DELAY};
 
-/// The reason why a machine has no circuit.
+/// Reason why a machine has no circuit.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum ExportError {
-    /// Its row is invalid, or the circuit does not support it.
+    /// Invalid row, or one that the circuit does not support.
     #[error(transparent)]
     Plan(#[from] PlanError),
-    /// Names in the row give a name in the circuit that is already used.
+    /// Names in the row that collide with names in the circuit.
     #[error(transparent)]
     Module(#[from] ModuleError),
 }
@@ -31,36 +32,65 @@ pub enum ExportError {
 pub struct DesignFile {
     /// Path inside the design's folder.
     pub name: String,
-    /// Contents.
+    /// Verilog text of the module.
     pub text: String,
 }
 
-/// The circuit of a machine.
+/// Circuit of a machine, as Verilog.
 #[derive(Clone, Debug)]
 pub struct Design {
-    /// The machine.
+    /// Row from which the circuit is generated.
     pub machine: &'static Machine,
-    /// The plan: all that was generated, by name.
+    /// Sizes and names of everything generated.
     pub plan: Plan,
-    /// Name of the core's module.
+    /// Module name of the core.
     pub top: String,
-    /// Verilog files, each with the one module of its name.
+    /// Verilog files, each with one module of the same name.
     pub files: Vec<DesignFile>,
-    /// Modules that replace those of the same name on Lattice ECP5.
-    pub ecp5: Vec<DesignFile>,
-    /// The core's parameter `LATCHED`: 0 or, for a program whose ports are latched, its
-    /// [`latched_inputs`](takt_isa::Program::latched_inputs). Its default is 0 unless [`Design::latching`] changes it.
+    /// Default of the core's parameter `LATCHED`: 0 or, for a program with latched ports, its
+    /// [`latched_inputs`](takt_isa::Program::latched_inputs). [`export`] sets 0, [`Design::latching`] changes it.
     pub latched: u16,
 }
 
-/// Cycles for which reset must be held, so that every pipeline is empty afterwards.
-pub const RESET_CYCLES: u64 = takt_isa::spec::units::MAX_LATENCY as u64;
+impl DesignFile {
+    /// Name without the folder.
+    pub fn base(&self) -> &str {
+        self.name.rsplit('/').next().unwrap_or(&self.name)
+    }
+}
+
+/// Modules of a family's own cells, in the folder of its name.
+pub fn modules(family: &Family) -> Vec<DesignFile> {
+    let file = |&(name, text): &(&str, &str)| DesignFile {
+        name: format!("{}/{name}", family.name),
+        text: text.to_owned(),
+    };
+    family.modules.iter().map(file).collect()
+}
+
+/// A design's files for a family: its own modules in place of the general ones of the same name.
+pub fn on_family(files: &[DesignFile], family: &Family) -> Vec<DesignFile> {
+    let own = modules(family);
+    let general = files.iter().filter(|file| own.iter().all(|module| module.base() != file.base()));
+    general.cloned().chain(own.iter().cloned()).collect()
+}
+
+/// Modules and lists of files of every family that has modules of its own: `takt_t3_NAME.f`, in which they replace the general ones.
+pub(crate) fn family_files(top: &str, files: &[DesignFile]) -> Vec<DesignFile> {
+    let mut more = Vec::new();
+    for family in FAMILIES.iter().filter(|family| !family.modules.is_empty()) {
+        more.extend(modules(family));
+        let text = on_family(files, family).iter().map(|file| format!("{}\n", file.name)).collect();
+        more.push(DesignFile { name: format!("{top}_{}.f", family.name), text });
+    }
+    more
+}
 
 impl Design {
-    /// The design for programs with `latched` latched inputs, which becomes the default of the core's parameter.
+    /// Changes the default of the core's parameter `LATCHED` to `latched`.
     ///
     /// # Errors
-    /// Those of [`export`].
+    /// See [`export`].
     pub fn latching(mut self, latched: u16) -> Result<Design, ExportError> {
         let name = format!("{}.v", self.top);
         let text = parts::core(&self.plan, latched)?;
@@ -69,7 +99,7 @@ impl Design {
     }
 }
 
-/// The circuit of a machine.
+/// Generates the circuit of a machine.
 ///
 /// # Errors
 /// If the core's modules do not support the machine, or a unit has no circuit.
@@ -96,7 +126,5 @@ pub fn export(machine: &'static Machine, library: &Library) -> Result<Design, Ex
             put(format!("units/{name}"), text);
         }
     }
-    let ecp5 =
-        ECP5.iter().map(|&(name, text)| DesignFile { name: format!("ecp5/{name}"), text: text.to_owned() });
-    Ok(Design { machine, top: plan.top(), files, ecp5: ecp5.collect(), latched: 0, plan })
+    Ok(Design { machine, top: plan.top(), files, latched: 0, plan })
 }

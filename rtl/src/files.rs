@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The Verilog files of `rtl/`, embedded.
+//! Embedded Verilog files of `rtl/`.
 
-/// A file's name and text.
+/// Name and text of a file.
 pub(crate) type File = (&'static str, &'static str);
 
 macro_rules! files {
@@ -10,7 +10,7 @@ macro_rules! files {
     };
 }
 
-/// The arithmetic units and what they share.
+/// Arithmetic units and their common modules.
 #[rustfmt::skip]
 pub(crate) const UNITS: &[File] = files!("units":
     "add.v"
@@ -36,13 +36,7 @@ pub(crate) const UNITS: &[File] = files!("units":
     "common/takt_wave_table.v"
 );
 
-/// Modules that replace shared ones on Lattice ECP5.
-pub(crate) const ECP5: &[File] = files!("ecp5":
-    "takt_bank.v"
-    "takt_product.v"
-);
-
-/// The fixed modules of a core, to which the generated ones are added.
+/// Fixed modules of a core, which the generated ones instantiate.
 #[rustfmt::skip]
 pub(crate) const CORE: &[File] = files!("core":
     "takt_bank.v"
@@ -60,7 +54,7 @@ pub(crate) const CORE: &[File] = files!("core":
     "takt_in_flight.v"
 );
 
-/// The modules between the cores of a system.
+/// Modules between the cores of a system.
 #[rustfmt::skip]
 pub(crate) const SYSTEM: &[File] = files!("system":
     "takt_delay.v"
@@ -89,7 +83,7 @@ mod tests {
                 .count()
         };
         assert_eq!(UNITS.len(), count("units") + count("units/common"));
-        assert_eq!((ECP5.len(), CORE.len()), (count("ecp5"), count("core")));
+        assert_eq!(CORE.len(), count("core"));
         assert_eq!(SYSTEM.len(), count("system"));
     }
 }

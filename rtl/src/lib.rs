@@ -13,6 +13,7 @@ pub mod estimate;
 pub mod export;
 mod files;
 pub mod header;
+pub mod memories;
 mod parts;
 pub mod plan;
 pub mod synthesis;

@@ -1,85 +1,67 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Results of synthesis: the committed `rtl/synthesis.json`, which `cargo xtask synth` writes.
+//! Results of synthesis: the committed `rtl/synthesis.json`, written by `cargo evidence synth`.
 
 use serde::{Deserialize, Serialize};
-use takt_isa::Machine;
+use takt_family::{MEASURED, Resources};
 
-/// One design on one device.
+/// Measurement of a design on a device.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Synthesis {
-    /// Name of the machine, or of the unit; path of a system's file.
+    /// Name of the machine or of the unit, or path of a system's file.
     pub design: String,
-    /// The device, as its maker calls it: `LFE5U-85F`.
+    /// Maker's name of the device ([`Part::name`](takt_family::Part::name)).
     pub device: String,
-    /// Speed grade; none where only resources are counted.
+    /// Speed grade; `None` where only resources are counted.
     pub grade: Option<u8>,
-    /// The clock in MHz after place and route, for seeds 1, 2, …; empty where only resources are counted.
+    /// Clock in MHz after place and route, for seeds 1, 2, …; empty where only resources are counted.
     pub mhz: Vec<f64>,
-    /// The resources of the device that it takes.
+    /// Resources of the device that the design takes.
     pub resources: Resources,
-    /// The critical path of the median seed, in words.
+    /// Critical path of the median seed, in words.
     pub critical_path: String,
     /// Day of the measurement: `2026-11-21`.
     pub date: String,
-    /// The tools and their versions.
+    /// Tools and their versions.
     pub tools: String,
-    /// A hash of the Verilog; none in measurements before 2026-11-25.
+    /// Hash of the Verilog; empty in measurements before 2026-11-25.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub circuit: String,
-    /// The resources of a system's parts, before place and route; else none.
+    /// Resources of a system's parts, before place and route; otherwise empty.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub parts: Vec<PartResources>,
 }
 
-/// A part of a system: a core with its gate, a link, or the rest.
+/// Part of a system: a core with its gate, a link, or the rest.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PartResources {
-    /// Its description.
+    /// Description of the part.
     pub name: String,
-    /// The resources that it takes.
+    /// Resources of the device that the part takes.
     pub resources: Resources,
 }
 
-/// Resources of a device.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Resources {
-    /// Look-up tables, those of carry chains and of memories in logic included: LUT4 on ECP5, GW2A and iCE40, ALUTs on Cyclone V,
-    /// LUT6 on 7 series.
-    pub luts: u64,
-    /// The number of them in carry chains: on ECP5 halves of their cells, where it was counted; on GW2A.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub carries: Option<u64>,
-    /// Flip-flops.
-    pub flip_flops: u64,
-    /// Multipliers of 18 x 18 bits (on Cyclone V up to 27 x 27, on 7 series 25 x 18, on iCE40 16 x 16).
-    pub multipliers: u64,
-    /// Block RAMs: 18 kbit on ECP5, GW2A and 7 series, 10 kbit on Cyclone V, 4 kbit on iCE40.
-    pub block_rams: u64,
-}
-
 impl Synthesis {
-    /// Clocks in MHz from the lowest to the highest.
+    /// Clocks in MHz, ascending.
     fn sorted(&self) -> Vec<f64> {
         let mut mhz = self.mhz.clone();
         mhz.sort_by(f64::total_cmp);
         mhz
     }
 
-    /// The lowest clock of all seeds in MHz.
+    /// Lowest clock of all seeds, in MHz.
     pub fn least(&self) -> Option<f64> {
         self.sorted().first().copied()
     }
 
-    /// The median clock in MHz; of an even number of seeds the lower one of the two in the middle.
+    /// Median clock in MHz; of an even number of seeds the lower of the two medians.
     pub fn median(&self) -> Option<f64> {
         let mhz = self.sorted();
         mhz.get(mhz.len().saturating_sub(1) / 2).copied()
     }
 
-    /// The highest clock of all seeds in MHz.
+    /// Highest clock of all seeds, in MHz.
     pub fn greatest(&self) -> Option<f64> {
         self.sorted().last().copied()
     }
@@ -88,30 +70,20 @@ impl Synthesis {
 /// Reads the text of `rtl/synthesis.json`.
 ///
 /// # Errors
-/// If it is none.
+/// If the text does not have the file's format.
 pub fn parse(text: &str) -> serde_json::Result<Vec<Synthesis>> {
     serde_json::from_str(text)
 }
 
-/// Every committed measurement.
+/// Committed measurements of all designs.
 pub fn committed() -> Vec<Synthesis> {
-    serde_json::from_str(include_str!("../synthesis.json")).expect("`cargo xtask synth` wrote the file")
+    serde_json::from_str(include_str!("../synthesis.json")).expect("`cargo evidence synth` wrote the file")
 }
 
-/// The representative measurement of a machine: on the largest device, at the best speed grade.
+/// Representative measurement of a machine: on the largest device, at the best speed grade.
 pub fn of_machine(name: &str) -> Option<Synthesis> {
-    let placed = committed().into_iter().filter(|row| row.design == name && row.device == "LFE5U-85F");
+    let placed = committed().into_iter().filter(|row| row.design == name && row.device == MEASURED.part);
     placed.max_by_key(|row| row.grade)
-}
-
-/// Block RAMs of a core: as synthesis counted them, for memories of other depths with the difference of these; or, for a machine
-/// whose row was not measured, those of its program and data.
-pub fn block_rams(machine: &'static Machine) -> u64 {
-    let memories = |machine: &Machine| machine.code_block_rams() + machine.data_block_rams();
-    let row = machine.row();
-    let others = of_machine(row.name)
-        .map_or(0, |measured| measured.resources.block_rams.saturating_sub(memories(row)));
-    others + memories(machine)
 }
 
 #[cfg(test)]
@@ -119,18 +91,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn memories_of_other_depths_take_the_difference() {
-        let machine = |name| Machine::from_name(name).expect("it is a machine");
-        let measured = of_machine("t3").expect("it is measured").resources.block_rams;
-        assert_eq!(block_rams(machine("t3")), measured);
-        assert_eq!(block_rams(machine("t3,data=32768")), measured + 64 - 2);
-    }
-
-    #[test]
     fn median_is_a_clock_that_was_reached() {
         let row = |mhz: &[f64]| Synthesis {
             design: "x".to_owned(),
-            device: "LFE5U-85F".to_owned(),
+            device: MEASURED.part.to_owned(),
             grade: Some(8),
             mhz: mhz.to_vec(),
             resources: Resources::default(),

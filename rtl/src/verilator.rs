@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Compilation with Verilator, cached: builds a program from a circuit in Verilog and a driver in C++, and keeps it by a hash of all
-//! its sources and options.
+//! Compilation with Verilator, cached: builds a program from a circuit in Verilog and a driver in C++, and stores it under a hash of all
+//! sources and options.
 //!
-//! Verilator's run-time library is compiled once for all programs, because it takes longer than most circuits.
+//! Verilator's run-time library takes longer to compile than most circuits, so it is compiled once for all programs.
 
 use std::collections::BTreeMap;
 use std::collections::hash_map::DefaultHasher;
@@ -15,66 +15,60 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use thiserror::Error;
 
-/// An error that leaves no program.
+/// Error that prevents a program.
 #[derive(Debug, Error)]
 pub enum VerilatorError {
-    /// A tool is missing.
+    /// A tool is not installed.
     #[error("{tool} is not installed; on Debian: apt-get install {package}")]
     Missing {
-        /// The program.
+        /// Name of the program.
         tool: &'static str,
-        /// Debian's package that has it.
+        /// Debian package that contains it.
         package: &'static str,
     },
-    /// A tool failed.
+    /// A tool failed, with its output.
     #[error("{tool} failed:\n{text}")]
     Tool {
-        /// The program.
+        /// Name of the program.
         tool: &'static str,
-        /// Its output.
+        /// Standard output and error.
         text: String,
     },
     /// A file cannot be written or read.
     #[error("{path}: {source}")]
     File {
-        /// The file.
+        /// Path of the file.
         path: String,
-        /// The reason.
+        /// Error of the file system.
         source: std::io::Error,
     },
+    /// No folder for the cache is available.
+    #[error(transparent)]
+    Cache(#[from] takt_cache::CacheError),
 }
 
-/// The folder in which programs are kept: `takt` in the user's cache folder.
-pub fn cache_folder() -> PathBuf {
-    let from = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
-    from("XDG_CACHE_HOME")
-        .or_else(|| from("HOME").map(|home| home.join(".cache")))
-        .unwrap_or_else(std::env::temp_dir)
-        .join("takt")
-}
-
-/// The sources and options of a program.
+/// Sources and options of a program.
 #[derive(Debug)]
 pub struct Sources<'a> {
-    /// The beginning of the program's name.
+    /// Prefix of the program's file name.
     pub name: &'a str,
-    /// The top's module.
+    /// Module name of the top.
     pub top: &'a str,
-    /// The prefix of the classes that Verilator makes.
+    /// Prefix of the classes that Verilator generates.
     pub prefix: &'static str,
-    /// Verilog.
+    /// Verilog files by name.
     pub files: Vec<(&'a str, &'a str)>,
-    /// The program around it, in C++.
+    /// Main program, in C++.
     pub driver: &'a str,
-    /// The driver's headers.
+    /// C++ headers of the driver, by name.
     pub headers: Vec<(&'a str, &'a str)>,
     /// Further arguments for Verilator.
     pub arguments: Vec<String>,
     /// Further arguments for the driver's compiler.
     pub defines: Vec<String>,
-    /// The C++ compiler's level of optimisation: `-O1`, where the program runs for seconds; `-O2`.
+    /// Optimisation level of the C++ compiler: `-O1` where the program runs for seconds, otherwise `-O2`.
     pub optimise: &'static str,
-    /// True if the program can write waveforms; the driver is then compiled with `TRACE` defined.
+    /// The program can write waveforms; the driver is compiled with `TRACE` defined.
     pub trace: bool,
 }
 
@@ -100,8 +94,9 @@ fn verilator() -> Command {
     Command::new("verilator")
 }
 
-/// Runs `make` if `path` does not exist yet, and only once in this process. Since other processes may do the same at the same time, the
-/// result is renamed to `path` only when it is complete.
+/// Runs `make` unless `path` already holds its complete result; a lock per path prevents parallel runs in this process. The result is a
+/// folder with a file of the same name and the file's checksum. Other processes may make it at the same time, so the folder is renamed to
+/// `path` when it is complete.
 fn once(
     path: &Path,
     make: impl FnOnce(&Path) -> Result<(), VerilatorError>,
@@ -113,19 +108,31 @@ fn once(
         Arc::clone(all.entry(path.to_owned()).or_default())
     };
     let _one = own.lock().unwrap_or_else(PoisonError::into_inner);
-    if path.exists() {
-        return Ok(path.to_owned());
+    let Some(name) = path.file_name() else { return Err(file_error(path)(ErrorKind::InvalidInput.into())) };
+    let kept = path.join(name);
+    if takt_cache::is_whole(&kept) {
+        return Ok(kept);
     }
+    takt_cache::discard(path);
     let number = NUMBER.fetch_add(1, Ordering::Relaxed);
     let partial = format!("{}.{}.{number}.partial", path.display(), std::process::id());
     let partial = Path::new(&partial);
-    fs::create_dir_all(partial).map_err(file_error(partial))?;
-    let made = make(partial).and_then(|()| fs::rename(partial.join("made"), path).map_err(file_error(path)));
-    let _ = fs::remove_dir_all(partial);
-    made.map(|()| path.to_owned())
+    let whole = partial.join("whole");
+    fs::create_dir_all(&whole).map_err(file_error(partial))?;
+    let made = make(partial).and_then(|()| {
+        let program = whole.join(name);
+        fs::rename(partial.join("made"), &program)
+            .and_then(|()| takt_cache::seal_program(&program))
+            .and_then(|()| fs::rename(&whole, path))
+            // Another process may have been faster.
+            .or_else(|error| if takt_cache::is_whole(&kept) { Ok(()) } else { Err(error) })
+            .map_err(file_error(path))
+    });
+    takt_cache::discard(partial);
+    made.map(|()| kept)
 }
 
-/// The options of everything that is compiled in C++, which must agree between a circuit and the library.
+/// Options of all C++ compilations, which must agree between circuit and run-time library.
 fn options(include: &Path, optimise: &str, trace: bool) -> Vec<String> {
     let trace = u8::from(trace);
     let mut options = vec![optimise.to_owned(), "-std=gnu++17".to_owned(), "-faligned-new".to_owned()];
@@ -139,7 +146,7 @@ fn options(include: &Path, optimise: &str, trace: bool) -> Vec<String> {
 }
 
 impl Sources<'_> {
-    /// Builds the program in a folder, or finds it there, if it was built before.
+    /// Builds the program in a folder, or finds an earlier build there.
     ///
     /// # Errors
     /// If Verilator, make or a C++ compiler is missing or fails.
@@ -192,7 +199,7 @@ impl Sources<'_> {
     }
 }
 
-/// The parts of the run-time library that a program needs, as Verilator's makefile lists them.
+/// Parts of the run-time library that a program needs, as Verilator's makefile lists them.
 fn globals(classes: &str) -> impl Iterator<Item = &str> {
     let mut listed = false;
     classes.lines().filter_map(move |line| {
@@ -206,7 +213,7 @@ fn globals(classes: &str) -> impl Iterator<Item = &str> {
     })
 }
 
-/// A part of the run-time library, compiled once.
+/// Compiles a part of the run-time library, once.
 fn runtime(
     folder: &Path,
     version: &str,
@@ -223,21 +230,21 @@ fn runtime(
     })
 }
 
-/// A fault for a circuit: a file, an expression or right-hand side that occurs once in it, and its replacement.
+/// Fault to plant in a circuit: file, an expression or right-hand side that occurs once in it, and its replacement.
 pub type Fault<'a> = (&'a str, &'a str, &'a str);
 
-/// Plants many faults in one circuit, each behind a multiplexer: a simulation selects one by the argument `+fault=`, from 1; without it,
-/// the circuit behaves as before. `top` is the top's module, which must be in one of the files.
+/// Plants many faults in one circuit, each behind a multiplexer. A simulation selects one by the argument `+fault=`, from 1; without it,
+/// the circuit behaves as before. `top` is the module of the top, in one of the files.
 ///
 /// # Errors
-/// In words, if an expression does not occur once.
+/// A message, if an expression does not occur exactly once.
 pub fn plant(files: &mut [crate::export::DesignFile], top: &str, faults: &[Fault<'_>]) -> Result<(), String> {
     for (number, (name, from, to)) in (1..).zip(faults) {
         let own = |file: &&mut crate::export::DesignFile| {
             file.name == *name || file.name.rsplit('/').next() == Some(&format!("{name}.v"))
         };
         let file = files.iter_mut().find(own).ok_or_else(|| format!("there is no file {name}"))?;
-        // An assignment is a statement of its own.
+        // The right-hand side of an assignment becomes the choice.
         let (head, from) = from.split_once("<= ").map_or(("", *from), |(head, from)| (head, from));
         let to = to.split_once("<= ").map_or(*to, |(_, to)| to);
         let head = if head.is_empty() { String::new() } else { format!("{head}<= ") };
@@ -261,12 +268,43 @@ pub fn plant(files: &mut [crate::export::DesignFile], top: &str, faults: &[Fault
 
 #[cfg(test)]
 mod tests {
-    use super::globals;
+    use super::{globals, once};
+    use std::cell::Cell;
+    use std::fs;
+    use std::path::Path;
 
     #[test]
     fn parts_of_the_library_are_listed() {
         let text = "VM_CLASSES_FAST += \\\n\tVtop \\\n\nVM_GLOBAL_FAST += \\\n\tverilated \\\n\tverilated_threads \\\n\n\
                     # Generated\nVM_GLOBAL_SLOW += \\\n\n";
         assert_eq!(globals(text).collect::<Vec<_>>(), ["verilated", "verilated_threads"]);
+    }
+
+    #[test]
+    fn a_damaged_program_is_made_again() {
+        let folder = std::env::temp_dir().join(format!("takt-verilator-{}", std::process::id()));
+        let (path, count) = (folder.join("top-1"), Cell::new(0));
+        let build = || {
+            once(&path, |work: &Path| {
+                count.set(count.get() + 1);
+                fs::write(work.join("made"), "native code").map_err(super::file_error(work))
+            })
+            .unwrap()
+        };
+        let program = build();
+        assert_eq!((build(), count.get()), (program.clone(), 1));
+        for damaged in ["native codE", "native", ""] {
+            fs::write(&program, damaged).unwrap();
+            assert_eq!(
+                (build(), fs::read_to_string(&program).unwrap().as_str()),
+                (program.clone(), "native code")
+            );
+        }
+        assert_eq!(count.get(), 4);
+        // A file in place of the folder, as earlier versions stored programs.
+        fs::remove_dir_all(&path).unwrap();
+        fs::write(&path, "old").unwrap();
+        assert_eq!((build(), count.get()), (program, 5));
+        fs::remove_dir_all(&folder).unwrap();
     }
 }

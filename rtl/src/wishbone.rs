@@ -1,37 +1,37 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Wishbone slave around a core: the core as a peripheral, an example of integration that is simulated like the rest.
+//! Wishbone slave around a core, as a peripheral: an example of integration that is simulated like the core.
 
 use crate::export::{Design, RESET_CYCLES, synthesis_top};
-use crate::synthesis::Resources;
 use crate::template::fill;
 use std::fmt::Write as _;
+use takt_family::Resources;
 use takt_isa::Machine;
 
-/// A register of the slave.
+/// Control or status register of the slave.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Register {
-    /// Its word address.
+    /// Address on the bus, in words.
     pub address: u16,
-    /// Its name.
+    /// Name, in lower case.
     pub name: &'static str,
-    /// `r`, `w` or `rw`.
+    /// Access by the host: `r`, `w` or `rw`.
     pub access: &'static str,
-    /// Its purpose.
+    /// Purpose of the register, for documentation.
     pub text: &'static str,
-    /// Its bit fields, from bit 0 on; empty if the register is a single number.
+    /// Bit fields from bit 0 on; empty if the register is a single value.
     pub fields: &'static [Field],
 }
 
-/// A bit field of a register.
+/// Bit field of a register.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Field {
-    /// Its name; in `status`, that of the slave's signal.
+    /// Field name; in `status`, the slave's signal of the same name.
     pub name: &'static str,
-    /// Its lowest bit.
+    /// Index of the lowest bit.
     pub low: u32,
-    /// Its bits.
+    /// Width of the field, in bits.
     pub width: u32,
-    /// Its meaning.
+    /// Meaning of the field, for documentation.
     pub text: &'static str,
 }
 
@@ -107,7 +107,7 @@ const LOAD_LOW: Register = Register {
     fields: &[],
 };
 
-/// Registers of the slave, by address. The wrapper, its test and the headers of programs take them from here.
+/// Registers of the slave, by address. The wrapper, its test and the headers of programs are generated from this table.
 pub const REGISTERS: &[Register] = &[CONTROL, STATUS, PERIOD, TICK, LOAD_PLACE, LOAD_HIGH, LOAD_LOW];
 
 /// Word address of input port 0.
@@ -115,12 +115,12 @@ pub const INPUTS: u16 = 0x1000;
 /// Word address of output port 0.
 pub const OUTPUTS: u16 = 0x2000;
 
-/// Name of the slave's module.
+/// Module name of the slave.
 pub fn name(design: &Design) -> String {
     format!("{}_wishbone", design.top)
 }
 
-/// The value of the slave's status register: the fields, with zeros between them.
+/// Concatenation for the status register: the fields, with zeros between them.
 fn status() -> String {
     let (mut parts, mut next) = (Vec::new(), 0);
     for field in STATUS.fields {
@@ -134,7 +134,7 @@ fn status() -> String {
     format!("{{{}}}", parts.join(", "))
 }
 
-/// Open connections for the core's pins that report each write of an output port, which a slave that reads the ports does not need.
+/// Open connections for the core's outputs that report each write of an output port: a slave that reads the ports does not need them.
 pub fn open_streams(machine: &Machine) -> String {
     let streams = machine.slots.iter().map(|slot| {
         let b = slot.bank.name;
@@ -143,7 +143,7 @@ pub fn open_streams(machine: &Machine) -> String {
     streams.collect::<Vec<_>>().join(" ")
 }
 
-/// The slave. `latched` is the default of its parameter for latched ports
+/// Generates the slave. `latched` is the default of its parameter for latched ports
 /// ([`Program::latched_inputs`](takt_isa::Program::latched_inputs)).
 pub fn wrapper(design: &Design, latched: u16) -> String {
     let machine = design.machine;
@@ -153,7 +153,7 @@ pub fn wrapper(design: &Design, latched: u16) -> String {
     let data_bits = machine.data_depth.trailing_zeros();
     let register_bits = takt_isa::Register::COUNT.trailing_zeros();
     let inputs_page = format!("{}'d{}", register_bits - input_bits, machine.inputs.base >> input_bits);
-    // The words that RESTORE keeps: data, then registers.
+    // Words that RESTORE keeps: data, then registers.
     let half = data_bits.max(register_bits);
     let words = (1 << half) + (1 << register_bits);
     let streams = open_streams(machine);
@@ -213,18 +213,18 @@ pub fn wrapper(design: &Design, latched: u16) -> String {
     )
 }
 
-/// The resources that [`on_few_pins`] takes beside the slave: its registers, and 3 LUT4 for each parity of eight bits, 3 for the rest.
+/// Resources of [`on_few_pins`] besides the slave: its registers, 3 LUT4 for each parity of eight bits, and 3 for the rest.
 pub const PINS: Resources =
     Resources { luts: 15, carries: None, flip_flops: 145, multipliers: 0, block_rams: 0 };
 
-/// The slave on a few pins, for a place-and-route run without a board. It is between registers, as in a system on the same device.
+/// Connects the slave to a few pins, for a place-and-route run without a board. It is between registers, as in a system on the same device.
 /// RESTORE is left out, since its memory belongs to the system.
 pub fn on_few_pins(design: &Design) -> String {
     let (name, slave) = (synthesis_top(design.machine), name(design));
     fill(include_str!("templates/few_pins.v.in"), &[("NAME", &name), ("SLAVE", &slave)])
 }
 
-/// Zero extension in Verilog: `what`, which has `bits` bits, extended to `wide` bits.
+/// Zero extension in Verilog: `what`, of `bits` bits, extended to `wide` bits.
 fn padded(wide: u32, bits: u32, what: &str) -> String {
     if wide == bits { format!("{{{what}}}") } else { format!("{{{}'d0, {what}}}", wide - bits) }
 }

@@ -21,7 +21,7 @@ module takt_pace #(
     output reg  take
 );
 
-    // From the cycle after `starts` to that of `tick`.
+    // Cycles from the start, in the cycle after `starts`, to the first tick.
     localparam FIRST = LEAD + OFFSET - 2;
     localparam LAST  = PERIOD - 1;
     localparam TAKE  = SNAPSHOTS + 2;   // the cycle before: take is a register, as it is in every mailbox of the core's snapshots

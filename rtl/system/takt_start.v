@@ -4,7 +4,7 @@
 // Contract
 //   waiting, halted: of each core. Let W be the last cycle in which a core issued its first `wait`, or halted; both are visible two
 //   cycles later. The first base tick B is in the first cycle from W + 4 + LEAD on that is a multiple of TICK, cycle 0 being the first
-//   after reset. If all cores have halted, there is none.
+//   after reset. If all cores have halted, no base tick comes.
 //   starts: high in cycle B - LEAD. due: high LEAD cycles before every base tick. Values that the host writes in that cycle are read by
 //   the periods that begin at the base tick.
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The exported design, as other tools see it.
+//! Tests how other tools see the exported design.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -13,8 +13,8 @@ fn silent(command: &mut Command) {
     assert!(output.status.success() && text.trim().is_empty(), "{command:?}\n{text}");
 }
 
-/// Writes the folder of every machine, and of one with the smallest and one with the largest memories, and hands it on, with the
-/// core's name.
+/// Writes the folders of every machine, and of a machine with the smallest and a machine with the largest memories, and hands each on, with
+/// the core's name.
 fn folders(mut look: impl FnMut(&Path, &Machine, &str)) {
     let other = ["t1,code=2,data=2", "t3,code=65536,data=65536"].map(Machine::from_name);
     let other = other.map(|machine| machine.expect("it is a machine"));
@@ -41,14 +41,14 @@ fn no_tool_complains() {
             silent(lint.args(files));
         };
         verilator(&["-f".to_owned(), format!("{top}.f")], top);
-        // With latched ports, of which there are two, many, all.
+        // Ports can be latched: two of them, many, or all.
         assert_eq!(top, format!("takt_{}", machine.identifier()));
         let ports = machine.inputs.depth;
         for latched in [2, 32, ports] {
             verilator(&[format!("-GLATCHED={latched}"), "-f".to_owned(), format!("{top}.f")], top);
         }
         let synthesis = format!("{top}_synthesis");
-        // The slave leaves ports of the core open.
+        // The slave leaves some ports of the core open.
         let open = "-Wno-PINCONNECTEMPTY".to_owned();
         let own = [format!("{top}_wishbone.v"), format!("{synthesis}.v")];
         verilator(&[&[open, "-f".to_owned(), format!("{top}.f")], &own[..]].concat(), &synthesis);

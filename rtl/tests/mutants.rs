@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Mutants of the units, which yosys has planted in a unit's netlist, meet the units' test. `cargo xtask mutants` calls this.
+//! Mutants of the units, which yosys has planted in a unit's netlist, meet the units' test. `cargo evidence mutants` runs this test.
 //!
-//! `TAKT_MUTANTS` names a folder with a netlist for each unit, whose plusarg `fault` chooses a mutant, and a file with the numbers of
-//! those to be tried, one a line.
+//! `TAKT_MUTANTS` names a folder with a netlist for each unit, whose plusarg `fault` chooses a mutant, and with a file of the mutants'
+//! numbers to be tried, one a line.
 #![allow(clippy::print_stdout)]
 
 use crate::harness::{Simulation, circuit, compile, library};
@@ -11,7 +11,7 @@ use std::path::PathBuf;
 use takt_isa::UNITS;
 
 #[test]
-#[ignore = "of netlists that `cargo xtask mutants` makes"]
+#[ignore = "of netlists that `cargo evidence mutants` makes"]
 fn units() {
     let folder = PathBuf::from(std::env::var_os("TAKT_MUTANTS").expect("TAKT_MUTANTS names a folder"));
     for unit in UNITS {
@@ -28,7 +28,7 @@ fn units() {
         {
             let mut simulation = Simulation::start(&circuit, program.clone(), &[format!("+fault={number}")])
                 .unwrap_or_else(|error| panic!("{error}"));
-            let outcome = simulation.check_special_values().and_then(|_| simulation.check_random(100_000, 1));
+            let outcome = simulation.check_all(100_000);
             match outcome {
                 Ok(_) if number == 0 => {}
                 Ok(_) => println!("mutant {} {number} survived", unit.name),
@@ -39,7 +39,7 @@ fn units() {
                 }
             }
         }
-        // Of a netlist that nobody will ask for again.
+        // Nobody will ask for this netlist's program again.
         let _ = fs::remove_file(program);
     }
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Rows that are machines and have no circuit: every reason, by the message that names machine, slot, unit and value; and every
-//! machine of the table has one.
+//! Rows that are machines but have no circuit: the test sees every reason, by the message that names machine, slot, unit and value. Every
+//! machine of the table has a circuit.
 
 use takt_isa::spec::fixture::FIXTURES;
 use takt_isa::spec::units::*;
@@ -18,7 +18,7 @@ fn refused(machine: Machine) -> String {
     Plan::new(machine, &Library::builtin()).map(|_| ()).expect_err("no circuit").to_string()
 }
 
-/// f3 with a slot changed.
+/// The machine f3 with a slot changed.
 fn slot(number: usize, change: impl FnOnce(&mut Slot)) -> Machine {
     let mut slots = F3.slots.to_vec();
     change(&mut slots[number]);
@@ -121,7 +121,7 @@ fn every_reason() {
     }
 }
 
-/// A row that is no machine has no circuit either.
+/// A row that is no machine has no circuit, either.
 #[test]
 fn no_machine() {
     let machine = Box::leak(Box::new(Machine { slots: &[], ..F3 }));
@@ -129,7 +129,7 @@ fn no_machine() {
     assert_eq!(error.to_string(), "machine `f3`: 0 slots; a machine has 1 to 8");
 }
 
-/// The name of a slot or bank that makes another name of the core.
+/// A slot cannot have a name that the core has already.
 #[test]
 fn names_that_clash() {
     for name in ["m_mul", "r"] {

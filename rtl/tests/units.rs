@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Every arithmetic circuit against the specification, bit for bit and cycle for cycle.
+//! Compares every arithmetic circuit with the specification, bit for bit and cycle for cycle.
 //!
 //! `TAKT_FULL=1` runs 10⁷ random operands per operation instead of 10⁵, and the planted faults.
 
 use crate::harness::{Simulation, circuit, elaborate, full, library, lint};
 use takt_isa::{Function, UNITS, Unit};
 
-/// Units that are wired into the core rather than computing a value from operands.
+/// Units that are wired into the core, instead of computing a value from operands.
 fn is_arithmetic(unit: &Unit) -> bool {
     !unit
         .functions
@@ -14,8 +14,8 @@ fn is_arithmetic(unit: &Unit) -> bool {
         .any(|function| matches!(function, Function::Control | Function::Load | Function::Store))
 }
 
-/// The unit's row, with another latency and interval if `TAKT_TRY` says so: `TAKT_TRY=sine:17/13,convert:4/1`. So a circuit can be
-/// tested before its row changes.
+/// The unit's row, with another latency and interval if `TAKT_TRY` names the unit, as in `TAKT_TRY=sine:17/13,convert:4/1`: a circuit can
+/// be tested before its row changes.
 fn unit(name: &str) -> Unit {
     let mut unit =
         *UNITS.iter().find(|unit| unit.name == name).unwrap_or_else(|| panic!("no unit is called `{name}`"));
@@ -34,7 +34,7 @@ fn unit(name: &str) -> Unit {
     unit
 }
 
-/// Reads without a warning, refuses latencies that it cannot honour, and computes what its instructions mean.
+/// Each circuit is read without a warning, refuses latencies that it cannot honour, and computes the meaning of its instructions.
 fn check(name: &str) {
     let (library, unit) = (library(), unit(name));
     let circuit = circuit(&library, &unit).unwrap_or_else(|error| panic!("{error}"));
@@ -52,8 +52,7 @@ fn check(name: &str) {
     let mut simulation =
         Simulation::new(&library, &circuit).unwrap_or_else(|error| panic!("`{name}`: {error}"));
     let count = if full() { 10_000_000 } else { 100_000 };
-    let special = simulation.check_special_values().unwrap_or_else(|error| panic!("{error}"));
-    let random = simulation.check_random(count, 1).unwrap_or_else(|error| panic!("{error}"));
+    let [special, _, random] = simulation.check_all(count).unwrap_or_else(|error| panic!("{error}"));
     assert!(special > 0 && random >= count, "`{name}` was not tested");
 }
 

@@ -112,7 +112,7 @@ module takt_add #(
     wire        close      = subtracts1 & ((distance1 == 9'h000) | (distance1 == 9'h1ff));
 
     // A subnormal result is shifted only until its exponent is 1: a one inserted at that place stops the count of leading zeros.
-    // Place 24 is that of the leading one.
+    // Place 24 holds the leading one.
     wire [24:0] stop;
     genvar i;
     generate

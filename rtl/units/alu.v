@@ -111,8 +111,8 @@ module takt_alu #(
     wire any_nan  = a_nan | b_nan;
     wire any_snan = (a_nan & ~a[22]) | (b_nan & ~b[22]);
 
-    // If the signs differ, a < b is the sign of a, or of b for unsigned integers. Of two negative binary32 numbers, the one of
-    // larger magnitude is less.
+    // If the signs differ, a < b is the sign of a, or of b for unsigned integers. Negative binary32 numbers are in
+    // reverse order of their magnitudes.
     wire unsigned_order = is_integer & op[1];
     wire reversed       = is_float & a[31];
     wire before_if_less = unlike ? (unsigned_order ? b[31] : a[31]) : ~reversed;

@@ -154,8 +154,8 @@ module takt_arctangent #(
     reg  [27:0] quotient;
     reg  [1:0]  digit_1, digit_2;       // the last two
 
-    // Selects a digit of 2 or 3, or of 0 or 1. The differences with all multiples are computed in parallel, one carry chain each; the one
-    // with the triple has three terms, which a carry-save adder makes two.
+    // Selects a digit of 2 or 3, or of 0 or 1. The differences with all multiples are computed in parallel, one carry
+    // chain each. The difference with the triple has three terms, which a carry-save adder reduces to two.
     wire [31:0] less_1 = {1'b0, rest, 2'd0} - {3'd0, divisor};
     wire [31:0] less_2 = {1'b0, rest, 2'd0} - {2'd0, divisor, 1'b0};
     wire [31:0] minus_2d = ~{2'd0, divisor, 1'b0};
@@ -203,7 +203,7 @@ module takt_arctangent #(
     takt_arctangent_table angles (.clk(clk), .row(row), .angle(table_angle));
     always @(posedge clk) angle <= table_angle;
 
-    // ---- 18: what the last stages need to know
+    // ---- 18: state for the last stages
 
     wire        direct = ~steep & ~left;
     wire        tiny   = (e >= 9'd126); // the result may be subnormal

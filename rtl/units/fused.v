@@ -108,7 +108,7 @@ module takt_fused #(
     wire        any_nan   = a_nan | y_nan | z_nan;
     wire        signaling = (a_nan & ~a[22]) | (y_nan & ~y[22]) | (z_nan & ~z[22]);
 
-    // A biased exponent; that of a subnormal number is 1.
+    // Biased exponents; 1 for a subnormal number.
     wire [7:0]  a_exponent = {a[30:24], a[23] | a_small};
     wire [7:0]  y_exponent = {y[30:24], y[23] | y_small};
     wire [7:0]  z_exponent = {z[30:24], z[23] | z_small};
@@ -169,7 +169,7 @@ module takt_fused #(
         lost2     <= lost;
         above2    <= at_top1 ? {1'b0, above_z1} : above_p1;
         minus2    <= minus1;
-        // An infinity's sign is found as that of the larger one.
+        // The finite side gets the infinite side's sign, so that the sum has it, too.
         p_sign2   <= infinite1 & ~p_infinite1 ? z_sign1 : p_sign1;
         z_sign2   <= infinite1 & p_infinite1 ? p_sign1 : z_sign1;
         nan2      <= nan1;

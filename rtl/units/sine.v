@@ -208,7 +208,7 @@ module takt_sine #(
             {zeros16_7, zeros8_7, given7, given_field7, cosine7, negative7, refused7};
     end
 
-    // =============================================================== 9: V, 29 bits after the point, of which 27 are used; n
+    // =============================================================== 9: V, 29 bits after the point (27 are used); n
 
     wire        zeros1 = ~n8[28];
     wire [27:0] n      = zeros1 ? n8[27:0] : n8[28:1];

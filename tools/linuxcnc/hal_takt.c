@@ -1,22 +1,24 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-// hal_takt: LinuxCNC's servo thread as the planner of the hybrid robot, whose controller runs on a board (docs/linuxcnc.md).
+// hal_takt: LinuxCNC's servo thread as the planner of a machine whose controller runs on a board (docs/linuxcnc.md). Joints, units and the
+// board's addresses are parameters, which `takt board hal` writes; without them, those of the hybrid robot.
 //
 // takt.write sends a knot each servo period, the joints' commanded positions with their velocities; a core of the board interpolates
-// between knots at 10 kHz (programs/hybrid/interpolation.s). The board sends a frame each millisecond with what its encoders had and the
-// point that belongs to it. takt.read takes it, and waits for it while the board has QUEUE knots: the board's clock paces the thread, so
+// between knots in each of its periods (programs/hybrid/interpolation.s). The board sends a frame each servo period with what its encoders
+// had and the point that belongs to it. takt.read takes it, and waits for it while the board has QUEUE knots: the board's clock paces the thread, so
 // that a simulated board may take any time. The order in the thread: takt.read, motion, takt.write.
 //
 // A fault ends in safe outputs and `takt.fault`, which stays until `takt.enable` has gone to 0.
 
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 
 #include "rtapi.h"
 #include "rtapi_app.h"
 #include "hal.h"
 #include "takt_link.h"
 
-MODULE_DESCRIPTION("the hybrid robot's controller on a board of Takt");
+MODULE_DESCRIPTION("a machine's controller on a board of Takt");
 MODULE_AUTHOR("The Takt authors");
 MODULE_LICENSE("Dual MIT/GPL");
 
@@ -27,28 +29,42 @@ RTAPI_MP_INT(baud, "bits per second, as in the wiring");
 static int timeout = 25;
 RTAPI_MP_INT(timeout, "ms without an answer or a frame that are a fault; of a simulated board, more");
 
-// programs/hybrid/followed.toml and interpolation.s.
+// As `takt board hal` writes them; here those of programs/hybrid/followed.toml.
+static char *joints = "LLLRR";
+RTAPI_MP_STRING(joints, "a letter for each joint: L linear (mm), R rotary (degrees)");
+static char *counts = "2.5e-7:2.5e-7:2.5e-7:2.3968449810713143e-5:2.3968449810713143e-5";
+RTAPI_MP_STRING(counts, "m or rad of an encoder's count, for each joint, between colons");
+static char *geometry = "hybrid";
+RTAPI_MP_STRING(geometry, "joints from encoders: `direct`, each from its own; `hybrid`, docs/robot.md");
+static int cores = 2;
+RTAPI_MP_INT(cores, "cores of the system that the board carries");
+static int encoders = 0x3000;
+RTAPI_MP_INT(encoders, "address of the first encoder's count, which the others follow");
+static int measured = 0x3405;
+RTAPI_MP_INT(measured, "address of the snapshot: counts, knot, phase, starved, standing");
+static int fifo = 0x3801;
+RTAPI_MP_INT(fifo, "address of the first field of the FIFO of knots: positions, then velocities");
+static int every = 10;
+RTAPI_MP_INT(every, "periods of the board from knot to knot, and from frame to frame");
+static int servo = 1000;
+RTAPI_MP_INT(servo, "us from knot to knot: the period of the servo thread");
+
 enum {
-    AXES = 5, CORES = 2,
+    MOST = 7,              // joints: a knot is one request
     BEGIN = 3,             // knots that wait on the board before it begins
     QUEUE = BEGIN + 1,     // knots that are there in the long run
-    EVERY = 10,            // periods from knot to knot, and from frame to frame
     HISTORY = 32,          // knots that are remembered, to know the point of a frame
     STATUS_EVERY = 10,     // servo periods from one look at the board's status to the next
     OFF_EVERY = 10,        // servo periods from one look at the encoders of a stopped board to the next
     PROBE_EVERY = 500,     // servo periods from one attempt to reach a silent board to the next
 };
-// Addresses of followed.toml (checked by tools/cli/tests/linuxcnc.rs): the encoders, which the host could also drive; the snapshot
-// `measured`, behind the wires to the motors; the FIFO's first field.
-enum { N1 = TAKT_DRIVEN, MEASURED = TAKT_SEEN + AXES, TO_1 = TAKT_FIFOS + 1 };
-// Words of a frame: `periods`, then the snapshot.
-enum { M1 = 1, KNOT = 6, PHASE, STARVED, STANDING, FRAME_WORDS };
-static const double STEP = 1e-3;                           // s, from knot to knot
+// Words of a frame: `periods`, the counts, and behind them these.
+enum { M1 = 1, KNOT = 0, PHASE, STARVED, STANDING, BEHIND };
 static const double UNIT[2] = {1.0 / (1 << 30), 1.0 / (1 << 26)}; // m and rad, of a knot's integers
 static const double LARGEST = 1 << 30;                     // of these: the difference of two must fit
 
-// docs/robot.md: the radius of the arms' pivots, and what a count is.
-static const double R = 0.5, COUNT[2] = {0.25e-6, 2 * M_PI / 262144};
+// docs/robot.md: the radius of the arms' pivots.
+static const double R = 0.5;
 
 enum state { OFF, RUNNING, FAULTED };
 enum fault { NONE, LINK, STARVING, STOPPED, FOLLOWING, REFUSED, RANGE };
@@ -61,8 +77,8 @@ static const char *const CAUSES[] = {"fault", "halt", "missed deadline", "host s
 typedef struct {
     hal_bit_t *enable, *driving, *fault;
     hal_u32_t *code, *causes, *period, *frame_knot, *phase, *knot, *starved, *skipped, *misses, *cycles;
-    hal_float_t *position[AXES], *velocity[AXES], *feedback[AXES], *error[AXES];
-    hal_float_t limit[AXES];
+    hal_float_t *position[MOST], *velocity[MOST], *feedback[MOST], *error[MOST];
+    hal_float_t limit[MOST];
 } pins;
 
 static pins *hal;
@@ -72,28 +88,54 @@ static enum state state;
 static uint32_t sent, last_period;
 static int since_status, since_probe, is_silent, is_asked;
 static int64_t asked;                                      // when the encoders were asked for, ms
-static double knots[HISTORY][2][AXES];                     // positions and velocities, m and rad
+static double knots[HISTORY][2][MOST];                     // positions and velocities, m and rad
+static int axes;                                           // joints
+static double count[MOST];                                 // m or rad of an encoder's count
+static void (*pose_of)(const uint32_t *counts, double *pose);
 
-static int rotary(int axis) { return axis >= 3; }
+static int rotary(int axis) { return joints[axis] == 'R'; }
 
 // LinuxCNC's units, mm and degrees, in SI units.
 static double si(int axis) { return rotary(axis) ? M_PI / 180 : 1e-3; }
 
-// Tool and table of encoder counts, (14) and (15) of docs/robot.md.
-static void pose_of(const uint32_t *counts, double *pose) {
-    double l[3];
-    for (int i = 0; i < 3; i++) l[i] = (int32_t)counts[i] * COUNT[0];
-    double a = l[0] * l[0], b = l[1] * l[1], c = l[2] * l[2];
+// Each joint from its own encoder.
+static void direct(const uint32_t *counts, double *pose) {
+    for (int i = 0; i < axes; i++) pose[i] = (int32_t)counts[i] * count[i];
+}
+
+// The hybrid robot's tool from its three arms, (14) and (15) of docs/robot.md.
+static void hybrid(const uint32_t *counts, double *pose) {
+    direct(counts, pose);
+    double a = pose[0] * pose[0], b = pose[1] * pose[1], c = pose[2] * pose[2];
     double x = -sqrt(3) * (b - c) / (6 * R), y = -(2 * a - b - c) / (6 * R);
     pose[0] = x;
     pose[1] = y;
     pose[2] = sqrt(fmax(a - x * x - (y - R) * (y - R), 0));
-    for (int i = 3; i < AXES; i++) pose[i] = (int32_t)counts[i] * COUNT[1];
+}
+
+// Joints, units and geometry of the parameters; what is wrong with them.
+static const char *configure(void) {
+    axes = (int)strlen(joints);
+    if (axes < 1 || axes > MOST || strspn(joints, "LR") != (size_t)axes) return "`joints` has 1 to 7 letters, L or R";
+    char *next = counts;
+    for (int i = 0; i < axes; i++) {
+        char *end;
+        count[i] = strtod(next, &end);
+        if (end == next || !isfinite(count[i]) || count[i] == 0 || *end != (i + 1 < axes ? ':' : 0))
+            return "`counts` has a number for each joint, with colons between them";
+        next = end + 1;
+    }
+    if (every < 1 || every > 4095 || servo < 1) return "`every` is 1 to 4095 periods, `servo` us";
+    int is_hybrid = strcmp(geometry, "hybrid") == 0;
+    if (!is_hybrid && strcmp(geometry, "direct") != 0) return "`geometry` is `direct` or `hybrid`";
+    if (is_hybrid && (axes < 3 || strncmp(joints, "LLL", 3) != 0)) return "the geometry `hybrid` has joints LLL, and others behind them";
+    pose_of = is_hybrid ? hybrid : direct;
+    return NULL;
 }
 
 static void show(const uint32_t *counts, double *pose) {
     pose_of(counts, pose);
-    for (int i = 0; i < AXES; i++) *hal->feedback[i] = pose[i] / si(i);
+    for (int i = 0; i < axes; i++) *hal->feedback[i] = pose[i] / si(i);
 }
 
 // A request, with an answer that is waited for. Silence is a fault only where the outputs should drive.
@@ -154,9 +196,9 @@ static int look_at_status(void) {
 
 // A knot of the joints' commanded positions; with velocity 0 if it is where the robot stands.
 static int push(int stands) {
-    uint32_t words[2 * AXES + 1];
-    double(*knot)[AXES] = knots[(sent + 1) % HISTORY];
-    for (int i = 0; i < AXES; i++) {
+    uint32_t words[2 * MOST + 1];
+    double(*knot)[MOST] = knots[(sent + 1) % HISTORY];
+    for (int i = 0; i < axes; i++) {
         knot[0][i] = *hal->position[i] * si(i);
         knot[1][i] = stands ? 0 : *hal->velocity[i] * si(i);
         double units = nearbyint(knot[0][i] / UNIT[rotary(i)]);
@@ -168,11 +210,11 @@ static int push(int stands) {
         }
         float speed = (float)knot[1][i];
         words[i] = (uint32_t)(int32_t)units;
-        memcpy(&words[AXES + i], &speed, sizeof speed);
+        memcpy(&words[axes + i], &speed, sizeof speed);
     }
-    words[2 * AXES] = 0;
+    words[2 * axes] = 0;
     *hal->knot = ++sent;
-    if (takt_request(&board, TO_1, 2 * AXES + 1, words)) {
+    if (takt_request(&board, (uint16_t)fifo, 2 * axes + 1, words)) {
         fail_silent();
         return -1;
     }
@@ -180,7 +222,7 @@ static int push(int stands) {
 }
 
 static void start(void) {
-    uint32_t stream = (uint32_t)EVERY << 20 | (FRAME_WORDS - 1) << 16 | MEASURED;
+    uint32_t stream = (uint32_t)every << 20 | (uint32_t)(axes + BEHIND) << 16 | (uint32_t)measured;
     sent = last_period = 0;
     since_status = 0;
     *hal->code = *hal->causes = 0;
@@ -199,26 +241,26 @@ static void start(void) {
 
 // What a frame says.
 static void take_frame(void) {
-    const uint32_t *words = board.stream.words;
-    double pose[AXES];
-    if (board.stream.count != FRAME_WORDS) return;
+    const uint32_t *words = board.stream.words, *behind = words + M1 + axes;
+    double pose[MOST];
+    if (board.stream.count != M1 + axes + BEHIND) return;
     show(words + M1, pose);
-    if (last_period && words[0] - last_period != EVERY) *hal->skipped += (words[0] - last_period) / EVERY - 1;
+    if (last_period && words[0] - last_period != (uint32_t)every) *hal->skipped += (words[0] - last_period) / (uint32_t)every - 1;
     last_period = *hal->period = words[0];
-    *hal->frame_knot = words[KNOT];
-    *hal->phase = words[PHASE];
-    *hal->starved = words[STARVED];
-    if (words[STARVED]) {
+    *hal->frame_knot = behind[KNOT];
+    *hal->phase = behind[PHASE];
+    *hal->starved = behind[STARVED];
+    if (behind[STARVED]) {
         fail(STARVING, "LinuxCNC's servo thread was late by more than the knots that wait there");
         return;
     }
     // The point that belongs to the encoders: on the cubic that ends with the last knot that was taken.
-    uint32_t end = words[KNOT], begin = end > 1 && !words[STANDING] ? end - 1 : end;
+    uint32_t end = behind[KNOT], begin = end > 1 && !behind[STANDING] ? end - 1 : end;
     if (sent - begin >= HISTORY) return;
-    double s = words[STANDING] ? 0 : words[PHASE] * (1.0 / EVERY);
-    for (int i = 0; i < AXES; i++) {
-        double(*p)[AXES] = knots[begin % HISTORY], (*q)[AXES] = knots[end % HISTORY];
-        double d = q[0][i] - p[0][i], u = p[1][i] * STEP, w = q[1][i] * STEP;
+    double s = behind[STANDING] ? 0 : behind[PHASE] * (1.0 / every);
+    for (int i = 0; i < axes; i++) {
+        double(*p)[MOST] = knots[begin % HISTORY], (*q)[MOST] = knots[end % HISTORY];
+        double d = q[0][i] - p[0][i], u = p[1][i] * servo * 1e-6, w = q[1][i] * servo * 1e-6;
         double point = p[0][i] + s * (u + s * (3 * d - 2 * u - w + s * (u + w - 2 * d)));
         *hal->error[i] = (pose[i] - point) / si(i);
         if (hal->limit[i] > 0 && fabs(*hal->error[i]) > hal->limit[i]) {
@@ -235,9 +277,9 @@ static void take_frame(void) {
 
 // Of a board that is stopped, or silent: it is asked again and again, without being waited for.
 static void read_off(void) {
-    double pose[AXES];
+    double pose[MOST];
     takt_hear(&board, 0);
-    if (is_asked && board.answered && board.count == AXES) {
+    if (is_asked && board.answered && board.count == axes) {
         is_asked = is_silent = 0;
         show(board.words, pose);
     }
@@ -249,7 +291,7 @@ static void read_off(void) {
     since_probe = 0;
     is_asked = 1;
     asked = takt_now_ms();
-    takt_request(&board, N1, AXES, NULL);
+    takt_request(&board, (uint16_t)encoders, axes, NULL);
 }
 
 static void takt_read(void *unused, long period) {
@@ -324,7 +366,7 @@ static int export(void) {
     };
     for (unsigned i = 0; i < sizeof counts / sizeof *counts; i++)
         bad |= hal_pin_u32_newf(HAL_OUT, counts[i].pin, component, "takt.%s", counts[i].name);
-    for (int i = 0; i < AXES; i++) {
+    for (int i = 0; i < axes; i++) {
         bad |= hal_pin_float_newf(HAL_IN, &hal->position[i], component, "takt.%d.pos-cmd", i);
         bad |= hal_pin_float_newf(HAL_IN, &hal->velocity[i], component, "takt.%d.vel-cmd", i);
         bad |= hal_pin_float_newf(HAL_OUT, &hal->feedback[i], component, "takt.%d.pos-fb", i);
@@ -349,8 +391,8 @@ static int meet(void) {
     const char *wrong = done < 0 ? "nothing answers: is this the right port, with the wiring's baud rate, and the board's bitstream loaded?"
         : done || id >> 16 != TAKT_MAGIC ? "what answers is no board of Takt"
         : (id >> 8 & 0xff) != TAKT_VERSION ? "the board speaks another version of the protocol"
-        : (id & 0xff) != CORES ? "the board does not carry programs/hybrid/followed.toml"
-        : control(0) || request(N1, AXES, NULL) ? "the board does not let its encoders be read" : NULL;
+        : (id & 0xff) != (uint32_t)cores ? "the board carries another system: its number of cores is not `cores`"
+        : control(0) || request((uint16_t)encoders, axes, NULL) ? "the board does not let its encoders be read" : NULL;
     if (wrong) {
         rtapi_print_msg(RTAPI_MSG_ERR, "takt: %s: %s\n", port, wrong);
         close(board.fd);
@@ -360,7 +402,12 @@ static int meet(void) {
 }
 
 int rtapi_app_main(void) {
-    double pose[AXES];
+    double pose[MOST];
+    const char *wrong = configure();
+    if (wrong) {
+        rtapi_print_msg(RTAPI_MSG_ERR, "takt: %s\n", wrong);
+        return -EINVAL;
+    }
     int error = meet();
     if (error) return error;
     component = hal_init("hal_takt");

@@ -3,13 +3,14 @@
 
     report.py FOLDER [--document FILE] [--picture FILE.svg]
 
-FOLDER has a folder for each run of `cargo xtask linuxcnc`: record.txt is LinuxCNC's side, of halsampler (record.hal), sim.csv the
+FOLDER has a folder for each run of `cargo evidence linuxcnc`: record.txt is LinuxCNC's side, of halsampler (record.hal), sim.csv the
 robot's, of `takt board sim --record`, result.json what run.py saw.
 """
 
 import argparse
 import json
 import re
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -217,12 +218,11 @@ def fill(file, name, text):
 
 
 def draw(file, run, cut, event):
-    import matplotlib
-
-    matplotlib.use("svg")
     import matplotlib.pyplot as plt
 
-    matplotlib.rcParams["svg.hashsalt"] = "takt"
+    sys.path.insert(0, str(Path(__file__).parents[1] / "python/examples"))
+    import pictures
+
     magnified = 500
     figure, (left, top, below) = plt.subplots(3, 1, figsize=(8, 9.5), height_ratios=[1.7, 1, 1], constrained_layout=True)
     some = slice(None, None, 40)
@@ -252,7 +252,7 @@ def draw(file, run, cut, event):
     below.axvline(0, color="0.5", ls=":")
     below.set(xlabel="time after the link was cut, ms", title="the link is cut in mid-cut: the board brakes, and its outputs become safe")
     below.legend(fontsize="small")
-    figure.savefig(file, metadata={"Date": None})
+    pictures.save(figure, file)
 
 
 #: Of the tool, m: what the founding paper requires; from an event to safe outputs, s: `host` in followed_board.toml, and a tick.

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Diagnostics: errors and warnings as plain data, and two ways to show them.
 //!
-//! Nothing here prints. [`Diagnostics::render`] makes the text for a terminal, with or without colour;
+//! The module prints nothing. [`Diagnostics::render`] makes the text for a terminal, with or without colour;
 //! [`Diagnostics::messages`] makes plain data for serde.
 
 use crate::levels::{Level, Levels, WARNINGS};
@@ -22,37 +22,38 @@ use takt_isa::text::{is_hidden, one_line, push_visible, visible};
 pub enum Severity {
     /// The program is assembled all the same.
     Warning,
-    /// There is no program.
+    /// The program is not assembled.
     Error,
 }
 
-/// A place in the source and what is there.
+/// A place in the source with a message.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Label {
-    /// The place.
+    /// Range of the source that is pointed at.
     pub span: Span,
     /// The message at this place; may be empty.
     pub message: String,
 }
 
-/// One error or warning.
+/// An error or a warning, as plain data.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Diagnostic {
     /// The severity of a diagnostic.
     pub severity: Severity,
     /// The kind of mistake, in a word or two: stable, for tools.
     pub code: &'static str,
-    /// The message.
+    /// Text of the error or warning, without its place.
     pub message: String,
-    /// Its places: the first is that of the mistake, others explain it. Empty if it has no place in a source.
+    /// Places: the first is the mistake's, others explain it. Empty if the mistake has no place in a source.
     pub labels: Vec<Label>,
-    /// Explanations.
+    /// Explanations, shown as `note:` below the source.
     pub notes: Vec<String>,
-    /// The advice, as a sentence.
+    /// Advice in a sentence, shown as `help:` below the source.
     pub help: Option<String>,
     /// The text that replaces the mistake.
     pub replacement: Option<String>,
-    /// Lines of which one is missing, for an editor to offer: declarations of a name, the `.include` of what defines it.
+    /// Alternative lines that would supply a missing declaration, for an editor to offer: declarations of a name, or the
+    /// `.include` of the file that defines it.
     pub missing: Vec<String>,
 }
 
@@ -85,7 +86,7 @@ impl Diagnostic {
         diagnostic
     }
 
-    /// Says what is at the place of the mistake.
+    /// Sets the message at the place of the mistake.
     pub fn here(mut self, message: impl Into<String>) -> Diagnostic {
         if let Some(label) = self.labels.first_mut() {
             label.message = message.into();
@@ -93,37 +94,37 @@ impl Diagnostic {
         self
     }
 
-    /// Points at another place.
+    /// Adds a further place with its message.
     pub fn also(mut self, span: Span, message: impl Into<String>) -> Diagnostic {
         self.labels.push(Label { span, message: message.into() });
         self
     }
 
-    /// Adds an explanation.
+    /// Adds an explanation, shown as `note:`.
     pub fn note(mut self, note: impl Into<String>) -> Diagnostic {
         self.notes.push(note.into());
         self
     }
 
-    /// Says what to do.
+    /// Sets the advice, shown as `help:`.
     pub fn help(mut self, help: impl Into<String>) -> Diagnostic {
         self.help = Some(help.into());
         self
     }
 
-    /// Says what to do, and what is to be written in the place of the mistake.
+    /// Sets the advice, and the text that replaces the mistake.
     pub fn mend(mut self, help: impl Into<String>, replacement: impl Into<String>) -> Diagnostic {
         self.replacement = Some(replacement.into());
         self.help(help)
     }
 
-    /// Lines of which one is missing; the help names them too.
+    /// Adds alternative lines that would supply a missing declaration; the help names them too.
     pub fn missing(mut self, lines: impl IntoIterator<Item = String>) -> Diagnostic {
         self.missing.extend(lines);
         self
     }
 
-    /// Offers a name in the place of a misspelt one, if there is one like it.
+    /// Suggests a similar name in place of a misspelt name; `None` changes nothing.
     pub fn did_you_mean(mut self, name: Option<String>) -> Diagnostic {
         if let Some(name) = name {
             self.help = Some(format!("did you mean `{name}`?"));
@@ -137,30 +138,30 @@ impl Diagnostic {
     }
 }
 
-/// Collects diagnostics during assembly: bounded, and each mistake of the source once however often it is expanded.
+/// Collects diagnostics during assembly: bounded in number, and each mistake of the source once, however often it is expanded.
 #[derive(Clone, Default)]
 pub struct Sink {
     kept: Vec<Diagnostic>,
     seen: HashSet<(&'static str, Span)>,
-    /// Errors met, those not kept included.
+    /// Number of errors met, kept or not.
     pub errors: usize,
-    /// Warnings met, those not kept included.
+    /// Number of warnings met, kept or not.
     pub warnings: usize,
-    /// The levels of warnings. A warning becomes an error only in the end, so that it hides no other.
+    /// Levels of the warnings. A warning becomes an error only in [`Sink::finish`], so that it hides no other.
     pub levels: Levels,
     /// The number of warnings that count as errors.
     denied: usize,
-    /// True if a source, or the end of a block, is missing. From then on only [`INDEPENDENT`] errors are taken: all others, and warnings,
-    /// may be consequences of what the missing source would have declared, or of where the block really ends.
+    /// A source, or the end of a block, is missing. From then on only [`INDEPENDENT`] errors are taken: all others, and warnings, may
+    /// follow from missing declarations, or from a wrong guess at the block's end.
     pub is_partial: bool,
 }
 
-/// Errors that no name decides, so that they stand although part of the source is missing: those of reading files and of their syntax.
+/// Codes of errors that depend on no name, so that they stand although part of the source is missing: reading files, and syntax.
 const INDEPENDENT: [&str; 8] =
     ["block", "expression", "include-cycle", "limit", "load", "syntax", "token", "unknown-directive"];
 
 impl Sink {
-    /// True if a further diagnostic of this severity would be kept: if not, its text need not be made.
+    /// A further diagnostic of this severity would be kept. If not, its text need not be made.
     pub fn keeps(&self, severity: Severity) -> bool {
         match severity {
             Severity::Error => self.errors < limits::SHOWN,
@@ -201,7 +202,7 @@ impl Sink {
         }
     }
 
-    /// Adds a diagnostic.
+    /// Adds a diagnostic whose text is made already.
     pub fn push(&mut self, diagnostic: Diagnostic) {
         self.add(diagnostic.severity, diagnostic.code, diagnostic.span(), || diagnostic);
     }
@@ -224,30 +225,30 @@ impl Sink {
 /// The errors and warnings of a program, in the order of its sources.
 #[derive(Clone, Debug, Default)]
 pub struct Diagnostics {
-    /// The sources that they point into.
+    /// Sources that the diagnostics point into.
     pub sources: Arc<Sources>,
-    /// Those that were kept: at most [`limits::SHOWN`] of each severity.
+    /// Diagnostics kept: at most [`limits::SHOWN`] of each severity.
     pub list: Vec<Diagnostic>,
-    /// Errors beyond those.
+    /// Number of errors beyond the list.
     pub more_errors: usize,
-    /// Warnings beyond those.
+    /// Number of warnings beyond the list.
     pub more_warnings: usize,
 }
 
 /// A diagnostic as plain data. Lines and columns count from 1; columns count characters.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Message {
-    /// Error or warning.
+    /// Severity, as `"warning"` or `"error"` in JSON.
     pub severity: Severity,
     /// The kind of mistake.
     pub code: &'static str,
-    /// The message.
+    /// Text of the error or warning.
     pub message: String,
-    /// Its places with their messages, that of the mistake first.
+    /// Places with their messages; the mistake's own place comes first.
     pub places: Vec<Annotation>,
-    /// Explanations.
+    /// Explanations, in the order in which they were added.
     pub notes: Vec<String>,
-    /// The advice.
+    /// Advice, if there is any.
     pub help: Option<String>,
     /// The text that replaces the mistake.
     pub replacement: Option<String>,
@@ -271,17 +272,17 @@ pub struct Annotation {
 }
 
 impl Diagnostics {
-    /// True if one of them is an error.
+    /// At least one error was met, shown or only counted.
     pub fn has_errors(&self) -> bool {
         self.more_errors > 0 || self.list.iter().any(|d| d.severity == Severity::Error)
     }
 
-    /// True if there is no diagnostic at all.
+    /// No error and no warning was met, shown or only counted.
     pub fn is_empty(&self) -> bool {
         self.list.is_empty() && self.more_errors + self.more_warnings == 0
     }
 
-    /// The text for a terminal: for each its message, file, line, column, the line of source and a caret. Characters that a
+    /// The text for a terminal: message, file, line, column, source line and caret of each diagnostic. Characters that a
     /// terminal would obey are escaped, whether they stand in a source, in its name or in a message.
     pub fn render(&self, colour: bool) -> String {
         let mut view = View::new(&self.sources);
@@ -344,22 +345,27 @@ impl Diagnostics {
 }
 
 /// A source with hidden characters escaped.
-struct Shown<'s> {
+struct EscapedSource<'s> {
     name: String,
     text: Cow<'s, str>,
     /// The lines of the text that is shown.
     lines: Lines,
-    /// For each escaped character the byte behind it, in the source and in what is shown.
+    /// For each escaped character, the byte behind it, in the source and in the shown text.
     moved: Vec<(usize, usize)>,
 }
 
-impl<'s> Shown<'s> {
-    fn of(source: &'s Source) -> Shown<'s> {
+impl<'s> EscapedSource<'s> {
+    fn of(source: &'s Source) -> EscapedSource<'s> {
         let (name, written) = (one_line(&source.name), source.text.as_str());
         // A carriage return belongs to its line's end: no other is in a source.
         let hidden = |c: char| is_hidden(c) && c != '\r';
         if !written.contains(hidden) {
-            return Shown { name, text: written.into(), lines: Lines::of(written), moved: Vec::new() };
+            return EscapedSource {
+                name,
+                text: written.into(),
+                lines: Lines::of(written),
+                moved: Vec::new(),
+            };
         }
         let (mut text, mut moved) = (String::with_capacity(written.len() + 64), Vec::new());
         for (at, c) in written.char_indices() {
@@ -370,7 +376,7 @@ impl<'s> Shown<'s> {
                 text.push(c);
             }
         }
-        Shown { name, lines: Lines::of(&text), text: text.into(), moved }
+        EscapedSource { name, lines: Lines::of(&text), text: text.into(), moved }
     }
 
     /// The place at which a byte of the source is shown.
@@ -380,7 +386,7 @@ impl<'s> Shown<'s> {
         shown + (byte - written)
     }
 
-    /// The byte of the source that is shown there; of an escaped character its first.
+    /// The byte of the source that is shown at a place; within an escape, a byte of the escaped character.
     fn byte(&self, place: usize) -> usize {
         let before = self.moved.partition_point(|(_, shown)| *shown <= place);
         let (written, shown) = before.checked_sub(1).map_or((0, 0), |last| self.moved[last]);
@@ -389,15 +395,15 @@ impl<'s> Shown<'s> {
     }
 }
 
-/// The sources as codespan-reporting reads them. Of a long line it sees only the part around the diagnostic at hand, or
-/// else one error in a line of a megabyte would be a megabyte of text.
+/// The sources as codespan-reporting reads them. From a long line only the part around the diagnostic at hand is visible, or
+/// else an error in a line of a megabyte would be a megabyte of text.
 struct View<'s> {
     sources: &'s Sources,
     /// The lines of sources, as they are written.
     lines: HashMap<usize, Lines>,
     /// The shown text of the sources that a diagnostic points into.
-    shown: HashMap<usize, Shown<'s>>,
-    /// File, line index and visible bytes of what is shown, where a line is cut.
+    shown: HashMap<usize, EscapedSource<'s>>,
+    /// Visible parts of cut lines: file, line index, and bytes of the shown text.
     windows: Vec<(usize, usize, Range<usize>)>,
 }
 
@@ -406,7 +412,7 @@ impl<'s> View<'s> {
         View { sources, lines: HashMap::new(), shown: HashMap::new(), windows: Vec::new() }
     }
 
-    /// Readies the view for a diagnostic, and returns it with places that lie in what is seen.
+    /// Prepares the view for a diagnostic, and returns the diagnostic with its places moved into the visible text.
     fn focus(&mut self, diagnostic: &Diagnostic) -> codespan::Diagnostic<usize> {
         self.windows.clear();
         let severity = match diagnostic.severity {
@@ -427,10 +433,11 @@ impl<'s> View<'s> {
         shown
     }
 
-    /// Opens a window on the span's line if that is long; the part of the span that is then seen, as bytes of what is shown.
+    /// Opens a window on the span's line if that is long. Returns the visible part of the span, as bytes of the shown text;
+    /// `None` for an unknown file.
     fn window(&mut self, file: usize, span: Span) -> Option<Range<usize>> {
         let source = self.sources.files().get(file)?;
-        let shown = self.shown.entry(file).or_insert_with(|| Shown::of(source));
+        let shown = self.shown.entry(file).or_insert_with(|| EscapedSource::of(source));
         let clamp = |offset: u32| shown.place(((offset - source.base) as usize).min(source.text.len()));
         let (start, mut end) = (clamp(span.start), clamp(span.end));
         let index = shown.lines.index(start as u32);
@@ -499,7 +506,7 @@ impl<'s> Files<'s> for View<'_> {
     }
 
     fn column_number(&'s self, id: usize, line: usize, byte: usize) -> Result<usize, Error> {
-        // Columns count what is written.
+        // Columns count the characters of the source as written, before escapes.
         let shown = self.shown.get(&id).ok_or(Error::FileMissing)?;
         let start = shown.lines.range(line).ok_or(Error::FileMissing)?.start;
         let text = &self.sources.files().get(id).ok_or(Error::FileMissing)?.text;

@@ -4,7 +4,7 @@
 use crate::nearest;
 use std::str::FromStr;
 
-/// Every warning: its name, and what it is about.
+/// Every warning: name and subject.
 pub const WARNINGS: &[(&str, &str)] = &[
     ("grouping", "a comparison stands beside `&`, `|` or another comparison without parentheses"),
     ("never-written", "a register with a place is read, and nothing writes it"),
@@ -17,33 +17,33 @@ pub const WARNINGS: &[(&str, &str)] = &[
     ("target", "a jump leads past the program's end"),
     ("types", "a value is read as another type than it is"),
     ("underflow", "a constant rounds to zero"),
-    ("unreachable", "nothing leads to a piece of code"),
+    ("unreachable", "code is unreachable"),
     ("unused", "a name is declared and not used, or written and not read"),
 ];
 
 /// The level of a warning.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Level {
-    /// It is not reported.
+    /// The warning is not reported.
     Allow,
-    /// It is reported.
+    /// The warning is reported, and the program assembled.
     Warn,
-    /// It is an error: there is no program.
+    /// The warning counts as an error: the program is not assembled.
     Error,
 }
 
-/// One wish, as a command line states it: `error`, `error=NAME` or `allow=NAME`.
+/// A setting of warning levels, as a command line states it: `error`, `error=NAME` or `allow=NAME`.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Wish {
+pub struct LevelSetting {
     level: Level,
-    /// Which of [`WARNINGS`]; all of them if none.
+    /// Index of the warning in [`WARNINGS`]; `None` sets all warnings.
     which: Option<usize>,
 }
 
-impl FromStr for Wish {
+impl FromStr for LevelSetting {
     type Err = String;
 
-    fn from_str(text: &str) -> Result<Wish, String> {
+    fn from_str(text: &str) -> Result<LevelSetting, String> {
         let (level, name) = text.split_once('=').map_or((text, None), |(level, name)| (level, Some(name)));
         let level = match (level, name) {
             ("error", _) => Level::Error,
@@ -59,11 +59,11 @@ impl FromStr for Wish {
                 format!("there is no warning `{name}`{meant} (warnings: {})", names.join(", "))
             })
         };
-        Ok(Wish { level, which: name.map(which).transpose()? })
+        Ok(LevelSetting { level, which: name.map(which).transpose()? })
     }
 }
 
-/// The level of each warning. A setting by name precedes one for all, and a later one an earlier.
+/// The level of each warning. A setting by name precedes a setting of all, and a later setting an earlier.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Levels {
     all: Option<Level>,
@@ -78,10 +78,10 @@ impl Levels {
     }
 }
 
-impl FromIterator<Wish> for Levels {
-    fn from_iter<I: IntoIterator<Item = Wish>>(wishes: I) -> Levels {
+impl FromIterator<LevelSetting> for Levels {
+    fn from_iter<I: IntoIterator<Item = LevelSetting>>(wishes: I) -> Levels {
         let mut levels = Levels::default();
-        for Wish { level, which } in wishes {
+        for LevelSetting { level, which } in wishes {
             *which.map_or(&mut levels.all, |which| &mut levels.named[which]) = Some(level);
         }
         levels
@@ -93,11 +93,11 @@ mod tests {
     use super::*;
 
     fn levels(wishes: &[&str]) -> Levels {
-        wishes.iter().map(|wish| wish.parse::<Wish>().expect("it is one")).collect()
+        wishes.iter().map(|wish| wish.parse::<LevelSetting>().expect("it is one")).collect()
     }
 
     #[test]
-    fn a_name_counts_more_than_all_and_the_last_more_than_the_first() {
+    fn level_of_a_name_overrides_all_and_the_last_setting_wins() {
         assert_eq!(levels(&[]).of("types"), Level::Warn);
         assert_eq!(levels(&["error"]).of("types"), Level::Error);
         for order in [["error", "allow=types"], ["allow=types", "error"]] {
@@ -109,8 +109,8 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_wish_is_told_what_would_be() {
-        let fails = |text: &str| text.parse::<Wish>().expect_err("it is none");
+    fn rejects_invalid_settings_with_valid_ones() {
+        let fails = |text: &str| text.parse::<LevelSetting>().expect_err("it is none");
         for text in ["", "allow", "all", "Error", "warn=types"] {
             assert_eq!(fails(text), "write `error`, `error=NAME` or `allow=NAME`");
         }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The name that was meant by a misspelt one.
+//! The known name nearest to a misspelt one.
 
 use crate::limits;
 
@@ -40,7 +40,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn nearest_finds_what_is_meant_and_nothing_far_fetched() {
+    fn nearest_suggests_similar_names_only() {
         let names = ["fadd", "fsub", "qprev", "q", "KP", "period"];
         let nearest = |name| nearest(name, names);
         assert_eq!(nearest("fad").as_deref(), Some("fadd"));

@@ -7,8 +7,8 @@ use std::borrow::Cow;
 use std::fmt;
 use std::sync::Arc;
 
-/// A text whose lines all end in a line feed, perhaps behind a carriage return: one that stands alone, as on old Macs, becomes
-/// a line feed. No byte moves, so that a place in one is a place in the other.
+/// The text with each lone carriage return, as on old Macs, turned into a line feed: every line then ends in a line feed,
+/// perhaps behind a carriage return. No byte moves, so that a place in one text is a place in the other.
 pub fn line_feeds(text: &str) -> Cow<'_, str> {
     let mut lone = lone_returns(text).peekable();
     if lone.peek().is_none() {
@@ -34,9 +34,9 @@ fn lone_returns(text: &str) -> impl Iterator<Item = usize> + '_ {
 /// A range of bytes in the program's sources.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Default, PartialOrd, Ord)]
 pub struct Span {
-    /// First byte.
+    /// Offset of the first byte.
     pub start: u32,
-    /// Byte after the last.
+    /// Offset of the byte after the last.
     pub end: u32,
 }
 
@@ -46,7 +46,7 @@ impl Span {
         Span { start, end }
     }
 
-    /// From the start of one to the end of the other.
+    /// From the start of this span to the end of another.
     pub const fn to(self, end: Span) -> Span {
         Span { start: self.start, end: end.end }
     }
@@ -74,14 +74,14 @@ impl chumsky::span::Span for Span {
     }
 }
 
-/// A source file.
+/// A source file and its place in the space of all offsets.
 #[derive(Clone, Debug)]
 pub struct Source {
-    /// Its path within the project, as diagnostics show it.
+    /// Path within the project, as diagnostics show it.
     pub name: Arc<str>,
-    /// Its text.
+    /// Text, with the line feeds of [`line_feeds`].
     pub text: Arc<String>,
-    /// Offset of its first byte in the space of all files.
+    /// Offset of the first byte in the space of all files.
     pub base: u32,
 }
 
@@ -105,20 +105,20 @@ impl Sources {
         self.add_shared(name, text.into())
     }
 
-    /// The same, of a text that others have too. Its lines are those that [`line_feeds`] makes of it.
+    /// Adds a file whose text is shared, with the line feeds of [`line_feeds`]; `None` if the space of offsets is full.
     pub fn add_shared(&mut self, name: &str, text: Arc<String>) -> Option<usize> {
         let text = match line_feeds(&text) {
             Cow::Borrowed(_) => text,
             Cow::Owned(text) => text.into(),
         };
-        // One offset lies between two files: the end of one is not the start of the next.
+        // A spare offset lies between two files: the end of a file is not the start of the next.
         let base = self.files.last().map_or(0, |last| last.base as usize + last.text.len() + 1);
         u32::try_from(base + text.len() + 1).ok()?;
         self.files.push(Source { name: name.into(), text, base: base as u32 });
         Some(self.files.len() - 1)
     }
 
-    /// The files.
+    /// The files, in the order in which they were met.
     pub fn files(&self) -> &[Source] {
         &self.files
     }
@@ -175,7 +175,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lines_end_in_whatever_ends_lines() {
+    fn lines_end_at_every_line_terminator() {
         let text = "a\r\r\nb\nc\rd";
         let lines = Lines::of(text);
         let all: Vec<&str> = (1..=5).map_while(|number| lines.text(text, number)).collect();

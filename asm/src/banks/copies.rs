@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Copies between banks: an operation that copies a value to the bank of its register, if another slot computes it. It goes into a
-//! slot that the source leaves free, else into a bundle of its own.
+//! Copies between banks: an operation that copies a value to the bank of its register, if another slot computes it. The copy goes
+//! into a slot that the source leaves free, else into a bundle of its own.
 
 use crate::banks::webs::BankCopy;
 use crate::banks::{self, Adjustment, BankAssignment, Transfer};
@@ -14,11 +14,11 @@ use takt_isa::{BundleAddress, Effect, Op};
 #[derive(Clone)]
 struct RunBundle {
     bundle: Bundle,
-    /// The bundle that it was; none if it is new.
+    /// Index of the original bundle; `None` for a new one.
     origin: Option<usize>,
 }
 
-/// True if a preset or a fused operation has replaced an operation.
+/// A preset or a fused operation has replaced this operation.
 fn is_gone(operation: &Operation) -> bool {
     operation.made && operation.op == Op::nop
 }
@@ -55,7 +55,7 @@ pub(crate) fn insert(ir: &mut Ir, assignment: &mut BankAssignment, copies: &[Ban
             let limit = limit(ir, run, copy, &here[index + 1..]);
             let cycles = put(ir, &mut places, run, copy, operation, limit);
             assignment.copied.push((assignment.adjustments.len(), copy.from));
-            // Its address is known after scheduling.
+            // The address is known after scheduling.
             let transfer = Transfer::Copy { address: BundleAddress::RESET, alone: true, cycles };
             assignment.adjustments.push(banks::adjustment(ir, copy.to, home.slot, &from, transfer));
         }
@@ -73,7 +73,7 @@ pub(crate) fn insert(ir: &mut Ir, assignment: &mut BankAssignment, copies: &[Ban
     ir.replace_bundles(bundles, |position: u32| moved.get(position as usize).copied().unwrap_or(position));
 }
 
-/// The bundle of a run before which a value must be copied: where control leaves, and for an output port also the next write
+/// Index of the bundle before which a value must be copied: where control leaves, and for an output port also the next write
 /// and the next access to memory, which may fault. `later` are the copies of the run that follow.
 fn limit(ir: &Ir, run: Run, copy: &BankCopy, later: &[BankCopy]) -> usize {
     let output = ir.register(copy.to).kind == RegisterKind::Output;

@@ -14,8 +14,8 @@ use crate::context::bits_text;
 use crate::ir::flow::{self, Flow};
 use crate::ir::runs::{self, Run};
 use crate::ir::{Constant, Ir, Operation, RegisterId, RegisterKind, VirtualRegister};
-use crate::report::source::Span;
 use foldhash::HashSet;
+use takt_diagnostics::source::Span;
 use takt_isa::fp::Host;
 use takt_isa::program::Location;
 use takt_isa::{BundleAddress, Effect, Machine, Op, ROWS, Register, Row, SlotIndex, Slots, Type, compute};
@@ -23,15 +23,15 @@ use takt_isa::{BundleAddress, Effect, Machine, Op, ROWS, Register, Row, SlotInde
 /// A transfer of a value to the home bank of its register.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Adjustment {
-    /// The register's name.
+    /// Name of the register in the source.
     pub register: String,
-    /// The bank that it lies in.
+    /// Home bank of the register.
     pub bank: &'static str,
-    /// The mnemonic of the operation that could not write it.
+    /// Mnemonic of the operation whose slot cannot write this bank.
     pub mnemonic: &'static str,
     /// The operation's source line.
     pub location: Option<Location>,
-    /// The transfer.
+    /// Transfer of the value to the bank.
     pub transfer: Transfer,
 }
 
@@ -42,13 +42,13 @@ pub enum Transfer {
     Preset(u32),
     /// An operation of the right slot, by name, gives the same bits.
     Rematerialised(&'static str),
-    /// Its value is copied.
+    /// The value is copied.
     Copy {
         /// The bundle that copies.
         address: BundleAddress,
-        /// True if nothing else issues in that bundle.
+        /// The copy issues in a bundle of its own.
         alone: bool,
-        /// The cycles that it costs its straight run of bundles; `None` if that is scheduled.
+        /// Cycles that the copy adds to its straight run of bundles; `None` if the run is scheduled.
         cycles: Option<u32>,
     },
 }
@@ -77,9 +77,9 @@ impl std::fmt::Display for Transfer {
 /// The home bank of a register.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct HomeBank {
-    /// The slot that writes it.
+    /// The slot that writes the bank.
     pub(crate) slot: SlotIndex,
-    /// The operation that copies bits there, if there is one.
+    /// The operation of the slot that copies bits, if it has one.
     pub(crate) copier: Option<Op>,
 }
 
@@ -95,14 +95,14 @@ pub(crate) struct BankConflict {
 /// The assignment of a program's registers to banks.
 #[derive(Default)]
 pub(crate) struct BankAssignment {
-    /// By register.
+    /// Home bank of each register that several slots write, by register index.
     pub(crate) of: Vec<Option<HomeBank>>,
     /// Liveness of registers with a home bank: by run, true if the register is live after it.
     pub(crate) live: Vec<(RegisterId, Vec<bool>)>,
     pub(crate) conflicts: Vec<BankConflict>,
     /// Registers that the source writes in `.once`, if only to write them again before they are read.
     pub(crate) set_once: HashSet<RegisterId>,
-    /// Registers made for values; that nothing reads one is no mistake.
+    /// Registers made for values: not reported if nothing reads them.
     pub(crate) quiet: HashSet<RegisterId>,
     pub(crate) adjustments: Vec<Adjustment>,
     /// For each copied value the index of its adjustment, and its register.
@@ -119,25 +119,25 @@ impl BankAssignment {
         self.conflicts.iter().find(|conflict| conflict.register == register)
     }
 
-    /// True if a register is live after a run: its value may be read, or a port shows it.
+    /// A register is live after a run: its value may be read, or a port shows it.
     pub(crate) fn is_live(&self, register: RegisterId, run: usize) -> bool {
         let found = self.live.binary_search_by_key(&register, |(register, _)| *register);
         found.map_or(true, |index| self.live[index].1[run])
     }
 }
 
-/// A write of a register: each of an output port, of others the last of each run.
+/// A write of a register: every write of an output port, the last write of each run for others.
 struct Write {
     bundle: usize,
     number: usize,
     slot: SlotIndex,
-    /// True if the value must reach the home bank: a port shows it, or it is live after the run.
+    /// The value must reach the home bank: a port shows it, or it is live after the run.
     live: bool,
-    /// The bits that it writes, if they are known.
+    /// The bits written, if they are known.
     constant: Option<u32>,
-    /// True if the loader can set them.
+    /// The loader can set the bits.
     initial: bool,
-    /// True if the value can be copied after it.
+    /// The value can be copied after the write.
     copied: bool,
 }
 
@@ -145,7 +145,7 @@ struct Write {
 const OPERATION: u64 = 1;
 const COPY: u64 = 4;
 
-/// Assigns home banks. Constants are transferred here; a value that is to be copied still writes the register.
+/// Assigns home banks. Constants are transferred here; values that need a copy still write the register.
 pub(crate) fn assign(ir: &mut Ir) -> BankAssignment {
     let contested = webs::contested(ir);
     let mut assignment = BankAssignment { of: vec![None; ir.registers.len()], ..BankAssignment::default() };
@@ -193,7 +193,7 @@ fn bank_writes(ir: &Ir, runs: &[Run], flow: &Flow, id: RegisterId, live: &[bool]
     let output = ir.register(id).kind == RegisterKind::Output;
     let fixed = runs::jumps_to_numbers(ir);
     let mut writes = Vec::new();
-    // True if an operation so far has used the register.
+    // An earlier operation has used the register.
     let mut used = false;
     for (run, live) in runs.iter().zip(live) {
         let first = writes.len();
@@ -217,7 +217,7 @@ fn bank_writes(ir: &Ir, runs: &[Run], flow: &Flow, id: RegisterId, live: &[bool]
     writes
 }
 
-/// True if the loader can set the register that an operation writes, provided that nothing uses it before.
+/// The loader can set the register that an operation writes, provided that nothing uses the register before.
 pub(crate) fn is_initial(ir: &Ir, flow: &Flow, at: usize, operation: &Operation) -> bool {
     let output = operation.dest.is_some_and(|dest| ir.register(dest).kind == RegisterKind::Output);
     !output && at < flow.once && constant(ir, operation).is_some()
@@ -259,7 +259,7 @@ fn best_bank(ir: &Ir, flow: &Flow, writes: &[Write], pinned: Option<Register>) -
         .map(|(_, _, slot)| slot)
 }
 
-/// True if no operation of a write's bundle needs a slot.
+/// No operation of the write's bundle needs the slot.
 fn is_free(ir: &Ir, write: &Write, slot: SlotIndex) -> bool {
     ir.bundles[write.bundle].operations.iter().all(|operation| operation.slot != Some(slot))
 }
@@ -270,7 +270,7 @@ fn transfer_constant(ir: &mut Ir, id: RegisterId, slot: SlotIndex, write: &Write
     let old = ir.bundles[write.bundle].operations[write.number];
     let transfer = if write.initial {
         ir.registers[id.index()].preset = Some(bits);
-        // It leaves its bundle later: indices of operations still count it.
+        // Taken out of its bundle later: indices of operations still count it.
         ir.bundles[write.bundle].operations[write.number] = Operation { made: true, ..old.idle() };
         Transfer::Preset(bits)
     } else if is_free(ir, write, slot) {
@@ -372,7 +372,7 @@ fn materialise(machine: &Machine, slot: SlotIndex, bits: u32) -> Option<(Op, [u3
         .map(|(_, op, sources)| (op, sources))
 }
 
-/// The register that holds these bits.
+/// The register that holds these bits, new if necessary.
 fn constant_register(ir: &mut Ir, bits: u32, span: Span) -> RegisterId {
     let holds = |register: &VirtualRegister| match register.kind {
         RegisterKind::Zero => bits == 0,

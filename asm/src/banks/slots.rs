@@ -7,7 +7,7 @@
 //! first open variable, in source order, takes its first slot, and so on. A bundle without a solution splits its operations from
 //! the shared variables; `resolve` has checked that it then has one.
 //!
-//! The scheduler chooses slots again for what it packs, as long as a register stays in one bank.
+//! The scheduler chooses slots again for operations that it packs, as long as a register stays in one bank.
 
 use crate::banks;
 use crate::ir::flow::Flow;
@@ -18,8 +18,8 @@ use foldhash::HashSet;
 use std::collections::{BTreeMap, VecDeque};
 use takt_isa::{SlotIndex, Slots};
 
-/// An operation: its bundle, and which of its operations.
-type At = (usize, usize);
+/// Position of an operation: its bundle, and its index there.
+type OperationPosition = (usize, usize);
 
 /// Chooses a slot for each operation.
 pub(crate) fn assign(ir: &mut Ir) {
@@ -36,22 +36,22 @@ pub(crate) fn assign(ir: &mut Ir) {
 
 /// The variables and their domains.
 struct Choice {
-    /// For each operation that needs a slot its variable, which it may share with those that write its register.
-    of: BTreeMap<At, usize>,
-    /// The domain of each variable: the slots that are left.
+    /// By operation that needs a slot: its variable, which writers of one register may share.
+    of: BTreeMap<OperationPosition, usize>,
+    /// Domain of each variable: the slots that are left.
     sets: Vec<Slots>,
-    /// For each variable the bundles of several operations that it occurs in.
+    /// By variable: the bundles of several operations that it occurs in.
     bundles: Vec<Vec<usize>>,
-    /// For each operation the slots that may execute it.
-    able: BTreeMap<At, Slots>,
+    /// By operation: the slots that may execute it.
+    able: BTreeMap<OperationPosition, Slots>,
 }
 
 impl Choice {
     fn new(ir: &Ir) -> Choice {
         let mut choice =
             Choice { of: BTreeMap::new(), sets: Vec::new(), bundles: Vec::new(), able: BTreeMap::new() };
-        let mut writers: BTreeMap<RegisterId, Vec<At>> = BTreeMap::new();
-        // Registers used so far. An operation that sets one to a constant before that may become a preset, whatever its bank.
+        let mut writers: BTreeMap<RegisterId, Vec<OperationPosition>> = BTreeMap::new();
+        // Registers used so far. An operation that sets an unused register to a constant may become a preset, whatever its bank.
         let mut used: HashSet<RegisterId> = HashSet::default();
         let runs = runs::runs(ir);
         let flow = Flow::new(ir, &runs);
@@ -75,7 +75,7 @@ impl Choice {
             used.extend(operations().filter_map(|operation| operation.dest));
         }
         for (register, writers) in writers {
-            let is_open = |at: &At| choice.able.get(at).is_some_and(|slots| slots.len() > 1);
+            let is_open = |at: &OperationPosition| choice.able.get(at).is_some_and(|slots| slots.len() > 1);
             if writers.len() > 1 && writers.iter().any(is_open) {
                 let (writers, slots) = together(ir, &runs, &flow, register, &writers);
                 choice.join(&writers, slots);
@@ -85,7 +85,7 @@ impl Choice {
     }
 
     /// Joins the variables of several operations.
-    fn join(&mut self, operations: &[At], slots: Slots) {
+    fn join(&mut self, operations: &[OperationPosition], slots: Slots) {
         let joint = self.sets.len();
         self.sets.push(slots);
         let bundles = operations.iter().filter_map(|at| self.of.insert(*at, joint));
@@ -94,7 +94,7 @@ impl Choice {
         self.bundles.push(bundles);
     }
 
-    /// Assigns every variable.
+    /// Settles every variable on one slot.
     fn settle(&mut self) {
         let all: Vec<usize> = self.bundles.iter().flatten().copied().collect();
         self.propagate(all.into());
@@ -112,7 +112,7 @@ impl Choice {
     /// Propagates the constraints of bundles to a fixed point: removes each slot that no matching of a bundle uses.
     fn propagate(&mut self, mut waiting: VecDeque<usize>) {
         while let Some(bundle) = waiting.pop_front() {
-            let operations: Vec<At> =
+            let operations: Vec<OperationPosition> =
                 self.of.range((bundle, 0)..(bundle + 1, 0)).map(|(at, _)| *at).collect();
             let variables: Vec<usize> = operations.iter().map(|at| self.of[at]).collect();
             let mut sets: Vec<Slots> = variables.iter().map(|variable| self.sets[*variable]).collect();
@@ -147,17 +147,24 @@ impl Choice {
     }
 }
 
-/// The operations that write a register and shall share a slot, and the slots that can take them: all operations, if a slot can take
-/// all; else those whose values must reach the register's home bank, or the heaviest of these that agree on a slot.
-fn together(ir: &Ir, runs: &[Run], flow: &Flow, register: RegisterId, writers: &[At]) -> (Vec<At>, Slots) {
-    let able = |at: &At| ir.bundles[at.0].operations[at.1].slots;
-    let common = |writers: &[At]| writers.iter().map(able).reduce(Slots::and).unwrap_or_default();
+/// The operations that write a register and shall share a slot, and the slots that can take them: all writers, if a slot can take
+/// them all; else the writers whose values must reach the register's home bank, or the heaviest of these that agree on a slot.
+fn together(
+    ir: &Ir,
+    runs: &[Run],
+    flow: &Flow,
+    register: RegisterId,
+    writers: &[OperationPosition],
+) -> (Vec<OperationPosition>, Slots) {
+    let able = |at: &OperationPosition| ir.bundles[at.0].operations[at.1].slots;
+    let common =
+        |writers: &[OperationPosition]| writers.iter().map(able).reduce(Slots::and).unwrap_or_default();
     if !common(writers).is_empty() {
         return (writers.to_vec(), common(writers));
     }
     // The last of each run; an output port shows every value.
-    let run = |at: &At| runs.partition_point(|run| run.start <= at.0);
-    let mut lasting: Vec<At> = match ir.register(register).kind {
+    let run = |at: &OperationPosition| runs.partition_point(|run| run.start <= at.0);
+    let mut lasting: Vec<OperationPosition> = match ir.register(register).kind {
         RegisterKind::Output => writers.to_vec(),
         _ => writers.chunk_by(|a, b| run(a) == run(b)).filter_map(|run| run.last().copied()).collect(),
     };

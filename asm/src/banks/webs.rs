@@ -5,7 +5,7 @@
 //! In `fmul t, a, b` and then `fadd t, t, c` the name `t` stands for two values, which on a machine with several banks may even
 //! lie in different ones. Each value but the run's last, which may be live after it, is renamed where that matters: where the
 //! scheduler may move the operations (renaming removes anti- and output dependences), and for names that operations of different
-//! slots write. Of these the last value, too, if its slot does not write the name's home bank.
+//! slots write. For such names the last value is renamed, too, if its slot does not write the home bank.
 
 use crate::banks::BankAssignment;
 use crate::ir::runs;
@@ -31,24 +31,24 @@ struct Renaming {
     left: u32,
     /// Values that have got a register of their own.
     made: u32,
-    /// The register of its current value, if not itself.
+    /// Register of the current value, if renamed.
     current: Option<RegisterId>,
-    /// The index of that value's [`Version`].
+    /// Index of the current value's [`Version`].
     version: usize,
 }
 
 /// A value to be copied to the home bank of its name.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BankCopy {
-    /// The bundle that computes it, and which of its operations.
+    /// Bundle and index of the operation that computes the value.
     pub(crate) at: (usize, usize),
-    /// The register that it lies in.
+    /// Register that holds the value.
     pub(crate) from: RegisterId,
-    /// The register that it goes to.
+    /// Register in the home bank.
     pub(crate) to: RegisterId,
 }
 
-/// Renames values. Returns those that are still to be copied to their home banks, in order.
+/// Renames values. Returns the values that are still to be copied to their home banks, in order.
 pub(crate) fn split(ir: &mut Ir, assignment: &mut BankAssignment) -> Vec<BankCopy> {
     let mut copies = Vec::new();
     if assignment.of.iter().all(Option::is_none) && !ir.scheduled {
@@ -86,7 +86,7 @@ pub(crate) fn split(ir: &mut Ir, assignment: &mut BankAssignment) -> Vec<BankCop
                 let original = &registers[dest.index()];
                 let home = assignment.get(dest);
                 let is_home = home.is_none_or(|home| operation.slot == Some(home.slot));
-                // A port shows every value, another register the run's last.
+                // A port shows every value; of another register only the run's last value matters.
                 let settles = name.left == 0 || original.kind == RegisterKind::Output;
                 if settles && is_home {
                     name.current = None;
@@ -126,7 +126,7 @@ pub(crate) fn split(ir: &mut Ir, assignment: &mut BankAssignment) -> Vec<BankCop
     copies
 }
 
-/// True if the values of a name may have registers of their own.
+/// The values of a name may have registers of their own.
 fn is_free(register: &VirtualRegister) -> bool {
     register.kind == RegisterKind::Plain && register.pinned.is_none() && register.preset.is_none()
 }

@@ -1,43 +1,43 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Checks of the whole program: registers that are read and never written, written by several slots, or never read.
 
-mod reach;
 pub(crate) mod types;
+mod unreachable;
 
 use crate::banks::{BankAssignment, BankConflict};
 use crate::context::{Context, ScopeId};
 use crate::ir::{Constant, Ir, Operation, RegisterId, RegisterKind, VirtualRegister};
-use crate::report::diag::{Diagnostic, Severity};
-use crate::report::nearest;
-use crate::report::source::Span;
-use crate::syntax::ast::Section;
+use takt_diagnostics::diag::{Diagnostic, Severity};
+use takt_diagnostics::nearest;
+use takt_diagnostics::source::Span;
 use takt_isa::program::Space;
 use takt_isa::{Effect, Field, Operand, ROWS, SlotIndex};
+use takt_syntax::ast::Section;
 
-/// An operation's place in the program: its bundle, and its index there.
-type Where = (u32, u32);
+/// Position of an operation in the program: its bundle, and its index there.
+type OperationPosition = (u32, u32);
 
 /// The uses of a register.
 #[derive(Clone, Copy, Default, Debug)]
 struct Use {
-    /// The first operation that reads it, and as which of its sources.
-    read: Option<(Where, usize)>,
-    /// The first operation that writes it, and its slot.
-    written: Option<(Where, SlotIndex)>,
-    /// True if an operation of `.once` writes it.
+    /// The first operation that reads the register, and the index of the source.
+    read: Option<(OperationPosition, usize)>,
+    /// The first operation that writes the register, and its slot.
+    written: Option<(OperationPosition, SlotIndex)>,
+    /// An operation of `.once` writes the register.
     once: bool,
-    /// Slots, by bit, that write it though another does.
+    /// Slots, by bit, that write the register besides the slot of the first write.
     conflicts: u64,
 }
 
 /// Checks a resolved program whose registers have their banks.
 pub(crate) fn check(context: &mut Context, ir: &Ir, assignment: &BankAssignment) {
-    // Operations with mistakes are not in the program: what then seems unused need not be.
+    // Operations with mistakes are not in the program: registers that then seem unused need not be.
     let complete = context.reports.sink.errors == 0;
     let mut uses = vec![Use::default(); ir.registers.len()];
     let mut opaque = false;
     let end = ir.bundles.len() as u32;
-    let mut beyond: Vec<Where> = Vec::new();
+    let mut beyond: Vec<OperationPosition> = Vec::new();
     for (index, bundle) in (0..).zip(&ir.bundles) {
         for (number, operation) in (0..).zip(&bundle.operations) {
             for (which, source) in operation.reads().iter().enumerate() {
@@ -58,7 +58,7 @@ pub(crate) fn check(context: &mut Context, ir: &Ir, assignment: &BankAssignment)
                         reach(context, ir, operation, dest, slot);
                     }
                 }
-                // One report for each slot too many is enough.
+                // Report each slot too many only once.
                 Some((first, owner)) if owner != slot && found.conflicts & 1 << slot.index() == 0 => {
                     found.conflicts |= 1 << slot.index();
                     two_slots(
@@ -93,9 +93,9 @@ pub(crate) fn check(context: &mut Context, ir: &Ir, assignment: &BankAssignment)
     }
     if !opaque {
         no_wait(context, ir);
-        reach::check(context, ir);
+        unreachable::check(context, ir);
         for array in context.declared.arrays.clone() {
-            // Of an array it is enough that one element is used.
+            // An array counts as used if one element is.
             let elements = array.elements().map(RegisterId::index);
             let best = elements
                 .max_by_key(|&element| (uses[element].read.is_some(), uses[element].written.is_some()));
@@ -133,7 +133,7 @@ pub(crate) fn check(context: &mut Context, ir: &Ir, assignment: &BankAssignment)
     }
 }
 
-fn at(ir: &Ir, (bundle, number): Where) -> &Operation {
+fn at(ir: &Ir, (bundle, number): OperationPosition) -> &Operation {
     &ir.bundles[bundle as usize].operations[number as usize]
 }
 
@@ -219,7 +219,7 @@ pub(crate) fn text(ir: &Ir, register: &VirtualRegister) -> String {
     format!("@{place}")
 }
 
-/// Registers that are never used, outputs that are never written, and what is written and never read.
+/// Warns of registers that are never used, outputs that are never written, and registers that are written and never read.
 fn unused(context: &mut Context, register: &VirtualRegister, found: &Use) {
     let name = &register.name;
     let (read, written) = (found.read.is_some(), is_written(register, found));
@@ -234,7 +234,7 @@ fn unused(context: &mut Context, register: &VirtualRegister, found: &Use) {
             (false, true) => format!("register `{name}` is written and never read"),
         },
     };
-    // A name that begins with `_` says: on purpose. A register without a name has none to declare.
+    // A name that begins with `_` is unused on purpose. A register without a name has nothing to declare.
     if !name.is_empty() && !name.starts_with('_') {
         let span = register.span;
         context
@@ -244,12 +244,12 @@ fn unused(context: &mut Context, register: &VirtualRegister, found: &Use) {
     }
 }
 
-/// True if a register gets a value, from an operation or the loader.
+/// A register gets a value, from an operation or the loader.
 fn is_written(register: &VirtualRegister, found: &Use) -> bool {
     found.written.is_some() || register.preset.is_some()
 }
 
-/// A register that is read and that nothing writes. By giving it a place, one says that one knows.
+/// Reports a register that is read and that nothing writes; only a warning if the source gives it a place.
 fn unwritten(context: &mut Context, ir: &Ir, register: &VirtualRegister, found: &Use, uses: &[Use]) {
     let is_register = matches!(register.kind, RegisterKind::Plain | RegisterKind::State);
     let Some((place, which)) = found.read.filter(|_| is_register && !is_written(register, found)) else {
@@ -269,7 +269,7 @@ fn unwritten(context: &mut Context, ir: &Ir, register: &VirtualRegister, found: 
     if !register.name.is_empty() {
         diagnostic = diagnostic.also(register.span, "declared here");
     }
-    // Mistaken for another: that one is written and perhaps never read.
+    // A probable mix-up: suggest a register that is written and never read.
     let written =
         ir.registers.iter().zip(uses).filter(|(_, found)| found.written.is_some() && found.read.is_none());
     diagnostic = match nearest(&name, written.map(|(register, _)| register.name.as_str())) {
@@ -296,7 +296,7 @@ fn state(context: &mut Context, ir: &Ir, register: &VirtualRegister, found: &Use
     context.reports.sink.push(error);
 }
 
-/// The bundle that an operation may continue at.
+/// Address of the bundle that an operation may continue at.
 fn target(ir: &Ir, operation: &Operation) -> Option<u32> {
     let target = match operation.constant {
         Constant::Value(target) => target,
@@ -306,7 +306,7 @@ fn target(ir: &Ir, operation: &Operation) -> Option<u32> {
     operation.row().shape.fields().contains(&Field::Target).then_some(target)
 }
 
-/// Warns of a target where there is no bundle, in a program of so many.
+/// Warns of a target beyond the program's `end` bundles.
 fn leaves(context: &mut Context, operation: &Operation, end: u32) {
     let span = operand(context, operation, |operand| *operand == Operand::Target);
     let message = "this continues past the end of the program";
@@ -327,7 +327,7 @@ fn no_wait(context: &mut Context, ir: &Ir) {
         if bundle.operations.iter().any(ends) {
             return;
         }
-        reached.extend(reach::next(ir, index, bundle));
+        reached.extend(unreachable::next(ir, index, bundle));
     }
     let Some(first) = ir.bundles.get(ir.period as usize).and_then(|bundle| bundle.operations.first()) else {
         return;

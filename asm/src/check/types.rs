@@ -2,24 +2,24 @@
 //! Type check: an abstract interpretation that warns of an operand whose value is certainly of another type than the operation reads.
 //!
 //! The instruction table gives every operand a type. A value has the type of the result that wrote it, of its declaration (ports, states,
-//! registers with a type or a preset), of its literal, or of its table in data memory; what takes any bits passes the type
-//! on. Types of other registers are followed through each straight run; where runs meet, a register has the type of all that is
-//! written to it, or none. A value that may be of either type is not reported: every warning is about a value that is certainly of
-//! the other type.
+//! registers with a type or a preset), of its literal, or of its table in data memory; an operation that takes any bits passes the type
+//! on. Types of other registers are followed through each straight run; where runs meet, a register has the type of all that is written
+//! to it, or none. A value that may be of either type is not reported: every warning is about a value that is certainly of the other
+//! type.
 
 use crate::check::{dest_span, source_span, text};
 use crate::context::{Context, ScopeId, words};
-use crate::ir::given::{self, Given, GivenTypes, Kind, OperandPosition, TypeOrigin};
 use crate::ir::runs::Run;
+use crate::ir::type_evidence::{self, GivenTypes, Kind, OperandPosition, TypeEvidence, TypeOrigin};
 use crate::ir::{Ir, LabelId, Operation, RegisterId, RegisterKind, VirtualRegister};
-use crate::report::diag::Diagnostic;
-use crate::report::source::Span;
 use crate::resolve::forms::passed;
-use crate::syntax::expr::Value;
 use foldhash::HashMap;
 use smallvec::SmallVec;
 use std::cell::Cell;
+use takt_diagnostics::diag::Diagnostic;
+use takt_diagnostics::source::Span;
 use takt_isa::{Effect, ROWS, Row, Type};
+use takt_syntax::expr::Value;
 
 #[derive(Clone, Copy, Debug)]
 struct Origin {
@@ -28,19 +28,19 @@ struct Origin {
     scope: ScopeId,
 }
 
-/// Abstract value: its [`Kind`], which is enough to find that there is a mistake, or also the origin of that, for the report.
-trait Known: Copy {
-    /// A value of this kind from there.
+/// Abstract value: its [`Kind`] alone, which is enough to find a mistake, or also the origin of the kind, for the report.
+trait AbstractValue: Copy {
+    /// A value with a kind and its origin.
     fn new(kind: Kind, origin: Option<Origin>) -> Self;
 
     fn kind(self) -> Kind;
 
-    fn typed(self) -> Typed;
+    fn typed(self) -> TracedKind;
 
     fn join(self, other: Self) -> Self;
 }
 
-impl Known for Kind {
+impl AbstractValue for Kind {
     #[inline]
     fn new(kind: Kind, _: Option<Origin>) -> Kind {
         kind
@@ -51,8 +51,8 @@ impl Known for Kind {
         self
     }
 
-    fn typed(self) -> Typed {
-        Typed { kind: self, origin: None }
+    fn typed(self) -> TracedKind {
+        TracedKind { kind: self, origin: None }
     }
 
     #[inline]
@@ -62,26 +62,26 @@ impl Known for Kind {
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Typed {
+struct TracedKind {
     kind: Kind,
     origin: Option<Origin>,
 }
 
-impl Known for Typed {
-    fn new(kind: Kind, origin: Option<Origin>) -> Typed {
-        Typed { kind, origin }
+impl AbstractValue for TracedKind {
+    fn new(kind: Kind, origin: Option<Origin>) -> TracedKind {
+        TracedKind { kind, origin }
     }
 
     fn kind(self) -> Kind {
         self.kind
     }
 
-    fn typed(self) -> Typed {
+    fn typed(self) -> TracedKind {
         self
     }
 
-    fn join(self, other: Typed) -> Typed {
-        Typed { kind: self.kind.join(other.kind), origin: self.origin.or(other.origin) }
+    fn join(self, other: TracedKind) -> TracedKind {
+        TracedKind { kind: self.kind.join(other.kind), origin: self.origin.or(other.origin) }
     }
 }
 
@@ -89,15 +89,15 @@ impl Known for Typed {
 /// against the order of the program.
 const PASSES: usize = 8;
 
-/// Warns of values that are read as, or go to a register of, another type than theirs.
+/// Warns of values that an operation reads as another type, or that go to a register of another type.
 pub(crate) fn check(context: &mut Context, ir: &Ir, runs: &[Run]) {
-    // An operation with a mistake is not in the program, and what it would have written is unknown.
+    // An operation with a mistake is not in the program, and its results are unknown.
     if context.reports.sink.errors > 0 {
         return;
     }
     let given = std::mem::take(&mut context.declared.given);
     if Types::<Kind>::new(context, ir, &given).settle(runs) {
-        let mut types = Types::<Typed>::new(context, ir, &given);
+        let mut types = Types::<TracedKind>::new(context, ir, &given);
         types.settle(runs);
         types.walk(runs, Some(context));
     }
@@ -108,23 +108,23 @@ struct Types<'i, V> {
     given: &'i GivenTypes,
     /// The value of each register at the start of a run.
     entry: Vec<V>,
-    /// True if its declaration gives that.
+    /// The declaration gives the type of the register.
     declared: Vec<bool>,
     /// The present value of each register, and the run that wrote it.
     now: Vec<(u32, V)>,
     /// The tables of data memory, by label.
     tables: HashMap<LabelId, V>,
-    /// For each instruction, the sources whose bits its result is.
+    /// By instruction: the sources whose bits become its result.
     passed: Vec<SmallVec<[usize; 2]>>,
-    /// Registers whose type at the beginning of a run, as it was so far, has been read.
+    /// Registers whose present type at the beginning of a run has been read.
     read: Vec<Cell<bool>>,
     /// A value has changed since it was read: the fixed point is not reached.
     changed: bool,
-    /// Something is read, or goes to a register of, another type than its own.
+    /// An operation reads a value as another type, or writes it to a register of another type.
     mistaken: bool,
 }
 
-impl<'i, V: Known> Types<'i, V> {
+impl<'i, V: AbstractValue> Types<'i, V> {
     fn new(context: &Context, ir: &'i Ir, given: &'i GivenTypes) -> Types<'i, V> {
         // A raw word may write anything.
         let opaque = ir.is_opaque();
@@ -173,7 +173,7 @@ impl<'i, V: Known> Types<'i, V> {
         self.mistaken
     }
 
-    /// Gives up on what is still changing.
+    /// Gives up on types that still change.
     fn forget(&mut self) {
         for (entry, declared) in self.entry.iter_mut().zip(&self.declared) {
             if !declared {
@@ -183,7 +183,7 @@ impl<'i, V: Known> Types<'i, V> {
         self.tables.values_mut().for_each(|table| *table = any());
     }
 
-    /// True if an operation now reads a value as another type than its own, or chooses between two types.
+    /// An operation reads a value as another type than its own, or chooses between two types.
     #[inline]
     fn is_mistaken(&self, run: u32, operation: &Operation) -> bool {
         let (mut int, mut float) = (false, false);
@@ -191,8 +191,7 @@ impl<'i, V: Known> Types<'i, V> {
             let kind = self.source(run, operation, *which).kind();
             (int, float) = (int | (kind == Kind::Int), float | (kind == Kind::Float));
         }
-        let row = operation.row();
-        let mistaken = |which| match row.source_type(which) {
+        let mistaken = |which| match self.expected_type(operation, which).0 {
             Type::B => false,
             wanted => self.source(run, operation, which).kind().mistaken_for(wanted).is_some(),
         };
@@ -233,18 +232,44 @@ impl<'i, V: Known> Types<'i, V> {
     #[inline]
     fn source(&self, run: u32, operation: &Operation, which: usize) -> V {
         match self.given.get(operation, OperandPosition::Source(which as u8)) {
-            Some(Given::Cast(ty)) => V::new(Kind::of(ty), None),
-            Some(Given::Literal { kind, what, span }) => literal(operation, kind, what, span),
+            Some(TypeEvidence::Cast(ty)) => V::new(Kind::of(ty), None),
+            Some(TypeEvidence::Literal { kind, what, span }) => literal(operation, kind, what, span),
+            // A value that is certainly of another type stays a mistake.
+            Some(TypeEvidence::Asked(ty)) => match self.present(run, operation.sources[which]) {
+                value if value.kind().mistaken_for(ty).is_some() => value,
+                _ => V::new(Kind::of(ty), None),
+            },
+            _ => self.present(run, operation.sources[which]),
+        }
+    }
+
+    /// The present value of a register.
+    #[inline]
+    fn present(&self, run: u32, register: RegisterId) -> V {
+        let index = register.index();
+        match self.now[index] {
+            (written, typed) if written == run => typed,
             _ => {
-                let index = operation.sources[which].index();
-                match self.now[index] {
-                    (written, typed) if written == run => typed,
-                    _ => {
-                        self.read[index].set(true);
-                        self.entry[index]
-                    }
-                }
+                self.read[index].set(true);
+                self.entry[index]
             }
+        }
+    }
+
+    /// The type of the elements of the array that an operation loads from or stores to.
+    fn element(&self, operation: &Operation) -> Option<Type> {
+        self.ir.access(operation).map(|access| self.ir.arrays[access.array.0 as usize].ty)
+    }
+
+    /// The type that one of an operation's sources is to have, and true if a macro's parameter asks for it.
+    #[inline]
+    fn expected_type(&self, operation: &Operation, which: usize) -> (Type, bool) {
+        match self.given.get(operation, OperandPosition::Source(which as u8)) {
+            Some(TypeEvidence::Asked(ty)) => (ty, true),
+            _ if which == 1 && operation.row().effect == Effect::Store => {
+                (self.element(operation).unwrap_or(Type::B), false)
+            }
+            _ => (operation.row().source_type(which), false),
         }
     }
 
@@ -257,19 +282,38 @@ impl<'i, V: Known> Types<'i, V> {
             let origin = Origin { what, span: operation.span, scope: ScopeId(operation.expansion) };
             V::new(Kind::of(ty), Some(origin))
         };
-        if let Some(Given::Cast(ty)) = self.given.get(operation, OperandPosition::Dest) {
+        if let Some(TypeEvidence::Cast(ty)) = self.given.get(operation, OperandPosition::Dest) {
             return result(ty);
         }
         if row.result_type() != Type::B {
             return result(row.result_type());
         }
+        if let Some(TypeEvidence::Asked(ty)) = self.given.get(operation, OperandPosition::Dest) {
+            return result(ty);
+        }
         match row.effect {
             Effect::Immediate => match self.given.get(operation, OperandPosition::Immediate) {
-                Some(Given::Literal { kind, what, span }) => literal(operation, kind, what, span),
+                Some(TypeEvidence::Literal { kind, what, span }) => literal(operation, kind, what, span),
                 _ => any(),
             },
-            Effect::Load => self.table(operation).map_or(any(), |label| self.tables[&label]),
-            _ => {
+            Effect::Load => match self.element(operation) {
+                Some(ty) => result(ty),
+                None => self.table(operation).map_or(any(), |label| self.tables[&label]),
+            },
+            // The type of the sources that pass to the result; effects without a result have no such source.
+            Effect::Compute
+            | Effect::Nothing
+            | Effect::Store
+            | Effect::Jump
+            | Effect::BranchZero
+            | Effect::BranchNonzero
+            | Effect::Call
+            | Effect::Return
+            | Effect::Loop
+            | Effect::Wait
+            | Effect::Halt
+            | Effect::ReadFlags
+            | Effect::ClearFlags => {
                 let passed = &self.passed[operation.op as usize];
                 let typed = passed.iter().map(|which| self.source(run, operation, *which));
                 typed.reduce(V::join).unwrap_or(any())
@@ -280,12 +324,12 @@ impl<'i, V: Known> Types<'i, V> {
     /// The table that an operation's memory operand lies in, if that is known.
     fn table(&self, operation: &Operation) -> Option<LabelId> {
         match self.given.get(operation, OperandPosition::Table) {
-            Some(Given::Table(label)) if self.tables.contains_key(&label) => Some(label),
+            Some(TypeEvidence::Table(label)) if self.tables.contains_key(&label) => Some(label),
             _ => None,
         }
     }
 
-    /// Joins the value of a store into that of its table.
+    /// Joins the value of a store into the value of its table.
     fn store(&mut self, run: u32, operation: &Operation) {
         if operation.row().effect == Effect::Store
             && let Some(label) = self.table(operation)
@@ -313,7 +357,7 @@ impl<'i, V: Known> Types<'i, V> {
             if let Some(context) = context {
                 wrong_register(context, self.ir, operation, register, ty, result.typed());
             }
-            // One mistake, one warning.
+            // Report each mistake once.
             any()
         } else if matches!(result.kind(), Kind::Any | Kind::None) || register.ty == Type::B {
             self.entry[index]
@@ -323,16 +367,19 @@ impl<'i, V: Known> Types<'i, V> {
         self.now[index] = (run, value);
     }
 
-    /// Reports what an operation reads as another type than it is.
+    /// Reports the sources that an operation reads as another type.
     fn reads(&self, run: u32, operation: &Operation, context: &mut Context) {
         for which in 0..operation.reads().len() {
-            let wanted = operation.row().source_type(which);
+            let (wanted, is_asked) = self.expected_type(operation, which);
             if wanted == Type::B {
                 continue;
             }
             let source = self.source(run, operation, which).typed();
             if let Some(ty) = source.kind.mistaken_for(wanted) {
-                wrong_source(context, self.ir, operation, which, (ty, wanted), source);
+                match is_asked {
+                    true => wrong_argument(context, self.ir, operation, which, (ty, wanted), source),
+                    false => wrong_source(context, self.ir, operation, which, (ty, wanted), source),
+                }
             }
         }
         // A choice between an integer and a float is neither.
@@ -347,22 +394,22 @@ impl<'i, V: Known> Types<'i, V> {
     }
 }
 
-/// A value of any type, of which nothing is known.
-fn any<V: Known>() -> V {
+/// A value of unknown type, which no operand rejects.
+fn any<V: AbstractValue>() -> V {
     V::new(Kind::Any, None)
 }
 
-fn literal<V: Known>(operation: &Operation, kind: Kind, what: TypeOrigin, span: Span) -> V {
+fn literal<V: AbstractValue>(operation: &Operation, kind: Kind, what: TypeOrigin, span: Span) -> V {
     V::new(kind, Some(Origin { what, span, scope: ScopeId(operation.expansion) }))
 }
 
 /// The types of the tables of data memory, by label.
-fn tables<V: Known>(ir: &Ir, types: &[Type]) -> HashMap<LabelId, V> {
+fn tables<V: AbstractValue>(ir: &Ir, types: &[Type]) -> HashMap<LabelId, V> {
     let typed = |(label, kind): (LabelId, Kind)| {
         let span = ir.labels[label.0 as usize].span;
         (label, V::new(kind, Some(Origin { what: TypeOrigin::Table, span, scope: ScopeId::ROOT })))
     };
-    given::tables(&ir.labels, types).into_iter().map(typed).collect()
+    type_evidence::tables(&ir.labels, types).into_iter().map(typed).collect()
 }
 
 /// The instruction that converts from one type to another.
@@ -376,7 +423,7 @@ fn convert(from: Type, to: Type) -> String {
     conversion(from, to).map_or(String::new(), |mnemonic| format!("convert it with `{mnemonic}`, "))
 }
 
-/// Says where a value got its type.
+/// Adds to a warning where the value got its type.
 fn explained(warning: Diagnostic, ty: Type, origin: Option<Origin>) -> Diagnostic {
     let Some(Origin { what, span, .. }) = origin else { return warning };
     let is = words(ty);
@@ -392,8 +439,8 @@ fn explained(warning: Diagnostic, ty: Type, origin: Option<Origin>) -> Diagnosti
     )
 }
 
-/// A literal as a warning shows it, and how it would be written as the wanted type.
-fn shown(value: Value, wanted: Type) -> (String, Option<String>) {
+/// A literal as a warning shows it, and its spelling as the wanted type.
+fn literal_spellings(value: Value, wanted: Type) -> (String, Option<String>) {
     match (value, wanted) {
         (Value::Int(value), Type::F) => (format!("the integer {value}"), Some(format!("{value}.0"))),
         (Value::Int(value), _) => (format!("the integer {value}"), None),
@@ -404,19 +451,25 @@ fn shown(value: Value, wanted: Type) -> (String, Option<String>) {
     }
 }
 
-/// An operation reads a value as another type than it is.
+/// Warns that an operation reads a value as another type.
 fn wrong_source(
     context: &mut Context,
     ir: &Ir,
     operation: &Operation,
     which: usize,
     (ty, wanted): (Type, Type),
-    source: Typed,
+    source: TracedKind,
 ) {
-    let name = text(ir, ir.register(operation.sources[which]));
     let place = source_span(context, operation, which);
+    let name = match ir.register(operation.sources[which]) {
+        // An element, or a nameless value, is shown in its spelling.
+        register if register.name.is_empty() && register.pinned.is_none() => {
+            bare(context.reports.sources.text(place)).to_owned()
+        }
+        register => text(ir, register),
+    };
     if let Some(Origin { what: TypeOrigin::Literal(value), span, scope }) = source.origin {
-        let (shown, instead) = shown(value, wanted);
+        let (shown, instead) = literal_spellings(value, wanted);
         let message = format!("{shown} in `{name}` is read as {}", words(wanted));
         let warning = Diagnostic::warning("types", span, message)
             .also(place, format!("`{}` reads {} here", operation.row().mnemonic, words(wanted)));
@@ -458,6 +511,26 @@ fn wrong_source(
     context.report(ScopeId(operation.expansion), warning.help(help));
 }
 
+/// Reports that a macro's argument is of another type than the parameter asks for: an error, as the resolver reports it of types
+/// that are known where the macro is used.
+fn wrong_argument(
+    context: &mut Context,
+    ir: &Ir,
+    operation: &Operation,
+    which: usize,
+    (ty, wanted): (Type, Type),
+    source: TracedKind,
+) {
+    let name = text(ir, ir.register(operation.sources[which]));
+    let place = source_span(context, operation, which);
+    let parameter = bare(context.reports.sources.text(place)).to_owned();
+    let message =
+        format!("`{name}` is {} here, and the parameter `{parameter}` is {}", words(ty), words(wanted));
+    let error = explained(Diagnostic::error("types", place, message), ty, source.origin);
+    let help = format!("{}or declare `{name}:{}`", convert(ty, wanted), wanted.name());
+    context.report(ScopeId(operation.expansion), error.help(help));
+}
+
 /// The instruction that compares floats as this one compares integers.
 fn comparison(row: &Row, ty: Type) -> Option<&'static str> {
     let compares = |row: &Row, ty| row.effect == Effect::Compute && row.types == [Type::I, ty, ty];
@@ -474,15 +547,20 @@ fn bare(written: &str) -> &str {
     written.split_once(':').map_or(written, |(name, _)| name.trim_end())
 }
 
-/// An operation chooses between an integer and a float.
-fn either(context: &mut Context, operation: &Operation, int: (usize, Typed), float: (usize, Typed)) {
+/// Warns that an operation chooses between an integer and a float.
+fn either(
+    context: &mut Context,
+    operation: &Operation,
+    int: (usize, TracedKind),
+    float: (usize, TracedKind),
+) {
     let mnemonic = operation.row().mnemonic;
     let (here, there) = (source_span(context, operation, int.0), source_span(context, operation, float.0));
     let message = format!("`{mnemonic}` gives an integer or a float");
     let warning = Diagnostic::warning("types", here, message).here("an integer").also(there, "a float");
     let help = match int.1.origin.map(|origin| origin.what) {
         Some(TypeOrigin::Literal(value)) => {
-            shown(value, Type::F).1.map(|instead| format!("write `{instead}`"))
+            literal_spellings(value, Type::F).1.map(|instead| format!("write `{instead}`"))
         }
         _ => None,
     };
@@ -490,7 +568,7 @@ fn either(context: &mut Context, operation: &Operation, int: (usize, Typed), flo
     let help = help.unwrap_or_else(|| {
         format!("{}or write `{written}:bits` if its bits are meant", convert(Type::I, Type::F))
     });
-    // A flag that is kept in a state of no type.
+    // Typical cause: a flag kept in a state without a type.
     let help = match float.1.origin {
         Some(Origin { what: TypeOrigin::Declared, span, .. }) => {
             let declared = context.reports.sources.text(span);
@@ -501,19 +579,23 @@ fn either(context: &mut Context, operation: &Operation, int: (usize, Typed), flo
     context.report(ScopeId(operation.expansion), warning.help(help));
 }
 
-/// A value goes to a register that is declared as another type.
+/// Warns that a value goes to a register that is declared as another type.
 fn wrong_register(
     context: &mut Context,
     ir: &Ir,
     operation: &Operation,
     register: &VirtualRegister,
     ty: Type,
-    result: Typed,
+    result: TracedKind,
 ) {
-    let (name, wanted) = (text(ir, register), register.ty);
+    let name = match register.name.is_empty() && register.pinned.is_none() {
+        true => context.reports.sources.text(register.span).to_owned(),
+        false => text(ir, register),
+    };
+    let wanted = register.ty;
     let declare = format!("declare `{name}:{}` if it is {}", ty.name(), words(ty));
     if let Some(Origin { what: TypeOrigin::Literal(value), span, scope }) = result.origin {
-        let (shown, instead) = shown(value, wanted);
+        let (shown, instead) = literal_spellings(value, wanted);
         let message = format!("{shown} goes to `{name}`, which is {}", words(wanted));
         let warning = Diagnostic::warning("types", span, message).also(register.span, "declared here");
         let instead = instead.map_or(String::new(), |instead| format!("write `{instead}`, or "));
@@ -523,14 +605,14 @@ fn wrong_register(
     let place = dest_span(context, operation);
     let message = format!("{} goes to `{name}`, which is {}", words(ty), words(wanted));
     let warning = Diagnostic::warning("types", place, message).also(register.span, "declared here");
-    // That the operation itself gives it needs no telling.
+    // Don't note the origin if it is the operation already shown.
     let origin = result.origin.filter(|origin| origin.span != operation.span);
     let written = bare(context.reports.sources.text(place));
     let help = format!("{declare}, {}or write `{written}:bits` if its bits are meant", convert(ty, wanted));
     context.report(ScopeId(operation.expansion), explained(warning, ty, origin).help(help));
 }
 
-/// Shows what an integer is as a float.
+/// Adds the float that an integer's bits make.
 fn noted(warning: Diagnostic, value: Value) -> Diagnostic {
     match value {
         Value::Int(value) => {

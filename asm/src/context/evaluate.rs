@@ -1,21 +1,21 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The values of expressions, and of the names in them.
 
-use crate::context::{Argument, At, Binding, Context, Reported, ScopeId, Wanted};
+use crate::context::{Argument, AstPlace, Binding, Context, ErrorReported, NameRole, ScopeId};
 use crate::limits;
-use crate::report::diag::Diagnostic;
-use crate::report::nearest;
-use crate::report::source::Span;
-use crate::syntax::ast::*;
-use crate::syntax::expr::{self, BUILTINS, EvalError, Fault, Function, Value};
-use crate::syntax::name::{NameId, NameRef};
 use std::rc::Rc;
+use takt_diagnostics::diag::Diagnostic;
+use takt_diagnostics::nearest;
+use takt_diagnostics::source::Span;
 use takt_isa::Type;
+use takt_syntax::ast::*;
+use takt_syntax::expr::{self, BUILTINS, EvalError, Fault, Function, Value};
+use takt_syntax::name::{NameId, NameRef};
 
 impl Context {
-    /// The name that a reference stands for where it stands, noted for the index.
+    /// The name that a reference stands for, noted for the index.
     #[inline]
-    pub(crate) fn name(&mut self, at: At, name: NameRef, span: Span) -> Result<NameId, Reported> {
+    pub(crate) fn name(&mut self, at: AstPlace, name: NameRef, span: Span) -> Result<NameId, ErrorReported> {
         let name = self.spelled(at, name, span)?;
         if let Some(notes) = &mut self.notes {
             notes.name(span, at.scope, name);
@@ -23,9 +23,14 @@ impl Context {
         Ok(name)
     }
 
-    /// The name that is written somewhere, whatever it may mean there: a register's place, an instruction, a word as `on`.
+    /// The name that a reference spells, whatever it may mean there: a register's place, an instruction, a word as `on`.
     #[inline]
-    pub(crate) fn spelled(&mut self, at: At, name: NameRef, span: Span) -> Result<NameId, Reported> {
+    pub(crate) fn spelled(
+        &mut self,
+        at: AstPlace,
+        name: NameRef,
+        span: Span,
+    ) -> Result<NameId, ErrorReported> {
         match name.resolve() {
             Ok(name) => Ok(name),
             Err(template) => self.nested(at, span, |context| context.instantiate(at, template, span)),
@@ -35,10 +40,10 @@ impl Context {
     /// Guards an evaluation within an evaluation.
     fn nested<T>(
         &mut self,
-        at: At,
+        at: AstPlace,
         span: Span,
-        evaluate: impl FnOnce(&mut Context) -> Result<T, Reported>,
-    ) -> Result<T, Reported> {
+        evaluate: impl FnOnce(&mut Context) -> Result<T, ErrorReported>,
+    ) -> Result<T, ErrorReported> {
         if self.depth >= limits::EVALUATION_DEPTH {
             let message = "names and arguments depend on one another too deeply";
             return Err(self.error(at.scope, "limit", span, message));
@@ -49,7 +54,7 @@ impl Context {
         value
     }
 
-    fn instantiate(&mut self, at: At, template: usize, span: Span) -> Result<NameId, Reported> {
+    fn instantiate(&mut self, at: AstPlace, template: usize, span: Span) -> Result<NameId, ErrorReported> {
         let ast = Rc::clone(&self.asts[at.ast as usize]);
         let Template { parts, tail } = &ast.templates[template];
         let mut text = String::new();
@@ -80,7 +85,7 @@ impl Context {
     }
 
     /// The text for one braced part of a name.
-    fn piece(&mut self, at: At, nodes: &[Node], span: Span) -> Result<String, Reported> {
+    fn piece(&mut self, at: AstPlace, nodes: &[Node], span: Span) -> Result<String, ErrorReported> {
         // A parameter whose argument is a name gives the name's text, unless that is an integer.
         if let [Node { kind: NodeKind::Name(name), span: place }] = *nodes {
             let name = self.name(at, name, place)?;
@@ -127,7 +132,7 @@ impl Context {
     }
 
     /// The type of a name.
-    pub(crate) fn type_named(&mut self, at: At, ty: Name) -> Result<Type, Reported> {
+    pub(crate) fn type_named(&mut self, at: AstPlace, ty: Name) -> Result<Type, ErrorReported> {
         let text = self.reports.sources.text(ty.span).to_owned();
         let types = [Type::F, Type::I, Type::B];
         if let Some(ty) = types.into_iter().find(|ty| ty.name() == text) {
@@ -140,9 +145,9 @@ impl Context {
     }
 
     /// Reports why an expression has no value.
-    pub(crate) fn fault(&mut self, scope: ScopeId, EvalError { span, fault }: EvalError) -> Reported {
+    pub(crate) fn fault(&mut self, scope: ScopeId, EvalError { span, fault }: EvalError) -> ErrorReported {
         let help = match &fault {
-            Fault::Reported => return Reported,
+            Fault::Reported => return ErrorReported,
             Fault::UnknownFunction(name) => {
                 let meant = nearest(name, Function::ALL.iter().map(|function| function.name()));
                 let all: Vec<&str> = Function::ALL.iter().map(|function| function.name()).collect();
@@ -167,7 +172,7 @@ impl Context {
     }
 
     /// The value of an expression.
-    pub(crate) fn value(&mut self, at: At, expr: ExprId) -> Result<Value, Reported> {
+    pub(crate) fn value(&mut self, at: AstPlace, expr: ExprId) -> Result<Value, ErrorReported> {
         let ast = &self.asts[at.ast as usize];
         if let [node] = ast.nodes[expr.range()] {
             match node.kind {
@@ -182,7 +187,7 @@ impl Context {
     }
 
     /// The value of an index, given as its nodes.
-    pub(crate) fn index(&mut self, at: At, nodes: &[Node], span: Span) -> Result<i64, Reported> {
+    pub(crate) fn index(&mut self, at: AstPlace, nodes: &[Node], span: Span) -> Result<i64, ErrorReported> {
         let id = ExprId { first: 0, count: nodes.len() as u32 };
         let value = expr::evaluate(nodes, id, &mut Environment { context: self, at });
         let span = nodes.last().map_or(span, |node| node.span);
@@ -192,13 +197,18 @@ impl Context {
     }
 
     /// The value of an expression that is to be an integer.
-    pub(crate) fn integer(&mut self, at: At, expr: Expr) -> Result<i64, Reported> {
+    pub(crate) fn integer(&mut self, at: AstPlace, expr: Expr) -> Result<i64, ErrorReported> {
         let value = self.value(at, expr.id)?;
         value.integer().map_err(|fault| self.fault(at.scope, EvalError { span: expr.span, fault }))
     }
 
     /// The value of a name that is not an argument.
-    pub(crate) fn name_value(&mut self, scope: ScopeId, name: NameId, span: Span) -> Result<Value, Reported> {
+    pub(crate) fn name_value(
+        &mut self,
+        scope: ScopeId,
+        name: NameId,
+        span: Span,
+    ) -> Result<Value, ErrorReported> {
         match self.lookup(scope, name) {
             Binding::Count(value) => Ok(Value::Int(value)),
             Binding::Builtin(builtin) => Ok(BUILTINS[builtin as usize].1),
@@ -206,7 +216,7 @@ impl Context {
             Binding::Constant(id) => {
                 let constant = &mut self.declared.constants[id as usize];
                 constant.used = true;
-                constant.value.ok_or(Reported)
+                constant.value.ok_or(ErrorReported)
             }
             Binding::Data(id) => Ok(Value::Int(self.declared.labels[id.0 as usize].position.into())),
             Binding::Table(id) => {
@@ -215,7 +225,7 @@ impl Context {
                 Ok(Value::Int(table.array.base.into()))
             }
             Binding::Argument(id) => self.argument_value(id, span),
-            Binding::None => Err(self.unknown(scope, name, span, Wanted::Value)),
+            Binding::None => Err(self.unknown(scope, name, span, NameRole::Value)),
             binding => {
                 let kind = self.declared.kind_text(binding);
                 let message = format!("`{}` is {kind}: it has no value here", self.scopes.text(name));
@@ -238,17 +248,30 @@ impl Context {
         }
     }
 
-    fn argument_value(&mut self, id: u32, span: Span) -> Result<Value, Reported> {
-        let Argument { operand, at, value } = self.declared.arguments[id as usize];
+    fn argument_value(&mut self, id: u32, span: Span) -> Result<Value, ErrorReported> {
+        let Argument { operand, at, value, asked, .. } = self.declared.arguments[id as usize];
         if let Some(value) = value {
             return Ok(value);
         }
         let value = match operand.kind {
             OperandKind::Expr(expr) => self.nested(at, span, |context| context.value(at, expr))?,
-            OperandKind::Name(name) => self.nested(at, span, |context| {
-                let name = context.name(at, name, operand.span)?;
-                context.name_value(at.scope, name, operand.span)
-            })?,
+            OperandKind::Name(name) => {
+                let name = self.name(at, name, operand.span)?;
+                let binding = self.lookup(at.scope, name);
+                // Name what the macro needs: the argument's name alone would not tell.
+                if matches!(binding, Binding::Register(_) | Binding::Array(_) | Binding::Word(_)) {
+                    let (shown, kind) = (self.scopes.text(name).to_owned(), self.declared.kind_text(binding));
+                    let message = format!("`{shown}` is {kind}, and the macro needs a number here");
+                    let mut error = Diagnostic::error("not-a-value", operand.span, message)
+                        .also(span, "the assembler computes with it")
+                        .help("write a constant, or a register in a macro's parameter that is one");
+                    if let Some(declared) = self.declared.declaration(binding) {
+                        error = error.also(declared, "declared here");
+                    }
+                    return Err(self.report(at.scope, error));
+                }
+                self.nested(at, span, |context| context.name_value(at.scope, name, operand.span))?
+            }
             OperandKind::Place(_)
             | OperandKind::Memory(_)
             | OperandKind::Cast(_)
@@ -258,22 +281,29 @@ impl Context {
                 return Err(self.report(at.scope, error));
             }
         };
+        // The body computes with a value of the declared type.
+        let value = match asked.filter(|asked| asked.declared).and_then(|asked| asked.value()) {
+            Some(ty) => value
+                .of_type(ty)
+                .map_err(|fault| self.fault(at.scope, EvalError { span: operand.span, fault }))?,
+            None => value,
+        };
         self.declared.arguments[id as usize].value = Some(value);
         Ok(value)
     }
 }
 
-/// The names of an expression where it stands.
+/// Resolves the names of an expression in its scope.
 struct Environment<'c> {
     context: &'c mut Context,
-    at: At,
+    at: AstPlace,
 }
 
 impl expr::Names for Environment<'_> {
     fn value(&mut self, name: NameRef, span: Span) -> Result<Value, EvalError> {
         let name = self.context.name(self.at, name, span);
         name.and_then(|name| self.context.name_value(self.at.scope, name, span))
-            .map_err(|Reported| EvalError { span, fault: Fault::Reported })
+            .map_err(|ErrorReported| EvalError { span, fault: Fault::Reported })
     }
 
     fn function(&mut self, name: NameId, span: Span) -> Result<Function, EvalError> {

@@ -1,88 +1,87 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Counted loops as the source has them: what their indices stand for, and between which values an affine function of these lies
-//! over all iterations.
+//! Counted loops as the source has them: values of their indices, and bounds of affine functions of these over all iterations.
 
-use crate::context::{At, Binding, Context, Reported, ScopeId, ScopeKind};
+use crate::context::{AstPlace, Binding, Context, ErrorReported, ScopeId, ScopeKind};
 use crate::ir::RegisterId;
 use crate::ir::arrays::Affine;
-use crate::report::diag::Diagnostic;
-use crate::report::source::Span;
-use crate::syntax::ast::*;
-use crate::syntax::expr::{self, EvalError, Fault, Value};
-use crate::syntax::name::{NameId, NameRef};
 use smallvec::SmallVec;
+use takt_diagnostics::diag::Diagnostic;
+use takt_diagnostics::source::Span;
+use takt_syntax::ast::*;
+use takt_syntax::expr::{self, EvalError, Fault, Value};
+use takt_syntax::name::{NameId, NameRef};
 
-/// Points of an iteration space that are looked at one by one.
+/// The most points of an iteration space that are tried one by one.
 const POINTS: u32 = 1 << 18;
 
 /// A counted loop of [`Declared::loops`](crate::context::Declared::loops).
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 pub(crate) struct SourceLoopId(pub(crate) u32);
 
-/// A loop that is counted when the program runs, as the source has it: an iteration is one of the source, however many of them the
-/// assembler writes into one turn.
+/// A loop that is counted when the program runs. Its iterations are the source's, even if the assembler writes several into one
+/// turn.
 #[derive(Clone, Debug)]
 pub(crate) struct SourceLoop {
-    /// The most iterations that there can be, given the iterations of the loops around.
+    /// Upper bound of the iterations, given the iterations of the loops around.
     pub(crate) most: Affine<SourceLoopId>,
 }
 
 /// An integer that the assembler knows up to the iteration numbers of the loops around.
 #[derive(Clone, PartialEq, Debug)]
-pub(crate) struct Counted {
-    /// As a function of the iterations that the source has.
+pub(crate) struct AffineInteger {
+    /// The value as a function of the source's iterations.
     pub(crate) source: Affine<SourceLoopId>,
-    /// As a function of the iterations that the program has.
+    /// The value as a function of the program's iterations.
     pub(crate) actual: Affine,
-    /// Registers that are added, each times a factor: of a subscript that is known only when the program runs.
+    /// Registers that are added, each times a factor, in a subscript that is known only when the program runs.
     pub(crate) registers: SmallVec<[(RegisterId, i64); 1]>,
 }
 
-impl Counted {
-    pub(crate) fn constant(value: i64) -> Counted {
-        Counted::new(Affine::constant(value), Affine::constant(value))
+impl AffineInteger {
+    pub(crate) fn constant(value: i64) -> AffineInteger {
+        AffineInteger::new(Affine::constant(value), Affine::constant(value))
     }
 
-    pub(crate) fn new(source: Affine<SourceLoopId>, actual: Affine) -> Counted {
-        Counted { source, actual, registers: SmallVec::new() }
+    pub(crate) fn new(source: Affine<SourceLoopId>, actual: Affine) -> AffineInteger {
+        AffineInteger { source, actual, registers: SmallVec::new() }
     }
 
     /// The sum with a multiple of another; `None` if a number leaves 64 bits.
-    pub(crate) fn plus(&self, other: &Counted, factor: i64) -> Option<Counted> {
+    pub(crate) fn plus(&self, other: &AffineInteger, factor: i64) -> Option<AffineInteger> {
         let source = self.source.plus(&other.source, factor)?;
         let mut registers = self.registers.clone();
         for (register, coefficient) in &other.registers {
             registers.push((*register, coefficient.checked_mul(factor)?));
         }
-        Some(Counted { source, actual: self.actual.plus(&other.actual, factor)?, registers })
+        Some(AffineInteger { source, actual: self.actual.plus(&other.actual, factor)?, registers })
     }
 
-    /// Its value, if it depends on no iteration and no register.
+    /// The value, if it depends on no iteration and no register.
     pub(crate) fn as_constant(&self) -> Option<i64> {
         self.source.as_constant().and(self.actual.as_constant()).filter(|_| self.registers.is_empty())
     }
 }
 
-/// What a name stands for that a counted loop counts with.
+/// The index variable of a counted loop or a sum.
 #[derive(Clone, Debug)]
 pub(crate) struct Index {
-    pub(crate) value: Counted,
-    /// The loop, if the name is its index in the loop's body and not in what is left behind it.
+    pub(crate) value: AffineInteger,
+    /// The loop, while the name is its index in the loop's body, and not in the iterations left over behind it.
     pub(crate) of: Option<SourceLoopId>,
     /// The `.for` or the sum.
     pub(crate) span: Span,
 }
 
-/// A value while an expression is computed.
+/// An operand during evaluation.
 pub(crate) enum Operand {
     Value(Value),
-    Counted(Counted),
+    Counted(AffineInteger),
 }
 
 impl Operand {
-    fn counted(self) -> Result<Counted, Fault> {
+    fn counted(self) -> Result<AffineInteger, Fault> {
         match self {
-            Operand::Value(value) => Ok(Counted::constant(value.integer()?)),
+            Operand::Value(value) => Ok(AffineInteger::constant(value.integer()?)),
             Operand::Counted(counted) => Ok(counted),
         }
     }
@@ -90,24 +89,29 @@ impl Operand {
 
 impl Context {
     /// The value of an expression that may contain the indices of the loops around.
-    pub(crate) fn counted(&mut self, at: At, expr: Expr) -> Result<Counted, Reported> {
+    pub(crate) fn counted(&mut self, at: AstPlace, expr: Expr) -> Result<AffineInteger, ErrorReported> {
         let ast = std::rc::Rc::clone(&self.asts[at.ast as usize]);
         self.counted_nodes(at, &ast.nodes[expr.id.range()], expr.span, false)
     }
 
     /// The value of a subscript, given as its nodes.
-    pub(crate) fn subscript(&mut self, at: At, nodes: &[Node], span: Span) -> Result<Counted, Reported> {
+    pub(crate) fn subscript(
+        &mut self,
+        at: AstPlace,
+        nodes: &[Node],
+        span: Span,
+    ) -> Result<AffineInteger, ErrorReported> {
         self.counted_nodes(at, nodes, span, true)
     }
 
-    /// The value of an expression, given as its nodes; of one that may name registers, if `registers` is true.
+    /// The value of an expression, given as its nodes. It may name registers if `registers` is true.
     fn counted_nodes(
         &mut self,
-        at: At,
+        at: AstPlace,
         nodes: &[Node],
         span: Span,
         registers: bool,
-    ) -> Result<Counted, Reported> {
+    ) -> Result<AffineInteger, ErrorReported> {
         let mut stack: Vec<Operand> = Vec::with_capacity(4);
         for node in nodes {
             let operand = self.operand(at, node, &mut stack, registers)?;
@@ -117,14 +121,14 @@ impl Context {
         value.counted().map_err(|fault| self.fault(at.scope, EvalError { span, fault }))
     }
 
-    /// The value of a node, given those of its operands.
+    /// The value of a node; takes its operands from the stack.
     fn operand(
         &mut self,
-        at: At,
+        at: AstPlace,
         node: &Node,
         stack: &mut Vec<Operand>,
         registers: bool,
-    ) -> Result<Operand, Reported> {
+    ) -> Result<Operand, ErrorReported> {
         let span = node.span;
         let operands = match node.kind {
             NodeKind::Int(value) => return Ok(Operand::Value(Value::Int(value))),
@@ -159,8 +163,13 @@ impl Context {
         value.map(Operand::Value).map_err(|fault| self.fault(at.scope, EvalError { span, fault }))
     }
 
-    /// The value of a node one of whose operands depends on an iteration.
-    fn affine(&mut self, at: At, node: &Node, operands: Vec<Operand>) -> Result<Operand, Reported> {
+    /// The value of a node with an operand that depends on an iteration.
+    fn affine(
+        &mut self,
+        at: AstPlace,
+        node: &Node,
+        operands: Vec<Operand>,
+    ) -> Result<Operand, ErrorReported> {
         let span = node.span;
         let fault = |context: &mut Context, fault| context.fault(at.scope, EvalError { span, fault });
         let mut counted = Vec::with_capacity(operands.len());
@@ -170,14 +179,14 @@ impl Context {
         let overflow = Fault::IntegerOverflow("an index");
         let value = match (node.kind, &counted[..]) {
             (NodeKind::Prefix(Operator::Add), [a]) => Some(a.clone()),
-            (NodeKind::Prefix(Operator::Sub), [a]) => Counted::constant(0).plus(a, -1),
+            (NodeKind::Prefix(Operator::Sub), [a]) => AffineInteger::constant(0).plus(a, -1),
             (NodeKind::Infix(Operator::Add), [a, b]) => a.plus(b, 1),
             (NodeKind::Infix(Operator::Sub), [a, b]) => a.plus(b, -1),
             (NodeKind::Infix(Operator::Mul), [a, b]) if b.as_constant().is_some() => {
-                Counted::constant(0).plus(a, b.as_constant().unwrap_or(0))
+                AffineInteger::constant(0).plus(a, b.as_constant().unwrap_or(0))
             }
             (NodeKind::Infix(Operator::Mul), [a, b]) if a.as_constant().is_some() => {
-                Counted::constant(0).plus(b, a.as_constant().unwrap_or(0))
+                AffineInteger::constant(0).plus(b, a.as_constant().unwrap_or(0))
             }
             _ => {
                 let message = "this is not affine: an index or a register may be added, subtracted, and multiplied by a constant";
@@ -192,11 +201,11 @@ impl Context {
     /// The value of a name, which may be a loop's index.
     fn counted_name(
         &mut self,
-        at: At,
+        at: AstPlace,
         name: NameRef,
         span: Span,
         registers: bool,
-    ) -> Result<Operand, Reported> {
+    ) -> Result<Operand, ErrorReported> {
         let name = self.name(at, name, span)?;
         let mut binding = self.lookup(at.scope, name);
         // An argument may be an expression with the index of a loop around the macro's use.
@@ -224,21 +233,21 @@ impl Context {
             Binding::Register(RegisterId::ZERO) => Ok(Operand::Value(Value::Int(0))),
             Binding::Register(register) if registers => {
                 let registers = SmallVec::from_elem((register, 1), 1);
-                Ok(Operand::Counted(Counted { registers, ..Counted::constant(0) }))
+                Ok(Operand::Counted(AffineInteger { registers, ..AffineInteger::constant(0) }))
             }
             _ => self.name_value(at.scope, name, span).map(Operand::Value),
         }
     }
 
-    /// True if an expression names the index of a loop that runs.
-    pub(crate) fn names_index(&self, at: At, id: ExprId) -> bool {
+    /// An expression names the index of a loop that runs.
+    pub(crate) fn names_index(&self, at: AstPlace, id: ExprId) -> bool {
         self.asts[at.ast as usize].nodes[id.range()].iter().any(|node| match node.kind {
             NodeKind::Name(name) => name.resolve().is_ok_and(|name| self.is_index(at.scope, name)),
             _ => false,
         })
     }
 
-    /// True if a name is the index of a loop that runs, or the argument of a macro that depends on one.
+    /// A name is the index of a loop that runs, or the argument of a macro that depends on one.
     pub(crate) fn is_index(&self, scope: ScopeId, name: NameId) -> bool {
         let mut binding = self.lookup(scope, name);
         for _ in 0..crate::limits::EVALUATION_DEPTH {
@@ -272,15 +281,15 @@ impl Context {
         loops
     }
 
-    /// The least and the largest value that a function has over all iterations of the loops around; `None` if there are none.
+    /// The least and the largest value of a function over all iterations of the loops around; `None` without any iteration.
     ///
     /// # Errors
-    /// If there are more than it looks at.
+    /// If the iteration space has more points than are tried.
     pub(crate) fn extremes(
         &self,
         around: &[SourceLoopId],
         function: &Affine<SourceLoopId>,
-    ) -> Result<Option<[i64; 2]>, TooMany> {
+    ) -> Result<Option<[i64; 2]>, IterationLimitExceeded> {
         let space = Space { context: self, around, function };
         space.extremes(&mut vec![0; around.len()], 0, &mut POINTS.clone())
     }
@@ -288,7 +297,7 @@ impl Context {
 
 /// An iteration space has too many points.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct TooMany;
+pub(crate) struct IterationLimitExceeded;
 
 /// The iteration space of a nest of loops, and a function on it.
 struct Space<'c> {
@@ -305,7 +314,7 @@ impl Space<'_> {
         at: &mut Vec<i64>,
         level: usize,
         points: &mut u32,
-    ) -> Result<Option<[i64; 2]>, TooMany> {
+    ) -> Result<Option<[i64; 2]>, IterationLimitExceeded> {
         let Some(&this) = self.around.get(level) else {
             let value = self.value(at, self.function);
             return Ok(Some([value, value]));
@@ -326,7 +335,7 @@ impl Space<'_> {
         }
         let mut all: Option<[i64; 2]> = None;
         for iteration in 0..count {
-            *points = points.checked_sub(1).ok_or(TooMany)?;
+            *points = points.checked_sub(1).ok_or(IterationLimitExceeded)?;
             at[level] = iteration;
             let Some([low, high]) = self.extremes(at, level + 1, points)? else { continue };
             all = Some(all.map_or([low, high], |[least, most]| [least.min(low), most.max(high)]));

@@ -1,41 +1,43 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Context of the stages after parsing: scopes, bindings of names, and diagnostics.
 
-mod declared;
+mod declarations;
 mod evaluate;
 pub(crate) mod loops;
 mod notes;
+mod parameters;
 mod reports;
 mod scopes;
-mod unknown;
+mod unknown_names;
 
-pub(crate) use declared::{Argument, Array, Declared, NamedConstant, Table};
+pub(crate) use declarations::{Argument, Array, Declarations, NamedConstant, Table};
 pub(crate) use notes::Notes;
+pub(crate) use parameters::{ArgumentKind, Open, ParameterType, Parameters};
 pub(crate) use reports::Reports;
-pub(crate) use scopes::{Binding, MacroDefinition, ScopeId, ScopeKind, Scopes};
-pub(crate) use unknown::Wanted;
+pub(crate) use scopes::{Binding, MacroDefinition, Scope, ScopeId, ScopeKind, Scopes};
+pub(crate) use unknown_names::NameRole;
 
 use crate::ir::RegisterId;
-use crate::report::diag::Diagnostic;
-use crate::report::source::Span;
-use crate::syntax::ast::*;
-use crate::syntax::name::NameId;
 use std::rc::Rc;
+use takt_diagnostics::diag::Diagnostic;
+use takt_diagnostics::source::Span;
 use takt_isa::program::Space;
 use takt_isa::{Machine, Op, Type};
+use takt_syntax::ast::*;
+use takt_syntax::name::{NameId, NameRef};
 
 /// Prefix of the built-in constants that are 1 if the machine has an instruction: `has.` and its mnemonic.
 pub(crate) const HAS: &str = "has.";
 /// Prefix of the built-in constants that are 1 if there is a macro: `macro.` and its name.
 const MACRO: &str = "macro.";
 
-/// The mistake is in the report.
+/// Proof that a mistake has been reported.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) struct Reported;
+pub(crate) struct ErrorReported;
 
-/// The place of an expression or operand: its tree and its scope.
+/// Place of an expression or operand: its tree and its scope.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct At {
+pub(crate) struct AstPlace {
     pub(crate) ast: u32,
     pub(crate) scope: ScopeId,
 }
@@ -45,11 +47,13 @@ pub(crate) struct Context {
     pub(crate) machine: &'static Machine,
     pub(crate) asts: Vec<Rc<Ast>>,
     pub(crate) scopes: Scopes,
-    pub(crate) declared: Declared,
+    pub(crate) declared: Declarations,
     pub(crate) reports: Reports,
-    /// Which names stand where, if an editor asks for it ([`index`](crate::index)).
+    /// Names with their places, if an editor asks for them ([`index`](crate::index)).
     pub(crate) notes: Option<Notes>,
-    /// Arguments and templates under evaluation, one within the other.
+    /// A declaration of a counted loop's body is met again, in another iteration that is written out: it is the same for all.
+    pub(crate) again: bool,
+    /// Nesting depth of arguments and templates under evaluation.
     depth: usize,
 }
 
@@ -58,17 +62,17 @@ impl Context {
         let mut scopes = Scopes::new();
         let zero = scopes.names_mut().intern("zero");
         scopes.bind(ScopeId::ROOT, zero, Binding::Register(RegisterId::ZERO));
-        let (declared, reports) = (Declared::new(), Reports::default());
-        Context { machine, asts: Vec::new(), scopes, declared, reports, notes: None, depth: 0 }
+        let (declared, reports) = (Declarations::new(), Reports::default());
+        Context { machine, asts: Vec::new(), scopes, declared, reports, notes: None, again: false, depth: 0 }
     }
 
     /// Reports a mistake in a scope, with the expansions that led there.
-    pub(crate) fn report(&mut self, scope: ScopeId, mut diagnostic: Diagnostic) -> Reported {
+    pub(crate) fn report(&mut self, scope: ScopeId, mut diagnostic: Diagnostic) -> ErrorReported {
         if self.reports.sink.keeps(diagnostic.severity) {
             diagnostic = self.scopes.with_expansions(scope, diagnostic);
         }
         self.reports.sink.push(diagnostic);
-        Reported
+        ErrorReported
     }
 
     pub(crate) fn error(
@@ -77,7 +81,7 @@ impl Context {
         code: &'static str,
         span: Span,
         message: impl Into<String>,
-    ) -> Reported {
+    ) -> ErrorReported {
         self.report(scope, Diagnostic::error(code, span, message))
     }
 
@@ -88,6 +92,22 @@ impl Context {
             Binding::None => self.undeclared(name),
             binding => binding,
         }
+    }
+
+    /// The binding of a name that may be made of parts, with arguments of macros replaced; [`Binding::None`] if unknown.
+    pub(crate) fn bound(&self, at: AstPlace, name: NameRef) -> Binding {
+        let mut binding = name.resolve().map_or(Binding::None, |name| self.lookup(at.scope, name));
+        for _ in 0..crate::limits::EVALUATION_DEPTH {
+            let Binding::Argument(argument) = binding else { break };
+            let Argument { operand, at, .. } = self.declared.arguments[argument as usize];
+            binding = match operand.kind {
+                OperandKind::Name(name) => {
+                    name.resolve().map_or(Binding::None, |name| self.lookup(at.scope, name))
+                }
+                _ => Binding::None,
+            };
+        }
+        binding
     }
 
     /// The binding of a name that is not declared.
@@ -115,19 +135,34 @@ impl Context {
         }))
     }
 
-    /// Declares a name in the scope that takes declarations, unless it is declared there.
+    /// Declares a name in the owning scope, unless it is declared there already.
     pub(crate) fn declare(
         &mut self,
-        at: At,
+        at: AstPlace,
         name: NameId,
         span: Span,
         binding: Binding,
-    ) -> Result<(), Reported> {
+    ) -> Result<(), ErrorReported> {
         let owner = self.scopes.scope(at.scope).owner;
+        self.declare_in(owner, at, name, span, binding)
+    }
+
+    /// Declares a name in a scope, given where the declaration stands.
+    pub(crate) fn declare_in(
+        &mut self,
+        owner: ScopeId,
+        at: AstPlace,
+        name: NameId,
+        span: Span,
+        binding: Binding,
+    ) -> Result<(), ErrorReported> {
         let before = self.scopes.bound(owner, name);
         if before == Binding::None {
             self.scopes.bind(owner, name, binding);
             return Ok(());
+        }
+        if self.again && self.declared.declaration(before) == Some(span) {
+            return Err(ErrorReported);
         }
         let text = self.scopes.text(name).to_owned();
         let error = Diagnostic::error("declared-twice", span, format!("`{text}` is declared already"));
@@ -160,7 +195,7 @@ pub(crate) fn space_of(section: Section) -> Space {
     if section == Section::Data { Space::Data } else { Space::Code }
 }
 
-/// Bits as a number: as an integer if that is small, else as binary32.
+/// Bits as a number: an integer if it is small, else binary32.
 pub(crate) fn bits_text(bits: u32) -> String {
     match bits as i32 {
         small @ -0xffff..=0xffff => small.to_string(),

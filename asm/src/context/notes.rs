@@ -1,23 +1,23 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Which names stand where: noted while names are resolved, for [`index`](crate::index). A part of [`context`](crate::context).
+//! Names and their places, noted for [`index`](crate::index) while names are resolved. A part of [`context`](crate::context).
 
 use crate::context::ScopeId;
 use crate::limits;
-use crate::report::source::Span;
-use crate::syntax::name::NameId;
+use takt_diagnostics::source::Span;
+use takt_syntax::name::NameId;
 
 /// Uses of names, in the order in which they were resolved: a place in a macro's body occurs once for each use of the macro.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Notes {
-    /// Names of registers, constants, labels and parameters: where, in which scope, and which.
+    /// Names of registers, constants, labels and parameters: place, scope and name.
     pub(crate) names: Vec<(Span, ScopeId, NameId)>,
-    /// Uses of macros.
+    /// Uses of macros: place and name.
     pub(crate) macros: Vec<(Span, NameId)>,
-    /// Sums of equations: where each stands, and where what it counts with.
+    /// Sums of equations: place of the sum, place of its index variable, and its name.
     pub(crate) sums: Vec<(Span, Span, NameId)>,
-    /// `.include`s, and which of the sources each means.
+    /// `.include`s: place, and index of the source.
     pub(crate) includes: Vec<(Span, usize)>,
-    /// More was met than is kept.
+    /// Some references were dropped at the limit.
     pub(crate) cut: bool,
 }
 

@@ -1,17 +1,18 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Names and the scopes that they are declared in.
 
+use crate::context::parameters::Parameters;
 use crate::ir::{LabelId, RegisterId};
-use crate::report::diag::Diagnostic;
-use crate::report::source::Span;
-use crate::syntax::ast::{Ast, DirectiveKind};
-use crate::syntax::intern::Interner;
-use crate::syntax::name::NameId;
 use foldhash::HashMap;
 use std::fmt::Write as _;
 use std::rc::Rc;
+use takt_diagnostics::diag::Diagnostic;
+use takt_diagnostics::source::Span;
+use takt_syntax::ast::{Ast, DirectiveKind};
+use takt_syntax::intern::Interner;
+use takt_syntax::name::NameId;
 
-/// An expansion: what a use of a macro, or one turn of a repetition, adds to the names around it.
+/// An expansion: the scope of a use of a macro, or of one turn of a repetition.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Default, Debug, PartialOrd, Ord)]
 pub(crate) struct ScopeId(pub(crate) u32);
 
@@ -25,35 +26,37 @@ pub(crate) struct Scope {
     pub(crate) parent: ScopeId,
     /// The scope that takes declarations: the macro's use, or the root.
     pub(crate) owner: ScopeId,
+    /// The scope that takes code labels: the owner, or within it an iteration of a counted loop as the assembler writes it.
+    pub(crate) labels: ScopeId,
     /// The expansion that this one stands in, for messages. Not the parent: a macro does not see its caller's names.
     pub(crate) within: ScopeId,
     pub(crate) kind: ScopeKind,
     /// The use of the macro, or the `.rep`.
     pub(crate) site: Span,
-    /// For a macro's use, the last of its first names, and their number.
+    /// For a macro's use and an iteration: index of the latest entry in the list of near names, and number of such entries.
     latest: u32,
     near: u32,
 }
 
-/// A name of a macro's use, and which name of that use came before: an index into the list of these.
-struct Near {
+/// A name of a macro's use, in a linked list: `before` is the index of the previous entry.
+struct MacroName {
     name: NameId,
     binding: Binding,
     before: u32,
 }
 
-/// Names of a macro's use that are searched one by one, which for the few that most have, its parameters, is faster than a
-/// table for all uses; that has the others.
+/// Names of a macro's use that are searched linearly, which is faster for the few parameters that most uses have. A table
+/// for all uses holds the others.
 const NEAR: u32 = 8;
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum ScopeKind {
     Root,
-    /// A macro and which of its uses.
+    /// Name of the macro, and number of the use.
     Macro(NameId, u32),
-    /// The name that counts, and its value.
+    /// Name and value of the counter.
     Rep(NameId, i64),
-    /// The name that a counted loop counts with, and which of the indices it is.
+    /// Name of the index variable, and its number in [`Declared::indices`](crate::context::Declared::indices).
     For(NameId, u32),
 }
 
@@ -69,32 +72,34 @@ pub(crate) enum Binding {
     Data(LabelId),
     /// A parameter: an index into the arguments.
     Argument(u32),
-    /// The name that a repetition counts with.
+    /// Value of the counter of a repetition.
     Count(i64),
-    /// The name that a counted loop counts with: an index into [`Declared::indices`](crate::context::Declared::indices).
+    /// The index variable of a counted loop: an index into [`Declared::indices`](crate::context::Declared::indices).
     Index(u32),
     /// An array in data memory: an index into [`Declared::tables`](crate::context::Declared::tables).
     Table(u32),
-    /// What an operand means that is an element of an array in data memory: an index into those that were met.
+    /// An array element in data memory; an index into the elements seen so far.
     Word(u32),
-    /// `pi` and the like.
+    /// A constant such as `pi`: an index into the built-in constants.
     Builtin(u32),
-    /// A built-in constant: true if the machine has the instruction of its name.
+    /// A `has.` or `macro.` constant: true if the machine has the instruction, or the macro exists.
     Has(bool),
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct MacroDefinition {
-    /// The tree that it is defined in, and the directive there.
+    /// The tree and the directive of the definition.
     pub(crate) ast: u32,
     pub(crate) directive: u32,
     /// First statement of the body.
     pub(crate) start: u32,
     pub(crate) uses: u32,
+    /// The types of its parameters.
+    pub(crate) types: Rc<Parameters>,
 }
 
 impl MacroDefinition {
-    /// The number of its parameters, and the place of its name in the definition.
+    /// The number of parameters, and the place of the name in the definition.
     pub(crate) fn parameters(&self, asts: &[Rc<Ast>]) -> (usize, Span) {
         match &asts[self.ast as usize].directives[self.directive as usize].kind {
             DirectiveKind::Macro { parameters, name, .. } => (parameters.len(), name.span),
@@ -102,21 +107,31 @@ impl MacroDefinition {
         }
     }
 
-    /// The macro's definition.
+    /// The name and the parameters, as the definition writes them.
+    pub(crate) fn declaration(&self, asts: &[Rc<Ast>]) -> Span {
+        let line = &asts[self.ast as usize].directives[self.directive as usize];
+        match &line.kind {
+            DirectiveKind::Macro { name, .. } => Span::new(name.span.start, line.span.end),
+            _ => line.span,
+        }
+    }
+
     pub(crate) fn span(&self, asts: &[Rc<Ast>]) -> Span {
         asts[self.ast as usize].directives[self.directive as usize].span
     }
 }
 
-/// Every name, and what it is bound to in each scope.
+/// Names, scopes, and the bindings of names in scopes.
 pub(crate) struct Scopes {
     names: Interner,
     scopes: Vec<Scope>,
     /// The bindings of the root scope, by the name's number.
     globals: Vec<Binding>,
-    near: Vec<Near>,
+    near: Vec<MacroName>,
     locals: HashMap<(u32, NameId), Binding>,
     pub(crate) macros: HashMap<NameId, MacroDefinition>,
+    /// By name: the number of labels in counted loops so far.
+    iterated: HashMap<NameId, u32>,
 }
 
 impl Scopes {
@@ -124,6 +139,7 @@ impl Scopes {
         let root = Scope {
             parent: ScopeId::ROOT,
             owner: ScopeId::ROOT,
+            labels: ScopeId::ROOT,
             within: ScopeId::ROOT,
             kind: ScopeKind::Root,
             site: Span::default(),
@@ -137,6 +153,7 @@ impl Scopes {
             near: Vec::new(),
             locals: HashMap::default(),
             macros: HashMap::default(),
+            iterated: HashMap::default(),
         }
     }
 
@@ -152,7 +169,7 @@ impl Scopes {
         self.names.text(name)
     }
 
-    /// The number of scopes; their numbers are below it.
+    /// Number of scopes; all ids are below it.
     pub(crate) fn count(&self) -> usize {
         self.scopes.len()
     }
@@ -164,8 +181,16 @@ impl Scopes {
     /// A new scope, for an expansion.
     pub(crate) fn open(&mut self, parent: ScopeId, within: ScopeId, kind: ScopeKind, site: Span) -> ScopeId {
         let id = ScopeId(self.scopes.len() as u32);
-        let owner = if matches!(kind, ScopeKind::Macro(..)) { id } else { self.scope(parent).owner };
-        self.scopes.push(Scope { parent, owner, within, kind, site, latest: 0, near: 0 });
+        let Scope { owner, labels, .. } = *self.scope(parent);
+        let (owner, labels) = if matches!(kind, ScopeKind::Macro(..)) { (id, id) } else { (owner, labels) };
+        self.scopes.push(Scope { parent, owner, labels, within, kind, site, latest: 0, near: 0 });
+        id
+    }
+
+    /// A new scope for an iteration of a counted loop, or for all of them where one is written for all: it takes code labels.
+    pub(crate) fn open_iteration(&mut self, parent: ScopeId, kind: ScopeKind, site: Span) -> ScopeId {
+        let id = self.open(parent, parent, kind, site);
+        self.scopes[id.0 as usize].labels = id;
         id
     }
 
@@ -180,14 +205,14 @@ impl Scopes {
         self.globals.get(name.0 as usize).copied().unwrap_or(Binding::None)
     }
 
-    /// The binding of a name by an expansion, or by those around it.
+    /// The binding of a name by an expansion, or by the expansions around it.
     fn expanded(&self, mut scope: ScopeId, name: NameId) -> Option<Binding> {
         while scope != ScopeId::ROOT {
             let here = self.scope(scope);
             match here.kind {
                 ScopeKind::Rep(variable, value) if variable == name => return Some(Binding::Count(value)),
                 ScopeKind::For(variable, index) if variable == name => return Some(Binding::Index(index)),
-                ScopeKind::Macro(..) => {
+                _ if here.labels == scope => {
                     if let Some(binding) = self.local(scope, name) {
                         return Some(binding);
                     }
@@ -209,7 +234,7 @@ impl Scopes {
         binding.unwrap_or(Binding::None)
     }
 
-    /// Binds a name in a scope, without asking whether it is bound.
+    /// Binds a name in a scope, replacing an earlier binding.
     pub(crate) fn bind(&mut self, scope: ScopeId, name: NameId, binding: Binding) {
         if scope == ScopeId::ROOT {
             let index = name.0 as usize;
@@ -223,7 +248,7 @@ impl Scopes {
                 None if self.scope(scope).near < NEAR => {
                     let index = self.near.len() as u32;
                     let of = &mut self.scopes[scope.0 as usize];
-                    self.near.push(Near { name, binding, before: of.latest });
+                    self.near.push(MacroName { name, binding, before: of.latest });
                     (of.latest, of.near) = (index, of.near + 1);
                 }
                 None => {
@@ -233,7 +258,7 @@ impl Scopes {
         }
     }
 
-    /// The index of a name in the list that is searched one by one.
+    /// The index of a name in the list that is searched linearly.
     #[inline]
     fn near_index(&self, scope: ScopeId, name: NameId) -> Option<usize> {
         let Scope { latest, near, .. } = *self.scope(scope);
@@ -265,13 +290,25 @@ impl Scopes {
         self.scope_name(scope).map_or_else(|| text.to_owned(), |scope| format!("{scope}.{text}"))
     }
 
-    /// Prefix of the names that are declared in a scope: the macro and the number of its use; `None` outside of macros.
+    /// The text of a code label, as the symbol map shows it; in a counted loop with a running number among labels of its name.
+    pub(crate) fn label_name(&mut self, scope: ScopeId, name: NameId) -> String {
+        let text = self.full_name(scope, name);
+        let Scope { owner, labels, .. } = *self.scope(scope);
+        if owner == labels {
+            return text;
+        }
+        let number = self.iterated.entry(name).or_default();
+        *number += 1;
+        format!("{text}.{number}")
+    }
+
+    /// Prefix of names that are declared in a scope: the macro and the number of its use; `None` outside of macros.
     pub(crate) fn scope_name(&self, scope: ScopeId) -> Option<String> {
         let owner = self.scope(scope).owner;
         match self.scope(owner).kind {
             ScopeKind::Macro(of, number) => {
                 let of = self.text(of);
-                // Room for any number: each use has such a name.
+                // Reserve for any number: each use has such a name.
                 let mut name = String::with_capacity(of.len() + 11);
                 name.push_str(of);
                 // A string takes all that is written to it.
@@ -303,7 +340,7 @@ impl Scopes {
                 ScopeKind::Rep(name, value) => {
                     diagnostic.also(site, format!("with {} = {value}", self.text(name)))
                 }
-                // Of a loop that runs every iteration is the same.
+                // A loop that runs has no value to show: every iteration is the same.
                 ScopeKind::For(..) | ScopeKind::Root => diagnostic,
             };
             scope = within;

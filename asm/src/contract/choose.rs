@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Choice of the products to fuse, by critical-path lengths.
 //!
-//! Fusing saves an operation. It saves time, too, where the sum waits for the product; but where it waits for what is added, or
-//! for another product, it costs the cycles by which a fused operation takes longer than a sum. So every product is fused that
-//! makes its sum earlier or no later, were there slots for everything, and every other one that leaves the run's longest chain as
+//! Fusing saves an operation. It also saves time where the sum waits for the product; where the sum waits for the addend, or for
+//! another product, it costs the cycles by which a fused operation takes longer than a sum. So a product is fused if its sum
+//! becomes earlier or no later, were there slots for everything; any other product is fused if the run's longest chain stays as
 //! long as it then is, or no longer than the slots take for the run's products and sums alone.
 //!
-//! The body of a counted loop is executed again before it ends (software pipelining), so that its chains do not count, only
-//! those from one iteration to the next: there every product is fused unless that makes the iterations' interval longer.
+//! The body of a counted loop is executed again before it ends (software pipelining), so only chains from one iteration to
+//! the next count: there every product is fused unless that lengthens the initiation interval.
 
-use super::{Where, Wishes};
+use super::{FusionCandidates, OperationPosition};
 use crate::ir::{Ir, LabelId, RegisterId, runs};
 use smallvec::SmallVec;
 use std::cmp::Reverse;
@@ -18,27 +18,31 @@ use takt_isa::{Function, Fusion, Op};
 
 /// An operation of the run.
 struct Node {
-    at: Where,
+    at: OperationPosition,
     op: Op,
-    /// What it reads that no earlier operation of the run writes.
+    /// Registers that it reads and that no earlier operation of the run writes.
     before: SmallVec<[RegisterId; 3]>,
     dest: Option<RegisterId>,
-    /// For each source the operation of the run that computes it.
+    /// By source: the operation of the run that computes it.
     from: SmallVec<[Option<usize>; 3]>,
-    /// The products with which it could be fused.
+    /// Products that could be fused into this operation.
     wishes: SmallVec<[(usize, Fusion); 2]>,
 }
 
 /// The decisions, by operation.
 struct Decisions {
-    /// The product with which it is fused.
+    /// The product that is fused into the operation.
     fused: Vec<Option<(usize, Fusion)>>,
-    /// The cycle from the run's start in which its result is ready.
+    /// Cycle from the run's start in which the result is ready.
     done: Vec<u32>,
 }
 
-/// The sums of a run that are fused, each with its product, in the order of the source.
-pub(super) fn choose(ir: &Ir, run: runs::Run, wishes: &Wishes) -> Vec<(Where, Where, Fusion)> {
+/// The sums of a run that are fused, each with its product, in source order.
+pub(super) fn choose(
+    ir: &Ir,
+    run: runs::Run,
+    wishes: &FusionCandidates,
+) -> Vec<(OperationPosition, OperationPosition, Fusion)> {
     let nodes = nodes(ir, run, wishes);
     if nodes.iter().all(|node| node.wishes.is_empty()) {
         return Vec::new();
@@ -60,7 +64,7 @@ pub(super) fn choose(ir: &Ir, run: runs::Run, wishes: &Wishes) -> Vec<(Where, Wh
         .collect()
 }
 
-/// The cycles that the products and sums of a run take on the slots that have them, none of them fused.
+/// Cycles to issue the products and sums of a run on the slots that host them, without fusing.
 fn work(ir: &Ir, nodes: &[Node]) -> u32 {
     let functions = [Function::Multiply, Function::Add];
     let counted = nodes.iter().filter(|node| functions.contains(&node.op.row().function)).count();
@@ -69,13 +73,13 @@ fn work(ir: &Ir, nodes: &[Node]) -> u32 {
     u32::try_from(counted.div_ceil(slots)).unwrap_or(u32::MAX)
 }
 
-/// True if a run is the whole body of a loop of the source.
+/// A run is the whole body of a loop of the source.
 fn is_loop(ir: &Ir, run: runs::Run) -> bool {
     let end = |label: LabelId| ir.labels[label.0 as usize].position as usize;
     ir.loops.iter().any(|counted| counted.head as usize == run.start && end(counted.end) == run.end)
 }
 
-/// A lower bound of the interval of iterations: that of the slots, and the longest chain from a value of one iteration to the same
+/// Lower bound of the initiation interval: the bound of the slots, and the longest chain from a value of one iteration to the same
 /// value of the next.
 fn interval(ir: &Ir, nodes: &[Node], decisions: &Decisions) -> u32 {
     let gone: HashSet<usize> = decisions.fused.iter().flatten().map(|(product, _)| *product).collect();
@@ -95,7 +99,7 @@ fn interval(ir: &Ir, nodes: &[Node], decisions: &Decisions) -> u32 {
     let carried: HashSet<RegisterId> = nodes.iter().flat_map(|node| node.before.iter().copied()).collect();
     let chains = carried.iter().filter_map(|register| {
         let last = *written.get(register)?;
-        // For each operation, the cycles from the register's value to its result.
+        // By operation: cycles from the register's value to its result.
         let mut from: Vec<Option<u32>> = Vec::with_capacity(nodes.len());
         for (number, node) in nodes.iter().enumerate() {
             let reads = |node: &Node| node.before.contains(register).then_some(0);
@@ -116,9 +120,9 @@ fn interval(ir: &Ir, nodes: &[Node], decisions: &Decisions) -> u32 {
     chains.max().unwrap_or(0).max(u32::try_from(slots).unwrap_or(u32::MAX))
 }
 
-fn nodes(ir: &Ir, run: runs::Run, wishes: &Wishes) -> Vec<Node> {
+fn nodes(ir: &Ir, run: runs::Run, wishes: &FusionCandidates) -> Vec<Node> {
     let mut nodes = Vec::new();
-    let mut numbers: HashMap<Where, usize> = HashMap::new();
+    let mut numbers: HashMap<OperationPosition, usize> = HashMap::new();
     let mut writer: HashMap<RegisterId, usize> = HashMap::new();
     for bundle in run.start..run.end {
         let mut written: SmallVec<[(RegisterId, usize); 4]> = SmallVec::new();
@@ -154,7 +158,7 @@ fn latency(ir: &Ir, op: Op) -> u32 {
     slot.and_then(|slot| ir.machine.unit(slot, function)).map_or(0, |unit| unit.latency)
 }
 
-/// The operations that a fused one waits for: those of the product's factors and of what is added.
+/// The operations that a fused operation waits for: sources of the product's factors and of the addend.
 fn waits_for<'a>(
     nodes: &'a [Node],
     sum: &'a Node,
@@ -165,8 +169,8 @@ fn waits_for<'a>(
     nodes[product].from.iter().copied().flatten().chain(addend)
 }
 
-/// Decides in source order. `may_wait` is true if the result of a fused operation may be ready in a cycle although that of the sum
-/// alone would be ready sooner.
+/// Decides in source order. `may_wait` allows a fused operation to be ready in a cycle although the sum alone would be ready
+/// sooner.
 fn decide(ir: &Ir, nodes: &[Node], may_wait: impl Fn(usize, u32) -> bool) -> Decisions {
     let mut decisions =
         Decisions { fused: Vec::with_capacity(nodes.len()), done: Vec::with_capacity(nodes.len()) };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! `.contract on`: a product and the sum that alone uses it become one operation, with one rounding.
+//! `.contract on`: a product and its only user, a sum, become one operation with one rounding.
 //!
 //! The choice depends on the source and the machine's latencies, never on the schedule, so that a program computes the same bits
 //! however it is scheduled. The product's operation is removed; the fused one replaces the sum.
@@ -23,65 +23,65 @@ pub struct Contraction {
     pub product: Option<Location>,
     /// The sum's source line.
     pub sum: Option<Location>,
-    /// Product and sum in the plain program ([`crate::plain`]): bundle, and number in it.
+    /// Product and sum in the plain program ([`crate::plain`]): bundle, and index in it.
     pub at: [(u32, u32); 2],
 }
 
-/// The fused products.
+/// Result of fusing a program's products.
 #[derive(Debug, Default)]
-pub(crate) struct Contracted {
-    /// In the order of the sums.
+pub(crate) struct ContractionResult {
+    /// Fused products, in the order of the sums.
     pub(crate) contractions: Vec<Contraction>,
-    /// Registers that only removed products used: that nothing writes or reads them is no mistake.
+    /// Registers that only removed products used: not reported as unused.
     pub(crate) gone: HashSet<RegisterId>,
 }
 
-/// An operation: its bundle, and its number there.
-type Where = (usize, usize);
+/// Position of an operation: its bundle, and its index there.
+type OperationPosition = (usize, usize);
 
-/// By sum, the products that it could be fused with, in the order of the source.
-type Wishes = HashMap<Where, SmallVec<[(Where, Fusion); 2]>>;
+/// By sum: the products that it could be fused with, in source order.
+type FusionCandidates = HashMap<OperationPosition, SmallVec<[(OperationPosition, Fusion); 2]>>;
 
-/// The state of a register so far in a straight run.
+/// The state of a register within a straight run.
 #[derive(Clone, Default)]
-struct Current {
-    /// The number of operations that have written it.
+struct RegisterState {
+    /// Number of writes so far.
     version: u32,
-    /// The product that it holds.
+    /// Index of the product that it holds.
     product: Option<usize>,
 }
 
 /// A product of a run.
 struct Product {
-    at: Where,
+    at: OperationPosition,
     dest: RegisterId,
-    /// The versions of its sources when it reads them, and of its result.
+    /// Versions of the sources when the product reads them, and of its result.
     versions: [u32; 2],
     version: u32,
-    /// Who reads it, as which source; of the second reader on it only matters that there is one.
-    readers: SmallVec<[(Where, usize); 2]>,
-    /// True if nothing writes its register again before the run ends.
+    /// Readers, each with the index of the source; a second reader rules out fusing.
+    readers: SmallVec<[(OperationPosition, usize); 2]>,
+    /// The product is the register's last value in the run.
     last: bool,
-    /// True if one of its sources is overwritten before the product is read.
+    /// A source is overwritten before the product is read.
     stale: bool,
 }
 
-/// Fuses what `is_on` allows, by index of the bundle, if the machine has an operation for it.
-pub(crate) fn contract(ir: &mut Ir, is_on: impl Fn(usize) -> bool) -> Contracted {
-    let mut contracted = Contracted::default();
+/// Fuses products into sums in bundles that `is_on` allows, if the machine has an operation for it.
+pub(crate) fn contract(ir: &mut Ir, is_on: impl Fn(usize) -> bool) -> ContractionResult {
+    let mut contracted = ContractionResult::default();
     let hosted = |fusion: &&Fusion| ir.machine.host(fusion.fused.row().function).is_some();
     let known: Vec<&Fusion> = fusions().iter().filter(hosted).collect();
     if known.is_empty() || !(0..ir.bundles.len()).any(&is_on) {
         return contracted;
     }
-    // Nothing can be removed if bundles must keep their addresses, or if raw words may read any register.
+    // Bundles with fixed addresses, or raw words that may read any register, rule out any removal.
     if runs::jumps_to_numbers(ir) || ir.is_opaque() {
         return contracted;
     }
     let exposed = exposed(ir);
-    let mut current = vec![Current::default(); ir.registers.len()];
+    let mut current = vec![RegisterState::default(); ir.registers.len()];
     for run in runs::runs(ir) {
-        current.fill(Current::default());
+        current.fill(RegisterState::default());
         let products = products(ir, &known, run, &mut current);
         let fits = |product: &Product| {
             let [(reader, source)] = product.readers[..] else { return None };
@@ -93,7 +93,7 @@ pub(crate) fn contract(ir: &mut Ir, is_on: impl Fn(usize) -> bool) -> Contracted
             let free = !(product.stale || product.last && exposed[product.dest.index()]);
             (wanted && free && has_place(ir, reader, fusion)).then_some((reader, **fusion))
         };
-        let mut wishes = Wishes::default();
+        let mut wishes = FusionCandidates::default();
         for product in &products {
             if let Some((sum, fusion)) = fits(product) {
                 wishes.entry(sum).or_default().push((product.at, fusion));
@@ -112,11 +112,11 @@ pub(crate) fn contract(ir: &mut Ir, is_on: impl Fn(usize) -> bool) -> Contracted
     contracted
 }
 
-fn at(ir: &Ir, (bundle, number): Where) -> &Operation {
+fn at(ir: &Ir, (bundle, number): OperationPosition) -> &Operation {
     &ir.bundles[bundle].operations[number]
 }
 
-/// Registers that a run reads before it writes them: by index, whether a value may be read outside its own run.
+/// By register: a run reads it before writing it, so a value may be read outside its own run.
 fn exposed(ir: &Ir) -> Vec<bool> {
     let mut exposed = vec![false; ir.registers.len()];
     let mut written = vec![usize::MAX; ir.registers.len()];
@@ -134,8 +134,8 @@ fn exposed(ir: &Ir) -> Vec<bool> {
     exposed
 }
 
-/// The products of a run whose registers only the run uses, and the readers of these.
-fn products(ir: &Ir, known: &[&Fusion], run: runs::Run, current: &mut [Current]) -> Vec<Product> {
+/// Products of a run that may be removed, with their readers.
+fn products(ir: &Ir, known: &[&Fusion], run: runs::Run, current: &mut [RegisterState]) -> Vec<Product> {
     let mut products: Vec<Product> = Vec::new();
     for bundle in run.start..run.end {
         let operations = || (0..).zip(&ir.bundles[bundle].operations);
@@ -181,14 +181,14 @@ fn products(ir: &Ir, known: &[&Fusion], run: runs::Run, current: &mut [Current])
             if let Some(old) = register.product {
                 products[old].last = false;
             }
-            *register = Current { version: register.version + 1, product };
+            *register = RegisterState { version: register.version + 1, product };
         }
     }
     products
 }
 
-/// True if the fused operation can replace the sum: a slot that writes the sum's register is free for it in that bundle.
-fn has_place(ir: &Ir, (bundle, number): Where, fusion: &Fusion) -> bool {
+/// The fused operation can replace the sum: a slot that writes the sum's register is free in that bundle.
+fn has_place(ir: &Ir, (bundle, number): OperationPosition, fusion: &Fusion) -> bool {
     let operations = &ir.bundles[bundle].operations;
     let dest = operations[number].dest;
     let others =
@@ -199,14 +199,14 @@ fn has_place(ir: &Ir, (bundle, number): Where, fusion: &Fusion) -> bool {
     // A branch on what its own bundle computes cannot wait for a copy.
     let branches =
         others().any(|other| other.redirects() && dest.is_some_and(|dest| other.reads().contains(&dest)));
-    // Nor does it go anywhere but where the source puts the sum.
+    // An operation whose slot the source names stays on it.
     let named =
         dest.is_some_and(|dest| operations[number].slots != banks::able(ir, dest, operations[number].op));
     !branches && !named && matching::is_possible(&slots)
 }
 
-/// Puts the fused operation in the sum's place, and takes the product out.
-fn fuse(ir: &mut Ir, product: Where, sum: Where, fusion: Fusion) -> Contraction {
+/// Puts the fused operation in the sum's place, and makes the product idle.
+fn fuse(ir: &mut Ir, product: OperationPosition, sum: OperationPosition, fusion: Fusion) -> Contraction {
     let first = *at(ir, product);
     let second = *at(ir, sum);
     let slots = second.dest.map_or_else(Slots::default, |dest| banks::able(ir, dest, fusion.fused));

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Register allocation: an address for each virtual register.
 //!
-//! A virtual register lies in the bank of the slot whose operations write it; one that nothing writes, such as a constant, lies
-//! in the bank with the most free registers. Within a bank addresses follow the order of declaration, around those that the
-//! source gives. Inputs lie in the input bank. An output has a number, which the source gives or which is the first that is free,
-//! and lies at that place of the output window of the bank of the slot that writes it.
+//! A virtual register lies in the bank of the slot whose operations write it; a register that nothing writes, such as a constant,
+//! lies in the bank with the most free registers. Within a bank addresses follow the order of declaration, around those that the
+//! source gives. Inputs lie in the input bank. An output has a number, given by the source or else the first free one, and lies
+//! at that place of the output window of the bank of the slot that writes it.
 //!
 //! A virtual register that only one straight run of bundles uses, and writes before it reads, has a live range from its first write
 //! to its last use. Live ranges are allocated by linear scan (Poletto, Sarkar, TOPLAS 1999), which reuses a register only after all
@@ -12,17 +12,17 @@
 
 use crate::ir::runs::Run;
 use crate::ir::{Ir, Operation, RegisterId, RegisterKind, VirtualRegister};
-use crate::report::diag::{Diagnostic, Sink};
-use crate::report::source::Span;
 use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
+use takt_diagnostics::diag::{Diagnostic, Sink};
+use takt_diagnostics::source::Span;
 use takt_isa::{Bank, Machine, Register, SlotIndex};
 
-/// The address of each virtual register, by index; `None` for those that nothing uses.
+/// Addresses of all virtual registers.
 #[derive(Clone, Debug)]
 pub(crate) struct Allocation {
-    /// The addresses.
+    /// Address of each virtual register, by index; `None` for unused ones.
     pub addresses: Vec<Option<Register>>,
-    /// True if another virtual register has the same address, at another time.
+    /// Another virtual register has the same address, at another time.
     pub shared: Vec<bool>,
 }
 
@@ -45,7 +45,7 @@ impl Window {
     }
 }
 
-/// The registers that are taken.
+/// Addresses that are taken.
 struct Space {
     taken: [bool; Register::COUNT],
 }
@@ -69,7 +69,7 @@ pub(crate) struct Pressure {
     pub(crate) writer: Vec<Option<SlotIndex>>,
     /// Live ranges within one run, still without an address: the bundles of the first write and the last use.
     pub(crate) ranges: Vec<Option<(u32, u32)>>,
-    /// By slot, the registers of its bank that are left for these.
+    /// By slot: registers of its bank that are left for these live ranges.
     pub(crate) free: Vec<usize>,
     space: Space,
     addresses: Vec<Option<Register>>,
@@ -77,7 +77,7 @@ pub(crate) struct Pressure {
     unplaced: Vec<usize>,
 }
 
-/// The register pressure of a bank: the most live values at a time, and the first bundle with so many.
+/// Peak register pressure of a bank: the most live values at a time, and the first bundle that reaches it.
 #[derive(Clone, Copy, Default)]
 struct Peak {
     values: usize,
@@ -85,7 +85,7 @@ struct Peak {
 }
 
 impl Pressure {
-    /// By slot, the peak of live values in its bank.
+    /// By slot: the peak of live values in its bank.
     fn peaks(&self) -> Vec<Peak> {
         peaks(&self.ranges, &self.writer, self.free.len())
     }
@@ -94,12 +94,12 @@ impl Pressure {
         self.peaks().iter().zip(&self.free).all(|(peak, free)| peak.values <= *free)
     }
 
-    /// True if only values that are live at the same time lack registers.
+    /// Only values that are live at the same time lack registers.
     pub(crate) fn is_short(&self) -> bool {
         !self.holds_values() && self.missing.is_empty() && self.unplaced.is_empty()
     }
 
-    /// The number of missing registers.
+    /// Number of missing registers.
     pub(crate) fn shortage(&self) -> usize {
         let peaks = self.peaks();
         let values = peaks.iter().zip(&self.free).map(|(peak, free)| peak.values.saturating_sub(*free));
@@ -116,7 +116,7 @@ impl Pressure {
         short.unwrap_or_else(|| "there would not be registers for all constants".to_owned())
     }
 
-    /// True if everything has a register.
+    /// Every value and register has an address, or room for one.
     pub(crate) fn has_all(&self) -> bool {
         self.missing.is_empty() && self.unplaced.is_empty() && self.holds_values()
     }
@@ -146,7 +146,7 @@ fn peaks(ranges: &[Option<(u32, u32)>], writer: &[Option<SlotIndex>], slots: usi
     changes.iter().map(most).collect()
 }
 
-/// Allocates every virtual register that is used. `why` is the reason that values without a register could not be spilled.
+/// Allocates every virtual register that is used. `why` tells why values without a register could not be spilled.
 pub(crate) fn allocate(ir: &Ir, runs: &[Run], why: Option<&str>, sink: &mut Sink) -> Allocation {
     let mut pressure = pressure(ir, runs, sink);
     let peaks = pressure.peaks();
@@ -155,8 +155,8 @@ pub(crate) fn allocate(ir: &Ir, runs: &[Run], why: Option<&str>, sink: &mut Sink
     Allocation { addresses: pressure.addresses, shared }
 }
 
-/// Allocates all virtual registers except live ranges within one run. Constants leave a register for each of these if there are
-/// enough, else as many as are live at a time.
+/// Allocates all virtual registers except live ranges within one run. Constants leave a register for each of these ranges if
+/// there are enough, else as many as are live at a time.
 pub(crate) fn pressure(ir: &Ir, runs: &[Run], sink: &mut Sink) -> Pressure {
     let pressure = pressure_with(ir, runs, false, sink);
     if pressure.has_all() {
@@ -166,10 +166,10 @@ pub(crate) fn pressure(ir: &Ir, runs: &[Run], sink: &mut Sink) -> Pressure {
     if closer.shortage() < pressure.shortage() { closer } else { pressure }
 }
 
-/// The same; if `close`, constants leave only as many registers as are live at a time.
+/// [`pressure`] with one policy for constants; if `close`, they leave only as many registers as are live at a time.
 fn pressure_with(ir: &Ir, runs: &[Run], close: bool, sink: &mut Sink) -> Pressure {
     let machine = ir.machine;
-    // The slot that writes each register, and whether an operation uses it at all.
+    // The slot that writes each register, and whether an operation uses the register at all.
     let mut writer: Vec<Option<SlotIndex>> = vec![None; ir.registers.len()];
     let mut used = vec![false; ir.registers.len()];
     for operation in ir.operations() {
@@ -189,7 +189,7 @@ fn pressure_with(ir: &Ir, runs: &[Run], close: bool, sink: &mut Sink) -> Pressur
     outputs(ir, &writer, &mut space, &mut addresses, sink);
     let mut ranges = ranges(ir, runs);
     let is_local = |index: usize| ranges[index].is_some() && addresses[index].is_none();
-    // The registers that live ranges within one run need in each bank: constants leave these if they can.
+    // Registers that live ranges within one run need in each bank: constants leave these if they can.
     let mut wanted_by_locals = vec![0; machine.slots.len()];
     if close {
         let local =
@@ -202,7 +202,7 @@ fn pressure_with(ir: &Ir, runs: &[Run], close: bool, sink: &mut Sink) -> Pressur
             wanted_by_locals[writer[index].unwrap_or(SlotIndex::FIRST).index()] += 1;
         }
     }
-    // Constants come after what has its bank: they go wherever there is room.
+    // Constants come last: they go wherever there is room.
     let is_constant = |index: &usize| {
         let register: &VirtualRegister = &ir.registers[*index];
         matches!(register.kind, RegisterKind::Constant(_))
@@ -233,7 +233,7 @@ fn pressure_with(ir: &Ir, runs: &[Run], close: bool, sink: &mut Sink) -> Pressur
         let kind = ir.registers[index].kind;
         let windows = machine.slots.iter().enumerate();
         let windows = windows.map(|(s, slot)| (s, Window::of(&slot.bank, kind, machine.outputs_per_bank)));
-        // The first of equals; one that is full has none to spare, however little its values need.
+        // Ties go to the first bank. A full bank is never chosen, however little its values need.
         let open = windows.rev().filter(|(_, window)| space.room(*window) > 0);
         let roomiest = open.max_by_key(|(s, window)| space.room(*window) as i64 - wanted_by_locals[*s]);
         match roomiest.and_then(|(_, window)| space.take(window)) {
@@ -250,7 +250,7 @@ fn pressure_with(ir: &Ir, runs: &[Run], close: bool, sink: &mut Sink) -> Pressur
     Pressure { writer, ranges, free, space, addresses, missing, unplaced }
 }
 
-/// Allocates the outputs.
+/// Allocates the output ports, by their numbers.
 fn outputs(
     ir: &Ir,
     writer: &[Option<SlotIndex>],
@@ -261,7 +261,7 @@ fn outputs(
     let machine = ir.machine;
     let count = machine.outputs_per_bank;
     let given: HashMap<RegisterId, u16> = ir.numbers.iter().map(|(number, id)| (*id, *number)).collect();
-    // An unnamed register that the source writes at an output's address has that number.
+    // An unnamed register that the source writes at an output's address takes that output's number.
     let unnamed = |number| {
         let mut places =
             machine.slots.iter().filter_map(|slot| machine.output_registers(slot).nth(usize::from(number)));
@@ -307,26 +307,26 @@ fn outputs(
     }
 }
 
-/// The live range of each virtual register that one run of bundles writes before it reads, and no other uses: the bundles of its
-/// first write and its last use.
+/// Live range of each virtual register that one run of bundles writes before it reads, and no other run uses: the bundles of the
+/// first write and the last use.
 fn ranges(ir: &Ir, runs: &[Run]) -> Vec<Option<(u32, u32)>> {
     /// The uses of a register so far.
     #[derive(Clone, Copy)]
-    enum Seen {
+    enum RegisterUses {
         Nowhere,
         In { run: u32, first: u32, last: u32 },
         Wide,
     }
     if ir.is_opaque() {
-        // A raw word may use anything.
+        // A raw word may use any register.
         return vec![None; ir.registers.len()];
     }
     let is_candidate = |register: &VirtualRegister| {
         register.kind == RegisterKind::Plain && register.pinned.is_none() && register.preset.is_none()
     };
-    let wide = |register| if is_candidate(register) { Seen::Nowhere } else { Seen::Wide };
-    let mut seen: Vec<Seen> = ir.registers.iter().map(wide).collect();
-    // Registers that may still be found to be short-lived: a program whose names are used throughout soon has none.
+    let wide = |register| if is_candidate(register) { RegisterUses::Nowhere } else { RegisterUses::Wide };
+    let mut seen: Vec<RegisterUses> = ir.registers.iter().map(wide).collect();
+    // Registers that may still turn out to be short-lived: a program whose names are used throughout soon has none.
     let mut left = ir.registers.iter().filter(|register| is_candidate(register)).count();
     for (run, bounds) in (0..).zip(runs) {
         if left == 0 {
@@ -335,29 +335,29 @@ fn ranges(ir: &Ir, runs: &[Run]) -> Vec<Option<(u32, u32)>> {
         for (at, bundle) in (bounds.start as u32..).zip(&ir.bundles[bounds.start..bounds.end]) {
             for source in bundle.operations.iter().flat_map(|operation| operation.reads()) {
                 match &mut seen[source.index()] {
-                    Seen::Wide => {}
-                    Seen::In { run: same, last, .. } if *same == run => *last = at,
+                    RegisterUses::Wide => {}
+                    RegisterUses::In { run: same, last, .. } if *same == run => *last = at,
                     seen => {
-                        *seen = Seen::Wide;
+                        *seen = RegisterUses::Wide;
                         left -= 1;
                     }
                 }
             }
             for dest in bundle.operations.iter().filter_map(|operation| operation.dest) {
                 match &mut seen[dest.index()] {
-                    Seen::Wide => {}
-                    Seen::In { run: same, last, .. } if *same == run => *last = at,
-                    seen @ Seen::Nowhere => *seen = Seen::In { run, first: at, last: at },
+                    RegisterUses::Wide => {}
+                    RegisterUses::In { run: same, last, .. } if *same == run => *last = at,
+                    seen @ RegisterUses::Nowhere => *seen = RegisterUses::In { run, first: at, last: at },
                     seen => {
-                        *seen = Seen::Wide;
+                        *seen = RegisterUses::Wide;
                         left -= 1;
                     }
                 }
             }
         }
     }
-    let range = |seen: &Seen| match *seen {
-        Seen::In { first, last, .. } => Some((first, last)),
+    let range = |seen: &RegisterUses| match *seen {
+        RegisterUses::In { first, last, .. } => Some((first, last)),
         _ => None,
     };
     seen.iter().map(range).collect()
@@ -374,7 +374,7 @@ fn linear_scan(ir: &Ir, pressure: &mut Pressure) -> Vec<bool> {
     starting.sort_unstable_by_key(|&(first, _, index)| (first, index));
     for (number, slot) in ir.machine.numbered_slots() {
         let window = Window::of(&slot.bank, RegisterKind::Plain, ir.machine.outputs_per_bank);
-        // Free registers, the longest free first, and who had each before; values that end, soonest first.
+        // Free registers, the longest free first, each with its previous owner; live values, soonest end first.
         let mut free: VecDeque<(Register, Option<usize>)> = VecDeque::new();
         while let Some(address) = space.take(window) {
             free.push_back((address, None));
@@ -403,11 +403,11 @@ fn linear_scan(ir: &Ir, pressure: &mut Pressure) -> Vec<bool> {
 /// The demand on a bank's registers, by purpose.
 struct Fill {
     constants: usize,
-    /// States, and what more than one block uses.
+    /// States, and names that more than one block uses.
     lasting: usize,
-    /// Values that only one block uses, at a time.
+    /// Values that only one block uses, at their peak.
     values: usize,
-    /// A place where one of the constants is used.
+    /// Use of one of the constants, to point at.
     constant: Option<Span>,
 }
 
@@ -442,7 +442,7 @@ impl std::fmt::Display for Fill {
     }
 }
 
-/// One error for each bank that is full.
+/// Reports an error for each full bank.
 fn report(ir: &Ir, pressure: &Pressure, peaks: &[Peak], why: Option<&str>, sink: &mut Sink) {
     let machine = ir.machine;
     let Pressure { missing, unplaced, .. } = pressure;
@@ -453,7 +453,7 @@ fn report(ir: &Ir, pressure: &Pressure, peaks: &[Peak], why: Option<&str>, sink:
         let bank = slot.map_or(&machine.inputs, |slot| &machine.slot(slot).bank);
         let window = Window::of(bank, kind, machine.outputs_per_bank);
         let available = usize::from(window.end - window.first);
-        // Short-lived values count as often as they are needed at a time.
+        // Short-lived values count by their largest number at a time.
         let lasts = |index: usize| pressure.ranges[index].is_none();
         let inside = |address: &Option<Register>| {
             address.is_some_and(|address| (window.first..window.end).contains(&address.get()))
@@ -470,7 +470,7 @@ fn report(ir: &Ir, pressure: &Pressure, peaks: &[Peak], why: Option<&str>, sink:
             values: peak.values,
             constant: constants.last().map(|index| ir.registers[*index].span),
         };
-        // If constants find no room, neither do values: that is the same mistake.
+        // If constants find no room, values find none for the same reason: report only once.
         if lasts(first) || unplaced.is_empty() {
             sink.push(full(ir, pressure, (first, slot), &fill, peak, available, why));
         }
@@ -500,7 +500,7 @@ fn report(ir: &Ir, pressure: &Pressure, peaks: &[Peak], why: Option<&str>, sink:
     }
 }
 
-/// Registers that keep their values from block to block.
+/// Number of registers that keep their values from block to block.
 fn lasting(ir: &Ir, pressure: &Pressure) -> usize {
     let is_one = |index: &usize| {
         let kind = ir.registers[*index].kind;
@@ -538,7 +538,7 @@ fn full(
     let bank = slot_row.bank.name;
     let message =
         format!("{needed} registers in bank {bank} are needed, and {} has {available}", machine.name);
-    // Values of a block are too many where most are needed at a time, not where one of them is declared.
+    // Point at the bundle where the most values of a block are live, not at a declaration.
     let writes = |operation: &&Operation| operation.slot == Some(slot) && operation.dest.is_some();
     let crowded = pressure.ranges[first].and_then(|_| {
         let operations = &ir.bundles.get(peak.bundle as usize)?.operations;
@@ -564,7 +564,7 @@ fn full(
     if mostly_constants {
         error.help(CONSTANTS_ELSEWHERE)
     } else if crowded.is_some() {
-        error.help("compute what is needed late closer to where it is needed, or use fewer values at a time")
+        error.help("compute late values closer to their use, or use fewer values at a time")
     } else {
         error.help("use a register again once its value is no longer needed")
     }

@@ -4,30 +4,30 @@
 pub(crate) mod allocate;
 pub(crate) mod spill;
 
+use crate::capacity;
 use crate::emit::allocate::Allocation;
 use crate::ir::position::Position;
 use crate::ir::{Constant, Ir, Operation, RegisterId, RegisterKind, numbered};
 use crate::limits::NAME_BYTES;
-use crate::report::diag::{Diagnostic, Sink};
-use crate::report::source::Span;
-use crate::room;
 use foldhash::{HashSet, HashSetExt as _};
 use std::collections::BTreeMap;
+use takt_diagnostics::diag::{Diagnostic, Sink};
+use takt_diagnostics::source::Span;
 use takt_isa::program::{LoopBound, Port, Range, Section, Symbol};
 use takt_isa::{BundleAddress, Instruction, Program, Register, SlotIndex, Type};
 
-/// A program, and which of its words a macro, a repetition or the assembler itself made (as indices into its code, ascending).
-pub(crate) struct Emitted {
+/// A program, with the words that a macro, a repetition or the assembler itself made (indices into its code, ascending).
+pub(crate) struct EmittedProgram {
     pub(crate) program: Program,
     pub(crate) expanded: Vec<u32>,
-    /// For each word that has a source line, its operation's order, and its expansion for the scope.
+    /// By word with a source line: its operation's order, and its expansion, which gives the scope.
     pub(crate) origins: Vec<Option<Position>>,
-    /// Words that compute a part of an equation, and where that stands.
+    /// Words that compute a part of an equation, and the place of the part.
     pub(crate) parts: Vec<(u32, Span)>,
 }
 
 /// Writes the program. The labels become its symbols.
-pub(crate) fn emit(ir: &mut Ir, allocation: &Allocation, sink: &mut Sink) -> Emitted {
+pub(crate) fn emit(ir: &mut Ir, allocation: &Allocation, sink: &mut Sink) -> EmittedProgram {
     let slots = ir.machine.slots.len();
     let filler = Instruction::NOP.encode().unwrap_or(0);
     let mut code = vec![filler; ir.bundles.len() * slots];
@@ -74,15 +74,15 @@ pub(crate) fn emit(ir: &mut Ir, allocation: &Allocation, sink: &mut Sink) -> Emi
         ranges: ranges(ir, allocation),
         files: ir.files.clone(),
         lines,
-        // Those of equations are known where the sources are.
+        // Columns of equations are added where the sources are at hand.
         parts: columns,
     };
     distinguish(&mut program);
-    Emitted { program, expanded, origins, parts }
+    EmittedProgram { program, expanded, origins, parts }
 }
 
 fn word(ir: &Ir, operation: &Operation, slot: SlotIndex, allocation: &Allocation, sink: &mut Sink) -> u64 {
-    // A register without a place is reported by the stage that found none.
+    // A missing address is reported by the allocation.
     let address = |id: crate::ir::RegisterId| allocation.addresses[id.index()].unwrap_or(Register::ZERO);
     let constant = match operation.constant {
         Constant::None => 0,
@@ -109,18 +109,7 @@ fn word(ir: &Ir, operation: &Operation, slot: SlotIndex, allocation: &Allocation
     }
 }
 
-/// True if no packing of the operations fits the program memory.
-pub(crate) fn is_too_long(ir: &Ir) -> bool {
-    let depth = ir.machine.most_bundles() as usize;
-    // A bundle has no more operations that need a slot than there are slots.
-    if ir.bundles.len() <= depth {
-        return false;
-    }
-    let words = depth.saturating_mul(ir.machine.slots.len());
-    ir.operations().filter(|operation| operation.slot.is_some()).count() > words
-}
-
-/// The program memory of the machine holds only so much.
+/// Reports a program that is longer than the machine's program memory.
 pub(crate) fn limits(ir: &Ir, sink: &mut Sink) {
     let depth = ir.machine.most_bundles() as usize;
     let bundles = ir.bundles.len();
@@ -132,7 +121,7 @@ pub(crate) fn limits(ir: &Ir, sink: &mut Sink) {
             bundles - depth
         );
         let error = Diagnostic::error("memory-full", first, message).here("the first that does not fit");
-        sink.push(error.help(room::for_bundles(ir.machine, bundles)));
+        sink.push(error.help(capacity::for_bundles(ir.machine, bundles)));
     }
 }
 
@@ -157,7 +146,7 @@ fn ports(ir: &Ir, allocation: &Allocation, wanted: impl Fn(RegisterKind) -> bool
     ir.registers
         .iter()
         .zip(allocation.addresses.iter().zip(&allocation.shared))
-        // A register that stands for several names at different times has none.
+        // A register shared by several names has no name.
         .filter(|(register, (_, shared))| wanted(register.kind) && !register.name.is_empty() && !**shared)
         .filter_map(|(register, (address, _))| {
             Some(Port { name: register.name.clone(), register: (*address)?, ty: register.ty })
@@ -168,7 +157,7 @@ fn ports(ir: &Ir, allocation: &Allocation, wanted: impl Fn(RegisterKind) -> bool
 fn symbols(labels: Vec<crate::ir::Label>) -> Vec<Symbol> {
     let symbol =
         |label: crate::ir::Label| Symbol { name: label.name, space: label.space, address: label.position };
-    // Those without a name are the assembler's own.
+    // Labels without a name are the assembler's own.
     let named = labels.into_iter().filter(|label| !label.name.is_empty());
     let mut symbols: Vec<Symbol> = named.map(symbol).collect();
     // Labels of one address stay in the order of the source.
@@ -187,7 +176,7 @@ fn sections(ir: &Ir) -> Vec<Section> {
         .collect()
 }
 
-/// The bounds of loops. Where the scheduler left nothing of a block of idle bundles, two may have come to one place.
+/// The bounds of loops. Two may have come to one place where the scheduler removed a block of idle bundles.
 fn loop_bounds(ir: &Ir) -> Vec<LoopBound> {
     let mut bounds: BTreeMap<u32, (u32, Option<u32>)> = BTreeMap::new();
     for bound in ir.loop_bounds.iter().filter(|bound| (bound.position as usize) < ir.bundles.len()) {
@@ -204,7 +193,7 @@ fn loop_bounds(ir: &Ir) -> Vec<LoopBound> {
         .collect()
 }
 
-/// The ranges of registers that have a place: what nothing uses has none.
+/// Ranges of registers that have an address; unused registers have none.
 fn ranges(ir: &Ir, allocation: &Allocation) -> Vec<Range> {
     let range = |&(id, [low, high]): &(RegisterId, [u32; 2])| {
         let register = allocation.addresses[id.index()]?;
@@ -217,8 +206,8 @@ fn ranges(ir: &Ir, allocation: &Allocation) -> Vec<Range> {
     ranges
 }
 
-/// Gives every named thing a name of its own. The source's names are; those that the assembler makes, of a macro's locals and
-/// of values split from a name, might be another's or too long.
+/// Makes all names unique and short enough. The source's names are; names that the assembler makes, of a macro's locals and
+/// of values split from a name, may collide or be too long.
 fn distinguish(program: &mut Program) {
     let count =
         program.inputs.len() + program.outputs.len() + program.registers.len() + program.symbols.len();
@@ -229,7 +218,7 @@ fn distinguish(program: &mut Program) {
     if all.len() == count {
         return;
     }
-    // Names with a point yield to those without, which only the source can have given.
+    // Names with a point yield to names without, which only the source can have given.
     let mut taken: HashSet<String> =
         all.into_iter().filter(|name| !name.contains('.')).map(str::to_owned).collect();
     let Program { inputs, outputs, registers, symbols, .. } = program;

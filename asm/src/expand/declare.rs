@@ -1,24 +1,25 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Declarations: registers and their places, presets, data. The part of [`expand`](crate::expand) that writes down what
-//! the program has, rather than where it goes.
+//! Declarations: registers and their places, presets, data. The part of [`expand`](crate::expand) that records the program's
+//! contents, as opposed to control flow.
 
-use crate::context::{Array, At, Binding, Context, Reported, ScopeId, Table};
+use crate::context::{Array, AstPlace, Binding, Context, ErrorReported, ScopeId, Table};
 use crate::expand::load::include_path;
+use crate::expand::numbers::{Table as Numbers, shape_text};
 use crate::expand::{Data, Expander, Fast};
 use crate::ir::arrays;
 use crate::ir::{Label, LabelId, RegisterId, RegisterKind, VirtualRegister};
 use crate::limits;
-use crate::report::diag::Diagnostic;
-use crate::report::machine::{MachineMistake, machine_file, machine_from};
-use crate::report::source::Span;
-use crate::syntax::ast::*;
-use crate::syntax::name::NameId;
 use smallvec::SmallVec;
+use takt_diagnostics::diag::Diagnostic;
+use takt_diagnostics::machine::{MachineMistake, machine_file, machine_from};
+use takt_diagnostics::source::Span;
 use takt_isa::program::{Columns, Location, Space};
 use takt_isa::{Machine, MachineNameError, Register, Type};
+use takt_syntax::ast::*;
+use takt_syntax::name::NameId;
 
 impl Expander<'_> {
-    pub(crate) fn data_section(&mut self, at: At, span: Span) -> Result<(), Reported> {
+    pub(crate) fn data_section(&mut self, at: AstPlace, span: Span) -> Result<(), ErrorReported> {
         if self.section == Section::Data {
             return Ok(());
         }
@@ -27,7 +28,13 @@ impl Expander<'_> {
         Err(self.context.report(at.scope, error))
     }
 
-    pub(crate) fn data(&mut self, at: At, values: &[Expr], ty: Type, span: Span) -> Result<(), Reported> {
+    pub(crate) fn data(
+        &mut self,
+        at: AstPlace,
+        values: &[Expr],
+        ty: Type,
+        span: Span,
+    ) -> Result<(), ErrorReported> {
         self.data_section(at, span)?;
         self.flat.data.extend(values.iter().map(|value| Data::Value(at, *value, ty)));
         self.data_words += values.len();
@@ -35,7 +42,7 @@ impl Expander<'_> {
         Ok(())
     }
 
-    pub(crate) fn check_data(&mut self, at: At, span: Span) {
+    pub(crate) fn check_data(&mut self, at: AstPlace, span: Span) {
         if self.data_words > limits::DATA_WORDS {
             let message = format!("the program expands to more than {} words of data", limits::DATA_WORDS);
             self.limit(at.scope, span, message);
@@ -44,10 +51,10 @@ impl Expander<'_> {
 
     pub(crate) fn declare(
         &mut self,
-        at: At,
-        what: Declares,
+        at: AstPlace,
+        what: DeclarationKind,
         declaration: &Declaration,
-    ) -> Result<(), Reported> {
+    ) -> Result<(), ErrorReported> {
         let Name { name, span } = declaration.name;
         let id = self.context.name(at, name, span)?;
         self.declare_name(at, what, declaration, id)
@@ -55,21 +62,21 @@ impl Expander<'_> {
 
     fn declare_name(
         &mut self,
-        at: At,
-        what: Declares,
+        at: AstPlace,
+        what: DeclarationKind,
         declaration: &Declaration,
         id: NameId,
-    ) -> Result<(), Reported> {
+    ) -> Result<(), ErrorReported> {
         let span = declaration.name.span;
         let kind = match what {
-            Declares::Register => RegisterKind::Plain,
-            Declares::State => RegisterKind::State,
-            Declares::Input => RegisterKind::Input,
-            Declares::Output => RegisterKind::Output,
+            DeclarationKind::Register => RegisterKind::Plain,
+            DeclarationKind::State => RegisterKind::State,
+            DeclarationKind::Input => RegisterKind::Input,
+            DeclarationKind::Output => RegisterKind::Output,
         };
         let register = RegisterId::new(self.context.declared.registers.len());
         self.context.declare(at, id, span, Binding::Register(register))?;
-        // From here on the name is known: a mistake in its type or place is reported and the rest stands.
+        // From here on the name is known: a mistake in its type or place is reported, and the declaration stands.
         let name = self.context.scopes.full_name(at.scope, id);
         self.context.declared.registers.push(VirtualRegister {
             name,
@@ -92,21 +99,21 @@ impl Expander<'_> {
     /// Declares an array of registers.
     pub(crate) fn declare_array(
         &mut self,
-        at: At,
-        what: Declares,
+        at: AstPlace,
+        what: DeclarationKind,
         declaration: &Declaration,
         sizes: &[Expr],
-    ) -> Result<(), Reported> {
+    ) -> Result<(), ErrorReported> {
         let Name { name, span } = declaration.name;
         let id = self.context.name(at, name, span)?;
         let text = self.context.scopes.full_name(at.scope, id);
         let kind = match what {
-            Declares::Register => RegisterKind::Plain,
-            Declares::State => RegisterKind::State,
-            Declares::Input => RegisterKind::Input,
-            Declares::Output => RegisterKind::Output,
+            DeclarationKind::Register => RegisterKind::Plain,
+            DeclarationKind::State => RegisterKind::State,
+            DeclarationKind::Input => RegisterKind::Input,
+            DeclarationKind::Output => RegisterKind::Output,
         };
-        // With a place it is one element that is declared: what disassembly says of an array.
+        // With a place, one element is declared: disassembly writes arrays like this.
         if declaration.place.is_some() {
             let mut indices = Vec::with_capacity(sizes.len());
             for size in sizes {
@@ -162,15 +169,15 @@ impl Expander<'_> {
         Ok(())
     }
 
-    /// The number of elements of an array, and its sizes.
+    /// The number of elements of an array, and its sizes. At most `most` elements are left of `in_all`.
     fn shape(
         &mut self,
-        at: At,
+        at: AstPlace,
         span: Span,
         sizes: &[Expr],
         most: usize,
         in_all: usize,
-    ) -> Result<(u32, SmallVec<[u32; 2]>), Reported> {
+    ) -> Result<(u32, SmallVec<[u32; 2]>), ErrorReported> {
         if sizes.len() > limits::ARRAY_INDICES {
             let message = format!("an array has at most {} indices", limits::ARRAY_INDICES);
             return Err(self.context.error(at.scope, "limit", span, message));
@@ -187,25 +194,29 @@ impl Expander<'_> {
                 let message = format!("arrays of more than {in_all} elements in all");
                 return Err(self.context.error(at.scope, "limit", size.span, message));
             }
-            // Not beyond the limit, which 32 bits hold.
+            // Within the limit, which 32 bits hold.
             count *= value as u32;
             shape.push(value as u32);
         }
         Ok((count, shape))
     }
 
-    /// Declares an array in data memory.
+    /// Declares an array in data memory. Its values may be listed or in a file; without any, they are zeros.
     pub(crate) fn declare_table(
         &mut self,
-        at: At,
+        at: AstPlace,
         declaration: &Declaration,
         sizes: &[Expr],
-        values: &[Expr],
-    ) -> Result<(), Reported> {
+        values: Option<&ArrayValues>,
+    ) -> Result<(), ErrorReported> {
         let Name { name, span } = declaration.name;
         let id = self.context.name(at, name, span)?;
         let text = self.context.scopes.full_name(at.scope, id);
-        if sizes.is_empty() {
+        let file = match values {
+            Some(ArrayValues::File(path, span)) => Some((self.numbers(at, path, *span)?, *span)),
+            _ => None,
+        };
+        if sizes.is_empty() && file.is_none() {
             let error = Diagnostic::error("array", span, format!("`{text}` has no size"))
                 .help(format!("write `{text}[n]`, or `{text}[n,m]`"));
             return Err(self.context.report(at.scope, error));
@@ -217,7 +228,14 @@ impl Expander<'_> {
             return Err(self.context.report(at.scope, error));
         }
         let most = limits::DATA_WORDS.saturating_sub(self.data_words);
-        let (words, sizes) = self.shape(at, span, sizes, most, limits::DATA_WORDS)?;
+        let (words, sizes) = match &file {
+            // A file has at most as many numbers as there are words.
+            Some((table, _)) if sizes.is_empty() => {
+                let sizes = table.sizes().into_iter().map(|size| size as u32).collect();
+                (table.values.len() as u32, sizes)
+            }
+            _ => self.shape(at, span, sizes, most, limits::DATA_WORDS)?,
+        };
         let ty = match declaration.ty {
             Some(ty) => self.context.type_named(at, ty)?,
             None => Type::F,
@@ -229,24 +247,14 @@ impl Expander<'_> {
         let (space, position) = (Space::Data, base);
         self.context.declared.labels.push(Label { name: text.clone(), space, position, span });
         self.context.declared.label_sections.push(Section::Data);
-        let array = arrays::Array { name: text.clone(), base, words, sizes, ty, span };
+        let array = arrays::Array { name: text, base, words, sizes, ty, span };
         let table = Table { array, label, used: false };
-        if values.is_empty() {
-            self.flat.data.push(Data::Space(at, span, words, ty));
-        } else {
-            self.flat
-                .data
-                .extend(values.iter().take(words as usize).map(|value| Data::Value(at, *value, ty)));
-            let given = values.len() as u32;
-            if given != words {
-                let message = format!("`{text}` has {words} elements, and these are {given} values");
-                let last = values.last().map_or(span, |last| values[0].span.to(last.span));
-                let error = Diagnostic::error("array", last, message)
-                    .also(span, format!("declared here as `{text}[{}]`", table.shape()))
-                    .help("give a value for each element, the last index counting fastest, or none: then all are 0");
-                self.context.report(at.scope, error);
-                self.flat.data.push(Data::Space(at, span, words.saturating_sub(given), ty));
+        match (file, values) {
+            (Some((numbers, span)), _) => self.values_of_file(at, &table, &numbers, span),
+            (None, Some(ArrayValues::Listed(values))) if !values.is_empty() => {
+                self.listed_values(at, &table, values);
             }
+            _ => self.flat.data.push(Data::Space(at, span, words, ty)),
         }
         self.context.declared.tables.push(table);
         self.data_words += words as usize;
@@ -254,8 +262,43 @@ impl Expander<'_> {
         Ok(())
     }
 
+    /// Appends the values that an array's declaration lists.
+    fn listed_values(&mut self, at: AstPlace, table: &Table, values: &[Expr]) {
+        let arrays::Array { name, words, ty, span, .. } = table.array.clone();
+        self.flat.data.extend(values.iter().take(words as usize).map(|value| Data::Value(at, *value, ty)));
+        let given = values.len() as u32;
+        if given != words {
+            let message = format!("`{name}` has {words} elements, and these are {given} values");
+            let last = values.last().map_or(span, |last| values[0].span.to(last.span));
+            let error = Diagnostic::error("array", last, message)
+                .also(span, format!("declared here as `{name}[{}]`", table.shape()))
+                .help(
+                    "give a value for each element, the last index counting fastest, or none: then all are 0",
+                );
+            self.context.report(at.scope, error);
+            self.flat.data.push(Data::Space(at, span, words.saturating_sub(given), ty));
+        }
+    }
+
+    /// Appends the values of an array from a file, whose path stands at `place`.
+    fn values_of_file(&mut self, at: AstPlace, table: &Table, numbers: &Numbers, place: Span) {
+        let arrays::Array { name, words, ty, span, sizes, .. } = table.array.clone();
+        if numbers.fits(&sizes) {
+            let values = numbers.values.iter().map(|value| Data::Value(numbers.at, *value, ty));
+            self.flat.data.extend(values);
+            return;
+        }
+        let message =
+            format!("`{name}` is `{name}[{}]`, and the file has {}", table.shape(), shape_text(numbers));
+        let error = Diagnostic::error("array", place, message)
+            .also(span, "declared here")
+            .help(format!("leave the size out, `{name}` alone: then it is the file's"));
+        self.context.report(at.scope, error);
+        self.flat.data.push(Data::Space(at, span, words, ty));
+    }
+
     /// Resolves the operand of the `@` of a declaration: a register's canonical name, or a port's number.
-    fn place(&mut self, at: At, register: RegisterId, place: Expr) -> Result<(), Reported> {
+    fn place(&mut self, at: AstPlace, register: RegisterId, place: Expr) -> Result<(), ErrorReported> {
         let name = match self.context.asts[at.ast as usize].nodes[place.id.range()] {
             [Node { kind: NodeKind::Name(name), span }] => Some(Name { name, span }),
             _ => None,
@@ -264,7 +307,7 @@ impl Expander<'_> {
             let id = self.context.spelled(at, name.name, name.span)?;
             let is_register = self.context.machine.register_address(self.context.scopes.text(id)).is_some();
             let binding = self.context.lookup(at.scope, id);
-            // Anything that is neither a register nor a number is taken for a misspelt register.
+            // Any operand that is neither a register nor a number is taken for a misspelt register.
             let is_number =
                 matches!(binding, Binding::Constant(_) | Binding::Count(_) | Binding::Argument(_));
             if is_register || !is_number {
@@ -277,7 +320,13 @@ impl Expander<'_> {
     }
 
     /// Gives a port its number.
-    fn number(&mut self, at: At, register: RegisterId, number: i64, span: Span) -> Result<(), Reported> {
+    fn number(
+        &mut self,
+        at: AstPlace,
+        register: RegisterId,
+        number: i64,
+        span: Span,
+    ) -> Result<(), ErrorReported> {
         let machine = self.context.machine;
         let (what, count) = match self.context.declared.registers[register.index()].kind {
             RegisterKind::Input => ("input", machine.input_count()),
@@ -306,8 +355,14 @@ impl Expander<'_> {
         self.take_number(at, register, number, span)
     }
 
-    /// Takes the number of an output port for it.
-    fn take_number(&mut self, at: At, register: RegisterId, number: u16, span: Span) -> Result<(), Reported> {
+    /// Reserves the number of an output port.
+    fn take_number(
+        &mut self,
+        at: AstPlace,
+        register: RegisterId,
+        number: u16,
+        span: Span,
+    ) -> Result<(), ErrorReported> {
         if let Some(other) = self.context.declared.numbered.get(&number) {
             let VirtualRegister { name, span: first, .. } = &self.context.declared.registers[other.index()];
             let error = Diagnostic::error("place", span, format!("output {number} is taken"))
@@ -319,8 +374,13 @@ impl Expander<'_> {
         Ok(())
     }
 
-    /// The word of a directive that switches something on or off.
-    pub(crate) fn is_on(&mut self, at: At, word: Name, directive: &'static str) -> Result<bool, Reported> {
+    /// The word of a directive that switches `on` or `off`.
+    pub(crate) fn is_on(
+        &mut self,
+        at: AstPlace,
+        word: Name,
+        directive: &'static str,
+    ) -> Result<bool, ErrorReported> {
         let name = self.context.spelled(at, word.name, word.span)?;
         match self.context.scopes.text(name) {
             "on" => Ok(true),
@@ -332,8 +392,8 @@ impl Expander<'_> {
         }
     }
 
-    /// `.fast`: what it allows from here on.
-    pub(crate) fn allowed(&mut self, at: At, words: &[Name]) -> Result<Fast, Reported> {
+    /// `.fast`: the transformations that it allows from here on.
+    pub(crate) fn allowed(&mut self, at: AstPlace, words: &[Name]) -> Result<Fast, ErrorReported> {
         let mut fast = Fast::default();
         for word in words {
             let name = self.context.name(at, word.name, word.span)?;
@@ -351,19 +411,19 @@ impl Expander<'_> {
         Ok(fast)
     }
 
-    fn columns(&mut self, at: At, first: Expr, last: Expr) -> Result<Columns, Reported> {
+    fn columns(&mut self, at: AstPlace, first: Expr, last: Expr) -> Result<Columns, ErrorReported> {
         let span = first.span.to(last.span);
         let (first, last) = (self.context.integer(at, first)?, self.context.integer(at, last)?);
         match (u32::try_from(first), u32::try_from(last)) {
             (Ok(first), Ok(last)) if 0 < first && first <= last => Ok(Columns { first, last }),
             _ => {
-                let message = format!("there are no columns {first} to {last}: they count from 1");
+                let message = format!("columns {first} to {last} do not exist: columns count from 1");
                 Err(self.context.error(at.scope, "range", span, message))
             }
         }
     }
 
-    pub(crate) fn set_loc(&mut self, at: At, places: &[Loc]) -> Result<(), Reported> {
+    pub(crate) fn set_loc(&mut self, at: AstPlace, places: &[Loc]) -> Result<(), ErrorReported> {
         let mut locations = Vec::with_capacity(places.len());
         for place in places {
             locations.push(match place {
@@ -396,15 +456,15 @@ impl Expander<'_> {
         Ok(())
     }
 
-    /// `.machine`: the machine of the whole program, in whose stead the caller gave one for sources that name none.
+    /// `.machine`: the machine of the whole program, replacing the caller's.
     pub(crate) fn machine(
         &mut self,
-        at: At,
+        at: AstPlace,
         machine: &MachineName,
         options: &[(Name, Expr)],
         index: u32,
         span: Span,
-    ) -> Result<(), Reported> {
+    ) -> Result<(), ErrorReported> {
         if index > 0 || self.include_depth > 1 || at.scope != ScopeId::ROOT {
             let error = Diagnostic::error("machine", span, "`.machine` is the first line of a program")
                 .help("move it before everything else in the source that is assembled");
@@ -436,8 +496,13 @@ impl Expander<'_> {
         Ok(())
     }
 
-    /// The machine of a file, whose path is relative to the folder of the source that is assembled.
-    fn machine_of_file(&mut self, at: At, path: &str, span: Span) -> Result<&'static Machine, Reported> {
+    /// The machine of a file, whose path is relative to the folder of the assembled source.
+    fn machine_of_file(
+        &mut self,
+        at: AstPlace,
+        path: &str,
+        span: Span,
+    ) -> Result<&'static Machine, ErrorReported> {
         let within = include_path("", path).filter(|path| machine_file(path) == Some((path.as_str(), "")));
         let Some(within) = within else {
             let message = format!("`{path}` is no machine's file within the project");
@@ -450,12 +515,12 @@ impl Expander<'_> {
         read.map_err(|mistake| self.context.report(at.scope, mistake.diagnose(span)))
     }
 
-    fn no_machine(&mut self, at: At, span: Span, error: MachineNameError) -> Reported {
+    fn no_machine(&mut self, at: AstPlace, span: Span, error: MachineNameError) -> ErrorReported {
         self.context.report(at.scope, MachineMistake::Name(error).diagnose(span))
     }
 
-    /// `.ports`: whether they are latched.
-    pub(crate) fn ports(&mut self, at: At, word: Name) -> Result<(), Reported> {
+    /// `.ports`: whether ports are latched or direct.
+    pub(crate) fn ports(&mut self, at: AstPlace, word: Name) -> Result<(), ErrorReported> {
         let name = self.context.spelled(at, word.name, word.span)?;
         let latched = match self.context.scopes.text(name) {
             "latched" => true,
@@ -478,7 +543,13 @@ impl Expander<'_> {
         }
     }
 
-    fn pin(&mut self, at: At, register: RegisterId, address: Register, span: Span) -> Result<(), Reported> {
+    fn pin(
+        &mut self,
+        at: AstPlace,
+        register: RegisterId,
+        address: Register,
+        span: Span,
+    ) -> Result<(), ErrorReported> {
         let machine = self.context.machine;
         let place = machine.register_name(address).unwrap_or_default();
         let wrong = match self.context.declared.registers[register.index()].kind {
@@ -521,7 +592,7 @@ impl Expander<'_> {
 }
 
 /// The address of a register by its canonical name.
-pub(crate) fn address(context: &mut Context, at: At, place: Name) -> Result<Register, Reported> {
+pub(crate) fn address(context: &mut Context, at: AstPlace, place: Name) -> Result<Register, ErrorReported> {
     let id = context.spelled(at, place.name, place.span)?;
     let text = context.scopes.text(id).to_owned();
     let machine = context.machine;
@@ -535,7 +606,7 @@ pub(crate) fn address(context: &mut Context, at: At, place: Name) -> Result<Regi
     })
 }
 
-/// The register at an address: the one the source names, or else one without a name.
+/// The register at an address: the source's named register, or else a new nameless register.
 pub(crate) fn register_at(context: &mut Context, address: Register, span: Span) -> RegisterId {
     if let Some(register) = context.declared.by_address.get(&address) {
         return *register;

@@ -1,33 +1,33 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Equations that use macros as functions: the uses, one after the other, and what is left for
-//! [`resolve`](crate::resolve::equation) to compute between them and behind them.
+//! Equations that use macros as functions: the uses in order, and the remaining pieces, which
+//! [`resolve`](crate::resolve::equation) computes between and after them.
 //!
-//! A macro's first parameter is what it writes, the others are the function's arguments. An argument that is a name, an element
-//! or a constant is passed as it is; any other is computed first, into a register that has no name.
+//! A macro's first parameter is its result, the others are the function's arguments. An argument that is a name, an element or
+//! a constant is passed unchanged; any other is computed first, into a nameless register.
 
-use crate::context::{At, Binding, Reported};
+use crate::context::{AstPlace, Binding, ErrorReported};
 use crate::expand::{Expander, Frame, FrameKind, Part};
 use crate::ir::{RegisterId, RegisterKind, VirtualRegister};
-use crate::report::diag::Diagnostic;
-use crate::report::source::Span;
-use crate::syntax::ast::*;
-use crate::syntax::expr::{operands, parts};
-use crate::syntax::name::{NameId, NameRef};
 use std::collections::HashMap;
 use std::rc::Rc;
+use takt_diagnostics::diag::Diagnostic;
+use takt_diagnostics::source::Span;
 use takt_isa::Type;
+use takt_syntax::ast::*;
+use takt_syntax::expr::{operands, parts};
+use takt_syntax::name::{NameId, NameRef};
 
-/// The function that adds up.
+/// Name of the function that adds up terms.
 pub(crate) const SUM: &str = "sum";
 
 /// Registers that hold the results of macros, by the node that uses the macro.
 pub(crate) type Results = Rc<HashMap<u32, RegisterId>>;
 
-/// A part of an equation that is computed by itself, for the sake of a macro's use.
+/// A part of an equation that is computed separately, for the sake of a macro's use.
 #[derive(Clone, Debug)]
 pub(crate) struct Piece {
-    /// The argument of a macro and the register that it is computed into; none for what is left of the equation.
-    pub(crate) argument: Option<(Expr, RegisterId)>,
+    /// The argument of a macro, the register that it is computed into, and the requested type; `None` for the rest of the equation.
+    pub(crate) argument: Option<(Expr, RegisterId, Option<Type>)>,
     /// Results of macros so far.
     pub(crate) results: Results,
 }
@@ -35,14 +35,14 @@ pub(crate) struct Piece {
 /// A piece of an equation that uses macros.
 #[derive(Clone, Debug)]
 pub(crate) enum Step {
-    /// Something computed.
+    /// A part to compute.
     Piece(Piece),
-    /// A macro's use and its operands.
+    /// A macro's use: name, operands and place.
     Use(NameId, Vec<Operand>, Span),
 }
 
 impl Expander<'_> {
-    pub(crate) fn equation(&mut self, at: At, statement: u32, equation: u32) {
+    pub(crate) fn equation(&mut self, at: AstPlace, statement: u32, equation: u32) {
         let ast = Rc::clone(&self.context.asts[at.ast as usize]);
         let equation = &ast.equations[equation as usize];
         // Errors are reported already.
@@ -61,11 +61,11 @@ impl Expander<'_> {
         self.frames.push(Frame { at, next: 0, end, kind });
     }
 
-    /// Does the next step of an equation.
-    pub(crate) fn step(&mut self, at: At, statement: u32, step: &Step) {
+    /// Executes the next step of an equation.
+    pub(crate) fn step(&mut self, at: AstPlace, statement: u32, step: &Step) {
         match step {
             Step::Piece(piece) => {
-                let span = piece.argument.map_or(Span::default(), |(value, _)| value.span);
+                let span = piece.argument.map_or(Span::default(), |(value, ..)| value.span);
                 self.count(at.scope, span);
                 let number = self.flat.pieces.len() as u32;
                 self.flat.pieces.push(piece.clone());
@@ -77,13 +77,13 @@ impl Expander<'_> {
                     // A call begins with the function's name.
                     notes.macro_use(Span::new(span.start, span.start + length), *name);
                 }
-                self.enter_macro(at, *name, *span, operands);
+                self.enter_macro(at, *name, (*span, true), operands);
             }
         }
     }
 
-    /// The steps of an equation: its macros' uses, inner ones first, then from left to right.
-    fn steps(&mut self, at: At, ast: &Ast, equation: &Equation) -> Result<Vec<Step>, Reported> {
+    /// The steps of an equation: its macros' uses, inner ones first, then from left to right; and the pieces between them.
+    fn steps(&mut self, at: AstPlace, ast: &Ast, equation: &Equation) -> Result<Vec<Step>, ErrorReported> {
         let mut steps = Vec::new();
         let mut results: HashMap<u32, RegisterId> = HashMap::new();
         for value in &equation.values {
@@ -101,6 +101,7 @@ impl Expander<'_> {
                     continue;
                 }
                 let (parameters, defined) = definition.parameters(&self.context.asts);
+                let types = Rc::clone(&definition.types);
                 let text = self.context.scopes.text(name).to_owned();
                 if parameters != arguments.len() + 1 {
                     return Err(self.wrong_arguments(
@@ -116,13 +117,11 @@ impl Expander<'_> {
                         format!("macro `{text}` within a `{SUM}`: it would be used once for all turns");
                     let error = Diagnostic::error("macro-in-sum", node.span, message)
                         .also(nodes[*from as usize].span, "counts here")
-                        .help(
-                            "compute what it gives in a `.rep`, into registers of its own, and add those up",
-                        );
+                        .help("compute its values in a `.rep`, into separate registers, and add these up");
                     return Err(self.context.report(at.scope, error));
                 }
                 let mut given = Vec::with_capacity(parameters);
-                for (from, to) in arguments {
+                for ((from, to), asked) in arguments.into_iter().zip(types.asked.iter().skip(1)) {
                     let span = nodes[to as usize].span;
                     let id = ExprId { first: first + from, count: to - from + 1 };
                     let part = &nodes[from as usize..=to as usize];
@@ -134,7 +133,8 @@ impl Expander<'_> {
                             Some(register) => self.unnamed(*register),
                             None => {
                                 let register = self.register(span);
-                                let argument = Some((Expr { id, span }, register));
+                                let asked = asked.and_then(|asked| asked.value());
+                                let argument = Some((Expr { id, span }, register, asked));
                                 steps
                                     .push(Step::Piece(Piece { argument, results: Rc::new(results.clone()) }));
                                 self.unnamed(register)
@@ -143,14 +143,17 @@ impl Expander<'_> {
                     };
                     given.push(Operand { kind, span });
                 }
-                // A macro that is the whole equation writes its target directly, unless it may still read that.
+                // A macro that is the whole equation writes its target directly, unless its body might read the target
+                // afterwards.
                 let is_whole = index as usize + 1 == nodes.len() && equation.values.len() == 1;
                 let target = match equation.targets[..] {
                     [target] if is_whole && !self.is_among(at, target, &given) => Some(target),
                     _ => None,
                 };
                 let dest = target.unwrap_or_else(|| {
-                    let register = self.result(&text, node.span);
+                    let asked = types.asked.first().copied().flatten();
+                    let ty = asked.and_then(|asked| asked.value()).unwrap_or(Type::F);
+                    let register = self.result(&text, node.span, ty);
                     results.insert(first + index, register);
                     Operand { kind: self.unnamed(register), span: node.span }
                 });
@@ -165,7 +168,7 @@ impl Expander<'_> {
         Ok(steps)
     }
 
-    /// First and last node of what each sum adds up.
+    /// First and last node of each sum.
     fn sums(&self, nodes: &[Node], parts: &[u32]) -> Vec<(u32, u32)> {
         let is_sum = |node: &Node| matches!(node.kind, NodeKind::Call(name, _) if self.context.scopes.text(name) == SUM);
         let sums = (0..).zip(nodes).filter(|(_, node)| is_sum(node));
@@ -174,12 +177,12 @@ impl Expander<'_> {
 
     fn wrong_arguments(
         &mut self,
-        at: At,
+        at: AstPlace,
         span: Span,
         text: &str,
         (parameters, found): (usize, usize),
         defined: Span,
-    ) -> Reported {
+    ) -> ErrorReported {
         let message = match parameters {
             0 => format!("macro `{text}` has no parameter that it could write: it is no function"),
             parameters => {
@@ -193,9 +196,9 @@ impl Expander<'_> {
         self.context.report(at.scope, error)
     }
 
-    /// True if a part of an expression is a constant, as far as its names are declared yet.
-    fn is_constant(&self, at: At, nodes: &[Node]) -> bool {
-        // A name made of parts may be anything's.
+    /// A part of an expression is constant, as far as its names are declared yet.
+    fn is_constant(&self, at: AstPlace, nodes: &[Node]) -> bool {
+        // A name made of parts may mean anything.
         let is_constant = |node: &Node| match node.kind {
             NodeKind::Name(name) => {
                 name.resolve().is_ok_and(|name| self.is_value(self.context.lookup(at.scope, name)))
@@ -228,8 +231,8 @@ impl Expander<'_> {
         }
     }
 
-    /// True if an operand may alias one of others.
-    fn is_among(&mut self, at: At, target: Operand, others: &[Operand]) -> bool {
+    /// An operand may alias one of the others.
+    fn is_among(&mut self, at: AstPlace, target: Operand, others: &[Operand]) -> bool {
         let mut meaning = |operand: Operand| -> Option<(NameId, Binding)> {
             let OperandKind::Name(name) = operand.kind else { return None };
             let mut name = self.context.name(at, name, operand.span).ok()?;
@@ -250,24 +253,24 @@ impl Expander<'_> {
         })
     }
 
-    /// A register for a value that the source gives no name.
+    /// A nameless register for a value.
     fn register(&mut self, span: Span) -> RegisterId {
         let registers = &mut self.context.declared.registers;
         registers.push(VirtualRegister::unnamed(span));
         RegisterId::new(registers.len() - 1)
     }
 
-    /// A register for what a macro gives. It has a name: operations of several slots may write it.
-    fn result(&mut self, of: &str, span: Span) -> RegisterId {
+    /// A register for a macro's result. It has a name: operations of several slots may write it.
+    fn result(&mut self, of: &str, span: Span, ty: Type) -> RegisterId {
         let registers = &mut self.context.declared.registers;
         let name = format!("{of}.value{}", registers.len());
-        registers.push(VirtualRegister { name, ty: Type::F, ..VirtualRegister::unnamed(span) });
+        registers.push(VirtualRegister { name, ty, ..VirtualRegister::unnamed(span) });
         let id = RegisterId::new(registers.len() - 1);
         self.context.declared.results.insert(id);
         id
     }
 
-    /// A name for such a register that no source can write, so that a macro's operand can be it.
+    /// A name for a nameless register that no source can write, so that the register can be a macro's operand.
     fn unnamed(&mut self, register: RegisterId) -> OperandKind {
         let name = self.context.scopes.names_mut().intern(&format!("={}", register.index()));
         self.context.scopes.bind(crate::context::ScopeId::ROOT, name, Binding::Register(register));
@@ -276,7 +279,7 @@ impl Expander<'_> {
 }
 
 impl VirtualRegister {
-    /// One for a value that the source gives no name.
+    /// A register for a value that the source gives no name.
     pub(crate) fn unnamed(span: Span) -> VirtualRegister {
         VirtualRegister {
             name: String::new(),

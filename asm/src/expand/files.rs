@@ -1,28 +1,28 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Source files: reading them, and `.include`. A part of [`expand`](crate::expand).
 
-use crate::context::{At, Reported};
+use crate::context::{AstPlace, ErrorReported};
 use crate::expand::load::{IncludePath, LoadError, Loader, include_path};
 use crate::expand::{Expander, FrameKind};
 use crate::limits;
-use crate::report::diag::Diagnostic;
-use crate::report::nearest;
-use crate::report::source::{Lines, Span};
-use crate::syntax::parse;
 use std::rc::Rc;
 use std::sync::Arc;
+use takt_diagnostics::diag::Diagnostic;
+use takt_diagnostics::nearest;
+use takt_diagnostics::source::{Lines, Span};
+use takt_syntax::parse;
 
-/// A source file: where it is, and its path there.
+/// A source file: the loader's place, and its path there.
 #[derive(Clone, PartialEq, Eq, Hash, Debug)]
 pub(crate) struct FileId {
-    /// Which of the loader's places beyond the project; `None` is the project itself.
+    /// Index among the loader's places beyond the project; `None` is the project itself.
     pub(crate) place: Option<usize>,
     pub(crate) path: String,
 }
 
 /// The reason that a file cannot be read.
 #[derive(Debug, thiserror::Error)]
-pub(crate) enum Unread {
+pub(crate) enum FileError {
     #[error("{0}")]
     Load(#[from] LoadError),
     #[error(
@@ -37,27 +37,27 @@ pub(crate) enum Unread {
 }
 
 /// A file's bytes as text.
-fn text_of(bytes: Vec<u8>) -> Result<String, Unread> {
+pub(crate) fn text_of(bytes: Vec<u8>) -> Result<String, FileError> {
     String::from_utf8(bytes).map_err(|error| {
         let offset = error.utf8_error().valid_up_to();
-        // The bytes before are text.
+        // The bytes before the error are text.
         let before = std::str::from_utf8(&error.as_bytes()[..offset]).unwrap_or_default();
         let lines = Lines::of(before);
         let index = lines.index(offset as u32);
         let (line, column) = (index + 1, offset - lines.range(index).map_or(0, |range| range.start) + 1);
-        Unread::NotText { byte: error.as_bytes()[offset], offset, line, column }
+        FileError::NotText { byte: error.as_bytes()[offset], offset, line, column }
     })
 }
 
 impl Expander<'_> {
-    /// True if a tree is that of a file of the library in memory.
+    /// A tree belongs to a file of the library in memory.
     pub(crate) fn is_in_library(&self, ast: u32) -> bool {
         let place = self.origins.get(ast as usize).and_then(|origin| origin.place);
         place.is_some_and(|place| !self.loader.places()[place].takes_quoted())
     }
 
     /// Reads and parses a file, or finds it among those read.
-    pub(crate) fn load(&mut self, id: &FileId) -> Result<(u32, usize), Unread> {
+    pub(crate) fn load(&mut self, id: &FileId) -> Result<(u32, usize), FileError> {
         if let Some(known) = self.files.get(id) {
             return Ok(*known);
         }
@@ -79,7 +79,7 @@ impl Expander<'_> {
                 Arc::new(text_of(bytes)?)
             }
         };
-        let file = self.context.reports.sources.add_shared(&name, text).ok_or(Unread::TooMuch)?;
+        let file = self.context.reports.sources.add_shared(&name, text).ok_or(FileError::TooMuch)?;
         let source = self.context.reports.sources.files()[file].clone();
         let ast = parse::parse(&source, self.context.scopes.names_mut(), &mut self.context.reports.sink);
         self.context.asts.push(Rc::new(ast));
@@ -89,17 +89,23 @@ impl Expander<'_> {
         Ok(known)
     }
 
-    /// Counts the bytes of a file that is read.
-    fn count_bytes(&mut self, bytes: usize) -> Result<(), Unread> {
+    /// Counts the bytes of a file against the limits.
+    pub(crate) fn count_bytes(&mut self, bytes: usize) -> Result<(), FileError> {
         if bytes > limits::FILE_BYTES {
             return Err(LoadError::TooLarge.into());
         }
         self.bytes += bytes;
-        if self.bytes > limits::SOURCE_BYTES { Err(Unread::TooMuch) } else { Ok(()) }
+        if self.bytes > limits::SOURCE_BYTES { Err(FileError::TooMuch) } else { Ok(()) }
     }
 
     /// `.include "path"`, or `.include <path>` of the library.
-    pub(crate) fn include(&mut self, at: At, path: &str, library: bool, span: Span) -> Result<(), Reported> {
+    pub(crate) fn include(
+        &mut self,
+        at: AstPlace,
+        path: &str,
+        library: bool,
+        span: Span,
+    ) -> Result<(), ErrorReported> {
         let files = self.frames.iter().filter_map(|frame| match frame.kind {
             FrameKind::File(file, _) => Some(file),
             _ => None,
@@ -126,9 +132,9 @@ impl Expander<'_> {
         self.includes += 1;
         if self.includes > limits::INCLUDES {
             self.limit(at.scope, span, format!("files are included more than {} times", limits::INCLUDES));
-            return Err(Reported);
+            return Err(ErrorReported);
         }
-        // Beside the including file, then in the places that take such a name.
+        // Beside the including file, then in the places that take such names.
         let beside = FileId { place: from.place, path: within.clone() };
         let path = if library { Some(within.clone()) } else { include_path("", path) };
         let places = self.loader.places().iter().enumerate();
@@ -138,7 +144,7 @@ impl Expander<'_> {
         let candidates: Vec<FileId> = Some(beside).filter(|_| !library).into_iter().chain(further).collect();
         for id in candidates {
             if let Some((_, file)) = self.files.get(&id).copied() {
-                // A library file that several files include is read once.
+                // A library file is read once, however many files include it.
                 if library {
                     self.note_include(span, file);
                     return Ok(());
@@ -162,7 +168,7 @@ impl Expander<'_> {
                     self.enter_file(ast, file);
                     return Ok(());
                 }
-                Err(Unread::Load(LoadError::NotFound)) => {}
+                Err(FileError::Load(LoadError::NotFound)) => {}
                 Err(unread) => {
                     let message = format!("`{}` cannot be read: {unread}", id.path);
                     return Err(self.context.error(at.scope, "load", span, message));
@@ -173,7 +179,7 @@ impl Expander<'_> {
             true => self.not_in_library(&within, span),
             false => self.not_found((from.place, &within), span),
         };
-        // From within, the outermost file last.
+        // List the chain from the innermost file to the outermost.
         let name = |file: &usize| format!("`{}`", self.context.reports.sources.files()[*file].name);
         let chain: Vec<String> = open.iter().rev().map(name).collect();
         let error = match &chain[..] {
@@ -187,14 +193,14 @@ impl Expander<'_> {
         Err(self.context.report(at.scope, error))
     }
 
-    /// Notes for the index which file an `.include` means.
+    /// Notes for the index the file of an `.include`.
     fn note_include(&mut self, span: Span, file: usize) {
         if let Some(notes) = &mut self.context.notes {
             notes.includes.push((span, file));
         }
     }
 
-    /// There is no file for `.include "path"` in a place and the project.
+    /// The error for an `.include "path"` without a file in its place and the project.
     fn not_found(&self, (place, path): (Option<usize>, &str), span: Span) -> Diagnostic {
         let message = format!("`{path}` cannot be read: {}", LoadError::NotFound);
         let error = Diagnostic::error("load", span, message);
@@ -227,7 +233,7 @@ impl Expander<'_> {
         }
     }
 
-    /// There is no file for `.include <path>`.
+    /// The error for an `.include <path>` without a file.
     fn not_in_library(&self, path: &str, span: Span) -> Diagnostic {
         let error = Diagnostic::error("load", span, format!("there is no `<{path}>`"));
         let mut names: Vec<String> = self.loader.places().iter().flat_map(IncludePath::sources).collect();

@@ -10,19 +10,19 @@ use std::sync::Arc;
 /// The reason that a source cannot be loaded.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum LoadError {
-    /// There is no source of that name.
+    /// No source has that name.
     #[error("there is no such file")]
     NotFound,
-    /// It lies outside the project folder.
+    /// The path leads outside the project folder.
     #[error("it lies outside the project folder")]
     Outside,
-    /// It is a folder or a device.
+    /// The path names a folder or a device.
     #[error("it is not a regular file")]
     NotAFile,
-    /// It is larger than [`limits::FILE_BYTES`].
+    /// The file is larger than [`limits::FILE_BYTES`].
     #[error("it has more than the {} bytes that the assembler reads", limits::FILE_BYTES)]
     TooLarge,
-    /// The system refuses.
+    /// The system refuses, with this message.
     #[error("{0}")]
     System(String),
 }
@@ -35,19 +35,19 @@ pub trait Loader {
     /// If it cannot be had.
     fn load(&self, path: &str) -> Result<Vec<u8>, LoadError>;
 
-    /// The source as shared text, if the loader has it in memory; [`Loader::load`] gives the same.
+    /// The source as shared text, if the loader has it in memory; [`Loader::load`] returns equal bytes.
     fn text(&self, path: &str) -> Option<Arc<String>> {
         let _ = path;
         None
     }
 
-    /// The names of the sources in a folder, as far as they can be had; the project's own folder is "".
+    /// Names of the sources in a folder, as far as the loader can list them; the project's own folder is "".
     fn names(&self, folder: &str) -> Vec<String> {
         let _ = folder;
         Vec::new()
     }
 
-    /// True if folders can be added to the places: on a command line, not in a page.
+    /// Folders can be added to the places: on a command line, not in a page.
     fn takes_folders(&self) -> bool {
         true
     }
@@ -64,18 +64,18 @@ pub struct IncludePath(IncludePathKind);
 
 #[derive(Clone, Debug)]
 enum IncludePathKind {
-    /// The prefix of paths in it, and the folder.
+    /// Prefix of the folder's paths, and the folder.
     Folder(String, FileLoader),
     Library(MemoryLoader),
 }
 
 impl IncludePath {
-    /// True if it is searched for `"name"` too, not only for `<name>`.
+    /// The place is searched for `"name"` too, not only for `<name>`.
     pub(crate) fn takes_quoted(&self) -> bool {
         matches!(self.0, IncludePathKind::Folder(..))
     }
 
-    /// A file in it as diagnostics, listings and the debugger name it: unlike any path within the project.
+    /// Name of a file in diagnostics, listings and the debugger: unlike any path within the project.
     pub(crate) fn name_of(&self, path: &str) -> String {
         match &self.0 {
             IncludePathKind::Folder(prefix, _) => format!("{prefix}{path}"),
@@ -83,7 +83,7 @@ impl IncludePath {
         }
     }
 
-    /// The names that can be asked for; of a folder, its own sources.
+    /// Names that can be requested; of a folder, its own sources.
     pub(crate) fn sources(&self) -> Vec<String> {
         match &self.0 {
             IncludePathKind::Folder(_, folder) => folder.names(""),
@@ -116,17 +116,17 @@ pub struct Search<L> {
 }
 
 impl<L: Loader> Search<L> {
-    /// The sources of a project and no further place.
+    /// Sources of a project without further places.
     pub fn new(project: L) -> Search<L> {
         Search { project, places: Vec::new() }
     }
 
-    /// A folder, searched after the places there are for `"name"` and for `<name>`.
+    /// Adds a folder, searched after the present places for `"name"` and for `<name>`.
     #[must_use]
     pub fn folder(mut self, folder: impl Into<PathBuf>) -> Search<L> {
         let folder = folder.into();
         let mut prefix = folder.display().to_string();
-        // Paths within the project begin with a name: they remain another file's.
+        // Paths within the project begin with a name: a prefix keeps them apart.
         if matches!(folder.components().next(), Some(Component::Normal(_))) {
             prefix.insert_str(0, "./");
         }
@@ -137,7 +137,7 @@ impl<L: Loader> Search<L> {
         self
     }
 
-    /// With what an editor has open, in the folders so far.
+    /// Replaces files by the texts that an editor has open, in the folders so far.
     #[must_use]
     pub fn with_open(mut self, open: &Open) -> Search<L> {
         for place in &mut self.places {
@@ -148,7 +148,7 @@ impl<L: Loader> Search<L> {
         self
     }
 
-    /// A library in memory, each file a name and its text, searched after the places there are for `<name>` only.
+    /// Adds a library in memory, each file a name and its text, searched after the present places for `<name>` only.
     #[must_use]
     pub fn library<'s>(mut self, files: impl IntoIterator<Item = &'s (&'s str, &'s str)>) -> Search<L> {
         self.places.push(IncludePath(IncludePathKind::Library(MemoryLoader::new(files))));
@@ -181,41 +181,41 @@ impl<L: Loader> Loader for Search<L> {
 /// Sources in memory, by path: embedded programs, editors, tests.
 #[derive(Clone, Debug, Default)]
 pub struct MemoryLoader {
-    files: BTreeMap<String, InMemory>,
+    files: BTreeMap<String, MemorySource>,
 }
 
-/// A source in memory: text, or bytes that are none.
+/// A source in memory: text, or bytes that are not UTF-8.
 #[derive(Clone, Debug)]
-enum InMemory {
+enum MemorySource {
     Text(Arc<String>),
     Bytes(Vec<u8>),
 }
 
-impl InMemory {
-    fn of(bytes: Vec<u8>) -> InMemory {
+impl MemorySource {
+    fn of(bytes: Vec<u8>) -> MemorySource {
         match String::from_utf8(bytes) {
-            Ok(text) => InMemory::Text(Arc::new(text)),
-            Err(error) => InMemory::Bytes(error.into_bytes()),
+            Ok(text) => MemorySource::Text(Arc::new(text)),
+            Err(error) => MemorySource::Bytes(error.into_bytes()),
         }
     }
 
     fn bytes(&self) -> &[u8] {
         match self {
-            InMemory::Text(text) => text.as_bytes(),
-            InMemory::Bytes(bytes) => bytes,
+            MemorySource::Text(text) => text.as_bytes(),
+            MemorySource::Bytes(bytes) => bytes,
         }
     }
 
     fn text(&self) -> Option<Arc<String>> {
         match self {
-            InMemory::Text(text) => Some(Arc::clone(text)),
-            InMemory::Bytes(_) => None,
+            MemorySource::Text(text) => Some(Arc::clone(text)),
+            MemorySource::Bytes(_) => None,
         }
     }
 }
 
 impl MemoryLoader {
-    /// A loader of some sources, each a path and its text.
+    /// A loader of sources, each a path and its text.
     pub fn new<'s>(sources: impl IntoIterator<Item = &'s (&'s str, &'s str)>) -> MemoryLoader {
         let mut loader = MemoryLoader::default();
         for (path, text) in sources {
@@ -233,7 +233,7 @@ impl MemoryLoader {
 
     /// Adds a source, or replaces it.
     pub fn add(&mut self, path: impl Into<String>, text: impl Into<Vec<u8>>) {
-        self.files.insert(path.into(), InMemory::of(text.into()));
+        self.files.insert(path.into(), MemorySource::of(text.into()));
     }
 }
 
@@ -257,16 +257,16 @@ impl Loader for MemoryLoader {
     }
 }
 
-/// One source in memory, and another loader for the others.
+/// Loader of a first source in memory, and of all others by another loader.
 pub(crate) struct First<'l> {
     name: &'l str,
-    source: InMemory,
+    source: MemorySource,
     rest: &'l dyn Loader,
 }
 
 impl<'l> First<'l> {
     pub(crate) fn new(name: &'l str, bytes: Vec<u8>, rest: &'l dyn Loader) -> First<'l> {
-        First { name, source: InMemory::of(bytes), rest }
+        First { name, source: MemorySource::of(bytes), rest }
     }
 }
 
@@ -296,20 +296,20 @@ impl Loader for First<'_> {
 #[derive(Clone, Debug)]
 pub struct FileLoader {
     root: PathBuf,
-    /// Texts that count in the place of what lies on the disk, by whole path.
+    /// Texts that replace files on the disk, by absolute path.
     open: Open,
 }
 
-/// Sources that an editor has open, by the whole path of each: saved or not, they count in the place of what lies on the disk.
+/// Sources that an editor has open, by absolute path: saved or not, they replace the files on the disk.
 pub type Open = Arc<BTreeMap<PathBuf, Arc<String>>>;
 
 impl FileLoader {
-    /// The loader of a folder. Whether there is such a folder shows when it is asked for a file.
+    /// The loader of a folder. A missing folder shows only when a file is requested.
     pub fn new(root: impl Into<PathBuf>) -> FileLoader {
         FileLoader { root: root.into(), open: Open::default() }
     }
 
-    /// The same, but for what an editor has open.
+    /// The loader, with the texts that an editor has open.
     #[must_use]
     pub fn with_open(self, open: Open) -> FileLoader {
         FileLoader { open, ..self }
@@ -367,7 +367,7 @@ impl Loader for FileLoader {
         if !whole.starts_with(&root) {
             return Err(LoadError::Outside);
         }
-        // The same file by another path.
+        // Another path to the same file.
         if let Some(text) = self.open.get(&whole) {
             return Ok(text.as_bytes().to_vec());
         }
@@ -380,14 +380,13 @@ impl Loader for FileLoader {
         }
         let file = std::fs::File::open(&whole).map_err(system)?;
         let mut bytes = Vec::new();
-        // One byte more than allowed shows a file that grows while it is read.
+        // Read one byte more than allowed, to detect a file that grows meanwhile.
         file.take(limits::FILE_BYTES as u64 + 1).read_to_end(&mut bytes).map_err(system)?;
         Ok(bytes)
     }
 }
 
-/// The path of an included file within the project, from that of the file that includes it; `None` if it leaves the
-/// project.
+/// The path of an included file within the project, given the path of the including file; `None` if it leaves the project.
 pub(crate) fn include_path(from: &str, path: &str) -> Option<String> {
     if path.starts_with('/') || path.contains(['\\', '\0']) || path.contains(':') {
         return None;
@@ -411,7 +410,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn text_in_memory_is_shared_and_bytes_that_are_none_are_not() {
+    fn shares_text_in_memory_and_rejects_other_bytes() {
         let mut files = MemoryLoader::of("a.s", " nop\n");
         files.add("b.s", [0x6e, 0xff]);
         let (shared, again) = (files.text("a.s").expect("it is text"), files.text("a.s"));
@@ -419,7 +418,7 @@ mod tests {
         assert_eq!(files.load("a.s"), Ok(shared.as_bytes().to_vec()));
         assert_eq!((files.text("b.s"), files.load("b.s")), (None, Ok(vec![0x6e, 0xff])));
         assert_eq!((files.text("c.s"), files.load("c.s")), (None, Err(LoadError::NotFound)));
-        // A text that a search finds is shared, too.
+        // Text found by a search is shared, too.
         assert!(Search::new(files).text("a.s").is_some_and(|again| Arc::ptr_eq(&shared, &again)));
     }
 

@@ -1,144 +1,146 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Macros, repetitions, conditionals and includes: the source as one flat list of bundles, data and declarations.
 //!
-//! Statements are met in the order in which they take effect. What declares is done at once; what needs every name to be
-//! known, bundles and data, is listed for [`resolve`](crate::resolve). The walk has a stack of its own, not the thread's.
+//! Statements are met in the order in which they take effect. Declarations are executed at once; bundles and data, which
+//! need every name to be known, are listed for [`resolve`](crate::resolve). The walk has a stack of its own, not the
+//! thread's.
 
 mod declare;
 pub(crate) mod equation;
 mod files;
 pub(crate) mod load;
 pub(crate) mod loops;
+mod macros;
+mod numbers;
 mod slices;
 
 pub(crate) use declare::{address, register_at};
 
 use crate::context::{
-    Argument, At, Binding, Context, MacroDefinition, NamedConstant, Reported, ScopeId, ScopeKind, space_of,
+    AstPlace, Binding, Context, ErrorReported, NamedConstant, Scope, ScopeId, ScopeKind, space_of,
 };
 use crate::expand::equation::{Piece, Step};
 use crate::expand::files::FileId;
 use crate::expand::load::{Loader, include_path};
-use crate::expand::loops::{CountedLoop, LoopNote, Pass, Written};
+use crate::expand::loops::{CountedLoop, ForDirective, LoopNote, Pass};
 use crate::ir::{Label, LabelId};
 use crate::limits;
-use crate::report::diag::Diagnostic;
-use crate::report::source::Span;
-use crate::syntax::ast::*;
-use crate::syntax::name::NameId;
-use smallvec::SmallVec;
 use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
+use takt_diagnostics::diag::Diagnostic;
+use takt_diagnostics::source::Span;
 use takt_isa::Type;
 use takt_isa::program::{Columns, Location};
+use takt_syntax::ast::*;
+use takt_syntax::name::NameId;
 
-/// A bundle or an equation of the source where it is expanded.
+/// A bundle or an equation of the source, in its expansion.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Item {
-    pub(crate) at: At,
+    pub(crate) at: AstPlace,
     pub(crate) statement: u32,
-    /// The part of it that is meant.
+    /// Part of the statement that counts.
     pub(crate) part: Part,
     /// The `.loc` in force: an index into [`Flat::locs`].
     pub(crate) loc: u32,
-    /// True if `.schedule on` is in force.
+    /// `.schedule on` is in force.
     pub(crate) scheduled: bool,
-    /// True if `.contract on` is in force; `None` if a file of the library excludes it for its macros.
+    /// `.contract on` is in force; `None` if a file of the library excludes it for its macros.
     pub(crate) contracted: Option<bool>,
-    /// The transformations that `.fast` allows.
+    /// Transformations that `.fast` allows.
     pub(crate) fast: Fast,
 }
 
-/// The part of a statement that is meant.
+/// Part of a statement.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Part {
-    /// All of it.
+    /// The statement as a whole.
     All,
-    /// Of an equation that uses macros: an index into [`Flat::pieces`].
+    /// A piece of an equation that uses macros: an index into [`Flat::pieces`].
     Piece(u32),
-    /// Of a `.for`, where a loop begins: an index into [`Flat::loops`].
+    /// The beginning of a `.for`'s loop: an index into [`Flat::loops`].
     Begin(u32),
-    /// Where it ends.
+    /// The end of a `.for`'s loop.
     End(u32),
 }
 
-/// A line, and the part of it that is meant, if it is not all.
+/// A line, and the columns of the part that counts, if not the whole line.
 pub(crate) type SourcePlace = (Location, Option<Columns>);
 
 /// Transformations of equations that `.fast` allows although they change the rounding.
 #[derive(Clone, Copy, Default, Debug)]
 pub(crate) struct Fast {
-    /// The order of a sum and of a product may change.
+    /// Sums and products may be reordered.
     pub(crate) reassociate: bool,
-    /// A division by a constant may be a multiplication by its inverse.
+    /// A division by a constant may become a multiplication by its inverse.
     pub(crate) reciprocal: bool,
 }
 
 /// Words of data memory.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Data {
-    /// A number, by its type.
-    Value(At, Expr, Type),
-    /// Zeros: where they are asked for, how many, and of which type.
-    Space(At, Span, u32, Type),
+    /// A number of a type.
+    Value(AstPlace, Expr, Type),
+    /// Zeros: scope, place, number of words, and type.
+    Space(AstPlace, Span, u32, Type),
 }
 
-/// A `.loop_bound`: of the bundle that follows, by its number in its section.
+/// A `.loop_bound` of the bundle that follows, by its number in its section.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LoopBound {
     pub(crate) section: Section,
     pub(crate) item: u32,
     pub(crate) most: u32,
     pub(crate) total: Option<u32>,
-    pub(crate) at: At,
+    pub(crate) at: AstPlace,
     pub(crate) span: Span,
 }
 
-/// A `.preset`.
+/// A `.preset` directive, with its scope.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Preset {
     pub(crate) register: Operand,
-    /// True if `@` precedes it.
+    /// The register is a place: `@` precedes it.
     pub(crate) placed: bool,
     pub(crate) value: Expr,
-    pub(crate) at: At,
+    pub(crate) at: AstPlace,
     pub(crate) span: Span,
 }
 
-/// A `.deadline`, `.order` or `.late`: the directive, and the section that it is about.
+/// A `.deadline`, `.order` or `.late`: the directive, and the section that it applies to.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Timing {
-    pub(crate) at: At,
+    pub(crate) at: AstPlace,
     pub(crate) directive: u32,
     pub(crate) section: Section,
 }
 
-/// The expanded source.
+/// The source after expansion.
 #[derive(Debug)]
-pub(crate) struct Flat {
+pub(crate) struct ExpandedSource {
     pub(crate) once: Vec<Item>,
     pub(crate) period: Vec<Item>,
     pub(crate) pieces: Vec<Piece>,
     /// Counted loops, by [`LoopId`](crate::ir::arrays::LoopId).
     pub(crate) loops: Vec<CountedLoop>,
-    /// What became of the loops of the source.
+    /// Forms of the source's loops, for reports.
     pub(crate) loop_notes: Vec<LoopNote>,
     pub(crate) data: Vec<Data>,
     pub(crate) presets: Vec<Preset>,
     pub(crate) loop_bounds: Vec<LoopBound>,
     pub(crate) timing: Vec<Timing>,
-    /// Each `.range`: where it stands, and the directive.
-    pub(crate) ranges: Vec<(At, u32)>,
+    /// Each `.range`: its scope, and the directive.
+    pub(crate) ranges: Vec<(AstPlace, u32)>,
     /// The `.ports` directive: true if `latched`, and its place.
     pub(crate) ports: Option<(bool, Span)>,
     /// The lines of each `.loc`; the first stands for no `.loc`.
     pub(crate) locs: Vec<Vec<Option<SourcePlace>>>,
-    /// Files that `.loc` names, in order, then those whose own lines are code.
+    /// Files that `.loc` names, in order, then files whose own lines are code.
     pub(crate) files: Vec<String>,
     file_numbers: HashMap<String, u32>,
 }
 
-impl Flat {
+impl ExpandedSource {
     /// The number of a file that code is attributed to.
     pub(crate) fn file(&mut self, name: &str) -> u32 {
         if let Some(known) = self.file_numbers.get(name) {
@@ -153,7 +155,7 @@ impl Flat {
 
 /// A list of statements being walked.
 pub(crate) struct Frame {
-    at: At,
+    at: AstPlace,
     next: u32,
     end: u32,
     pub(crate) kind: FrameKind,
@@ -162,10 +164,10 @@ pub(crate) struct Frame {
 pub(crate) enum FrameKind {
     /// An equation that uses macros; its statement.
     Equation(Rc<[Step]>, u32),
-    /// A file, its path, and the `.loc` that was in force where it is included.
+    /// Index of a file, and the `.loc` that was in force where it is included.
     File(usize, u32),
     Macro,
-    /// A repetition: the name that counts, its value and its last value, the first statement, and the scope around it.
+    /// A repetition: name, present and last value of the counter, first statement, and enclosing scope.
     Rep {
         variable: NameId,
         value: i64,
@@ -174,8 +176,8 @@ pub(crate) enum FrameKind {
         outer: ScopeId,
         site: Span,
     },
-    /// A counted loop: the name that counts, what it does, how much of that is done, the statement that says so, the first of its body
-    /// and the one behind it, and the scope around it.
+    /// A counted loop: index variable, passes, number of passes done, opening statement, first statement of the body, statement after
+    /// the body, and enclosing scope.
     For {
         variable: NameId,
         passes: Rc<[Pass]>,
@@ -191,9 +193,9 @@ pub(crate) enum FrameKind {
 pub(crate) struct Expander<'l> {
     pub(crate) context: Context,
     pub(crate) loader: &'l dyn Loader,
-    pub(crate) flat: Flat,
+    pub(crate) flat: ExpandedSource,
     pub(crate) frames: Vec<Frame>,
-    /// The counted loops that run around the present statement, each with its place.
+    /// Counted loops that run around the present statement, each with its place.
     pub(crate) nest: Vec<(u32, Span)>,
     pub(crate) section: Section,
     pub(crate) loc: u32,
@@ -201,27 +203,29 @@ pub(crate) struct Expander<'l> {
     statements: usize,
     /// Files read: the tree and the index in the sources.
     pub(crate) files: HashMap<FileId, (u32, usize)>,
-    /// Which file each of the sources is.
+    /// Identity of each source, by tree.
     pub(crate) origins: Vec<FileId>,
+    /// Files of numbers that were read.
+    tables: HashMap<FileId, Rc<numbers::Table>>,
     /// Bytes of all files read.
     pub(crate) bytes: usize,
-    /// True if the following bundles are scheduled.
+    /// The following bundles are scheduled.
     scheduled: bool,
-    /// True if products in the following lines are fused into sums.
+    /// Products in the following lines are fused into sums.
     contracted: bool,
-    /// Files of the library of whose operations none is fused.
+    /// Trees of library files none of whose products are fused.
     uncontracted: HashSet<u32>,
     fast: Fast,
     pub(crate) include_depth: usize,
     pub(crate) includes: usize,
     macro_depth: usize,
-    /// A limit is reached: there is no going on.
+    /// A limit is reached: expansion ends.
     stop: bool,
 }
 
 impl<'l> Expander<'l> {
     pub(crate) fn new(context: Context, loader: &'l dyn Loader) -> Expander<'l> {
-        let flat = Flat {
+        let flat = ExpandedSource {
             once: Vec::new(),
             period: Vec::new(),
             pieces: Vec::new(),
@@ -253,6 +257,7 @@ impl<'l> Expander<'l> {
             statements: 0,
             files: HashMap::new(),
             origins: Vec::new(),
+            tables: HashMap::new(),
             bytes: 0,
             include_depth: 0,
             includes: 0,
@@ -262,7 +267,7 @@ impl<'l> Expander<'l> {
     }
 
     /// Expands the program that begins with a file.
-    pub(crate) fn expand(mut self, path: &str) -> (Context, Flat) {
+    pub(crate) fn expand(mut self, path: &str) -> (Context, ExpandedSource) {
         let Some(path) = include_path("", path) else {
             let message = format!("`{path}` does not name a file of the project");
             self.context.reports.sink.push(Diagnostic::placeless("load", message));
@@ -270,7 +275,7 @@ impl<'l> Expander<'l> {
         };
         match self.load(&FileId { place: None, path: path.clone() }) {
             Ok((ast, file)) => {
-                // Room for the bundles of a program in one file: memory that is not written to costs nothing.
+                // Reserve for the bundles of a program in one file: memory that is not written to costs nothing.
                 let room = self.context.asts[ast as usize].operations.len();
                 self.flat.once.reserve(room);
                 self.flat.period.reserve(room);
@@ -309,13 +314,13 @@ impl<'l> Expander<'l> {
 
     pub(crate) fn enter_file(&mut self, ast: u32, file: usize) {
         let end = self.context.asts[ast as usize].statements.len() as u32;
-        let at = At { ast, scope: ScopeId::ROOT };
+        let at = AstPlace { ast, scope: ScopeId::ROOT };
         self.frames.push(Frame { at, next: 0, end, kind: FrameKind::File(file, self.loc) });
         self.loc = 0;
         self.include_depth += 1;
     }
 
-    /// At the end of a frame's statements: goes on with the next turn, or leaves.
+    /// Ends a frame's statements: continues with the next turn, or leaves the frame.
     fn leave(&mut self) {
         if self.pass() {
             return;
@@ -343,7 +348,7 @@ impl<'l> Expander<'l> {
         }
     }
 
-    /// Counts a statement.
+    /// Counts a statement against the limit.
     #[inline]
     pub(crate) fn count(&mut self, scope: ScopeId, span: Span) {
         self.statements += 1;
@@ -361,7 +366,7 @@ impl<'l> Expander<'l> {
         self.stop = true;
     }
 
-    fn statement(&mut self, at: At, index: u32) {
+    fn statement(&mut self, at: AstPlace, index: u32) {
         let ast = &self.context.asts[at.ast as usize];
         let Statement { label, kind, .. } = ast.statements[index as usize];
         self.statements += 1;
@@ -384,13 +389,15 @@ impl<'l> Expander<'l> {
             StatementKind::Equation(equation) => self.equation(at, index, equation),
             StatementKind::Directive(directive) => {
                 let ast = Rc::clone(&self.context.asts[at.ast as usize]);
+                self.context.again = self.is_again(at, &ast, &ast.directives[directive as usize]);
                 // Errors are reported already; the walk goes on.
                 let _ = self.directive(at, &ast, directive, index);
+                self.context.again = false;
             }
         }
     }
 
-    /// Bundles of a section so far.
+    /// Number of bundles of a section so far.
     fn bundles(&self, section: Section) -> usize {
         match section {
             Section::Once => self.flat.once.len(),
@@ -401,11 +408,11 @@ impl<'l> Expander<'l> {
 
     fn loop_bound(
         &mut self,
-        at: At,
+        at: AstPlace,
         most: Expr,
         total: Option<&(Name, Expr)>,
         span: Span,
-    ) -> Result<(), Reported> {
+    ) -> Result<(), ErrorReported> {
         let turns = self.iterations(at, most)?;
         let total = match total {
             Some((name, value)) => {
@@ -414,7 +421,7 @@ impl<'l> Expander<'l> {
                 if text != "total" {
                     let message = format!("`{text}` is no part of a `.loop_bound`");
                     let error = Diagnostic::error("loop", name.span, message)
-                        .did_you_mean(crate::report::nearest(&text, ["total"]))
+                        .did_you_mean(takt_diagnostics::nearest(&text, ["total"]))
                         .note("behind the iterations may stand `total m`, the most in one section");
                     return Err(self.context.report(at.scope, error));
                 }
@@ -437,8 +444,8 @@ impl<'l> Expander<'l> {
         Ok(())
     }
 
-    /// The iterations of a loop at most.
-    fn iterations(&mut self, at: At, value: Expr) -> Result<u32, Reported> {
+    /// The most iterations of a loop.
+    fn iterations(&mut self, at: AstPlace, value: Expr) -> Result<u32, ErrorReported> {
         let number = self.context.integer(at, value)?;
         u32::try_from(number).ok().filter(|number| *number > 0).ok_or_else(|| {
             let message = format!("{number} iterations: a loop has 1 to {}", u32::MAX);
@@ -446,7 +453,7 @@ impl<'l> Expander<'l> {
         })
     }
 
-    fn label(&mut self, at: At, label: Name) {
+    fn label(&mut self, at: AstPlace, label: Name) {
         let Ok(name) = self.context.name(at, label.name, label.span) else { return };
         let position = match self.section {
             Section::Data => self.data_words,
@@ -455,8 +462,15 @@ impl<'l> Expander<'l> {
         let id = LabelId(self.context.declared.labels.len() as u32);
         let space = space_of(self.section);
         let binding = if self.section == Section::Data { Binding::Data(id) } else { Binding::Code(id) };
-        if self.context.declare(at, name, label.span, binding).is_ok() {
-            let name = self.context.scopes.full_name(at.scope, name);
+        // A label whose name is made of a count is unique by that, and can be reached from everywhere.
+        let Scope { owner, labels, .. } = *self.context.scopes.scope(at.scope);
+        let is_local = self.section != Section::Data && label.name.resolve().is_ok();
+        let scope = if is_local { labels } else { owner };
+        if self.context.declare_in(scope, at, name, label.span, binding).is_ok() {
+            let name = match is_local {
+                true => self.context.scopes.label_name(at.scope, name),
+                false => self.context.scopes.full_name(at.scope, name),
+            };
             self.context.declared.labels.push(Label {
                 name,
                 space,
@@ -467,7 +481,7 @@ impl<'l> Expander<'l> {
         }
     }
 
-    fn bundle(&mut self, at: At, index: u32, first: u32, count: u32) {
+    fn bundle(&mut self, at: AstPlace, index: u32, first: u32, count: u32) {
         let ast = &self.context.asts[at.ast as usize];
         let operation = ast.operations[first as usize];
         if count == 1 {
@@ -484,7 +498,7 @@ impl<'l> Expander<'l> {
     }
 
     /// Adds a bundle, an equation or a piece of one to the section.
-    pub(crate) fn push(&mut self, at: At, statement: u32, part: Part, span: Span) {
+    pub(crate) fn push(&mut self, at: AstPlace, statement: u32, part: Part, span: Span) {
         let contracted = (!self.uncontracted.contains(&at.ast)).then_some(self.contracted);
         let items = match self.section {
             Section::Once => &mut self.flat.once,
@@ -509,68 +523,13 @@ impl<'l> Expander<'l> {
         }
     }
 
-    fn call(&mut self, at: At, name: NameId, operation: Operation) {
-        let first = operation.first as usize;
-        let operands = &self.context.asts[at.ast as usize].operands[first..first + operation.count as usize];
-        let given: SmallVec<[Operand; 6]> = operands.into();
-        let Some(definition) = self.context.scopes.macros.get(&name) else { return };
-        let (parameters, defined) = definition.parameters(&self.context.asts);
-        if parameters != given.len() {
-            let plural = if parameters == 1 { "" } else { "s" };
-            let message = format!(
-                "macro `{}` takes {parameters} argument{plural}, not {}",
-                self.context.scopes.text(name),
-                operation.count
-            );
-            let error = Diagnostic::error("arguments", operation.span, message).also(defined, "defined here");
-            self.context.report(at.scope, error);
-            return;
-        }
-        if let Some(notes) = &mut self.context.notes {
-            notes.macro_use(operation.mnemonic.span, name);
-        }
-        self.enter_macro(at, name, operation.span, &given);
-    }
-
-    /// Goes on with a macro's body. There are as many operands as the macro has parameters.
-    pub(crate) fn enter_macro(&mut self, at: At, name: NameId, span: Span, given: &[Operand]) {
-        let Some(definition) = self.context.scopes.macros.get_mut(&name) else { return };
-        definition.uses += 1;
-        let MacroDefinition { ast, directive, start, uses } = *definition;
-        let body = Rc::clone(&self.context.asts[ast as usize]);
-        let DirectiveKind::Macro { parameters, end, .. } = &body.directives[directive as usize].kind else {
-            return;
-        };
-        if self.macro_depth >= limits::MACRO_DEPTH {
-            let message =
-                format!("macros are used within one another more than {} deep", limits::MACRO_DEPTH);
-            let error = Diagnostic::error("limit", span, message)
-                .help("does the macro use itself without an `.if` that ends it?");
-            self.context.report(at.scope, error);
-            self.stop = true;
-            return;
-        }
-        let scope = self.context.scopes.open(ScopeId::ROOT, at.scope, ScopeKind::Macro(name, uses), span);
-        for (parameter, operand) in parameters.iter().zip(given) {
-            let (mut operand, mut outer) = (*operand, at);
-            // A parameter that is passed on unchanged stands for its own argument.
-            if let OperandKind::Name(passed) = operand.kind
-                && let Ok(passed) = passed.resolve()
-                && let Binding::Argument(argument) = self.context.lookup(at.scope, passed)
-            {
-                Argument { operand, at: outer, .. } = self.context.declared.arguments[argument as usize];
-            }
-            let id = self.context.declared.arguments.len() as u32;
-            self.context.declared.arguments.push(Argument { operand, at: outer, value: None });
-            if let Ok(parameter) = parameter.name.resolve() {
-                self.context.scopes.bind(scope, parameter, Binding::Argument(id));
-            }
-        }
-        self.macro_depth += 1;
-        self.frames.push(Frame { at: At { ast, scope }, next: start, end: *end, kind: FrameKind::Macro });
-    }
-
-    fn directive(&mut self, at: At, ast: &Rc<Ast>, directive: u32, index: u32) -> Result<(), Reported> {
+    fn directive(
+        &mut self,
+        at: AstPlace,
+        ast: &Rc<Ast>,
+        directive: u32,
+        index: u32,
+    ) -> Result<(), ErrorReported> {
         let DirectiveLine { kind, span } = &ast.directives[directive as usize];
         let span = *span;
         match kind {
@@ -591,85 +550,39 @@ impl<'l> Expander<'l> {
                 for (number, declaration) in (1..).zip(arrays) {
                     let (first, count) = declaration.sizes;
                     let sizes = &ast.sizes[first as usize..(first + count) as usize];
-                    let values = if number == arrays.len() { &values[..] } else { &[] };
+                    let values = if number == arrays.len() { Some(values) } else { None };
                     let _ = self.declare_table(at, declaration, sizes, values);
                 }
             }
-            DirectiveKind::Const(name, value) => {
-                let id = self.context.name(at, name.name, name.span)?;
-                let value = self.context.value(at, value.id).ok();
-                let number = self.context.declared.constants.len() as u32;
-                self.context.declare(at, id, name.span, Binding::Constant(number))?;
-                let text = self.context.scopes.full_name(at.scope, id);
-                let watched = self.include_depth == 1 && at.scope == ScopeId::ROOT;
-                self.context.declared.constants.push(NamedConstant {
-                    name: text,
-                    value,
-                    span: name.span,
-                    used: false,
-                    watched,
-                });
-            }
+            DirectiveKind::Const(name, value) => self.constant(at, name, value)?,
             DirectiveKind::Preset { register, placed, value } => {
                 // Registers may be declared further down.
                 let (register, placed, value) = (*register, *placed, *value);
-                self.flat.presets.push(Preset { register, placed, value, at, span });
+                if !(self.context.again && self.flat.presets.iter().any(|preset| preset.span == span)) {
+                    self.flat.presets.push(Preset { register, placed, value, at, span });
+                }
             }
             DirectiveKind::Section(section) => self.section = *section,
             DirectiveKind::Float(values) => self.data(at, values, Type::F, span)?,
             DirectiveKind::Word(values) => self.data(at, values, Type::I, span)?,
-            DirectiveKind::Space(words) => {
-                self.data_section(at, span)?;
-                let count = self.context.integer(at, *words)?;
-                if !(0..=limits::DATA_WORDS as i64).contains(&count) {
-                    let message = format!("{count} words of space: it is 0 to {}", limits::DATA_WORDS);
-                    return Err(self.context.error(at.scope, "limit", words.span, message));
-                }
-                self.data_words += count as usize;
-                self.flat.data.push(Data::Space(at, words.span, count as u32, Type::B));
-                self.check_data(at, span);
-            }
+            DirectiveKind::Space(words) => self.space(at, *words, span)?,
             DirectiveKind::Macro { name, parameters, end } => {
                 self.jump(*end + 1);
-                self.define(at, directive, *name, parameters, index + 1)?;
+                self.define(at, directive, *name, parameters, (index + 1, *end))?;
             }
             DirectiveKind::Rep { variable, first, last, end } => {
                 self.jump(*end + 1);
-                let variable = self.context.spelled(at, variable.name, variable.span)?;
-                let from = self.context.integer(at, *first)?;
-                let to = self.context.integer(at, *last)?;
-                if to.saturating_sub(from) >= limits::REPETITIONS {
-                    let message = format!(
-                        "{} repetitions: more than the {} that the assembler makes",
-                        i128::from(to) - i128::from(from) + 1,
-                        limits::REPETITIONS
-                    );
-                    return Err(self.context.error(at.scope, "limit", first.span.to(last.span), message));
-                }
-                if from <= to {
-                    let scope =
-                        self.context.scopes.open(at.scope, at.scope, ScopeKind::Rep(variable, from), span);
-                    let start = index + 1;
-                    let kind = FrameKind::Rep {
-                        variable,
-                        value: from,
-                        last: to,
-                        start,
-                        outer: at.scope,
-                        site: span,
-                    };
-                    self.frames.push(Frame { at: At { scope, ..at }, next: start, end: *end, kind });
-                }
+                self.repeat(at, (*variable, *first, *last), (index + 1, *end), span)?;
             }
             DirectiveKind::For { variable, first, last, options, end } => {
                 self.jump(*end + 1);
                 let (variable, first, last) = (*variable, *first, *last);
                 let body = (index + 1, *end);
-                self.for_loop(at, ast, Written { variable, first, last, options, body, span })?;
+                self.for_loop(at, ast, ForDirective { variable, first, last, options, body, span })?;
             }
             DirectiveKind::If(condition, next) => {
-                // A condition with a mistake counts as true: of the branches one is read, not none.
-                if self.context.value(at, condition.id).is_ok_and(crate::syntax::expr::Value::is_zero) {
+                // A condition with a mistake counts as true, so that a branch is read.
+                if self.context.value(at, condition.id).is_ok_and(takt_syntax::expr::Value::is_zero) {
                     self.branch(at, ast, *next);
                 }
             }
@@ -679,14 +592,14 @@ impl<'l> Expander<'l> {
             DirectiveKind::Broken(_, end) => self.jump(*end + 1),
             DirectiveKind::Include(path, library) => {
                 let included = self.include(at, path, *library, span);
-                // Nobody knows what the file declares: errors about names would hide this one.
+                // The file's declarations are unknown: errors about names would hide this one.
                 self.context.reports.sink.is_partial |= included.is_err();
                 included?;
             }
             DirectiveKind::Loc(places) => self.set_loc(at, places)?,
             DirectiveKind::Schedule(word) => self.scheduled = self.is_on(at, *word, "schedule")?,
             DirectiveKind::Contract(word) => match self.is_on(at, *word, "contract")? {
-                // A file of the library speaks for itself, wherever its macros are used.
+                // A file of the library decides for its own macros, wherever they are used.
                 false if self.is_in_library(at.ast) => {
                     self.uncontracted.insert(at.ast);
                 }
@@ -696,7 +609,12 @@ impl<'l> Expander<'l> {
             DirectiveKind::Ports(word) => self.ports(at, *word)?,
             DirectiveKind::LoopBound(most, total) => self.loop_bound(at, *most, total.as_ref(), span)?,
             // Registers may be declared further down.
-            DirectiveKind::Range { .. } => self.flat.ranges.push((at, directive)),
+            DirectiveKind::Range { .. } => {
+                let is_same = |(before, other): &(AstPlace, u32)| (before.ast, *other) == (at.ast, directive);
+                if !(self.context.again && self.flat.ranges.iter().any(is_same)) {
+                    self.flat.ranges.push((at, directive));
+                }
+            }
             DirectiveKind::Deadline(..) | DirectiveKind::Order(_) | DirectiveKind::Late(..) => {
                 if self.section == Section::Data {
                     let error =
@@ -704,11 +622,73 @@ impl<'l> Expander<'l> {
                             .help("open `.once` or `.period` before it");
                     return Err(self.context.report(at.scope, error));
                 }
-                self.flat.timing.push(Timing { at, directive, section: self.section });
+                let is_same = |other: &Timing| (other.at.ast, other.directive) == (at.ast, directive);
+                if !(self.context.again && self.flat.timing.iter().any(is_same)) {
+                    self.flat.timing.push(Timing { at, directive, section: self.section });
+                }
             }
             DirectiveKind::Error(text) => {
                 return Err(self.context.report(at.scope, Diagnostic::error("user", span, text.clone())));
             }
+        }
+        Ok(())
+    }
+
+    /// Declares a constant.
+    fn constant(&mut self, at: AstPlace, name: &Name, value: &Expr) -> Result<(), ErrorReported> {
+        let id = self.context.name(at, name.name, name.span)?;
+        let value = self.context.value(at, value.id).ok();
+        let number = self.context.declared.constants.len() as u32;
+        self.context.declare(at, id, name.span, Binding::Constant(number))?;
+        let text = self.context.scopes.full_name(at.scope, id);
+        let watched = self.include_depth == 1 && at.scope == ScopeId::ROOT;
+        self.context.declared.constants.push(NamedConstant {
+            name: text,
+            value,
+            span: name.span,
+            used: false,
+            watched,
+        });
+        Ok(())
+    }
+
+    /// Leaves words of data memory free.
+    fn space(&mut self, at: AstPlace, words: Expr, span: Span) -> Result<(), ErrorReported> {
+        self.data_section(at, span)?;
+        let count = self.context.integer(at, words)?;
+        if !(0..=limits::DATA_WORDS as i64).contains(&count) {
+            let message = format!("{count} words of space: it is 0 to {}", limits::DATA_WORDS);
+            return Err(self.context.error(at.scope, "limit", words.span, message));
+        }
+        self.data_words += count as usize;
+        self.flat.data.push(Data::Space(at, words.span, count as u32, Type::B));
+        self.check_data(at, span);
+        Ok(())
+    }
+
+    /// Enters a repetition, whose variable and bounds are given, and the statements of its body.
+    fn repeat(
+        &mut self,
+        at: AstPlace,
+        (variable, first, last): (Name, Expr, Expr),
+        (start, end): (u32, u32),
+        span: Span,
+    ) -> Result<(), ErrorReported> {
+        let variable = self.context.spelled(at, variable.name, variable.span)?;
+        let from = self.context.integer(at, first)?;
+        let to = self.context.integer(at, last)?;
+        if to.saturating_sub(from) >= limits::REPETITIONS {
+            let message = format!(
+                "{} repetitions: more than the {} that the assembler makes",
+                i128::from(to) - i128::from(from) + 1,
+                limits::REPETITIONS
+            );
+            return Err(self.context.error(at.scope, "limit", first.span.to(last.span), message));
+        }
+        if from <= to {
+            let scope = self.context.scopes.open(at.scope, at.scope, ScopeKind::Rep(variable, from), span);
+            let kind = FrameKind::Rep { variable, value: from, last: to, start, outer: at.scope, site: span };
+            self.frames.push(Frame { at: AstPlace { scope, ..at }, next: start, end, kind });
         }
         Ok(())
     }
@@ -720,58 +700,15 @@ impl<'l> Expander<'l> {
         }
     }
 
-    /// Continues with the branch of an `.if` that is taken, from the first that may be.
-    fn branch(&mut self, at: At, ast: &Ast, mut next: u32) {
+    /// Continues with the branch of an `.if` that is taken, beginning at the candidate `next`.
+    fn branch(&mut self, at: AstPlace, ast: &Ast, mut next: u32) {
         while let Some(StatementKind::Directive(directive)) =
             ast.statements.get(next as usize).map(|statement| statement.kind)
             && let DirectiveKind::Elif(condition, after, _) = &ast.directives[directive as usize].kind
-            && self.context.value(at, condition.id).is_ok_and(crate::syntax::expr::Value::is_zero)
+            && self.context.value(at, condition.id).is_ok_and(takt_syntax::expr::Value::is_zero)
         {
             next = *after;
         }
         self.jump(next + 1);
-    }
-
-    fn define(
-        &mut self,
-        at: At,
-        directive: u32,
-        name: Name,
-        parameters: &[Name],
-        start: u32,
-    ) -> Result<(), Reported> {
-        if at.scope != ScopeId::ROOT {
-            return Err(Reported);
-        }
-        let id = self.context.spelled(at, name.name, name.span)?;
-        let text = self.context.scopes.text(id).to_owned();
-        if id.op().is_some() {
-            let error = Diagnostic::error("declared-twice", name.span, format!("`{text}` is an instruction"))
-                .help("give the macro another name");
-            return Err(self.context.report(at.scope, error));
-        }
-        if let Some(before) = self.context.scopes.macros.get(&id) {
-            let first = before.span(&self.context.asts);
-            let error =
-                Diagnostic::error("declared-twice", name.span, format!("macro `{text}` is defined already"))
-                    .also(first, "defined here first");
-            return Err(self.context.report(at.scope, error));
-        }
-        let mut seen: HashMap<NameId, Span> = HashMap::new();
-        for parameter in parameters {
-            let Ok(id) = parameter.name.resolve() else {
-                let error = Diagnostic::error("name", parameter.span, "a parameter is a plain name");
-                return Err(self.context.report(at.scope, error));
-            };
-            if let Some(first) = seen.insert(id, parameter.span) {
-                let text = self.context.scopes.text(id);
-                let message = format!("parameter `{text}` is declared twice");
-                let error = Diagnostic::error("declared-twice", parameter.span, message)
-                    .also(first, "declared here first");
-                return Err(self.context.report(at.scope, error));
-            }
-        }
-        self.context.scopes.macros.insert(id, MacroDefinition { ast: at.ast, directive, start, uses: 0 });
-        Ok(())
     }
 }

@@ -1,56 +1,62 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Equations between slices: a loop over their elements, for each index that is a slice.
 //!
-//! The values are those from before the equation. As elements are written one after the other, an array on both sides must be
-//! either the same elements, or moved along by a constant: then the loop runs in the direction in which an element is read before it is
+//! All values are those from before the equation. As elements are written one after the other, an array on both sides must be either
+//! the same elements, or moved along by a constant: then the loop runs in the direction in which an element is read before it is
 //! written.
 
-use crate::context::loops::Counted;
-use crate::context::{At, Binding, Context, Reported};
+use crate::context::loops::AffineInteger;
+use crate::context::{AstPlace, Binding, Context, ErrorReported};
 use crate::expand::Expander;
-use crate::expand::loops::{Chosen, Range};
-use crate::report::diag::Diagnostic;
-use crate::report::source::Span;
-use crate::syntax::ast::*;
-use crate::syntax::expr::{operands, parts};
-use crate::syntax::name::NameId;
+use crate::expand::loops::{LoopOptions, Range};
 use smallvec::SmallVec;
 use std::rc::Rc;
+use takt_diagnostics::diag::Diagnostic;
+use takt_diagnostics::source::Span;
+use takt_syntax::ast::*;
+use takt_syntax::expr::{operands, parts};
+use takt_syntax::name::NameId;
 
 /// An index of an element or a slice.
 #[derive(Clone, PartialEq)]
 #[allow(clippy::large_enum_variant, reason = "there are a few at a time, for one line of the source")]
 enum Subscript {
-    One(Counted),
-    /// The first and the last.
-    Several(Counted, Counted),
+    One(AffineInteger),
+    /// First and last index of a slice.
+    Several(AffineInteger, AffineInteger),
 }
 
-/// An element or a slice, and where it stands.
-struct Named {
+/// An element or a slice, with its place.
+struct ArrayReference {
     array: Binding,
     subscripts: Vec<Subscript>,
     span: Span,
 }
 
 impl Context {
-    /// The name that counts the elements of a slice, by the number of its index among the slices of the element, from 1. No
-    /// source can write it.
+    /// Name of the counter of a slice's elements, by the slice's number in the element, from 1. No source can write this
+    /// name.
     pub(crate) fn slice_name(&mut self, number: usize) -> NameId {
         self.scopes.names_mut().intern(&format!(":{number}"))
     }
 
-    /// The present value of an index that is a slice, of which it is the one of that number.
+    /// Name of a loop in registers and reports: the index variable, or for a slice a name that an image can hold.
+    pub(crate) fn loop_name(&self, variable: NameId) -> String {
+        let text = self.scopes.text(variable);
+        text.strip_prefix(':').map_or_else(|| text.to_owned(), |number| format!("slice.{number}"))
+    }
+
+    /// The present value of an index that is a slice, the `number`-th of its element.
     pub(crate) fn slice_index(
         &mut self,
-        at: At,
+        at: AstPlace,
         nodes: &[Node],
         number: usize,
         span: Span,
-    ) -> Result<Counted, Reported> {
+    ) -> Result<AffineInteger, ErrorReported> {
         let name = self.slice_name(number);
         let offset = match self.lookup(at.scope, name) {
-            Binding::Count(value) => Counted::constant(value),
+            Binding::Count(value) => AffineInteger::constant(value),
             Binding::Index(index) => self.declared.indices[index as usize].value.clone(),
             _ => {
                 let error = Diagnostic::error("slice", span, "a slice where one value is needed")
@@ -64,15 +70,15 @@ impl Context {
                 let (from, to) = operands(&parts, inner.len() as u32)[0];
                 self.subscript(at, &nodes[from as usize..=to as usize], span)?
             }
-            _ => Counted::constant(1),
+            _ => AffineInteger::constant(1),
         };
         first
             .plus(&offset, 1)
             .ok_or_else(|| self.error(at.scope, "range", span, "a subscript beyond 64 bits"))
     }
 
-    /// What an array's name means, arguments of macros replaced.
-    fn array(&mut self, at: At, name: Name) -> Result<Binding, Reported> {
+    /// The binding of an array's name, arguments of macros replaced.
+    fn array(&mut self, at: AstPlace, name: Name) -> Result<Binding, ErrorReported> {
         let mut id = self.spelled(at, name.name, name.span)?;
         let mut binding = self.lookup(at.scope, id);
         for _ in 0..crate::limits::EVALUATION_DEPTH {
@@ -87,14 +93,14 @@ impl Context {
 }
 
 impl Expander<'_> {
-    /// Opens the next loop of an equation between slices; false if none is left to open.
+    /// Opens the next loop of an equation between slices. False if all loops are open.
     pub(crate) fn slice_loop(
         &mut self,
-        at: At,
+        at: AstPlace,
         ast: &Rc<Ast>,
         statement: u32,
         equation: &Equation,
-    ) -> Result<bool, Reported> {
+    ) -> Result<bool, ErrorReported> {
         let targets: Vec<&Element> =
             equation.targets.iter().filter_map(|target| element(ast, *target)).collect();
         let Some(first) = targets.iter().find(|element| element.is_slice()) else { return Ok(false) };
@@ -118,10 +124,10 @@ impl Expander<'_> {
         }
         let backwards = self.direction(at, ast, equation)?;
         let count = lengths[open].clone();
-        let last = count.plus(&Counted::constant(1), -1);
+        let last = count.plus(&AffineInteger::constant(1), -1);
         let last = last
             .ok_or_else(|| self.context.error(at.scope, "range", equation.span, "a range beyond 64 bits"))?;
-        let (first, step) = if backwards { (last, -1) } else { (Counted::constant(0), 1) };
+        let (first, step) = if backwards { (last, -1) } else { (AffineInteger::constant(0), 1) };
         let range = Range { first, step, count, register: None };
         let variable = self.context.slice_name(open + 1);
         let needs = self.slice_of_registers(at, ast, equation)?;
@@ -130,7 +136,7 @@ impl Expander<'_> {
             at,
             variable,
             &range,
-            Chosen::default(),
+            LoopOptions::default(),
             (needs, open + 1 == levels),
             body,
             equation.span,
@@ -147,14 +153,14 @@ impl Expander<'_> {
         })
     }
 
-    /// Every slice of an equation has the lengths of the first.
+    /// Checks that every slice of an equation has the lengths of the first.
     fn check_slices(
         &mut self,
-        at: At,
+        at: AstPlace,
         ast: &Ast,
         equation: &Equation,
-        lengths: &[Counted],
-    ) -> Result<(), Reported> {
+        lengths: &[AffineInteger],
+    ) -> Result<(), ErrorReported> {
         let targets = equation.targets.iter().map(|target| (element(ast, *target), target.span));
         let mut others: Vec<(&Element, Span)> = Vec::new();
         for (target, span) in targets {
@@ -176,7 +182,7 @@ impl Expander<'_> {
             let named = self.named(at, element, span)?;
             let found = self.lengths(at, &named)?;
             if found != lengths {
-                let shown = |lengths: &[Counted]| {
+                let shown = |lengths: &[AffineInteger]| {
                     let texts = lengths.iter().map(|length| match length.as_constant() {
                         Some(length) => length.to_string(),
                         None => "?".to_owned(),
@@ -192,11 +198,11 @@ impl Expander<'_> {
     }
 
     /// The lengths of a slice, in the order of its indices.
-    fn lengths(&mut self, at: At, named: &Named) -> Result<Vec<Counted>, Reported> {
+    fn lengths(&mut self, at: AstPlace, named: &ArrayReference) -> Result<Vec<AffineInteger>, ErrorReported> {
         let mut lengths = Vec::new();
         for subscript in &named.subscripts {
             let Subscript::Several(first, last) = subscript else { continue };
-            let length = last.plus(first, -1).and_then(|length| length.plus(&Counted::constant(1), 1));
+            let length = last.plus(first, -1).and_then(|length| length.plus(&AffineInteger::constant(1), 1));
             let mut length = length
                 .ok_or_else(|| self.context.error(at.scope, "range", named.span, "a range beyond 64 bits"))?;
             length.registers.retain(|register| register.1 != 0);
@@ -214,7 +220,12 @@ impl Expander<'_> {
         Ok(lengths)
     }
 
-    fn named(&mut self, at: At, element: &Element, span: Span) -> Result<Named, Reported> {
+    fn named(
+        &mut self,
+        at: AstPlace,
+        element: &Element,
+        span: Span,
+    ) -> Result<ArrayReference, ErrorReported> {
         let array = self.context.array(at, element.name)?;
         let sizes: SmallVec<[u32; 2]> = match array {
             Binding::Array(array) => self.context.declared.arrays[array as usize].sizes.clone(),
@@ -236,7 +247,7 @@ impl Expander<'_> {
             subscripts.push(match nodes.last().map(|node| node.kind) {
                 Some(NodeKind::All) => {
                     let size = sizes.get(number).copied().unwrap_or(1);
-                    Subscript::Several(Counted::constant(1), Counted::constant(size.into()))
+                    Subscript::Several(AffineInteger::constant(1), AffineInteger::constant(size.into()))
                 }
                 Some(NodeKind::Range) => {
                     let parts = parts(nodes);
@@ -249,16 +260,16 @@ impl Expander<'_> {
                 _ => Subscript::One(self.context.subscript(at, nodes, span)?),
             });
         }
-        Ok(Named { array, subscripts, span })
+        Ok(ArrayReference { array, subscripts, span })
     }
 
-    /// The place of a slice of an array of registers, if there is one.
+    /// The place of the first slice of an array of registers.
     fn slice_of_registers(
         &mut self,
-        at: At,
+        at: AstPlace,
         ast: &Ast,
         equation: &Equation,
-    ) -> Result<Option<Span>, Reported> {
+    ) -> Result<Option<Span>, ErrorReported> {
         let targets =
             equation.targets.iter().filter_map(|target| Some((element(ast, *target)?, target.span)));
         for (element, span) in targets.chain(Self::read(ast, equation)) {
@@ -269,8 +280,8 @@ impl Expander<'_> {
         Ok(None)
     }
 
-    /// True if the elements are to be written from the last to the first.
-    fn direction(&mut self, at: At, ast: &Ast, equation: &Equation) -> Result<bool, Reported> {
+    /// Elements must be written from the last to the first.
+    fn direction(&mut self, at: AstPlace, ast: &Ast, equation: &Equation) -> Result<bool, ErrorReported> {
         let mut ways: [Option<Span>; 2] = [None, None];
         for target in &equation.targets {
             let Some(written) = element(ast, *target) else { continue };
@@ -299,7 +310,7 @@ impl Expander<'_> {
                 let error = Diagnostic::error(
                     "slice",
                     one,
-                    "elements before and behind those that are written are read",
+                    "the equation reads elements before and after the written ones",
                 )
                 .also(other, "the others")
                 .help("write to another array");
@@ -310,11 +321,10 @@ impl Expander<'_> {
     }
 }
 
-/// The direction in which what is read lies from what is written, 0 if either is right; `None` if an element may be written before it
-/// is read.
-fn way(written: &Named, read: &Named) -> Option<i64> {
+/// Direction from the written elements to the read ones, 0 if either works; `None` if an element may be written before it is read.
+fn way(written: &ArrayReference, read: &ArrayReference) -> Option<i64> {
     let pairs = || written.subscripts.iter().zip(&read.subscripts);
-    let difference = |a: &Counted, b: &Counted| {
+    let difference = |a: &AffineInteger, b: &AffineInteger| {
         let mut difference = a.plus(b, -1)?;
         difference.registers.sort_unstable();
         let registers = &difference.registers;
@@ -324,7 +334,7 @@ fn way(written: &Named, read: &Named) -> Option<i64> {
         }
         difference.as_constant()
     };
-    // Apart for certain in one direction.
+    // Certainly disjoint in one dimension.
     let apart = pairs().any(|pair| match pair {
         (Subscript::One(a), Subscript::One(b)) => difference(a, b).is_some_and(|distance| distance != 0),
         (Subscript::Several(first, last), Subscript::One(one)) => {
@@ -355,7 +365,7 @@ fn way(written: &Named, read: &Named) -> Option<i64> {
         }
     }
     match (same_slices, same_rest) {
-        // Rows that are either the same or have nothing in common.
+        // Rows are equal, or have no common elements.
         (true, _) => Some(0),
         (false, true) => Some(moved),
         (false, false) => None,
@@ -366,7 +376,7 @@ fn is_slice(index: &[Node]) -> bool {
     index.last().is_some_and(|node| node.kind.is_slice())
 }
 
-/// The element that an operand is.
+/// The element that an operand denotes.
 fn element(ast: &Ast, operand: Operand) -> Option<&Element> {
     match operand.kind {
         OperandKind::Element(element) => Some(&ast.elements[element as usize]),

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Arrays of data memory, counted loops, and which element each access is: what a scheduler needs to tell accesses apart.
+//! Arrays of data memory, counted loops, and the element that each access touches: a scheduler needs these to tell accesses
+//! apart.
 
 use crate::ir::{Ir, LabelId, Operation};
 use crate::loops::LoopCount;
-use crate::report::source::Span;
 use smallvec::SmallVec;
+use takt_diagnostics::source::Span;
 use takt_isa::Type;
 
 /// An array of [`Ir::arrays`].
@@ -22,17 +23,17 @@ pub struct AccessId(pub u32);
 /// An array of data memory, declared by `.array`. Its words follow one another, the last index counting fastest.
 #[derive(Clone, Debug)]
 pub struct Array {
-    /// Its name; one that is local to a macro's use has the macro's name and the use's number before it.
+    /// Name of the array; locals of a macro are prefixed with the macro's name and the use's number.
     pub name: String,
-    /// The word of data memory that its first element is.
+    /// First word in data memory.
     pub base: u32,
-    /// The number of its words.
+    /// Number of words, the product of the sizes.
     pub words: u32,
     /// The number of elements in each dimension; indices count from 1.
     pub sizes: SmallVec<[u32; 2]>,
-    /// The type of its elements.
+    /// Type of the elements.
     pub ty: Type,
-    /// The place of its declaration.
+    /// Place of the declaration.
     pub span: Span,
 }
 
@@ -40,17 +41,17 @@ pub struct Array {
 /// but for calls.
 #[derive(Clone, Copy, Debug)]
 pub struct Loop {
-    /// Index of the first bundle of the body. What is computed once for the loop stands before it.
+    /// Index of the first bundle of the body. Bundles before it compute the values that the loop needs once.
     pub head: u32,
-    /// The label behind the last bundle of the body.
+    /// The label after the last bundle of the body.
     pub end: LabelId,
-    /// The number of iterations each time it is entered.
+    /// Number of iterations each time that the loop is entered.
     pub iterations: LoopCount,
-    /// The loop whose body it stands in.
+    /// Innermost enclosing loop, if any.
     pub parent: Option<LoopId>,
-    /// The number of loops around it.
+    /// Number of enclosing loops.
     pub depth: u32,
-    /// The `.for`, or the sum.
+    /// Place of the `.for`, or of the sum.
     pub span: Span,
 }
 
@@ -60,7 +61,7 @@ pub struct Loop {
 /// other the language leaves it undefined. Loads and stores of one array therefore touch no word of another.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct ArrayAccess {
-    /// The array.
+    /// Array that the access stays in.
     pub array: ArrayId,
     /// The word, from the array's first one; `None` if it depends on more than the iterations of the loops around.
     pub word: Option<Affine>,
@@ -69,14 +70,14 @@ pub struct ArrayAccess {
 /// An affine function of iteration numbers, which count from 0 each time a loop is entered: of the loops around, unless said otherwise.
 #[derive(Clone, PartialEq, Eq, Hash, Debug)]
 pub struct Affine<L = LoopId> {
-    /// Its value where all iteration numbers are 0.
+    /// The value where all iteration numbers are 0.
     pub constant: i64,
-    /// The coefficients, none of them 0, by ascending loop.
+    /// Nonzero coefficients, by ascending loop.
     pub terms: SmallVec<[(L, i64); 4]>,
 }
 
 impl<L: Copy + Ord> Affine<L> {
-    /// A function that is the same everywhere.
+    /// A function without iteration numbers.
     pub(crate) fn constant(constant: i64) -> Affine<L> {
         Affine { constant, terms: SmallVec::new() }
     }
@@ -101,17 +102,17 @@ impl<L: Copy + Ord> Affine<L> {
         Some(sum)
     }
 
-    /// A multiple of it; `None` if a number leaves 64 bits.
+    /// A multiple of the function; `None` if a number leaves 64 bits.
     pub(crate) fn times(&self, factor: i64) -> Option<Affine<L>> {
         Affine::constant(0).plus(self, factor)
     }
 
-    /// The factor of a loop's iteration number; 0 if it does not depend on it.
+    /// The coefficient of a loop's iteration number; 0 if the function does not depend on it.
     pub(crate) fn coefficient(&self, of: L) -> i64 {
         self.terms.binary_search_by_key(&of, |term| term.0).map_or(0, |at| self.terms[at].1)
     }
 
-    /// The same function where a loop is in a certain iteration.
+    /// The function with a loop fixed in one iteration; `None` if a number leaves 64 bits.
     pub(crate) fn at(&self, of: L, iteration: i64) -> Option<Affine<L>> {
         let mut fixed = self.clone();
         fixed.constant = fixed.constant.checked_add(self.coefficient(of).checked_mul(iteration)?)?;
@@ -119,21 +120,21 @@ impl<L: Copy + Ord> Affine<L> {
         Some(fixed)
     }
 
-    /// The same function so many iterations of a loop later.
+    /// The function `iterations` iterations of a loop later; `None` if a number leaves 64 bits.
     pub(crate) fn later(&self, of: L, iterations: i64) -> Option<Affine<L>> {
         let mut later = self.clone();
         later.constant = later.constant.checked_add(self.coefficient(of).checked_mul(iterations)?)?;
         Some(later)
     }
 
-    /// Its value, if it is the same everywhere.
+    /// The value, if the function is constant.
     pub(crate) fn as_constant(&self) -> Option<i64> {
         self.terms.is_empty().then_some(self.constant)
     }
 }
 
 impl Ir {
-    /// The element that an operation accesses, if its address is that of an array's element.
+    /// The array element that an operation accesses, if its address is such an element's.
     pub fn access(&self, operation: &Operation) -> Option<&ArrayAccess> {
         operation.access.map(|AccessId(access)| &self.accesses[access as usize])
     }

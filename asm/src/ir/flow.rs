@@ -15,15 +15,15 @@ const LOOPS: u32 = 4;
 
 /// The control flow of a program.
 pub(crate) struct Flow {
-    /// For each run, those that control may come from.
+    /// By run: the runs that control may come from.
     sources: Vec<Vec<usize>>,
-    /// Runs after which every register counts as read: control stops there, and what registers hold can be looked at.
+    /// Runs after which every register counts as read: control stops there, and a debugger can look at registers.
     ends: Vec<usize>,
-    /// Bundles from the first on that are issued once each, one after another.
+    /// Number of bundles from the first on that are issued once each, one after another.
     pub(crate) once: usize,
     /// The estimated frequency of each bundle.
     pub(crate) weights: Vec<u64>,
-    /// True if control may go anywhere, or the registers that an operation reads are not known: then every register is live.
+    /// Control may go anywhere, or raw words may read any register: then every register is live.
     pub(crate) unknown: bool,
 }
 
@@ -31,7 +31,7 @@ impl Flow {
     pub(crate) fn new(ir: &Ir, runs: &[Run]) -> Flow {
         let count = ir.bundles.len();
         let starts: HashMap<usize, usize> = (0..).zip(runs).map(|(index, run)| (run.start, index)).collect();
-        // Every redirection with a target: from which bundle to which.
+        // Redirections with a target: source bundle, target bundle and effect.
         let mut jumps: Vec<(usize, usize, Effect)> = Vec::new();
         for (at, bundle) in ir.bundles.iter().enumerate() {
             for operation in &bundle.operations {
@@ -76,8 +76,8 @@ impl Flow {
         Flow { sources, ends, once, weights: weights(ir, &jumps), unknown }
     }
 
-    /// For each run whether a register may be read after it before it is written, given for each run whether it reads the
-    /// register before it writes it, and whether it writes it.
+    /// Liveness of a register at the end of each run. Given by run: whether it reads the register before writing it, and
+    /// whether it writes it.
     pub(crate) fn live_after(&self, reads: &[bool], writes: &[bool]) -> Vec<bool> {
         if self.unknown {
             return vec![true; reads.len()];
@@ -100,7 +100,7 @@ impl Flow {
 }
 
 impl Flow {
-    /// True if one of some runs is passed on every way from the start to the end of a run, itself included.
+    /// Every path from the start to the end of run `at`, itself included, passes a run of `some`.
     pub(crate) fn is_always(&self, at: usize, some: &[bool]) -> bool {
         let mut left = vec![at];
         let mut known = vec![false; some.len()];
@@ -117,7 +117,7 @@ impl Flow {
     }
 }
 
-/// Bundles from the first on that are issued once each and in order: nothing leads back to them or past them.
+/// Number of bundles from the first on that are issued once each and in order: nothing leads back to them or past them.
 fn once(ir: &Ir, jumps: &[(usize, usize, Effect)]) -> usize {
     let onward = |&(at, to, effect): &(usize, usize, Effect)| {
         to == at + 1 && matches!(effect, Effect::Jump | Effect::Wait)
@@ -136,7 +136,7 @@ fn once(ir: &Ir, jumps: &[(usize, usize, Effect)]) -> usize {
 fn weights(ir: &Ir, jumps: &[(usize, usize, Effect)]) -> Vec<u64> {
     let mut deeper = vec![0i64; ir.bundles.len() + 1];
     for &(at, to, effect) in jumps.iter().filter(|&&(at, to, _)| to <= at) {
-        // The period as a whole is no loop, nor is what calls something above it.
+        // The period as a whole is no loop; a call of earlier code makes none either.
         if matches!(effect, Effect::Jump | Effect::BranchZero | Effect::BranchNonzero | Effect::Loop) {
             deeper[to] += 1;
             deeper[at + 1] -= 1;
@@ -152,7 +152,7 @@ fn weights(ir: &Ir, jumps: &[(usize, usize, Effect)]) -> Vec<u64> {
         .collect()
 }
 
-/// For each run whether it reads a register before it writes it, and whether it writes it.
+/// By run: whether it reads a register before it writes it, and whether it writes it.
 pub(crate) fn uses(ir: &Ir, runs: &[Run], register: RegisterId) -> (Vec<bool>, Vec<bool>) {
     let of = |run: &Run| {
         let mut read = false;

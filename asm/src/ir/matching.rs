@@ -4,17 +4,17 @@
 use takt_isa::spec::check::MAX_SLOTS;
 use takt_isa::{SlotIndex, Slots};
 
-/// Operations that cannot all have a slot: fewer slots can take them than they are.
+/// A set of operations for which there are too few slots.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) struct Conflict {
     /// The operations, by index, ascending.
     pub(crate) operations: Vec<usize>,
-    /// The slots that can take any of them.
+    /// Slots that can take any of them.
     pub(crate) slots: Slots,
 }
 
-/// A slot for each operation, given those that can take it, no slot twice. Of several such the one that gives the first operation
-/// the first slot that it can have, then the second, and so on.
+/// A slot for each operation, given the slots that can take it, no slot twice. The result is the lexicographically first: the
+/// first operation gets the first slot that it can have, then the second, and so on.
 ///
 /// # Errors
 /// If there is no such matching: the operations in conflict, of which the last is the first that finds no slot.
@@ -29,7 +29,7 @@ pub(crate) fn assign(sets: &[Slots]) -> Result<Vec<SlotIndex>, Conflict> {
             return Err(Conflict { operations, slots: seen });
         }
     }
-    // One by one the first slot that leaves room for the rest.
+    // Give each operation in turn the first slot that leaves a matching for the rest.
     let mut fixed = sets.to_vec();
     for index in 0..fixed.len() {
         let all = fixed[index];
@@ -43,13 +43,13 @@ pub(crate) fn assign(sets: &[Slots]) -> Result<Vec<SlotIndex>, Conflict> {
     Ok(fixed.iter().filter_map(|set| set.first()).collect())
 }
 
-/// True if every operation can have a slot.
+/// A matching gives every operation a slot.
 pub(crate) fn is_possible(sets: &[Slots]) -> bool {
     let mut owner = [None; MAX_SLOTS];
     (0..sets.len()).all(|index| place(sets, index, &mut owner, &mut Slots::default()))
 }
 
-/// Every way to give each operation a slot, up to so many.
+/// Enumerates assignments of slots to operations, up to `most`.
 pub(crate) fn all(sets: &[Slots], most: usize) -> Vec<Vec<SlotIndex>> {
     let mut found = Vec::new();
     extend(sets, &mut Vec::new(), most, &mut found);
@@ -70,7 +70,7 @@ fn extend(sets: &[Slots], chosen: &mut Vec<SlotIndex>, most: usize, found: &mut 
     }
 }
 
-/// Finds an augmenting path: a slot for an operation, moving others if need be. `seen` are the slots that were tried.
+/// Finds an augmenting path: a slot for an operation, moving others if need be. `seen` collects the slots that were tried.
 fn place(sets: &[Slots], index: usize, owner: &mut [Option<usize>; MAX_SLOTS], seen: &mut Slots) -> bool {
     for slot in sets[index].iter() {
         if seen.contains(slot) {
@@ -103,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn the_first_assignment_is_found_however_others_must_move() {
+    fn finds_the_first_assignment_by_moving_earlier_ones() {
         assert_eq!(assign(&sets(&["01", "0"])), slots("10"));
         assert_eq!(assign(&sets(&["012", "01", "0"])), slots("210"));
         assert_eq!(assign(&sets(&["12", "012", "01"])), slots("120"));
@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn a_conflict_names_those_in_the_way_and_no_others() {
+    fn conflict_names_exactly_the_blocking_operations() {
         let conflict = |operations: &[usize], slots: &str| {
             Err(Conflict { operations: operations.to_vec(), slots: sets(&[slots])[0] })
         };
@@ -120,7 +120,7 @@ mod tests {
         assert_eq!(assign(&sets(&["0", ""])), conflict(&[1], ""));
     }
 
-    /// Against trying everything.
+    /// Compares with exhaustive search.
     #[test]
     fn assignments_and_conflicts_are_right() {
         for code in 0..1u32 << 12 {

@@ -2,7 +2,7 @@
 //! The program between names and words: bundles of operations on virtual registers.
 //!
 //! [`resolve`](crate::resolve) makes it, a scheduler may rearrange it, [`allocate`](crate::emit::allocate) gives its registers
-//! addresses and `emit` its words. What holds at every stage:
+//! addresses, and `emit` makes its words. Invariants at every stage:
 //!
 //! * a bundle has at least one operation and no two that claim one slot; on a machine with one slot it has exactly one;
 //! * all operations of a bundle read before any writes; bundles execute in the order of [`Ir::bundles`], and
@@ -11,21 +11,22 @@
 //!   ([`Operation::slots`]) is chosen first by [`assign`](crate::banks::slots::assign), and again by the scheduler;
 //! * bundles of `once` precede those of `period`; a label stands before the bundle at its position, or at the end.
 //!
-//! Whoever moves bundles must move [`Label::position`]s, [`LoopBound::position`]s, [`Loop::head`]s and [`Ir::period`] along, and leave alone, as
-//! fences, bundles that hold a raw word ([`Bundle::is_opaque`]). Targets that the source wrote as numbers stay as they are.
+//! A stage that moves bundles must move [`Label::position`]s, [`LoopBound::position`]s, [`Loop::head`]s and [`Ir::period`] along, and leave
+//! alone, as fences, bundles that hold a raw word ([`Bundle::is_opaque`]). Targets that the source wrote as numbers stay as they are.
 
 pub(crate) mod arrays;
+pub(crate) mod calls;
 pub(crate) mod flow;
-pub(crate) mod given;
 pub(crate) mod matching;
 pub(crate) mod position;
 pub(crate) mod runs;
+pub(crate) mod type_evidence;
 
 use crate::ir::arrays::{AccessId, Array, ArrayAccess, Loop};
-use crate::report::source::Span;
 use smallvec::SmallVec;
 use std::collections::BTreeMap;
 use std::num::NonZeroU32;
+use takt_diagnostics::source::Span;
 use takt_isa::program::{Columns, Location, Space};
 use takt_isa::{Effect, Machine, Op, Operand, ROWS, Register, Row, SlotIndex, Slots, Type};
 
@@ -46,7 +47,7 @@ impl RegisterId {
         }
     }
 
-    /// Its index in [`Ir::registers`].
+    /// Index of the register in [`Ir::registers`].
     #[inline]
     pub const fn index(self) -> usize {
         self.0.get() as usize - 1
@@ -66,7 +67,7 @@ pub enum RegisterKind {
     State,
     /// An input port: written from outside, at the tick.
     Input,
-    /// An output port.
+    /// An output port: read from outside.
     Output,
     /// Holds these bits from the start; nothing writes it.
     Constant(u32),
@@ -77,21 +78,21 @@ pub enum RegisterKind {
 /// A register of the source, before it has a place in the machine.
 #[derive(Clone, Debug)]
 pub struct VirtualRegister {
-    /// Its name; empty for a constant's and for one that the source names by its place alone.
+    /// Name in the source; empty for constants, and for registers that the source names by their place alone.
     pub name: String,
-    /// Its role.
+    /// Role of the register.
     pub kind: RegisterKind,
-    /// The type as which its bits are shown.
+    /// Type as which debuggers show the bits.
     pub ty: Type,
-    /// The address that the source gives it.
+    /// Address that the source gives the register.
     pub pinned: Option<Register>,
-    /// The bits that the loader writes there, if the source says so. A constant's bits are in its kind.
+    /// Bits that the loader writes, if the source says so. A constant's bits are in its kind.
     pub preset: Option<u32>,
-    /// The place of its declaration, or for a constant of its first use.
+    /// Place of the declaration, or of a constant's first use.
     pub span: Span,
 }
 
-/// A name with something behind it, and that before the indices if it is an element's: `t.1`, `P.1[2,3]`.
+/// A name with a suffix, which precedes an element's indices: `t.1`, `P.1[2,3]`.
 pub(crate) fn numbered(name: &str, number: &str) -> String {
     let (head, indices) = name.split_at(name.find('[').unwrap_or(name.len()));
     format!("{head}{number}{indices}")
@@ -100,23 +101,23 @@ pub(crate) fn numbered(name: &str, number: &str) -> String {
 /// The constant operand of an operation.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Constant {
-    /// Nothing.
+    /// Operation without a constant operand.
     None,
     /// An immediate, an offset, or a bundle address that the source gives as a number.
     Value(u32),
     /// The address of a code label.
     Code(LabelId),
-    /// A word given bit by bit: its index in [`Ir::raw`]. What it reads and writes is not known.
+    /// A word given bit by bit: an index into [`Ir::raw`]. Its reads and writes are not known.
     Raw(u32),
 }
 
-/// The source line that an operation is attributed to, and the part of it where the source says it (`.loc`), in eight bytes: there
-/// is one for each operation of a program. [`Ir::location`] and [`Ir::columns`] read it.
+/// The source line that an operation is attributed to, and the part of it where the source says it (`.loc`), in eight bytes, as
+/// every operation has one. [`Ir::location`] and [`Ir::columns`] read it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Attribution {
-    /// The file, or [`Attribution::NO_FILE`], or [`Attribution::PART`].
+    /// Index of the file, or [`Attribution::NO_FILE`], or [`Attribution::PART`].
     file: u32,
-    /// The line; of a part of one, an index into [`Ir::parts`].
+    /// Line number; for [`Attribution::PART`], an index into [`Ir::parts`].
     line: u32,
 }
 
@@ -124,53 +125,56 @@ impl Attribution {
     const NO_FILE: u32 = u32::MAX;
     const PART: u32 = u32::MAX - 1;
 
-    /// No line.
+    /// Attribution to no line.
     pub(crate) const NONE: Attribution = Attribution { file: Attribution::NO_FILE, line: 0 };
 
-    /// A line.
+    /// Attribution to a whole line.
     #[inline]
     pub(crate) const fn to(Location { file, line }: Location) -> Attribution {
         Attribution { file, line }
     }
 }
 
-/// An operation.
+/// An operation on virtual registers.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Operation {
-    /// The instruction; `nop` where the word is given bit by bit.
+    /// Instruction; `nop` where the word is given bit by bit.
     pub op: Op,
-    /// The slots that may execute it: those that host its function, as far as the source leaves a choice. None if any can, as a `nop`.
+    /// Slots that may execute the operation: hosts of its function, as far as the source leaves a choice. Empty if any can, as
+    /// for `nop`.
     pub slots: Slots,
-    /// The slot that executes it, as assigned so far; `None` if any can.
+    /// Slot that executes the operation, as assigned so far; `None` if any can.
     pub slot: Option<SlotIndex>,
-    /// The register that it writes.
+    /// Register that the operation writes.
     pub dest: Option<RegisterId>,
-    /// The registers that it reads: as many as the instruction's shape has sources, the rest zero.
+    /// Registers that the operation reads: as many as the instruction's shape has sources, the rest zero.
     pub sources: [RegisterId; 3],
     /// Immediate, target or offset.
     pub constant: Constant,
-    /// The element of an array that it accesses: [`Ir::access`].
+    /// Array element that the operation accesses: [`Ir::access`].
     pub access: Option<AccessId>,
-    /// The source line that it is attributed to.
+    /// Source line that the operation is attributed to.
     pub(crate) attribution: Attribution,
-    /// Its place in the source.
+    /// Place in the source.
     pub span: Span,
-    /// The use of a macro, or iteration of a repetition, that made it; 0 if it stands in the source itself.
+    /// The use of a macro, or iteration of a repetition, that made the operation; 0 if it stands in the source itself.
     pub expansion: u32,
-    /// True if the assembler made it, for the operation at its place in the source.
+    /// The assembler made the operation, for the source's operation at the same place.
     pub made: bool,
-    /// Its place in the order of the source: the index of its bundle before any was moved.
+    /// Position in source order: the index of the bundle before any was moved.
     pub order: u32,
-    /// Its source: the tree, and the operation of the tree; [`Operation::COMPUTED`] if it is a part of an equation.
-    /// For messages that point at an operand.
+    /// Origin in the source: the tree, and the operation of the tree; [`Operation::COMPUTED`] for a part of an equation. For
+    /// messages that point at an operand.
     pub(crate) written: (u32, u32),
 }
 
 impl Operation {
-    /// In [`Operation::written`] the operation that no tree has: one that computes a part of an equation, where its span is.
+    /// Value of [`Operation::written`] for an operation that no tree has: it computes a part of an equation, where its span is.
     pub(crate) const COMPUTED: u32 = u32::MAX;
+    /// Least number of computed operations that have numbers of their own, because something is known of them.
+    pub(crate) const FIRST_COMPUTED: u32 = 1 << 31;
 
-    /// One that reads and writes nothing yet; it executes in the first of the slots unless another is chosen.
+    /// An operation without operands; it executes in the first of the slots unless another is chosen.
     pub(crate) fn new(
         op: Op,
         slots: Slots,
@@ -196,24 +200,24 @@ impl Operation {
         }
     }
 
-    /// True if it computes a part of an equation.
+    /// The operation computes a part of an equation.
     pub(crate) fn is_computed(&self) -> bool {
-        self.written.1 == Operation::COMPUTED
+        self.written.1 >= Operation::FIRST_COMPUTED
     }
 
-    /// The instruction's row.
+    /// Row of the instruction table.
     #[inline]
     pub fn row(&self) -> &'static Row {
         self.op.row()
     }
 
-    /// The registers that it reads.
+    /// Registers that the operation reads.
     #[inline]
     pub fn reads(&self) -> &[RegisterId] {
         &self.sources[..self.row().shape.sources()]
     }
 
-    /// The bundle that it may continue at: by its label, or else by number.
+    /// Target bundle of a redirection: a label, or else a number.
     pub(crate) fn target(&self) -> Option<Result<LabelId, u32>> {
         if matches!(self.constant, Constant::None) {
             return None;
@@ -226,12 +230,12 @@ impl Operation {
         }
     }
 
-    /// The bundle that it may continue at, if the source gives it as a number.
+    /// Target bundle of a redirection, if the source gives it as a number.
     pub(crate) fn target_number(&self) -> Option<u32> {
         self.target()?.err()
     }
 
-    /// One that does nothing, in its place.
+    /// An idle operation in place of this one.
     pub(crate) fn idle(&self) -> Operation {
         Operation {
             op: Op::nop,
@@ -247,20 +251,20 @@ impl Operation {
         }
     }
 
-    /// True if execution may continue elsewhere than at the next bundle.
+    /// Execution may continue elsewhere than at the next bundle.
     #[inline]
     pub fn redirects(&self) -> bool {
         self.row().effect.redirects()
     }
 }
 
-/// The instruction of an effect.
+/// The first instruction with an effect.
 pub(crate) fn with_effect(effect: Effect) -> Option<Op> {
     ROWS.iter().find(|row| row.effect == effect).map(|row| row.op)
 }
 
-/// An instruction that a machine has, by its form in equations and the one type of its result and its sources; with it, for each operand
-/// of the form, the source that it is.
+/// An instruction that a machine has, by its form in equations and the common type of its result and its sources. Also returns, for
+/// each operand of the form, the index of its source.
 pub(crate) fn with_form<const N: usize>(
     machine: &Machine,
     symbol: &str,
@@ -279,41 +283,41 @@ pub(crate) fn with_form<const N: usize>(
 pub struct Bundle {
     /// The operations, in the order of the source.
     pub operations: SmallVec<[Operation; 1]>,
-    /// True if the source wrote it with `||`.
+    /// The source wrote the bundle with `||`.
     pub explicit: bool,
-    /// True if the scheduler may move it.
+    /// The scheduler may move the bundle.
     pub scheduled: bool,
 }
 
 impl Bundle {
-    /// True if it does nothing and is there because a loop must end in it: the scheduler would leave nothing of it.
+    /// An idle bundle, there because a loop must end in it: the scheduler would remove it.
     pub(crate) fn holds_place(&self) -> bool {
         let holds =
             |operation: &Operation| operation.is_computed() && operation.row().effect == Effect::Nothing;
         self.operations.iter().all(|operation| holds(operation) && !operation.made)
     }
 
-    /// True if it contains a word given bit by bit, whose effect is not known.
+    /// The bundle contains a raw word, whose effect is not known.
     pub fn is_opaque(&self) -> bool {
         self.operations.iter().any(|operation| matches!(operation.constant, Constant::Raw(_)))
     }
 }
 
-/// A label.
+/// A label of code or data.
 #[derive(Clone, Debug)]
 pub struct Label {
-    /// Its name; one that is local to a macro's use has the macro's name and the use's number before it.
+    /// Name of the label; locals of a macro are prefixed with the macro's name and the use's number.
     pub name: String,
-    /// Which memory it points into.
+    /// Memory that the label points into.
     pub space: Space,
-    /// Index of the bundle that it stands before, or word of data memory.
+    /// Index of the next bundle, or of the word of data memory.
     pub position: u32,
-    /// The place of its declaration.
+    /// Place of the declaration.
     pub span: Span,
 }
 
 impl Label {
-    /// True if it begins a table of data memory. A label whose name begins with `_` stands within the table before it.
+    /// The label begins a table of data memory. A label whose name begins with `_` stands within the table before it.
     pub(crate) fn is_table(&self) -> bool {
         let name = self.name.rsplit('.').next().unwrap_or(&self.name);
         self.space == Space::Data && !name.starts_with('_')
@@ -325,22 +329,22 @@ impl Label {
 pub struct LoopBound {
     /// Index of the bundle that heads the loop.
     pub position: u32,
-    /// Iterations at most each time that it is entered.
+    /// The most iterations each time that the loop is entered.
     pub most: u32,
-    /// Iterations at most in one section, from reset or a tick to the next `wait`; `None` if the source does not say.
+    /// The most iterations in one section, from reset or a tick to the next `wait`; `None` if the source does not say.
     pub total: Option<u32>,
 }
 
 /// A timing demand of the source on ports.
 #[derive(Clone, Debug)]
 pub struct Demand {
-    /// Its kind.
+    /// Kind of the demand.
     pub kind: DemandKind,
-    /// The ports, in the order of the directive, and where they stand in it.
+    /// Ports in the order of the directive, with their places in it.
     pub ports: Vec<(RegisterId, Span)>,
-    /// True if it is about `.period`, else about `.once`.
+    /// The demand is on `.period`; otherwise on `.once`.
     pub period: bool,
-    /// The directive.
+    /// Place of the directive.
     pub span: Span,
 }
 
@@ -349,9 +353,9 @@ pub struct Demand {
 pub enum DemandKind {
     /// Each output is written for the last time in this cycle or before; the section's first bundle issues in cycle 1.
     Deadline(u32),
-    /// Whatever is read from or written to a port comes before what is read from or written to the next.
+    /// Every read or write of a port comes before every read or write of the next port.
     Order,
-    /// The inputs are read as late as a schedule allows that is at most so many cycles longer than the shortest found.
+    /// The inputs are read as late as possible, in a schedule at most this many cycles longer than the shortest found.
     Late(u32),
 }
 
@@ -360,76 +364,75 @@ pub enum DemandKind {
 pub(crate) struct Version {
     /// The register that the source names.
     pub(crate) name: RegisterId,
-    /// The value's own.
+    /// The value's own register.
     pub(crate) register: RegisterId,
-    /// The order of the operation that writes it: operations behind that one read it.
+    /// Order of the operation that writes the value: operations after it read the value.
     pub(crate) after: u32,
-    /// The order of the last operations that may read it: where the name is next written.
+    /// Order of the last operations that may read the value: where the name is next written.
     pub(crate) through: u32,
 }
 
 /// A program before registers have addresses.
 #[derive(Clone, Debug)]
 pub struct Ir {
-    /// The machine that it is for.
+    /// Machine that the program is for.
     pub machine: &'static Machine,
-    /// The registers; the first is `zero`. Those that nothing uses get no address.
+    /// Registers; the first is `zero`. Unused ones get no address.
     pub registers: Vec<VirtualRegister>,
-    /// The bundles: those of `once`, then those of `period`.
+    /// Bundles of `once`, then of `period`.
     pub bundles: Vec<Bundle>,
     /// Index of the first bundle of `period`.
     pub period: u32,
-    /// The labels, in the order of the source.
+    /// Labels in source order.
     pub labels: Vec<Label>,
     /// Bounds of loops, by ascending position.
     pub loop_bounds: Vec<LoopBound>,
-    /// The counted loops.
+    /// Counted loops of the source.
     pub loops: Vec<Loop>,
-    /// The arrays of data memory, by ascending base.
+    /// Arrays of data memory, by ascending base.
     pub arrays: Vec<Array>,
     /// Accesses of arrays' elements: [`Ir::access`].
     pub accesses: Vec<ArrayAccess>,
-    /// Between which values registers lie when a period begins, least and largest, in the order of the source.
+    /// Ranges of registers when a period begins, least and largest value, in source order.
     pub ranges: Vec<(RegisterId, [u32; 2])>,
-    /// The timing demands on ports, in source order.
+    /// Timing demands on ports, in source order.
     pub demands: Vec<Demand>,
-    /// True if inputs are latched together at the tick, and outputs published together at `wait`.
+    /// Inputs are latched together at the tick, and outputs published together at `wait`.
     pub latched: bool,
-    /// Outputs whose number the source gives, by number: `@ 3`, or that of the register it names.
+    /// Outputs with a number in the source, by number: `@ 3`, or the number of the named register.
     pub numbers: BTreeMap<u16, RegisterId>,
-    /// True if the scheduler may move any bundle.
+    /// The scheduler may move some bundle.
     pub scheduled: bool,
-    /// True if several slots may execute an operation; perhaps of one that has changed since.
+    /// Several slots may execute some operation, or could before operations changed.
     pub(crate) has_choices: bool,
-    /// Data memory.
+    /// Initial words of data memory.
     pub data: Vec<u32>,
     /// Words given bit by bit.
     pub raw: Vec<u64>,
-    /// By bundle, as the source has them: whether `.contract on` is in force there; none where it has no effect.
+    /// By bundle of the source: whether `.contract on` is in force; `None` where it has no effect.
     pub contracted: Vec<Option<bool>>,
     /// Source files that [`Ir::location`] names.
     pub files: Vec<String>,
-    /// Parts of lines that operations are attributed to.
+    /// Parts of lines to which operations are attributed.
     pub(crate) parts: Vec<(Location, Columns)>,
     /// Values with registers of their own, by [`Version::after`] for each name.
     pub(crate) versions: Vec<Version>,
 }
 
 impl Ir {
-    /// A register.
     #[inline]
     pub fn register(&self, id: RegisterId) -> &VirtualRegister {
         &self.registers[id.index()]
     }
 
-    /// The attribution to a line, or to a part of it.
+    /// Attribution to a line, or to a part of it.
     pub(crate) fn attribute(&mut self, location: Location, columns: Option<Columns>) -> Attribution {
         let Some(columns) = columns else { return Attribution::to(location) };
         self.parts.push((location, columns));
         Attribution { file: Attribution::PART, line: self.parts.len() as u32 - 1 }
     }
 
-    /// The source line that an operation is attributed to.
+    /// Source line that an operation is attributed to.
     #[inline]
     pub fn location(&self, operation: &Operation) -> Option<Location> {
         let Attribution { file, line } = operation.attribution;
@@ -440,14 +443,14 @@ impl Ir {
         }
     }
 
-    /// The part of that line, where the source says it (`.loc`).
+    /// Part of the source line, where the source says it (`.loc`).
     #[inline]
     pub fn columns(&self, operation: &Operation) -> Option<Columns> {
         let Attribution { file, line } = operation.attribution;
         (file == Attribution::PART).then(|| self.parts[line as usize].1)
     }
 
-    /// Replaces the bundles, and moves what stands between them by `moved`: from a bundle's old number to its new one.
+    /// Replaces the bundles, and moves labels, bounds and loops along: `moved` maps a bundle's old number to its new one.
     pub(crate) fn replace_bundles(&mut self, bundles: Vec<Bundle>, moved: impl Fn(u32) -> u32) {
         self.period = moved(self.period);
         for label in self.labels.iter_mut().filter(|label| label.space == Space::Code) {
@@ -462,12 +465,23 @@ impl Ir {
         self.bundles = bundles;
     }
 
-    /// True if it contains a word given bit by bit, whose effect is not known.
+    /// The program contains a raw word, whose effect is not known.
     pub(crate) fn is_opaque(&self) -> bool {
         !self.raw.is_empty() && self.bundles.iter().any(Bundle::is_opaque)
     }
 
-    /// Every operation, in order.
+    /// The program memory cannot hold the program, however its bundles are packed.
+    pub(crate) fn is_too_long(&self) -> bool {
+        let depth = self.machine.most_bundles() as usize;
+        // A bundle has at most as many operations that need a slot as there are slots.
+        if self.bundles.len() <= depth {
+            return false;
+        }
+        let words = depth.saturating_mul(self.machine.slots.len());
+        self.operations().filter(|operation| operation.slot.is_some()).count() > words
+    }
+
+    /// Iterates over the operations of all bundles, in order.
     pub fn operations(&self) -> impl Iterator<Item = &Operation> {
         self.bundles.iter().flat_map(|bundle| &bundle.operations)
     }

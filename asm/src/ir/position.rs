@@ -6,19 +6,20 @@ use std::num::NonZeroU32;
 /// The position of a line in the source, macros and repetitions written out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Position {
-    /// Its place in the order of the source, macros and repetitions written out.
+    /// Index in source order, macros and repetitions written out.
     pub order: u32,
-    /// The number of the scope and 1: so a word without a position takes no more room than one with.
+    /// Number of the scope, plus 1: an `Option` of a position then takes no more room.
     scope: NonZeroU32,
 }
 
 impl Position {
-    /// The position of a place in the order of the source, in a use of a macro: an index into [`Names::scopes`](crate::names::Names::scopes), below 2³² - 1.
+    /// The position `order` in source order, in a use of a macro, `scope`: an index into
+    /// [`Names::scopes`](crate::names::Names::scopes), below 2³² - 1.
     pub const fn new(order: u32, scope: u32) -> Position {
         Position { order, scope: NonZeroU32::MIN.saturating_add(scope) }
     }
 
-    /// The use of a macro that it is of: an index into [`Names::scopes`](crate::names::Names::scopes).
+    /// The use of a macro: an index into [`Names::scopes`](crate::names::Names::scopes).
     pub const fn scope(self) -> u32 {
         self.scope.get() - 1
     }

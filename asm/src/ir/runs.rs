@@ -8,16 +8,16 @@ use takt_isa::program::Space;
 /// A straight run of bundles: control enters at the first only, and leaves after the last only.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Run {
-    /// Index of its first bundle.
+    /// Index of the first bundle.
     pub(crate) start: usize,
-    /// Index of the bundle after its last.
+    /// Index of the bundle after the last.
     pub(crate) end: usize,
-    /// True if the scheduler may move its bundles.
+    /// The scheduler may move the bundles.
     pub(crate) scheduled: bool,
 }
 
 /// Cuts the program into runs: at labels, at heads of loops and at bundles that are jumped to by number, at the period's start,
-/// after redirections, around what must not move.
+/// after redirections, and around immovable bundles.
 pub(crate) fn runs(ir: &Ir) -> Vec<Run> {
     let count = ir.bundles.len();
     let mut cut = vec![false; count + 1];
@@ -33,7 +33,7 @@ pub(crate) fn runs(ir: &Ir) -> Vec<Run> {
     let mut before = ir.bundles.first().is_some_and(|bundle| bundle.scheduled);
     let has_raw = !ir.raw.is_empty();
     for (i, bundle) in ir.bundles.iter().enumerate() {
-        // The status register sees every operation before and none after: a wall.
+        // The status register sees every operation before and none after: a fence.
         let (mut is_wall, mut redirects) = (has_raw && bundle.is_opaque(), false);
         for operation in &bundle.operations {
             let effect = operation.row().effect;
@@ -58,7 +58,7 @@ pub(crate) fn runs(ir: &Ir) -> Vec<Run> {
     runs
 }
 
-/// True if a target is a number: then every bundle must keep its address.
+/// A target is a number, so every bundle must keep its address.
 pub(crate) fn jumps_to_numbers(ir: &Ir) -> bool {
     ir.operations().any(|operation| operation.target_number().is_some())
 }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A program to source text that assembles to the same program, bit for bit.
+//! Disassembly: source text that assembles to the same program, bit for bit.
 //!
-//! Everything has its place given (`@`), every operation its line (`.loc`). A word that the assembler would not put where
-//! it stands, because it is no instruction or stands in the wrong slot, is written bit by bit (`.raw`).
+//! Every register has its place (`@`), every operation its line (`.loc`). A word that the assembler would not put where it
+//! stands, because it is no instruction or stands in the wrong slot, is written bit by bit (`.raw`).
 
 use std::collections::HashMap;
 use std::fmt::Write as _;
@@ -26,9 +26,9 @@ pub fn disassemble(program: &Program) -> String {
 /// The source lines of a bundle's operations.
 #[derive(Clone, PartialEq, Eq)]
 enum BundleOrigin {
-    /// All operations have the same.
+    /// All operations have the same line.
     One(Option<SourcePart>),
-    /// Each operation has its own.
+    /// Each operation has a line of its own.
     Each(Vec<Option<SourcePart>>),
 }
 
@@ -76,7 +76,7 @@ impl<'p> Writer<'p> {
         }
     }
 
-    /// A line of text; a `String` takes all.
+    /// Writes a line of text; a `String` takes all.
     fn line(&mut self, line: std::fmt::Arguments<'_>) {
         let _ = self.text.write_fmt(line);
         self.text.push('\n');
@@ -108,7 +108,7 @@ impl<'p> Writer<'p> {
             self.line(format_args!(".preset @{place} = 0x{bits:08x}  ; {value:?}"));
         }
         for range in &self.program.ranges {
-            // An element is named by its place, and a place has no type.
+            // Elements are named by their place, and a place has no type.
             let named = inputs.iter().chain(outputs).chain(registers).find(|port| {
                 port.register == range.register && port.ty == range.ty && !port.name.contains('[')
             });
@@ -121,7 +121,7 @@ impl<'p> Writer<'p> {
             };
             self.line(format_args!(".range  {name} = {ends}"));
         }
-        // The order in which `.loc` first names the files is theirs in the program.
+        // The order of the first `.loc` lines is the order of the files in the program.
         for file in files {
             self.line(format_args!(".loc {} 1", quoted(file)));
         }
@@ -178,7 +178,7 @@ impl<'p> Writer<'p> {
         }
     }
 
-    /// A bundle's text, and where its operations come from.
+    /// A bundle's text, and the source lines of its operations.
     fn bundle(&self, words: &[u64], lines: &[Option<SourcePart>]) -> (String, Vec<Option<SourcePart>>) {
         let slots = || self.program.machine.numbered_slots().map(|(slot, _)| slot);
         let word = |slot: SlotIndex| words[slot.index()];
@@ -197,7 +197,7 @@ impl<'p> Writer<'p> {
                 self.raw(word(slot), slot)
             }));
         }
-        // A `nop` takes the first slot that is free: where that is the right one for each, they are written as such.
+        // A `nop` takes the first free slot: write `nop` where that is the right slot for each.
         let free = slots().filter(|slot| !present.contains(slot) || idle.iter().any(|(_, nop)| nop == slot));
         if free.zip(&idle).all(|(free, (_, slot))| free == *slot) {
             for (index, _) in &idle {
@@ -211,7 +211,7 @@ impl<'p> Writer<'p> {
         format!(".raw {} 0x{word:012x}", self.program.machine.slot(slot).name)
     }
 
-    /// The text of a word, if the assembler would put that text's word into this slot.
+    /// The text of a word, if the assembler would put this text's word into this slot.
     fn operation(&self, word: u64, slot: SlotIndex) -> Option<String> {
         let machine = self.program.machine;
         let instruction = Instruction::decode(word).ok()?;
@@ -238,7 +238,7 @@ impl<'p> Writer<'p> {
         if machine.hosts(function).len() < 2 {
             return Some(text);
         }
-        // Its slot is one of several.
+        // Several slots host the function: name the slot.
         let (mnemonic, operands) = text.split_at(instruction.op.row().mnemonic.len());
         Some(format!("{mnemonic}.{}{operands}", machine.slot(slot).name))
     }
@@ -282,7 +282,7 @@ fn quoted(text: &str) -> String {
             '"' | '\\' => quoted.extend(['\\', c]),
             '\n' => quoted.push_str("\\n"),
             '\r' => quoted.push_str("\\r"),
-            // In a name of a file, say: what a terminal would obey.
+            // Characters in a file's name that a terminal would obey become visible.
             c => push_visible(&mut quoted, c),
         }
     }

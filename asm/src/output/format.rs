@@ -1,35 +1,35 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! `takt fmt`: a source in the columns that the shipped ones have.
+//! `takt fmt`: lays out a source in the columns of the shipped programs.
 //!
-//! Only blanks change, and only between tokens: what the assembler reads is the same. Labels stand in the first column,
-//! instructions in [`CODE`], their operands in the second such column, comments behind code in [`COMMENT`] or, where the code
-//! is longer, behind it. Operands of directives and macros are tables as often as lists: their inner blanks remain. A bundle or
-//! directive that cannot be read is left as it is, on all its lines.
+//! Only blanks change, and only between tokens: the assembler reads the same. Labels stand in the first column, instructions in
+//! [`CODE`], their operands in the second such column, comments behind code in [`COMMENT`] or, where the code is longer, behind
+//! it. Operands of directives and macros are tables as often as lists: their inner blanks remain. A bundle or directive that
+//! cannot be read is left unchanged, on all its lines.
 
-use crate::report::diag::Sink;
-use crate::report::source::{Sources, line_feeds};
-use crate::syntax::intern::Interner;
-use crate::syntax::parse;
-use crate::syntax::tokens::{Token, TokenKind, lines};
 use std::collections::BTreeSet;
+use takt_diagnostics::diag::Sink;
+use takt_diagnostics::source::{Sources, line_feeds};
 use takt_isa::Op;
+use takt_syntax::intern::Interner;
+use takt_syntax::parse;
+use takt_syntax::tokens::{Token, TokenKind, lines};
 
-/// The column of instructions, and as far behind it that of their operands.
+/// Column of instructions, and distance from there to their operands.
 pub const CODE: usize = 8;
-/// The column of comments behind code.
+/// Column of comments behind code.
 pub const COMMENT: usize = 40;
 
-/// The source, laid out. Laying it out again changes nothing.
+/// Lays out a source. Laying it out again changes nothing.
 pub fn format(text: &str) -> String {
     // A carriage return alone ends a line too.
     let text = &*line_feeds(text);
     let (mut sources, mut names, mut sink) = (Sources::default(), Interner::new(), Sink::default());
-    // A file that is too large for the assembler is left as it is.
+    // A file that is too large for the assembler stays unchanged.
     let Some(file) = sources.add("", text.into()) else { return text.to_owned() };
     let ast = parse::parse(&sources.files()[file].clone(), &mut names, &mut sink);
     let broken: BTreeSet<u32> = ast.broken.into_iter().collect();
     let mut out = String::with_capacity(text.len() + text.len() / 8);
-    // The present statement: true if it continues, and true if it could not be read.
+    // The present statement: whether it continues, and whether it could not be read.
     let (mut continues, mut keep) = (false, false);
     for ((number, line), tokens) in (1..).zip(text.split('\n')).zip(lines(text)) {
         let mut code = tokens.iter().filter(|token| token.kind != TokenKind::Comment);
@@ -57,7 +57,7 @@ pub fn format(text: &str) -> String {
             continues = last == TokenKind::Bars;
         }
     }
-    // One line break at the end, of the kind that the text has.
+    // End with one line break, of the kind that the text has.
     let ending = if out.contains("\r\n") { "\r\n" } else { "\n" };
     let length = out.trim_end_matches(['\n', '\r']).len();
     if out.ends_with('\n') || length == out.len() {
@@ -74,7 +74,7 @@ struct CodeLine<'t> {
     text: &'t str,
     start: usize,
     tokens: &'t [Token],
-    /// It belongs to the bundle of the line before.
+    /// The line continues the bundle of the line before.
     continues: bool,
 }
 
@@ -138,7 +138,7 @@ impl CodeLine<'_> {
     }
 
     fn operation(&self, tokens: &[Token], aligned: bool, out: &mut String) {
-        // An equation: nothing of it has a column.
+        // Equations have no columns.
         if tokens.iter().any(|token| token.kind == TokenKind::Assign) {
             return self.operands(tokens, false, out);
         }
@@ -161,14 +161,14 @@ impl CodeLine<'_> {
         let start = width(out);
         out.push_str(&self.text[name.range.clone()]);
         let Some(first) = operands.first() else { return };
-        // A single blank is a choice, more are a column.
+        // A single blank is a choice, more blanks are a column.
         let gap = columns(&self.text[name.range.end..first.range.start]);
         pad(out, if gap == 1 { 0 } else { start + CODE }, 1);
         self.operands(operands, false, out);
     }
 
-    /// Operands: of a list with single blanks, of what may be a table with those that there are. Within brackets, blanks are no
-    /// business of columns.
+    /// Writes operands: lists with single blanks, possible tables with the blanks of the source. Within brackets all blanks
+    /// stay.
     fn operands(&self, operands: &[Token], is_list: bool, out: &mut String) {
         let (mut before, mut depth): (Option<&Token>, u32) = (None, 0);
         for token in operands {
@@ -197,7 +197,7 @@ impl CodeLine<'_> {
         }
     }
 
-    /// Tokens of one name, as they are written.
+    /// Copies the tokens of one name as written.
     fn copy(&self, tokens: &[Token], out: &mut String) {
         if let [first, .., last] | [first @ last] = tokens {
             out.push_str(&self.text[first.range.start..last.range.end]);
@@ -205,7 +205,7 @@ impl CodeLine<'_> {
     }
 }
 
-/// The tokens of the name that a list begins with: one, or those of a template.
+/// Number of tokens of the name at the beginning of a list: one, or all of a template.
 fn head(tokens: &[Token]) -> usize {
     let mut depth = 0;
     for (index, token) in tokens.iter().enumerate() {
@@ -221,20 +221,20 @@ fn head(tokens: &[Token]) -> usize {
     tokens.len()
 }
 
-/// The colon behind the label that a line begins with.
+/// Index of the colon after the label that a line begins with.
 fn label(tokens: &[Token]) -> Option<usize> {
     let head = head(tokens);
     let is_name = matches!(tokens.first()?.kind, TokenKind::Name | TokenKind::TemplateBegin);
     (is_name && tokens.get(head)?.kind == TokenKind::Colon).then_some(head)
 }
 
-/// Blanks up to a column, and at least so many.
+/// Adds blanks up to a column, at least `least`.
 fn pad(out: &mut String, column: usize, least: usize) {
     let more = column.saturating_sub(width(out)).max(least);
     out.extend(std::iter::repeat_n(' ', more));
 }
 
-/// The characters of the line so far.
+/// Number of characters in the line so far.
 fn width(out: &str) -> usize {
     out.chars().count()
 }

@@ -1,22 +1,22 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Listing of a program, its symbol map, and its memories as `$readmemh` files.
 
-use crate::Assembled;
+use crate::AssembledProgram;
 use crate::context::bits_text;
-use crate::report::source::Lines;
-use crate::syntax::expr::Value;
 use serde::Serialize;
 use std::borrow::Cow;
 use std::fmt::Write as _;
+use takt_diagnostics::source::Lines;
 use takt_isa::program::{Columns, Location, Port, Space};
 use takt_isa::text::visible;
 use takt_isa::{Instruction, Program, SlotIndex, Type};
+use takt_syntax::expr::Value;
 
-/// The listing of an assembled program: for each bundle its address, its words in the order of the slots, and the source
-/// lines that they come from. An operation that a macro, a repetition or the assembler made is shown as what it became, behind a `+`;
-/// so is one that computes a part of an equation, with that part. Before a line stand the slots of those of its operations that
-/// another slot could have taken.
-pub fn listing(assembled: &Assembled) -> String {
+/// The listing of an assembled program: for each bundle its address, its words in the order of the slots, and the source lines that
+/// they come from. An operation that a macro, a repetition or the assembler made is disassembled, behind a `+`; so is an operation
+/// that computes a part of an equation, with that part. A line begins with the slots of its operations that another slot could have
+/// taken.
+pub fn listing(assembled: &AssembledProgram) -> String {
     let mut lister = Lister::new(assembled);
     lister.code();
     lister.data();
@@ -29,15 +29,15 @@ pub fn listing(assembled: &Assembled) -> String {
 
 struct Lister<'a> {
     program: &'a Program,
-    assembled: &'a Assembled,
-    /// For each file of the program its text and lines, if it is among the sources.
+    assembled: &'a AssembledProgram,
+    /// Text and lines of each file of the program that is among the sources.
     files: Vec<Option<(&'a str, Lines)>>,
     filler: u64,
     text: String,
 }
 
 impl<'a> Lister<'a> {
-    fn new(assembled: &'a Assembled) -> Lister<'a> {
+    fn new(assembled: &'a AssembledProgram) -> Lister<'a> {
         let program = &assembled.program;
         let source = |name: &String| {
             let file = assembled.sources.files().iter().find(|file| *file.name == **name)?;
@@ -48,7 +48,7 @@ impl<'a> Lister<'a> {
         Lister { program, assembled, files, filler, text: String::new() }
     }
 
-    /// A line of text; a `String` takes all.
+    /// Writes a line of text; a `String` takes all.
     fn line(&mut self, line: std::fmt::Arguments<'_>) {
         let start = self.text.len();
         let _ = self.text.write_fmt(line);
@@ -114,7 +114,7 @@ impl<'a> Lister<'a> {
         }
     }
 
-    /// The source lines of a bundle, whose words begin at `first`: place and text.
+    /// The source lines of a bundle whose words begin at `first`: place and text.
     fn rows(&self, first: usize) -> Vec<(String, String)> {
         let program = self.program;
         let mut rows: Vec<(String, String, Vec<&str>)> = Vec::new();
@@ -181,7 +181,7 @@ impl<'a> Lister<'a> {
         Some(line.chars().take(160).collect())
     }
 
-    /// An operation as what it became.
+    /// Disassembles the operation of a word.
     fn operation(&self, index: usize, slot: SlotIndex) -> String {
         let program = self.program;
         let word = program.code[index];
@@ -235,45 +235,45 @@ impl<'a> Lister<'a> {
     }
 }
 
-/// The names of a program and what they stand for.
+/// Symbol map: names of a program with their values.
 #[derive(Clone, Debug, Serialize)]
 pub struct SymbolMap {
-    /// Labels, by address.
+    /// Labels, by ascending address.
     pub labels: Vec<Label>,
-    /// Input ports.
+    /// Input ports of the program.
     pub inputs: Vec<Register>,
-    /// Output ports.
+    /// Output ports of the program.
     pub outputs: Vec<Register>,
-    /// Named registers.
+    /// Registers with a name.
     pub registers: Vec<Register>,
-    /// Named constants.
+    /// Constants with a name.
     pub constants: Vec<Constant>,
 }
 
 /// A label of the [`SymbolMap`].
 #[derive(Clone, Debug, Serialize)]
 pub struct Label {
-    /// Its name.
+    /// Name of the label.
     pub name: String,
-    /// Which memory it points into.
+    /// Memory that it points into.
     pub space: Space,
-    /// Bundle or word of data.
+    /// Address of the bundle or data word.
     pub address: u32,
 }
 
 /// A named register of the [`SymbolMap`].
 #[derive(Clone, Debug, Serialize)]
 pub struct Register {
-    /// Its name in the source.
+    /// Name in the source.
     pub name: String,
-    /// Its canonical name.
+    /// Canonical name of its place on the machine.
     pub place: String,
-    /// Its address.
+    /// Address in the register space.
     pub address: takt_isa::Register,
-    /// The number of a port.
+    /// Number of a port; `None` for other registers.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub number: Option<u16>,
-    /// The type as which its bits are shown.
+    /// Type as which debuggers show the bits.
     #[serde(rename = "type")]
     pub ty: Type,
 }
@@ -281,14 +281,14 @@ pub struct Register {
 /// A named constant of the [`SymbolMap`].
 #[derive(Clone, Debug, Serialize)]
 pub struct Constant {
-    /// Its name.
+    /// Name in the source.
     pub name: String,
-    /// Its value.
+    /// Value of its expression.
     pub value: Value,
 }
 
 /// The symbol map of an assembled program.
-pub fn symbol_map(assembled: &Assembled) -> SymbolMap {
+pub fn symbol_map(assembled: &AssembledProgram) -> SymbolMap {
     let Program { machine, symbols, inputs, outputs, registers, .. } = &assembled.program;
     let label = |symbol: &takt_isa::program::Symbol| Label {
         name: symbol.name.clone(),

@@ -1,49 +1,50 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Bindings of a source's names in the assembled program, for debuggers: the assembler may give the values of one name registers
-//! of their own, the scheduler moves the operations that compute them, and a macro's names are others in each use.
+//! of their own, the scheduler moves the operations that compute them, and a macro's names differ in each use.
 //!
-//! The source's order decides which value a name means: a line reads the value that the line before it in the source wrote,
+//! Source order decides which value a name means: a line reads the value that the line before it in the source wrote,
 //! wherever the two were scheduled. So each word has the [`Position`] of its line, and each value the range of that order in
-//! which it is the name's.
+//! which the name means it.
 
 use crate::context::{Context, ScopeId};
-use crate::emit::Emitted;
+use crate::emit::EmittedProgram;
 use crate::emit::allocate::Allocation;
 use crate::ir::arrays::Array;
 pub use crate::ir::position::Position;
 use crate::ir::{Ir, RegisterId};
-use crate::report::source::{Lines, Sources, Span};
-use crate::syntax::expr::Value;
 use std::collections::{BTreeMap, HashMap, HashSet};
+use takt_diagnostics::source::{Lines, Sources, Span};
 use takt_isa::program::Columns;
 use takt_isa::{BundleAddress, Register, Type};
+use takt_syntax::expr::Value;
 
-/// Debugging information of a program: an image has it, unless it is stripped.
+/// Debugging information of a program, part of its image unless stripped.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DebugInfo {
-    /// Sources: the names that the program has for them, and their texts.
+    /// Sources: names as in the program, and texts.
     pub sources: Vec<(String, String)>,
-    /// Named constants, in the order of the source.
+    /// Named constants in source order.
     pub constants: Vec<(String, Value)>,
-    /// The bindings of names.
+    /// Bindings of names to registers and data words.
     pub names: Names,
 }
 
 /// The bindings of names.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Names {
-    /// Of each word of the code that has a source line, parallel to it. Empty if nothing is known.
+    /// Position of each word of the code that has a source line. Empty if nothing is known.
     pub positions: Vec<Option<Position>>,
     /// Uses of macros. The first stands for the code outside of macros.
     pub scopes: Vec<Scope>,
-    /// Names that stand for one register here and another there: all of its values for each.
+    /// Values of names that stand for one register here and another there.
     pub values: Vec<NamedValue>,
     /// Arrays in data memory.
     pub arrays: Vec<NamedArray>,
 }
 
 impl Names {
-    /// The position of the line that a bundle shows: of its first operation that has one, or else of a bundle before.
+    /// The position of the line that a bundle shows: taken from its first operation with a position, or else from a bundle
+    /// before.
     pub fn at_hand(&self, slots: usize, address: BundleAddress) -> Position {
         let end = (address.index() + 1).saturating_mul(slots).min(self.positions.len());
         let bundles = self.positions[..end].rchunks(slots.max(1));
@@ -54,46 +55,45 @@ impl Names {
 /// An array in data memory. Its words follow one another, the last index counting fastest.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NamedArray {
-    /// Its name.
+    /// Name of the array.
     pub name: String,
-    /// The word of data memory that its first element is.
+    /// First word in data memory.
     pub base: u32,
-    /// The number of elements in each dimension; indices count from 1.
+    /// Number of elements in each dimension; indices count from 1.
     pub sizes: Vec<u32>,
-    /// The type of its elements.
+    /// Type of the elements.
     pub ty: Type,
 }
 
 /// A use of a macro.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Scope {
-    /// Prefix of the names declared in it: the macro and the number of its use, `limit.2`. A point follows.
+    /// Prefix of the names declared in the use: the macro and the number of the use, `limit.2`. A point follows.
     pub name: String,
-    /// Its parameters that stand for registers, and the names of those.
+    /// Parameters that stand for registers, and the registers' names.
     pub parameters: Vec<(String, String)>,
 }
 
-/// A value of a name, and where it lives.
+/// A value of a name, and its register.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NamedValue {
-    /// The name in the source.
+    /// Name in the source.
     pub name: String,
-    /// The value's own name: `t.1`, or that of the source for the last one of a straight run, which later runs may read.
+    /// Name of the value: `t.1`, or the source's name for the last value of a straight run, which later runs may read.
     pub label: String,
-    /// Its register.
+    /// Register that holds the value.
     pub register: Register,
-    /// The type as which its bits are read.
+    /// Type as which debuggers read the bits.
     pub ty: Type,
-    /// The name means it for lines with an order above the first and up to the second. `None`: for all lines for which it means
-    /// no other value.
+    /// Range of source order in which the name means this value: above the first, up to the second. `None`: everywhere that it
+    /// means no other value.
     pub orders: Option<(u32, u32)>,
-    /// The first bundle that writes it and the last one that uses it, if it lives only there: its register may have other
-    /// values elsewhere.
+    /// Bundles of the first write and the last use, if the register may hold other values elsewhere.
     pub bundles: Option<(BundleAddress, BundleAddress)>,
 }
 
-/// The columns of what words compute of their lines: of those that the program attributes to the lines where they stand.
-pub(crate) fn parts(sources: &Sources, emitted: &Emitted) -> Vec<(u32, Columns)> {
+/// Columns of the parts of lines that words compute, for words attributed to the lines where these parts stand.
+pub(crate) fn parts(sources: &Sources, emitted: &EmittedProgram) -> Vec<(u32, Columns)> {
     let mut lines: HashMap<usize, Lines> = HashMap::new();
     let part = |&(word, span): &(u32, Span)| {
         let number = sources.file_of(span.start);
@@ -115,7 +115,12 @@ pub(crate) fn parts(sources: &Sources, emitted: &Emitted) -> Vec<(u32, Columns)>
 }
 
 /// The bindings of a program's names.
-pub(crate) fn names(context: &mut Context, ir: &Ir, allocation: &Allocation, emitted: &mut Emitted) -> Names {
+pub(crate) fn names(
+    context: &mut Context,
+    ir: &Ir,
+    allocation: &Allocation,
+    emitted: &mut EmittedProgram,
+) -> Names {
     let (positions, scopes) = positions(context, ir, emitted);
     let array = |array: &Array| {
         let Array { name, base, sizes, ty, .. } = array;
@@ -125,7 +130,11 @@ pub(crate) fn names(context: &mut Context, ir: &Ir, allocation: &Allocation, emi
     Names { positions, scopes, values: values(ir, allocation, emitted), arrays }
 }
 
-fn positions(context: &mut Context, ir: &Ir, emitted: &mut Emitted) -> (Vec<Option<Position>>, Vec<Scope>) {
+fn positions(
+    context: &mut Context,
+    ir: &Ir,
+    emitted: &mut EmittedProgram,
+) -> (Vec<Option<Position>>, Vec<Scope>) {
     let mut given = std::mem::take(&mut context.declared.parameters);
     given.sort_unstable();
     given.dedup_by_key(|(scope, name, _)| (*scope, *name));
@@ -140,10 +149,10 @@ fn positions(context: &mut Context, ir: &Ir, emitted: &mut Emitted) -> (Vec<Opti
         names.sort_unstable();
         names
     };
-    // Room for each to be a macro's use: memory that is not written to costs nothing.
+    // Reserve room for each scope to be a macro's use: memory that is not written to costs nothing.
     let mut scopes = Vec::with_capacity(context.scopes.count());
     scopes.push(Scope::default());
-    // By owner; 0 for those that have none yet, as for the code outside of macros.
+    // Numbers of scopes by owner; 0 for owners without one yet, as for the code outside of macros.
     let mut numbers = vec![0; context.scopes.count()];
     let mut position = |position: Position| {
         let expansion = position.scope();
@@ -160,14 +169,14 @@ fn positions(context: &mut Context, ir: &Ir, emitted: &mut Emitted) -> (Vec<Opti
         }
         Position::new(position.order, *number)
     };
-    // In the memory that the origins have.
+    // Reuses the memory of the origins.
     let origins = std::mem::take(&mut emitted.origins);
     let positions = origins.into_iter().map(|origin| origin.map(&mut position)).collect();
     (positions, scopes)
 }
 
-fn values(ir: &Ir, allocation: &Allocation, emitted: &Emitted) -> Vec<NamedValue> {
-    // The values with registers of their own, by the register that the source names.
+fn values(ir: &Ir, allocation: &Allocation, emitted: &EmittedProgram) -> Vec<NamedValue> {
+    // Values with registers of their own, by the register that the source names.
     type Values = Vec<(RegisterId, Option<(u32, u32)>)>;
     let mut split: BTreeMap<RegisterId, Values> = BTreeMap::new();
     for version in &ir.versions {
@@ -214,7 +223,7 @@ fn values(ir: &Ir, allocation: &Allocation, emitted: &Emitted) -> Vec<NamedValue
     values
 }
 
-/// For each register the first bundle that writes it and the last one that uses it.
+/// By register: the first bundle that writes it, and the last bundle that uses it.
 fn ranges(ir: &Ir) -> Vec<Option<(BundleAddress, BundleAddress)>> {
     let mut ranges: Vec<Option<(BundleAddress, BundleAddress)>> = vec![None; ir.registers.len()];
     for (address, bundle) in (0..).map(BundleAddress::new).zip(&ir.bundles) {

@@ -1,28 +1,29 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Addresses that are known before the program runs: whether they lie in the data memory, and in the table that the source names.
+//! Addresses that are known before the program runs: checks that they lie in the data memory, and in the table that the source
+//! names.
 
-use crate::context::{At, Binding};
+use crate::capacity;
+use crate::context::{AstPlace, Binding};
 use crate::ir::{LabelId, RegisterId, RegisterKind};
-use crate::report::diag::{Diagnostic, Severity};
-use crate::report::source::Span;
 use crate::resolve::Resolver;
-use crate::room;
-use crate::syntax::ast::Operator;
-use crate::syntax::ast::*;
-use crate::syntax::name::NameRef;
 use std::rc::Rc;
+use takt_diagnostics::diag::{Diagnostic, Severity};
+use takt_diagnostics::source::Span;
+use takt_syntax::ast::Operator;
+use takt_syntax::ast::*;
+use takt_syntax::name::NameRef;
 
-/// Nodes of expressions, and of the arguments that they name, that are looked at for a label.
+/// The most nodes of expressions, and of the arguments that they name, to search for a label.
 const NODES: u32 = 1 << 12;
 
 /// The table into which an expression points.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Origin {
-    /// A number: it names none.
+    /// A number, without a table.
     Number,
     /// A label, plus or minus a number.
     Label(LabelId),
-    /// Something else that is computed from labels.
+    /// Another value computed from labels.
     Other,
 }
 
@@ -31,8 +32,8 @@ impl Resolver<'_> {
     /// the part that gives the offset.
     pub(crate) fn check_address(
         &mut self,
-        at: At,
-        written: (At, Operand),
+        at: AstPlace,
+        written: (AstPlace, Operand),
         offset: u32,
         base: RegisterId,
         span: Span,
@@ -49,7 +50,7 @@ impl Resolver<'_> {
             let error = Diagnostic::error("range", span, message)
                 .note(format!("{} has {} words, from 0", machine.name, machine.data_depth));
             let error = match u64::try_from(word) {
-                Ok(word) => error.help(room::for_words(machine, word + 1)),
+                Ok(word) => error.help(capacity::for_words(machine, word + 1)),
                 Err(_) => error,
             };
             self.context.report(at.scope, error);
@@ -60,8 +61,8 @@ impl Resolver<'_> {
         }
     }
 
-    /// A constant address by the name of a table lies in that table.
-    fn check_table(&mut self, at: At, label: LabelId, word: i64, span: Span) {
+    /// Checks that a constant address given by the name of a table lies in that table.
+    fn check_table(&mut self, at: AstPlace, label: LabelId, word: i64, span: Span) {
         let context = &self.context;
         let tables = || context.declared.labels.iter().filter(|label| label.is_table());
         let found = &context.declared.labels[label.0 as usize];
@@ -96,8 +97,8 @@ impl Resolver<'_> {
         self.context.report(at.scope, error);
     }
 
-    /// The label whose address an operand is, plus or minus a number: the table that it lies in.
-    pub(crate) fn table_of(&mut self, at: At, kind: OperandKind) -> Option<LabelId> {
+    /// The table that an operand lies in: it is the address of a label, plus or minus a number.
+    pub(crate) fn table_of(&mut self, at: AstPlace, kind: OperandKind) -> Option<LabelId> {
         match self.origin(at, kind, &mut NODES.clone()) {
             Origin::Label(label) => Some(label),
             Origin::Number | Origin::Other => None,
@@ -105,7 +106,7 @@ impl Resolver<'_> {
     }
 
     /// The table that an operand names.
-    fn origin(&mut self, at: At, kind: OperandKind, nodes: &mut u32) -> Origin {
+    fn origin(&mut self, at: AstPlace, kind: OperandKind, nodes: &mut u32) -> Origin {
         match kind {
             OperandKind::Name(name) => self.origin_of_name(at, name, nodes),
             OperandKind::Expr(expr) => self.origin_of(at, expr, nodes),
@@ -124,7 +125,7 @@ impl Resolver<'_> {
         }
     }
 
-    fn origin_of_name(&mut self, at: At, name: NameRef, nodes: &mut u32) -> Origin {
+    fn origin_of_name(&mut self, at: AstPlace, name: NameRef, nodes: &mut u32) -> Origin {
         let Ok(name) = self.context.spelled(at, name, Span::default()) else { return Origin::Other };
         match self.context.lookup(at.scope, name) {
             Binding::Data(label) => Origin::Label(label),
@@ -137,7 +138,7 @@ impl Resolver<'_> {
         }
     }
 
-    fn origin_of(&mut self, at: At, expr: ExprId, nodes: &mut u32) -> Origin {
+    fn origin_of(&mut self, at: AstPlace, expr: ExprId, nodes: &mut u32) -> Origin {
         let ast = Rc::clone(&self.context.asts[at.ast as usize]);
         let mut stack: Vec<Origin> = Vec::new();
         for node in &ast.nodes[expr.range()] {

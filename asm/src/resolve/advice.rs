@@ -1,26 +1,26 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Advice on a line whose instruction is not known, or takes other operands: the part of
-//! [`resolve`](crate::resolve) that guesses the intention.
+//! Advice on a line whose instruction is unknown, or takes other operands: the part of [`resolve`](crate::resolve) that guesses
+//! the intention.
 
-use crate::context::{At, Reported};
+use crate::context::{AstPlace, ErrorReported};
 use crate::expand::load::Loader;
-use crate::report::diag::Diagnostic;
-use crate::report::nearest;
-use crate::report::source::{Span, line_feeds};
 use crate::resolve::Resolver;
-use crate::syntax::ast::*;
-use crate::syntax::foreign;
-use crate::syntax::name::NameId;
+use takt_diagnostics::diag::Diagnostic;
+use takt_diagnostics::nearest;
+use takt_diagnostics::source::{Span, line_feeds};
 use takt_isa::{Effect, ROWS, Row};
+use takt_syntax::ast::*;
+use takt_syntax::foreign;
+use takt_syntax::name::NameId;
 
 impl Resolver<'_> {
     pub(crate) fn wrong_count(
         &mut self,
-        at: At,
+        at: AstPlace,
         row: &Row,
-        written: &crate::syntax::ast::Operation,
+        written: &takt_syntax::ast::Operation,
         operands: &[Operand],
-    ) -> Reported {
+    ) -> ErrorReported {
         let places = row.shape.operands();
         let plural = |count: usize| if count == 1 { "" } else { "s" };
         let message = format!(
@@ -30,7 +30,7 @@ impl Resolver<'_> {
             plural(places.len()),
             operands.len()
         );
-        // At the first operand too many, or else behind the last.
+        // Point at the first operand too many, or else at the whole operation.
         let span = match operands.get(places.len()) {
             Some(first) => first.span.to(written.span),
             None => written.span,
@@ -42,11 +42,11 @@ impl Resolver<'_> {
 
     pub(crate) fn unknown_mnemonic(
         &mut self,
-        at: At,
+        at: AstPlace,
         name: NameId,
-        written: &crate::syntax::ast::Operation,
+        written: &takt_syntax::ast::Operation,
         of: usize,
-    ) -> Reported {
+    ) -> ErrorReported {
         let text = self.context.scopes.text(name).to_owned();
         let span = written.mnemonic.span;
         if let Some(definition) = self.context.scopes.macros.get(&name)
@@ -97,7 +97,7 @@ impl Resolver<'_> {
     }
 }
 
-/// Says which file of the library defines what is missing.
+/// Adds the library file that defines the missing macro.
 pub(crate) fn from_library(error: Diagnostic, file: &str) -> Diagnostic {
     let line = format!(".include <{file}>");
     error.help(format!("the library defines it: `{line}`")).missing([line])
@@ -127,7 +127,7 @@ pub(super) fn loading() -> &'static str {
     ROWS.iter().find(|row| row.effect == Effect::Load).map_or("", |row| row.mnemonic)
 }
 
-/// Instructions of other processors that Takt has not, though one of a similar name may do something else.
+/// Advice on instructions of other processors that Takt lacks, where a similar name may mean another operation.
 fn absent(name: &str) -> Option<&'static str> {
     Some(match name {
         "fmadd" | "fmac" | "fmla" | "mac" | "madd" => "`fma` is a · b + c; a machine may lack it",
@@ -136,7 +136,7 @@ fn absent(name: &str) -> Option<&'static str> {
             "RISC-V's fnmsub is `fnma`, c - a · b, and its fnmadd is `fnms`, -(a · b) - c; a machine may lack them"
         }
         "imul" | "idiv" | "imod" | "irem" | "imin" | "imax" | "iabs" | "ineg" => {
-            "of integers there are sums, shifts, logic and comparisons: `itof` converts, and `ishl` multiplies by a power of two"
+            "integers have sums, shifts, logic and comparisons: `itof` converts, and `ishl` multiplies by a power of two"
         }
         "fgt" | "fge" | "fcmp" => "swap the operands of `flt` or `fle`",
         "igt" | "igtu" | "ige" | "ile" => {
@@ -188,7 +188,7 @@ fn alias(name: &str) -> Option<&'static str> {
 mod tests {
     use super::*;
 
-    /// Advice that names what there is not would be worse than none.
+    /// Advice must name existing instructions only.
     #[test]
     fn advice_names_instructions() {
         let known = |name: &str| ROWS.iter().any(|row| row.mnemonic == name);

@@ -17,13 +17,13 @@ pub(crate) struct Key {
     op: Op,
     sources: [(RegisterId, u32); 3],
     equation: u32,
-    /// Of a load the offset, the array, and the version of that.
+    /// Loads only: the offset, the array, and the array's version.
     word: Option<(u32, ArrayId, u32)>,
 }
 
-/// An available subexpression: its register, the version of that, and the bundle that computes it.
+/// An available subexpression: its register, the register's version, and the bundle that computes it.
 #[derive(Clone, Copy, Debug)]
-struct Known {
+struct AvailableExpression {
     register: RegisterId,
     writes: u32,
     bundle: u32,
@@ -31,14 +31,15 @@ struct Known {
 
 #[derive(Default)]
 pub(crate) struct CommonSubexpressions {
-    known: HashMap<Key, Known>,
-    /// The version of each register, by index: the number of its writes.
+    known: HashMap<Key, AvailableExpression>,
+    /// Version of each register, by index: the number of its writes.
     writes: Vec<u32>,
-    /// The version of each array, by index: the number of stores to it, and that of stores to any word.
+    /// Version of each array, by index: the number of stores to it; then the number of stores to unknown words.
     stores: Vec<u32>,
     stores_anywhere: u32,
     equation: u32,
-    /// Ranges of bundles that control must not enter: from behind the computation of a subexpression to its use in another equation.
+    /// Ranges of bundles that control must not enter: from after the computation of a subexpression to its use in another
+    /// equation.
     pub(crate) stretches: Vec<(u32, u32)>,
 }
 
@@ -79,7 +80,7 @@ impl CommonSubexpressions {
         Key { word: Some((offset, array, stores + self.stores_anywhere)), ..key }
     }
 
-    /// Records a store to an array, or to any word.
+    /// Records a store to an array, or to an unknown word.
     pub(crate) fn store(&mut self, array: Option<ArrayId>) {
         let Some(ArrayId(array)) = array else {
             self.stores_anywhere += 1;
@@ -101,10 +102,10 @@ impl CommonSubexpressions {
     /// Records that a register, just written, holds a subexpression.
     pub(crate) fn insert(&mut self, key: Key, register: RegisterId, bundle: u32) {
         let writes = self.writes(register);
-        self.known.insert(key, Known { register, writes, bundle });
+        self.known.insert(key, AvailableExpression { register, writes, bundle });
     }
 
-    /// Forgets a subexpression whose register does not last.
+    /// Forgets a subexpression whose register is overwritten or unstable.
     pub(crate) fn remove(&mut self, key: &Key) {
         self.known.remove(key);
     }

@@ -2,41 +2,41 @@
 //! Elements of arrays in data memory: subscripts to addresses, loads and stores.
 //!
 //! An address is a register plus an offset that the load or store has in its word. Subscripts that are affine in the indices of
-//! loops share a register for each distinct vector of coefficients, which the loops advance
-//! ([`loops`](crate::resolve::loops)); all that is constant is in the offset.
+//! loops share a register for each distinct vector of coefficients, which the loops advance ([`loops`](crate::resolve::loops));
+//! constants go into the offset.
 
-use crate::context::loops::{Counted, TooMany};
-use crate::context::{At, Binding, Reported, Table};
+use crate::context::loops::{AffineInteger, IterationLimitExceeded};
+use crate::context::{AstPlace, Binding, ErrorReported, Table};
 use crate::ir::arrays::{AccessId, Affine, ArrayAccess, ArrayId};
-use crate::ir::given::Kind;
+use crate::ir::type_evidence::Kind;
 use crate::ir::{Bundle, Constant, Operation, RegisterId, with_effect};
-use crate::report::diag::Diagnostic;
-use crate::report::source::Span;
 use crate::resolve::Resolver;
 use crate::resolve::term::{CurrentEquation, Term, TermForm};
-use crate::syntax::ast::{ExprId, Name, Node, Operand, OperandKind, Operator};
-use crate::syntax::expr::Value;
 use smallvec::SmallVec;
+use takt_diagnostics::diag::Diagnostic;
+use takt_diagnostics::source::Span;
 use takt_isa::shape::Field;
 use takt_isa::{Effect, Type};
+use takt_syntax::ast::{ExprId, Name, Node, Operand, OperandKind, Operator};
+use takt_syntax::expr::Value;
 
 /// An element of an array in data memory.
 #[derive(Clone, Debug)]
 pub(super) struct Word {
     pub(super) array: ArrayId,
-    /// The word, from the array's first.
-    place: Counted,
+    /// Index of the word, from the array's first.
+    place: AffineInteger,
     pub(super) span: Span,
 }
 
 impl Word {
-    /// True if a subscript names a register.
+    /// A subscript names the register.
     pub(super) fn names(&self, id: RegisterId) -> bool {
         self.place.registers.iter().any(|(register, _)| *register == id)
     }
 }
 
-/// What an element of an array is.
+/// Location of an array element.
 #[allow(clippy::large_enum_variant, reason = "there is one at a time")]
 pub(super) enum Place {
     Register(RegisterId),
@@ -55,18 +55,18 @@ impl Resolver<'_> {
     /// The element of an array in data memory, given its indices.
     pub(super) fn word(
         &mut self,
-        at: At,
+        at: AstPlace,
         table: u32,
         indices: &[Vec<Node>],
         span: Span,
-    ) -> Result<Word, Reported> {
+    ) -> Result<Word, ErrorReported> {
         self.context.declared.tables[table as usize].used = true;
         let declared = self.context.declared.tables[table as usize].clone();
         let array = &declared.array;
         if indices.len() != array.sizes.len() {
             return Err(self.wrong_indices(at, &declared, indices.len(), span));
         }
-        let mut place = Counted::constant(0);
+        let mut place = AffineInteger::constant(0);
         let mut around = None;
         let mut slices = 0;
         for (nodes, size) in indices.iter().zip(&array.sizes) {
@@ -84,7 +84,7 @@ impl Resolver<'_> {
                         return Err(self.outside(at, &declared, [low, high], *size, here));
                     }
                     Ok(_) => {}
-                    Err(TooMany) => {
+                    Err(IterationLimitExceeded) => {
                         let message = "this nest has too many iterations for its subscripts to be checked";
                         return Err(self.context.error(at.scope, "limit", here, message));
                     }
@@ -101,17 +101,17 @@ impl Resolver<'_> {
                     return Err(self.context.report(at.scope, error));
                 }
             }
-            let next = Counted::constant(0)
+            let next = AffineInteger::constant(0)
                 .plus(&place, i64::from(*size))
                 .and_then(|place| place.plus(&index, 1))
-                .and_then(|place| place.plus(&Counted::constant(1), -1));
+                .and_then(|place| place.plus(&AffineInteger::constant(1), -1));
             place = next
                 .ok_or_else(|| self.context.error(at.scope, "range", here, "a subscript beyond 64 bits"))?;
         }
         Ok(Word { array: ArrayId(table), place, span })
     }
 
-    fn wrong_indices(&mut self, at: At, table: &Table, found: usize, span: Span) -> Reported {
+    fn wrong_indices(&mut self, at: AstPlace, table: &Table, found: usize, span: Span) -> ErrorReported {
         let (text, takes) = (&table.array.name, table.array.sizes.len());
         let plural = if takes == 1 { "index" } else { "indices" };
         let message = format!("`{text}` has {takes} {plural}, not {found}");
@@ -120,7 +120,14 @@ impl Resolver<'_> {
         self.context.report(at.scope, error)
     }
 
-    fn outside(&mut self, at: At, table: &Table, [low, high]: [i64; 2], size: u32, span: Span) -> Reported {
+    fn outside(
+        &mut self,
+        at: AstPlace,
+        table: &Table,
+        [low, high]: [i64; 2],
+        size: u32,
+        span: Span,
+    ) -> ErrorReported {
         let text = &table.array.name;
         let message = match low == high {
             true => format!("`{text}` has no element {low} here: it is 1 to {size}"),
@@ -133,18 +140,18 @@ impl Resolver<'_> {
         self.context.report(at.scope, error)
     }
 
-    /// The address of an element: what it takes to compute it is emitted.
+    /// The address of an element; emits the operations that compute it.
     pub(super) fn word_address(
         &mut self,
-        at: At,
+        at: AstPlace,
         line: &mut CurrentEquation,
         word: &Word,
-    ) -> Result<Address, Reported> {
+    ) -> Result<Address, ErrorReported> {
         let base = self.context.declared.tables[word.array.0 as usize].array.base;
-        let Counted { actual, registers, .. } = &word.place;
+        let AffineInteger { actual, registers, .. } = &word.place;
         let page = i64::from(Field::Offset.bits().max()) + 1;
         let first = i64::from(base) + actual.constant;
-        // What does not fit into the offset is added to the register.
+        // The register takes the part that does not fit into the offset.
         let pages = if registers.is_empty() { first.div_euclid(page) * page } else { first.min(0) };
         let over = if registers.is_empty() { 0 } else { (first - pages).div_euclid(page) * page };
         let bias = pages + over;
@@ -176,64 +183,33 @@ impl Resolver<'_> {
         Ok(Address { base, offset, access })
     }
 
-    /// A register times a factor, as shifts and sums: the machine multiplies no integers.
-    fn scaled(
-        &mut self,
-        at: At,
-        line: &mut CurrentEquation,
-        register: RegisterId,
-        factor: i64,
-        span: Span,
-    ) -> Result<RegisterId, Reported> {
-        let magnitude = factor.unsigned_abs();
-        let mut sum: Option<RegisterId> = None;
-        for bit in (0..u64::BITS).filter(|bit| magnitude >> bit & 1 != 0) {
-            let part = match bit {
-                0 => register,
-                bit => {
-                    let by = self.pooled(bit, span);
-                    self.integer_operation(at, line, Operator::Shl, [register, by], span)?
-                }
-            };
-            sum = Some(match sum {
-                None => part,
-                Some(sum) => self.integer_operation(at, line, Operator::Add, [sum, part], span)?,
-            });
-        }
-        let sum = sum.unwrap_or(RegisterId::ZERO);
-        if factor >= 0 {
-            return Ok(sum);
-        }
-        self.integer_operation(at, line, Operator::Sub, [RegisterId::ZERO, sum], span)
-    }
-
-    /// A register that holds an operation on integers.
+    /// Emits an operation on integers. Returns the register of its result.
     pub(super) fn integer_operation(
         &mut self,
-        at: At,
+        at: AstPlace,
         line: &mut CurrentEquation,
         operator: Operator,
         operands: [RegisterId; 2],
         span: Span,
-    ) -> Result<RegisterId, Reported> {
+    ) -> Result<RegisterId, ErrorReported> {
         let terms = operands.map(|register| Term { form: TermForm::Register(register, Kind::Int), span });
         let here = (span, ExprId { first: 0, count: 0 });
         match self.operate(at, line, operator.text(), &terms, here, Kind::Int)?.form {
             TermForm::Register(register, _) => Ok(register),
-            _ => Err(Reported),
+            _ => Err(ErrorReported),
         }
     }
 
-    /// Loads an element into a register of its own, unless its value is at hand.
+    /// Loads an element into a register of its own, unless a register holds it already.
     pub(super) fn load(
         &mut self,
-        at: At,
+        at: AstPlace,
         line: &mut CurrentEquation,
         word: &Word,
         span: Span,
-    ) -> Result<RegisterId, Reported> {
+    ) -> Result<RegisterId, ErrorReported> {
         let address = self.word_address(at, line, word)?;
-        let Some(op) = with_effect(Effect::Load) else { return Err(Reported) };
+        let Some(op) = with_effect(Effect::Load) else { return Err(ErrorReported) };
         let slots = self.hosting(at, op, None, span)?;
         let key = self.subexpressions.element(op, address.base, address.offset, word.array);
         if let Some((register, bundle)) = self.subexpressions.find(&key) {
@@ -262,14 +238,14 @@ impl Resolver<'_> {
     /// Stores a register's value to an element.
     pub(super) fn store(
         &mut self,
-        at: At,
+        at: AstPlace,
         line: &mut CurrentEquation,
         word: &Word,
         value: RegisterId,
         span: Span,
-    ) -> Result<(), Reported> {
+    ) -> Result<(), ErrorReported> {
         let address = self.word_address(at, line, word)?;
-        let Some(op) = with_effect(Effect::Store) else { return Err(Reported) };
+        let Some(op) = with_effect(Effect::Store) else { return Err(ErrorReported) };
         let slots = self.hosting(at, op, None, span)?;
         let bundle = self.ir.bundles.len();
         let operation = Operation {
@@ -280,7 +256,7 @@ impl Resolver<'_> {
         };
         let operations = SmallVec::from_elem(operation, 1);
         self.push(Bundle { operations, explicit: false, scheduled: line.scheduled });
-        // A load of the element would give the value again.
+        // A load of the element would return the value: reuse it.
         if let Some(load) = with_effect(Effect::Load) {
             let key = self.subexpressions.element(load, address.base, address.offset, word.array);
             self.subexpressions.insert(key, value, bundle as u32);
@@ -288,8 +264,8 @@ impl Resolver<'_> {
         Ok(())
     }
 
-    /// Stores what the bundle just pushed has computed for elements.
-    pub(super) fn store_results(&mut self, at: At) {
+    /// Stores the results of the bundle just pushed to array elements.
+    pub(super) fn store_results(&mut self, at: AstPlace) {
         for (word, value, span) in std::mem::take(&mut self.stores) {
             let mut line = CurrentEquation::new(self.line);
             // Errors are reported already.
@@ -297,21 +273,26 @@ impl Resolver<'_> {
         }
     }
 
-    /// The register of an element that an instruction reads: loaded before it.
-    pub(super) fn loaded(&mut self, at: At, word: u32, span: Span) -> Result<RegisterId, Reported> {
+    /// The register of an element that an instruction reads, loaded before the instruction.
+    pub(super) fn loaded(
+        &mut self,
+        at: AstPlace,
+        word: u32,
+        span: Span,
+    ) -> Result<RegisterId, ErrorReported> {
         let mut line = CurrentEquation::new(self.line);
         let word = self.words[word as usize].clone();
         self.load(at, &mut line, &word, span)
     }
 
-    /// What an element is, given its array's name and its indices.
+    /// The location of an element, given its array's name and its indices.
     pub(super) fn element_place(
         &mut self,
-        at: At,
+        at: AstPlace,
         name: Name,
         indices: &[Vec<Node>],
         span: Span,
-    ) -> Result<Place, Reported> {
+    ) -> Result<Place, ErrorReported> {
         let operand = Operand { kind: OperandKind::Name(name.name), span: name.span };
         match self.meaning(at, operand)?.2 {
             Some((_, Binding::Table(table))) => self.word(at, table, indices, span).map(Place::Word),
@@ -322,10 +303,10 @@ impl Resolver<'_> {
     /// The value of an affine function of indices: a register, or a constant.
     pub(super) fn counted_form(
         &mut self,
-        at: At,
+        at: AstPlace,
         line: &mut CurrentEquation,
         counted: usize,
-    ) -> Result<TermForm, Reported> {
+    ) -> Result<TermForm, ErrorReported> {
         let Affine { constant, terms } = line.counted[counted].clone();
         if terms.is_empty() {
             return Ok(TermForm::Constant(Value::Int(constant), ExprId { first: 0, count: 0 }));
@@ -334,7 +315,7 @@ impl Resolver<'_> {
         Ok(TermForm::Register(register, Kind::Int))
     }
 
-    /// The function that an operator gives of functions of indices and integers, if that is affine.
+    /// The affine function that an operator makes of functions of indices and integers; `None` if the result is not affine.
     pub(super) fn counted_operation(
         &self,
         line: &mut CurrentEquation,
@@ -367,25 +348,25 @@ impl Resolver<'_> {
         Some(TermForm::Counted(line.counted.len() - 1))
     }
 
-    /// The register of a loop's index where an instruction reads it.
+    /// The register of a loop's index for an instruction that reads it.
     pub(super) fn index_register(
         &mut self,
-        at: At,
+        at: AstPlace,
         index: u32,
         ty: Type,
         span: Span,
-    ) -> Result<RegisterId, Reported> {
+    ) -> Result<RegisterId, ErrorReported> {
         let mut line = CurrentEquation::new(self.line);
         line.counted.push(self.context.declared.indices[index as usize].value.actual.clone());
         match self.counted_form(at, &mut line, 0)? {
             TermForm::Register(register, _) => Ok(register),
             TermForm::Constant(value, expr) => self.holding(at, value, expr, span, ty),
-            TermForm::Chain(..) | TermForm::Counted(_) => Err(Reported),
+            TermForm::Chain(..) | TermForm::Counted(_) => Err(ErrorReported),
         }
     }
 
     /// Reports that an array is named where a register is needed.
-    pub(super) fn whole_array(&mut self, at: At, table: u32, span: Span) -> Reported {
+    pub(super) fn whole_array(&mut self, at: AstPlace, table: u32, span: Span) -> ErrorReported {
         let table = &self.context.declared.tables[table as usize];
         let all = |index: &str| vec![index; table.array.sizes.len()].join(",");
         let (first, all) = (all("1"), all(":"));

@@ -3,27 +3,32 @@
 //! registers, in the order in which the equation is written ([`expression`](crate::resolve::expression)). The span of an operation
 //! is the part of the line that it computes. This file assigns the values to their targets and checks their types.
 
-use crate::context::{At, Binding, Reported, Wanted, words};
+use crate::context::{AstPlace, Binding, ErrorReported, NameRole, words};
 use crate::expand::equation::Results;
 use crate::expand::{Item, Part};
 use crate::ir::arrays;
-use crate::ir::given::Kind;
+use crate::ir::type_evidence::{Kind, OperandPosition, TypeEvidence};
 use crate::ir::{Bundle, LabelId, Operation, RegisterId, RegisterKind, VirtualRegister};
 use crate::limits;
-use crate::report::diag::Diagnostic;
-use crate::report::source::Span;
 use crate::resolve::Resolver;
 use crate::resolve::elements::Word;
 use crate::resolve::forms::Meaning;
 use crate::resolve::term::{CurrentEquation, Term, TermForm};
-use crate::syntax::ast::*;
-use crate::syntax::expr::Value;
 use smallvec::SmallVec;
 use std::rc::Rc;
+use takt_diagnostics::diag::Diagnostic;
+use takt_diagnostics::source::Span;
 use takt_isa::{Effect, Op, Slots, Type};
+use takt_syntax::ast::*;
+use takt_syntax::expr::Value;
 
 impl Resolver<'_> {
-    pub(super) fn equation(&mut self, item: &Item, ast: &Rc<Ast>, equation: u32) -> Result<(), Reported> {
+    pub(super) fn equation(
+        &mut self,
+        item: &Item,
+        ast: &Rc<Ast>,
+        equation: u32,
+    ) -> Result<(), ErrorReported> {
         let equation = &ast.equations[equation as usize];
         let number = ast.statements[item.statement as usize].line;
         let location = self.location(item, (equation.span, number), 0, 1);
@@ -35,11 +40,12 @@ impl Resolver<'_> {
         self.subexpressions.next();
         self.line = (location, item.scheduled);
         let mut line = CurrentEquation { results, fast: item.fast, ..CurrentEquation::new(self.line) };
-        // The values of the line before are used.
-        self.free_totals();
-        if let Some((value, register)) = argument {
-            let term = self.compute(item.at, &mut line, ast, value.id, Kind::None)?;
-            return self.assign(item.at, &mut line, &[(register, Kind::None, value.span)], &[term], &[]);
+        if let Some((value, register, asked)) = argument {
+            let asked = asked.map_or(Kind::None, Kind::of);
+            let term = self.compute(item.at, &mut line, ast, value.id, asked)?;
+            // Computed values are checked by the macro's use.
+            let wanted = if term.value().is_some() { asked } else { Kind::None };
+            return self.assign(item.at, &mut line, &[(register, wanted, value.span)], &[term], &[]);
         }
         if equation.targets.len() != equation.values.len() {
             let (targets, values) = (equation.targets.len(), equation.values.len());
@@ -58,17 +64,19 @@ impl Resolver<'_> {
             return Err(self.context.error(item.at.scope, "limit", equation.span, message));
         }
         let mut targets: Vec<(RegisterId, Kind, Span)> = Vec::with_capacity(equation.targets.len());
-        // Those that are elements in data memory, by their number.
+        // Targets that are elements in data memory, by their position.
         let mut words: Vec<(usize, Word)> = Vec::new();
         let mut failed = false;
         for (number, target) in equation.targets.iter().enumerate() {
             match self.meaning(item.at, *target) {
                 Ok((_, _, Some((_, Binding::Word(word))))) => {
+                    let ty = self.element_type(&self.words[word as usize]);
+                    failed |= self.check_result(Kind::of(ty)).is_err();
                     words.push((number, self.words[word as usize].clone()));
                     continue;
                 }
                 Ok(_) => {}
-                Err(Reported) => {
+                Err(ErrorReported) => {
                     failed = true;
                     continue;
                 }
@@ -83,7 +91,7 @@ impl Resolver<'_> {
                     }
                     targets.push((register, wanted, target.span));
                 }
-                Err(Reported) => failed = true,
+                Err(ErrorReported) => failed = true,
             }
         }
         let mut terms = Vec::with_capacity(equation.values.len());
@@ -98,26 +106,27 @@ impl Resolver<'_> {
             match (self.compute(item.at, &mut line, ast, value.id, wanted), word) {
                 (Ok(term), Some((_, word))) => stored.push((word, term)),
                 (Ok(term), None) => terms.push(term),
-                (Err(Reported), _) => failed = true,
+                (Err(ErrorReported), _) => failed = true,
             }
         }
-        if failed { Err(Reported) } else { self.assign(item.at, &mut line, &targets, &terms, &stored) }
+        if failed { Err(ErrorReported) } else { self.assign(item.at, &mut line, &targets, &terms, &stored) }
     }
 
     /// The type of an element.
-    fn element_type(&self, word: &Word) -> Type {
+    pub(super) fn element_type(&self, word: &Word) -> Type {
         self.context.declared.tables[word.array.0 as usize].array.ty
     }
 
-    /// The register that an equation writes, and the type that it has whatever is written.
-    fn target_of(&mut self, at: At, target: Operand) -> Result<(RegisterId, Kind), Reported> {
-        self.cast = None;
-        let register = self.dest(at, target, Wanted::Left)?;
-        Ok((register, self.declared_kind(register).unwrap_or(Kind::None)))
+    /// The register that an equation writes, and its type, if that does not depend on the value.
+    fn target_of(&mut self, at: AstPlace, target: Operand) -> Result<(RegisterId, Kind), ErrorReported> {
+        (self.cast, self.asked) = (None, None);
+        let register = self.dest(at, target, NameRole::Left)?;
+        let asked = self.type_of_parameter().map_or(Kind::None, Kind::of);
+        Ok((register, self.declared_kind(register).unwrap_or(asked)))
     }
 
-    /// The type that a register is declared with; none for one that has the type of what it holds.
-    fn declared_kind(&self, id: RegisterId) -> Option<Kind> {
+    /// The declared type of a register; `None` if its values determine the type.
+    pub(super) fn declared_kind(&self, id: RegisterId) -> Option<Kind> {
         let register = &self.context.declared.registers[id.index()];
         let is_open = register.kind == RegisterKind::Plain
             && (register.name.is_empty() && register.pinned.is_none()
@@ -125,15 +134,21 @@ impl Resolver<'_> {
         (!is_open).then(|| Kind::of(register.ty))
     }
 
-    /// The known type of a register's value.
-    pub(super) fn kind(&self, id: RegisterId) -> Kind {
-        self.declared_kind(id).unwrap_or_else(|| match self.kinds.get(id.index()) {
-            None | Some(Kind::None) => Kind::Float,
-            Some(kind) => *kind,
-        })
+    /// The type of a register's value, as far as its declaration or the writes above tell.
+    pub(super) fn written_kind(&self, id: RegisterId) -> Kind {
+        let written = || self.kinds.get(id.index()).copied().unwrap_or(Kind::None);
+        self.declared_kind(id).unwrap_or_else(written)
     }
 
-    /// Notes the type of what was written to a register.
+    /// The type of a register's value; float by default.
+    pub(super) fn kind(&self, id: RegisterId) -> Kind {
+        match self.written_kind(id) {
+            Kind::None => Kind::Float,
+            kind => kind,
+        }
+    }
+
+    /// Notes the type of the value last written to a register.
     pub(super) fn set_kind(&mut self, id: RegisterId, kind: Kind) {
         if self.kinds.len() <= id.index() {
             self.kinds.resize(self.context.declared.registers.len().max(id.index() + 1), Kind::None);
@@ -141,12 +156,12 @@ impl Resolver<'_> {
         self.kinds[id.index()] = kind;
     }
 
-    /// The type of what an operation writes.
+    /// Type of an operation's result.
     pub(super) fn result_kind(&self, operation: &Operation) -> Kind {
-        use crate::ir::given::{Given, OperandPosition};
         let given = |part| match self.context.declared.given.get(operation, part) {
-            Some(Given::Cast(ty)) => Some(Kind::of(ty)),
-            Some(Given::Literal { kind, .. }) => Some(kind),
+            Some(TypeEvidence::Cast(ty)) => Some(Kind::of(ty)),
+            Some(TypeEvidence::Literal { kind, .. }) => Some(kind),
+            Some(TypeEvidence::Asked(ty)) if operation.row().result_type() == Type::B => Some(Kind::of(ty)),
             _ => None,
         };
         if let Some(kind) = given(OperandPosition::Dest).or_else(|| given(OperandPosition::Immediate)) {
@@ -162,12 +177,11 @@ impl Resolver<'_> {
         }
     }
 
-    /// The type of a source of an operation, as far as it is known.
+    /// Type of an operation's source, if known.
     fn source_kind(&self, operation: &Operation, which: usize) -> Kind {
-        use crate::ir::given::{Given, OperandPosition};
         match self.context.declared.given.get(operation, OperandPosition::Source(which as u8)) {
-            Some(Given::Cast(ty)) => return Kind::of(ty),
-            Some(Given::Literal { kind, .. }) => return kind,
+            Some(TypeEvidence::Cast(ty) | TypeEvidence::Asked(ty)) => return Kind::of(ty),
+            Some(TypeEvidence::Literal { kind, .. }) => return kind,
             _ => {}
         }
         let id = operation.sources[which];
@@ -177,16 +191,15 @@ impl Resolver<'_> {
         }
     }
 
-    /// The table that a load or store names, and what is known of the type of its words.
+    /// The table that a load or store names, and the type of its words, if known.
     fn table_kind(&self, operation: &Operation) -> Option<(LabelId, Kind)> {
-        use crate::ir::given::{Given, OperandPosition};
         match self.context.declared.given.get(operation, OperandPosition::Table) {
-            Some(Given::Table(label)) => self.tables.get(&label).map(|kind| (label, *kind)),
+            Some(TypeEvidence::Table(label)) => self.tables.get(&label).map(|kind| (label, *kind)),
             _ => None,
         }
     }
 
-    /// Notes for the equations below what a store leaves in its table.
+    /// Notes the type that a store leaves in its table, for the equations below.
     pub(super) fn note_store(&mut self, operation: &Operation) {
         if operation.row().effect == Effect::Store
             && let Some((label, kind)) = self.table_kind(operation)
@@ -199,12 +212,12 @@ impl Resolver<'_> {
     /// Writes an equation's values to its registers and elements, all of them computed before any is written.
     fn assign(
         &mut self,
-        at: At,
+        at: AstPlace,
         line: &mut CurrentEquation,
         targets: &[(RegisterId, Kind, Span)],
         terms: &[Term],
         words: &[(Word, Term)],
-    ) -> Result<(), Reported> {
+    ) -> Result<(), ErrorReported> {
         let mut failed = false;
         for ((target, wanted, span), term) in targets.iter().zip(terms) {
             let VirtualRegister { name, span: declared, .. } =
@@ -219,7 +232,7 @@ impl Resolver<'_> {
             failed |= self.check_target(at, (&name, declared), (wanted, word.span), *term).is_err();
         }
         if failed {
-            return Err(Reported);
+            return Err(ErrorReported);
         }
         // The last operation writes the target itself if nothing after it reads the target's old value.
         let mut left: Vec<(RegisterId, Kind, Term)> = Vec::new();
@@ -245,12 +258,12 @@ impl Resolver<'_> {
                         || operation.reads().contains(&value)
                 };
                 if !behind.iter().flat_map(|bundle| &bundle.operations).any(touches) {
-                    // A register that has its place leaves fewer slots to choose from.
+                    // A pinned target leaves fewer slots to choose from.
                     let slots = self.writing(self.ir.bundles[bundle].operations[0].slots, Some(*target));
                     let operation = &mut self.ir.bundles[bundle].operations[0];
                     (operation.dest, operation.slots, operation.slot) = (Some(*target), slots, slots.first());
                     line.computed.remove(place);
-                    self.written(*target, kind);
+                    self.written(*target, kind.or(*wanted));
                     let register = &self.context.declared.registers[target.index()];
                     let lasts = matches!(register.kind, RegisterKind::Plain | RegisterKind::State);
                     if lasts && register.pinned.is_none() {
@@ -275,12 +288,12 @@ impl Resolver<'_> {
                     };
                     self.holding(at, value, expr, term.span, ty)?
                 }
-                // An expression's value is computed.
-                TermForm::Chain(..) | TermForm::Counted(_) => return Err(Reported),
+                // The caller has computed an expression's value.
+                TermForm::Chain(..) | TermForm::Counted(_) => return Err(ErrorReported),
             };
             self.store(at, line, word, value, word.span)?;
         }
-        // A register that is read and written is kept where it is read after it is written.
+        // A register that is both read and written is copied first where it is read after it is written.
         for index in 0..left.len() {
             let TermForm::Register(value, kind) = left[index].2.form else { continue };
             let written = left[..index].iter().any(|(target, ..)| *target == value)
@@ -300,7 +313,7 @@ impl Resolver<'_> {
             };
             let kind = term.kind().unwrap_or(Kind::of(ty));
             self.copy(at, line, term, ty, Some(target))?;
-            self.written(target, kind);
+            self.written(target, kind.or(wanted));
         }
         Ok(())
     }
@@ -310,14 +323,15 @@ impl Resolver<'_> {
         self.subexpressions.write(target);
     }
 
-    /// Checks that a value may go to a register or an array, given its name and its declaration, its type and where it is written.
+    /// Checks that a value may go to a register or an array, given the target's name and declaration, its type and the place of
+    /// the write.
     fn check_target(
         &mut self,
-        at: At,
+        at: AstPlace,
         (name, declared): (&str, Span),
         (wanted, span): (Kind, Span),
         term: Term,
-    ) -> Result<(), Reported> {
+    ) -> Result<(), ErrorReported> {
         let Some(kind) = term.kind() else { return Ok(()) };
         let (is, to) = match (kind, wanted) {
             (Kind::Int, Kind::Float) => (Type::I, Type::F),
@@ -341,45 +355,64 @@ impl Resolver<'_> {
         Err(self.context.report(at.scope, error))
     }
 
-    /// Copies a value, to a register or to a new one.
+    /// Copies a value to `target`, or to a new register.
     pub(super) fn copy(
         &mut self,
-        at: At,
+        at: AstPlace,
         line: &mut CurrentEquation,
         term: Term,
         ty: Type,
         target: Option<RegisterId>,
-    ) -> Result<RegisterId, Reported> {
+    ) -> Result<RegisterId, ErrorReported> {
         let source = match term.form {
             TermForm::Register(register, _) => register,
-            // An expression's value is computed.
-            TermForm::Chain(..) | TermForm::Counted(_) => return Err(Reported),
+            // The caller has computed an expression's value.
+            TermForm::Chain(..) | TermForm::Counted(_) => return Err(ErrorReported),
             TermForm::Constant(value, expr) => self.holding(at, value, expr, term.span, ty)?,
         };
-        let Some(Meaning { op, .. }) = self.forms.get("", 1).first() else { return Err(Reported) };
+        let Some(Meaning { op, .. }) = self.forms.get("", 1).first() else { return Err(ErrorReported) };
         let op = *op;
         let slots = self.hosting(at, op, None, term.span)?;
         let sources = [source, RegisterId::ZERO, RegisterId::ZERO];
         let register = target.unwrap_or_else(|| self.fresh(term.span));
         self.emit(at, line, op, slots, sources, register, term.span);
+        self.note_computed(term.kind().unwrap_or(Kind::of(ty)));
         Ok(register)
     }
 
-    /// The register that holds a constant as a type has it.
+    /// Notes for the type check the type of the last operation's result, where its instruction leaves it open.
+    pub(super) fn note_computed(&mut self, kind: Kind) {
+        let ty = match kind {
+            Kind::Float => Type::F,
+            Kind::Int => Type::I,
+            Kind::None | Kind::Any => return,
+        };
+        let Some(operation) = self.ir.bundles.last_mut().and_then(|bundle| bundle.operations.first_mut())
+        else {
+            return;
+        };
+        if operation.row().result_type() == Type::B && self.computed > Operation::FIRST_COMPUTED {
+            self.computed -= 1;
+            operation.written.1 = self.computed;
+            self.context.declared.given.insert(operation, OperandPosition::Dest, TypeEvidence::Cast(ty));
+        }
+    }
+
+    /// The register that holds a constant converted to a type.
     pub(super) fn holding(
         &mut self,
-        at: At,
+        at: AstPlace,
         value: Value,
         expr: ExprId,
         span: Span,
         ty: Type,
-    ) -> Result<RegisterId, Reported> {
+    ) -> Result<RegisterId, ErrorReported> {
         let operand = Operand { kind: OperandKind::Expr(expr), span };
         let bits = self.bits(at, value, ty, operand)?;
         Ok(self.pooled(bits, span))
     }
 
-    /// A register without a name.
+    /// A new nameless register.
     pub(super) fn fresh(&mut self, span: Span) -> RegisterId {
         let registers = &mut self.context.declared.registers;
         registers.push(VirtualRegister::unnamed(span));
@@ -389,7 +422,7 @@ impl Resolver<'_> {
     #[allow(clippy::too_many_arguments)]
     pub(super) fn emit(
         &mut self,
-        at: At,
+        at: AstPlace,
         line: &CurrentEquation,
         op: Op,
         slots: Slots,

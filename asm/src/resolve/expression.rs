@@ -1,68 +1,130 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Expressions of equations, computed: a loop over nodes in postfix order, as a constant's
-//! ([`expr::evaluate`](crate::syntax::expr::evaluate)) is, with a stack of values that are constants or registers. Constant parts are
-//! folded on the way, and of a choice whose condition is a constant only the alternative is computed that it chooses.
+//! Computation of expressions in equations: a loop over nodes in postfix order, like the evaluation of constants
+//! ([`expr::evaluate`](takt_syntax::expr::evaluate)), with a stack of values that are constants or registers. Constant parts are
+//! folded on the way. If the condition of a choice is a constant, only the chosen alternative is computed.
 
-use crate::context::{At, Binding, Reported, ScopeKind, Wanted};
+use crate::context::{AstPlace, Binding, ErrorReported, NameRole, ScopeKind};
 use crate::expand::equation::SUM;
-use crate::ir::given::Kind;
+use crate::ir::type_evidence::Kind;
 use crate::ir::{RegisterId, RegisterKind};
 use crate::limits;
-use crate::report::diag::Diagnostic;
-use crate::report::source::Span;
 use crate::resolve::Resolver;
 use crate::resolve::elements::Place;
 use crate::resolve::forms::Meaning;
 use crate::resolve::sums::CountedSum;
-use crate::resolve::term::{CurrentEquation, Here, Term, TermForm};
-use crate::syntax::ast::*;
-use crate::syntax::expr::{self, EvalError, Value};
-use crate::syntax::name::{NameId, NameRef};
+use crate::resolve::term::{CurrentEquation, LineExpression, Term, TermForm};
 use smallvec::SmallVec;
 use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
+use takt_diagnostics::diag::Diagnostic;
+use takt_diagnostics::source::Span;
 use takt_isa::Type;
+use takt_syntax::ast::*;
+use takt_syntax::expr::{self, EvalError, Value};
+use takt_syntax::name::{NameId, NameRef};
 
 /// Structure of an expression, found before it is computed.
 struct Plan {
-    /// By first node: the last node of what a macro has computed.
+    /// By first node: the last node of a part that a macro has computed.
     results: HashMap<u32, u32>,
     /// By first node: the node of a sum.
     sums: HashMap<u32, u32>,
     /// By first node of a choice's first alternative: the choice.
     choices: HashMap<u32, u32>,
-    /// Choices that are the value of the whole, or an alternative of such a choice.
+    /// Choices that are the value of the whole expression, or an alternative of such a choice.
     whole: HashSet<u32>,
     /// First node of the part that each node heads.
     parts: Vec<u32>,
 }
 
 /// A stretch of nodes being computed.
-struct Stretch {
-    at: At,
+struct NodeRange {
+    at: AstPlace,
     next: u32,
     end: u32,
-    /// True if it is an alternative of a choice that is made already.
+    /// The stretch is an alternative of a choice that is already made.
     chosen: bool,
-    sum: Option<Turns>,
+    sum: Option<SumState>,
     /// The term of a sum that is a loop.
     counted: Option<CountedSum>,
 }
 
 /// The state of a sum.
-struct Turns {
+struct SumState {
     variable: NameId,
     value: i64,
     last: i64,
-    outer: At,
+    outer: AstPlace,
     start: u32,
     node: u32,
     total: Option<Term>,
 }
 
+/// An expression being computed: its nodes, in postfix order, and the terms so far.
+struct Computation<'c> {
+    ast: &'c Rc<Ast>,
+    id: ExprId,
+    plan: Plan,
+    stack: Vec<Term>,
+    /// Stretches of nodes that are entered, the innermost last.
+    stretches: Vec<NodeRange>,
+}
+
+impl Computation<'_> {
+    fn node(&self, index: u32) -> Node {
+        self.ast.nodes[self.id.range()][index as usize]
+    }
+
+    /// Place of the part that ends at a node.
+    fn place(&self, index: u32) -> LineExpression {
+        let first = self.plan.parts[index as usize];
+        (self.node(index).span, ExprId { first: self.id.first + first, count: index - first + 1 })
+    }
+
+    /// Value of the part that ends at a node.
+    fn constant(&self, value: Value, index: u32) -> Term {
+        let (span, id) = self.place(index);
+        Term { form: TermForm::Constant(value, id), span }
+    }
+
+    /// Terms of a node's operands.
+    fn take(&mut self, count: usize) -> Vec<Term> {
+        self.stack.split_off(self.stack.len().saturating_sub(count))
+    }
+
+    fn skip_to(&mut self, node: u32) {
+        if let Some(stretch) = self.stretches.last_mut() {
+            stretch.next = node;
+        }
+    }
+
+    /// Enters the chosen branch of a choice with a constant condition; false if no such choice has its first branch here.
+    fn choose(&mut self, index: u32) -> bool {
+        let Some(stretch) = self.stretches.last_mut() else { return false };
+        if std::mem::replace(&mut stretch.chosen, false) {
+            return false;
+        }
+        let Some(&choice) = self.plan.choices.get(&index) else { return false };
+        let Some(value) = self.stack.last().and_then(Term::value) else { return false };
+        self.stack.pop();
+        stretch.next = choice + 1;
+        let operands = expr::operands(&self.plan.parts, choice);
+        let (next, last) = operands[if value.is_zero() { 2 } else { 1 }];
+        let at = stretch.at;
+        self.stretches.push(NodeRange { at, next, end: last + 1, chosen: true, sum: None, counted: None });
+        true
+    }
+}
+
 impl Resolver<'_> {
     /// Analyses the structure of an expression before it is computed.
-    fn plan(&mut self, at: At, line: &CurrentEquation, ast: &Ast, id: ExprId) -> Result<Plan, Reported> {
+    fn plan(
+        &mut self,
+        at: AstPlace,
+        line: &CurrentEquation,
+        ast: &Ast,
+        id: ExprId,
+    ) -> Result<Plan, ErrorReported> {
         let nodes = &ast.nodes[id.range()];
         let parts = expr::parts(nodes);
         let (results, sums) = (HashMap::new(), HashMap::new());
@@ -80,7 +142,7 @@ impl Resolver<'_> {
             let first = plan.parts[index as usize];
             match node.kind {
                 NodeKind::Call(..) if line.results.contains_key(&(id.first + index)) => {
-                    // Of several that begin at one node the last, around the others, counts.
+                    // If several parts begin at one node, the outermost counts.
                     plan.results.insert(first, index);
                 }
                 NodeKind::Call(name, count) if self.context.scopes.text(name) == SUM => {
@@ -104,222 +166,218 @@ impl Resolver<'_> {
         Ok(plan)
     }
 
-    /// Computes an expression. `wanted` is the type of the register that its value goes to, if it has one.
+    /// Computes an expression. `wanted` is the type of the target register, if it has one.
     pub(super) fn compute(
         &mut self,
-        at: At,
+        at: AstPlace,
         line: &mut CurrentEquation,
         ast: &Rc<Ast>,
         id: ExprId,
         wanted: Kind,
-    ) -> Result<Term, Reported> {
-        let nodes = &ast.nodes[id.range()];
+    ) -> Result<Term, ErrorReported> {
         let plan = self.plan(at, line, ast, id)?;
-        let mut stack: Vec<Term> = Vec::with_capacity(8);
-        let end = nodes.len() as u32;
-        let mut stretches = vec![Stretch { at, next: 0, end, chosen: false, sum: None, counted: None }];
-        let constant = |value, first: u32, last: u32, span| {
-            let id = ExprId { first: id.first + first, count: last - first + 1 };
-            Term { form: TermForm::Constant(value, id), span }
-        };
-        while let Some(stretch) = stretches.last_mut() {
-            let at = stretch.at;
-            if stretch.next == stretch.end {
-                let Some(stretch) = stretches.pop() else { break };
-                if let Some(sum) = stretch.counted {
-                    let Some(term) = stack.pop() else { return Err(Reported) };
-                    stack.push(self.end_sum(line, sum, term)?);
-                    continue;
-                }
-                let Some(turns) = stretch.sum else { continue };
-                let span = nodes[turns.node as usize].span;
-                let Some(term) = stack.pop() else { return Err(Reported) };
-                let total = match turns.total {
-                    None => term,
-                    Some(total) => {
-                        let first = plan.parts[turns.node as usize];
-                        let id = ExprId { first: id.first + first, count: turns.node - first + 1 };
-                        match (total.value(), term.value()) {
-                            (Some(a), Some(b)) => {
-                                let value = self.folded(at, expr::infix(Operator::Add, a, b), span)?;
-                                Term { form: TermForm::Constant(value, id), span }
-                            }
-                            _ => {
-                                let symbol = Operator::Add.text();
-                                self.apply(at, line, symbol, &[total, term], (span, id), Kind::None)?
-                            }
-                        }
-                    }
-                };
-                if turns.value == turns.last {
-                    stack.push(Term { span, ..total });
-                    continue;
-                }
-                let value = turns.value + 1;
-                stretches.push(self.turn(Turns { value, total: Some(total), ..turns }, span)?);
+        let end = id.range().len() as u32;
+        let whole = NodeRange { at, next: 0, end, chosen: false, sum: None, counted: None };
+        let mut run = Computation { ast, id, plan, stack: Vec::with_capacity(8), stretches: vec![whole] };
+        while let Some(&NodeRange { at, next: index, end, .. }) = run.stretches.last() {
+            if index == end {
+                self.end_stretch(line, &mut run)?;
                 continue;
             }
-            let index = stretch.next;
-            if !std::mem::replace(&mut stretch.chosen, false)
-                && let Some(&choice) = plan.choices.get(&index)
-                && let Some(value) = stack.last().and_then(Term::value)
-            {
-                stack.pop();
-                stretch.next = choice + 1;
-                let operands = expr::operands(&plan.parts, choice);
-                let (first, last) = operands[if value.is_zero() { 2 } else { 1 }];
-                stretches.push(Stretch {
-                    at,
-                    next: first,
-                    end: last + 1,
-                    chosen: true,
-                    sum: None,
-                    counted: None,
-                });
+            if run.choose(index) {
                 continue;
             }
-            if let Some(&call) = plan.results.get(&index)
+            if let Some(&call) = run.plan.results.get(&index)
                 && let Some(&register) = line.results.get(&(id.first + call))
             {
-                stretch.next = call + 1;
+                run.skip_to(call + 1);
                 let form = TermForm::Register(register, self.kind(register));
-                stack.push(Term { form, span: nodes[call as usize].span });
-                continue;
+                let span = run.node(call).span;
+                run.stack.push(Term { form, span });
+            } else if let Some(&sum) = run.plan.sums.get(&index) {
+                run.skip_to(sum + 1);
+                self.start_sum(at, line, &mut run, (index, sum))?;
+            } else {
+                run.skip_to(index + 1);
+                if run.node(index).kind != NodeKind::Prefix(Operator::Add) {
+                    let term = self.node_term(at, line, &mut run, index, wanted)?;
+                    run.stack.push(term);
+                }
             }
-            if let Some(&sum) = plan.sums.get(&index) {
-                stretch.next = sum + 1;
-                let operands = expr::operands(&plan.parts, sum);
-                let expression = |(first, last): (u32, u32)| Expr {
-                    id: ExprId { first: id.first + first, count: last - first + 1 },
-                    span: nodes[last as usize].span,
-                };
-                let NodeKind::Name(variable) = nodes[index as usize].kind else { return Err(Reported) };
-                let counts = nodes[index as usize].span;
-                let variable = self.context.spelled(at, variable, counts)?;
-                let span = nodes[sum as usize].span;
-                if let Some(notes) = &mut self.context.notes {
-                    notes.sum(span, counts, variable);
-                }
-                let bounds = [expression(operands[1]), expression(operands[2])];
-                if bounds.iter().any(|bound| self.context.names_index(at, bound.id)) {
-                    let (start, end) = (operands[3].0, sum);
-                    match self.begin_sum(at, line, variable, bounds, span)? {
-                        Some((counted, at)) => {
-                            let counted = Some(counted);
-                            stretches.push(Stretch {
-                                at,
-                                next: start,
-                                end,
-                                chosen: false,
-                                sum: None,
-                                counted,
-                            });
-                        }
-                        None => stack.push(constant(Value::Int(0), index, sum, span)),
-                    }
-                    continue;
-                }
-                let from = self.context.integer(at, bounds[0])?;
-                let last = self.context.integer(at, bounds[1])?;
-                if from > last {
-                    stack.push(constant(Value::Int(0), index, sum, span));
-                    continue;
-                }
-                let start = operands[3].0;
-                let turns = Turns { variable, value: from, last, outer: at, start, node: sum, total: None };
-                stretches.push(self.turn(turns, span)?);
-                continue;
-            }
-            stretch.next += 1;
-            let node = nodes[index as usize];
-            let here = (
-                node.span,
-                ExprId {
-                    first: id.first + plan.parts[index as usize],
-                    count: index - plan.parts[index as usize] + 1,
-                },
-            );
-            let mut take = |count: usize| stack.split_off(stack.len().saturating_sub(count));
-            let term = match node.kind {
-                NodeKind::Int(value) => constant(Value::Int(value), index, index, node.span),
-                NodeKind::Real(value) => constant(Value::Real(value), index, index, node.span),
-                NodeKind::Name(name) => self.name(at, line, name, here)?,
-                NodeKind::All | NodeKind::Range => return Err(Reported),
-                NodeKind::Element(element) => {
-                    let Element { name, indices } = &ast.elements[element as usize];
-                    let register = match self.element_place(at, *name, indices, node.span)? {
-                        Place::Register(register) => register,
-                        Place::Word(word) => self.load(at, line, &word, node.span)?,
-                    };
-                    Term { form: TermForm::Register(register, self.kind(register)), span: node.span }
-                }
-                NodeKind::Prefix(Operator::Add) => continue,
-                NodeKind::Prefix(operator) => {
-                    let terms = take(1);
-                    match terms[..] {
-                        [Term { form: TermForm::Constant(value, _), .. }] => constant(
-                            self.folded(at, expr::prefix(operator, value), node.span)?,
-                            plan.parts[index as usize],
-                            index,
-                            node.span,
-                        ),
-                        _ => match self.counted_operation(line, operator, &terms) {
-                            Some(form) => Term { form, span: node.span },
-                            None => self.apply(at, line, operator.text(), &terms, here, Kind::None)?,
-                        },
-                    }
-                }
-                NodeKind::Infix(operator) => {
-                    let terms = take(2);
-                    match (terms[0].value(), terms[1].value()) {
-                        (Some(a), Some(b)) => constant(
-                            self.folded(at, expr::infix(operator, a, b), node.span)?,
-                            plan.parts[index as usize],
-                            index,
-                            node.span,
-                        ),
-                        _ => match self.counted_operation(line, operator, &terms) {
-                            Some(form) => Term { form, span: node.span },
-                            None => self.apply(at, line, operator.text(), &terms, here, Kind::None)?,
-                        },
-                    }
-                }
-                NodeKind::Choice => {
-                    let terms = take(3);
-                    let wanted = if plan.whole.contains(&index) { wanted } else { Kind::Any };
-                    self.apply(at, line, "?:", &terms, here, wanted)?
-                }
-                NodeKind::Call(name, count) => {
-                    let terms = take(count as usize);
-                    let values: Option<Vec<Value>> = terms.iter().map(Term::value).collect();
-                    match (name.function(), values) {
-                        (Some(function), Some(values)) => constant(
-                            self.folded(at, expr::call(function, &values), node.span)?,
-                            plan.parts[index as usize],
-                            index,
-                            node.span,
-                        ),
-                        _ => self.function(at, line, name, &terms, here)?,
-                    }
-                }
-            };
-            stack.push(term);
         }
-        let value = stack.pop().ok_or(Reported)?;
+        let value = run.stack.pop().ok_or(ErrorReported)?;
         self.settled(at, line, value)
+    }
+
+    /// Ends a stretch of nodes: of a sum, its turn is added, and the next begins.
+    fn end_stretch(
+        &mut self,
+        line: &mut CurrentEquation,
+        run: &mut Computation<'_>,
+    ) -> Result<(), ErrorReported> {
+        let Some(NodeRange { at, sum, counted, .. }) = run.stretches.pop() else { return Ok(()) };
+        if let Some(sum) = counted {
+            let term = run.stack.pop().ok_or(ErrorReported)?;
+            let total = self.end_sum(line, sum, term)?;
+            run.stack.push(total);
+            return Ok(());
+        }
+        let Some(turns) = sum else { return Ok(()) };
+        let span = run.node(turns.node).span;
+        let term = run.stack.pop().ok_or(ErrorReported)?;
+        let total = match turns.total {
+            None => term,
+            Some(total) => match (total.value(), term.value()) {
+                (Some(a), Some(b)) => {
+                    let value = self.folded(at, expr::infix(Operator::Add, a, b), span)?;
+                    run.constant(value, turns.node)
+                }
+                _ => {
+                    let (symbol, here) = (Operator::Add.text(), run.place(turns.node));
+                    self.apply(at, line, symbol, &[total, term], here, Kind::None)?
+                }
+            },
+        };
+        if turns.value == turns.last {
+            run.stack.push(Term { span, ..total });
+            return Ok(());
+        }
+        let value = turns.value + 1;
+        let next = self.turn(SumState { value, total: Some(total), ..turns }, span)?;
+        run.stretches.push(next);
+        Ok(())
+    }
+
+    /// Begins a sum, whose first node and call are given: in a counted loop, or a turn at a time.
+    fn start_sum(
+        &mut self,
+        at: AstPlace,
+        line: &mut CurrentEquation,
+        run: &mut Computation<'_>,
+        (index, sum): (u32, u32),
+    ) -> Result<(), ErrorReported> {
+        let operands = expr::operands(&run.plan.parts, sum);
+        let expression = |(first, last): (u32, u32)| Expr {
+            id: ExprId { first: run.id.first + first, count: last - first + 1 },
+            span: run.node(last).span,
+        };
+        let NodeKind::Name(variable) = run.node(index).kind else { return Err(ErrorReported) };
+        let counts = run.node(index).span;
+        let variable = self.context.spelled(at, variable, counts)?;
+        let span = run.node(sum).span;
+        if let Some(notes) = &mut self.context.notes {
+            notes.sum(span, counts, variable);
+        }
+        let bounds = [expression(operands[1]), expression(operands[2])];
+        let start = operands[3].0;
+        if bounds.iter().any(|bound| self.context.names_index(at, bound.id)) {
+            match self.begin_sum(at, line, variable, bounds, span)? {
+                Some((counted, at)) => run.stretches.push(NodeRange {
+                    at,
+                    next: start,
+                    end: sum,
+                    chosen: false,
+                    sum: None,
+                    counted: Some(counted),
+                }),
+                None => run.stack.push(run.constant(Value::Int(0), sum)),
+            }
+            return Ok(());
+        }
+        let from = self.context.integer(at, bounds[0])?;
+        let last = self.context.integer(at, bounds[1])?;
+        if from > last {
+            run.stack.push(run.constant(Value::Int(0), sum));
+            return Ok(());
+        }
+        let turns = SumState { variable, value: from, last, outer: at, start, node: sum, total: None };
+        let first = self.turn(turns, span)?;
+        run.stretches.push(first);
+        Ok(())
+    }
+
+    /// Computes a node from the terms of its operands, which it takes from the stack.
+    fn node_term(
+        &mut self,
+        at: AstPlace,
+        line: &mut CurrentEquation,
+        run: &mut Computation<'_>,
+        index: u32,
+        wanted: Kind,
+    ) -> Result<Term, ErrorReported> {
+        let (node, here) = (run.node(index), run.place(index));
+        let span = node.span;
+        let folded = match node.kind {
+            NodeKind::Int(value) => Ok(Value::Int(value)),
+            NodeKind::Real(value) => Ok(Value::Real(value)),
+            NodeKind::Name(name) => return self.name(at, line, name, here),
+            NodeKind::All | NodeKind::Range => return Err(ErrorReported),
+            NodeKind::Element(element) => {
+                let Element { name, indices } = &run.ast.elements[element as usize];
+                let register = match self.element_place(at, *name, indices, span)? {
+                    Place::Register(register) => register,
+                    Place::Word(word) => self.load(at, line, &word, span)?,
+                };
+                return Ok(Term { form: TermForm::Register(register, self.kind(register)), span });
+            }
+            NodeKind::Prefix(operator) => {
+                let terms = run.take(1);
+                match terms[..] {
+                    [Term { form: TermForm::Constant(value, _), .. }] => expr::prefix(operator, value),
+                    _ => return self.operator_term(at, line, operator, &terms, here),
+                }
+            }
+            NodeKind::Infix(operator) => {
+                let terms = run.take(2);
+                match (terms[0].value(), terms[1].value()) {
+                    (Some(a), Some(b)) => expr::infix(operator, a, b),
+                    _ => return self.operator_term(at, line, operator, &terms, here),
+                }
+            }
+            NodeKind::Choice => {
+                let terms = run.take(3);
+                let wanted = if run.plan.whole.contains(&index) { wanted } else { Kind::Any };
+                return self.apply(at, line, "?:", &terms, here, wanted);
+            }
+            NodeKind::Call(name, count) => {
+                let terms = run.take(count as usize);
+                let values: Option<Vec<Value>> = terms.iter().map(Term::value).collect();
+                match (name.function(), values) {
+                    (Some(function), Some(values)) => expr::call(function, &values),
+                    _ => return self.function(at, line, name, &terms, here),
+                }
+            }
+        };
+        let value = self.folded(at, folded, span)?;
+        Ok(run.constant(value, index))
+    }
+
+    /// An operation on terms that are not all constant: of counted loops' variables, or of registers.
+    fn operator_term(
+        &mut self,
+        at: AstPlace,
+        line: &mut CurrentEquation,
+        operator: Operator,
+        terms: &[Term],
+        here: LineExpression,
+    ) -> Result<Term, ErrorReported> {
+        match self.counted_operation(line, operator, terms) {
+            Some(form) => Ok(Term { form, span: here.0 }),
+            None => self.apply(at, line, operator.text(), terms, here, Kind::None),
+        }
     }
 
     pub(super) fn folded(
         &mut self,
-        at: At,
+        at: AstPlace,
         value: Result<Value, expr::Fault>,
         span: Span,
-    ) -> Result<Value, Reported> {
+    ) -> Result<Value, ErrorReported> {
         value.map_err(|fault| self.context.fault(at.scope, EvalError { span, fault }))
     }
 
     /// The next turn of a sum.
-    fn turn(&mut self, turns: Turns, span: Span) -> Result<Stretch, Reported> {
+    fn turn(&mut self, turns: SumState, span: Span) -> Result<NodeRange, ErrorReported> {
         self.turns += 1;
         if self.turns > limits::STATEMENTS {
             let message = format!("sums of more than {} turns in all", limits::STATEMENTS);
@@ -329,40 +387,55 @@ impl Resolver<'_> {
         let kind = ScopeKind::Rep(turns.variable, turns.value);
         let scope = self.context.scopes.open(outer.scope, outer.scope, kind, span);
         let (next, end) = (turns.start, turns.node);
-        Ok(Stretch { at: At { scope, ..outer }, next, end, chosen: false, sum: Some(turns), counted: None })
+        Ok(NodeRange {
+            at: AstPlace { scope, ..outer },
+            next,
+            end,
+            chosen: false,
+            sum: Some(turns),
+            counted: None,
+        })
     }
 
     /// The operand that a name denotes.
     fn name(
         &mut self,
-        at: At,
+        at: AstPlace,
         line: &mut CurrentEquation,
         name: NameRef,
-        (span, id): Here,
-    ) -> Result<Term, Reported> {
-        self.cast = None;
+        (span, id): LineExpression,
+    ) -> Result<Term, ErrorReported> {
+        (self.cast, self.asked) = (None, None);
         let (place, given, meaning) = self.meaning(at, Operand { kind: OperandKind::Name(name), span })?;
         let register = |resolver: &Self, register| {
-            let kind = resolver.cast.map_or_else(|| resolver.kind(register), Kind::of);
+            let taken = resolver.cast.or(resolver.type_of_parameter());
+            let kind = taken.map_or_else(|| resolver.kind(register), Kind::of);
             Term { form: TermForm::Register(register, kind), span }
         };
         match (given.kind, meaning) {
             (_, Some((_, Binding::Register(RegisterId::ZERO)))) => {
                 Ok(Term { form: TermForm::Constant(Value::Int(0), id), span })
             }
-            (_, Some((_, Binding::Register(found)))) => Ok(register(self, found)),
+            (_, Some((_, Binding::Register(found)))) => {
+                self.check_register(found)?;
+                Ok(register(self, found))
+            }
             (_, Some((_, Binding::Word(word)))) => {
                 let word = self.words[word as usize].clone();
+                self.check_argument(Kind::of(self.element_type(&word)))?;
+                let asked = self.asked;
                 let loaded = self.load(at, line, &word, span)?;
+                self.asked = asked;
                 Ok(register(self, loaded))
             }
             (_, Some((_, Binding::Index(index)))) => {
+                self.check_argument(Kind::Int)?;
                 let function = self.context.declared.indices[index as usize].value.actual.clone();
                 line.counted.push(function);
                 Ok(Term { form: TermForm::Counted(line.counted.len() - 1), span })
             }
             (_, Some((name, Binding::None))) => {
-                Err(self.context.unknown(place.scope, name, given.span, Wanted::Source))
+                Err(self.context.unknown(place.scope, name, given.span, NameRole::Source))
             }
             (OperandKind::Place(_), _) => {
                 let found = self.source(place, given, Type::B)?;
@@ -376,27 +449,30 @@ impl Resolver<'_> {
             }
             (OperandKind::Expr(expr), _) => {
                 let value = self.context.value(place, expr)?;
+                let value = self.value_of_parameter_type(value, span)?;
                 Ok(Term { form: TermForm::Constant(value, id), span })
             }
-            (_, Some((name, _))) => {
+            (_, Some((name, binding))) => {
+                self.check_address_of(binding)?;
                 let value = self.context.name_value(place.scope, name, given.span)?;
+                let value = self.value_of_parameter_type(value, span)?;
                 Ok(Term { form: TermForm::Constant(value, id), span })
             }
             _ => Err(self.context.error(at.scope, "operand", span, "this has no value")),
         }
     }
 
-    /// Computes a function.
+    /// Computes a call of a function.
     fn function(
         &mut self,
-        at: At,
+        at: AstPlace,
         line: &mut CurrentEquation,
         name: NameId,
         terms: &[Term],
-        here: Here,
-    ) -> Result<Term, Reported> {
+        here: LineExpression,
+    ) -> Result<Term, ErrorReported> {
         let text = self.context.scopes.text(name).to_owned();
-        // The least or greatest of several.
+        // Least or greatest of several values.
         let takes_any = name.function().is_some_and(|function| function.arguments() == 0);
         if let [first, rest @ ..] = terms
             && takes_any
@@ -409,16 +485,16 @@ impl Resolver<'_> {
         self.apply(at, line, &text, terms, here, Kind::None)
     }
 
-    /// Computes what a symbol means between terms: of the instructions that have the form, the one for the terms' types.
+    /// Computes a symbol between terms: by the instruction that has this form for the terms' types.
     pub(super) fn apply(
         &mut self,
-        at: At,
+        at: AstPlace,
         line: &mut CurrentEquation,
         symbol: &str,
         terms: &[Term],
-        here: Here,
+        here: LineExpression,
         wanted: Kind,
-    ) -> Result<Term, Reported> {
+    ) -> Result<Term, ErrorReported> {
         if let Some(term) = self.fast(at, line, symbol, terms, here)? {
             return Ok(term);
         }
@@ -429,16 +505,19 @@ impl Resolver<'_> {
         self.operate(at, line, symbol, &settled, here, wanted)
     }
 
-    /// The same, of values that are computed, as written.
+    /// Computes a symbol between settled terms, without the transformations of `.fast`.
     pub(super) fn operate(
         &mut self,
-        at: At,
+        at: AstPlace,
         line: &mut CurrentEquation,
         symbol: &str,
         terms: &[Term],
-        here: Here,
+        here: LineExpression,
         wanted: Kind,
-    ) -> Result<Term, Reported> {
+    ) -> Result<Term, ErrorReported> {
+        if let Some(term) = self.integers(at, line, symbol, terms, here)? {
+            return Ok(term);
+        }
         let fitting: Vec<Meaning> = self
             .forms
             .get(symbol, terms.len())
@@ -466,7 +545,7 @@ impl Resolver<'_> {
         };
         let (op, row) = (*op, op.row());
         let slots = self.hosting(at, op, None, self.symbol_span(symbol, terms, here.0))?;
-        // Constants that the instruction takes as any bits are of the type of what they are an alternative to.
+        // Constants whose bits the instruction passes on have the type of the other alternatives.
         let passed = self.forms.passed(op).to_vec();
         let among = |which: &usize| passed.is_empty() || passed.contains(which);
         let mut kind = Kind::None;
@@ -500,8 +579,8 @@ impl Resolver<'_> {
                 TermForm::Constant(value, expr) => {
                     (self.holding(at, value, expr, term.span, ty)?, Kind::of(ty))
                 }
-                // Its caller has computed it.
-                TermForm::Chain(..) | TermForm::Counted(_) => return Err(Reported),
+                // The caller has computed an expression's value.
+                TermForm::Chain(..) | TermForm::Counted(_) => return Err(ErrorReported),
             };
         }
         let result = self.forms.result(op, |which| kinds[which]);
@@ -517,6 +596,7 @@ impl Resolver<'_> {
         let register = self.fresh(here.0);
         let bundle = self.ir.bundles.len();
         self.emit(at, line, op, slots, registers, register, here.0);
+        self.note_computed(result);
         self.subexpressions.insert(key, register, bundle as u32);
         line.computed.push((register, bundle, key));
         Ok(Term { form: TermForm::Register(register, result), span: here.0 })
@@ -528,7 +608,7 @@ impl Resolver<'_> {
             || register.pinned.is_some_and(|address| self.ir.machine.is_input(address))
     }
 
-    /// True if an instruction takes the types of the terms.
+    /// The types of the terms fit an instruction.
     pub(super) fn fits(&self, meaning: &Meaning, terms: &[Term]) -> bool {
         let row = meaning.op.row();
         let passed = self.forms.passed(meaning.op);
@@ -572,7 +652,7 @@ impl Resolver<'_> {
     }
 }
 
-/// The comparison that is true where another is not.
+/// The comparison that negates another.
 pub(super) fn opposite(symbol: &str) -> Option<&'static str> {
     Some(match symbol {
         "!=" => "==",

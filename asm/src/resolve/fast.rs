@@ -2,31 +2,32 @@
 //! Tree-height reduction of sums and products, and division by constants as multiplication, where `.fast` allows it. A part of
 //! [`expression`](crate::resolve::expression).
 //!
-//! A sum of several terms is kept as the list of its terms, and a product as that of its factors, until the value is needed. Then
+//! A sum of several terms is kept as a list of terms, and a product as a list of factors, until the value is needed. Then
 //! neighbours are paired until one is left, so that n terms make a dependence chain of ⌈log₂ n⌉ operations.
 
-use crate::context::{At, Reported};
-use crate::ir::given::Kind;
+use crate::context::{AstPlace, ErrorReported};
+use crate::ir::type_evidence::Kind;
 use crate::resolve::Resolver;
-use crate::resolve::term::{Chain, CurrentEquation, Here, Term, TermForm};
-use crate::syntax::ast::{ExprId, Operator};
-use crate::syntax::expr::{self, Value};
+use crate::resolve::term::{Chain, CurrentEquation, LineExpression, Term, TermForm};
+use takt_syntax::ast::{ExprId, Operator};
+use takt_syntax::expr::{self, Value};
 
 impl Resolver<'_> {
     /// The operand that a symbol computes where `.fast` allows a transformation; `None` if none applies.
     pub(super) fn fast(
         &mut self,
-        at: At,
+        at: AstPlace,
         line: &mut CurrentEquation,
         symbol: &str,
         terms: &[Term],
-        here: Here,
-    ) -> Result<Option<Term>, Reported> {
+        here: LineExpression,
+    ) -> Result<Option<Term>, ErrorReported> {
         let [a, b] = terms else { return Ok(None) };
         let (sum, difference) = (Operator::Add.text(), Operator::Sub.text());
         let product = Operator::Mul.text();
         if line.fast.reciprocal
             && symbol == Operator::Div.text()
+            && a.kind() != Some(Kind::Int)
             && let TermForm::Constant(divisor, id) = b.form
         {
             let inverse = 1.0 / divisor.real();
@@ -53,30 +54,30 @@ impl Resolver<'_> {
         Ok(Some(Term { form, span: here.0 }))
     }
 
-    /// The terms or factors of a value; of one that is computed already, or in another way, itself.
+    /// The terms or factors of a value; the value itself if it is computed already, or by another operator.
     fn flattened(
         &mut self,
-        at: At,
+        at: AstPlace,
         line: &mut CurrentEquation,
         term: Term,
         is_product: bool,
-    ) -> Result<Vec<(Term, bool)>, Reported> {
+    ) -> Result<Vec<(Term, bool)>, ErrorReported> {
         if let TermForm::Chain(index, _) = term.form
             && line.chains[index].is_product == is_product
         {
-            // Every value is used once: of the chain that it was nothing is wanted again.
+            // Every value is used once, so the chain is not needed again.
             return Ok(std::mem::take(&mut line.chains[index].terms));
         }
         Ok(vec![(self.settled(at, line, term)?, false)])
     }
 
-    /// A value that is computed.
+    /// Computes a value that is still a chain or a function of indices.
     pub(super) fn settled(
         &mut self,
-        at: At,
+        at: AstPlace,
         line: &mut CurrentEquation,
         term: Term,
-    ) -> Result<Term, Reported> {
+    ) -> Result<Term, ErrorReported> {
         if let TermForm::Counted(index) = term.form {
             let form = self.counted_form(at, line, index)?;
             return Ok(Term { form, ..term });
@@ -125,7 +126,7 @@ impl Resolver<'_> {
         match left[..] {
             [(value, false)] => Ok(Term { span: term.span, ..value }),
             [(value, true)] => self.operate(at, line, Operator::Sub.text(), &[value], here, Kind::None),
-            _ => Err(Reported),
+            _ => Err(ErrorReported),
         }
     }
 }

@@ -1,23 +1,23 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Which instruction an operator or a function of an equation means: what the instruction table says, by form and by type.
+//! Instructions for the operators and functions of equations, from the instruction table, by form and by type.
 
-use crate::ir::given::Kind;
+use crate::ir::type_evidence::Kind;
 use std::collections::HashMap;
 use takt_isa::spec::instructions::compute;
 use takt_isa::{Effect, Op, ROWS, Row, Type};
 
-/// An instruction that an operator or a function may mean.
+/// An instruction that computes an operator or a function.
 #[derive(Clone, Debug)]
 pub(crate) struct Meaning {
     pub(crate) op: Op,
-    /// For each operand of the form the source that it is.
+    /// By operand of the form: the index of the instruction's source.
     pub(crate) sources: Vec<usize>,
 }
 
 /// Instructions by their form in equations: symbol and number of operands.
 pub(crate) struct Forms {
     forms: HashMap<(String, usize), Vec<Meaning>>,
-    /// For each instruction, the sources of which one gives the result its bits.
+    /// By instruction: sources whose bits may become the result ([`passed`]).
     passed: Vec<Vec<usize>>,
 }
 
@@ -33,12 +33,12 @@ impl Forms {
         Forms { forms, passed: ROWS.iter().map(passed).collect() }
     }
 
-    /// The instructions of a symbol with so many operands.
+    /// The instructions of a symbol with this number of operands.
     pub(crate) fn get(&self, symbol: &str, operands: usize) -> &[Meaning] {
         self.forms.get(&(symbol.to_owned(), operands)).map_or(&[], Vec::as_slice)
     }
 
-    /// With how many operands a symbol means anything.
+    /// The least number of operands with which a symbol has a meaning.
     pub(crate) fn operands(&self, symbol: &str) -> Option<usize> {
         self.forms.keys().filter(|(known, _)| known == symbol).map(|(_, operands)| *operands).min()
     }
@@ -52,7 +52,7 @@ impl Forms {
         names
     }
 
-    /// The sources of an instruction of which one gives its result the bits.
+    /// Sources of an instruction whose bits may become its result.
     pub(crate) fn passed(&self, op: Op) -> &[usize] {
         &self.passed[op as usize]
     }
@@ -65,7 +65,7 @@ impl Forms {
         found.next().map(|((symbol, _), _)| symbol.as_str())
     }
 
-    /// The type of an instruction's result, given those of its sources.
+    /// Type of an instruction's result, given the types of its sources.
     pub(crate) fn result(&self, op: Op, source: impl Fn(usize) -> Kind) -> Kind {
         let row = op.row();
         if row.result_type() != Type::B {
@@ -78,8 +78,8 @@ impl Forms {
     }
 }
 
-/// The sources of which one gives an instruction's result its bits; none if it computes new ones. The table says what
-/// an instruction computes: it is asked with patterns that nothing but a copy gives again.
+/// Sources whose bits may become an instruction's result; empty if it computes new bits. Found by executing the instruction
+/// on patterns that only a copy returns.
 pub(crate) fn passed(row: &Row) -> Vec<usize> {
     const PATTERNS: [u32; 3] = [0x1234_5679, 0xa5b6_c7d3, 0x5e8f_9a1b];
     let mut passed = Vec::new();

@@ -1,33 +1,33 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Counted loops to operations: the machine's own loops where it has them, else a counter and a branch.
+//! Counted loops as operations: the machine's own loops where it has them, else a counter and a branch.
 //!
 //! **Strength reduction** (Cooper, Torczon, Engineering a Compiler, §10.7). An affine function of iteration numbers is kept in an
 //! *induction register*: set before its innermost loop, to the value that the function has without that loop's iterations, and
 //! advanced by that loop's coefficient at the end of each iteration. Functions that differ by a constant share one register, since
-//! loads and stores add a constant of their own. Registers are found while a loop's body is resolved; what sets them is inserted
-//! before the loop once the program is read.
+//! loads and stores add a constant of their own. Registers are found while a loop's body is resolved; the operations that set them
+//! are inserted before the loop once the program is read.
 
-use crate::context::{At, Reported};
+use crate::context::{AstPlace, ErrorReported};
 use crate::expand::loops::{Count, CountedLoop, Share};
 use crate::expand::{Item, Part};
 use crate::ir::arrays::{Loop, LoopId};
-use crate::ir::given::Kind;
+use crate::ir::type_evidence::Kind;
 use crate::ir::{
     Bundle, Constant, Label, LabelId, LoopBound, Operation, RegisterId, RegisterKind, VirtualRegister,
     with_effect,
 };
 use crate::limits;
 use crate::loops::LoopCount;
-use crate::report::diag::Diagnostic;
-use crate::report::source::Span;
 use crate::resolve::Resolver;
 use crate::resolve::term::{CurrentEquation, Term, TermForm};
-use crate::syntax::ast::*;
-use crate::syntax::expr::Value;
 use smallvec::SmallVec;
 use std::collections::HashMap;
+use takt_diagnostics::diag::Diagnostic;
+use takt_diagnostics::source::Span;
 use takt_isa::program::Space;
 use takt_isa::{Effect, Op, Slots, Type};
+use takt_syntax::ast::*;
+use takt_syntax::expr::Value;
 
 /// An affine function of iteration numbers in a register.
 #[derive(Clone, Debug)]
@@ -41,32 +41,41 @@ struct Induction {
 #[derive(Debug)]
 struct OpenLoop {
     id: LoopId,
-    /// The bundle before which induction registers are set: the last one before the body.
+    /// Bundle before which induction registers are set: the last one before the body.
     setup: usize,
     head: usize,
-    /// The label behind the body.
+    /// The label after the body.
     end: LabelId,
-    /// Where the machine counts no loops: the register that counts down, and the label of the body.
+    /// Without a loop of the machine: the register that counts down, and the label of the body.
     counter: Option<(RegisterId, LabelId)>,
     inductions: Vec<Induction>,
     share: Share,
-    /// The name that counts, for those of registers.
+    /// A count that is known only at run time: the register that the source names, and the register of the number of iterations.
+    given: Option<[RegisterId; 2]>,
+    /// Name of the index variable, for names of registers.
     name: String,
     span: Span,
+}
+
+/// An ended loop whose left-over iterations follow.
+#[derive(Debug)]
+struct ClosedLoop {
+    /// Induction registers, which keep their last values.
+    inductions: Vec<Induction>,
+    /// Register of the number of iterations, if it is not to be computed again.
+    number: Option<RegisterId>,
 }
 
 /// The counted loops around the present line.
 #[derive(Debug, Default)]
 pub(super) struct Nest {
     open: Vec<OpenLoop>,
-    /// Induction registers of loops that have ended: they keep their last values.
-    closed: HashMap<LoopId, Vec<Induction>>,
+    closed: HashMap<LoopId, ClosedLoop>,
     /// Bundles to be inserted before others.
     inserted: Vec<(usize, Bundle)>,
-    /// Registers that are free for other loops, each from a bundle on.
-    free: Vec<(RegisterId, usize)>,
-    /// Totals of the present equation's sums.
-    totals: Vec<RegisterId>,
+    /// Counters, induction registers and totals, each loop with registers of its own: [`share`](crate::resolve::share) merges
+    /// them where possible.
+    pub(super) made: Vec<RegisterId>,
 }
 
 impl Nest {
@@ -75,7 +84,7 @@ impl Nest {
     }
 }
 
-/// Something that must be there for a loop.
+/// Parameters for beginning a loop.
 pub(super) struct LoopStart {
     pub(super) variable: String,
     pub(super) id: LoopId,
@@ -86,8 +95,8 @@ pub(super) struct LoopStart {
 }
 
 impl Resolver<'_> {
-    /// Where a `.for` begins or ends a loop.
-    pub(super) fn loop_part(&mut self, item: &Item, ast: &Ast) -> Result<(), Reported> {
+    /// Begins or ends the loop of a `.for`.
+    pub(super) fn loop_part(&mut self, item: &Item, ast: &Ast) -> Result<(), ErrorReported> {
         let (number, begins) = match item.part {
             Part::Begin(number) => (number, true),
             Part::End(number) => (number, false),
@@ -102,12 +111,12 @@ impl Resolver<'_> {
         if !begins {
             return self.end_loop(item.at, &mut line, id);
         }
-        let variable = self.context.scopes.text(variable).to_owned();
+        let variable = self.context.loop_name(variable);
         let start = LoopStart { variable, id, share, range, span };
         self.begin_loop(item.at, &mut line, &start, &count)
     }
 
-    /// Room for the loops that the source's `.for` make.
+    /// Reserves entries for the loops of the source's `.for`s.
     pub(super) fn reserve_loops(&mut self) {
         let empty = Loop {
             head: 0,
@@ -120,35 +129,35 @@ impl Resolver<'_> {
         self.ir.loops = self.flat.loops.iter().map(|counted| Loop { span: counted.span, ..empty }).collect();
     }
 
-    /// A loop that a sum makes.
+    /// A new entry for the loop of a sum.
     pub(super) fn new_loop(&mut self, span: Span) -> LoopId {
         let (iterations, end) = (LoopCount::Exactly(1), LabelId(0));
         self.ir.loops.push(Loop { head: 0, end, iterations, parent: None, depth: 0, span });
         LoopId(self.ir.loops.len() as u32 - 1)
     }
 
-    /// A label of the assembler's own. Its position is set when it is reached.
-    fn made_label(&mut self, span: Span) -> LabelId {
+    /// A label of the assembler's own, positioned when it is reached.
+    fn new_label(&mut self, span: Span) -> LabelId {
         let id = LabelId((self.context.declared.labels.len() + self.made_labels.len()) as u32);
         self.made_labels.push(Label { name: String::new(), space: Space::Code, position: 0, span });
         id
     }
 
     /// Places a label of the assembler's own before the next bundle.
-    fn place_made(&mut self, label: LabelId) {
+    fn place_label(&mut self, label: LabelId) {
         let index = label.0 as usize - self.context.declared.labels.len();
         self.made_labels[index].position = self.ir.bundles.len() as u32;
         self.subexpressions.cut();
     }
 
-    /// Begins a loop: computes its count, passes over it if there are no iterations, and sets what counts.
+    /// Begins a loop: computes its count, skips it if there are no iterations, and sets the counter.
     pub(super) fn begin_loop(
         &mut self,
-        at: At,
+        at: AstPlace,
         line: &mut CurrentEquation,
         start: &LoopStart,
         count: &Count,
-    ) -> Result<(), Reported> {
+    ) -> Result<(), ErrorReported> {
         let &LoopStart { id, share, range: [least, most], span, .. } = start;
         let depth = self.nest.open.len();
         if depth >= limits::LOOP_DEPTH {
@@ -163,8 +172,17 @@ impl Resolver<'_> {
             }
             return Err(self.context.report(at.scope, error));
         }
-        let end = self.made_label(span);
-        let number = self.count(at, line, count, span)?;
+        let end = self.new_label(span);
+        // The turns come right before the iterations left over.
+        let kept = match share {
+            Share::Rest(_) => self.nest.closed.get(&LoopId(id.0 - 1)).and_then(|closed| closed.number),
+            Share::All | Share::Turns(_) => None,
+        };
+        let (number, source) = match kept {
+            Some(number) => (number, None),
+            None => self.count(at, line, count, span)?,
+        };
+        let given = source.map(|source| [source, number]);
         let (number, least, most) = match share {
             Share::All => (number, least, most),
             Share::Turns(shift) | Share::Rest(shift) => {
@@ -183,10 +201,10 @@ impl Resolver<'_> {
                 }
             }
         };
-        // What is left of a loop goes on from its registers, even if it has had no turn.
+        // The iterations left over continue from the loop's registers, even if it has had no turn.
         let mut before = None;
         if least < 1 {
-            // Below zero there are no iterations either.
+            // A negative count means no iterations, too.
             let condition = match least {
                 0 => number,
                 _ => self.integer_operation(at, line, Operator::Gt, [number, RegisterId::ZERO], span)?,
@@ -202,11 +220,11 @@ impl Resolver<'_> {
             }
             None => {
                 let name = format!("{}.count", start.variable);
-                let counter = self.named_register(name, Type::I, setup, span);
+                let counter = self.named_register(name, Type::I, span);
                 let term = Term { form: TermForm::Register(number, Kind::Int), span };
                 self.copy(at, line, term, Type::I, Some(counter))?;
-                let head = self.made_label(span);
-                self.place_made(head);
+                let head = self.new_label(span);
+                self.place_label(head);
                 Some((counter, head))
             }
         };
@@ -223,19 +241,19 @@ impl Resolver<'_> {
         self.ir.loops[id.0 as usize] =
             Loop { head: head as u32, end, iterations, parent, depth: depth as u32, span };
         let (inductions, name) = (Vec::new(), start.variable.clone());
-        self.nest.open.push(OpenLoop { id, setup, head, end, counter, inductions, share, name, span });
+        self.nest.open.push(OpenLoop { id, setup, head, end, counter, inductions, share, given, name, span });
         Ok(())
     }
 
     /// Ends a loop: advances its induction registers and counts.
     pub(super) fn end_loop(
         &mut self,
-        at: At,
+        at: AstPlace,
         line: &mut CurrentEquation,
         id: LoopId,
-    ) -> Result<(), Reported> {
-        // One that could not begin, which is reported.
-        let Some(open) = self.nest.open.pop_if(|open| open.id == id) else { return Err(Reported) };
+    ) -> Result<(), ErrorReported> {
+        // A loop that could not begin is reported.
+        let Some(open) = self.nest.open.pop_if(|open| open.id == id) else { return Err(ErrorReported) };
         self.subexpressions.cut();
         let span = open.span;
         for Induction { terms, register, .. } in &open.inductions {
@@ -254,24 +272,45 @@ impl Resolver<'_> {
             let operations = SmallVec::from_elem(operation, 1);
             self.push(Bundle { operations, explicit: false, scheduled: false });
         }
-        self.place_made(open.end);
-        let end = self.ir.bundles.len();
-        self.nest.free.extend(open.counter.map(|(counter, _)| (counter, end)));
-        let mut unused = match open.share {
-            Share::Turns(_) => {
-                self.nest.closed.insert(id, open.inductions);
-                return Ok(());
-            }
-            // The loop whose rest it is comes right before it.
-            Share::Rest(_) => self.nest.closed.remove(&LoopId(id.0 - 1)).unwrap_or_default(),
-            Share::All => Vec::new(),
-        };
-        unused.extend(open.inductions);
-        self.nest.free.extend(unused.iter().map(|induction| (induction.register, end)));
+        self.place_label(open.end);
+        if let Share::Turns(_) = open.share {
+            let number = self.iteration_count_register(at, line, &open)?;
+            self.nest.closed.insert(id, ClosedLoop { inductions: open.inductions, number });
+        }
         Ok(())
     }
 
-    /// True if a body must have another bundle at its end: it has none, its last one redirects, or a label or the end of a loop in it
+    /// The register that keeps a loop's number of iterations for the iterations left over; `None` if these can compute it again,
+    /// since the body does not change the register that gives it.
+    fn iteration_count_register(
+        &mut self,
+        at: AstPlace,
+        line: &mut CurrentEquation,
+        open: &OpenLoop,
+    ) -> Result<Option<RegisterId>, ErrorReported> {
+        let Some([source, number]) = open.given else { return Ok(None) };
+        let registers = &self.context.declared.registers;
+        let is_declared = |of: RegisterId| {
+            let register = &registers[of.index()];
+            !register.name.is_empty() || register.pinned.is_some()
+        };
+        let changes =
+            |operation: &Operation| operation.dest == Some(source) || operation.row().effect == Effect::Call;
+        let mut body = self.ir.bundles[open.head..].iter().flat_map(|bundle| &bundle.operations);
+        if is_declared(source) && !self.is_port(source) && !body.any(changes) {
+            return Ok(None);
+        }
+        if !is_declared(number) {
+            return Ok(Some(number));
+        }
+        let kept = self.named_register(format!("{}.number", open.name), Type::I, open.span);
+        let term = Term { form: TermForm::Register(number, Kind::Int), span: open.span };
+        self.copy(at, line, term, Type::I, Some(kept))?;
+        self.defer(open.setup);
+        Ok(Some(kept))
+    }
+
+    /// A body needs an idle bundle at its end: it has no bundles, its last one redirects, or a label or the end of an inner loop
     /// stands there.
     fn needs_last(&self, open: &OpenLoop) -> bool {
         let end = self.ir.bundles.len();
@@ -282,17 +321,19 @@ impl Resolver<'_> {
         last.operations.iter().any(Operation::redirects) || ends.next().is_some()
     }
 
-    /// The register of a loop's number of iterations.
+    /// The register of a loop's number of iterations; also the register that the source names for it, if any.
     fn count(
         &mut self,
-        at: At,
+        at: AstPlace,
         line: &mut CurrentEquation,
         count: &Count,
         span: Span,
-    ) -> Result<RegisterId, Reported> {
+    ) -> Result<(RegisterId, Option<RegisterId>), ErrorReported> {
         match count {
-            Count::Known(affine) if affine.terms.is_empty() => self.integer(at, affine.constant, span),
-            Count::Known(affine) => self.induction(at, line, &affine.terms, affine.constant),
+            Count::Known(affine) if affine.terms.is_empty() => {
+                Ok((self.integer(at, affine.constant, span)?, None))
+            }
+            Count::Known(affine) => Ok((self.induction(at, line, &affine.terms, affine.constant)?, None)),
             Count::Register(operand, offset) => {
                 let register = self.source(at, *operand, Type::I)?;
                 if self.kind(register) == Kind::Float {
@@ -305,66 +346,64 @@ impl Resolver<'_> {
                     return Err(self.context.report(at.scope, error));
                 }
                 let more = match offset.terms.is_empty() {
-                    true if offset.constant == 0 => return Ok(register),
+                    true if offset.constant == 0 && self.is_port(register) => {
+                        // Several operations read the number, and the port may change from one to the next.
+                        let term = Term { form: TermForm::Register(register, Kind::Int), span };
+                        return Ok((self.copy(at, line, term, Type::I, None)?, Some(register)));
+                    }
+                    true if offset.constant == 0 => return Ok((register, Some(register))),
                     true => self.integer(at, offset.constant, span)?,
                     false => self.induction(at, line, &offset.terms, offset.constant)?,
                 };
-                self.integer_operation(at, line, Operator::Add, [register, more], span)
+                let number = self.integer_operation(at, line, Operator::Add, [register, more], span)?;
+                Ok((number, Some(register)))
             }
         }
     }
 
-    /// A number, or 0 if it is negative.
+    /// An input port that may change at any time.
+    fn is_port(&self, register: RegisterId) -> bool {
+        self.context.declared.registers[register.index()].kind == RegisterKind::Input && !self.ir.latched
+    }
+
+    /// Emits the maximum of a number and 0.
     fn not_negative(
         &mut self,
-        at: At,
+        at: AstPlace,
         line: &mut CurrentEquation,
         number: RegisterId,
         span: Span,
-    ) -> Result<RegisterId, Reported> {
+    ) -> Result<RegisterId, ErrorReported> {
         let is_positive = self.integer_operation(at, line, Operator::Gt, [number, RegisterId::ZERO], span)?;
         let terms = [is_positive, number, RegisterId::ZERO]
             .map(|register| Term { form: TermForm::Register(register, Kind::Int), span });
         match self.operate(at, line, "?:", &terms, (span, ExprId { first: 0, count: 0 }), Kind::Int)?.form {
             TermForm::Register(register, _) => Ok(register),
-            _ => Err(Reported),
+            _ => Err(ErrorReported),
         }
     }
 
     /// The register of an integer.
-    fn integer(&mut self, at: At, value: i64, span: Span) -> Result<RegisterId, Reported> {
+    fn integer(&mut self, at: AstPlace, value: i64, span: Span) -> Result<RegisterId, ErrorReported> {
         self.holding(at, Value::Int(value), ExprId { first: 0, count: 0 }, span, Type::I)
     }
 
     /// Writes an operation on integers to a register.
     fn integer_to(
         &mut self,
-        at: At,
+        at: AstPlace,
         line: &mut CurrentEquation,
         operator: Operator,
         operands: [RegisterId; 2],
         dest: RegisterId,
         span: Span,
-    ) -> Result<(), Reported> {
+    ) -> Result<(), ErrorReported> {
         self.integer_operation(at, line, operator, operands, span)?;
         self.redirect(line, dest);
         Ok(())
     }
 
-    /// Frees what the sums of an equation have added up, behind it.
-    pub(super) fn free_totals(&mut self) {
-        let end = self.ir.bundles.len();
-        self.nest.free.extend(self.nest.totals.drain(..).map(|total| (total, end)));
-    }
-
-    /// The register of a sum's total.
-    pub(super) fn total(&mut self, name: String, ty: Type, from: usize, span: Span) -> RegisterId {
-        let total = self.named_register(name, ty, from, span);
-        self.nest.totals.push(total);
-        total
-    }
-
-    /// Has the last operation write another register than the one just made for it.
+    /// Makes the last operation write `dest` instead of the register just made for it.
     pub(super) fn redirect(&mut self, line: &mut CurrentEquation, dest: RegisterId) {
         let Some((_, bundle, key)) = line.computed.pop() else { return };
         let slots = self.writing(self.ir.bundles[bundle].operations[0].slots, Some(dest));
@@ -374,7 +413,7 @@ impl Resolver<'_> {
         self.subexpressions.write(dest);
     }
 
-    /// The machine's own instruction for counted loops, if it counts one within those around.
+    /// The machine's instruction for counted loops, if it counts one more loop within those around.
     fn counting(&self) -> Option<(Op, Slots)> {
         let machine = self.ir.machine;
         let op = with_effect(Effect::Loop).filter(|_| self.nest.open.len() < machine.loop_depth as usize)?;
@@ -382,65 +421,17 @@ impl Resolver<'_> {
         (!slots.is_empty()).then_some((op, slots))
     }
 
-    /// Refuses jumps into and out of the body of a loop: its count is set before it and runs out at its end.
-    pub(super) fn check_jumps(&mut self) {
-        if self.ir.loops.is_empty() {
-            return;
-        }
-        let first_made = self.context.declared.labels.len();
-        let position = |label: LabelId| match (label.0 as usize).checked_sub(first_made) {
-            Some(made) => self.made_labels[made].position,
-            None => self.context.declared.labels[label.0 as usize].position,
-        };
-        let bodies: Vec<(std::ops::Range<u32>, Span)> =
-            self.ir.loops.iter().map(|counted| (counted.head..position(counted.end), counted.span)).collect();
-        let mut wrong: Vec<(Operation, Span, &str)> = Vec::new();
-        for (index, bundle) in (0..).zip(&self.ir.bundles) {
-            for operation in bundle.operations.iter().filter(|operation| operation.redirects()) {
-                let effect = operation.row().effect;
-                let to = match operation.target() {
-                    Some(Ok(label)) if (label.0 as usize) < first_made => Some(position(label)),
-                    Some(Err(number)) => Some(number),
-                    // What the assembler makes keeps to the rules.
-                    Some(Ok(_)) => continue,
-                    None => None,
-                };
-                for (body, span) in &bodies {
-                    let is_from = body.contains(&index);
-                    // A jump to the head would be another iteration that is not counted.
-                    let is_to = to.is_some_and(|to| body.contains(&to) && (to != body.start || is_from));
-                    let message = match effect {
-                        Effect::Call | Effect::Halt => continue,
-                        Effect::Return if is_from => "this leaves the body of a counted loop",
-                        _ if is_from && !is_to => "this leaves the body of a counted loop",
-                        _ if is_to && !is_from => "this leads into the body of a counted loop",
-                        _ => continue,
-                    };
-                    wrong.push((*operation, *span, message));
-                    break;
-                }
-            }
-        }
-        for (operation, span, message) in wrong {
-            let error = Diagnostic::error("loop", operation.span, message)
-                .also(span, "this loop")
-                .note("a counted loop is entered at its beginning and left when its count runs out")
-                .help("write a loop that ends earlier with a label and `bnz`");
-            self.context.report(crate::context::ScopeId(operation.expansion), error);
-        }
-    }
-
     /// Emits a branch on a register.
     fn control(
         &mut self,
-        at: At,
+        at: AstPlace,
         line: &CurrentEquation,
         effect: Effect,
         register: RegisterId,
         target: LabelId,
         span: Span,
-    ) -> Result<(), Reported> {
-        let Some(op) = with_effect(effect) else { return Err(Reported) };
+    ) -> Result<(), ErrorReported> {
+        let Some(op) = with_effect(effect) else { return Err(ErrorReported) };
         let slots = self.hosting(at, op, None, span)?;
         self.push_control(at, line, (op, slots), register, target, span);
         Ok(())
@@ -448,7 +439,7 @@ impl Resolver<'_> {
 
     fn push_control(
         &mut self,
-        at: At,
+        at: AstPlace,
         line: &CurrentEquation,
         (op, slots): (Op, Slots),
         register: RegisterId,
@@ -464,40 +455,36 @@ impl Resolver<'_> {
         self.push(Bundle { operations, explicit: false, scheduled: line.scheduled });
     }
 
-    /// A register that several operations write, the first of them at a bundle, with a name that no source has.
-    pub(super) fn named_register(&mut self, name: String, ty: Type, from: usize, span: Span) -> RegisterId {
-        let registers = &self.context.declared.registers;
-        let fits = |&(id, free): &(RegisterId, usize)| free <= from && registers[id.index()].ty == ty;
-        if let Some(place) = self.nest.free.iter().position(fits) {
-            return self.nest.free.swap_remove(place).0;
-        }
+    /// A register that several operations write, with a name that no source has.
+    pub(super) fn named_register(&mut self, name: String, ty: Type, span: Span) -> RegisterId {
         let registers = &mut self.context.declared.registers;
         registers.push(VirtualRegister { name, ty, ..VirtualRegister::unnamed(span) });
         let id = RegisterId::new(registers.len() - 1);
         self.context.declared.results.insert(id);
         self.context.declared.typed.insert(id);
+        self.nest.made.push(id);
         id
     }
 
-    /// The register that holds an affine function of iteration numbers, a constant added.
+    /// The register that holds an affine function of iteration numbers plus a constant.
     pub(super) fn induction(
         &mut self,
-        at: At,
+        at: AstPlace,
         line: &mut CurrentEquation,
         terms: &[(LoopId, i64)],
         bias: i64,
-    ) -> Result<RegisterId, Reported> {
+    ) -> Result<RegisterId, ErrorReported> {
         let Some((&(id, _), outer)) = terms.split_last() else {
             return self.integer(at, bias, Span::default());
         };
         let is_same = |known: &&Induction| known.bias == bias && known.terms[..] == *terms;
         let Some(level) = self.nest.open.iter().position(|open| open.id == id) else {
-            let known = self.nest.closed.get(&id).and_then(|known| known.iter().find(is_same));
-            // The body of what is left of a loop is the loop's own.
+            let known = self.nest.closed.get(&id).and_then(|closed| closed.inductions.iter().find(is_same));
+            // The iterations left over share the loop's body, and so its registers.
             return known.map(|known| known.register).ok_or_else(|| {
                 // A loop that could not begin is reported.
                 if self.context.reports.sink.errors > 0 {
-                    return Reported;
+                    return ErrorReported;
                 }
                 let span = self.ir.loops[id.0 as usize].span;
                 let message = "this body differs in the iterations that are left over";
@@ -510,7 +497,7 @@ impl Resolver<'_> {
         }
         let (span, name) = (self.nest.open[level].span, format!("{}.offset", self.nest.open[level].name));
         let setup = self.nest.open[level].setup;
-        let register = self.named_register(name, Type::I, setup, span);
+        let register = self.named_register(name, Type::I, span);
         let from = self.induction(at, line, outer, bias)?;
         let term = Term { form: TermForm::Register(from, Kind::Int), span };
         self.copy(at, line, term, Type::I, Some(register))?;
@@ -527,7 +514,7 @@ impl Resolver<'_> {
         }
     }
 
-    /// Inserts the bundles that were deferred. A label before which one is inserted stays before it.
+    /// Inserts the deferred bundles. A label stays before a bundle that is inserted there.
     pub(super) fn insert(&mut self) {
         let mut inserted = std::mem::take(&mut self.nest.inserted);
         if inserted.is_empty() {

@@ -1,20 +1,26 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Diagnostics for expressions that no instruction computes. A part of [`equation`](crate::resolve::equation).
 
-use crate::context::{At, Reported};
-use crate::ir::given::Kind;
-use crate::report::diag::Diagnostic;
-use crate::report::nearest;
-use crate::report::source::Span;
+use crate::context::{AstPlace, ErrorReported};
+use crate::ir::type_evidence::Kind;
 use crate::resolve::Resolver;
 use crate::resolve::advice::from_library;
 use crate::resolve::term::Term;
-use crate::syntax::ast::Operator;
+use takt_diagnostics::diag::Diagnostic;
+use takt_diagnostics::nearest;
+use takt_diagnostics::source::Span;
 use takt_isa::Type;
+use takt_syntax::ast::Operator;
 
 impl Resolver<'_> {
-    /// Reports that a symbol means nothing between these terms.
-    pub(super) fn no_form(&mut self, at: At, symbol: &str, terms: &[Term], span: Span) -> Reported {
+    /// Reports that no instruction computes a symbol between these terms.
+    pub(super) fn no_form(
+        &mut self,
+        at: AstPlace,
+        symbol: &str,
+        terms: &[Term],
+        span: Span,
+    ) -> ErrorReported {
         let place = self.symbol_span(symbol, terms, span);
         if self.forms.get(symbol, terms.len()).is_empty() {
             return self.no_symbol(at, symbol, terms, place);
@@ -36,7 +42,7 @@ impl Resolver<'_> {
             .mend(format!("compare it: `{condition} != 0`"), format!("{condition} != 0"));
             return self.context.report(at.scope, error);
         }
-        // The types that instructions of this form take.
+        // Instructions of this form take the type.
         let wants = |ty| {
             self.forms
                 .get(symbol, terms.len())
@@ -44,14 +50,14 @@ impl Resolver<'_> {
                 .any(|meaning| meaning.sources.iter().any(|which| meaning.op.row().source_type(*which) == ty))
         };
         let error = match (find(Kind::Int), find(Kind::Float)) {
-            // If no instruction takes either type, converting one operand is no help.
+            // If no instruction takes either type, converting one operand does not help.
             (Some(int), Some(float)) if condition || wants(Type::F) => {
                 let (name, other) = (text(self, int), text(self, float));
                 let message = format!("{shown} between an integer and a float");
                 let error = Diagnostic::error("equation", int.span, message)
                     .here("an integer")
                     .also(float.span, "a float");
-                // A comparison with a float that is rounded first would compare another.
+                // Rounding a float before a comparison would compare another value.
                 let compares = Operator::COMPARISONS.iter().any(|operator| operator.text() == symbol);
                 match (convert(Type::I, Type::F), convert(Type::F, Type::I)) {
                     (Some(float_of), Some(int_of)) if wants(Type::I) && !compares => error
@@ -93,7 +99,7 @@ impl Resolver<'_> {
                     return self.context.report(at.scope, error);
                 }
                 if symbol == and || symbol == or {
-                    // Bits of a number, as a condition; or a comparison without its parentheses.
+                    // Either the bits of a number as a condition, or a comparison without its parentheses.
                     let error = error.help(format!(
                         "conditions are comparisons in parentheses, as `({name} > 0) {symbol} …`; declare `{name}:bits` if its pattern is meant"
                     ));
@@ -118,8 +124,8 @@ impl Resolver<'_> {
         self.context.report(at.scope, error)
     }
 
-    /// No instruction has the form at all.
-    fn no_symbol(&mut self, at: At, symbol: &str, terms: &[Term], place: Span) -> Reported {
+    /// Reports that no instruction has the form at all.
+    fn no_symbol(&mut self, at: AstPlace, symbol: &str, terms: &[Term], place: Span) -> ErrorReported {
         let is_name = symbol.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_');
         if !is_name {
             let message = format!("no instruction computes `{symbol}`");

@@ -3,49 +3,53 @@
 
 mod address;
 mod advice;
+mod arguments;
 mod common_subexpressions;
 mod elements;
 pub(crate) mod equation;
 mod expression;
 mod fast;
 pub(crate) mod forms;
+mod integers;
 mod loops;
 mod mismatch;
+mod nesting;
 mod operand;
 pub(crate) mod serialise;
+mod share;
 mod slots;
 mod sums;
 mod term;
 
-use crate::context::{At, Binding, Context, Reported, ScopeId};
+use crate::capacity;
+use crate::context::{AstPlace, Binding, Context, ErrorReported, ScopeId};
 use crate::expand::load::Loader;
-use crate::expand::{self, Data, Flat, Item, Part, Timing};
-use crate::ir::given::{self, Kind};
+use crate::expand::{self, Data, ExpandedSource, Item, Part, Timing};
+use crate::ir::type_evidence::{self, Kind};
 use crate::ir::{
     Attribution, Bundle, Constant, Demand, DemandKind, Ir, Label, LabelId, LoopBound, Operation, RegisterId,
     RegisterKind,
 };
-use crate::report::diag::Diagnostic;
-use crate::report::source::Span;
 use crate::resolve::common_subexpressions::CommonSubexpressions;
 use crate::resolve::elements::Word;
 use crate::resolve::forms::Forms;
 use crate::resolve::loops::Nest;
-use crate::room;
-use crate::syntax::ast::*;
-use foldhash::HashMap;
+use foldhash::{HashMap, HashSet};
 use smallvec::SmallVec;
 use std::collections::BTreeMap;
 use std::rc::Rc;
+use takt_diagnostics::diag::Diagnostic;
+use takt_diagnostics::source::Span;
 use takt_isa::program::{Location, Range};
 use takt_isa::spec::instructions::Function;
-use takt_isa::{Effect, Op, ROWS, Register, Slots, Type};
+use takt_isa::{Effect, Machine, Op, ROWS, Register, Slots, Type};
+use takt_syntax::ast::*;
 
 /// The most cycles that a demand on ports can name: many times what a program memory holds.
 const MAX_CYCLES: u32 = 1 << 24;
 
-/// Resolves the expanded source. What has a mistake is left out; the report says whether there is any.
-pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: Flat) -> Ir {
+/// Resolves the expanded source. Lines with mistakes are left out and reported.
+pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: ExpandedSource) -> Ir {
     let machine = context.machine;
     let slots = ROWS
         .iter()
@@ -56,7 +60,84 @@ pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: Flat) ->
                 .map_or(Host::None, Host::Slots),
         })
         .collect();
-    let ir = Ir {
+    let ir = empty(machine, &flat);
+    let types = flat.data.iter().flat_map(|data| match data {
+        Data::Space(_, _, count, ty) => std::iter::repeat_n(*ty, *count as usize),
+        Data::Value(_, _, ty) => std::iter::repeat_n(*ty, 1),
+    });
+    context.declared.data_types = types.collect();
+    let tables = type_evidence::tables(&context.declared.labels, &context.declared.data_types);
+    let data_words = context.declared.data_types.len() as u32;
+    let is_full = data_words > machine.data_depth;
+    if is_full {
+        data_full(context, &flat.data, data_words);
+    }
+    let (pool, own_files) = (HashMap::default(), Vec::new());
+    let has_typed = context.scopes.macros.values().any(|known| known.types.asked.iter().any(Option::is_some));
+    let follows_types = has_typed || context.asts.iter().any(|ast| !ast.equations.is_empty());
+    let mut resolver = Resolver {
+        context,
+        loader,
+        flat,
+        ir,
+        slots,
+        pool,
+        own_files,
+        label: 0,
+        data_words,
+        is_full,
+        tables,
+        cast: None,
+        asked: None,
+        mistaken: HashSet::default(),
+        computed: Operation::COMPUTED,
+        forms: Forms::new(),
+        kinds: Vec::new(),
+        subexpressions: CommonSubexpressions::default(),
+        nest: Nest::default(),
+        made_labels: Vec::new(),
+        words: Vec::new(),
+        stores: Vec::new(),
+        line: (Attribution::NONE, false),
+        turns: 0,
+        follows_types,
+    };
+    resolver.reserve_loops();
+    let once = std::mem::take(&mut resolver.flat.once);
+    resolver.section(Section::Once, &once);
+    resolver.ir.period = resolver.ir.bundles.len() as u32;
+    let period = std::mem::take(&mut resolver.flat.period);
+    resolver.section(Section::Period, &period);
+    resolver.insert();
+    resolver.entered();
+    resolver.data();
+    resolver.presets();
+    resolver.ranges();
+    for timing in std::mem::take(&mut resolver.flat.timing) {
+        // Errors are reported already.
+        if let Ok(demand) = resolver.demand(&timing) {
+            resolver.ir.demands.push(demand);
+        }
+    }
+    let Resolver { mut ir, flat, made_labels, nest, .. } = resolver;
+    context.report_unknown();
+    ir.registers = std::mem::take(&mut context.declared.registers);
+    ir.numbers = std::mem::take(&mut context.declared.numbered);
+    ir.labels = std::mem::take(&mut context.declared.labels);
+    let source_labels = ir.labels.len();
+    ir.labels.extend(made_labels);
+    ir.arrays = context.declared.tables.iter().map(|table| table.array.clone()).collect();
+    ir.files = flat.files;
+    nesting::check(context, &ir, source_labels);
+    if context.reports.sink.errors == 0 {
+        share::share(&mut ir, &nest.made);
+    }
+    ir
+}
+
+/// The program before its first line is resolved.
+fn empty(machine: &'static Machine, flat: &ExpandedSource) -> Ir {
+    Ir {
         machine,
         registers: Vec::new(),
         bundles: Vec::with_capacity(flat.once.len() + flat.period.len()),
@@ -78,71 +159,7 @@ pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: Flat) ->
         files: Vec::new(),
         parts: Vec::new(),
         versions: Vec::new(),
-    };
-    let types = flat.data.iter().flat_map(|data| match data {
-        Data::Space(_, _, count, ty) => std::iter::repeat_n(*ty, *count as usize),
-        Data::Value(_, _, ty) => std::iter::repeat_n(*ty, 1),
-    });
-    context.declared.data_types = types.collect();
-    let tables = given::tables(&context.declared.labels, &context.declared.data_types);
-    let data_words = context.declared.data_types.len() as u32;
-    let is_full = data_words > machine.data_depth;
-    if is_full {
-        data_full(context, &flat.data, data_words);
     }
-    let (pool, own_files) = (HashMap::default(), Vec::new());
-    let has_equations = context.asts.iter().any(|ast| !ast.equations.is_empty());
-    let mut resolver = Resolver {
-        context,
-        loader,
-        flat,
-        ir,
-        slots,
-        pool,
-        own_files,
-        label: 0,
-        data_words,
-        is_full,
-        tables,
-        cast: None,
-        forms: Forms::new(),
-        kinds: Vec::new(),
-        subexpressions: CommonSubexpressions::default(),
-        nest: Nest::default(),
-        made_labels: Vec::new(),
-        words: Vec::new(),
-        stores: Vec::new(),
-        line: (Attribution::NONE, false),
-        turns: 0,
-        has_equations,
-    };
-    resolver.reserve_loops();
-    let once = std::mem::take(&mut resolver.flat.once);
-    resolver.section(Section::Once, &once);
-    resolver.ir.period = resolver.ir.bundles.len() as u32;
-    let period = std::mem::take(&mut resolver.flat.period);
-    resolver.section(Section::Period, &period);
-    resolver.insert();
-    resolver.check_jumps();
-    resolver.entered();
-    resolver.data();
-    resolver.presets();
-    resolver.ranges();
-    for timing in std::mem::take(&mut resolver.flat.timing) {
-        // Errors are reported already.
-        if let Ok(demand) = resolver.demand(&timing) {
-            resolver.ir.demands.push(demand);
-        }
-    }
-    let Resolver { mut ir, flat, made_labels, .. } = resolver;
-    context.report_unknown();
-    ir.registers = std::mem::take(&mut context.declared.registers);
-    ir.numbers = std::mem::take(&mut context.declared.numbered);
-    ir.labels = std::mem::take(&mut context.declared.labels);
-    ir.labels.extend(made_labels);
-    ir.arrays = context.declared.tables.iter().map(|table| table.array.clone()).collect();
-    ir.files = flat.files;
-    ir
 }
 
 /// Reports that the source declares more data than the machine has memory for.
@@ -153,7 +170,7 @@ fn data_full(context: &mut Context, data: &[Data], words: u32) {
         context.machine.name,
         words - depth
     );
-    // The table of the first word without a place.
+    // Find the table of the first word without a place.
     let mut end = 0;
     let found = data.iter().find_map(|data| {
         let (at, span, count) = match *data {
@@ -173,11 +190,11 @@ fn data_full(context: &mut Context, data: &[Data], words: u32) {
     if let Some(table) = tables.max_by_key(|label| label.position) {
         error = error.also(table.span, format!("in `{}`", table.name));
     }
-    let help = room::for_words(context.machine, words.into());
+    let help = capacity::for_words(context.machine, words.into());
     context.report(at.scope, error.help(help));
 }
 
-/// Which slots execute an instruction.
+/// Slots that execute an instruction.
 #[derive(Clone, Copy)]
 enum Host {
     Any,
@@ -187,45 +204,51 @@ enum Host {
 
 pub(crate) struct Resolver<'c> {
     pub(crate) context: &'c mut Context,
-    /// Loader of further sources, for guesses at the intention of a mistake.
+    /// Loader of further sources, for guesses at the intention behind a mistake.
     pub(crate) loader: &'c dyn Loader,
-    flat: Flat,
+    flat: ExpandedSource,
     pub(crate) ir: Ir,
     slots: Vec<Host>,
     /// Registers that hold constants, by bits.
     pub(crate) pool: HashMap<u32, RegisterId>,
-    /// For each tree, the number of its file among those that code is attributed to.
+    /// By tree: the number of its file among the files that code is attributed to.
     own_files: Vec<Option<u32>>,
-    /// Labels before this one have their position.
+    /// Number of labels that already have their position.
     label: usize,
     /// The cast of the present operand, if the source has one.
     pub(crate) cast: Option<Type>,
+    /// The argument that the present operand stands for, if its parameter has a type.
+    pub(crate) asked: Option<u32>,
+    /// Arguments whose types are reported to be wrong, with the place.
+    mistaken: HashSet<(u32, Span)>,
+    /// Number of the latest computed operation with a number of its own; these count down.
+    computed: u32,
     /// Words of data memory that the source declares.
     pub(crate) data_words: u32,
-    /// True, and reported, if that is more than the machine has.
+    /// The source declares more words than the machine has, which is reported.
     pub(crate) is_full: bool,
-    /// The types of tables, as far as the program is read.
+    /// Types of tables, as far as the program is read.
     pub(crate) tables: HashMap<LabelId, Kind>,
-    /// The instructions by their form in equations.
+    /// Instructions by their form in equations.
     forms: Forms,
-    /// The type last written to each register above the present line.
+    /// Type of the value last written to each register above the present line.
     kinds: Vec<Kind>,
-    /// The available subexpressions.
+    /// Subexpressions that are available.
     subexpressions: CommonSubexpressions,
-    /// The counted loops around the present line, and those whose values are wanted behind them.
+    /// Counted loops around the present line, and ended loops whose values are still needed.
     nest: Nest,
-    /// Labels that the assembler makes: they follow those of the source.
+    /// Labels made by the assembler, numbered after the source's.
     made_labels: Vec<Label>,
-    /// Elements of arrays in data memory that operands are.
+    /// Elements of arrays in data memory that operands denote.
     words: Vec<Word>,
-    /// Elements that the present bundle writes, and the registers with their values.
+    /// Elements that the present bundle writes, with the registers of their values.
     stores: Vec<(Word, RegisterId, Span)>,
-    /// The present line.
+    /// Attribution of the present line, and whether it is scheduled.
     line: (Attribution, bool),
-    /// Turns of all sums.
+    /// Number of turns of all sums so far.
     turns: usize,
-    /// True if there are equations at all: only they need the types above.
-    has_equations: bool,
+    /// Equations or macros with typed parameters exist: only they need the types above.
+    follows_types: bool,
 }
 
 impl Resolver<'_> {
@@ -253,7 +276,7 @@ impl Resolver<'_> {
         self.place_labels(section, u32::MAX);
     }
 
-    /// Sets the position of the section's labels that stand at or before a statement. Returns where the next one stands.
+    /// Positions the section's labels that stand at or before a statement. Returns the statement of the next label.
     fn place_labels(&mut self, section: Section, statement: u32) -> u32 {
         while let Some(label) = self.context.declared.labels.get_mut(self.label) {
             if self.context.declared.label_sections[self.label] == section {
@@ -336,12 +359,12 @@ impl Resolver<'_> {
         self.store_results(item.at);
     }
 
-    /// Refuses jumps by number to where an equation counts on what was computed above.
+    /// Refuses jumps by number into stretches that rely on a subexpression computed above.
     fn entered(&mut self) {
         if self.subexpressions.stretches.is_empty() {
             return;
         }
-        // The number of ranges that begin less those that end before each bundle.
+        // Per bundle: stretches that begin minus stretches that end before it.
         let mut steps = vec![0i64; self.ir.bundles.len() + 2];
         for (computed, used) in &self.subexpressions.stretches {
             steps[*computed as usize + 1] += 1;
@@ -373,13 +396,13 @@ impl Resolver<'_> {
             operation.order = order;
             self.ir.has_choices |= operation.slots.len() > 1;
         }
-        if self.has_equations {
+        if self.follows_types {
             self.note_results(&bundle);
         }
         self.ir.bundles.push(bundle);
     }
 
-    /// Notes for the equations below what a bundle writes.
+    /// Notes the types that a bundle writes, for the equations below.
     fn note_results(&mut self, bundle: &Bundle) {
         let is_opaque = bundle.is_opaque();
         for operation in &bundle.operations {
@@ -399,7 +422,7 @@ impl Resolver<'_> {
         }
     }
 
-    /// The source line of an operation: its own, or that of `.loc`.
+    /// The source line of an operation: its own, or the line of `.loc`.
     fn location(
         &mut self,
         item: &Item,
@@ -431,12 +454,12 @@ impl Resolver<'_> {
 
     fn operation(
         &mut self,
-        at: At,
+        at: AstPlace,
         ast: &Ast,
         number: u32,
         of: usize,
         location: Attribution,
-    ) -> Result<Operation, Reported> {
+    ) -> Result<Operation, ErrorReported> {
         let written = &ast.operations[number as usize];
         let name = self.context.spelled(at, written.mnemonic.name, written.mnemonic.span)?;
         let operands = &ast.operands[written.first as usize..(written.first + written.count) as usize];
@@ -459,24 +482,24 @@ impl Resolver<'_> {
         let mut operation = Operation::new(op, slots, written.span, location, at.scope.0, (at.ast, number));
         let mut failed = false;
         for (place, operand) in places.iter().zip(operands) {
-            // All operands are looked at, whatever is wrong with one.
+            // Check all operands, even if one is wrong.
             failed |= self.operand(at, row, *place, *operand, &mut operation).is_err();
         }
         operation.slots = self.writing(slots, operation.dest);
         operation.slot = operation.slots.first();
-        if failed { Err(Reported) } else { Ok(operation) }
+        if failed { Err(ErrorReported) } else { Ok(operation) }
     }
 
-    /// `.raw slot word`.
+    /// A word given bit by bit: `.raw slot word`.
     fn raw(
         &mut self,
-        at: At,
+        at: AstPlace,
         number: u32,
-        written: &crate::syntax::ast::Operation,
+        written: &takt_syntax::ast::Operation,
         operands: &[Operand],
         location: Attribution,
-    ) -> Result<Operation, Reported> {
-        let [slot, word] = operands else { return Err(Reported) };
+    ) -> Result<Operation, ErrorReported> {
+        let [slot, word] = operands else { return Err(ErrorReported) };
         let name = self.context.reports.sources.text(slot.span).to_owned();
         let index = self.named_slot(at, &name, slot.span)?;
         let value = self.operand_value(at, *word)?;
@@ -510,7 +533,7 @@ impl Resolver<'_> {
     }
 
     /// A number of cycles, not less than `least`.
-    fn cycles(&mut self, at: At, cycles: Expr, least: u32) -> Result<u32, Reported> {
+    fn cycles(&mut self, at: AstPlace, cycles: Expr, least: u32) -> Result<u32, ErrorReported> {
         let value = self.context.integer(at, cycles)?;
         u32::try_from(value).ok().filter(|cycles| (least..=MAX_CYCLES).contains(cycles)).ok_or_else(|| {
             let message = format!("cycles are {least} to {MAX_CYCLES} here, not {value}");
@@ -519,7 +542,7 @@ impl Resolver<'_> {
     }
 
     /// Resolves a `.deadline`, `.order` or `.late`.
-    fn demand(&mut self, timing: &Timing) -> Result<Demand, Reported> {
+    fn demand(&mut self, timing: &Timing) -> Result<Demand, ErrorReported> {
         let at = timing.at;
         let ast = Rc::clone(&self.context.asts[at.ast as usize]);
         let DirectiveLine { kind, span } = &ast.directives[timing.directive as usize];
@@ -533,7 +556,7 @@ impl Resolver<'_> {
                 let cost = cost.map_or(Ok(0), |cost| self.cycles(at, cost, 0))?;
                 (DemandKind::Late(cost), names, Some(RegisterKind::Input))
             }
-            _ => return Err(Reported),
+            _ => return Err(ErrorReported),
         };
         if let Some((true, latched)) = self.flat.ports {
             return Err(self.unlatched(at, kind, *span, latched));
@@ -555,8 +578,8 @@ impl Resolver<'_> {
         Ok(Demand { kind, ports, period: timing.section == Section::Period, span: *span })
     }
 
-    /// The ports of a program whose ports are latched have no times of their own.
-    fn unlatched(&mut self, at: At, kind: DemandKind, span: Span, latched: Span) -> Reported {
+    /// Reports a demand on latched ports, which have no times of their own.
+    fn unlatched(&mut self, at: AstPlace, kind: DemandKind, span: Span, latched: Span) -> ErrorReported {
         let (message, help) = match kind {
             DemandKind::Deadline(_) => (
                 "a deadline for outputs that are published together, at the `wait`",
@@ -576,20 +599,22 @@ impl Resolver<'_> {
     }
 
     fn presets(&mut self) {
+        let mut seen: HashMap<RegisterId, Span> = HashMap::default();
         for preset in std::mem::take(&mut self.flat.presets) {
             let found = self.preset_registers(preset.at, preset.register, preset.placed);
             let Ok(value) = self.context.value(preset.at, preset.value.id) else { continue };
-            // A named register has a type, a place has any.
+            // A named register has a type; a place accepts any.
             let Ok((members, ty)) = found else { continue };
             let Ok(bits) = self.bits(preset.at, value, ty, preset.value.into()) else { continue };
             for register in members {
-                let register = &mut self.context.declared.registers[register.index()];
-                if register.preset.replace(bits).is_some() {
-                    let error =
-                        Diagnostic::error("declared-twice", preset.span, "this register is preset already");
+                if let Some(first) = seen.insert(register, preset.span) {
+                    let message = "this register is preset already";
+                    let error = Diagnostic::error("declared-twice", preset.span, message)
+                        .also(first, "preset here first");
                     self.context.report(preset.at.scope, error);
                     break;
                 }
+                self.context.declared.registers[register.index()].preset = Some(bits);
             }
         }
     }
@@ -631,25 +656,25 @@ impl Resolver<'_> {
         }
     }
 
-    /// The registers that a `.range` names, of an array all, and their type.
+    /// The registers that a `.range` names, all elements for an array, and their type.
     fn range_registers(
         &mut self,
-        at: At,
+        at: AstPlace,
         operand: Operand,
         placed: bool,
-    ) -> Result<(Vec<RegisterId>, Type), Reported> {
+    ) -> Result<(Vec<RegisterId>, Type), ErrorReported> {
         let (members, ty) = self.preset_registers(at, operand, placed)?;
         // A place has no type: its range is one of floats.
         Ok((members, if placed { Type::F } else { ty }))
     }
 
-    /// The registers that a `.preset` names, of an array all, and their type.
+    /// The registers that a `.preset` names, all elements for an array, and their type.
     fn preset_registers(
         &mut self,
-        at: At,
+        at: AstPlace,
         operand: Operand,
         placed: bool,
-    ) -> Result<(Vec<RegisterId>, Type), Reported> {
+    ) -> Result<(Vec<RegisterId>, Type), ErrorReported> {
         if let (OperandKind::Name(name), false) = (operand.kind, placed) {
             let id = self.context.spelled(at, name, operand.span)?;
             if let Binding::Array(number) = self.context.lookup(at.scope, id) {

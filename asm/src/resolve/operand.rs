@@ -1,42 +1,44 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Operands to registers, labels and numbers: the part of [`resolve`](crate::resolve) that looks at one operand.
+//! Operands as registers, labels and numbers: the part of [`resolve`](crate::resolve) for one operand.
 
-use crate::context::Wanted;
-use crate::context::{Argument, Array, At, Binding, Reported};
+use crate::context::NameRole;
+use crate::context::{Argument, Array, AstPlace, Binding, ErrorReported};
 use crate::expand::{address, register_at};
-use crate::ir::given::{Given, Kind, OperandPosition, TypeOrigin};
+use crate::ir::type_evidence::{Kind, OperandPosition, TypeEvidence, TypeOrigin};
 use crate::ir::{Constant, Label, LabelId, Operation, RegisterId, RegisterKind, VirtualRegister};
-use crate::report::diag::Diagnostic;
-use crate::report::source::Span;
 use crate::resolve::Resolver;
 use crate::resolve::advice::loading;
 use crate::resolve::elements::Place as ElementPlace;
 use crate::resolve::term::CurrentEquation;
-use crate::syntax::ast::*;
-use crate::syntax::expr::{EvalError, Value};
-use crate::syntax::name::NameId;
 use std::rc::Rc;
+use takt_diagnostics::diag::Diagnostic;
+use takt_diagnostics::source::Span;
 use takt_isa::shape::Field;
 use takt_isa::{Operand as Place, Row, Type};
+use takt_syntax::ast::*;
+use takt_syntax::expr::{EvalError, Value};
+use takt_syntax::name::NameId;
 
-/// An operand and where it stands, parameters replaced by what was given for them; and what its name means, if it is one.
-type Meaning = (At, Operand, Option<(NameId, Binding)>);
+/// An operand and its scope, parameters replaced by their arguments; and its binding, if it is a name.
+type Meaning = (AstPlace, Operand, Option<(NameId, Binding)>);
 
 impl Resolver<'_> {
     #[inline]
     pub(crate) fn operand(
         &mut self,
-        at: At,
+        at: AstPlace,
         row: &Row,
         place: Place,
         operand: Operand,
         operation: &mut Operation,
-    ) -> Result<(), Reported> {
-        self.cast = None;
+    ) -> Result<(), ErrorReported> {
+        (self.cast, self.asked) = (None, None);
         match place {
             Place::Dest => {
-                operation.dest = Some(self.dest(at, operand, Wanted::Dest)?);
+                operation.dest = Some(self.dest(at, operand, NameRole::Dest)?);
+                self.check_operand(row, (row.result_type(), false), operand.span, at.scope)?;
                 self.note_cast(operation, OperandPosition::Dest);
+                self.note_parameter_type(operation, OperandPosition::Dest);
             }
             Place::Source(index) => {
                 let ty = row.source_type(index);
@@ -45,14 +47,18 @@ impl Resolver<'_> {
                     None => self.other_source(at, operand, ty)?,
                 };
                 operation.sources[index] = source;
+                let asked = self.asked;
+                self.check_operand(row, (ty, true), operand.span, at.scope)?;
                 let is_constant = || {
                     let register = &self.context.declared.registers[source.index()];
                     matches!(register.kind, RegisterKind::Constant(_))
                 };
-                if ty == Type::B && is_constant() {
+                if ty == Type::B && self.type_of_parameter().is_none() && is_constant() {
                     self.note_literal(at, operand, operation, OperandPosition::Source(index as u8));
                 }
+                self.asked = asked;
                 self.note_cast(operation, OperandPosition::Source(index as u8));
+                self.note_parameter_type(operation, OperandPosition::Source(index as u8));
             }
             Place::Immediate => {
                 operation.constant = match self.code_label(at, operand)? {
@@ -61,8 +67,11 @@ impl Resolver<'_> {
                 };
                 match operation.constant {
                     Constant::Code(_) => {
-                        let given =
-                            Given::Literal { kind: Kind::Int, what: TypeOrigin::Address, span: operand.span };
+                        let given = TypeEvidence::Literal {
+                            kind: Kind::Int,
+                            what: TypeOrigin::Address,
+                            span: operand.span,
+                        };
                         self.context.declared.given.insert(operation, OperandPosition::Immediate, given);
                     }
                     Constant::Value(0) => {}
@@ -91,7 +100,7 @@ impl Resolver<'_> {
                     self.context.declared.given.insert(
                         operation,
                         OperandPosition::Table,
-                        Given::Table(table),
+                        TypeEvidence::Table(table),
                     );
                 }
                 self.note_cast(operation, OperandPosition::Source(0));
@@ -100,25 +109,25 @@ impl Resolver<'_> {
         Ok(())
     }
 
-    /// Notes the type that the operand just read is taken as.
+    /// Notes the type that the source casts the last operand to.
     #[inline]
     fn note_cast(&mut self, operation: &Operation, part: OperandPosition) {
         if let Some(ty) = self.cast {
-            self.context.declared.given.insert(operation, part, Given::Cast(ty));
+            self.context.declared.given.insert(operation, part, TypeEvidence::Cast(ty));
         }
     }
 
-    /// Notes the type of a constant where the instruction takes any.
-    fn note_literal(&mut self, at: At, operand: Operand, operation: &Operation, part: OperandPosition) {
+    /// Notes the type of a constant where the instruction takes any bits.
+    fn note_literal(&mut self, at: AstPlace, operand: Operand, operation: &Operation, part: OperandPosition) {
         let Ok(value) = self.operand_value(at, operand) else { return };
         let is_address = self.table_of(at, operand.kind).is_some();
-        let given = Given::literal(value, is_address, operand.span);
+        let given = TypeEvidence::literal(value, is_address, operand.span);
         self.context.declared.given.insert(operation, part, given);
     }
 
     /// The register that an operand names, if it is a plain name and no address is required.
     #[inline(always)]
-    fn plain(&self, at: At, operand: Operand) -> Option<RegisterId> {
+    fn plain(&self, at: AstPlace, operand: Operand) -> Option<RegisterId> {
         let OperandKind::Name(name) = operand.kind else { return None };
         match self.context.lookup(at.scope, name.resolve().ok()?) {
             Binding::Register(register) if self.context.notes.is_none() => Some(register),
@@ -126,9 +135,13 @@ impl Resolver<'_> {
         }
     }
 
-    /// Follows parameters to the operand that was given for them, and what its name means if it is a name.
-    pub(crate) fn meaning(&mut self, mut at: At, mut operand: Operand) -> Result<Meaning, Reported> {
-        let mut parameter = None;
+    /// Replaces parameters by their arguments, and looks up the binding if the operand is a name.
+    pub(crate) fn meaning(
+        &mut self,
+        mut at: AstPlace,
+        mut operand: Operand,
+    ) -> Result<Meaning, ErrorReported> {
+        let (mut parameter, mut asked) = (None, None);
         loop {
             if let OperandKind::Cast(cast) = operand.kind {
                 let Cast { operand: inner, ty } = self.context.asts[at.ast as usize].casts[cast as usize];
@@ -144,6 +157,7 @@ impl Resolver<'_> {
                 && let Some((name, indices)) = self.indexed(at, operand)
             {
                 let place = self.element_place(at, name, &indices, operand.span)?;
+                self.asked = asked;
                 let id = self.context.name(at, name.name, name.span)?;
                 let binding = match place {
                     ElementPlace::Register(register) => Binding::Register(register),
@@ -154,12 +168,16 @@ impl Resolver<'_> {
                 };
                 return Ok((at, operand, Some((id, binding))));
             }
+            self.asked = asked;
             let OperandKind::Name(name) = operand.kind else { return Ok((at, operand, None)) };
             let name = self.context.name(at, name, operand.span)?;
             match self.context.lookup(at.scope, name) {
                 // Arguments that are parameters themselves were replaced when the macro was used.
                 Binding::Argument(argument) => {
                     parameter.get_or_insert((self.context.scopes.scope(at.scope).owner, name));
+                    if self.context.declared.arguments[argument as usize].asked.is_some() {
+                        asked.get_or_insert(argument);
+                    }
                     Argument { operand, at, .. } = self.context.declared.arguments[argument as usize];
                 }
                 binding => {
@@ -169,14 +187,20 @@ impl Resolver<'_> {
                             known.push((scope, name, register));
                         }
                     }
+                    self.check_array(binding)?;
                     return Ok((at, operand, Some((name, binding))));
                 }
             }
         }
     }
 
-    /// The register that an operand names, to be written: by an instruction, or an equation.
-    pub(crate) fn dest(&mut self, at: At, operand: Operand, wanted: Wanted) -> Result<RegisterId, Reported> {
+    /// The register that an operand names as the target of an instruction or an equation.
+    pub(crate) fn dest(
+        &mut self,
+        at: AstPlace,
+        operand: Operand,
+        wanted: NameRole,
+    ) -> Result<RegisterId, ErrorReported> {
         if let Some(register) = self.plain(at, operand) {
             let VirtualRegister { kind, pinned, .. } = &self.context.declared.registers[register.index()];
             if matches!(kind, RegisterKind::Plain | RegisterKind::State | RegisterKind::Output)
@@ -186,15 +210,21 @@ impl Resolver<'_> {
             }
         }
         let help = match wanted {
-            Wanted::Left => "the left side of `=` is the register to write",
+            NameRole::Left => "the left side of `=` is the register to write",
             _ => "the first operand is the register to write",
         };
         let (place, given, meaning) = self.meaning(at, operand)?;
         let register = match (given.kind, meaning) {
-            (_, Some((_, Binding::Register(register)))) => register,
-            // Stored when the bundle has computed it.
+            (_, Some((_, Binding::Register(register)))) => {
+                self.check_result(self.declared_kind(register).unwrap_or(Kind::None))?;
+                register
+            }
+            // The store follows the bundle that computes the value.
             (_, Some((_, Binding::Word(word)))) => {
+                let ty = self.element_type(&self.words[word as usize]);
+                self.check_result(Kind::of(ty))?;
                 let register = self.fresh(given.span);
+                self.context.declared.registers[register.index()].ty = ty;
                 self.stores.push((self.words[word as usize].clone(), register, given.span));
                 return Ok(register);
             }
@@ -246,8 +276,8 @@ impl Resolver<'_> {
         Err(self.context.report(at.scope, error))
     }
 
-    /// The array and the indices of an operand that is an element of one. With one index it looks like a place in memory.
-    fn indexed(&mut self, at: At, operand: Operand) -> Option<(Name, Vec<Vec<Node>>)> {
+    /// The array and the indices of an operand that is an array element. With one index it looks like a place in memory.
+    fn indexed(&mut self, at: AstPlace, operand: Operand) -> Option<(Name, Vec<Vec<Node>>)> {
         let ast = Rc::clone(&self.context.asts[at.ast as usize]);
         match operand.kind {
             OperandKind::Element(element) => {
@@ -270,7 +300,7 @@ impl Resolver<'_> {
                 }
                 match (binding, base.kind) {
                     (Binding::Array(_) | Binding::Table(_), _) => {}
-                    // An element that is declared with its place.
+                    // An element that is declared with a place.
                     (Binding::None, OperandKind::Expr(expr)) => {
                         let [Node { kind: NodeKind::Int(index), .. }] = ast.nodes[expr.range()] else {
                             return None;
@@ -294,24 +324,24 @@ impl Resolver<'_> {
         }
     }
 
-    /// The register that an element is.
+    /// The register of an array element.
     pub(crate) fn element(
         &mut self,
-        at: At,
+        at: AstPlace,
         name: Name,
         indices: &[Vec<Node>],
         span: Span,
-    ) -> Result<RegisterId, Reported> {
+    ) -> Result<RegisterId, ErrorReported> {
         let operand = Operand { kind: OperandKind::Name(name.name), span: name.span };
         let (place, _, meaning) = self.meaning(at, operand)?;
         let array = match meaning {
             Some((_, Binding::Array(array))) => self.context.declared.arrays[array as usize].clone(),
-            // Only an array can be indexed by a loop that runs.
+            // An index that is a running loop's needs an array.
             Some((id, Binding::None)) if self.varies(at, indices) => {
-                return Err(self.context.unknown(place.scope, id, name.span, Wanted::Array));
+                return Err(self.context.unknown(place.scope, id, name.span, NameRole::Array));
             }
             Some((id, Binding::None)) => {
-                let indices: Result<Vec<String>, Reported> = indices
+                let indices: Result<Vec<String>, ErrorReported> = indices
                     .iter()
                     .map(|nodes| self.context.index(at, nodes, span).map(|index| index.to_string()))
                     .collect();
@@ -319,7 +349,7 @@ impl Resolver<'_> {
                 let element = self.context.scopes.names_mut().intern(&element);
                 return match self.context.lookup(place.scope, element) {
                     Binding::Register(register) => Ok(register),
-                    _ => Err(self.context.unknown(place.scope, id, name.span, Wanted::Array)),
+                    _ => Err(self.context.unknown(place.scope, id, name.span, NameRole::Array)),
                 };
             }
             _ => {
@@ -366,8 +396,8 @@ impl Resolver<'_> {
         Ok(RegisterId::new(first.index() + number as usize))
     }
 
-    /// True if an index is a slice, or mentions the index of a loop that runs.
-    fn varies(&self, at: At, indices: &[Vec<Node>]) -> bool {
+    /// An index is a slice, or mentions the index of a loop that runs.
+    fn varies(&self, at: AstPlace, indices: &[Vec<Node>]) -> bool {
         let is_index = |node: &Node| match node.kind {
             NodeKind::Name(name) => {
                 name.resolve().is_ok_and(|id| matches!(self.context.lookup(at.scope, id), Binding::Index(_)))
@@ -378,7 +408,13 @@ impl Resolver<'_> {
     }
 
     /// The present value of an index that is a slice of an array of registers, whose loop is written out.
-    fn slice_constant(&mut self, at: At, nodes: &[Node], number: usize, span: Span) -> Result<i64, Reported> {
+    fn slice_constant(
+        &mut self,
+        at: AstPlace,
+        nodes: &[Node],
+        number: usize,
+        span: Span,
+    ) -> Result<i64, ErrorReported> {
         let index = self.context.slice_index(at, nodes, number, span)?;
         index.as_constant().ok_or_else(|| {
             let message = "the elements of an array of registers are known when the program is assembled";
@@ -386,17 +422,17 @@ impl Resolver<'_> {
         })
     }
 
-    /// The port that a name stands for, of a kind if one is wanted.
+    /// The port that a name stands for, an input or an output if `wanted`.
     pub(crate) fn port(
         &mut self,
-        at: At,
+        at: AstPlace,
         name: Name,
         wanted: Option<RegisterKind>,
-    ) -> Result<RegisterId, Reported> {
+    ) -> Result<RegisterId, ErrorReported> {
         let operand = Operand { kind: OperandKind::Name(name.name), span: name.span };
         let (place, given, meaning) = self.meaning(at, operand)?;
         if let Some((name, Binding::None)) = meaning {
-            return Err(self.context.unknown(place.scope, name, given.span, Wanted::Source));
+            return Err(self.context.unknown(place.scope, name, given.span, NameRole::Source));
         }
         let is_port = |kind| match wanted {
             Some(wanted) => kind == wanted,
@@ -429,10 +465,10 @@ impl Resolver<'_> {
     /// The register that a `.preset` names, by its name or its place, or the element of an array.
     pub(crate) fn preset_register(
         &mut self,
-        at: At,
+        at: AstPlace,
         operand: Operand,
         placed: bool,
-    ) -> Result<(RegisterId, Type), Reported> {
+    ) -> Result<(RegisterId, Type), ErrorReported> {
         let (place, given, meaning) = if placed { (at, operand, None) } else { self.meaning(at, operand)? };
         let (register, ty) = match (given.kind, meaning) {
             (_, Some((_, Binding::Register(register)))) => {
@@ -459,7 +495,7 @@ impl Resolver<'_> {
                 if let Some((id, Binding::None)) = meaning
                     && !self.looks_like_a_place(id)
                 {
-                    return Err(self.context.unknown(place.scope, id, given.span, Wanted::Dest));
+                    return Err(self.context.unknown(place.scope, id, given.span, NameRole::Dest));
                 }
                 let address = address(self.context, place, Name { name, span: given.span })?;
                 (register_at(self.context, address, given.span), Type::B)
@@ -476,46 +512,75 @@ impl Resolver<'_> {
         Ok((register, ty))
     }
 
-    /// True if a name is that of a bank and a number.
+    /// A name consists of a bank's name and a number.
     fn looks_like_a_place(&self, name: NameId) -> bool {
         let text = self.context.scopes.text(name);
         let digits = text.trim_end_matches(|c: char| c.is_ascii_digit());
         digits.len() < text.len() && self.ir.machine.banks().any(|bank| bank.name == digits)
     }
 
-    /// A register to read: a register as such, or the one that holds a constant.
-    pub(crate) fn source(&mut self, at: At, operand: Operand, ty: Type) -> Result<RegisterId, Reported> {
+    /// The register of an operand to read: a named register, or a register that holds a constant.
+    pub(crate) fn source(
+        &mut self,
+        at: AstPlace,
+        operand: Operand,
+        ty: Type,
+    ) -> Result<RegisterId, ErrorReported> {
         match self.plain(at, operand) {
             Some(register) => Ok(register),
             None => self.other_source(at, operand, ty),
         }
     }
 
-    /// A register to read that is not named as such where it is read.
-    fn other_source(&mut self, at: At, operand: Operand, ty: Type) -> Result<RegisterId, Reported> {
+    /// The register of an operand to read that does not name it directly.
+    fn other_source(
+        &mut self,
+        at: AstPlace,
+        operand: Operand,
+        ty: Type,
+    ) -> Result<RegisterId, ErrorReported> {
         let (place, given, meaning) = self.meaning(at, operand)?;
-        match (given.kind, meaning) {
-            (_, Some((_, Binding::Register(register)))) => Ok(register),
-            (_, Some((_, Binding::Word(word)))) => self.loaded(at, word, given.span),
-            (_, Some((_, Binding::Index(index)))) => self.index_register(at, index, ty, given.span),
+        let asked = self.asked;
+        let source = match (given.kind, meaning) {
+            (_, Some((_, Binding::Register(register)))) => {
+                self.check_register(register)?;
+                register
+            }
+            (_, Some((_, Binding::Word(word)))) => {
+                let ty = self.element_type(&self.words[word as usize]);
+                self.check_argument(Kind::of(ty))?;
+                let loaded = self.loaded(at, word, given.span)?;
+                self.cast.get_or_insert(ty);
+                loaded
+            }
+            (_, Some((_, Binding::Index(index)))) => {
+                self.check_argument(Kind::Int)?;
+                self.index_register(at, index, ty, given.span)?
+            }
             (_, Some((name, Binding::None))) => {
-                Err(self.context.unknown(place.scope, name, given.span, Wanted::Source))
+                return Err(self.context.unknown(place.scope, name, given.span, NameRole::Source));
             }
             (OperandKind::Place(name), _) => {
                 let address = address(self.context, place, Name { name, span: given.span })?;
-                Ok(register_at(self.context, address, given.span))
+                register_at(self.context, address, given.span)
             }
             (OperandKind::Memory(_), _) => {
                 let error =
                     Diagnostic::error("operand", given.span, "a memory operand where a register is read")
                         .help("load it into a register with `ld` first");
-                Err(self.context.report(at.scope, error))
+                return Err(self.context.report(at.scope, error));
             }
             _ => {
-                let bits = self.constant(place, given, ty)?;
-                Ok(self.pooled(bits, given.span))
+                if let Some((_, binding)) = meaning {
+                    self.check_address_of(binding)?;
+                }
+                // An argument has its parameter's type, also where its bits are taken.
+                let bits = self.constant(place, given, self.type_of_parameter().unwrap_or(ty))?;
+                self.pooled(bits, given.span)
             }
-        }
+        };
+        self.asked = asked;
+        Ok(source)
     }
 
     /// The register that holds a constant.
@@ -538,12 +603,18 @@ impl Resolver<'_> {
     }
 
     /// The bits of a constant operand.
-    fn constant(&mut self, at: At, operand: Operand, ty: Type) -> Result<u32, Reported> {
+    fn constant(&mut self, at: AstPlace, operand: Operand, ty: Type) -> Result<u32, ErrorReported> {
         let value = self.operand_value(at, operand)?;
         self.bits(at, value, ty, operand)
     }
 
-    pub(crate) fn bits(&mut self, at: At, value: Value, ty: Type, operand: Operand) -> Result<u32, Reported> {
+    pub(crate) fn bits(
+        &mut self,
+        at: AstPlace,
+        value: Value,
+        ty: Type,
+        operand: Operand,
+    ) -> Result<u32, ErrorReported> {
         let span = operand.span;
         let bits = value.bits(ty).map_err(|fault| self.context.fault(at.scope, EvalError { span, fault }))?;
         if let Value::Real(real) = value
@@ -570,7 +641,7 @@ impl Resolver<'_> {
         Ok(bits)
     }
 
-    pub(crate) fn operand_value(&mut self, at: At, operand: Operand) -> Result<Value, Reported> {
+    pub(crate) fn operand_value(&mut self, at: AstPlace, operand: Operand) -> Result<Value, ErrorReported> {
         let (place, given, meaning) = self.meaning(at, operand)?;
         match (given.kind, meaning) {
             (OperandKind::Expr(expr), _) => self.context.value(place, expr),
@@ -587,20 +658,20 @@ impl Resolver<'_> {
         }
     }
 
-    /// The code label that an operand is, if it is one.
-    fn code_label(&mut self, at: At, operand: Operand) -> Result<Option<LabelId>, Reported> {
+    /// The code label that an operand names, if any.
+    fn code_label(&mut self, at: AstPlace, operand: Operand) -> Result<Option<LabelId>, ErrorReported> {
         Ok(match self.meaning(at, operand)? {
             (_, _, Some((_, Binding::Code(label)))) => Some(label),
             _ => None,
         })
     }
 
-    fn target(&mut self, at: At, operand: Operand) -> Result<Constant, Reported> {
+    fn target(&mut self, at: AstPlace, operand: Operand) -> Result<Constant, ErrorReported> {
         let (place, given, meaning) = self.meaning(at, operand)?;
         match meaning {
             Some((_, Binding::Code(label))) => return Ok(Constant::Code(label)),
             Some((name, Binding::None)) => {
-                return Err(self.context.unknown(place.scope, name, given.span, Wanted::Target));
+                return Err(self.context.unknown(place.scope, name, given.span, NameRole::Target));
             }
             Some((name, binding @ (Binding::Register(_) | Binding::Data(_)))) => {
                 let kind = self.context.declared.kind_text(binding);
@@ -623,12 +694,12 @@ impl Resolver<'_> {
     /// A number for a field of the word.
     fn field(
         &mut self,
-        at: At,
+        at: AstPlace,
         value: i64,
         field: Field,
         span: Span,
         what: &str,
-    ) -> Result<Constant, Reported> {
+    ) -> Result<Constant, ErrorReported> {
         let most = field.bits().max();
         match u32::try_from(value) {
             Ok(value) if value <= most => Ok(Constant::Value(value)),
@@ -640,7 +711,12 @@ impl Resolver<'_> {
     }
 
     /// Offset and base of a memory operand.
-    fn memory(&mut self, at: At, operand: Operand, row: &Row) -> Result<(u32, RegisterId), Reported> {
+    fn memory(
+        &mut self,
+        at: AstPlace,
+        operand: Operand,
+        row: &Row,
+    ) -> Result<(u32, RegisterId), ErrorReported> {
         let (place, given, meaning) = self.meaning(at, operand)?;
         let (value, span, base) = match (given.kind, meaning) {
             (OperandKind::Memory(memory), _) => {
@@ -681,16 +757,16 @@ impl Resolver<'_> {
                 (value, given.span, RegisterId::ZERO)
             }
         };
-        // If the data does not fit, addresses in it are no errors of their own.
+        // If the data does not fit, its addresses are no errors of their own.
         if self.is_full && self.table_of(place, given.kind).is_some() {
-            return Err(Reported);
+            return Err(ErrorReported);
         }
         match self.field(at, value, Field::Offset, span, "an offset")? {
             Constant::Value(offset) => {
                 self.check_address(at, (place, given), offset, base, span);
                 Ok((offset, base))
             }
-            _ => Err(Reported),
+            _ => Err(ErrorReported),
         }
     }
 }

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! One after another: the operations of a bundle on a machine with one slot.
+//! Serialisation: the operations of a bundle, one after another, on a machine with one slot.
 
 use crate::ir::{Constant, Operation, RegisterId, VirtualRegister};
-use crate::report::diag::Diagnostic;
+use takt_diagnostics::diag::Diagnostic;
 use takt_isa::Machine;
 use takt_isa::spec::instructions::Effect;
 
-/// Makes the diagnostic, if it is reported.
+/// Builds the diagnostic if it is to be reported.
 pub(crate) type Explain<'o> = Box<dyn FnOnce(&[VirtualRegister], &Machine) -> Diagnostic + 'o>;
 
-/// The error of a bundle in which two operations write one register.
+/// The error of a bundle with two operations that write one register.
 pub(crate) fn twice(operations: &[Operation]) -> Option<Explain<'_>> {
     for (index, operation) in operations.iter().enumerate() {
         let Some(dest) = operation.dest else { continue };
@@ -24,7 +24,7 @@ pub(crate) fn twice(operations: &[Operation]) -> Option<Explain<'_>> {
     None
 }
 
-/// An order of a bundle's operations that means, one after another, what they mean together: all read before any writes.
+/// A sequential order of a bundle's operations with the same effect as together, where all read before any writes.
 pub(crate) fn order(operations: &[Operation]) -> Result<Vec<usize>, Explain<'_>> {
     if let Some(explain) = twice(operations) {
         return Err(explain);
@@ -34,7 +34,7 @@ pub(crate) fn order(operations: &[Operation]) -> Result<Vec<usize>, Explain<'_>>
     {
         return Err(Box::new(move |_, machine| {
             let message =
-                format!("{} has one slot, and what a raw word reads and writes is not known", machine.name);
+                format!("{} has one slot, and the operands of a raw word are unknown", machine.name);
             Diagnostic::error("bundle-order", raw.span, message).help("write it as a bundle of its own")
         }));
     }
@@ -45,7 +45,7 @@ pub(crate) fn order(operations: &[Operation]) -> Result<Vec<usize>, Explain<'_>>
             Diagnostic::error("bundle-order", second.span, message).also(first.span, "the other")
         }));
     }
-    // Repeatedly the first, in the order of the source, that no other must precede.
+    // Repeatedly take the first operation in source order that no other must precede.
     let mut left: Vec<usize> = (0..operations.len()).collect();
     let mut order = Vec::with_capacity(operations.len());
     while !left.is_empty() {
@@ -63,7 +63,7 @@ pub(crate) fn order(operations: &[Operation]) -> Result<Vec<usize>, Explain<'_>>
     Ok(order)
 }
 
-/// True if an operation must come before another of its bundle.
+/// An operation must come before another of its bundle.
 fn precedes(first: &Operation, second: &Operation) -> bool {
     let effects = (first.row().effect, second.row().effect);
     let overwritten = second.dest.is_some_and(|dest| first.reads().contains(&dest));
@@ -73,7 +73,7 @@ fn precedes(first: &Operation, second: &Operation) -> bool {
         || second.redirects()
         // A load reads before a store writes.
         || effects == (Effect::Load, Effect::Store)
-        // The flags of earlier operations do not include those of this bundle.
+        // A read of the flags sees earlier operations, not this bundle.
         || effects == (Effect::ReadFlags, Effect::ClearFlags)
         || (early(effects.0) && !early(effects.1))
 }
@@ -95,9 +95,9 @@ fn cycle(
 ) -> Diagnostic {
     let first = &operations[left[0]];
     let message =
-        format!("{} has one slot, and there is no order for the operations of this bundle", machine.name);
+        format!("{} has one slot, and no order of this bundle's operations keeps its meaning", machine.name);
     let mut error = Diagnostic::error("bundle-order", first.span, message);
-    // Each of these reads what another writes.
+    // Each of these reads a register that another writes.
     for &index in left {
         let reader = &operations[index];
         for &other in left {

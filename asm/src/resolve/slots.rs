@@ -2,18 +2,23 @@
 //! Slots that the source names, and the slots of a bundle's operations.
 
 use super::{Host, Resolver};
-use crate::context::{At, Reported};
+use crate::context::{AstPlace, ErrorReported};
 use crate::ir::matching::{self, Conflict};
 use crate::ir::{Constant, Operation, RegisterId};
-use crate::report::diag::Diagnostic;
-use crate::report::nearest;
-use crate::report::source::Span;
-use crate::syntax::name::NameId;
+use takt_diagnostics::diag::Diagnostic;
+use takt_diagnostics::nearest;
+use takt_diagnostics::source::Span;
 use takt_isa::{Op, Row, SlotIndex, Slots};
+use takt_syntax::name::NameId;
 
 impl Resolver<'_> {
-    /// The slot of a name.
-    pub(super) fn named_slot(&mut self, at: At, name: &str, span: Span) -> Result<SlotIndex, Reported> {
+    /// The slot with a name.
+    pub(super) fn named_slot(
+        &mut self,
+        at: AstPlace,
+        name: &str,
+        span: Span,
+    ) -> Result<SlotIndex, ErrorReported> {
         let slots = self.ir.machine.slots;
         if let Some((index, _)) = self.ir.machine.numbered_slots().find(|(_, slot)| slot.name == name) {
             return Ok(index);
@@ -27,13 +32,13 @@ impl Resolver<'_> {
         Err(self.context.report(at.scope, error))
     }
 
-    /// The instruction of a mnemonic that names its slot, as `fadd.aux`, and that slot.
+    /// The instruction and the slot of a mnemonic that names its slot, as `fadd.aux`.
     pub(super) fn pinned(
         &mut self,
-        at: At,
+        at: AstPlace,
         name: NameId,
         span: Span,
-    ) -> Result<Option<(Op, Slots)>, Reported> {
+    ) -> Result<Option<(Op, Slots)>, ErrorReported> {
         let text = self.context.scopes.text(name);
         let Some((op, slot)) = text
             .split_once('.')
@@ -44,7 +49,7 @@ impl Resolver<'_> {
         Ok(Some((op, Slots::of(self.named_slot(at, &slot, span)?))))
     }
 
-    /// Names of slots, as a message lists them.
+    /// Lists slots by name, for a message.
     fn names(&self, slots: Slots) -> String {
         let names: Vec<String> =
             slots.iter().map(|slot| format!("`{}`", self.ir.machine.slot(slot).name)).collect();
@@ -54,29 +59,29 @@ impl Resolver<'_> {
         }
     }
 
-    /// An instruction's slot is named, and hosts no unit for it.
+    /// Reports that an instruction's named slot hosts no unit for it.
     pub(super) fn not_hosted(
         &mut self,
-        at: At,
+        at: AstPlace,
         row: &Row,
         hosts: Slots,
         named: Slots,
         span: Span,
-    ) -> Reported {
+    ) -> ErrorReported {
         let message = format!("slot {} has no unit for `{}`", self.names(named), row.mnemonic);
         let plural = if hosts.len() == 1 { "slot" } else { "slots" };
         let note = format!("{}: {plural} {}", self.ir.machine.name, self.names(hosts));
         self.context.report(at.scope, Diagnostic::error("no-unit", span, message).note(note))
     }
 
-    /// The slots that may execute an instruction, or the one that the source names; none if any can.
+    /// The slots that may execute an instruction, or the slot that the source names; empty if any can.
     pub(super) fn hosting(
         &mut self,
-        at: At,
+        at: AstPlace,
         op: Op,
         named: Option<Slots>,
         span: Span,
-    ) -> Result<Slots, Reported> {
+    ) -> Result<Slots, ErrorReported> {
         let row = op.row();
         match (self.slots[op as usize], named) {
             (Host::Any, named) => Ok(named.unwrap_or_default()),
@@ -96,16 +101,20 @@ impl Resolver<'_> {
         }
     }
 
-    /// Of these slots the one that writes a register which has its place, if it is among them; otherwise all.
+    /// The slot that writes a pinned register, if it is among `slots`; otherwise all of them.
     pub(super) fn writing(&self, slots: Slots, dest: Option<RegisterId>) -> Slots {
         let place = dest.and_then(|dest| self.context.declared.registers[dest.index()].pinned);
         let writer = place.map(|place| self.ir.machine.writers(place).and(slots));
         writer.filter(|writer| !writer.is_empty()).unwrap_or(slots)
     }
 
-    /// Gives each operation of a bundle a slot. More of them than there are slots for them is a mistake.
-    pub(super) fn assign_slots(&mut self, at: At, operations: &mut [Operation]) -> Result<(), Reported> {
-        // Most bundles leave no choice, and their operations have the slots that they are to have.
+    /// Gives each operation of a bundle a slot, and reports operations that compete for too few slots.
+    pub(super) fn assign_slots(
+        &mut self,
+        at: AstPlace,
+        operations: &mut [Operation],
+    ) -> Result<(), ErrorReported> {
+        // In most bundles no operation has a choice, and all have their slots already.
         let mut taken = Slots::default();
         let is_settled = |operation: &Operation| {
             let is_free = operation.slots.len() == 1 && taken.and(operation.slots).is_empty();
@@ -148,8 +157,8 @@ impl Resolver<'_> {
         result
     }
 
-    /// Operations of a bundle, one more than the slots that can take them.
-    fn conflict(&mut self, at: At, competing: &[&Operation], slots: Slots) -> Reported {
+    /// Reports operations of a bundle that are one more than the slots that can take them.
+    fn conflict(&mut self, at: AstPlace, competing: &[&Operation], slots: Slots) -> ErrorReported {
         let (needs, named) = match slots.len() {
             1 => ("needs it", format!("slot {}", self.names(slots))),
             _ => ("needs one of them", format!("slots {}", self.names(slots))),
@@ -160,7 +169,7 @@ impl Resolver<'_> {
         };
         let count = if competing.len() == 2 { "two".to_owned() } else { competing.len().to_string() };
         let message = format!("{count} operations of the bundle need {named}");
-        let [others @ .., last] = competing else { return Reported };
+        let [others @ .., last] = competing else { return ErrorReported };
         let mut error =
             Diagnostic::error("slot-conflict", last.span, message).here(format!("`{}` {needs}", what(last)));
         for other in others {

@@ -1,60 +1,59 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Sums whose bounds depend on the index of a loop that runs: they are loops themselves. A part of
-//! [`expression`](crate::resolve::expression).
+//! Sums as loops: their bounds depend on the index of a loop that runs. A part of [`expression`](crate::resolve::expression).
 
-use crate::context::loops::{Counted, Index, SourceLoop, SourceLoopId, TooMany};
-use crate::context::{At, Reported, ScopeKind};
+use crate::context::loops::{AffineInteger, Index, IterationLimitExceeded, SourceLoop, SourceLoopId};
+use crate::context::{AstPlace, ErrorReported, ScopeKind};
 use crate::expand::equation::SUM;
 use crate::expand::loops::{Count, Share};
 use crate::ir::RegisterId;
 use crate::ir::arrays::{Affine, LoopId};
-use crate::ir::given::Kind;
+use crate::ir::type_evidence::Kind;
 use crate::limits;
-use crate::report::diag::Diagnostic;
-use crate::report::source::Span;
 use crate::resolve::Resolver;
 use crate::resolve::loops::LoopStart;
 use crate::resolve::term::{CurrentEquation, Term, TermForm};
-use crate::syntax::ast::*;
-use crate::syntax::expr::Value;
-use crate::syntax::name::NameId;
+use takt_diagnostics::diag::Diagnostic;
+use takt_diagnostics::source::Span;
 use takt_isa::Type;
+use takt_syntax::ast::*;
+use takt_syntax::expr::Value;
+use takt_syntax::name::NameId;
 
 /// A sum that is a loop, whose term is being computed.
 pub(super) struct CountedSum {
     /// The place of the sum.
-    at: At,
+    at: AstPlace,
     id: LoopId,
-    /// The first bundle of what the loop needs, and the last one before its body.
+    /// First bundle of the loop's setup, and the last one before its body.
     start: usize,
     setup: usize,
-    /// True if there may be nothing to add up.
+    /// The sum may have no terms.
     may_be_empty: bool,
     name: String,
     span: Span,
 }
 
 impl Resolver<'_> {
-    /// Begins the loop of a sum; `None` if there is never anything to add up.
+    /// Begins the loop of a sum; `None` if the sum never has terms.
     pub(super) fn begin_sum(
         &mut self,
-        at: At,
+        at: AstPlace,
         line: &mut CurrentEquation,
         variable: NameId,
         [first, last]: [Expr; 2],
         span: Span,
-    ) -> Result<Option<(CountedSum, At)>, Reported> {
+    ) -> Result<Option<(CountedSum, AstPlace)>, ErrorReported> {
         let beyond =
             |resolver: &mut Self| resolver.context.error(at.scope, "range", span, "a range beyond 64 bits");
         let first = self.context.counted(at, first)?;
         let last = self.context.counted(at, last)?;
-        let count = last.plus(&first, -1).and_then(|count| count.plus(&Counted::constant(1), 1));
+        let count = last.plus(&first, -1).and_then(|count| count.plus(&AffineInteger::constant(1), 1));
         let count = count.ok_or_else(|| beyond(self))?;
         let around = self.context.loops_around(at.scope);
         let range = match self.context.extremes(&around, &count.source) {
             Ok(Some(range)) => range,
             Ok(None) => [0, 0],
-            Err(TooMany) => {
+            Err(IterationLimitExceeded) => {
                 let message = "this nest has too many iterations for its subscripts to be checked";
                 return Err(self.context.error(at.scope, "limit", span, message));
             }
@@ -69,7 +68,7 @@ impl Resolver<'_> {
         let source = SourceLoopId(self.context.declared.loops.len() as u32);
         self.context.declared.loops.push(SourceLoop { most: count.source.clone() });
         let id = self.new_loop(span);
-        let one = Counted::new(Affine::iteration(source, 1), Affine::iteration(id, 1));
+        let one = AffineInteger::new(Affine::iteration(source, 1), Affine::iteration(id, 1));
         let value = first.plus(&one, 1).ok_or_else(|| beyond(self))?;
         let start = self.ir.bundles.len();
         let name = self.context.scopes.text(variable).to_owned();
@@ -81,7 +80,7 @@ impl Resolver<'_> {
         let kind = ScopeKind::For(variable, index);
         let scope = self.context.scopes.open(at.scope, at.scope, kind, span);
         let sum = CountedSum { at, id, start, setup, may_be_empty: range[0] < 1, name, span };
-        Ok(Some((sum, At { scope, ..at })))
+        Ok(Some((sum, AstPlace { scope, ..at })))
     }
 
     /// Adds the term and ends the loop.
@@ -90,7 +89,7 @@ impl Resolver<'_> {
         line: &mut CurrentEquation,
         sum: CountedSum,
         term: Term,
-    ) -> Result<Term, Reported> {
+    ) -> Result<Term, ErrorReported> {
         let CountedSum { at, id, start, setup, may_be_empty, name, span } = sum;
         let term = self.settled(at, line, term)?;
         let kind = match term.form {
@@ -100,13 +99,13 @@ impl Resolver<'_> {
             _ => Kind::Float,
         };
         let ty = if kind == Kind::Int { Type::I } else { Type::F };
-        let total = self.total(format!("{name}.sum"), ty, start, span);
+        let total = self.named_register(format!("{name}.sum"), ty, span);
         let here = (span, ExprId { first: 0, count: 0 });
         let so_far = Term { form: TermForm::Register(total, kind), span };
         self.operate(at, line, Operator::Add.text(), &[so_far, term], here, Kind::None)?;
         self.redirect(line, total);
         self.end_loop(at, line, id)?;
-        // What a sum starts from leaves its first term as it is: -0 of floats. Of no terms it is 0.
+        // The start value must not change the first term: -0 for floats. A sum without terms is 0.
         let from = if ty == Type::I { 0.0f32 } else { -0.0 };
         self.set_before(at, line, total, from.to_bits(), setup, span)?;
         if may_be_empty {
@@ -115,16 +114,16 @@ impl Resolver<'_> {
         Ok(Term { form: TermForm::Register(total, kind), span })
     }
 
-    /// Sets a register to a constant before a bundle that is there already.
+    /// Sets a register to a constant before an existing bundle.
     fn set_before(
         &mut self,
-        at: At,
+        at: AstPlace,
         line: &mut CurrentEquation,
         register: RegisterId,
         bits: u32,
         before: usize,
         span: Span,
-    ) -> Result<(), Reported> {
+    ) -> Result<(), ErrorReported> {
         let from = self.pooled(bits, span);
         let term = Term { form: TermForm::Register(from, Kind::Any), span };
         self.copy(at, line, term, Type::B, Some(register))?;

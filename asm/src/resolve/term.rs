@@ -4,26 +4,26 @@
 use crate::expand::Fast;
 use crate::expand::equation::Results;
 use crate::ir::arrays::Affine;
-use crate::ir::given::Kind;
+use crate::ir::type_evidence::Kind;
 use crate::ir::{Attribution, RegisterId};
-use crate::report::source::Span;
 use crate::resolve::common_subexpressions::Key;
-use crate::syntax::ast::ExprId;
-use crate::syntax::expr::Value;
+use takt_diagnostics::source::Span;
+use takt_syntax::ast::ExprId;
+use takt_syntax::expr::Value;
 
 /// The present part of a line, and its expression.
-pub(super) type Here = (Span, ExprId);
+pub(super) type LineExpression = (Span, ExprId);
 
 /// The form of an operand in an equation.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum TermForm {
     /// A constant, and its expression.
     Constant(Value, ExprId),
-    /// A register and what is known of its type.
+    /// A register and its type, if known.
     Register(RegisterId, Kind),
-    /// A sum or a product that is still to be computed: which of the line's, and its type.
+    /// A sum or a product that is still to be computed: its index in the line, and its type.
     Chain(usize, Kind),
-    /// An affine function of the indices of loops that run: which of the line's.
+    /// An affine function of the indices of loops that run: its index in the line.
     Counted(usize),
 }
 
@@ -67,7 +67,7 @@ pub(super) struct CurrentEquation {
 }
 
 impl CurrentEquation {
-    /// One of a line, given where it stands and whether it is scheduled.
+    /// An equation on a line, given its attribution and whether it is scheduled.
     pub(super) fn new((location, scheduled): (Attribution, bool)) -> CurrentEquation {
         let (results, fast) = (Results::default(), Fast::default());
         let (computed, chains, counted) = (Vec::new(), Vec::new(), Vec::new());
@@ -79,6 +79,6 @@ impl CurrentEquation {
 #[derive(Clone, Debug)]
 pub(super) struct Chain {
     pub(super) is_product: bool,
-    /// Its terms, each with true if it is subtracted; or its factors.
+    /// Terms, each with true if it is subtracted; or factors.
     pub(super) terms: Vec<(Term, bool)>,
 }

@@ -8,31 +8,34 @@ use std::collections::{BTreeMap, BTreeSet};
 use takt_isa::timing::Reservation;
 use takt_isa::{Machine, SlotIndex, Slots};
 
-/// Thresholds that the bound of a resource tries.
+/// The most tail lengths that the bound of a resource tries as thresholds; of more, it takes an even sample.
 const TAILS: usize = 128;
 
 /// The most sets of slots, or of units, that are examined: far more than a machine's functions make.
 const SETS: usize = 64;
 
-/// No schedule can be shorter than the largest of these, in cycles from the block's first issue to its last.
+/// Lower bounds of a block's length, in cycles from its first issue to its last, both included. The largest counts.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Bound {
-    /// The longest chain of dependent operations.
+    /// Longest chain of dependent operations.
     pub critical_path: u32,
-    /// For each slot, the operations that only it can issue, with what must precede the first and follow the last.
+    /// By slot: cycles to issue the operations that only this slot can take, plus the head before the first and the tail after
+    /// the last.
     pub slots: Vec<u32>,
-    /// For each unit, likewise, with the unit's interval.
+    /// By unit, slot after slot: cycles to issue the operations that only this unit can take, one per initiation interval, plus
+    /// head and tail.
     pub units: Vec<u32>,
-    /// Likewise for slots and for units that can take one another's operations: those that only they can take, together.
+    /// Bounds of sets of slots, and of units, for the operations that only members of the set can take.
     pub shared: Vec<SharedBound>,
-    /// The bound that the exact search proved: a shorter schedule leaves some operation no cycle. 0 if it is not better.
+    /// Bound that the exact search proved: a shorter schedule leaves some operation no cycle. 0 if it is not better than the
+    /// others.
     pub windows: u32,
 }
 
 /// A [`Bound`] of several slots or units together.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SharedBound {
-    /// The resources.
+    /// Slots or units that share the operations.
     pub resources: Resources,
     /// The bound, in cycles.
     pub cycles: u32,
@@ -48,7 +51,7 @@ pub enum Resources {
 }
 
 impl Resources {
-    /// Their names on a machine: `slot add`, `slots add+aux`, `unit divroot`, `units add.add+aux.add`.
+    /// Names on a machine: `slot add`, `slots add+aux`, `unit divroot`, `units add.add+aux.add`.
     pub fn text(&self, machine: &Machine) -> String {
         match self {
             Resources::Slots(slots) => {
@@ -81,7 +84,7 @@ impl Resources {
 }
 
 impl Bound {
-    /// The largest of the bounds.
+    /// The largest bound, in cycles.
     pub fn cycles(&self) -> u32 {
         let shared = self.shared.iter().map(|shared| shared.cycles);
         self.slots
@@ -92,7 +95,7 @@ impl Bound {
             .fold(self.critical_path.max(self.windows), u32::max)
     }
 
-    /// The operations that the slots or units of a shared bound have to issue.
+    /// Number of operations that only these slots or units can issue.
     pub(super) fn operations(problem: &Problem, resources: &Resources) -> usize {
         let issued = |(_, index): &(usize, usize), task: &Task| match resources {
             Resources::Slots(slots) => task.slots(*index).is_within(*slots),
@@ -106,12 +109,12 @@ impl Bound {
     }
 }
 
-/// The units that an operation's choices use; empty if one choice needs none.
+/// The units that an operation's choices use; empty if any choice needs no unit.
 fn units_of<'p>(uses: impl Iterator<Item = &'p Reservation>) -> BTreeSet<usize> {
     uses.map(|usage| usage.unit.map(usize::from)).collect::<Option<BTreeSet<usize>>>().unwrap_or_default()
 }
 
-/// Sets, and the unions of those that have members in common.
+/// The given sets and the unions of overlapping ones, at most [`SETS`] in all.
 pub(super) fn unions(sets: impl Iterator<Item = BTreeSet<usize>>) -> Vec<BTreeSet<usize>> {
     let mut all: Vec<BTreeSet<usize>> = Vec::new();
     for set in sets.collect::<BTreeSet<_>>() {
@@ -133,7 +136,8 @@ impl Problem {
         bound(self, &Graph::new(self).chains())
     }
 
-    /// Keeps every task behind those that stand `reach` tasks or more before it. Returns the bound without that.
+    /// Keeps every task from issuing before the task that stands `reach` places ahead of it. Returns the bound without these
+    /// edges.
     pub(super) fn keep_near(&mut self, reach: usize) -> Bound {
         let bound = self.bound();
         let edge = |to: usize| Edge { from: to - reach, to, distance: 0, latency_of: None, demanded: false };
@@ -148,7 +152,7 @@ pub(super) fn bound(problem: &Problem, chains: &Chains) -> Bound {
     let critical_path =
         (0..tasks.len()).map(|i| chains.head[i] + chains.tail[i] + 1).max().unwrap_or_default();
     let mut intervals = vec![1; problem.units];
-    // Operations by the slots and by the units that can take them: the task, as often as it has such operations.
+    // Operations by the slots, and by the units, that can take them; a task appears once for each of its operations.
     let mut by_slots: BTreeMap<BTreeSet<usize>, Vec<usize>> = BTreeMap::new();
     let mut by_units: BTreeMap<BTreeSet<usize>, Vec<usize>> = BTreeMap::new();
     for (i, task) in tasks.iter().enumerate() {
@@ -195,9 +199,9 @@ pub(super) fn bound(problem: &Problem, chains: &Chains) -> Bound {
     }
 }
 
-/// The bound of operations that share resources, each of which takes one every so many cycles (`intervals`): after the earliest
-/// of them can start, the cycles that it takes to issue them all, and what follows the last; taken over the subsets that start
-/// late and end early enough to matter. `members` are their tasks.
+/// Bound of operations that share resources with the initiation intervals `intervals`: the earliest head, the cycles to issue
+/// all of them, and the shortest tail; maximised over subsets with late heads and long tails. `members` are the tasks of the
+/// operations.
 fn together(chains: &Chains, members: Vec<usize>, intervals: &[u32]) -> u32 {
     let mut by_head = members;
     by_head.sort_by_key(|&i| Reverse(chains.head[i]));

@@ -7,30 +7,30 @@ use super::bound::{Bound, Resources};
 use super::problem::{Edge, Problem};
 use crate::ir::runs::Run;
 use crate::ir::{Bundle, Demand, DemandKind, Ir, Operation, RegisterId, RegisterKind};
-use crate::report::diag::{Diagnostic, Sink};
-use crate::report::source::Span;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
+use takt_diagnostics::diag::{Diagnostic, Sink};
+use takt_diagnostics::source::Span;
 use takt_isa::SlotIndex;
 
-/// The most pairs of reads and writes that the orders of a run may give: far more than a port is used.
+/// The most pairs of reads and writes that the orders of a run may give: far more than programs use.
 const ORDER_EDGES: usize = 1 << 16;
 
 /// Places of a chain of operations that an error points at.
 const SHOWN: usize = 8;
 
-/// The times that meet a demand; those of the `.late` directives of a run are one.
+/// Times at which a demand is met. All `.late` directives of a run share one report.
 #[derive(Clone, Debug)]
 pub struct TimingReport {
     /// The kind of demand.
     pub kind: DemandKind,
-    /// True if of `.period`, else of `.once`.
+    /// The section is `.period`, not `.once`.
     pub period: bool,
-    /// For each port its name and the cycles in which it was first and last read, or written. The first bundle of the
-    /// section issues in cycle 1; in a later run of bundles that of the run does.
+    /// By port: name, and the cycles of its first and last read or write. The first bundle of the section issues in cycle 1;
+    /// a later run of bundles has a cycle 1 of its own.
     pub ports: Vec<(String, u32, u32)>,
-    /// For inputs read late: cycles from the first read to the last write of an output that depends on one, and what no
-    /// schedule can be shorter than.
+    /// For inputs read late: cycles from the first read to the last write of a dependent output, and the lower bound of this
+    /// window.
     pub window: Option<(u32, u32)>,
 }
 
@@ -43,7 +43,7 @@ struct Event {
     span: Span,
 }
 
-/// The demands of each run, by index. Those that belong to no single run are reported.
+/// The demands of each run, by index. A demand that spans several runs is reported.
 pub(super) fn assign(ir: &Ir, runs: &[Run], sink: &mut Sink) -> Vec<Vec<usize>> {
     let mut assigned = vec![Vec::new(); runs.len()];
     if ir.demands.is_empty() {
@@ -52,7 +52,7 @@ pub(super) fn assign(ir: &Ir, runs: &[Run], sink: &mut Sink) -> Vec<Vec<usize>> 
     for (number, demand) in ir.demands.iter().enumerate() {
         let is_of_section = |run: &&Run| (run.start >= ir.period as usize) == demand.period;
         let section = if demand.period { ".period" } else { ".once" };
-        // The runs that use each port, and where first.
+        // Runs that use each port, with the place of the first use.
         let mut users: Vec<(usize, RegisterId, Span)> = Vec::new();
         for (index, run) in runs.iter().enumerate().filter(|(_, run)| is_of_section(run)) {
             let operations = ir.bundles[run.start..run.end].iter().flat_map(|bundle| &bundle.operations);
@@ -107,7 +107,7 @@ pub(super) fn assign(ir: &Ir, runs: &[Run], sink: &mut Sink) -> Vec<Vec<usize>> 
     assigned
 }
 
-/// True if an operation reads an input port, or writes an output port. (Reads of an output are not visible outside.)
+/// An operation reads an input port, or writes an output port. (Reads of an output are invisible outside.)
 fn uses(ir: &Ir, operation: &Operation, port: RegisterId) -> bool {
     match ir.register(port).kind {
         RegisterKind::Output => operation.dest == Some(port),
@@ -119,7 +119,7 @@ fn uses(ir: &Ir, operation: &Operation, port: RegisterId) -> bool {
 pub(super) struct Demands<'a> {
     ir: &'a Ir,
     bundles: &'a [Bundle],
-    /// The demands of the run, as indices into those of the program.
+    /// Demands of the run, as indices into the program's demands.
     of: &'a [usize],
 }
 
@@ -135,7 +135,7 @@ impl<'a> Demands<'a> {
             for (index, operation) in self.bundles[origin].operations.iter().enumerate() {
                 let span = operation.span;
                 if uses(self.ir, operation, port) {
-                    // The same for every choice of slots: ports are written by the quickest ([`Domains`](super::domains::Domains)).
+                    // Equal for every choice of slots: ports are written by the quickest ([`Domains`](super::domains::Domains)).
                     let written = || block.problem.tasks[task].written(index).unwrap_or(0);
                     let after = if operation.dest == Some(port) { written() } else { 0 };
                     events.push(Event { task, after, span });
@@ -150,7 +150,7 @@ impl<'a> Demands<'a> {
         &self.ir.register(port).name
     }
 
-    /// Adds the demands to a problem. False if one cannot be met, which is reported.
+    /// Adds the demands to a problem. False, with a report, if one cannot be met.
     pub(super) fn apply(&self, block: &mut Block, sink: &mut Sink) -> bool {
         self.order(block, sink) && {
             let mut possible = true;
@@ -195,7 +195,7 @@ impl<'a> Demands<'a> {
             }
             for (at, pair) in demand.ports.windows(2).enumerate() {
                 let (before, after) = (self.events(block, pair[0].0), self.events(block, pair[1].0));
-                // Of writes, which keep their own order, the last and the first are enough.
+                // Writes keep their own order, so the last and the first are enough.
                 let writes = |events: &[Event]| events.iter().all(|event| event.after > 0);
                 let before =
                     if writes(&before) { &before[before.len().saturating_sub(1)..] } else { &before };
@@ -211,7 +211,8 @@ impl<'a> Demands<'a> {
             }
         }
         for (demand, at, x, y) in &ordered {
-            // `y` happens after `x` does. That it also issues no sooner is more than is asked, and keeps bundles in order.
+            // `y` happens after `x`. An earlier issue of `y` is forbidden, too: this asks for more than the demand, and keeps
+            // bundles in order.
             let distance = (x.after + 1).saturating_sub(y.after);
             if x.task == y.task {
                 self.contradiction(demand, *at, x, y, "one bundle uses both", sink);
@@ -255,7 +256,7 @@ impl<'a> Demands<'a> {
         sink.push(error.note("operations wait for results, memory accesses, faults and other orders"));
     }
 
-    /// True if lower bounds let a port be written by a cycle; if not, reports the chain or the resource that prevents it.
+    /// Lower bounds allow a write of the port by cycle `limit`; if not, the chain or the resource that prevents it is reported.
     fn can_meet(
         &self,
         block: &Block,
@@ -354,7 +355,7 @@ impl<'a> Demands<'a> {
                             error = error
                                 .also(event.span, "written here")
                                 .note(format!("by itself it cannot be written before cycle {bound}"));
-                            // No order of the operations makes it.
+                            // No order of the operations meets the limit.
                             if bound > limit {
                                 error = error.help(later(bound));
                             }
@@ -387,7 +388,7 @@ fn later(cycles: u32) -> String {
     format!("allow cycle {cycles} or later, or compute less before it")
 }
 
-/// Topological sort of the tasks, else in their order. False if there is a cycle.
+/// Topological sort of the tasks that otherwise keeps their order. False on a cycle.
 fn sort(block: &mut Block) -> bool {
     let n = block.problem.tasks.len();
     let mut succs = vec![Vec::new(); n];

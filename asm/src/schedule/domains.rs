@@ -7,7 +7,8 @@ use crate::ir::{Bundle, Ir, Operation, RegisterId, RegisterKind};
 use std::collections::{BTreeMap, HashMap};
 use takt_isa::{SlotIndex, Slots};
 
-/// So many registers that outlive their block and have a choice of banks are left to the blocks, which take the slot that is free first.
+/// Registers that outlive their block and have a choice of banks: up to this number, the blocks choose, and take the slot that is
+/// free first.
 const FEW: usize = 32;
 
 /// For each register that several operations write, the slots that all of them may have.
@@ -20,14 +21,14 @@ pub(super) struct Domains {
 struct Writers {
     /// The slots that may execute all of them.
     able: Slots,
-    /// The last run that has one.
+    /// Last run with a writer.
     run: usize,
     count: u32,
-    /// True if they keep their slots.
+    /// The writers keep the slots that they have.
     stay: bool,
-    /// True if one of them shares its bundle with others.
+    /// A writer shares its bundle with other operations.
     bundled: bool,
-    /// The slot that they have.
+    /// Slot of the first writer.
     slot: SlotIndex,
 }
 
@@ -94,7 +95,7 @@ impl Domains {
         let (open, settled): (Vec<_>, Vec<_>) = able.into_iter().partition(|(_, slots)| slots.len() > 1);
         settled.iter().filter_map(|(_, slots)| slots.first()).for_each(|slot| room[slot.index()] -= 1);
         for (register, slots) in open {
-            // The first of equals.
+            // Ties go to the first slot.
             let roomiest = slots.iter().rev().max_by_key(|slot| room[slot.index()]);
             if let Some(slot) = roomiest {
                 room[slot.index()] -= 1;
@@ -103,8 +104,8 @@ impl Domains {
         }
     }
 
-    /// The slots that may execute an operation; for one that writes an output port, those with the least latency: the port's demands
-    /// count on that.
+    /// Slots that may execute an operation. Writes of an output port go to the slots of least latency, on which the port's demands
+    /// count.
     pub(super) fn able(&self, ir: &Ir, operation: &Operation) -> Slots {
         let Some(dest) = operation.dest else { return operation.slots };
         let slots = self.of.get(&dest).map_or(operation.slots, |slots| slots.and(operation.slots));

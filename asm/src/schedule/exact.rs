@@ -13,31 +13,34 @@ use super::graph::Graph;
 use super::list::Plan;
 use super::random::Random;
 use super::reservations::{Direction, Reservations};
-use super::time_windows::{Empty, Propagation, TimeWindows};
+use super::time_windows::{Propagation, Stop, TimeWindows};
 
 /// The longest block that is searched, in tasks.
 const TASKS: usize = 2000;
 
-/// Edges and members that propagation may visit for a unit of effort.
-const WORK_PER_EFFORT: u64 = 8_000_000;
+/// Steps charged for a schedule that violates a unit's initiation interval, in addition to the steps of its decisions: such a
+/// schedule ends a round of the search, however short.
+const WASTED: u64 = 2000;
 
 /// Dead ends before the first restart; before each further one half as many again.
 const DEAD_ENDS: u64 = 64;
 
 /// The result of a search.
 pub(super) struct ExactResult {
-    /// No schedule is shorter.
+    /// Proved lower bound of the length, in cycles.
     pub(super) bound: u32,
     /// The shortest schedule that was found, if one was.
     pub(super) plan: Option<Plan>,
+    /// Steps of the search.
+    pub(super) steps: u64,
 }
 
 /// The task that a search decides on next.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Branch {
-    /// The most urgent of those that can issue first: this finds good schedules.
+    /// The most urgent task that can issue first: finds good schedules.
     Earliest,
-    /// One with the smallest window (fail first): this proves soon that there is no schedule.
+    /// A task with the smallest window (fail first): soon proves that no schedule exists.
     Narrowest,
 }
 
@@ -67,73 +70,70 @@ impl Decision {
 }
 
 /// The end of a search for a schedule of one length.
-enum Found {
+enum SearchOutcome {
     Schedule(Plan),
     /// No schedule has this length.
     Nothing,
-    /// The work that was allowed is done.
+    /// The allowed work is done.
     Unknown,
 }
 
-/// Searches for schedules shorter than `length`, down to `least`; `None` if there is nothing to search.
-pub(super) fn search(graph: &Graph<'_>, least: u32, length: u32, effort: u32) -> Option<ExactResult> {
+/// Searches for schedules shorter than `length`, down to `least`, for `allowed` steps; `None` if there is nothing to search.
+pub(super) fn search(graph: &Graph<'_>, least: u32, length: u32, allowed: u64) -> Option<ExactResult> {
     let tasks = &graph.problem.tasks;
-    if tasks.len() > TASKS || effort == 0 || least >= length {
+    if tasks.len() > TASKS || allowed == 0 || least >= length {
         return None;
     }
-    let allowed = u64::from(effort) * WORK_PER_EFFORT;
-    // With deadlines, that no schedule meets them says nothing of schedules that miss them.
+    // An infeasible length is a lower bound only without deadlines: a schedule that misses them may still be that short.
     let timeless = tasks.iter().all(|task| task.latest.is_none());
     let mut exact = ExactSearch {
         graph,
-        propagation: Propagation::new(graph),
-        allowed: allowed / 8,
+        propagation: Propagation::new(graph, allowed / 8),
         random: Random::new(),
         weights: vec![0; tasks.len()],
         lightest: graph.lightest(),
     };
-    let mut result = ExactResult { bound: least, plan: None };
+    let mut result = ExactResult { bound: least, plan: None, steps: 0 };
     while result.bound < length && !exact.is_feasible(result.bound) {
         result.bound += 1;
     }
-    exact.allowed = allowed / 3;
+    exact.propagation.allowed = allowed / 3;
     let mut length = length;
     while result.bound < length {
         match exact.search(result.bound, Branch::Narrowest) {
-            Found::Schedule(plan) => {
+            SearchOutcome::Schedule(plan) => {
                 length = plan.start.iter().max().map_or(0, |last| last + 1);
                 result.plan = Some(plan);
             }
-            Found::Nothing if timeless => result.bound += 1,
-            Found::Nothing | Found::Unknown => break,
+            SearchOutcome::Nothing if timeless => result.bound += 1,
+            SearchOutcome::Nothing | SearchOutcome::Unknown => break,
         }
     }
-    // The weights of a proof are not those of a schedule.
-    (exact.allowed, exact.random) = (allowed, Random::new());
+    // Weights learned by the proof do not serve the search for a schedule.
+    (exact.propagation.allowed, exact.random) = (allowed, Random::new());
     exact.weights.fill(0);
     while result.bound < length {
         match exact.search(length - 1, Branch::Earliest) {
-            Found::Schedule(plan) => {
+            SearchOutcome::Schedule(plan) => {
                 length = plan.start.iter().max().map_or(0, |last| last + 1);
                 result.plan = Some(plan);
             }
-            Found::Nothing => {
+            SearchOutcome::Nothing => {
                 if timeless {
                     result.bound = length;
                 }
                 break;
             }
-            Found::Unknown => break,
+            SearchOutcome::Unknown => break,
         }
     }
+    result.steps = exact.propagation.work;
     Some(result)
 }
 
 struct ExactSearch<'g, 'p> {
     graph: &'g Graph<'p>,
     propagation: Propagation<'g, 'p>,
-    /// The work at which it stops.
-    allowed: u64,
     random: Random,
     /// The number of conflicts in which each task was left no cycle.
     weights: Vec<i64>,
@@ -142,18 +142,17 @@ struct ExactSearch<'g, 'p> {
 }
 
 impl ExactSearch<'_, '_> {
-    fn is_spent(&self) -> bool {
-        self.propagation.work >= self.allowed
-    }
-
-    /// True if propagation does not prove that no schedule has so many cycles.
+    /// Neither propagation nor shaving excludes a schedule of `length` cycles.
     fn is_feasible(&mut self, length: u32) -> bool {
         let mut windows = TimeWindows::new(self.graph.problem, length, false);
-        self.propagation.narrow(&mut windows).and_then(|()| self.shave(&mut windows, self.allowed)).is_ok()
+        let allowed = self.propagation.allowed;
+        let narrowed = self.propagation.narrow(&mut windows).and_then(|()| self.shave(&mut windows, allowed));
+        !matches!(narrowed, Err(Stop::Empty { .. }))
     }
 
-    /// Cuts off the ends of windows at which propagation proves that a task cannot issue, until so much work is done.
-    fn shave(&mut self, windows: &mut TimeWindows, allowed: u64) -> Result<(), Empty> {
+    /// Shaving: cuts off the ends of windows at which propagation proves that a task cannot issue, until the work reaches
+    /// `allowed`.
+    fn shave(&mut self, windows: &mut TimeWindows, allowed: u64) -> Result<(), Stop> {
         let mut tasks: Vec<usize> = (0..windows.first.len()).collect();
         tasks.sort_by_key(|&task| windows.last[task] - windows.first[task]);
         loop {
@@ -171,8 +170,9 @@ impl ExactSearch<'_, '_> {
                         } else {
                             *first = *last
                         }
-                        if self.propagation.narrow(&mut supposed).is_ok() {
-                            break;
+                        match self.propagation.narrow(&mut supposed) {
+                            Err(Stop::Empty { .. }) => {}
+                            Ok(()) | Err(Stop::Spent) => break,
                         }
                         if early {
                             windows.first[task] += 1
@@ -189,26 +189,35 @@ impl ExactSearch<'_, '_> {
         }
     }
 
-    /// A schedule of at most so many cycles.
-    fn search(&mut self, length: u32, branch: Branch) -> Found {
+    /// Searches for a schedule of at most `length` cycles, with restarts.
+    fn search(&mut self, length: u32, branch: Branch) -> SearchOutcome {
         let mut root = TimeWindows::new(self.graph.problem, length, true);
-        let third = self.propagation.work + self.allowed.saturating_sub(self.propagation.work) / 3;
-        if self.propagation.narrow(&mut root).and_then(|()| self.shave(&mut root, third)).is_err() {
-            return Found::Nothing;
+        let Propagation { work, allowed, .. } = self.propagation;
+        let third = work + allowed.saturating_sub(work) / 3;
+        match self.propagation.narrow(&mut root).and_then(|()| self.shave(&mut root, third)) {
+            Ok(()) => {}
+            Err(Stop::Empty { .. }) => return SearchOutcome::Nothing,
+            Err(Stop::Spent) => return SearchOutcome::Unknown,
         }
         let mut dead_ends = DEAD_ENDS;
         for round in 0.. {
             match self.descend(root.clone(), branch, dead_ends, [0, 2, 4, 8][round % 4]) {
-                Found::Unknown if self.is_spent() => return Found::Unknown,
-                Found::Unknown => dead_ends += dead_ends / 2,
+                SearchOutcome::Unknown if self.propagation.is_spent() => return SearchOutcome::Unknown,
+                SearchOutcome::Unknown => dead_ends += dead_ends / 2,
                 found => return found,
             }
         }
-        Found::Unknown
+        SearchOutcome::Unknown
     }
 
-    /// One search, with noise in the urgency, until it has met so many dead ends.
-    fn descend(&mut self, mut windows: TimeWindows, branch: Branch, dead_ends: u64, noise: u64) -> Found {
+    /// Depth-first search with noise in the urgency, until it has met `dead_ends` dead ends.
+    fn descend(
+        &mut self,
+        mut windows: TimeWindows,
+        branch: Branch,
+        dead_ends: u64,
+        noise: u64,
+    ) -> SearchOutcome {
         let mut left = dead_ends;
         // Each decision, and the windows before it.
         let mut decisions: Vec<(TimeWindows, Decision)> = Vec::new();
@@ -232,7 +241,11 @@ impl ExactSearch<'_, '_> {
                 let start: Vec<u32> = windows.first.iter().map(|&cycle| cycle.max(0) as u32).collect();
                 let choice = (0..start.len()).map(|task| windows.choices(task).next().unwrap_or(0)).collect();
                 let plan = Plan { start, choice };
-                return if self.holds(&plan) { Found::Schedule(plan) } else { Found::Unknown };
+                return if self.holds(&plan) {
+                    SearchOutcome::Schedule(plan)
+                } else {
+                    SearchOutcome::Unknown
+                };
             };
             let decision = if windows.is_fixed(task) {
                 let choice = windows.choices(task).min_by_key(|choice| *choice != preferred[task]);
@@ -242,15 +255,16 @@ impl ExactSearch<'_, '_> {
             };
             decisions.push((windows.clone(), decision));
             decision.apply(&mut windows);
-            while let Err(Empty { task }) = self.propagation.narrow(&mut windows) {
-                // A choice of slots is tried without looking ahead: that it fails is no dead end.
+            while let Err(stop) = self.propagation.narrow(&mut windows) {
+                let Stop::Empty { task } = stop else { return SearchOutcome::Unknown };
+                // A choice of slots is tried without looking ahead, so its failure is no dead end.
                 if !matches!(decisions.last(), Some((_, Decision::Slots(..)))) {
                     self.weights[task] += 1;
                     left -= 1;
                 }
-                let Some((before, decision)) = decisions.pop() else { return Found::Nothing };
-                if left == 0 || self.is_spent() {
-                    return Found::Unknown;
+                let Some((before, decision)) = decisions.pop() else { return SearchOutcome::Nothing };
+                if left == 0 || self.propagation.is_spent() {
+                    return SearchOutcome::Unknown;
                 }
                 windows = before;
                 decision.exclude(&mut windows);
@@ -269,16 +283,21 @@ impl ExactSearch<'_, '_> {
         preferred
     }
 
-    /// True if all resources are free, the units too, whose intervals the time windows do not know.
-    fn holds(&self, plan: &Plan) -> bool {
+    /// Checks all resources of a plan, units included: the time windows do not model their initiation intervals.
+    fn holds(&mut self, plan: &Plan) -> bool {
         let problem = self.graph.problem;
         let mut table = Reservations::new(problem);
-        problem.tasks.iter().zip(plan.start.iter().zip(&plan.choice)).all(|(task, (&cycle, &choice))| {
-            let operations = task.choice(choice);
-            let fits = table.fits(operations, cycle as usize, Direction::Forward);
-            table.reserve(operations, cycle as usize, Direction::Forward);
-            fits
-        })
+        let holds =
+            problem.tasks.iter().zip(plan.start.iter().zip(&plan.choice)).all(|(task, (&cycle, &choice))| {
+                let operations = task.choice(choice);
+                let fits = table.fits(operations, cycle as usize, Direction::Forward);
+                table.reserve(operations, cycle as usize, Direction::Forward);
+                fits
+            });
+        if !holds {
+            self.propagation.work += WASTED + table.take_visited();
+        }
+        holds
     }
 }
 
@@ -290,7 +309,7 @@ mod tests {
     use takt_isa::SlotIndex;
     use takt_isa::timing::Reservation;
 
-    /// True if the tasks from the `placed`th on can all issue before `length`: every cycle and every choice is tried.
+    /// Exhaustive oracle: the tasks from the `placed`th on can all issue before `length`.
     fn exists(problem: &Problem, length: u32, plan: &mut Vec<(u32, u8)>) -> bool {
         let placed = plan.len();
         let Some(task) = problem.tasks.get(placed) else { return true };
@@ -351,11 +370,11 @@ mod tests {
     proptest! {
         /// On problems that can be searched through: no schedule is shorter than the bound, and the bound is reached.
         #[test]
-        fn the_shortest_is_found_and_proved(problem in problem()) {
+        fn finds_and_proves_the_shortest_schedule(problem in problem()) {
             let graph = Graph::new(&problem);
             let long = problem.tasks.len() as u32 * 4;
             let shortest = (1..=long).find(|length| exists(&problem, *length, &mut Vec::new()));
-            let result = search(&graph, 1, long, 20).expect("there is something to search");
+            let result = search(&graph, 1, long, 20 * super::super::budget::STEPS).expect("there is something to search");
             prop_assert_eq!(Some(result.bound), shortest);
             let plan = result.plan.expect("the longest was longer than need be");
             prop_assert_eq!(plan.start.iter().max().map(|last| last + 1), shortest);

@@ -13,11 +13,11 @@ pub(super) struct Chains {
 /// An edge, seen from one of its ends.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Arc {
-    /// The other end.
+    /// Task at the other end.
     pub(super) task: u32,
-    /// Its distance, or the least if that depends on a choice.
+    /// Cycles between the issues; the least, if a choice of slots decides.
     pub(super) distance: u32,
-    /// [`Edge::latency_of`], or `FIXED`.
+    /// Operation of [`Edge::latency_of`], or `FIXED`.
     latency_of: u32,
 }
 
@@ -86,8 +86,8 @@ impl<'p> Graph<'p> {
         Chains { head, tail }
     }
 
-    /// For each task the latest cycle of issue with which the schedule has `length` cycles and deadlines are met `spare` cycles
-    /// early; negative where that cannot be.
+    /// Latest issue cycle of each task for a schedule of `length` cycles that meets deadlines `spare` cycles early; negative if
+    /// impossible.
     pub(super) fn due(&self, length: u32, spare: u32) -> Vec<i64> {
         let mut due = vec![i64::from(length) - 1; self.problem.tasks.len()];
         for i in (0..due.len()).rev() {
@@ -103,7 +103,7 @@ impl<'p> Graph<'p> {
 }
 
 impl Problem {
-    /// The tasks from which a task of `from` can be reached, and those themselves.
+    /// Selects the tasks of `from` and all their predecessors.
     pub(super) fn before(&self, from: impl Fn(usize) -> bool) -> Vec<bool> {
         let graph = Graph::new(self);
         let mut reached: Vec<bool> = (0..self.tasks.len()).map(from).collect();
@@ -113,7 +113,7 @@ impl Problem {
         reached
     }
 
-    /// The tasks that can be reached from one of `from`, and those themselves.
+    /// Selects the tasks of `from` and all their successors.
     pub(super) fn after(&self, from: impl Fn(usize) -> bool) -> Vec<bool> {
         let graph = Graph::new(self);
         let mut reached: Vec<bool> = (0..self.tasks.len()).map(from).collect();

@@ -11,9 +11,9 @@ use std::collections::BinaryHeap;
 /// A schedule: the cycle and the choice of slots of each task.
 #[derive(Clone, Debug)]
 pub(super) struct Plan {
-    /// The cycle. Those of a backward pass count from the end.
+    /// Issue cycle of each task; a backward pass counts from the end.
     pub(super) start: Vec<u32>,
-    /// The index of the task's choice.
+    /// Index of each task's choice of slots.
     pub(super) choice: Vec<u8>,
 }
 
@@ -28,14 +28,15 @@ impl Plan {
 pub(super) struct SlotPreference {
     /// The preferred choice of each task.
     pub(super) toward: Vec<u8>,
-    /// The slack that a task spends to get it, in quarters of the time until it is due. With 0 it only breaks ties.
+    /// Slack that a task spends on its preferred choice, in quarters of the time until it is due. With 0 the preference only
+    /// breaks ties.
     pub(super) quarters: u32,
     /// The due times of the tasks in a forward pass, and in a backward one.
     pub(super) due: [Vec<i64>; 2],
 }
 
 impl SlotPreference {
-    /// The cycles by which the preferred choice may be later than another that is free in a cycle.
+    /// Cycles by which the preferred choice may come later than another one that is free in `cycle`.
     #[inline]
     fn patience(&self, direction: Direction, task: usize, cycle: u32) -> u32 {
         if self.quarters == 0 {
@@ -47,8 +48,8 @@ impl SlotPreference {
 }
 
 impl Graph<'_> {
-    /// Places every task, in a topological order that otherwise follows `key` (small first), in the first cycle that is free and not
-    /// before its `release`; of several choices of slots it takes the one whose results come first, unless it prefers another.
+    /// Places every task in the first free cycle not before its `release`, in a topological order that otherwise follows `key`
+    /// (small first). Among choices of slots, the earliest results win, unless the task prefers another.
     pub(super) fn list_schedule(
         &self,
         direction: Direction,
@@ -112,9 +113,8 @@ impl Graph<'_> {
         }
     }
 
-    /// The cycles in which the tasks really issue if those of one cycle of the plan become a bundle: bundles issue in order, each as
-    /// early as the machine allows, which may be earlier than planned, and then its reservations may delay a later one. Returns the
-    /// length.
+    /// Actual issue cycles if the tasks of each planned cycle become a bundle: bundles issue in order, each as early as the machine
+    /// allows. An issue earlier than planned may delay a later bundle by its reservations. Returns the length.
     pub(super) fn issue(&self, plan: &Plan, table: &mut Reservations, start: &mut [u32]) -> u32 {
         let Plan { start: plan, choice } = plan;
         let mut order: Vec<u32> = (0..plan.len() as u32).collect();
@@ -148,7 +148,7 @@ impl Graph<'_> {
 }
 
 impl Problem {
-    /// The cycles in which the tasks issue if each is a bundle, in the order in which they stand.
+    /// Issue cycles if each task is a bundle of its own, in the order of the tasks.
     pub(super) fn as_written(&self) -> Vec<u32> {
         let mut plan = Plan::new(self);
         plan.start = (0..self.tasks.len() as u32).collect();

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Alias analysis of the loads and stores of a block, and of those that cannot fault.
+//! Alias analysis of a block's loads and stores, and detection of accesses that cannot fault.
 //!
-//! An address is an offset and the value of a register: a value number and what constants were added to it since. Two addresses with
-//! the same value number, or with constant values, are the same or different for certain. Elements of arrays are told apart by their
-//! array, and by their word if that is affine in the iterations of the loops around. Any others may alias.
+//! An address is an offset plus the value of a register: a value number, and the sum of the constants added since. Two addresses
+//! with the same value number, or with constant values, are the same or different for certain. Elements of arrays are told apart by
+//! their array, and by their word if it is affine in the iterations of the loops around. Any other two may alias.
 
 use crate::ir::arrays::{Affine, ArrayAccess, LoopId};
 use crate::ir::{Constant, Ir, Operation, RegisterId, RegisterKind};
@@ -15,14 +15,14 @@ use takt_isa::{Effect, Type};
 enum Root {
     /// The value of the register at the start of the block.
     Initial(RegisterId),
-    /// A value of the block. Two numbers may be of equal values.
+    /// A value computed in the block. Two numbers may stand for equal values.
     Numbered(u32),
 }
 
 /// The value of a register at some place of a block, or the address of a load or store.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Value {
-    /// It is known before the program runs. As an address it may be outside the data memory.
+    /// Bits known before the program runs. As an address they may lie outside the data memory.
     Known(u32),
     /// A value plus a constant, modulo 2³².
     Based(Root, u32),
@@ -36,7 +36,7 @@ impl Value {
         }
     }
 
-    /// True if two addresses may be the same.
+    /// Two addresses may be equal.
     fn may_be(self, other: Value) -> bool {
         match (self, other) {
             (Value::Known(a), Value::Known(b)) => a == b,
@@ -50,15 +50,15 @@ impl Value {
 #[derive(Clone)]
 pub(super) struct Access {
     address: Value,
-    /// The element of an array that it is. Its word is that of the block's first iteration, or of the one after.
+    /// Element of an array; its word is for the block's first iteration, or for the next.
     element: Option<ArrayAccess>,
     store: bool,
-    /// True if its address may lie outside the data memory.
+    /// The address may lie outside the data memory.
     pub(super) may_fault: bool,
 }
 
 impl Access {
-    /// True if two accesses, in one iteration of the loops around, may be to the same word.
+    /// Two accesses may touch the same word in one iteration of the loops around.
     fn may_be(&self, other: &Access) -> bool {
         let apart = match (&self.element, &other.element) {
             (Some(a), Some(b)) if a.array != b.array => true,
@@ -74,15 +74,15 @@ impl Access {
 /// Value numbers of registers, and the loads and stores so far, in source order.
 pub(super) struct Memory<'a> {
     ir: &'a Ir,
-    /// Registers that hold one value for good, with its bits.
+    /// By register: its bits, if they never change ([`fixed`]).
     fixed: &'a [Option<u32>],
     values: HashMap<RegisterId, Value>,
     numbers: u32,
-    /// The loop of which two iterations are examined, in the second of them.
+    /// Loop whose second iteration is examined, if the source has it by `.for`.
     second: Option<LoopId>,
-    /// The values at the start of the last iteration.
+    /// Values at the start of the second iteration.
     starts: HashMap<RegisterId, Value>,
-    /// Each with its task, and with which of those before it are known to precede it, a bit each.
+    /// Task and access, with a bit for each earlier access that is known to precede it.
     accesses: Vec<(usize, Access, Vec<u64>)>,
 }
 
@@ -113,13 +113,13 @@ impl<'a> Memory<'a> {
         let found = self.ir.register(register);
         let machine = self.ir.machine;
         if found.kind == RegisterKind::Input || found.pinned.is_some_and(|at| machine.is_input(at)) {
-            // It may change from one cycle to the next.
+            // Inputs may change from one cycle to the next.
             return self.unknown();
         }
         self.values.get(&register).copied().unwrap_or(Value::Based(Root::Initial(register), 0))
     }
 
-    /// The load or store that an operation is, if it is one, before its bundle writes anything.
+    /// The load or store of an operation, with the values before its bundle writes anything.
     pub(super) fn access(&mut self, operation: &Operation) -> Option<Access> {
         let store = match operation.row().effect {
             Effect::Load => false,
@@ -171,7 +171,7 @@ impl<'a> Memory<'a> {
         }
     }
 
-    /// The tasks of earlier loads and stores that a further one must follow, without those that the others imply.
+    /// Tasks of earlier loads and stores that a new access must follow, without tasks that the others imply.
     pub(super) fn follow(&mut self, task: usize, access: Access) -> Vec<usize> {
         let mut before = vec![0u64; self.accesses.len().div_ceil(64)];
         let mut follows = Vec::new();
@@ -197,8 +197,8 @@ impl Memory<'_> {
     }
 
     /// Pairs of accesses to one word that are two or more iterations apart: the earlier task, the later one, and the least such
-    /// distance. Those that may be to one word in the next iteration already need none.
-    /// `tasks` is the number of an iteration's tasks.
+    /// distance. Pairs that may alias in the next iteration already need no entry. `tasks` is the number of an iteration's
+    /// tasks.
     pub(super) fn far(&self, tasks: usize, of: Option<LoopId>) -> Vec<(usize, usize, u32)> {
         let first = || self.accesses.iter().filter(|(task, ..)| *task < tasks);
         let mut pairs = Vec::new();
@@ -214,7 +214,7 @@ impl Memory<'_> {
         pairs
     }
 
-    /// The iterations of a loop, two or more, after which an element is another one.
+    /// Distance in iterations, at least two, at which `later` reaches the word of `earlier`.
     fn elements(earlier: &ArrayAccess, later: &ArrayAccess, of: LoopId) -> Option<u32> {
         let (Some(earlier), Some(later)) = (&earlier.word, &later.word) else { return None };
         let gap = earlier.constant.checked_sub(later.constant)?;
@@ -223,7 +223,7 @@ impl Memory<'_> {
         u32::try_from(distance).ok().filter(|distance| earlier.terms == later.terms && *distance >= 2)
     }
 
-    /// The iterations, two or more, after which an address that moves by a constant is another one.
+    /// Distance in iterations, at least two, at which an address that moves by a constant reaches another.
     fn distance(&self, earlier: Value, later: Value) -> Option<u32> {
         let (Value::Based(Root::Initial(a), i), Value::Based(Root::Initial(b), j)) = (earlier, later) else {
             return None;
@@ -245,7 +245,7 @@ fn is_difference(operation: &Operation) -> bool {
     operation.row().types == [Type::I; 3] && operation.row().forms.contains(&"a - b")
 }
 
-/// The constant that an operation adds to a source of integers; `None` if it does something else.
+/// The constant that an operation adds to an integer source; `None` for other operations.
 pub(super) fn step(operation: &Operation, fixed: &[Option<u32>]) -> Option<i64> {
     let [a, b] = [0, 1].map(|source| fixed[operation.sources[source].index()]);
     let constant = match (a, b) {
@@ -257,7 +257,7 @@ pub(super) fn step(operation: &Operation, fixed: &[Option<u32>]) -> Option<i64> 
     Some(constant.into())
 }
 
-/// For each register the bits that it holds for good: constants, and what is preset and never written.
+/// By register: its bits, if they never change (constants, and presets that nothing writes).
 pub(super) fn fixed(ir: &Ir) -> Vec<Option<u32>> {
     let mut fixed: Vec<Option<u32>> = ir
         .registers
@@ -271,7 +271,7 @@ pub(super) fn fixed(ir: &Ir) -> Vec<Option<u32>> {
         .collect();
     let opaque = ir.is_opaque();
     for (bits, register) in fixed.iter_mut().zip(&ir.registers) {
-        // A raw word may write any register, and from outside an input may be written.
+        // A raw word may write any register, and an input may be written from outside.
         let input = register.pinned.is_some_and(|address| ir.machine.is_input(address));
         if register.preset.is_some() && (opaque || input) {
             *bits = None;
@@ -283,7 +283,7 @@ pub(super) fn fixed(ir: &Ir) -> Vec<Option<u32>> {
     fixed
 }
 
-/// The data words that loads and stores of a program touch; `None` if one goes where a register says, which may be any word.
+/// The data words that loads and stores of a program touch; `None` if an address depends on a register that changes.
 pub(crate) fn touched(ir: &Ir) -> Option<BTreeSet<u32>> {
     if ir.is_opaque() {
         return None;

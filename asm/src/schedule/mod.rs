@@ -2,11 +2,13 @@
 //! Scheduler: packs operations into bundles and orders them, from the machine's tables and [`takt_isa::timing`]'s reservation
 //! tables alone.
 //!
-//! It works on one basic block at a time: a straight run of bundles that control enters only at its first and leaves only after
-//! its last. Dependences are edges between two tasks (see [`Block`]); everything else may move. List scheduling in forward and
-//! backward passes ([`solve`]) is followed by an exact search ([`exact`]). `docs/scheduling.md` explains it to programmers.
+//! The scheduler works on one basic block at a time: a straight run of bundles that control enters only at its first and leaves
+//! only after its last. Dependences are edges between two tasks (see [`Block`]); everything else may move. List scheduling in
+//! forward and backward passes ([`solve`]) is followed by an exact search ([`exact`]). `docs/scheduling.md` explains it to
+//! programmers.
 
 mod bound;
+mod budget;
 mod demand;
 mod domains;
 mod exact;
@@ -23,6 +25,7 @@ mod time_windows;
 
 pub use crate::ir::DemandKind;
 pub use bound::{Bound, Resources, SharedBound};
+pub use budget::{Budget, most_steps};
 pub use demand::TimingReport;
 pub(crate) use memory::touched;
 pub use modulo::IntervalBound;
@@ -32,7 +35,6 @@ use crate::ir::arrays::LoopId;
 use crate::ir::matching;
 use crate::ir::runs;
 use crate::ir::{Bundle, Ir, Operation, RegisterId, RegisterKind};
-use crate::report::diag::Sink;
 use demand::Demands;
 use domains::Domains;
 use list::Plan;
@@ -40,6 +42,7 @@ use memory::Memory;
 use problem::{Edge, Problem, Task};
 use smallvec::{SmallVec, smallvec};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
+use takt_diagnostics::diag::Sink;
 use takt_isa::program::{Location, Space};
 use takt_isa::timing::Reservation;
 use takt_isa::{BundleAddress, Effect, Machine, SlotIndex, Slots};
@@ -54,52 +57,51 @@ pub struct BlockReport {
     pub location: Option<Location>,
     /// The label at the block's start, if there is one.
     pub label: Option<String>,
-    /// Address of its first bundle.
+    /// Address of the first bundle.
     pub address: BundleAddress,
-    /// Operations.
+    /// Number of operations in the block.
     pub operations: u32,
-    /// Bundles that they are packed into.
+    /// Number of bundles that the operations are packed into.
     pub bundles: u32,
-    /// Cycles from the issue of its first bundle to that of its last, both included, if nothing is pending at its start.
+    /// Cycles from the issue of the first bundle to the issue of the last, both included, if nothing is pending at the start.
     pub cycles: u32,
-    /// The lower bound of its length.
+    /// Lower bound of the length.
     pub bound: Bound,
 }
 
 /// Report of a scheduled program.
 #[derive(Clone, Debug, Default)]
 pub struct Report {
-    /// Of each block that was scheduled.
+    /// Blocks that were scheduled.
     pub blocks: Vec<BlockReport>,
-    /// Of each loop that was pipelined.
+    /// Loops that were pipelined.
     pub loops: Vec<LoopReport>,
-    /// Of each innermost loop that was not.
+    /// Innermost loops that were not pipelined, with reasons.
     pub plain_loops: Vec<PlainLoop>,
-    /// Of each demand on ports.
+    /// Times at which the demands on ports are met.
     pub timing: Vec<TimingReport>,
 }
 
-/// The freedom of a schedule to depart from the source's order. The nearer to that, the lower the register pressure, and the longer
-/// the schedule may be.
+/// Freedom of a schedule to leave source order. Staying near it lowers the register pressure, and may lengthen the schedule.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Order {
-    /// Any order.
+    /// Operations may leave source order freely.
     Free,
-    /// An operation does not issue before one that precedes it by so many bundles or more.
+    /// An operation does not issue before another that precedes it by this many bundles or more.
     Near(usize),
     /// The source's order: bundles stay as they are written, on the slots that they have without a scheduler.
     Written,
 }
 
-/// Schedules every block of bundles that ask for it ([`Bundle::scheduled`]), and checks what is demanded of ports.
-pub fn schedule(ir: &mut Ir, effort: u32, order: Order, sink: &mut Sink) -> Report {
-    schedule_without(ir, effort, order, &[], sink)
+/// Schedules every block of bundles that ask for it ([`Bundle::scheduled`]), and checks the demands on ports.
+pub fn schedule(ir: &mut Ir, budget: &mut Budget, order: Order, sink: &mut Sink) -> Report {
+    schedule_without(ir, budget, order, &[], sink)
 }
 
-/// The same, and leaves loops of these numbers ([`LoopReport::number`]) as they are written.
+/// [`schedule`], with the loops of these numbers ([`LoopReport::number`]) left as they are written.
 pub fn schedule_without(
     ir: &mut Ir,
-    effort: u32,
+    budget: &mut Budget,
     order: Order,
     without: &[usize],
     sink: &mut Sink,
@@ -112,7 +114,7 @@ pub fn schedule_without(
         return Report::default();
     }
     let (mut loops, plain_loops) = match order {
-        Order::Free if !fixed && ir.scheduled => pipeline::pipeline(ir, without),
+        Order::Free if !fixed && ir.scheduled => pipeline::pipeline(ir, without, budget),
         _ => Default::default(),
     };
     let fixed_registers = memory::fixed(ir);
@@ -123,11 +125,13 @@ pub fn schedule_without(
     let mut bundles: Vec<Bundle> = Vec::with_capacity(ir.bundles.len());
     // New address of each block's start, by its old one.
     let mut moved = BTreeMap::new();
+    let is_scheduled = |run: &runs::Run| run.scheduled && run.end - run.start >= 2 && !fixed;
+    let mut left = runs.iter().filter(|run| is_scheduled(run)).count();
     for (run, demands) in runs.iter().zip(&demands) {
         let address = bundles.len() as u32;
         moved.insert(run.start as u32, address);
         let old = &ir.bundles[run.start..run.end];
-        let scheduled = run.scheduled && old.len() >= 2 && !fixed;
+        let scheduled = is_scheduled(run);
         if !scheduled && demands.is_empty() {
             bundles.extend_from_slice(old);
             continue;
@@ -153,7 +157,9 @@ pub fn schedule_without(
             Order::Near(reach) => Some(block.problem.keep_near(reach)),
             Order::Free | Order::Written => None,
         };
-        let solution = solve::solve(&block.problem, effort);
+        let solution = solve::solve(&block.problem, budget.of_block(left));
+        budget.take_for_block(solution.steps);
+        left = left.saturating_sub(1);
         report.timing.extend(demands.check(&block, &solution.plan.start, solution.window, scheduled, sink));
         let packed = block.pack(old, &solution.plan);
         domains.settle(&packed);
@@ -176,7 +182,7 @@ pub(crate) fn as_written(ir: &Ir, bundles: &[Bundle]) -> Vec<u32> {
     Block::new(ir, &memory::fixed(ir), bundles, None).problem.as_written()
 }
 
-/// Cycles from an operation's issue to the earliest one of an operation that reads its result.
+/// Cycles from an operation's issue to the earliest issue of an operation that reads its result.
 pub(crate) fn latency(machine: &Machine, operation: &Operation) -> u32 {
     reservation(machine, operation, operation.slot).writeback.unwrap_or(0)
 }
@@ -194,12 +200,12 @@ fn reservation(machine: &Machine, operation: &Operation, slot: Option<SlotIndex>
     Reservation::new(machine, slot, operation.row().function, operation.dest.is_some())
 }
 
-/// The event of an earlier task for which a task waits.
+/// Event of an earlier task for which a task waits.
 #[derive(Clone, Copy)]
 enum Wait {
-    /// So many cycles from its issue.
+    /// A number of cycles after its issue.
     Cycles(u32),
-    /// The write of one of its operations.
+    /// Writeback of one of its operations.
     Written(usize),
 }
 
@@ -211,7 +217,7 @@ enum Wait {
 /// - Loads and stores that may touch the same word keep their order, except loads among loads.
 /// - A load or store whose address is not known may fault, and what was on the output ports before must be the same: outputs
 ///   written before it in the source issue before it, outputs written after it not before it.
-/// - What redirects control comes last; what drains comes when all is written.
+/// - Operations that redirect control come last; operations that drain come when all is written.
 struct Block {
     problem: Problem,
     /// The bundle of each task.
@@ -219,14 +225,14 @@ struct Block {
 }
 
 impl Block {
-    /// The problem of a run of bundles: as they are written, or if `banks` says where registers may lie, for a schedule, which has
-    /// no use for fillers. `fixed` holds the bits of registers that never change ([`memory::fixed`]).
+    /// The problem of a run of bundles: as written; or with `domains` (the banks in which registers may lie) for a schedule, which
+    /// drops fillers. `fixed` holds the bits of registers that never change ([`memory::fixed`]).
     fn new(ir: &Ir, fixed: &[Option<u32>], bundles: &[Bundle], domains: Option<&Domains>) -> Block {
         Block::iterations(ir, fixed, bundles, domains, usize::MAX, None).0
     }
 
-    /// The same for two iterations of a loop, `of` if the source has it by `.for`, the second of which begins with the bundle `second`; and the pairs of memory accesses
-    /// that must keep their order over more than one iteration ([`Memory::far`]).
+    /// The problem of two iterations of a loop, where the second begins with the bundle `second`; `of` is the loop if the source has it by
+    /// `.for`. Also returns the pairs of memory accesses that must keep their order over more than one iteration ([`Memory::far`]).
     fn iterations(
         ir: &Ir,
         fixed: &[Option<u32>],
@@ -247,7 +253,8 @@ impl Block {
         let mut values: HashMap<RegisterId, (usize, usize)> = HashMap::new();
         let mut readers: HashMap<RegisterId, Vec<usize>> = HashMap::new();
         let mut memory = Memory::new(ir, fixed);
-        // Loads and stores that may fault; for each output port the task of its last write, and how many of those precede it.
+        // Loads and stores that may fault; for each output port the task of its last write, and the number of such accesses
+        // before it.
         let mut faults: Vec<usize> = Vec::new();
         let mut outputs: BTreeMap<RegisterId, (usize, usize)> = BTreeMap::new();
         for (b, bundle) in bundles.iter().enumerate() {
@@ -338,7 +345,7 @@ impl Block {
         (Block { problem, origins }, far)
     }
 
-    /// The report of the block, a run that now begins at an address.
+    /// Report of the block, whose run now begins at `address`.
     fn report(
         &self,
         ir: &Ir,
@@ -360,8 +367,8 @@ impl Block {
         }
     }
 
-    /// The bundles of a schedule: tasks that issue in one cycle become one bundle. A gap that only a demand makes is filled, for
-    /// the machine would not wait.
+    /// The bundles of a schedule: tasks that issue in one cycle become one bundle. A gap that only a demand causes is filled
+    /// with idle bundles, for the machine would not wait.
     fn pack(&self, old: &[Bundle], plan: &Plan) -> Vec<Bundle> {
         let start = &plan.start;
         let mut by_cycle: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
@@ -408,7 +415,7 @@ impl Block {
 /// The most choices of slots that the scheduler examines for a bundle.
 const CHOICES: usize = 120;
 
-/// The choices of slots for the operations of a bundle, the present one first; the only one without domains.
+/// The choices of slots for the operations of a bundle, the present one first; without domains, only the present one.
 fn choices(ir: &Ir, bundle: &Bundle, domains: Option<&Domains>) -> Vec<Vec<Option<SlotIndex>>> {
     let present: Vec<Option<SlotIndex>> = bundle.operations.iter().map(|operation| operation.slot).collect();
     let Some(domains) = domains else { return vec![present] };

@@ -1,25 +1,27 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Iterative modulo scheduling (Rau 1994): the issue times of one iteration of a loop of which a new iteration begins every so many
-//! cycles, the initiation interval.
+//! Iterative modulo scheduling (Rau 1994): the issue times of one iteration of a loop in which a new iteration begins every
+//! initiation interval.
 //!
-//! Operations are placed in the order of their height, the longest way to the end of the iteration. One that finds no place
-//! displaces others, which are placed again. The interval is the least for which this succeeds.
+//! Operations are placed in the order of their height, the longest path to the end of the iteration. An operation that finds
+//! no place displaces others, which are placed again. The interval is the least for which this succeeds.
 //!
-//! An operation that waits for nothing of its iteration, as a load by an induction register, can be placed as late as what reads its
-//! value allows, after that (as in swing modulo scheduling, Llosa 1996): its value then takes a register for a few cycles, not for an
-//! interval.
+//! An operation that waits for nothing of its iteration, as a load by an induction register, can be placed as late as the readers of
+//! its value allow, after them (as in swing modulo scheduling, Llosa 1996): its value then takes a register for a few cycles, not for
+//! an interval.
 
+use super::budget::{PLACING, Steps};
 use super::problem::{Edge, Task};
+use std::cell::Cell;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::ops::RangeInclusive;
 use takt_isa::Slots;
 use takt_isa::timing::{Reservation, Resource};
 
-/// Placements that an interval is tried for, as a multiple of the number of tasks.
+/// Placements to try per interval, as a multiple of the number of tasks.
 const PLACEMENTS: usize = 12;
 
-/// The most schedules of which the best is taken.
+/// The most schedules that are compared.
 const ATTEMPTS: usize = 4;
 
 /// Precedence in a loop: `to` of the iteration that begins `iterations` later issues after `from`, by the edge's distance.
@@ -29,37 +31,37 @@ pub(super) struct LoopEdge {
     pub(super) iterations: u32,
 }
 
-/// A load or store whose address is a register that each iteration advances by a constant, once, and the task that does so. They need no
-/// order: another offset makes up for an advance too many or too few. But for so many cycles after it, the access would wait for
-/// the register.
+/// A load or store by an induction register, and the task that advances this register by a constant, once in each iteration. They need
+/// no order: another offset makes up for an advance too many or too few. But within `latency` cycles after the advance, the access would
+/// wait for the register.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Advanced {
+pub(super) struct AdvancedAccess {
     pub(super) access: usize,
     pub(super) advance: usize,
     pub(super) latency: u32,
 }
 
-/// One iteration of a loop.
+/// Tasks and precedence of one iteration of a loop.
 #[derive(Clone, Debug, Default)]
 pub(super) struct LoopProblem {
     pub(super) tasks: Vec<Task>,
     pub(super) edges: Vec<LoopEdge>,
-    pub(super) advanced: Vec<Advanced>,
+    pub(super) advanced: Vec<AdvancedAccess>,
 }
 
 /// Lower bounds of the initiation interval, in cycles.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct IntervalBound {
-    /// For sets of slots, the operations of an iteration that only they can issue, for each of them.
+    /// By set of slots: operations of an iteration that only these slots can issue, divided by the number of slots, rounded up.
     pub slots: Vec<(Slots, u32)>,
-    /// By unit, over all units of the machine, slot after slot: the cycles that an iteration keeps it busy.
+    /// By unit, slot after slot: the cycles that an iteration keeps it busy.
     pub units: Vec<u32>,
     /// Recurrence: the longest chain of operations from one iteration to the next.
     pub recurrence: u32,
 }
 
 impl IntervalBound {
-    /// The largest of them.
+    /// The largest bound, in cycles.
     pub fn cycles(&self) -> u32 {
         let slots = self.slots.iter().map(|(_, cycles)| *cycles);
         slots.chain(self.units.iter().copied()).chain([self.recurrence]).max().unwrap_or(1).max(1)
@@ -75,26 +77,28 @@ pub(super) struct ModuloSchedule {
 }
 
 impl ModuloSchedule {
-    /// Cycles of so many iterations, to the issue of the last operation.
+    /// Cycles of `count` iterations, to the issue of the last operation.
     pub(super) fn cycles(&self, count: u32) -> u64 {
         u64::from(self.interval) * u64::from(count - 1)
             + u64::from(self.start.iter().max().map_or(0, |last| last + 1))
     }
 
-    /// The number of iterations that are under way at a time.
+    /// The number of iterations that overlap.
     pub(super) fn stages(&self) -> u32 {
         self.start.iter().max().map_or(1, |last| last / self.interval + 1)
     }
 }
 
 impl LoopProblem {
-    /// The height of each task: the longest way from its issue to the end of the iteration, if one begins every `interval` cycles.
-    /// `None` if there is no end to it: then the interval is too short for a recurrence.
-    fn heights(&self, interval: u32) -> Option<Vec<i64>> {
+    /// The height of each task: the longest path from its issue to the end of the iteration, if one begins every `interval`
+    /// cycles. `None` if the heights do not converge, for the interval is too short for a recurrence, or if the steps are spent.
+    fn heights(&self, interval: u32, steps: &mut Steps) -> Option<Vec<i64>> {
         let mut heights = vec![0i64; self.tasks.len()];
-        // Bellman-Ford: the longest ways have no more edges than there are tasks. Edges mostly lead onwards, hence backwards.
+        // Bellman-Ford: the longest paths have no more edges than there are tasks. Edges mostly lead onwards, so relaxing goes
+        // backwards.
         for _ in 0..=self.tasks.len() {
             let mut changed = false;
+            steps.take(self.edges.len())?;
             for LoopEdge { edge, iterations } in self.edges.iter().rev() {
                 let way = heights[edge.to] + i64::from(edge.distance)
                     - i64::from(*iterations) * i64::from(interval);
@@ -110,14 +114,15 @@ impl LoopProblem {
         None
     }
 
-    /// Lower bounds of the interval. `units` is the number of the machine's units.
-    pub(super) fn bound(&self, slots: usize, units: usize) -> IntervalBound {
+    /// Lower bounds of the interval. `units` is the number of the machine's units. If the steps are spent, the bound of recurrences is
+    /// lower than it could be.
+    pub(super) fn bound(&self, slots: usize, units: usize, steps: &mut Steps) -> IntervalBound {
         let uses = |task: &Task, index: usize| task.operation(index).next().and_then(|usage| usage.unit);
         let operations =
             || self.tasks.iter().flat_map(|task| (0..task.operations).map(move |index| (task, index)));
         let mut busy = vec![0; units];
         for (task, index) in operations() {
-            // One that could go to another unit counts for none.
+            // An operation with a choice of units keeps no unit busy for certain.
             let fixed = task.operation(index).all(|usage| usage.unit == uses(task, index));
             if let Some((unit, first)) = uses(task, index).zip(task.operation(index).next()).filter(|_| fixed)
             {
@@ -134,30 +139,38 @@ impl LoopProblem {
         let mut most = self.edges.iter().map(|loop_edge| loop_edge.edge.distance).sum::<u32>().max(1);
         while recurrence < most {
             let middle = recurrence.midpoint(most);
-            match self.heights(middle) {
+            match self.heights(middle, steps) {
                 Some(_) => most = middle,
+                None if steps.are_spent() => break,
                 None => recurrence = middle + 1,
             }
         }
         IntervalBound { slots: sets.collect(), units: busy, recurrence }
     }
 
-    /// The schedule of those intervals with which `count` iterations take the fewest cycles, and which has fewer stages than that: else
-    /// there would be no kernel.
-    pub(super) fn schedule(&self, intervals: RangeInclusive<u32>, count: u32) -> Option<ModuloSchedule> {
+    /// The schedule, among these intervals, with which `count` iterations take the fewest cycles, as far as the steps suffice. It has
+    /// fewer stages than iterations: otherwise there would be no kernel.
+    pub(super) fn schedule(
+        &self,
+        intervals: RangeInclusive<u32>,
+        count: u32,
+        steps: &mut Steps,
+    ) -> Option<ModuloSchedule> {
         let mut best: Option<ModuloSchedule> = None;
         let mut left = ATTEMPTS;
         for interval in intervals {
             let shortest = u64::from(interval) * u64::from(count - 1);
-            if left == 0 || best.as_ref().is_some_and(|best| best.cycles(count) <= shortest) {
+            let is_best = |best: &ModuloSchedule| best.cycles(count) <= shortest;
+            if left == 0 || steps.are_spent() || best.as_ref().is_some_and(is_best) {
                 break;
             }
-            let Some(heights) = self.heights(interval) else { continue };
+            let Some(heights) = self.heights(interval, steps) else { continue };
             let found = [true, false].into_iter().filter_map(|late| {
-                let found = self.tighten(Placement::new(self, interval, heights.clone(), late).run()?);
+                let placed = Placement::new(self, interval, heights.clone(), late, steps).run()?;
+                let found = self.tighten(placed, steps);
                 Some((found.cycles(count), found))
             });
-            // The first of equals has shorter lifetimes.
+            // Ties go to late placement, which has shorter lifetimes.
             let Some((_, found)) = found.min_by_key(|(cycles, found)| (*cycles, found.stages())) else {
                 continue;
             };
@@ -170,7 +183,7 @@ impl LoopProblem {
         best
     }
 
-    /// True for each task that waits for no other of its iteration.
+    /// By task: it waits for no other task of its iteration.
     fn leads(&self) -> Vec<bool> {
         let mut leads = vec![true; self.tasks.len()];
         for LoopEdge { edge, .. } in self.edges.iter().filter(|loop_edge| loop_edge.iterations == 0) {
@@ -179,16 +192,21 @@ impl LoopProblem {
         leads
     }
 
-    /// Moves tasks as early as their resources stay the same: by whole intervals; the first begins in cycle 0.
-    fn tighten(&self, mut schedule: ModuloSchedule) -> ModuloSchedule {
+    /// Moves tasks earlier by whole intervals, which keeps their resources; the first begins in cycle 0.
+    fn tighten(&self, mut schedule: ModuloSchedule, steps: &mut Steps) -> ModuloSchedule {
         let interval = i64::from(schedule.interval);
+        let mut before = vec![Vec::new(); self.tasks.len()];
+        self.edges.iter().for_each(|loop_edge| before[loop_edge.edge.to].push(*loop_edge));
         let first = schedule.start.iter().min().copied().unwrap_or(0);
         schedule.start.iter_mut().for_each(|start| *start -= first);
         for _ in 0..=self.tasks.len() {
             let mut moved = false;
-            for task in 0..self.tasks.len() {
-                let after = self.edges.iter().filter(|loop_edge| loop_edge.edge.to == task);
-                let earliest = after
+            if steps.take(self.edges.len()).is_none() {
+                break;
+            }
+            for (task, before) in before.iter().enumerate() {
+                let earliest = before
+                    .iter()
                     .map(|LoopEdge { edge, iterations }| {
                         i64::from(schedule.start[edge.from]) + i64::from(edge.distance)
                             - i64::from(*iterations) * interval
@@ -219,26 +237,38 @@ struct Placement<'p> {
     problem: &'p LoopProblem,
     interval: u32,
     heights: Vec<i64>,
-    /// For each task its edges to others and from others.
+    /// By task: edges to others, and from others.
     onwards: Vec<Vec<LoopEdge>>,
     before: Vec<Vec<LoopEdge>>,
-    /// For each task the accesses that it advances, or what advances it: the other task, the latency, and true if the task is the access.
+    /// By task: the accesses that it advances, or the task that advances it: the other task, the latency, and true if this task
+    /// is the access.
     advanced: Vec<Vec<(usize, u32, bool)>>,
-    /// For each task and choice, the resources that it takes, by row of the table, each with the cycles after its issue; `None` if it
-    /// takes one twice, so that no interval of this length has room for it.
+    /// By task and choice: the rows of the table that it takes, each with the cycles after its issue; `None` if it takes a row twice,
+    /// so that no interval of this length has room for it.
     held: Vec<Vec<Option<Places>>>,
-    /// Modulo reservation table: which task holds a resource, a row, in a cycle of the interval.
+    /// Modulo reservation table: by row and by cycle of the interval, the task that holds the resource.
     table: Vec<Vec<Option<usize>>>,
     start: Vec<Option<u32>>,
     choice: Vec<u8>,
-    /// The first cycle in which a displaced task is placed again at the earliest.
+    /// By task: the earliest cycle in which it is placed again after it was displaced.
     next: Vec<u32>,
-    /// For each task, true if it is placed as late as the others allow, after them.
+    /// By task: it is placed as late as the others allow, after them.
     late: Vec<bool>,
+    /// First cycle of the tasks that are not late.
+    begin: u32,
+    /// Cells of the table visited since steps were taken for them.
+    visited: Cell<usize>,
+    steps: &'p mut Steps,
 }
 
 impl<'p> Placement<'p> {
-    fn new(problem: &'p LoopProblem, interval: u32, heights: Vec<i64>, late: bool) -> Placement<'p> {
+    fn new(
+        problem: &'p LoopProblem,
+        interval: u32,
+        heights: Vec<i64>,
+        late: bool,
+        steps: &'p mut Steps,
+    ) -> Placement<'p> {
         let count = problem.tasks.len();
         let (mut onwards, mut before) = (vec![Vec::new(); count], vec![Vec::new(); count]);
         for loop_edge in &problem.edges {
@@ -246,7 +276,7 @@ impl<'p> Placement<'p> {
             before[loop_edge.edge.to].push(*loop_edge);
         }
         let mut advanced = vec![Vec::new(); count];
-        for &Advanced { access, advance, latency } in &problem.advanced {
+        for &AdvancedAccess { access, advance, latency } in &problem.advanced {
             advanced[access].push((advance, latency, true));
             advanced[advance].push((access, latency, false));
         }
@@ -260,7 +290,9 @@ impl<'p> Placement<'p> {
                 });
                 places.extend(cycles.map(|after| (row, after % interval)));
             }
-            let twice = (1..places.len()).any(|index| places[..index].contains(&places[index]));
+            let mut sorted = places.clone();
+            sorted.sort_unstable();
+            let twice = sorted.windows(2).any(|pair| pair[0] == pair[1]);
             (!twice).then_some(places)
         };
         let held: Vec<Vec<_>> = problem
@@ -268,6 +300,9 @@ impl<'p> Placement<'p> {
             .iter()
             .map(|task| (0..task.choices()).map(|choice| held(task, choice)).collect())
             .collect();
+        let late = if late { problem.leads() } else { vec![false; count] };
+        // Late tasks find an interval of room before all others.
+        let begin = if late.contains(&true) { interval } else { 0 };
         Placement {
             problem,
             advanced,
@@ -280,18 +315,22 @@ impl<'p> Placement<'p> {
             start: vec![None; count],
             choice: vec![0; count],
             next: vec![0; count],
-            late: if late { problem.leads() } else { vec![false; count] },
+            late,
+            begin,
+            visited: Cell::new(0),
+            steps,
         }
     }
 
-    /// The order in which a task is placed: by its height; one that is placed late right after the first that waits for it.
+    /// Priority of placement: a task's height; for a late task, the largest height of a task that waits for it, right after that
+    /// task.
     fn priority(&self, task: usize) -> (i64, bool, Reverse<usize>) {
         let waits = self.onwards[task]
             .iter()
             .filter(|LoopEdge { edge, iterations }| *iterations == 0 && edge.to != task);
         let after =
             waits.map(|LoopEdge { edge, .. }| self.heights[edge.to]).max().filter(|_| self.late[task]);
-        // Of equal heights, the earlier in the source comes first.
+        // Among equal heights, the earlier in the source comes first.
         (after.unwrap_or(self.heights[task]), after.is_none(), Reverse(task))
     }
 
@@ -306,13 +345,15 @@ impl<'p> Placement<'p> {
             }
             placements = placements.checked_sub(1)?;
             let displaced = self.place(task)?;
+            let edges = self.before[task].len() + self.onwards[task].len();
+            self.steps.take(PLACING as usize + edges + self.visited.take())?;
             left.extend(displaced.into_iter().map(|task| self.priority(task)));
         }
         let start = self.start.into_iter().collect::<Option<Vec<u32>>>()?;
         Some(ModuloSchedule { interval: self.interval, start, choice: self.choice })
     }
 
-    /// Places a task. Returns those that it displaces; `None` if it fits nowhere, however empty the table.
+    /// Places a task, and returns the tasks that it displaces; `None` if it fits nowhere, however empty the table.
     fn place(&mut self, task: usize) -> Option<Vec<usize>> {
         let interval = i64::from(self.interval);
         let ready = self.before[task].iter().filter_map(|LoopEdge { edge, iterations }| {
@@ -320,9 +361,8 @@ impl<'p> Placement<'p> {
             // An operation that follows itself does so by the interval alone.
             (edge.from != task).then(|| start + i64::from(edge.distance) - i64::from(*iterations) * interval)
         });
-        // What is placed late finds an interval of room before all others.
-        let begin = if self.late.contains(&true) && !self.late[task] { interval } else { 0 };
-        let earliest = ready.max().unwrap_or(0).max(begin) as u32;
+        let begin = if self.late[task] { 0 } else { self.begin };
+        let earliest = ready.max().unwrap_or(0).max(begin.into()) as u32;
         let choices = 0..self.problem.tasks[task].choices() as u8;
         let free_in = |cycle: u32| {
             choices
@@ -368,9 +408,10 @@ impl<'p> Placement<'p> {
         displaced.sort_unstable();
         displaced.dedup();
         for &other in &displaced {
-            self.start[other] = None;
-            let clear = |holder: &mut Option<usize>| _ = holder.take_if(|holder| *holder == other);
-            self.table.iter_mut().flatten().for_each(clear);
+            let (start, choice) = (self.start[other].take()?, usize::from(self.choice[other]));
+            for &(row, after) in self.held[other][choice].as_ref()? {
+                self.table[row][((start + after) % self.interval) as usize] = None;
+            }
         }
         for &(row, after) in self.held[task][usize::from(choice)].as_ref()? {
             self.table[row][((cycle + after) % self.interval) as usize] = Some(task);
@@ -379,12 +420,15 @@ impl<'p> Placement<'p> {
         Some(displaced)
     }
 
-    /// The tasks that hold what a task would take; `None` if it takes something twice.
+    /// The tasks in the way of a task in `cycle`: holders of its resources, and accesses or advances too near to it; `None` if it
+    /// takes a resource twice.
     fn holders(&self, task: usize, choice: u8, cycle: u32) -> Option<impl Iterator<Item = usize>> {
         let interval = self.interval;
         let held = self.held[task][usize::from(choice)].as_ref()?;
-        let holder =
-            move |(row, after): &(usize, u32)| self.table[*row][((cycle + after) % interval) as usize];
+        let holder = move |(row, after): &(usize, u32)| {
+            self.visited.set(self.visited.get() + 1);
+            self.table[*row][((cycle + after) % interval) as usize]
+        };
         let waits = move |&(other, latency, is_access): &(usize, u32, bool)| {
             let start = self.start[other]?;
             let (access, advance) = if is_access { (cycle, start) } else { (start, cycle) };

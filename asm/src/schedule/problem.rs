@@ -4,18 +4,18 @@
 use takt_isa::Slots;
 use takt_isa::timing::Reservation;
 
-/// Operations that issue in one cycle: one, or those of an explicit bundle.
+/// Operations that issue in one cycle: a single operation, or an explicit bundle.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Task {
     /// The number of its operations.
     pub(super) operations: usize,
-    /// Its operations, once for each choice of their slots.
+    /// Reservations of the operations, once for each choice of slots.
     pub(super) uses: Vec<Reservation>,
     /// Cycles from its issue to its last write of an output port, if it writes one.
     pub(super) output: Option<u32>,
     /// The last cycle in which it may issue.
     pub(super) latest: Option<u32>,
-    /// True if it should issue as late as the length of the schedule allows.
+    /// Issue as late as the length of the schedule allows (`.late`).
     pub(super) late: bool,
 }
 
@@ -25,14 +25,14 @@ impl Task {
         self.uses.len().checked_div(self.operations).unwrap_or(1)
     }
 
-    /// Its operations on the slots of a choice.
+    /// Reservations of the operations on the slots of a choice.
     #[inline]
     pub(super) fn choice(&self, choice: u8) -> &[Reservation] {
         let first = usize::from(choice) * self.operations;
         &self.uses[first..first + self.operations]
     }
 
-    /// One operation, on the slots of each choice.
+    /// Reservations of one operation, by choice of slots.
     pub(super) fn operation(&self, index: usize) -> impl Iterator<Item = &Reservation> {
         self.uses.iter().skip(index).step_by(self.operations.max(1))
     }
@@ -47,7 +47,7 @@ impl Task {
         self.operation(index).filter_map(|usage| usage.writeback).min()
     }
 
-    /// True if the latency of an operation depends on the choice of its slot.
+    /// The latency of an operation depends on the choice of its slot.
     pub(super) fn varies(&self, index: usize) -> bool {
         self.operation(index).any(|usage| usage.writeback != self.written(index))
     }
@@ -56,15 +56,13 @@ impl Task {
 /// Precedence: `to` issues at least `distance` cycles after `from`; `from < to`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Edge {
-    /// The earlier task.
     pub(super) from: usize,
-    /// The later task.
     pub(super) to: usize,
-    /// Cycles between their issues; where it is a latency that depends on a choice, the least.
+    /// Cycles between the issues; the least, if it is a latency that depends on a choice.
     pub(super) distance: u32,
     /// The operation of the earlier task whose latency the distance is, if that depends on the choice of its slot.
     pub(super) latency_of: Option<usize>,
-    /// True if only the source demands it: the machine would not wait.
+    /// Only the source demands the order: the machine would not wait.
     pub(super) demanded: bool,
 }
 
@@ -73,19 +71,17 @@ pub(super) struct Edge {
 pub(super) struct Problem {
     /// The tasks, in source order, which is a topological order of the edges.
     pub(super) tasks: Vec<Task>,
-    /// The precedence edges.
     pub(super) edges: Vec<Edge>,
     /// Cycles by which the schedule may be longer for the sake of late tasks.
     pub(super) slack: u32,
-    /// Number of slots.
     pub(super) slots: usize,
     /// Number of units over all slots.
     pub(super) units: usize,
 }
 
 impl Problem {
-    /// The subproblem of the tasks that `keep` selects, and one more task, the moment in which those kept tasks for which `ends`
-    /// gives a delay have all passed it. Also returns each kept task's index in this problem.
+    /// The subproblem of the tasks that `keep` selects, and a final task: the moment in which all kept tasks with a delay from
+    /// `ends` have passed it. Also returns each kept task's index in this problem.
     pub(super) fn subproblem(
         &self,
         keep: &[bool],

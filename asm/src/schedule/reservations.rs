@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Reservation table of a partial schedule: which slots, units and write ports are taken in which cycle. The resources that an
-//! operation holds are those of [`Reservation::held`].
+//! Reservation table of a partial schedule: the busy cycles of slots, units and write ports. [`Reservation::held`] says what
+//! an operation holds.
 
 use super::problem::Problem;
+use std::cell::Cell;
 use std::ops::Range;
 use takt_isa::timing::{Reservation, Resource};
 
@@ -17,10 +18,15 @@ pub(super) enum Direction {
 /// Offset of write ports, which are held after the issue: it keeps their indices positive in a backward pass.
 const PORT_OFFSET: usize = takt_isa::spec::units::MAX_LATENCY as usize;
 
+/// Cells that are cleared in the time of a visit.
+const CLEARED: usize = 8;
+
 /// The cycles in which each resource is taken: slots, write ports, units.
 pub(super) struct Reservations {
     rows: Vec<Row>,
     slots: usize,
+    /// Cells visited so far.
+    visited: Cell<u64>,
 }
 
 /// The cycles in which one resource is taken, as a union-find forest: the entry of a cycle is itself if the cycle is free, else
@@ -65,11 +71,21 @@ impl Row {
 impl Reservations {
     pub(super) fn new(problem: &Problem) -> Reservations {
         let rows = vec![Row::default(); 2 * problem.slots + problem.units];
-        Reservations { rows, slots: problem.slots }
+        Reservations { rows, slots: problem.slots, visited: Cell::new(0) }
     }
 
     pub(super) fn clear(&mut self) {
+        self.visit(self.rows.iter().map(|row| row.0.len()).sum::<usize>() / CLEARED);
         self.rows.iter_mut().for_each(Row::clear);
+    }
+
+    fn visit(&self, cells: usize) {
+        self.visited.set(self.visited.get() + cells as u64);
+    }
+
+    /// The cells visited since the last call.
+    pub(super) fn take_visited(&mut self) -> u64 {
+        self.visited.take()
     }
 
     /// A resource's row, and the first of its cycles that an operation holds if it issues in `cycle` of a pass. In a backward pass
@@ -96,10 +112,11 @@ impl Reservations {
         }
     }
 
-    /// True if all resources of some operations are free for an issue in a cycle.
+    /// All resources of the operations are free for an issue in `cycle`.
     pub(super) fn fits(&self, operations: &[Reservation], cycle: usize, direction: Direction) -> bool {
         operations.iter().flat_map(Reservation::held).all(|(resource, cycles)| {
             let (row, first) = self.held(resource, &cycles, cycle, direction);
+            self.visit(cycles.len());
             (first..first + cycles.len()).all(|cycle| !self.rows[row].is_set(cycle))
         })
     }
@@ -115,6 +132,7 @@ impl Reservations {
             let before = cycle;
             for (resource, cycles) in operations.iter().flat_map(Reservation::held) {
                 let (row, first) = self.held(resource, &cycles, cycle, direction);
+                self.visit(cycles.len());
                 for k in 0..cycles.len() {
                     // An issue up to the taken cycle would hold it, too.
                     let free = self.rows[row].free_from(first + k);
@@ -133,6 +151,7 @@ impl Reservations {
     pub(super) fn reserve(&mut self, operations: &[Reservation], cycle: usize, direction: Direction) {
         for (resource, cycles) in operations.iter().flat_map(Reservation::held) {
             let (row, first) = self.held(resource, &cycles, cycle, direction);
+            self.visit(cycles.len());
             (first..first + cycles.len()).for_each(|cycle| self.rows[row].set(cycle));
         }
     }
@@ -151,7 +170,7 @@ mod tests {
     }
 
     proptest! {
-        /// The first fit is the one that trying each cycle finds, however the table was filled.
+        /// The first fit is the cycle that trying each of them finds, however the table was filled.
         #[test]
         fn the_first_fit_is_the_first(
             tasks in prop::collection::vec((prop::collection::vec(reservation(), 1..3), 0..20usize), 1..60),

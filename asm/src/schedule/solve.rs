@@ -9,6 +9,7 @@
 //! write. The same problem always has the same solution.
 
 use super::bound::{self, Bound};
+use super::budget::PLACING;
 use super::exact::{self, ExactResult};
 use super::graph::Graph;
 use super::list::{Plan, SlotPreference};
@@ -16,18 +17,20 @@ use super::problem::{Problem, Task};
 use super::random::Random;
 use super::reservations::{Direction, Reservations};
 
-/// A schedule.
+/// Result of the search for a block's schedule.
 #[derive(Clone, Debug)]
 pub(super) struct Solution {
-    /// The cycle in which each task issues, of which the first is 0, and on which slots.
+    /// Issue cycle of each task, from 0, and its choice of slots.
     pub(super) plan: Plan,
     /// Cycles from the first issue to the last, both included.
     pub(super) length: u32,
     /// The lower bound of the length.
     pub(super) bound: Bound,
     /// If there are late tasks that output ports depend on: cycles from the first late task's issue to the last such write, and
-    /// the bound of that.
+    /// the lower bound of this window.
     pub(super) window: Option<(u32, u32)>,
+    /// Steps of the searches.
+    pub(super) steps: u64,
 }
 
 /// Cost of a schedule, compared lexicographically.
@@ -35,23 +38,23 @@ pub(super) struct Solution {
 struct Cost {
     /// Cycles by which deadlines are missed, in all.
     tardy: u32,
-    /// The length, or what is allowed if that is more.
+    /// The length, but at least the allowed length.
     excess: u32,
     window: u32,
     length: u32,
 }
 
-/// The slack that tasks spend to get their preferred slots, by turns, in quarters of the time until they are due.
+/// Share of its slack, in quarters, that a task may wait for its preferred slot. Rounds cycle through these.
 const QUARTERS: [u32; 4] = [0, 1, 2, 4];
 
-/// One in so many tasks prefers other slots than the best schedule's.
+/// A task in this many gets a random preference instead of the best schedule's slots.
 const STRAY: u64 = 32;
 
-/// Edges that cost as much as placing a task: more than an operation has but for loads and stores in great number.
+/// Edges that cost as much as placing a task: more than an operation has, except for loads and stores in great number.
 const EDGES: usize = 16;
 
-/// Passes of schedule generation that a unit of effort buys, counted in tasks placed.
-const TASKS_PER_EFFORT: u64 = 200_000;
+/// The most passes that improve one list schedule: far more than it takes to converge.
+const PASSES: u64 = 1000;
 
 impl Problem {
     /// The window from late reads of inputs to the outputs that depend on them: its tasks, and the lower bound of its length.
@@ -70,7 +73,7 @@ impl Problem {
     }
 }
 
-/// From the first task that reads an input late to the last write of an output that depends on one.
+/// The window from the first late read of an input to the last write of an output that depends on one.
 #[derive(Default)]
 struct LateWindow {
     late: Vec<usize>,
@@ -90,19 +93,21 @@ impl LateWindow {
     }
 }
 
-/// The search for a schedule: what it has found, and what it still may spend.
+/// State of the search for a block's schedule.
 struct Search<'p> {
     graph: Graph<'p>,
     bound: Bound,
     window: LateWindow,
     table: Reservations,
     random: Random,
-    /// Tasks that may still be placed.
+    /// Steps that are left.
     budget: u64,
-    /// The length up to which it does not count.
+    /// Steps taken so far.
+    steps: u64,
+    /// Length up to which all schedules cost the same.
     allowed: u32,
     best: Option<(Cost, Plan)>,
-    /// True if any task has a choice of slots, and each task's choice with the least demand.
+    /// Some task has a choice of slots. `lightest` is each task's choice with the least demand.
     has_choices: bool,
     lightest: Vec<u8>,
     /// The earliest cycle of each task.
@@ -113,19 +118,19 @@ impl Search<'_> {
     fn cost(&self, length: u32, start: &[u32]) -> Cost {
         let tasks = self.graph.problem.tasks.iter().zip(start);
         let tardy = tasks.filter_map(|(task, start)| Some(start.saturating_sub(task.latest?))).sum();
-        // While it is the length that is searched for, late tasks count for nothing: they cost what they are allowed and no more.
+        // The search for the shortest length ignores late tasks: their window counts once a length is allowed.
         let window = if self.allowed == 0 { 0 } else { self.window.cycles(start) };
         Cost { tardy, excess: length.max(self.allowed), window, length }
     }
 
-    /// True if the deadlines are met and the length is the lower bound.
+    /// The deadlines are met, and the length is the lower bound.
     fn is_shortest(&self) -> bool {
         let is_bound = |cost: &Cost| cost.tardy == 0 && cost.length <= self.bound.cycles();
         self.best.as_ref().is_some_and(|(cost, _)| is_bound(cost))
     }
 
-    /// A schedule from priorities (small first), and its improvement forward and backward until two rounds bring nothing. Late
-    /// tasks issue in cycle `release` or later. Returns whether the budget lasts for more.
+    /// Builds a schedule from priorities (small first), and improves it forward and backward until two rounds bring nothing.
+    /// Late tasks issue in cycle `release` or later. Returns whether the budget lasts for more.
     fn descend(&mut self, (mut key, lean): (Vec<u64>, SlotPreference), release: u32) -> bool {
         let n = self.graph.problem.tasks.len();
         let (mut plan, mut start) = (Plan::new(self.graph.problem), vec![0; n]);
@@ -142,7 +147,10 @@ impl Search<'_> {
             }
             settled = if least.is_none_or(|least| cost < least) { 0 } else { settled + 1 };
             least = Some(least.map_or(cost, |least| cost.min(least)));
-            if settled == 2 || (release == 0 && cost.tardy == 0 && length <= self.bound.cycles()) {
+            if settled == 2
+                || spent > PASSES
+                || (release == 0 && cost.tardy == 0 && length <= self.bound.cycles())
+            {
                 break;
             }
             key = start.iter().map(|start| u64::from(u32::MAX - start)).collect();
@@ -152,8 +160,10 @@ impl Search<'_> {
             self.graph.list_schedule(Direction::Forward, &key, &lean, forward, &mut self.table, &mut plan);
             spent += 2;
         }
-        // With very many edges, these are the work.
-        let cost = spent * n.max(self.graph.problem.edges.len() / EDGES) as u64;
+        // With very many edges, the edges are the work; with long intervals, the cells of the table.
+        let placing = PLACING * spent * n.max(self.graph.problem.edges.len() / EDGES) as u64;
+        let cost = placing.max(self.table.take_visited());
+        self.steps += cost;
         let lasts = self.budget >= cost;
         self.budget = self.budget.saturating_sub(cost);
         lasts
@@ -181,8 +191,8 @@ impl Search<'_> {
         (key, self.lean(round))
     }
 
-    /// The preferred slots of a round: at first those with the least demand, then in odd rounds those of the best schedule, except for
-    /// a few tasks; and the slack that tasks spend for them.
+    /// Preferred slots of a round: at first the slots with the least demand, then in odd rounds the best schedule's slots, except
+    /// for a few tasks; and the slack that tasks spend for them.
     fn lean(&mut self, round: usize) -> SlotPreference {
         let mut lean =
             SlotPreference { toward: self.lightest.clone(), quarters: 0, due: [Vec::new(), Vec::new()] };
@@ -202,11 +212,12 @@ impl Search<'_> {
         lean
     }
 
-    /// Searches exactly for a schedule that priorities have not found, and for a proof that there is none.
-    fn exact(&mut self, effort: u32) {
+    /// Exact search for a better schedule, and for a higher lower bound.
+    fn exact(&mut self, budget: u64) {
         let Some((cost, _)) = self.best.as_ref().filter(|(cost, _)| cost.tardy == 0) else { return };
-        let result = exact::search(&self.graph, self.bound.cycles(), cost.length, effort);
-        let Some(ExactResult { bound, plan }) = result else { return };
+        let result = exact::search(&self.graph, self.bound.cycles(), cost.length, budget);
+        let Some(ExactResult { bound, plan, steps }) = result else { return };
+        self.steps += steps;
         if bound > self.bound.cycles() {
             self.bound.windows = bound;
         }
@@ -221,8 +232,8 @@ impl Search<'_> {
     }
 
     /// Delays the late tasks more and more, within the length that is allowed for it.
-    fn delay(&mut self, effort: u32) {
-        self.budget = u64::from(effort) * TASKS_PER_EFFORT;
+    fn delay(&mut self, budget: u64) {
+        self.budget = budget;
         if let Some((cost, plan)) = self.best.take() {
             self.allowed = cost.length + self.graph.problem.slack;
             self.best = Some((self.cost(cost.length, &plan.start), plan));
@@ -244,8 +255,8 @@ impl Search<'_> {
     }
 }
 
-/// Schedules a block. `effort` bounds the search; 0 is the first forward and backward passes only.
-pub(super) fn solve(problem: &Problem, effort: u32) -> Solution {
+/// Schedules a block. `budget` limits the steps of each search; with 0, only the first forward and backward passes run.
+pub(super) fn solve(problem: &Problem, budget: u64) -> Solution {
     let graph = Graph::new(problem);
     let chains = graph.chains();
     let mut search = Search {
@@ -253,7 +264,8 @@ pub(super) fn solve(problem: &Problem, effort: u32) -> Solution {
         window: problem.watched(),
         table: Reservations::new(problem),
         random: Random::new(),
-        budget: u64::from(effort) * TASKS_PER_EFFORT,
+        budget,
+        steps: 0,
         allowed: 0,
         best: None,
         has_choices: problem.tasks.iter().any(|task| task.choices() > 1),
@@ -270,13 +282,13 @@ pub(super) fn solve(problem: &Problem, effort: u32) -> Solution {
             break;
         }
     }
-    search.exact(effort);
+    search.exact(budget);
     if !search.window.late.is_empty() {
-        search.delay(effort);
+        search.delay(budget);
     }
-    let Search { best, bound, window, .. } = search;
+    let Search { best, bound, window, steps, .. } = search;
     let (cost, plan) = best.map_or_else(|| (None, Plan::new(problem)), |(cost, plan)| (Some(cost), plan));
     let length = cost.map_or(0, |cost| cost.length);
     let window = cost.filter(|_| !window.outputs.is_empty()).map(|cost| (cost.window, window.bound));
-    Solution { plan, length, bound, window }
+    Solution { plan, length, bound, window, steps }
 }

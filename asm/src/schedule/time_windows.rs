@@ -27,10 +27,13 @@ pub(super) struct TimeWindows {
     choices: Vec<Choices>,
 }
 
-/// Conflict: no schedule is left. The task has an empty window, or is one of those that have too few cycles together.
+/// The reason why windows are not narrowed to a fixed point.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) struct Empty {
-    pub(super) task: usize,
+pub(super) enum Stop {
+    /// Conflict: no schedule is left. The task has an empty window, or belongs to tasks that have too few cycles together.
+    Empty { task: usize },
+    /// The allowed work is done. The windows stay as far narrowed as they are.
+    Spent,
 }
 
 impl TimeWindows {
@@ -45,12 +48,12 @@ impl TimeWindows {
         TimeWindows { first: vec![0; last.len()], choices: choices.collect(), last }
     }
 
-    /// True if a task's cycle is known.
+    /// A task's cycle is known.
     pub(super) fn is_fixed(&self, task: usize) -> bool {
         self.first[task] == self.last[task]
     }
 
-    /// True if a task's cycle and its choice of slots are known.
+    /// A task's cycle and its choice of slots are known.
     pub(super) fn is_decided(&self, task: usize) -> bool {
         self.is_fixed(task) && self.choices.get(task).is_none_or(|left| left.is_power_of_two())
     }
@@ -76,23 +79,23 @@ impl TimeWindows {
     }
 }
 
-/// All of so many choices, of which there are fewer than bits.
+/// The set of `count` choices; fewer than the type has bits.
 fn all(count: usize) -> Choices {
     (1 << count) - 1
 }
 
-/// An operation that uses a resource of a constraint, so many cycles after its issue, if its task takes one of some choices.
+/// An operation that uses a constraint's resource `offset` cycles after its issue, if its task takes one of `choices`.
 struct Member {
     task: usize,
     offset: i32,
     choices: Choices,
 }
 
-/// Cardinality constraint: of its members, so many at most use it in one cycle.
+/// Cardinality constraint: at most `capacity` members use the resource in one cycle.
 struct Constraint {
     members: Vec<Member>,
     capacity: i32,
-    /// Indices into the members: by the first cycle, and by the last, as of the last propagation.
+    /// Indices into the members, sorted by first and by last cycle, as of the last propagation.
     by_first: Vec<usize>,
     by_last: Vec<usize>,
 }
@@ -103,7 +106,7 @@ impl Constraint {
         Constraint { by_last: by_first.clone(), by_first, members, capacity: capacity as i32 }
     }
 
-    /// True if all members are as late after their issue: then a constraint on write ports says no more than that on their slots.
+    /// All members have the same offset: a constraint on write ports then says no more than the constraint on their slots.
     fn is_uniform(&self) -> bool {
         self.members.iter().all(|member| member.offset == self.members[0].offset)
     }
@@ -114,27 +117,38 @@ pub(super) struct Propagation<'g, 'p> {
     graph: &'g Graph<'p>,
     constraints: Vec<Constraint>,
     cardinality: Cardinality,
-    /// True if a distance depends on a choice of slots.
+    /// Some distance depends on a choice of slots.
     varies: bool,
-    /// Edges and members visited: the work so far.
+    /// Edges and members visited: the work so far, in steps.
     pub(super) work: u64,
+    /// The work at which it stops.
+    pub(super) allowed: u64,
 }
 
 impl<'g, 'p> Propagation<'g, 'p> {
-    pub(super) fn new(graph: &'g Graph<'p>) -> Propagation<'g, 'p> {
+    pub(super) fn new(graph: &'g Graph<'p>, allowed: u64) -> Propagation<'g, 'p> {
         let constraints = constraints(graph.problem);
         let varies = graph.problem.edges.iter().any(|edge| edge.latency_of.is_some());
-        Propagation { graph, constraints, cardinality: Cardinality::default(), varies, work: 0 }
+        Propagation { graph, constraints, cardinality: Cardinality::default(), varies, work: 0, allowed }
+    }
+
+    pub(super) fn is_spent(&self) -> bool {
+        self.work >= self.allowed
     }
 
     /// Narrows the windows to a fixed point.
-    pub(super) fn narrow(&mut self, windows: &mut TimeWindows) -> Result<(), Empty> {
+    pub(super) fn narrow(&mut self, windows: &mut TimeWindows) -> Result<(), Stop> {
         loop {
+            if self.is_spent() {
+                return Err(Stop::Spent);
+            }
             self.precedence(windows)?;
             let mut changed = false;
             for constraint in &mut self.constraints {
-                self.work += 4 * constraint.members.len() as u64;
-                changed |= self.cardinality.narrow(constraint, windows)?;
+                let visits = 4 * constraint.members.len() as u64;
+                let narrowed = self.cardinality.narrow(constraint, windows);
+                self.work += visits.max(std::mem::take(&mut self.cardinality.moves));
+                changed |= narrowed?;
             }
             if !changed {
                 return Ok(());
@@ -143,7 +157,7 @@ impl<'g, 'p> Propagation<'g, 'p> {
     }
 
     /// Propagates the precedence edges.
-    fn precedence(&mut self, windows: &mut TimeWindows) -> Result<(), Empty> {
+    fn precedence(&mut self, windows: &mut TimeWindows) -> Result<(), Stop> {
         let TimeWindows { first, last, choices } = &mut *windows;
         let distance = |from: usize, arc: &Arc| match choices.get(from).filter(|_| self.varies) {
             Some(left) if left.is_power_of_two() => {
@@ -164,7 +178,7 @@ impl<'g, 'p> Propagation<'g, 'p> {
         }
         self.work += (2 * self.graph.problem.edges.len() + first.len()) as u64;
         match (0..windows.first.len()).find(|task| windows.is_empty(*task)) {
-            Some(task) => Err(Empty { task }),
+            Some(task) => Err(Stop::Empty { task }),
             None => Ok(()),
         }
     }
@@ -206,7 +220,8 @@ fn members(
                     None => members.push(Member { task, offset, choices: 1 << choice }),
                 }
             }
-            // Of several slots, a choice of one of them is the single slot's constraint.
+            // With several slots, keep only operations that use the set in every choice. Others count in the constraints of
+            // single slots.
             if set.len() > 1 {
                 let is_always = |member: &Member| member.choices == all(row.choices());
                 let keep = members[first..].iter().all(is_always);
@@ -217,8 +232,9 @@ fn members(
     members
 }
 
-/// Insertion sort, for what is nearly sorted.
-fn settle(order: &mut [usize], key: impl Fn(usize) -> i32) {
+/// Insertion sort, for nearly sorted input. Returns the number of moves.
+fn settle(order: &mut [usize], key: impl Fn(usize) -> i32) -> u64 {
+    let mut moves = 0;
     for at in 1..order.len() {
         let moved = order[at];
         let mut to = at;
@@ -227,10 +243,12 @@ fn settle(order: &mut [usize], key: impl Fn(usize) -> i32) {
             to -= 1;
         }
         order[to] = moved;
+        moves += (at - to) as u64;
     }
+    moves
 }
 
-/// Propagator of a cardinality constraint. The names are those of the papers.
+/// Propagator of a cardinality constraint, with the names of the papers.
 #[derive(Default)]
 struct Cardinality {
     first: Vec<i32>,
@@ -242,11 +260,13 @@ struct Cardinality {
     first_rank: Vec<usize>,
     last_rank: Vec<usize>,
     active: [Vec<usize>; 2],
+    /// Moves made while sorting members, charged as work.
+    moves: u64,
 }
 
 impl Cardinality {
-    /// Narrows the windows of a constraint's members. True if one has changed.
-    fn narrow(&mut self, constraint: &mut Constraint, windows: &mut TimeWindows) -> Result<bool, Empty> {
+    /// Narrows the windows of a constraint's members. True if any changed.
+    fn narrow(&mut self, constraint: &mut Constraint, windows: &mut TimeWindows) -> Result<bool, Stop> {
         let Constraint { members, by_first, by_last, capacity } = constraint;
         let mut changed = false;
         // First the beginnings; then the ends, which are the beginnings with time running backwards.
@@ -264,15 +284,15 @@ impl Cardinality {
                 one.reverse();
                 other.reverse();
             }
-            settle(one, |member| self.first[member]);
-            settle(other, |member| self.last[member]);
+            self.moves += settle(one, |member| self.first[member]);
+            self.moves += settle(other, |member| self.last[member]);
             let found = self.filter(members, [one, other], &windows.choices, *capacity);
             if sign < 0 {
                 one.reverse();
                 other.reverse();
             }
             match found {
-                Err(member) => return Err(Empty { task: members[member].task }),
+                Err(member) => return Err(Stop::Empty { task: members[member].task }),
                 Ok(false) => continue,
                 Ok(true) => changed = true,
             }
@@ -282,7 +302,7 @@ impl Cardinality {
                     false => windows.last[task] = windows.last[task].min(-first - offset),
                 }
                 if windows.is_empty(task) {
-                    return Err(Empty { task });
+                    return Err(Stop::Empty { task });
                 }
             }
         }
@@ -311,7 +331,8 @@ impl Cardinality {
         found
     }
 
-    /// Raises `first` where a Hall interval begins at or before it and `last` lies beyond. `Err` is a member of too many in one.
+    /// Raises `first` where a Hall interval begins at or before it and `last` lies beyond. `Err` is a member of an overfull
+    /// interval.
     fn raise(&mut self, by_first: &[usize], by_last: &[usize], capacity: i32) -> Result<bool, usize> {
         self.rank(by_first, by_last, capacity);
         let Cardinality { first, bounds, tree, differences, hall, first_rank, last_rank, .. } = self;
@@ -346,7 +367,7 @@ impl Cardinality {
         Ok(changed)
     }
 
-    /// Collects the distinct ends of the intervals, ascending, and the rank of each member's among them.
+    /// Collects the distinct ends of the intervals, ascending, and each member's ranks among them.
     fn rank(&mut self, by_first: &[usize], by_last: &[usize], capacity: i32) {
         let Cardinality { first, last, bounds, tree, differences, hall, first_rank, last_rank, .. } = self;
         first_rank.resize(first.len(), 0);
@@ -401,7 +422,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// All ways to give the members cycles, none to more than `capacity` of them.
+    /// All assignments of cycles to members, at most `capacity` members in a cycle.
     fn ways(windows: &[(i32, i32)], capacity: usize, taken: &mut Vec<i32>, all: &mut Vec<Vec<i32>>) {
         match windows.get(taken.len()) {
             None => all.push(taken.clone()),
@@ -421,7 +442,7 @@ mod tests {
         /// The ends of the windows are exactly the least and the largest cycle of each member over all solutions, and a conflict is
         /// reported exactly if there is no solution.
         #[test]
-        fn ends_are_those_of_all_ways(
+        fn windows_equal_enumeration_of_all_schedules(
             windows in prop::collection::vec((0..7i32, 0..5i32), 2..7),
             capacity in 1..4usize,
         ) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The kinds of token and their regular expressions: what logos generates `src/lex/raw.rs` from (`cargo xtask docs`). It is
-//! not compiled: logos' derive would bring its parsers of Rust and of regular expressions into every build of Takt.
+//! not compiled: logos' derive would bring its parsers of Rust and of regular expressions into every build of Takt. A cold
+//! `cargo run --release -- track` took 414 s of CPU time without it and 474 s (14 % more) with it, in one pair on a busy machine.
 
 /// A kind of token, as the regular expressions tell them apart.
 #[derive(Logos, Clone, Copy, PartialEq, Eq, Debug)]

@@ -5,15 +5,15 @@
 //! allocations, and a statement within a repetition is read again and again without being copied.
 
 use crate::name::{NameId, NameRef};
-use crate::report::source::Span;
 use std::collections::BTreeSet;
+use takt_diagnostics::source::Span;
 
 /// A name and its place.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Name {
-    /// The name.
+    /// Plain name or template, not yet resolved.
     pub name: NameRef,
-    /// Its place.
+    /// Source range of the name.
     pub span: Span,
 }
 
@@ -26,7 +26,7 @@ pub enum MachineName {
     File(String, Span),
 }
 
-/// `head{e}middle{e}tail`: what precedes each braced expression, the expression, and the tail.
+/// `head{e}middle{e}tail`: the text before each braced expression, the expression, and the tail.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Template {
     /// Text and expression, in turn.
@@ -38,39 +38,39 @@ pub struct Template {
 /// A node of an expression's tree.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Node {
-    /// Its kind.
+    /// Literal, name, operator, call or index.
     pub kind: NodeKind,
-    /// The part of the source that it stands for.
+    /// Source range of the subexpression.
     pub span: Span,
 }
 
 /// The kind of a node. Operands precede their operator.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum NodeKind {
-    /// An integer literal.
+    /// An integer literal of 64 bits.
     Int(i64),
-    /// A real literal.
+    /// A real literal in binary64.
     Real(f64),
-    /// A name.
+    /// A name, not yet resolved.
     Name(NameRef),
-    /// An operator before the one operand that precedes the node.
+    /// An operator of one operand, which precedes the node.
     Prefix(Operator),
-    /// An operator between the two operands that precede the node.
+    /// An operator of two operands, which precede the node.
     Infix(Operator),
-    /// A function, by name, of as many arguments as precede the node.
+    /// A call of a function, by name, with the number of arguments that precede the node.
     Call(NameId, u32),
     /// `c ? a : b` of the three operands that precede the node.
     Choice,
     /// `name[i, j]`: an index into [`Ast::elements`].
     Element(u32),
-    /// In an index, `:`: all there are.
+    /// In an index, `:`: all elements in this direction.
     All,
-    /// In an index, `a:b` of the two operands that precede the node: those from `a` to `b`.
+    /// In an index, `a:b` of the two operands that precede the node: the elements from `a` to `b`.
     Range,
 }
 
 impl NodeKind {
-    /// True if an index is a slice, given its last node.
+    /// An index that ends in this node is a slice.
     pub const fn is_slice(self) -> bool {
         matches!(self, NodeKind::All | NodeKind::Range)
     }
@@ -79,14 +79,14 @@ impl NodeKind {
 /// An expression: a range of nodes.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct ExprId {
-    /// First node.
+    /// Index of the first node in [`Ast::nodes`], or in a list of its own.
     pub first: u32,
-    /// Number of nodes.
+    /// Number of nodes; the last is the root.
     pub count: u32,
 }
 
 impl ExprId {
-    /// The nodes' indices.
+    /// Indices of the nodes in their list.
     #[inline]
     pub fn range(self) -> std::ops::Range<usize> {
         self.first as usize..(self.first + self.count) as usize
@@ -96,18 +96,18 @@ impl ExprId {
 /// An expression and its place.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Expr {
-    /// The expression.
+    /// Nodes of the expression.
     pub id: ExprId,
-    /// Its place.
+    /// Source range of the expression.
     pub span: Span,
 }
 
 /// An operand as written.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Operand {
-    /// Its kind.
+    /// Form of the operand.
     pub kind: OperandKind,
-    /// Its place.
+    /// Source range of the operand.
     pub span: Span,
 }
 
@@ -122,7 +122,7 @@ impl From<Expr> for Operand {
 pub enum OperandKind {
     /// A name alone: a register, port, label, constant or parameter.
     Name(NameRef),
-    /// Any other expression.
+    /// An expression other than a name alone.
     Expr(ExprId),
     /// `@m12`: a register by its canonical name.
     Place(NameRef),
@@ -137,14 +137,14 @@ pub enum OperandKind {
 /// `name[i, j]`: an element of an array; or a slice of one, if an index ends in [`NodeKind::All`] or [`NodeKind::Range`].
 #[derive(Clone, PartialEq, Debug)]
 pub struct Element {
-    /// The array.
+    /// Name of the array.
     pub name: Name,
     /// The nodes of each index.
     pub indices: Vec<Vec<Node>>,
 }
 
 impl Element {
-    /// True if it is several elements.
+    /// At least one index is a slice.
     pub fn is_slice(&self) -> bool {
         self.indices.iter().any(|index| index.last().is_some_and(|node| node.kind.is_slice()))
     }
@@ -157,7 +157,7 @@ pub struct Equation {
     pub targets: Vec<Operand>,
     /// The values on the right.
     pub values: Vec<Expr>,
-    /// All of it.
+    /// Source range from the first target to the last value.
     pub span: Span,
 }
 
@@ -166,14 +166,14 @@ pub struct Equation {
 pub struct Cast {
     /// The operand before the colon.
     pub operand: Operand,
-    /// The type's name.
+    /// Name of the type.
     pub ty: Name,
 }
 
-/// `offset[register]`.
+/// `offset[register]`: a word of data memory.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Memory {
-    /// The offset; none is 0.
+    /// The offset; `None` stands for 0.
     pub offset: Option<Expr>,
     /// The operand in the brackets.
     pub base: Operand,
@@ -184,31 +184,31 @@ pub struct Memory {
 pub struct Operation {
     /// The mnemonic, the macro's name, or `.raw`.
     pub mnemonic: Name,
-    /// Its first operand in [`Ast::operands`].
+    /// Index of the first operand in [`Ast::operands`].
     pub first: u32,
-    /// The number of its operands.
+    /// Number of operands from there on.
     pub count: u32,
-    /// Line, from 1.
+    /// Line of the mnemonic, from 1.
     pub line: u32,
-    /// From the mnemonic to the last operand.
+    /// Source range from the mnemonic to the last operand.
     pub span: Span,
 }
 
-/// A line: an optional label, and what follows.
+/// A line: an optional label, and its content.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Statement {
-    /// The label.
+    /// Label before the content, if any.
     pub label: Option<Name>,
-    /// The rest of the line.
+    /// Content of the line behind the label.
     pub kind: StatementKind,
-    /// Line, from 1.
+    /// Line number, from 1; the first number of a continued line.
     pub line: u32,
 }
 
 /// The kind of a line.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum StatementKind {
-    /// Nothing: a label alone, or a line that could not be read.
+    /// No content: a label alone, or a line that could not be read.
     Empty,
     /// Operations: their first in [`Ast::operations`] and their number, at most [`BUNDLE_OPERATIONS`](crate::limits::BUNDLE_OPERATIONS).
     Bundle(u32, u8),
@@ -220,28 +220,46 @@ pub enum StatementKind {
 
 /// The kind of a declaration.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Declares {
-    /// Registers.
+pub enum DeclarationKind {
+    /// Registers in general: `.reg`.
     Register,
-    /// Registers whose value outlives the period.
+    /// Registers whose value outlives the period: `.state`.
     State,
-    /// Input ports.
+    /// Ports that the program reads: `.input`.
     Input,
-    /// Output ports.
+    /// Ports that the program writes: `.output`.
     Output,
 }
 
-/// One name of a declaration.
+/// A declared name, with sizes, type and place as written.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Declaration {
-    /// The name.
+    /// Name that is declared.
     pub name: Name,
-    /// Of an array, how many elements it has in each direction: where they begin in [`Ast::sizes`], and how many there are.
+    /// Sizes of an array in each direction: index of the first in [`Ast::sizes`], and their number, 0 for a single register.
     pub sizes: (u32, u32),
     /// The type after its colon.
     pub ty: Option<Name>,
     /// The operand of its `@`: the name of a register, or the number of a port.
     pub place: Option<Expr>,
+}
+
+/// The values of an array's elements.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub enum ArrayValues {
+    /// Values as listed; zeros if the list is empty.
+    Listed(Vec<Expr>),
+    /// Numbers of a file, by path and place of the path.
+    File(String, Span),
+}
+
+/// A parameter of a macro.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Parameter {
+    /// Name of the parameter.
+    pub name: Name,
+    /// The type after its colon.
+    pub ty: Option<Name>,
 }
 
 /// A section of the program.
@@ -251,12 +269,12 @@ pub enum Section {
     Once,
     /// The section that runs every period.
     Period,
-    /// Data memory.
+    /// Contents of data memory.
     Data,
 }
 
 impl Section {
-    /// Its name, without the point.
+    /// Name of the section, without the point.
     pub const fn name(self) -> &'static str {
         match self {
             Section::Once => "once",
@@ -269,7 +287,7 @@ impl Section {
 /// A directive and its operands.
 #[derive(Clone, PartialEq, Debug)]
 pub struct DirectiveLine {
-    /// The directive.
+    /// Directive with its operands.
     pub kind: DirectiveKind,
     /// The directive's place and, where it has operands, theirs.
     pub span: Span,
@@ -279,61 +297,61 @@ pub struct DirectiveLine {
 #[derive(Clone, PartialEq, Debug)]
 pub enum DirectiveKind {
     /// `.reg`, `.state`, `.input`, `.output`.
-    Declare(Declares, Vec<Declaration>),
+    Declare(DeclarationKind, Vec<Declaration>),
     /// `.machine`, and its options with their values.
     Machine(MachineName, Vec<(Name, Expr)>),
-    /// `.array`: the arrays, and the values of the last one's elements; zeros if there are none.
-    Array(Vec<Declaration>, Vec<Expr>),
-    /// `.const`.
+    /// `.array`: the arrays, and the values of the last one's elements.
+    Array(Vec<Declaration>, ArrayValues),
+    /// `.const`, the name and its value.
     Const(Name, Expr),
-    /// `.preset`.
+    /// `.preset`, the register and its value.
     Preset {
         /// The register, by its name or its place; or an element of an array.
         register: Operand,
-        /// True if `@` precedes it: then it is an address.
+        /// `@` precedes the register, which is then named by its address.
         placed: bool,
         /// The value that the loader writes there.
         value: Expr,
     },
-    /// `.once`, `.period`, `.data`.
+    /// `.once`, `.period` or `.data`: the section that begins.
     Section(Section),
-    /// `.float`.
+    /// `.float` and the values of the words.
     Float(Vec<Expr>),
-    /// `.word`.
+    /// `.word` and the values of the words.
     Word(Vec<Expr>),
-    /// `.space`.
+    /// `.space` and the number of words.
     Space(Expr),
     /// `.macro`, its parameters, and the statement of its `.endm`.
     Macro {
-        /// The macro.
+        /// Name of the macro.
         name: Name,
-        /// Its parameters.
-        parameters: Vec<Name>,
-        /// The statement after its end.
+        /// Parameters of the macro, in order.
+        parameters: Vec<Parameter>,
+        /// Statement of the `.endm`.
         end: u32,
     },
     /// `.rep` and the statement of its `.endr`.
     Rep {
         /// The name that counts.
         variable: Name,
-        /// Its first value.
+        /// First value of the name.
         first: Expr,
-        /// Its last value.
+        /// Last value of the name, included.
         last: Expr,
-        /// The statement after its end.
+        /// Statement of the `.endr`.
         end: u32,
     },
     /// `.for` and the statement of its `.endfor`.
     For {
         /// The name that counts.
         variable: Name,
-        /// Its first value.
+        /// First value of the name.
         first: Expr,
-        /// Its last value.
+        /// Last value of the name, included.
         last: Expr,
         /// `step`, `unroll` and `max`, each with its value.
         options: Vec<(Name, Expr)>,
-        /// The statement after its end.
+        /// Statement of the `.endfor`.
         end: u32,
     },
     /// `.if` and the statement of the next branch or its `.endif`.
@@ -344,19 +362,20 @@ pub enum DirectiveKind {
     Else(u32),
     /// `.endm`, `.endr`, `.endfor`, `.endif`.
     End(Directive),
-    /// A `.macro`, `.rep`, `.for` or `.if` that could not be read, and where it ends: what it encloses is passed over.
+    /// A `.macro`, `.rep`, `.for` or `.if` that could not be read, and the statement of its end: everything between is passed
+    /// over.
     Broken(Directive, u32),
     /// `.include`, and whether the name stands in `<>`: in the library rather than beside this file.
     Include(String, bool),
     /// `.loc`: one place for all that follows, or one for each operation of each bundle that follows.
     Loc(Vec<Loc>),
-    /// `.error`.
+    /// `.error` and its text.
     Error(String),
     /// `.schedule` and `on` or `off`.
     Schedule(Name),
     /// `.contract` and `on` or `off`.
     Contract(Name),
-    /// `.fast` and what it allows, or `off`.
+    /// `.fast` and the changes that it allows, or `off`.
     Fast(Vec<Name>),
     /// `.ports` and `latched` or `direct`.
     Ports(Name),
@@ -366,11 +385,11 @@ pub enum DirectiveKind {
     Range {
         /// The registers, by their names or their places; or elements of arrays.
         registers: Vec<Operand>,
-        /// True if `@` precedes them: then they are addresses.
+        /// `@` precedes the registers, which are then named by their addresses.
         placed: bool,
-        /// The least value.
+        /// Least value of each register.
         low: Expr,
-        /// The largest value.
+        /// Largest value of each register.
         high: Expr,
     },
     /// `.deadline`, the ports, and the cycle.
@@ -381,7 +400,7 @@ pub enum DirectiveKind {
     Late(Vec<Name>, Option<Expr>),
 }
 
-/// One place of a `.loc`.
+/// A place of a `.loc`.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Loc {
     /// `none`, or another name by mistake.
@@ -400,20 +419,20 @@ macro_rules! directives {
         }
 
         impl Directive {
-            /// Every directive.
+            /// All directives, in the order of the table.
             pub const ALL: &[Directive] = &[$(Directive::$variant),*];
 
-            /// Its name, with the point.
+            /// Name of the directive, with the point.
             pub const fn name(self) -> &'static str {
                 match self { $(Directive::$variant => $name,)* }
             }
 
-            /// Its operands, as a message shows them.
+            /// Operands of the directive, as a message shows them.
             pub const fn operands(self) -> &'static str {
                 match self { $(Directive::$variant => $operands,)* }
             }
 
-            /// Its meaning, in a sentence.
+            /// Meaning of the directive, in a sentence.
             pub const fn text(self) -> &'static str {
                 match self { $(Directive::$variant => $text,)* }
             }
@@ -427,32 +446,32 @@ directives! {
     State ".state" "a, b:int, c @ m3, P[4,4]" "Registers whose value outlives the period.";
     Input ".input" "a, b:int, z[3]" "Input ports; `@ 4` gives one its number.";
     Output ".output" "a, b:int, u[4]" "Output ports; `@ 3` gives one its number.";
-    Array ".array" "A[12,12], x[12], k[3]:int = 1, 2, 3" "Arrays in data memory; the values are those of the last one.";
+    Array ".array" "A[12,12], x[12], k[3]:int = 1, 2, 3|\"file\"" "Arrays in data memory; the values are those of the last one, listed or in a file of numbers.";
     Const ".const" "NAME = expression" "A named constant, evaluated in binary64 or as an integer, rounded once where it is used.";
     Preset ".preset" "m12 = expression" "A register that the loader sets.";
-    Once ".once" "" "What follows runs once, after reset.";
-    Period ".period" "" "What follows runs every period.";
-    Data ".data" "" "What follows is data memory.";
+    Once ".once" "" "The following code runs once, after reset.";
+    Period ".period" "" "The following code runs in every period.";
+    Data ".data" "" "The following lines fill data memory.";
     Float ".float" "expression, …" "Words of data: binary32.";
     Word ".word" "expression, …" "Words of data: 32-bit integers.";
     Space ".space" "words" "Words of data: zeros.";
-    Macro ".macro" "name p, q" "A macro; its use writes out the body with the arguments for the parameters.";
+    Macro ".macro" "name d:float, x:float, n:number" "A macro; its use writes out the body with the arguments for the parameters, whose types are float, int, bits, number or name.";
     EndMacro ".endm" "" "The end of a macro's body.";
     Rep ".rep" "i, first, last" "Repeats its body with the name = first … last.";
     EndRep ".endr" "" "The end of a repetition's body.";
     For ".for" "i, first, last step s unroll n max m" "A counted loop: its body runs with the name = first … last.";
     EndFor ".endfor" "" "The end of a counted loop's body.";
-    If ".if" "expression" "Assembles what follows if the value is not zero.";
-    Elif ".elif" "expression" "Assembles what follows if no branch before was taken and the value is not zero.";
-    Else ".else" "" "Assembles what follows if no branch before was taken.";
+    If ".if" "expression" "Assembles the following lines if the value is not zero.";
+    Elif ".elif" "expression" "Assembles the following lines if no branch before was taken and the value is not zero.";
+    Else ".else" "" "Assembles the following lines if no branch before was taken.";
     EndIf ".endif" "" "The end of the branches.";
     Include ".include" "\"file\"|<file>" "The named file: beside this one, or of the library.";
-    Loc ".loc" "\"file\" line" "What follows is attributed to that line of that file.";
+    Loc ".loc" "\"file\" line" "Attributes the following lines to this line of this file.";
     Error ".error" "\"text\"" "An error with that text.";
-    Schedule ".schedule" "on|off" "Whether the assembler packs what follows into bundles and orders it.";
-    Contract ".contract" "on|off" "Whether a product that only one sum uses becomes a fused operation with it.";
-    Fast ".fast" "reassociate reciprocal|off" "What equations may do beyond what is written.";
-    Ports ".ports" "latched|direct" "Whether inputs are taken together at the tick and outputs published together at `wait`.";
+    Schedule ".schedule" "on|off" "Turns the scheduler on or off, which packs the following operations into bundles and orders them.";
+    Contract ".contract" "on|off" "Turns contraction on or off: a product with a single use, in a sum, is fused with this sum.";
+    Fast ".fast" "reassociate reciprocal|off" "Rewrites of equations that are allowed although they change rounding.";
+    Ports ".ports" "latched|direct" "Latches ports: inputs are taken together at the tick, outputs published together at `wait`.";
     LoopBound ".loop_bound" "n total m" "The bundle that follows heads a loop of at most n iterations, in one section at most m.";
     Range ".range" "a, b = least, largest" "Between which values inputs or states lie when a period begins: `takt accuracy` rests on it.";
     Deadline ".deadline" "port, port = cycle" "Each output is written for the last time in that cycle or before.";
@@ -461,10 +480,10 @@ directives! {
     Raw ".raw" "slot 0x…" "48 bits for a slot, whatever they mean.";
 }
 
-/// A source file, read.
+/// A source file as a tree, in flat lists.
 #[derive(Clone, Default, Debug)]
 pub struct Ast {
-    /// Lines that say something, in order.
+    /// Lines with a label or content, in order.
     pub statements: Vec<Statement>,
     /// Operations of the bundles.
     pub operations: Vec<Operation>,
@@ -472,21 +491,21 @@ pub struct Ast {
     pub operands: Vec<Operand>,
     /// Nodes of the expressions.
     pub nodes: Vec<Node>,
-    /// Memory operands.
+    /// Operands in data memory, `offset[register]`.
     pub memories: Vec<Memory>,
     /// Operands with a type.
     pub casts: Vec<Cast>,
-    /// Elements of arrays.
+    /// Elements and slices of arrays.
     pub elements: Vec<Element>,
-    /// Equations.
+    /// Equations, in the order of the lines.
     pub equations: Vec<Equation>,
     /// Sizes of declared arrays.
     pub sizes: Vec<Expr>,
-    /// Name templates.
+    /// Templates of names, such as `l{i}`.
     pub templates: Vec<Template>,
-    /// Directives.
+    /// Directives, in the order of the lines.
     pub directives: Vec<DirectiveLine>,
-    /// Names in lines that could not be read and may have declared them: that they are unknown is no further error.
+    /// Names that an unreadable line may have declared: the use of such a name is no further error.
     pub doubtful: BTreeSet<NameId>,
     /// Lines, from 1, that could not be read.
     pub broken: Vec<u32>,
@@ -517,13 +536,13 @@ pub enum Operator {
 }
 
 impl Operator {
-    /// Every operator.
+    /// All operators, prefix operators included.
     pub const ALL: [Operator; 18] = {
         use Operator::*;
         [Eq, Ne, Lt, Le, Gt, Ge, Or, And, Shl, Shr, Add, Sub, Mul, Div, Rem, Complement, Not, Power]
     };
 
-    /// Its spelling in the source.
+    /// Spelling of the operator in the source.
     pub const fn text(self) -> &'static str {
         match self {
             Operator::Eq => "==",
@@ -550,7 +569,7 @@ impl Operator {
     /// Precedence of prefix operators: less than powers.
     pub const PREFIX: u16 = 7;
 
-    /// Its precedence as a binary operator, from 1; 0 if it is not one.
+    /// Precedence as a binary operator, from 1; 0 for an operator that is only a prefix.
     pub const fn precedence(self) -> u16 {
         match self {
             Operator::Eq | Operator::Ne | Operator::Lt | Operator::Le | Operator::Gt | Operator::Ge => 1,
@@ -568,17 +587,17 @@ impl Operator {
     pub const COMPARISONS: &[Operator] =
         &[Operator::Eq, Operator::Ne, Operator::Lt, Operator::Le, Operator::Gt, Operator::Ge];
 
-    /// True if it compares two values: its result is 1 or 0.
+    /// The operator compares two values: its result is 1 or 0.
     pub const fn compares(self) -> bool {
         self.precedence() == Operator::Eq.precedence()
     }
 
-    /// True if it joins conditions, and other integers, bit by bit.
+    /// The operator is `&` or `|`: it joins conditions, and other integers bit by bit.
     pub const fn joins(self) -> bool {
         matches!(self, Operator::And | Operator::Or)
     }
 
-    /// True if it may be a prefix operator.
+    /// The operator may stand before a single operand.
     pub const fn is_prefix(self) -> bool {
         matches!(self, Operator::Add | Operator::Sub | Operator::Complement | Operator::Not)
     }

@@ -3,17 +3,17 @@
 
 use crate::ast::Directive;
 use crate::foreign;
-use crate::grammar::Expected;
+use crate::grammar::ExpectedItems;
 use crate::lex::{Token, is_equation};
 use crate::name::NameId;
-use crate::report::diag::Diagnostic;
-use crate::report::nearest;
-use crate::report::source::Span;
+use takt_diagnostics::diag::Diagnostic;
+use takt_diagnostics::nearest;
+use takt_diagnostics::source::Span;
 use takt_isa::ROWS;
 
 /// An error of the grammar as a user reads it.
 pub(crate) fn describe<'s>(
-    error: &Expected,
+    error: &ExpectedItems,
     tokens: &[(Token, Span)],
     text: &dyn Fn(Span) -> &'s str,
 ) -> Diagnostic {
@@ -36,7 +36,6 @@ pub(crate) fn describe<'s>(
     if expected.len() > 1 {
         expected.retain(|expected| !["`(`", "`[`", "`:`"].contains(&expected.as_str()));
     }
-    let previous = at.checked_sub(1).map(|before| tokens[before].0);
     let is_alone = matches!(tokens[0], (Token::Directive(_), span) if span.start == span.end);
     let directive = tokens.iter().find_map(|(token, _)| match token {
         Token::Directive(directive) if !is_alone => Some(*directive),
@@ -45,12 +44,44 @@ pub(crate) fn describe<'s>(
     if !is_alone && let Some(diagnostic) = foreign::describe(tokens, at, text) {
         return diagnostic;
     }
+    if found == Token::NotDirective {
+        return unknown_directive(span, text(span), &shown);
+    }
     let diagnostic = Diagnostic::error("syntax", span, "");
     let mut diagnostic = diagnostic.here(match expected.len() {
         0 => "not expected here".to_owned(),
         _ => format!("expected {}", list(&expected)),
     });
-    // The likely intention, from the tokens around the error.
+    let line = ErrorLine { tokens, at, is_alone, directive };
+    let (message, help) = intention(&line, &shown);
+    diagnostic.message = message;
+    diagnostic.help = help.or_else(|| match (directive, tokens.first()) {
+        (Some(directive), _) if directive.operands().is_empty() => {
+            Some(format!("`{}` stands alone", directive.name()))
+        }
+        (Some(directive), _) => Some(format!("write `{} {}`", directive.name(), directive.operands())),
+        (None, _) => {
+            mnemonic(tokens, at).map(|row| format!("write `{} {}`", row.mnemonic, row.shape.syntax()))
+        }
+    });
+    diagnostic
+}
+
+/// A line with an error, and the place of the error.
+struct ErrorLine<'t> {
+    tokens: &'t [(Token, Span)],
+    /// Index of the first token that the grammar rejects.
+    at: usize,
+    /// The line is the text of one expression.
+    is_alone: bool,
+    directive: Option<Directive>,
+}
+
+/// The likely intention, from the tokens around the error: message and help.
+fn intention(line: &ErrorLine<'_>, shown: &str) -> (String, Option<String>) {
+    let &ErrorLine { tokens, at, is_alone, directive } = line;
+    let found = tokens[at].0;
+    let previous = at.checked_sub(1).map(|before| tokens[before].0);
     let operand = |token: Option<Token>| {
         matches!(
             token,
@@ -64,19 +95,7 @@ pub(crate) fn describe<'s>(
             )
         )
     };
-    let (message, help) = match (previous, found) {
-        (_, Token::NotDirective) => {
-            let known = Directive::ALL.iter().map(|directive| directive.name());
-            let meant = nearest(text(span), known);
-            let message = format!("there is no directive {shown}");
-            let diagnostic = Diagnostic::error("unknown-directive", span, message).here("unknown");
-            return if meant.is_some() {
-                diagnostic.did_you_mean(meant)
-            } else {
-                let known: Vec<&str> = Directive::ALL.iter().map(|directive| directive.name()).collect();
-                diagnostic.note(format!("directives: {}", known.join(" ")))
-            };
-        }
+    match (previous, found) {
         (Some(Token::Bars), Token::Newline) => (
             "the bundle ends in `||`".to_owned(),
             Some("remove it, or write the next operation on the next line".to_owned()),
@@ -134,18 +153,21 @@ pub(crate) fn describe<'s>(
         }
         _ if at == 0 => (format!("a line cannot begin with {shown}"), None),
         _ => (format!("{shown} is not expected here"), None),
-    };
-    diagnostic.message = message;
-    diagnostic.help = help.or_else(|| match (directive, tokens.first()) {
-        (Some(directive), _) if directive.operands().is_empty() => {
-            Some(format!("`{}` stands alone", directive.name()))
-        }
-        (Some(directive), _) => Some(format!("write `{} {}`", directive.name(), directive.operands())),
-        (None, _) => {
-            mnemonic(tokens, at).map(|row| format!("write `{} {}`", row.mnemonic, row.shape.syntax()))
-        }
-    });
-    diagnostic
+    }
+}
+
+/// Error of a directive that does not exist.
+fn unknown_directive(span: Span, word: &str, shown: &str) -> Diagnostic {
+    let known = Directive::ALL.iter().map(|directive| directive.name());
+    let meant = nearest(word, known);
+    let message = format!("there is no directive {shown}");
+    let diagnostic = Diagnostic::error("unknown-directive", span, message).here("unknown");
+    if meant.is_some() {
+        diagnostic.did_you_mean(meant)
+    } else {
+        let known: Vec<&str> = Directive::ALL.iter().map(|directive| directive.name()).collect();
+        diagnostic.note(format!("directives: {}", known.join(" ")))
+    }
 }
 
 /// The instruction that the token at `at` belongs to.

@@ -4,26 +4,26 @@
 //! An expression is stored in postfix order: evaluation is a loop over its nodes with a stack of values, so neither the
 //! length nor the nesting of an expression can exhaust the thread's stack, and evaluation is linear.
 //!
-//! Values are 64-bit integers while all operands are integers and the operation is an integer one, else binary64. The
-//! elementary functions are those of the `libm` crate, not the host's: an image is the same wherever it is assembled.
+//! Values are 64-bit integers while all operands are integers and the operation has an integer result, else binary64. The
+//! elementary functions come from the `libm` crate, not from the host: an image is the same wherever it is assembled.
 
 use crate::ast::{ExprId, Node, NodeKind, Operator};
 use crate::name::NameRef;
-use crate::report::source::Span;
 use smallvec::SmallVec;
+use takt_diagnostics::source::Span;
 use takt_isa::Type;
 
 /// The value of an expression.
 #[derive(Clone, Copy, PartialEq, Debug, serde::Serialize)]
 #[serde(untagged)]
 pub enum Value {
-    /// An integer.
+    /// An integer of 64 bits.
     Int(i64),
     /// A real number in binary64.
     Real(f64),
 }
 
-/// In the fewest digits that say it exactly; those of binary32 where it holds the value.
+/// Writes the fewest digits that read back exactly, as binary32 where it holds the value.
 impl std::fmt::Display for Value {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match *self {
@@ -54,10 +54,10 @@ macro_rules! functions {
         }
 
         impl Function {
-            /// Every function.
+            /// All functions, in the order of the table.
             pub const ALL: &[Function] = &[$(Function::$variant),*];
 
-            /// Its name.
+            /// Name of the function.
             pub const fn name(self) -> &'static str {
                 match self { $(Function::$variant => $name,)* }
             }
@@ -88,8 +88,8 @@ functions! {
     Abs "abs" 1 "Absolute value; an integer's is an integer.";
     Min "min" 0 "The least of its arguments; an integer if all are.";
     Max "max" 0 "The greatest of its arguments; an integer if all are.";
-    Floor "floor" 1 "The greatest integer not above.";
-    Ceil "ceil" 1 "The least integer not below.";
+    Floor "floor" 1 "The greatest integer that is not above the operand.";
+    Ceil "ceil" 1 "The least integer that is not below the operand.";
     Round "round" 1 "The nearest integer, of two equally near the even one, as `ftoi` rounds.";
     Int "int" 1 "The integer part, towards zero.";
     Float "float" 1 "The same value as a real number.";
@@ -115,15 +115,15 @@ pub enum Fault {
     /// A real number where only integers make sense.
     #[error("{operator} takes integers, and {value} is a real number")]
     NeedsInteger {
-        /// The operation.
+        /// Name of the operator or function.
         operator: &'static str,
-        /// The operand.
+        /// Operand that is no integer.
         value: f64,
     },
     /// A shift by less than 0 or more than 63.
     #[error("a shift by {0}: the count is 0 to 63")]
     ShiftCount(i64),
-    /// Nothing has the name.
+    /// No value has the name.
     #[error("`{0}` is not known")]
     UnknownName(String),
     /// No function has the name.
@@ -132,7 +132,7 @@ pub enum Fault {
     /// The wrong number of arguments.
     #[error("{name} takes {} argument{}, not {found}", if *.takes == 0 { "at least 1".to_owned() } else { takes.to_string() }, if *.takes == 1 { "" } else { "s" })]
     Arguments {
-        /// The function.
+        /// Name of the function.
         name: &'static str,
         /// The number that it takes; 0 for one or more.
         takes: usize,
@@ -148,10 +148,10 @@ pub enum Fault {
     /// A real number where an integer goes.
     #[error("{0} is not an integer")]
     NotInteger(f64),
-    /// An element of an array.
+    /// An element of an array, known only when the program runs.
     #[error("an element of an array has no value before the program runs")]
     Element,
-    /// The caller has reported it.
+    /// A fault that the implementation of [`Names`] has reported.
     #[error("reported")]
     Reported,
 }
@@ -159,7 +159,7 @@ pub enum Fault {
 /// A [`Fault`] and the part of the expression that has it.
 #[derive(Clone, PartialEq, Debug)]
 pub struct EvalError {
-    /// The part.
+    /// Source range of the part.
     pub span: Span,
     /// The reason that it has no value.
     pub fault: Fault,
@@ -252,7 +252,7 @@ pub fn parts(nodes: &[Node]) -> Vec<u32> {
     parts
 }
 
-/// The parts that are the operands of a node, in order: first and last node of each. `parts` is what [`parts`] gave.
+/// The operands of a node, in order: first and last node of each. `parts` is the result of [`parts`].
 pub fn operands(parts: &[u32], node: u32) -> SmallVec<[(u32, u32); 3]> {
     let (start, mut end) = (parts[node as usize], node);
     let mut operands = SmallVec::new();
@@ -266,7 +266,7 @@ pub fn operands(parts: &[u32], node: u32) -> SmallVec<[(u32, u32); 3]> {
 }
 
 impl Value {
-    /// As a real number.
+    /// The value in binary64.
     pub fn real(self) -> f64 {
         match self {
             Value::Int(value) => value as f64,
@@ -274,7 +274,7 @@ impl Value {
         }
     }
 
-    /// True if it is zero.
+    /// The value is zero, of either sign.
     pub fn is_zero(self) -> bool {
         match self {
             Value::Int(value) => value == 0,
@@ -282,7 +282,19 @@ impl Value {
         }
     }
 
-    /// As an integer: a real number that is one counts.
+    /// The number as a literal of a type: a real number for floats, an integer for integers, unchanged for bits.
+    ///
+    /// # Errors
+    /// If it is no integer, and one is asked for.
+    pub fn of_type(self, ty: Type) -> Result<Value, Fault> {
+        Ok(match ty {
+            Type::F => Value::Real(self.real()),
+            Type::I => Value::Int(self.integer()?),
+            Type::B => self,
+        })
+    }
+
+    /// The value as an integer; a real number without a fraction counts.
     ///
     /// # Errors
     /// If it is no integer, or beyond 64 bits.
@@ -324,7 +336,7 @@ fn integer_bits(value: i64) -> Result<u32, Fault> {
         .map_err(|_| Fault::IntegerRange(value))
 }
 
-/// The integer that a real number is.
+/// The integer that equals a real number, if it fits 64 bits.
 fn whole(value: f64) -> Option<i64> {
     // 2^63 is the first that does not fit; the comparison is exact.
     (value == libm::trunc(value)
@@ -401,7 +413,7 @@ pub fn infix(operator: Operator, a: Value, b: Value) -> Result<Value, Fault> {
         (Div | Rem, _, b) if b.is_zero() => Err(Fault::DivisionByZero),
         (Div, Value::Int(a), Value::Int(b)) if a.checked_rem(b) == Some(0) => Ok(Value::Int(a / b)),
         (Div, ..) => real(a.real() / b.real()),
-        // The one overflow, i64::MIN % -1, has the remainder 0.
+        // The only overflow, i64::MIN % -1, has the remainder 0.
         (Rem, Value::Int(a), Value::Int(b)) => {
             let remainder = a.checked_rem(b).unwrap_or(0);
             Ok(Value::Int(if remainder != 0 && (remainder < 0) != (b < 0) {

@@ -6,11 +6,11 @@ use crate::expr::{self, BUILTINS, EvalError, Fault, Function, Names, Value};
 use crate::intern::Interner;
 use crate::name::{NameId, NameRef};
 use crate::parse::parse_expression;
-use crate::report::diag::{Diagnostic, Diagnostics, Sink};
-use crate::report::source::{Sources, Span};
 use std::sync::Arc;
+use takt_diagnostics::diag::{Diagnostic, Diagnostics, Sink};
+use takt_diagnostics::source::{Sources, Span};
 
-/// A parsed expression.
+/// A parsed expression with its names and its text.
 #[derive(Clone, Debug)]
 pub struct Expression {
     ast: Ast,
@@ -20,7 +20,7 @@ pub struct Expression {
 }
 
 impl Expression {
-    /// Parses an expression.
+    /// Parses an expression, which is one line.
     ///
     /// # Errors
     /// If the text is no expression.
@@ -47,7 +47,7 @@ impl Expression {
         }
     }
 
-    /// The names that the expression uses, but for those that the language knows.
+    /// Plain names in the expression, constants such as `pi` included; functions and templates are left out.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.ast.nodes[self.id.range()].iter().filter_map(|node| match node.kind {
             NodeKind::Name(name) => name.resolve().ok().map(|name| self.names.text(name)),
@@ -55,7 +55,7 @@ impl Expression {
         })
     }
 
-    /// The expression's value, where `lookup` gives that of a name. `pi` and the like need not be given.
+    /// The expression's value, with the names' values from `lookup`. `pi` and the like need not be given.
     ///
     /// # Errors
     /// If a name is unknown or an operation has no value.

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Statements and operators that other languages have, and how this one writes them.
+//! Statements and operators of other languages, and the forms of this language for them.
 
 use crate::ast::{Directive, Operator};
 use crate::lex::{Token, is_equation};
-use crate::report::diag::Diagnostic;
-use crate::report::source::Span;
+use takt_diagnostics::diag::Diagnostic;
+use takt_diagnostics::source::Span;
 
 type Tokens<'t> = &'t [(Token, Span)];
 
@@ -35,15 +35,16 @@ pub fn statement(word: &str, rest: &str) -> Option<String> {
             "`.for {}, 1, 3` … `.endfor` repeats its lines for 1, 2 and 3; `.rep` … `.endr` writes them out",
             named("i")
         ),
-        "int" => format!("declare it with `.reg {}:int`, then write what it is", named("n")),
+        "int" => format!("declare it with `.reg {}:int`, then assign its value", named("n")),
         "let" | "var" | "float" | "double" if !named("").is_empty() => {
-            format!("declare it with `.reg {}`, then write what it is", named("u"))
+            format!("declare it with `.reg {}`, then assign its value", named("u"))
         }
         _ => return None,
     })
 }
 
-/// The form here of a line that the grammar rejects and another language has. `at` is the token where the grammar stopped.
+/// A diagnostic with the form here of a line that another language has and the grammar rejects. `at` is the token where the
+/// grammar stopped.
 pub(crate) fn describe<'s>(
     tokens: Tokens<'_>,
     at: usize,
@@ -86,7 +87,7 @@ impl<'s> ForeignLine<'_, '_, 's> {
         }
     }
 
-    /// The text of some tokens.
+    /// The place and the text of some tokens.
     fn part(&self, range: std::ops::Range<usize>) -> (Span, &'s str) {
         let Some(tokens) = self.tokens.get(range).filter(|tokens| !tokens.is_empty()) else {
             return (Span::default(), "");
@@ -99,14 +100,14 @@ impl<'s> ForeignLine<'_, '_, 's> {
         self.part(0..self.tokens.len())
     }
 
-    /// True if two tokens stand together, without a blank.
+    /// A token and the next stand together, without a blank.
     fn touch(&self, index: usize) -> bool {
         matches!(self.tokens.get(index..index + 2), Some([first, second]) if first.1.end == second.1.start)
     }
 
     fn statement(&self) -> Option<Diagnostic> {
         let word = self.word(0);
-        // It may be a register's name.
+        // The word may be a register's name.
         if matches!(
             self.token(1),
             None | Some(Token::Assign | Token::Comma | Token::BracketOpen | Token::Operator(_))
@@ -227,7 +228,7 @@ impl<'s> ForeignLine<'_, '_, 's> {
         }
     }
 
-    /// True if bars cannot separate operations: in an equation or a directive, behind which no operation stands.
+    /// Bars join conditions: they stand in an equation or a directive, and no operation follows them.
     fn is_or(&self, index: usize, is_equation: bool) -> bool {
         match self.token(0) {
             Some(Token::Directive(directive)) => {
@@ -243,7 +244,7 @@ impl<'s> ForeignLine<'_, '_, 's> {
         }
     }
 
-    /// The expression with conditions in parentheses and the language's operators between them, and where it stands.
+    /// The expression with conditions in parentheses and the language's operators between them, and its place.
     fn conditions(&self, joins: &dyn Fn(usize) -> Option<(usize, Operator)>) -> Option<(Span, String)> {
         let start = match self.token(0)? {
             Token::Directive(Directive::If | Directive::Elif) => 1,
@@ -269,7 +270,7 @@ impl<'s> ForeignLine<'_, '_, 's> {
             match token {
                 Token::Open | Token::BracketOpen => depth += 1,
                 Token::Close | Token::BracketClose => depth = depth.checked_sub(1)?,
-                // One in parentheses is left to who wrote it.
+                // A join within parentheses is left to the author.
                 _ if joins(index).is_some() => return None,
                 Token::Operator(operator) if depth == 0 => compares |= operator.compares(),
                 Token::Comma | Token::Question | Token::Assign if depth == 0 => return None,

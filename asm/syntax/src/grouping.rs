@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Comparisons that stand beside `&`, `|` or another comparison without parentheses. Languages differ in which of them binds
-//! more tightly: a reader may take such a line otherwise than the assembler does.
+//! Comparisons that stand beside `&`, `|` or another comparison without parentheses. Languages differ in the precedence of
+//! these operators: a reader may take such a line otherwise than the assembler does.
 
 use crate::ast::{Node, NodeKind, Operator};
 use crate::expr::{operands, parts};
 use crate::grammar::{Builder, Mark};
 use crate::limits;
-use crate::report::diag::{Diagnostic, Severity, Sink};
-use crate::report::source::{Source, Span};
+use takt_diagnostics::diag::{Diagnostic, Severity, Sink};
+use takt_diagnostics::source::{Source, Span};
 
 /// Warns of such comparisons in the line whose parts begin at a mark.
 pub(crate) fn check(builder: &Builder<'_>, mark: Mark, source: &Source, sink: &mut Sink) {
@@ -39,18 +39,18 @@ impl Tree<'_> {
     fn infix(&self, node: u32) -> Option<Infix> {
         let Node { kind: NodeKind::Infix(operator), span } = self.nodes[node as usize] else { return None };
         let [(_, a), (_, b)] = operands(&self.parts, node)[..] else { return None };
-        // A node's place is without its parentheses, that of what is around it with them.
+        // A node's place excludes the node's own parentheses; the place of the node around it includes them.
         let (left, right) = (self.nodes[a as usize].span, self.nodes[b as usize].span);
         let operands = [(a, span.start < left.start), (b, right.end < span.end)];
         Some(Infix { operator, span, operands })
     }
 
-    /// The same of an operand, if it stands bare and is a comparison.
+    /// The operator of an operand that is a comparison without parentheses.
     fn compared(&self, (node, parenthesised): (u32, bool)) -> Option<Infix> {
         self.infix(node).filter(|inner| !parenthesised && inner.operator.compares())
     }
 
-    /// The same of an operand, if it stands bare and is joined of others by `&` or `|`.
+    /// The operator of an operand that `&` or `|` joins, without parentheses.
     fn joined(&self, (node, parenthesised): (u32, bool)) -> Option<Infix> {
         self.infix(node).filter(|inner| !parenthesised && inner.operator.joins())
     }
@@ -102,8 +102,8 @@ impl Tree<'_> {
             let (a, b) = self.gap(this);
             let (end, is_last) = (this.span.end, index + 1 == chain.len());
             text += &format!("({} {} ", self.text(from, a), this.operator.text());
-            // The right side of a comparison: several joined operands, of which only the first is compared, or one that the next comparison
-            // takes, too.
+            // The right side of a comparison: several joined operands with only the first compared, or an operand that the next
+            // comparison takes, too.
             match self.joined(this.operands[1]) {
                 Some(joined) => {
                     let ((first, _), (_, last)) = (self.join(joined, 0), self.join(joined, 1));
@@ -137,7 +137,7 @@ fn expression(nodes: &[Node], source: &Source, sink: &mut Sink) {
         return;
     }
     let tree = Tree { nodes, parts: parts(nodes), source };
-    // Comparisons that stand bare in one that is reported.
+    // Comparisons without parentheses inside a reported comparison.
     let mut told = vec![false; nodes.len()];
     for node in (0..nodes.len() as u32).rev() {
         let Some(infix) = tree.infix(node).filter(|infix| infix.operator.compares()) else { continue };
@@ -151,7 +151,7 @@ fn expression(nodes: &[Node], source: &Source, sink: &mut Sink) {
         }
         sink.add(Severity::Warning, "grouping", infix.span, || {
             let warning = |message: String| Diagnostic::warning("grouping", infix.span, message);
-            // A longer correction is not written out: it nests as deeply as it is long.
+            // A longer correction is not written out: its nesting grows with its length.
             let is_short = (infix.span.end - infix.span.start) as usize <= limits::QUOTED_BYTES;
             let Some(joined) = joined.filter(|_| chained.is_none()) else {
                 if !is_short {
@@ -179,9 +179,9 @@ mod tests {
     use super::*;
     use crate::intern::Interner;
     use crate::parse::parse;
-    use crate::report::source::Sources;
+    use takt_diagnostics::source::Sources;
 
-    /// The expression that is offered for a line's, and the places of all warnings.
+    /// The replacements that the warnings of a line offer.
     fn offered(line: &str) -> Vec<String> {
         let (mut sources, mut sink) = (Sources::default(), Sink::default());
         sources.add("test.s", format!("{line}\n"));
@@ -199,7 +199,7 @@ mod tests {
             ("a<b|c<d&e<f", "(a < b) | (c < d) & (e < f)"),
             ("f & a < b & (g) | c+1 >= d & h", "f & (a < b) & (g) | (c+1 >= d) & h"),
             ("(a + 1) == (b) & (c - 2) < d", "((a + 1) == (b)) & ((c - 2) < d)"),
-            // As it is computed, where it may be meant so.
+            // The computed grouping, where it may be the intended one.
             ("n & 1 == 0", "(n & 1) == 0"),
             ("a == b & c", "a == (b & c)"),
             ("a & b == c | d", "(a & b) == (c | d)"),
@@ -217,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_clear_is_no_mistake() {
+    fn accepts_unambiguous_conditions() {
         for line in [
             " y = (a < b) & (c < d)",
             " y = (n & 1) == 0",

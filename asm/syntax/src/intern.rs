@@ -47,7 +47,7 @@ impl Interner {
         self.find(name).unwrap_or_else(|| NameId(self.names.insert_full(name.into()).0 as u32))
     }
 
-    /// The name's text.
+    /// The text of a name, by its number.
     #[inline]
     pub fn text(&self, name: NameId) -> &str {
         &self.names[name.0 as usize]
@@ -111,7 +111,7 @@ mod tests {
 
     #[test]
     fn known_names_are_distinct() {
-        // One name in two lists would shift the numbers of all that follow.
+        // A name in two lists would shift the numbers of all names behind it.
         let count = NameId::BUILTINS as usize + BUILTINS.len();
         assert_eq!(Interner::new().count(), count);
     }

@@ -2,8 +2,7 @@
 //! The syntax of the assembler's language: text to tree, before any name has a meaning; and the expression
 //! language.
 //!
-//! A crate of its own because its parsers take long to compile. It is a part of `takt-asm`, which offers what others may use
-//! of it.
+//! A crate of its own because its parsers take long to compile. Its public items reach other crates through `takt-asm`.
 
 pub mod ast;
 mod blocks;
@@ -21,11 +20,10 @@ pub mod parse;
 pub mod tokens;
 
 pub use expression::Expression;
-pub use takt_diagnostics as report;
 
-use crate::report::diag::{Diagnostics, Sink};
-use crate::report::source::Sources;
 use std::sync::Arc;
+use takt_diagnostics::diag::{Diagnostics, Sink};
+use takt_diagnostics::source::Sources;
 
 /// Syntax errors of a text: its tokens, its lines, its blocks. Nothing is included, expanded or resolved.
 pub fn read(name: &str, text: &str) -> Diagnostics {
@@ -34,7 +32,7 @@ pub fn read(name: &str, text: &str) -> Diagnostics {
         Some(index) => {
             parse::parse(&sources.files()[index], &mut intern::Interner::new(), &mut sink);
         }
-        None => sink.push(crate::report::diag::Diagnostic::placeless("limit", "the source is too long")),
+        None => sink.push(takt_diagnostics::diag::Diagnostic::placeless("limit", "the source is too long")),
     }
     sink.finish(Arc::new(sources))
 }

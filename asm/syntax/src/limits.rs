@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Every limit of the assembler, by name. They keep an unreasonable source from taking unreasonable time or memory:
-//! beyond each stands one clear error. None is near what a real program needs.
+//! Every limit of the assembler, by name. The limits keep an unreasonable source from taking unreasonable time or memory:
+//! beyond each stands one clear error. No real program comes near one.
 
 pub use takt_diagnostics::limits::*;
 
@@ -22,11 +22,11 @@ pub const ARRAY_ELEMENTS: usize = 1 << 16;
 pub const ARRAY_INDICES: usize = 8;
 /// Registers that a statement writes, as `a, b = …`.
 pub const EQUATION_TARGETS: usize = 64;
-/// `.include` within `.include`.
+/// Depth of `.include` within `.include`.
 pub const INCLUDE_DEPTH: usize = 32;
 /// `.include`s met during expansion.
 pub const INCLUDES: usize = 1 << 16;
-/// A macro's use within a macro's body.
+/// Depth of macro uses within macros' bodies.
 pub const MACRO_DEPTH: usize = 64;
 /// `.rep` and `.if` within one another, in one file.
 pub const BLOCK_DEPTH: usize = 64;
@@ -47,7 +47,7 @@ pub const BUNDLE_OPERATIONS: usize = 64;
 pub const DATA_WORDS: usize = 1 << 20;
 /// Characters of a name.
 pub const NAME_BYTES: usize = 255;
-/// Names that a program may use, those of macros' locals and of name templates included.
+/// Names that a program may use, including macros' locals and expanded name templates.
 pub const NAMES: usize = 1 << 24;
 /// Names in the source, each expansion counted, that an index of names keeps.
 pub const REFERENCES: usize = 1 << 20;

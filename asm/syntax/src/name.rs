@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Names as numbers.
+//! Numbers that stand for names and for templates of names.
 
-/// A name's number.
+/// Number of an interned name.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, PartialOrd, Ord)]
 pub struct NameId(pub u32);
 
@@ -12,7 +12,7 @@ pub struct NameRef(u32);
 impl NameRef {
     const TEMPLATE: u32 = 1 << 31;
 
-    /// A plain name.
+    /// The reference to a plain name.
     #[inline]
     pub const fn plain(name: NameId) -> NameRef {
         NameRef(name.0)

@@ -13,16 +13,16 @@ use crate::intern::Interner;
 use crate::lex::{Chunk, Lexer, LineTokens, Token, is_equation};
 use crate::limits;
 use crate::name::NameRef;
-use crate::report::diag::{Diagnostic, Severity, Sink};
-use crate::report::source::{Source, Span};
 use chumsky::Parser as _;
 use chumsky::input::Input as _;
 use std::cell::OnceCell;
+use takt_diagnostics::diag::{Diagnostic, Severity, Sink};
+use takt_diagnostics::source::{Source, Span};
 
 /// Tokens read at a time: enough that building the parser does not count, few enough to stay in the cache.
 const CHUNK: usize = 1 << 14;
 
-/// Bytes that a line has in most sources, or more.
+/// Bytes of an average line in most sources, at the least.
 const LINE: usize = 24;
 
 /// Reads a source file.
@@ -50,8 +50,8 @@ fn parse_with(source: &Source, names: &mut Interner, sink: &mut Sink, shortcut: 
 
 /// Parses an expression alone: its nodes, or `None` with errors in the sink.
 pub fn parse_expression(source: &Source, names: &mut Interner, sink: &mut Sink) -> Option<(Ast, ExprId)> {
-    // As the value of a constant, an expression reads like any other. The directive before it takes no room in the text:
-    // messages know by that that nobody wrote it.
+    // An expression is read as the value of a constant. The directive before it has an empty span, by which messages know
+    // that nobody wrote it.
     let mut ast = Ast::default();
     let mut lexer = Lexer::new(&source.text, source.base);
     let mut chunk = Chunk::default();
@@ -81,7 +81,7 @@ pub fn parse_expression(source: &Source, names: &mut Interner, sink: &mut Sink) 
 
 fn parse_chunk(chunk: &Chunk, source: &Source, ast: &mut Ast, sink: &mut Sink, shortcut: bool) {
     let mut builder = Builder { ast: std::mem::take(ast), text: &source.text, base: source.base, line: 0 };
-    // Built when a line first needs them.
+    // Parsers, built when a line first needs them.
     let (bundle, equation) = (OnceCell::new(), OnceCell::new());
     let mut start = 0;
     for line in &chunk.lines {
@@ -177,8 +177,8 @@ fn number_lines(operations: &mut [Operation], tokens: &[(Token, Span)], first: u
     }
 }
 
-/// Keeps of a line that could not be read what other lines depend on: its label, the block that it opens or closes, and
-/// the names that it may have declared.
+/// Keeps the parts of an unreadable line that other lines depend on: its label, the block that it opens or closes, and the
+/// names that it may have declared.
 fn broken(tokens: &[(Token, Span)], line: &LineTokens, ast: &mut Ast) {
     ast.broken.push(line.number);
     let (label, rest) = match tokens {
@@ -223,7 +223,7 @@ fn broken(tokens: &[(Token, Span)], line: &LineTokens, ast: &mut Ast) {
     ast.statements.push(Statement { label, kind, line: line.number });
 }
 
-/// True if an operand nests deeper, or is longer, than the assembler reads, which is reported.
+/// Reports an operand that nests deeper, or is longer, than the assembler reads; true if there is one.
 fn nests_too_deeply(tokens: &[(Token, Span)], sink: &mut Sink) -> bool {
     // For each open bracket, and for the operand as a whole, the prefix operators and powers that await their operand, and
     // the choices that await their last alternative.
@@ -290,8 +290,8 @@ fn nests_too_deeply(tokens: &[(Token, Span)], sink: &mut Sink) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::source::Sources;
     use proptest::prelude::*;
+    use takt_diagnostics::source::Sources;
 
     /// The tree and the errors of a text, as text.
     fn read(text: &str, shortcut: bool) -> String {
@@ -324,7 +324,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { cases: 3000, ..ProptestConfig::default() })]
 
-        /// Nor in expressions, most of them well formed.
+        /// The shortcut reads expressions, most of them well formed, as the grammar does.
         #[test]
         fn the_shortcut_computes_the_same(
             parts in prop::collection::vec(

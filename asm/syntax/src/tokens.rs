@@ -3,9 +3,9 @@
 
 use crate::ast::Directive;
 use crate::lex::Raw;
-use crate::report::source::line_feeds;
 use logos::Logos;
 use std::ops::Range;
+use takt_diagnostics::source::line_feeds;
 
 /// The kind of a token.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
@@ -18,21 +18,21 @@ pub enum TokenKind {
     TemplateMiddle,
     /// The end of a name with `{}`, from the last brace on.
     TemplateEnd,
-    /// A directive.
+    /// A known directive, such as `.reg`.
     Directive,
     /// A word with a leading point that is no directive.
     UnknownDirective,
-    /// A number.
+    /// A number, integer or real.
     Number,
     /// A text in `"`.
     Text,
     /// `||`, between the operations of a bundle.
     Bars,
-    /// `,`.
+    /// `,`, between operands and values.
     Comma,
-    /// `:`.
+    /// `:`, after a label or before a type.
     Colon,
-    /// `=`.
+    /// `=`, before a value.
     Assign,
     /// A bracket, a parenthesis or `@`.
     Punctuation,
@@ -47,9 +47,9 @@ pub enum TokenKind {
 /// A token and its place.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Token {
-    /// Its kind.
+    /// Kind, by which an editor colours the token.
     pub kind: TokenKind,
-    /// Its bytes in the text. A token lies in one line.
+    /// Bytes of the token in the text. A token lies in one line.
     pub range: Range<usize>,
 }
 
@@ -67,7 +67,7 @@ pub fn lines(text: &str) -> Vec<Vec<Token>> {
         let raw = lexer.next();
         let range = lexer.span();
         let last = lines.len() - 1;
-        // Comments are what the lexer passes over besides blanks; one ends with its line.
+        // Besides blanks, the lexer passes over comments; a comment ends with its line.
         let passed = &text[end..range.start];
         if let Some(at) = passed.find(';') {
             let comment = passed[at..].trim_end_matches('\r');
@@ -114,7 +114,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// Whatever the text: tokens lie in their line, in order, and between them there are blanks only.
+        /// Tokens of any text lie in their line, in order, with only blanks between them.
         #[test]
         fn nothing_is_lost(text in "([a-f{}0-9 .,;:|\"\\\\\t\r\n\u{e9}=]|0x|\n; c\n){0,60}") {
             let lines = lines(&text);

@@ -2,11 +2,11 @@
 //! Helpers that the tests share.
 
 use std::path::PathBuf;
-use takt_asm::{Assembled, FileLoader, MemoryLoader, Options, diag::Diagnostics};
+use takt_asm::{AssembledProgram, FileLoader, MemoryLoader, Options, diag::Diagnostics};
 use takt_isa::{F3, Machine};
 
-/// The sources of a folder of this crate's tests whose names begin so, in order of their names, with the machine that
-/// their first line asks for (`; machine f1`).
+/// The sources of a folder of this crate's tests whose names begin with `prefix`, in order of their names, with the machine
+/// that their first line asks for (`; machine f1`).
 pub(crate) fn sources(folder: &str, prefix: &str) -> Vec<(String, &'static Machine)> {
     let mut names: Vec<String> = std::fs::read_dir(root(folder))
         .expect("the folder is part of the crate")
@@ -27,7 +27,7 @@ pub(crate) fn root(folder: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests").join(folder)
 }
 
-/// So many random programs, or those few without optimisation, and for each of the mutants (`cargo xtask mutants`).
+/// The number of random programs: `many`, or `few` without optimisation and for each mutant (`cargo evidence mutants`).
 pub(crate) fn programs(few: u64, many: u64) -> u64 {
     if cfg!(debug_assertions) || std::env::var_os("TAKT_FEW").is_some() { few } else { many }
 }
@@ -41,18 +41,18 @@ pub(crate) fn assemble_file(
     folder: &str,
     name: &str,
     machine: &'static Machine,
-) -> Result<Assembled, Diagnostics> {
+) -> Result<AssembledProgram, Diagnostics> {
     takt_asm::assemble(name, &FileLoader::new(root(folder)), &options(machine))
 }
 
-/// Assembles a text.
-pub(crate) fn assemble(text: &str, machine: &'static Machine) -> Result<Assembled, Diagnostics> {
+/// Assembles a text as the file `test.s`.
+pub(crate) fn assemble(text: &str, machine: &'static Machine) -> Result<AssembledProgram, Diagnostics> {
     takt_asm::assemble("test.s", &MemoryLoader::of("test.s", text), &options(machine))
 }
 
 /// Assembles a text without mistakes for the fast machine.
 #[track_caller]
-pub(crate) fn good(text: &str) -> Assembled {
+pub(crate) fn good(text: &str) -> AssembledProgram {
     match assemble(text, &F3) {
         Ok(assembled) => assembled,
         Err(report) => panic!("{}", report.render(false)),
@@ -69,7 +69,7 @@ pub(crate) fn bad(text: &str, machine: &'static Machine) -> Diagnostics {
 }
 
 /// The bundles of a program as text, with the names of the source.
-pub(crate) fn bundles(assembled: &Assembled) -> Vec<String> {
+pub(crate) fn bundles(assembled: &AssembledProgram) -> Vec<String> {
     let program = &assembled.program;
     let bundle = |address| {
         let instructions = program.bundle(address).expect("it is in the program").expect("it is legal");

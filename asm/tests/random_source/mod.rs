@@ -2,6 +2,8 @@
 //! Random sources from a seed, which every machine takes.
 #![allow(dead_code)]
 
+pub(crate) mod full_language;
+
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::{Rng as _, SeedableRng as _};
 use std::fmt::Write as _;
@@ -34,7 +36,7 @@ const PREFIX: [&str; 3] = ["m", "a", "x"];
 const NAMES: u64 = 6;
 const INPUTS: [&str; 4] = ["in0", "in1", "in2", "in3"];
 
-/// A counted loop: so often as a constant or a register says, perhaps around another, over an array; perhaps with a maximum search,
+/// A counted loop with a count from a constant or a register, perhaps around another, over an array; perhaps with a maximum search,
 /// whose branch can become a selection.
 fn counted_loop(random: &mut Random, number: u64, operand: &dyn Fn(&mut Random) -> String) -> String {
     let mut text = String::new();
@@ -67,7 +69,7 @@ pub(crate) fn source(seed: u64) -> String {
     source_with(seed, false)
 }
 
-/// The same, with counted loops.
+/// A source as [`source`] makes it, with counted loops.
 pub(crate) fn source_with_loops(seed: u64) -> String {
     source_with(seed, true)
 }
@@ -81,7 +83,9 @@ fn source_with(seed: u64, has_loops: bool) -> String {
             let _ = writeln!(text, ".state {prefix}{k}");
         }
     }
-    text.push_str(".macro greater w, a, b\n flt w, a, b\n bz w, not\n mov x1, b\n mov x2, x0\nnot:\n.endm\n");
+    text.push_str(
+        ".macro greater w, a:bits, b:bits\n flt w, a, b\n bz w, not\n mov x1, b\n mov x2, x0\nnot:\n.endm\n",
+    );
     text.push_str(".reg t u:int index:int w0:int w1:int w2:int\n.array V[20]\n.data\nbuf: .float 1.0, -2.5, 1e-30, 3e38\n .space 12\n.once\n");
     for k in 0..NAMES {
         let _ =
@@ -117,7 +121,7 @@ fn source_with(seed: u64, has_loops: bool) -> String {
             1 => writeln!(text, " iand index, {a}, 7\n st buf+4[index], {b}"),
             2 => writeln!(text, " ld {}, buf+2", format_args!("x{}", random.below(NAMES))),
             3 => writeln!(text, " sel x{}, {a}, {b}, {c}", random.below(NAMES)),
-            // One name for values of several slots.
+            // A name for values of several slots.
             4 => writeln!(text, " fmul t, {a}, {b}\n fadd t, t, {c}\n fabs t, t\n mov ox, t"),
             5 => writeln!(text, " fmul m0, a0, m1 || fadd a2, m1, a0 || mov x2, x3"),
             6 if random.below(3) == 0 => writeln!(text, " rdflags u\n mov of, u\n clrflags"),

@@ -82,7 +82,7 @@ fn row(name: &'static str, slots: &Slots) -> Machine {
     machine
 }
 
-/// The rows.
+/// All rows, built once.
 pub(crate) fn all() -> &'static [Machine] {
     static ALL: OnceLock<Vec<Machine>> = OnceLock::new();
     ALL.get_or_init(|| ROWS.iter().map(|(name, slots)| row(name, slots)).collect())
@@ -93,7 +93,8 @@ pub(crate) fn named(name: &str) -> &'static Machine {
     all().iter().find(|machine| machine.name == name).expect("it is among the rows")
 }
 
-/// A row with two to four slots, in which each unit of f3, or one that does the same in other time, stands in one slot or more.
+/// A row with two to four slots, in which each unit of f3, or a unit with the same functions and another timing, stands in one
+/// slot or more.
 pub(crate) fn random(mut below: impl FnMut(u64) -> u64) -> &'static Machine {
     let count = 2 + below(3) as usize;
     let mut units: Vec<Vec<Unit>> = vec![Vec::new(); count];

@@ -1,32 +1,32 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The rules of issue, stated again for the check: `docs/timing.md` in code, without the specification's scoreboard.
+//! Rules of issue, stated a second time for the check: `docs/timing.md` in code, independent of the specification's scoreboard.
 
 use crate::code::Operation;
 use foldhash::{HashMap, HashMapExt as _, HashSet, HashSetExt as _};
 use takt_isa::Machine;
 
-/// The time of the image's next bundle on one path, in cycles since a section began.
+/// Time along one path through the image, in cycles since the section began.
 #[derive(Clone, Debug)]
 pub(crate) struct Clock {
-    /// The section's first bundle.
+    /// First bundle of the section.
     pub(crate) start: u32,
-    /// Cycles before it: after reset it is fetched first.
+    /// Cycles before cycle 0: after a reset, the front end first fetches that bundle.
     pub(crate) before: u64,
-    /// The first cycle in which the next bundle can issue: the front end has delivered it.
+    /// First cycle in which the next bundle can issue, because the front end has delivered it.
     delivered: u64,
-    /// The cycle of the last issue.
+    /// Cycle of the last issue.
     pub(crate) last: u64,
     ready: HashMap<usize, u64>,
     free: HashMap<(usize, usize), u64>,
-    /// Writes to come: slot and cycle.
+    /// Booked write ports: slot and cycle.
     booked: HashSet<(usize, u64)>,
     drained: u64,
-    /// The cycle of the last write of each register.
+    /// Cycle of the last write of each register.
     pub(crate) written: HashMap<usize, u64>,
 }
 
 impl Clock {
-    /// A section whose first bundle can issue in cycle 1, with nothing in flight.
+    /// Clock of a section whose first bundle can issue in cycle 1, with nothing in flight.
     pub(crate) fn new(start: u32, before: u64) -> Clock {
         Clock {
             start,
@@ -41,8 +41,8 @@ impl Clock {
         }
     }
 
-    /// Issues a bundle: in the first cycle in which every source is on its bus, no result for a register that it writes is in
-    /// flight, its units are free, nothing is in flight at all if it waits for that, and its results have write ports.
+    /// Issues a bundle: in the first cycle in which every source is on its bus, no result for a destination is in flight, its units are
+    /// free, nothing at all is in flight if an operation drains, and its results have write ports.
     pub(crate) fn issue(&mut self, bundle: &[Operation]) {
         let mut cycle = self.delivered;
         for operation in bundle {
@@ -76,12 +76,12 @@ impl Clock {
         (self.last, self.delivered) = (cycle, cycle + 1);
     }
 
-    /// The front end fetches again, from elsewhere.
+    /// Redirection: the front end starts fetching again.
     pub(crate) fn redirect(&mut self, machine: &Machine) {
         self.delivered = self.last + 1 + u64::from(machine.refill);
     }
 
-    /// The front end waited for a branch that is not taken.
+    /// Resolve: the front end waited for a branch that is not taken.
     pub(crate) fn not_taken(&mut self, machine: &Machine) {
         self.delivered = self.last + 1 + u64::from(machine.resolve);
     }

@@ -1,99 +1,76 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A checker that an image does what its source says (translation validation), for every path and every input.
+//! Translation validation: checks that an image does what its source says, for every path and every input.
 //!
-//! It executes the plain program of the source ([`takt_asm::plain`]) and the image's words, both symbolically, and compares what
-//! can be seen: what is written to ports, data memory, flags, states, and where each goes. `docs/verify.md` says what it takes on
-//! trust.
+//! The checker executes the plain program of the source ([`takt_asm::plain`]) and the image's words, both symbolically, and compares the
+//! observable effects: writes to ports, data memory, flags and states, and decisions. `docs/verify.md` lists the trusted parts.
 
 mod clock;
 mod code;
+mod fields;
+mod labels;
+mod liveness;
+mod marks;
 mod memory;
-mod relate;
+mod relation;
 mod run;
 mod term;
 
-pub use relate::MAX_VISITS;
-pub use run::MAX_STEPS;
-pub use term::MAX_TERMS;
+pub use term::MAX_STEPS;
 
 use takt_asm::Contraction;
-use takt_asm::plain::{Plain, PlainKind};
-use takt_asm::select::Selection;
+use takt_asm::plain::{PlainKind, PlainProgram};
 use takt_isa::Program;
 use takt_isa::program::{Location, SectionCycles};
 
-/// A change by the assembler that the source does not say. None is taken on trust: each is accepted only where the source permits it and
-/// it changes no bit that is said.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Hint {
-    /// A product is fused into a sum: each by its bundle in the plain program, and its number there.
-    Fused {
-        /// The product.
-        product: (u32, u32),
-        /// The sum.
-        sum: (u32, u32),
-    },
-    /// A short branch, by its bundle in the plain program, is a selection.
-    Selected(u32),
-}
-
-/// The hints of an assembled program: its fused sums and its selections.
-pub fn hints(contractions: &[Contraction], selections: &[Selection]) -> Vec<Hint> {
-    let fused = contractions.iter().map(|fused| Hint::Fused { product: fused.at[0], sum: fused.at[1] });
-    fused.chain(selections.iter().map(|selection| Hint::Selected(selection.at))).collect()
-}
-
-/// The first difference, or the reason why none can be excluded.
+/// First difference found, or the reason why the check cannot exclude a difference.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Difference {
-    /// The source line.
+    /// Line of the source.
     pub place: Option<Location>,
-    /// The difference, in words.
+    /// Description of the difference.
     pub what: String,
-    /// The source's term there, in words.
+    /// The source's term there, as text.
     pub source: Option<String>,
-    /// The image's term there.
+    /// The image's term there, as text.
     pub image: Option<String>,
 }
 
-/// The time of a section that takes the same on every path, by the check's own statement of the rules of issue.
+/// Time of a section that takes equally long on every path, by the check's own statement of the rules of issue.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct SectionTime {
-    /// The image's bundle that it begins with.
+    /// First bundle of the section in the image.
     pub start: u32,
     /// Cycles from the reset or the tick to cycle 0: the time to fetch that bundle after a reset.
     pub before: u64,
-    /// The image's bundle that ends it: a `wait` or `halt`.
+    /// Last bundle in the image: a `wait` or `halt`.
     pub wait: u32,
-    /// The source line of that.
+    /// Source line of the last bundle.
     pub location: Option<Location>,
-    /// The cycle in which it issues; the section's first bundle can issue in cycle 1.
+    /// Cycle of the last bundle's issue; the first bundle can issue in cycle 1.
     pub cycles: u64,
-    /// The cycle in which each output is last written: by the number of its declaration.
+    /// Cycle of the last write to each output, by number of its declaration.
     pub outputs: Vec<(usize, u64)>,
 }
 
-/// The result of a check that succeeds.
+/// Result of a successful check.
 #[derive(Clone, PartialEq, Eq, Debug)]
-pub struct Established {
-    /// Places at which the relation between source and image was found.
+pub struct EquivalenceReport {
+    /// Cuts: pairs of positions at which the relation between source and image is known.
     pub cuts: usize,
-    /// Times that one of them was visited.
-    pub visits: usize,
-    /// Bundles executed, of both programs.
+    /// Steps that the check took, of [`MAX_STEPS`].
     pub steps: u64,
-    /// Terms made.
-    pub terms: usize,
-    /// Sums that are fused with a product, by source line: a rounding less than written.
+    /// Source lines of sums that are fused with a product, and so round once less than written.
     pub fused: Vec<Option<Location>>,
-    /// Sections that take the same time on every path.
+    /// Sections that take equally long on every path.
     pub times: Vec<SectionTime>,
-    /// Deadlines that hold in such sections.
+    /// Number of deadlines that hold in such sections.
     pub deadlines: usize,
+    /// Source lines that fault on a path that the check cannot exclude; the image's behaviour after the fault is not compared.
+    pub faults: Vec<Location>,
 }
 
-impl Established {
-    /// Compares claims about the cycles of sections with the times found here. Returns the number of sections compared.
+impl EquivalenceReport {
+    /// Compares claims about the cycles of sections with the times found. Returns the number of sections compared.
     ///
     /// # Errors
     /// The first claim that does not hold.
@@ -119,20 +96,22 @@ impl Established {
     }
 }
 
-/// Checks that an image does what the source says.
+/// Checks that an image does what its source says. `contractions` lists the fused products; the list is a hint, and each entry is accepted
+/// only where the source permits it and the image does it.
 ///
 /// # Errors
-/// The first difference, or the reason why none can be excluded.
-pub fn verify(program: &Program, plain: &Plain, hints: &[Hint]) -> Result<Established, Difference> {
-    let source = code::of_source(plain, hints)?;
-    let image = code::of_image(program, plain)?;
-    let selected = hints.iter().filter_map(|hint| match hint {
-        Hint::Selected(bundle) => Some(*bundle),
-        Hint::Fused { .. } => None,
-    });
-    let found = relate::Relation::new(plain, &source, &image, selected.collect()).follow()?;
+/// The first difference found, or the reason why the check cannot exclude a difference.
+pub fn verify(
+    program: &Program,
+    plain: &PlainProgram,
+    contractions: &[Contraction],
+) -> Result<EquivalenceReport, Difference> {
+    let layout = fields::compare(program, plain)?;
+    let source = code::of_source(plain, &layout, contractions)?;
+    let image = code::of_image(program, &layout)?;
+    let found = relation::Relation::new(plain, &source, &image, &layout).follow()?;
     let sums = found.fused.iter().filter_map(|number| {
-        let &Hint::Fused { sum: (bundle, at), .. } = hints.get(*number)? else { return None };
+        let [_, (bundle, at)] = contractions.get(*number)?.at;
         Some(plain.bundles[bundle as usize].operations[at as usize].location)
     });
     let period = program.sections.iter().find(|section| section.name == "period");
@@ -154,13 +133,12 @@ pub fn verify(program: &Program, plain: &Plain, hints: &[Hint]) -> Result<Establ
             deadlines += 1;
         }
     }
-    Ok(Established {
+    Ok(EquivalenceReport {
         cuts: found.cuts,
-        visits: found.visits,
         steps: found.steps,
-        terms: found.terms,
         fused: sums.collect(),
         times: found.times.into_values().collect(),
         deadlines,
+        faults: found.faults.into_iter().map(|(file, line)| Location { file, line }).collect(),
     })
 }

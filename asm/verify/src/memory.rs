@@ -1,52 +1,82 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Data memory as terms: a region for each array, and one for the words outside all of them.
+//! Data memory as terms: a region for each array, and one for all words outside of arrays.
 
 use crate::term::{Node, Term, Terms};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
+use takt_asm::plain::{PlainKind, PlainOperation, PlainProgram};
+use takt_isa::Effect;
 
-/// The regions of a data memory.
+/// Partition of the data memory into regions.
 #[derive(Clone, Debug)]
 pub(crate) struct Map {
-    /// The arrays, by ascending first word: first word, words, number.
+    /// Arrays in ascending order: first word, length, number.
     arrays: Vec<(u32, u32, usize)>,
-    /// The words of the memory.
+    /// Words of the memory.
     pub(crate) depth: u32,
     data: Vec<u32>,
+    /// Words that the source accesses outside of arrays; `None` if they are unknown.
+    touched: Option<HashSet<u32>>,
 }
 
 impl Map {
-    pub(crate) fn new(arrays: &[(String, u32, u32)], depth: u32, data: &[u32]) -> Map {
-        let numbered = arrays.iter().enumerate();
+    pub(crate) fn new(plain: &PlainProgram) -> Map {
+        let numbered = plain.arrays.iter().enumerate();
         let mut arrays: Vec<_> = numbered.map(|(number, (_, base, words))| (*base, *words, number)).collect();
         arrays.sort_unstable();
-        Map { arrays, depth, data: data.to_vec() }
+        Map { arrays, depth: plain.machine.data_depth, data: plain.data.clone(), touched: touched(plain) }
+    }
+
+    /// Neither an access of the source nor a host's access by name can reach the word, so that the assembler may spill there.
+    pub(crate) fn is_free(&self, word: u32) -> bool {
+        let is_touched = |touched: &HashSet<u32>| touched.contains(&word);
+        word < self.depth
+            && word as usize >= self.data.len()
+            && self.of(word) == self.arrays.len()
+            && !self.touched.as_ref().is_none_or(is_touched)
     }
 
     pub(crate) fn regions(&self) -> usize {
         self.arrays.len() + 1
     }
 
-    /// The region of a word.
+    /// Region of a word.
     fn of(&self, address: u32) -> usize {
         let before = self.arrays.partition_point(|(base, ..)| *base <= address);
         let around = before.checked_sub(1).map(|at| self.arrays[at]);
         around.filter(|(base, words, _)| address - base < *words).map_or(self.arrays.len(), |found| found.2)
     }
 
-    /// The region of an address: known from its number, or from what the source says about it; else any.
+    /// Region of an address: from its value, or from the array that the source names; `None` if unknown.
     pub(crate) fn region(&self, terms: &Terms, address: Term, said: Option<usize>) -> Option<usize> {
-        terms.known(address).map(|address| self.of(address)).or(said)
+        terms.constant_value(address).map(|address| self.of(address)).or(said)
     }
 }
 
-/// The words of a region.
+/// Words that the source accesses outside of arrays; `None` if an address depends on a register that is written.
+fn touched(plain: &PlainProgram) -> Option<HashSet<u32>> {
+    let operations = || plain.bundles.iter().flat_map(|bundle| &bundle.operations);
+    let written: HashSet<u32> = operations().filter_map(|operation| operation.dest).collect();
+    let accesses = operations().filter(|operation| {
+        operation.array.is_none() && matches!(operation.op.row().effect, Effect::Load | Effect::Store)
+    });
+    let word = |operation: &PlainOperation| {
+        let base = operation.sources[0];
+        let register =
+            plain.registers.get(base as usize).filter(|register| register.kind == PlainKind::Plain)?;
+        let bits = register.preset.filter(|_| !written.contains(&base))?;
+        Some(bits.wrapping_add(operation.constant))
+    };
+    accesses.map(word).collect()
+}
+
+/// Contents of a region.
 #[derive(Clone, Debug)]
 struct Region {
-    /// Its contents before the words below were stored.
+    /// Contents before the stores in `words`.
     base: Term,
-    /// The unknown part of the addresses of `words`.
+    /// Symbolic part of the addresses of `words`.
     unknown: Term,
-    /// Words stored, by the known part of the address.
+    /// Stored words, by the constant part of the address.
     words: BTreeMap<u32, Term>,
 }
 
@@ -55,7 +85,7 @@ impl Region {
         Region { base, unknown: Terms::ZERO, words: BTreeMap::new() }
     }
 
-    /// The region as one term.
+    /// The contents as one term.
     fn flat(&self, terms: &mut Terms) -> Term {
         let mut flat = self.base;
         for (&offset, &value) in &self.words {
@@ -66,17 +96,17 @@ impl Region {
     }
 }
 
-/// A data memory.
+/// Contents of a data memory, by region.
 #[derive(Clone, Debug)]
 pub(crate) struct Memory(Vec<Region>);
 
 impl Memory {
-    /// The memory whose regions hold these terms.
+    /// A memory whose regions hold these terms.
     pub(crate) fn holding(regions: impl IntoIterator<Item = Term>) -> Memory {
         Memory(regions.into_iter().map(Region::holding).collect())
     }
 
-    /// Its regions, each as one term.
+    /// Contents of each region, as one term each.
     pub(crate) fn flat(&self, terms: &mut Terms) -> Vec<Term> {
         self.0.iter().map(|region| region.flat(terms)).collect()
     }
@@ -94,7 +124,7 @@ impl Memory {
             _ if unknown == region.unknown || region.words.is_empty() => region.base,
             _ => region.flat(terms),
         };
-        match (terms.node(base), terms.known(address)) {
+        match (terms.node(base), terms.constant_value(address)) {
             (Node::Loaded(_), Some(word)) => {
                 terms.constant(map.data.get(word as usize).copied().unwrap_or(0))
             }

@@ -1,41 +1,38 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Symbolic execution of one of the two programs, up to where its way depends on a value that is not known.
+//! Symbolic execution of one of the programs, up to a decision on an unknown value.
 //!
-//! A register is not read before its last result is there, and not written while a result for it is in flight (docs/timing.md): so
-//! values do not depend on latencies, and bundles can be executed one after another.
+//! An operation reads a register only after the last result has arrived, and issues only when no result for its destination is in flight
+//! (docs/timing.md). So values do not depend on latencies, and bundles can be executed one after another.
 
 use crate::Difference;
 use crate::clock::Clock;
-use crate::code::{Code, Fused, Operation};
+use crate::code::{Code, ContractionRole, Operation};
+use crate::marks::Marks;
 use crate::memory::{Map, Memory};
-use crate::term::{MAX_TERMS, Node, Term, Terms};
+use crate::term::{COPIES, MAX_STEPS, Node, Term, Terms};
 use foldhash::{HashMap, HashSet};
 use std::collections::{BTreeMap, BTreeSet};
 use takt_isa::program::Location;
 use takt_isa::{Effect, Machine, Type};
 
-/// The most bundles that a check executes, of both programs together.
-pub const MAX_STEPS: u64 = 50_000_000;
-
-/// The state that both runs of a segment share.
+/// State shared by both programs of a visit.
 pub(crate) struct World<'a> {
     pub(crate) terms: Terms,
     pub(crate) map: Map,
     pub(crate) machine: &'a Machine,
-    /// The addresses that the source has accessed since the last cut, and the array of each that it says.
+    /// Addresses that the source has accessed since the last cut, with the array that it names.
     pub(crate) touched: HashMap<Term, Option<usize>>,
-    /// Registers that the source has read since the last cut though nothing may have written them: if nothing has, it has
-    /// faulted there, and the image may.
+    /// Possibly unwritten values that the source has read since the last cut. If they are unwritten, the source has faulted, and the image
+    /// may read them as well.
     pub(crate) risked: HashSet<Term>,
-    /// Branches of the source, by bundle, of which both ways are computed and selected from, as the image does.
+    /// Branches of the source, by bundle, that are executed as selections, as in the image.
     pub(crate) selected: HashSet<u32>,
-    /// Counts of loops that the source has begun since the last cut and that are not known, with the most that it allows.
-    pub(crate) counted: HashMap<Term, u32>,
-    pub(crate) steps: u64,
+    /// The source has faulted: from there on, the image may do anything.
+    pub(crate) faulted: bool,
     pub(crate) fused: BTreeSet<usize>,
 }
 
-/// A program that runs.
+/// State of one running program.
 #[derive(Clone, Debug)]
 pub(crate) struct Side<'a> {
     pub(crate) code: &'a Code,
@@ -43,34 +40,38 @@ pub(crate) struct Side<'a> {
     pub(crate) at: u32,
     pub(crate) registers: Vec<Term>,
     pub(crate) calls: Vec<u32>,
-    /// Loops under way: first bundle, and the one after the last.
+    /// Active loops: first bundle, and the bundle after the last.
     pub(crate) loops: Vec<(u32, u32)>,
-    /// Their iterations left.
+    /// Remaining iterations of each active loop.
     pub(crate) left: Vec<Term>,
     pub(crate) memory: Memory,
-    /// Flags raised before the last cut, and by what since.
+    /// Flags raised before the last cut, and the terms that raised flags since.
     pub(crate) flags: (Term, BTreeSet<Term>),
-    /// The values written to each output port since the last cut.
+    /// Values written to each output port since the last cut.
     pub(crate) ports: BTreeMap<usize, Vec<(Term, Option<Location>)>>,
-    /// The stores since the last cut: address, word.
+    /// Stores since the last cut: address, word, source line.
     pub(crate) stores: Vec<(Term, Term, Option<Location>)>,
-    /// The loops begun since the last cut whose count is not known: the count, and the most that the source allows.
+    /// Unknown counts of loops started since the last cut, with the source's bound.
     pub(crate) counts: Vec<(Term, u32)>,
-    /// Of each fused product the factors and the value.
+    /// Marks since the last cut.
+    pub(crate) marks: Marks,
+    /// Factors and value of each fused product.
     products: HashMap<usize, ([Term; 2], Term)>,
+    /// Values that the image has spilled since the last cut to data words that the source cannot reach.
+    kept: HashMap<u32, Term>,
     pub(crate) clock: Option<Clock>,
 }
 
-/// The reason why a run stops.
+/// Reason why a run stops.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Event {
-    /// It goes on at one of two bundles, on whether a value is zero.
+    /// Branch on whether `condition` is zero.
     Branch { condition: Term, target: u32, zero: bool },
-    /// A loop goes on or ends.
+    /// End of an iteration: the loop continues if `condition` is not zero.
     LoopEnd { condition: Term },
-    /// It waits for the tick, to go on at a bundle.
+    /// Wait for the tick, which continues at a bundle.
     Wait(u32),
-    /// It has ended.
+    /// End of the program.
     Halt,
 }
 
@@ -89,13 +90,15 @@ impl<'a> Side<'a> {
             ports: BTreeMap::new(),
             stores: Vec::new(),
             counts: Vec::new(),
+            marks: Marks::default(),
             products: HashMap::default(),
+            kept: HashMap::default(),
             clock: None,
         }
     }
 
     pub(crate) fn location(&self) -> Option<Location> {
-        self.code.bundles.get(self.at as usize)?.iter().find_map(|operation| operation.location)
+        self.code.location(self.at)
     }
 
     fn wrong(&self, operation: Option<&Operation>, what: &str) -> Difference {
@@ -108,12 +111,22 @@ impl<'a> Side<'a> {
         }
     }
 
-    /// Runs to the next event. The program stays at the bundle of the event, which has been executed.
+    /// A fault on data: in the source it ends the path.
+    fn fault(&self, operation: &Operation, what: &str, world: &mut World<'_>) -> Difference {
+        world.faulted |= !self.is_image;
+        self.wrong(Some(operation), what)
+    }
+
+    /// Runs to the next event. The program stays at the event's bundle, which has been executed.
     pub(crate) fn run(&mut self, world: &mut World<'_>) -> Result<Event, Difference> {
         loop {
-            world.steps += 1;
-            if world.steps > MAX_STEPS || world.terms.count() > MAX_TERMS {
-                return Err(self.wrong(None, "takes longer than the check's limit of bundles and terms"));
+            world.terms.steps += 1;
+            if world.terms.steps > MAX_STEPS {
+                let what = format!(
+                    "the checker's limit of {MAX_STEPS} steps is reached before every path has been followed: whether the image is \
+                     its source is not known"
+                );
+                return Err(Difference { place: self.location(), what, source: None, image: None });
             }
             let code = self.code;
             let Some(bundle) = code.bundles.get(self.at as usize) else {
@@ -122,11 +135,12 @@ impl<'a> Side<'a> {
             if let Some(clock) = &mut self.clock {
                 clock.issue(bundle);
             }
+            self.marks.arrive(code, self.at);
             let flow = self.execute(bundle, world)?;
             if let Some(event) = self.follow(flow, world)? {
                 match event {
                     Event::Branch { condition, .. } | Event::LoopEnd { condition } => {
-                        match world.terms.known(condition) {
+                        match world.terms.constant_value(condition) {
                             Some(bits) => self.resume(event, bits != 0, world),
                             None if self.selects(event, world) => {}
                             None => return Ok(event),
@@ -155,7 +169,7 @@ impl<'a> Side<'a> {
         Ok(value)
     }
 
-    /// Executes a bundle. Returns the operation that decides where it goes on, and the value that this one reads.
+    /// Executes a bundle. Returns its control-flow operation with the value that it reads.
     fn execute(
         &mut self,
         bundle: &'a [Operation],
@@ -187,7 +201,14 @@ impl<'a> Side<'a> {
                     continue;
                 }
                 Effect::Nothing => continue,
-                _ => {
+                Effect::Jump
+                | Effect::BranchZero
+                | Effect::BranchNonzero
+                | Effect::Call
+                | Effect::Return
+                | Effect::Loop
+                | Effect::Wait
+                | Effect::Halt => {
                     flow = Some((operation, sources[0]));
                     continue;
                 }
@@ -208,12 +229,13 @@ impl<'a> Side<'a> {
             }
             if let Some(port) = self.code.outputs[dest] {
                 self.ports.entry(port).or_default().push((value, operation.location));
+                self.marks.done += 1;
             }
         }
         Ok(flow)
     }
 
-    /// The value of an operation; of a sum that is fused with a product that of the fused instruction.
+    /// Value of an operation; of a contracted sum, the value of the fused instruction.
     fn compute(
         &mut self,
         operation: &Operation,
@@ -221,14 +243,14 @@ impl<'a> Side<'a> {
         world: &mut World<'_>,
     ) -> Result<(Term, Option<Term>), Difference> {
         match operation.fused {
-            Fused::No => Ok(world.terms.apply(operation.op, sources)),
-            Fused::Product(number) => {
-                // The product's own flags are not raised: the fused operation raises those of the whole.
+            ContractionRole::No => Ok(world.terms.apply(operation.op, sources)),
+            ContractionRole::Product(number) => {
+                // The product's own flags are not raised: the fused operation raises the flags of the whole.
                 let (value, _) = world.terms.apply(operation.op, sources);
                 self.products.insert(number, ([sources[0], sources[1]], value));
                 Ok((value, None))
             }
-            Fused::Sum { product, source, op } => match self.products.get(&product) {
+            ContractionRole::Sum { product, source, op } => match self.products.get(&product) {
                 Some(&([a, b], value)) if value == sources[source] => {
                     world.fused.insert(product);
                     Ok(world.terms.apply(op, [a, b, sources[1 - source]]))
@@ -247,13 +269,16 @@ impl<'a> Side<'a> {
         world: &mut World<'_>,
     ) -> Result<Term, Difference> {
         let address = world.terms.offset(sources[0], operation.constant);
-        let outside = world.terms.known(address).is_some_and(|word| word >= world.map.depth);
+        let outside = world.terms.constant_value(address).is_some_and(|word| word >= world.map.depth);
         if outside {
-            return Err(self.wrong(Some(operation), "leaves the data memory"));
+            return Err(self.fault(operation, "leaves the data memory", world));
         }
         let said = if self.is_image {
-            match (world.terms.known(address), world.touched.get(&address)) {
+            match (world.terms.constant_value(address), world.touched.get(&address)) {
                 (_, Some(said)) => *said,
+                (Some(word), None) if world.map.is_free(word) => {
+                    return self.keep(operation, word, sources[1]);
+                }
                 (Some(_), None) => None,
                 (None, None) => {
                     return Err(self.wrong(Some(operation), "accesses a word that the source does not"));
@@ -269,10 +294,21 @@ impl<'a> Side<'a> {
         }
         self.memory.store(&mut world.terms, region, address, sources[1]);
         self.stores.push((address, sources[1], operation.location));
+        self.marks.done += 1;
         Ok(sources[1])
     }
 
-    /// Goes on after a bundle, unless that depends on a value.
+    /// Stores a value in a spill word, which the source cannot reach, or loads it from there.
+    fn keep(&mut self, operation: &Operation, word: u32, value: Term) -> Result<Term, Difference> {
+        if operation.op.row().effect == Effect::Store {
+            self.kept.insert(word, value);
+            return Ok(value);
+        }
+        let kept = self.kept.get(&word).copied();
+        kept.ok_or_else(|| self.wrong(Some(operation), "loads a data word that it has not stored before"))
+    }
+
+    /// Moves to the next bundle, or returns the decision that it depends on.
     fn follow(
         &mut self,
         flow: Option<(&Operation, Term)>,
@@ -304,37 +340,33 @@ impl<'a> Side<'a> {
                     return Err(self.wrong(Some(operation), "calls more deeply than the machine can"));
                 }
                 self.calls.push(next);
+                self.marks.done += 1;
                 self.jump(target, machine);
             }
             Effect::Return => {
                 let Some(back) = self.calls.pop() else {
                     return Err(self.wrong(Some(operation), "returns from no call"));
                 };
+                self.marks.done += 1;
                 self.jump(back, machine);
             }
             Effect::Loop => {
                 let cut = self.loops.last().is_some_and(|(_, end)| *end > self.at && *end <= target);
-                let known = world.terms.known(value);
+                let known = world.terms.constant_value(value);
                 let count = known.is_some_and(|count| count == 0 || count > u32::from(u16::MAX));
                 if cut || count || self.loops.len() >= machine.loop_depth as usize {
                     return Err(self.wrong(Some(operation), "starts a loop that the machine cannot execute"));
                 }
-                let bound = self.code.bounds.get(&next).copied();
+                let bound = self.code.bounds.get(&next).map(|bound| bound.most);
                 match (known, bound) {
                     (Some(count), Some(most)) if count > most => {
-                        return Err(
-                            self.wrong(Some(operation), "iterates more often than its loop bound allows")
-                        );
+                        let what = "iterates more often than its loop bound allows";
+                        return Err(self.fault(operation, what, world));
                     }
-                    (None, Some(most)) if !self.is_image => {
-                        self.counts.push((value, most));
-                        world.counted.insert(value, most);
-                    }
-                    (None, Some(most)) if world.counted.get(&value).is_none_or(|allowed| most < *allowed) => {
-                        return Err(self.wrong(Some(operation), "has a loop bound that the source does not"));
-                    }
+                    (None, Some(most)) => self.counts.push((value, most)),
                     _ => {}
                 }
+                self.marks.begin(value, next, operation.location);
                 self.loops.push((next, target));
                 self.left.push(value);
                 if let Some(clock) =
@@ -346,13 +378,19 @@ impl<'a> Side<'a> {
             }
             Effect::Wait => return Ok(Some(Event::Wait(target))),
             Effect::Halt => return Ok(Some(Event::Halt)),
-            _ => self.at = next,
+            // These do not redirect: the next bundle follows.
+            Effect::Compute
+            | Effect::Nothing
+            | Effect::Immediate
+            | Effect::Load
+            | Effect::Store
+            | Effect::ReadFlags
+            | Effect::ClearFlags => self.at = next,
         }
         Ok(None)
     }
 
-    /// The bundles that a branch of the source passes over, if they do nothing but write registers that are no ports: no flags, no
-    /// memory.
+    /// Bundles that a branch of the source skips, if they only write registers other than ports: no flags, no memory.
     pub(crate) fn passed_over(&self, event: Event) -> Option<&'a [Vec<Operation>]> {
         let Event::Branch { target, .. } = event else { return None };
         let passed = self.code.bundles.get(self.at as usize + 1..target as usize)?;
@@ -360,15 +398,17 @@ impl<'a> Side<'a> {
             let row = operation.op.row();
             let is_port = operation.dest.is_some_and(|dest| self.code.outputs[dest].is_some());
             matches!(row.effect, Effect::Compute | Effect::Immediate)
-                && matches!(operation.fused, Fused::No)
+                && matches!(operation.fused, ContractionRole::No)
                 && !row.types.contains(&Type::F)
                 && !is_port
         };
-        let leads_on = self.loops.last().is_none_or(|(_, end)| *end > target);
+        // Neither direction ends an iteration of the active loop, whose body may call this code from elsewhere.
+        let ends = |(_, end): &(u32, u32)| self.at < *end && *end <= target;
+        let leads_on = !self.loops.last().is_some_and(ends);
         (leads_on && !self.is_image && passed.iter().flatten().all(is_harmless)).then_some(passed)
     }
 
-    /// Takes both ways of a branch at once, if it is one of those: each register that they leave different is selected.
+    /// Executes a branch as a selection, if it is marked for that: each register that differs between both directions becomes a `sel`.
     fn selects(&mut self, event: Event, world: &mut World<'_>) -> bool {
         let Event::Branch { condition, target, zero } = event else { return false };
         if self.is_image || !world.selected.contains(&self.at) {
@@ -376,6 +416,7 @@ impl<'a> Side<'a> {
         }
         let Some(passed) = self.passed_over(event) else { return false };
         let before = self.registers.clone();
+        world.terms.steps += before.len() as u64 / COPIES;
         for bundle in passed {
             let apply = |operation: &Operation| {
                 let mut sources = [Terms::ZERO; 3];
@@ -396,7 +437,7 @@ impl<'a> Side<'a> {
             });
         }
         for (now, before) in self.registers.iter_mut().zip(before) {
-            // A branch if zero passes over what is done otherwise.
+            // A branch on zero skips the computation if the condition is zero.
             let values = if zero { [*now, before] } else { [before, *now] };
             *now = world.terms.select(condition, values);
         }
@@ -411,7 +452,7 @@ impl<'a> Side<'a> {
         }
     }
 
-    /// Goes on after an event, where a condition is not zero or, if `truth` is false, zero.
+    /// Continues after an event, with the condition nonzero, or zero if `truth` is false.
     pub(crate) fn resume(&mut self, event: Event, truth: bool, world: &mut World<'_>) {
         match event {
             Event::Branch { target, zero, .. } if truth != zero => self.jump(target, world.machine),

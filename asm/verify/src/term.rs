@@ -1,63 +1,68 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Terms: what a register, a memory or the flags hold, as a function of what they held at the last cut. Equal terms have equal
-//! numbers (hash consing), in whichever of the two programs they arise.
+//! Terms: contents of registers, memory and flags as functions of the contents at the last cut. Equal terms have equal numbers (hash
+//! consing), in either program.
 
 use foldhash::{HashMap, HashMapExt as _};
 use takt_isa::fp::{Flags, Host};
 use takt_isa::program::Location;
 use takt_isa::{Op, ROWS, Type, compute};
 
-/// The most terms of a check.
-pub const MAX_TERMS: usize = 16_000_000;
-/// The depth to which a term is written out in words.
+/// Limit on the steps of a check: bundles executed, cells compared at cuts, and terms made or found again. A check does nothing else that
+/// takes long, so that the limit bounds its time and its memory.
+pub const MAX_STEPS: u64 = 30_000_000;
+/// Number of copied cells that count as one step.
+pub(crate) const COPIES: u64 = 8;
+/// Depth to which messages write out a term.
 const DEPTH: usize = 4;
 
 /// A term: an index into [`Terms`].
 #[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Debug)]
 pub(crate) struct Term(pub(crate) u32);
 
-/// The outermost part of a term.
+/// Outermost constructor of a term.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub(crate) enum Node {
-    /// 32 bits.
+    /// Known bits of a word.
     Constant(u32),
-    /// The unknown value of a class of cells at a cut, by the first cell of the class.
+    /// Unknown value of a class of cells at a cut, named after the first cell of the class.
     Unknown { cut: u32, cell: u32 },
-    /// The same of a class that may be of registers which nothing has written yet.
+    /// Unknown value of a class that may contain unwritten registers.
     PerhapsUnwritten { cut: u32, cell: u32 },
-    /// A register that nothing has written yet.
+    /// Value of an unwritten register.
     Unwritten,
-    /// An instruction of its sources; those that it has not are zero.
+    /// Result of an instruction; missing operands are zero.
     Apply(Op, [Term; 3]),
-    /// The flags that an instruction raises.
+    /// Flags that an instruction raises.
     Raised(Op, [Term; 3]),
-    /// Flags raised by an instruction of constants.
+    /// Flags raised by an instruction on constants.
     Flags(u32),
-    /// The word of a memory at an address.
+    /// Word of a memory at an address.
     Load(Term, Term),
-    /// A memory with another word at an address.
+    /// A memory with a word replaced: memory, address, word.
     Store(Term, Term, Term),
-    /// A region of the memory as the image was loaded.
+    /// Initial contents of a region.
     Loaded(u32),
-    /// A region after a store that may have gone to any of them.
+    /// A region after a store that may have gone to any region.
     StoredAnywhere(u32, Term),
-    /// The iterations left after one more.
+    /// Remaining iterations after one more.
     OneLess(Term),
-    /// Not zero if more than one iteration is left.
+    /// Nonzero if more than one iteration remains.
     MoreThanOne(Term),
-    /// A list.
+    /// List cell: the list before, and its last element.
     Pair(Term, Term),
 }
 
-/// All terms of a check.
+/// Arena of all terms of a check.
 pub(crate) struct Terms {
     nodes: Vec<Node>,
     numbers: HashMap<Node, Term>,
-    /// The instructions that copy their source.
+    /// Instructions that copy their operand.
     copies: Vec<Op>,
-    /// The source lines that terms first came from.
+    /// Source line at which each term first arose.
     pub(crate) origins: HashMap<Term, Location>,
-    /// The case of a case split: terms and the constants that they are.
+    /// Steps so far, of [`MAX_STEPS`].
+    pub(crate) steps: u64,
+    /// Assumptions of the current case: terms with their constants.
     assumed: HashMap<Term, Term>,
 }
 
@@ -70,28 +75,26 @@ impl Terms {
             numbers: HashMap::new(),
             copies: ROWS.iter().filter(|row| row.copies()).map(|row| row.op).collect(),
             origins: HashMap::new(),
+            steps: 0,
             assumed: HashMap::new(),
         };
         terms.constant(0);
         terms
     }
 
-    pub(crate) fn count(&self) -> usize {
-        self.nodes.len()
-    }
-
     pub(crate) fn node(&self, term: Term) -> Node {
         self.nodes[term.0 as usize]
     }
 
-    /// The term of a node in the present case.
+    /// Term of a node under the current case.
     pub(crate) fn make(&mut self, node: Node) -> Term {
         let term = self.in_any_case(node);
         self.in_case(term)
     }
 
-    /// The term of a node, whatever is assumed: what is unknown at a cut does not become known by the case that leads there.
+    /// Term of a node regardless of assumptions: a case that leads to a cut makes none of its unknowns known.
     pub(crate) fn in_any_case(&mut self, node: Node) -> Term {
+        self.steps += 1;
         let next = Term(self.nodes.len() as u32);
         let term = *self.numbers.entry(node).or_insert(next);
         if term == next {
@@ -100,12 +103,12 @@ impl Terms {
         term
     }
 
-    /// The constant that a term is in the present case, or the term.
+    /// Constant that the current case assumes for a term, or the term itself.
     pub(crate) fn in_case(&self, term: Term) -> Term {
         self.assumed.get(&term).copied().unwrap_or(term)
     }
 
-    /// Assumes that terms have these values, and no others. Of a sum with a constant, it is the rest that is assumed to be a value.
+    /// Replaces the assumptions. For a sum with a constant, the symbolic part is assumed to have the difference.
     pub(crate) fn assume(&mut self, cases: &[(Term, u32)]) {
         self.assumed.clear();
         for &(term, value) in cases {
@@ -115,9 +118,9 @@ impl Terms {
         }
     }
 
-    /// One of two values, the first if a condition is not zero.
+    /// Selects the first value if the condition is nonzero, otherwise the second.
     pub(crate) fn select(&mut self, condition: Term, values: [Term; 2]) -> Term {
-        match self.known(condition) {
+        match self.constant_value(condition) {
             Some(bits) => values[usize::from(bits == 0)],
             None if values[0] == values[1] => values[0],
             None => self.make(Node::Apply(Op::sel, [condition, values[0], values[1]])),
@@ -128,20 +131,20 @@ impl Terms {
         self.make(Node::Constant(bits))
     }
 
-    pub(crate) fn known(&self, term: Term) -> Option<u32> {
+    pub(crate) fn constant_value(&self, term: Term) -> Option<u32> {
         match self.node(term) {
             Node::Constant(bits) => Some(bits),
             _ => None,
         }
     }
 
-    /// The value of an instruction, and what it adds to the flags. What is known is computed; a copy is what it copies; a sum of
-    /// integers has its constants added up, so that an address has one form.
+    /// Result of an instruction, and the flags that it raises. Constants are folded, copies resolved, and the constants of integer sums
+    /// added up, so that addresses have a normal form.
     pub(crate) fn apply(&mut self, op: Op, sources: [Term; 3]) -> (Term, Option<Term>) {
         if self.copies.contains(&op) {
             return (sources[0], None);
         }
-        if let [Some(a), Some(b), Some(c)] = sources.map(|source| self.known(source)) {
+        if let [Some(a), Some(b), Some(c)] = sources.map(|source| self.constant_value(source)) {
             let value = compute::<Host>(op, a, b, c);
             let raised =
                 (value.flags != Flags::NONE).then(|| self.make(Node::Flags(value.flags.bits().into())));
@@ -166,7 +169,7 @@ impl Terms {
         (value, raises.then(|| self.make(Node::Raised(op, sources))))
     }
 
-    /// A term plus a number.
+    /// Sum of a term and a constant.
     pub(crate) fn offset(&mut self, term: Term, offset: u32) -> Term {
         let (base, before) = self.linear(term);
         let total = self.constant(before.wrapping_add(offset));
@@ -179,11 +182,11 @@ impl Terms {
         self.make(Node::Apply(Op::iadd, [base, total, Terms::ZERO]))
     }
 
-    /// The unknown part of a sum and its constant. The unknown part of a constant is [`Terms::ZERO`].
+    /// Splits a sum into its symbolic part and its constant. The symbolic part of a constant is [`Terms::ZERO`].
     pub(crate) fn linear(&self, term: Term) -> (Term, u32) {
         match self.node(term) {
             Node::Constant(bits) => (Terms::ZERO, bits),
-            Node::Apply(Op::iadd, [a, b, _]) => match self.known(b) {
+            Node::Apply(Op::iadd, [a, b, _]) => match self.constant_value(b) {
                 Some(offset) => (a, offset),
                 None => (term, 0),
             },
@@ -191,31 +194,31 @@ impl Terms {
         }
     }
 
-    /// True if it is that of a register that nothing may have written.
+    /// The value may come from an unwritten register.
     pub(crate) fn may_be_unwritten(&self, term: Term) -> bool {
         matches!(self.node(term), Node::Unwritten | Node::PerhapsUnwritten { .. })
     }
 
     pub(crate) fn one_less(&mut self, term: Term) -> Term {
-        match self.known(term) {
+        match self.constant_value(term) {
             Some(left) => self.constant(left.wrapping_sub(1)),
             None => self.make(Node::OneLess(term)),
         }
     }
 
     pub(crate) fn more_than_one(&mut self, term: Term) -> Term {
-        match self.known(term) {
+        match self.constant_value(term) {
             Some(left) => self.constant(u32::from(left > 1)),
             None => self.make(Node::MoreThanOne(term)),
         }
     }
 
-    /// The innermost instructions in which two terms differ.
+    /// Innermost instructions in which two terms differ.
     pub(crate) fn first_difference(&self, source: Term, image: Term) -> (Term, Term) {
         let (mut source, mut image) = (source, image);
         while let (Node::Apply(a, from), Node::Apply(b, to)) = (self.node(source), self.node(image)) {
             let mut differing = from.into_iter().zip(to).filter(|(from, to)| from != to);
-            // Two leaves say less than the instruction that takes one for the other.
+            // Two leaves say less than the instruction with the wrong operand.
             let inside =
                 |(from, to)| [from, to].map(|term| matches!(self.node(term), Node::Apply(..))) == [true; 2];
             match (differing.next(), differing.next()) {
@@ -234,7 +237,7 @@ impl Terms {
         list
     }
 
-    /// The term in words; `name` names the cell of an unknown value.
+    /// Text of a term; `name` names the cell of an unknown value.
     pub(crate) fn text(&self, term: Term, name: &dyn Fn(u32) -> String) -> String {
         self.text_to(term, name, DEPTH)
     }

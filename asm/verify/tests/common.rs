@@ -1,28 +1,31 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Assembles a source and checks its image.
 
-use takt_asm::plain::{Plain, plain};
-use takt_asm::{Assembled, Loader, Options, assemble};
-use takt_verify::{Difference, Established, Hint, verify};
+use takt_asm::plain::{PlainProgram, plain};
+use takt_asm::{AssembledProgram, Loader, Options, assemble};
+use takt_verify::{Difference, EquivalenceReport, verify};
 
-/// The image and the plain program of a source; `None` if the machine does not take it.
-pub(crate) fn build(path: &str, loader: &dyn Loader, options: &Options) -> Option<(Assembled, Plain)> {
+/// Image and plain program of a source; `None` if the machine does not take it.
+pub(crate) fn build(
+    path: &str,
+    loader: &dyn Loader,
+    options: &Options,
+) -> Option<(AssembledProgram, PlainProgram)> {
     let assembled = assemble(path, loader, options).ok()?;
     let plain = plain(path, loader, options).expect("the assembler has accepted it");
     Some((assembled, plain))
 }
 
-pub(crate) fn hints(assembled: &Assembled) -> Vec<Hint> {
-    takt_verify::hints(&assembled.contractions, &assembled.selections)
-}
-
 /// Checks the image of a source.
-pub(crate) fn check(assembled: &Assembled, plain: &Plain) -> Result<Established, Difference> {
-    verify(&assembled.program, plain, &hints(assembled))
+pub(crate) fn check(
+    assembled: &AssembledProgram,
+    plain: &PlainProgram,
+) -> Result<EquivalenceReport, Difference> {
+    verify(&assembled.program, plain, &assembled.contractions)
 }
 
-/// A difference in words.
-pub(crate) fn text(plain: &Plain, difference: &Difference) -> String {
+/// Text of a difference.
+pub(crate) fn text(plain: &PlainProgram, difference: &Difference) -> String {
     let place = difference
         .place
         .map_or("?".to_owned(), |place| format!("{}:{}", plain.files[place.file as usize], place.line));

@@ -2,6 +2,8 @@
 //! Tests of the checker, one program: a module for each subject.
 
 mod common;
+mod fields;
+mod limits;
 mod mutants;
 mod places;
 mod random;

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Images with one thing changed: each that does something else, as the emulator shows, is refused.
+//! Images with a random change: each that behaves differently in the emulator is refused.
 
 #![allow(clippy::print_stdout)]
 
-use crate::common::{build, check, hints};
+use crate::common::{build, check};
 use crate::random::number;
 use crate::random_source::{Random, source, source_with_loops};
 use crate::shipped::{loader, shipped};
-use takt_asm::plain::Plain;
-use takt_asm::{Assembled, Contract, MemoryLoader, Options};
+use takt_asm::plain::PlainProgram;
+use takt_asm::{AssembledProgram, Contract, MemoryLoader, Options};
 use takt_emu::Emulator;
 use takt_isa::shape::OPCODE;
 use takt_isa::{Instruction, Program, T1, T3, T4};
@@ -17,12 +17,12 @@ use takt_verify::verify;
 const PERIODS: usize = 6;
 const RUNS: u64 = 8;
 
-/// The number of mutants: `TAKT_MUTANTS`, or else as many as were asked for. `TAKT_SEED` draws others.
+/// Number of mutants: `TAKT_MUTANTS`, by default 200. `TAKT_SEED` draws others.
 fn mutants() -> u64 {
     number("TAKT_MUTANTS").unwrap_or(200)
 }
 
-/// Changes one thing. Returns what.
+/// Applies a random change and describes it.
 fn mutate(program: &mut Program, random: &mut Random) -> String {
     let slots = program.machine.slots.len();
     let bundles = program.code.len() / slots;
@@ -72,8 +72,8 @@ fn mutate(program: &mut Program, random: &mut Random) -> String {
     }
 }
 
-/// The observable behaviour of a run on inputs from a seed: values of each declared output, in order, memory, flags, and the fault.
-fn observe(program: &Program, plain: &Plain, seed: u64) -> (Vec<String>, bool) {
+/// Observable behaviour of a run on inputs from a seed: values of each declared output in order, memory and flags; and true after a fault.
+fn observe(program: &Program, plain: &PlainProgram, seed: u64) -> (Vec<String>, bool) {
     let Ok(mut emulator) = Emulator::new(program) else { return (vec!["not loaded".to_owned()], true) };
     emulator.set_cycle_limit(2_000_000);
     emulator.set_watched(program.outputs.iter().map(|port| port.register));
@@ -106,7 +106,7 @@ fn observe(program: &Program, plain: &Plain, seed: u64) -> (Vec<String>, bool) {
     (seen, false)
 }
 
-fn victims() -> Vec<(String, Assembled, Plain)> {
+fn victims() -> Vec<(String, AssembledProgram, PlainProgram)> {
     let mut victims = Vec::new();
     for (folder, name) in shipped() {
         let wanted = folder.ends_with("examples") || folder.ends_with("hybrid") || folder.ends_with("arm");
@@ -134,7 +134,7 @@ fn victims() -> Vec<(String, Assembled, Plain)> {
 }
 
 #[test]
-fn every_mutant_that_differs_is_refused() {
+fn rejects_every_different_mutant() {
     let victims = victims();
     let random = &mut Random::new(number("TAKT_SEED").unwrap_or(38));
     let (mut refused, mut differing, mut alike, mut placed) = (0, 0, 0, 0);
@@ -145,12 +145,12 @@ fn every_mutant_that_differs_is_refused() {
         let (name, assembled, plain) = &victims[random.below(victims.len() as u64) as usize];
         let mut program = assembled.program.clone();
         let what = mutate(&mut program, random);
-        let verdict = verify(&program, plain, &hints(assembled));
+        let verdict = verify(&program, plain, &assembled.contractions);
         let differs = (0..RUNS).any(|seed| {
             let (expected, faults) = observe(&assembled.program, plain, seed);
             let (found, _) = observe(&program, plain, seed);
             match faults {
-                // Behaviour after a fault of the source is not defined, nor is that just before it.
+                // Behaviour after a fault of the source, and just before it, is undefined.
                 true => false,
                 false => expected != found,
             }

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The difference between an image and another source is at the line that differs; what is fused and how long it takes are stated.
+//! Differences are reported at the line that differs; contractions and times are reported.
 
-use crate::common::{build, check, hints, text};
-use takt_asm::{Contract, MemoryLoader, Options};
-use takt_isa::{T3, T4};
+use crate::common::{build, check, text as words};
+use takt_asm::{Contract, MemoryLoader, Options, Schedule};
+use takt_isa::{T1, T3, T4};
 use takt_verify::verify;
 
 const SOURCE: &str = "\
@@ -35,16 +35,16 @@ skip:
     wait p
 ";
 
-/// The answer of the checker to the image of the source and another source.
+/// Message of the checker for the image of `SOURCE` against a changed source.
 fn against(from: &str, to: &str) -> String {
     let options = Options { machine: &T3, ..Options::default() };
     let image = build("a.s", &MemoryLoader::of("a.s", SOURCE), &options).expect("it assembles").0;
     assert!(SOURCE.contains(from), "{from}");
     let other = SOURCE.replacen(from, to, 1);
     let (assembled, plain) = build("a.s", &MemoryLoader::of("a.s", other), &options).expect("it assembles");
-    match verify(&image.program, &plain, &hints(&assembled)) {
+    match verify(&image.program, &plain, &assembled.contractions) {
         Ok(_) => "verified".to_owned(),
-        Err(difference) => text(&plain, &difference).lines().next().unwrap_or_default().to_owned(),
+        Err(difference) => words(&plain, &difference).lines().next().unwrap_or_default().to_owned(),
     }
 }
 
@@ -73,14 +73,14 @@ fn fused_sums_and_times_are_stated() {
     wrong[0].cycles.worst -= 1;
     wrong[0].cycles.best -= 1;
     assert!(established.compare(&wrong).is_err());
-    // Without the permission the fused sum is not what the source says.
+    // Without permission to contract, the fused sum differs from the source.
     let forbidden = source.replace(".contract on\n", "\n");
     let (_, plain) = build("a.s", &MemoryLoader::of("a.s", forbidden), &options).expect("it assembles");
-    assert!(verify(&assembled.program, &plain, &hints(&assembled)).is_err());
+    assert!(verify(&assembled.program, &plain, &assembled.contractions).is_err());
     assert!(verify(&assembled.program, &plain, &[]).is_err());
 }
 
-/// A period with a loop whose count is the input `n`, and then `last`.
+/// A period with a loop whose count is the input `n`, followed by `last`.
 fn counting(bound: u32, last: &str) -> String {
     format!(
         ".schedule on\n.input n:int, x\n.output y:int\n.state s:int\n.reg i:int a e:int f:int\n.data\nv: .space 40\n.once\n li s, 0\n wait p\n\
@@ -89,9 +89,9 @@ fn counting(bound: u32, last: &str) -> String {
     )
 }
 
-/// The case of one count is none of the periods after it: an image is refused that differs for another count, later.
+/// Assumptions about a count end with the period: an image that differs for another count in a later period is refused.
 #[test]
-fn a_count_of_one_period_is_none_of_the_next() {
+fn counters_do_not_carry_over_periods() {
     let options = Options { machine: &T3, ..Options::default() };
     let build = |text: &str| build("a.s", &MemoryLoader::of("a.s", text), &options).expect("it assembles");
     let last = |third: &str| format!(" ieq e, n, 3\n iand f, s, e\n mov y, {third}");
@@ -99,9 +99,47 @@ fn a_count_of_one_period_is_none_of_the_next() {
     assert_eq!(honest.loops.len(), 1, "it is pipelined");
     assert!(check(&honest, &plain).is_ok(), "{:?}", check(&honest, &plain));
     let (wrong, _) = build(&counting(12, &last("f")));
-    assert!(verify(&wrong.program, &plain, &hints(&honest)).is_err());
-    // Nor may the image's loop stop sooner than the source's.
+    assert!(verify(&wrong.program, &plain, &honest.contractions).is_err());
+    // The image's loop may not have a smaller bound than the source's.
     let mut bounded = honest.program.clone();
     bounded.loop_bounds.iter_mut().for_each(|bound| bound.most = 2);
-    assert!(verify(&bounded, &plain, &hints(&honest)).is_err());
+    assert!(verify(&bounded, &plain, &honest.contractions).is_err());
+}
+
+/// Images under every scheduling option are verified, with selections, unrolled loops and spilled values among them.
+#[test]
+fn images_of_other_schedules_are_verified() {
+    let selection_in_a_called_sub = "\
+.input n:int\n.output y:int\n.reg k:int c:int\n.preset k = 0\n.schedule on\n.period\np: .for i, 1, 5\n call sub\n .endfor\n y = k\n wait p\n\
+sub: ilt c, k, n\n bz c, L\n iadd k, k, 1\nL: ret\n";
+    let count_at_run_time = "\
+.array A[6]\n.input n:int, x\n.output y\n.schedule on\n.period\np: .for i, 1, n max 2 unroll 2\n A[3-i] = x\n .endfor\n y = A[1]\n wait p\n";
+    let selection = "\
+.input n:int, m:int\n.output y:int\n.reg k:int c:int\n.preset k = 0\n.schedule on\n.period\np: ilt c, k, n\n bz c, L\n iadd k, k, 1\nL: y = k\n wait p\n";
+    let spilled = {
+        use std::fmt::Write as _;
+        let mut text = ".input x[20]\n.output y\n.schedule on\n.reg y0\n.period\np: y0 = 0\n".to_owned();
+        for k in 1..=300 {
+            let _ = writeln!(text, ".reg v{k}\n v{k} = x[{}]*{k}.5 + x[{}]", 1 + k % 20, 1 + k % 19);
+        }
+        for k in 1..=300 {
+            let _ = writeln!(text, " y0 = y0 + v{k}*v{}", 301 - k);
+        }
+        text + " y = y0\n wait p\n"
+    };
+    let mut has_spills = false;
+    for text in [selection_in_a_called_sub, count_at_run_time, selection, &spilled] {
+        for machine in [&T1, &T3, &T4] {
+            for schedule in [Schedule::None, Schedule::AsWritten, Schedule::All] {
+                let options = Options { machine, schedule, effort: 0, ..Options::default() };
+                let built = build("a.s", &MemoryLoader::of("a.s", text), &options);
+                let Some((assembled, plain)) = built else { continue };
+                has_spills |= assembled.spills.iter().any(|spills| !spills.values.is_empty());
+                if let Err(difference) = verify(&assembled.program, &plain, &assembled.contractions) {
+                    panic!("{schedule:?} on {}: {}\n{text}", machine.name, words(&plain, &difference));
+                }
+            }
+        }
+    }
+    assert!(has_spills, "no program keeps values in data memory");
 }

@@ -1,19 +1,23 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The image of every shipped program is its source.
+//! Images of all shipped programs are verified against their sources.
+
+#![allow(clippy::print_stdout)]
 
 use crate::common::{build, check, text};
+use crate::random::MARGIN;
 use std::path::{Path, PathBuf};
 use takt_asm::{Contract, FileLoader, Options, Schedule, Search};
 use takt_isa::{Machine, T1, T3, T4};
+use takt_verify::{EquivalenceReport, MAX_STEPS};
 
-/// Folders of programs, and how they are assembled there.
+/// Folders of shipped programs.
 const FOLDERS: [&str; 7] = ["hybrid", "arm", "three", "kernels", "taclebench", "examples", "systems"];
 
 fn programs() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../programs")
 }
 
-/// The shipped programs: folder and file.
+/// Shipped programs: folder and file.
 pub(crate) fn shipped() -> Vec<(PathBuf, String)> {
     let mut found = Vec::new();
     for folder in FOLDERS.map(|folder| programs().join(folder)) {
@@ -34,18 +38,27 @@ pub(crate) fn loader(folder: &Path) -> Search<FileLoader> {
 
 fn check_all(machine: &'static Machine, schedule: Schedule, contract: Contract) {
     let (mut checked, mut compared, mut wrong) = (0, 0, Vec::new());
+    let (mut most_steps, mut most_of) = (0, String::new());
     for (folder, name) in shipped() {
         let options = Options { machine, schedule, contract, effort: 0, ..Options::default() };
         let built = build(&name, &loader(&folder), &options);
-        // Files to be included have no code.
+        // Files for inclusion have no code.
         let Some((assembled, plain)) = built.filter(|(_, plain)| !plain.bundles.is_empty()) else { continue };
         checked += 1;
         let claims = takt_analysis::section_cycles(&assembled.program).unwrap_or_default();
-        match check(&assembled, &plain).and_then(|established| established.compare(&claims)) {
-            Ok(sections) => compared += sections,
+        let compare = |established: EquivalenceReport| Ok((established.steps, established.compare(&claims)?));
+        match check(&assembled, &plain).and_then(compare) {
+            Ok((steps, sections)) => {
+                compared += sections;
+                if steps > most_steps {
+                    (most_steps, most_of) = (steps, name);
+                }
+            }
             Err(difference) => wrong.push(format!("{name}: {}", text(&plain, &difference))),
         }
     }
+    println!("{}: at most {most_steps} steps, for {most_of}", machine.name);
+    assert!(most_steps < MAX_STEPS / MARGIN, "{most_of} takes {most_steps} of {MAX_STEPS} steps");
     assert!(checked > 40 && compared > checked, "{checked} programs, {compared} sections compared");
     assert!(wrong.is_empty(), "{} of {checked}:\n{}", wrong.len(), wrong.join("\n"));
 }

@@ -27,47 +27,46 @@ pub const MAX_DEPTH: usize = 64;
 /// Limit on the cycles of a section.
 pub const MAX_CYCLES: Cycle = 1 << 62;
 
-/// The best and the worst case of a section.
+/// Best and worst case of a section.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SectionBounds {
-    /// The label at which it begins; `once` for the section that runs once.
+    /// Label of its first bundle; `once` for the section that runs once.
     pub name: String,
-    /// Its first bundle.
+    /// First bundle: bundle 0, or the target of a `wait`.
     pub address: BundleAddress,
-    /// Its place in the source.
+    /// Source line of the first bundle, if known.
     pub location: Option<Location>,
-    /// The bundles that end it: `wait`s and `halt`s, ascending.
+    /// Bundles that end the section, `wait`s and `halt`s, ascending.
     pub ends: Vec<BundleAddress>,
-    /// True if it begins at reset, false if at a tick.
+    /// Starts at reset; all other sections start at a tick.
     pub once: bool,
-    /// The cycles that it takes. For the section that runs once: from reset to the issue of its `wait`, both included. For a period: from
-    /// the cycle after its tick to the issue of its `wait`, provided that the tick comes after the front end has refilled
-    /// ([`takt_isa::Machine::refill`] cycles after the previous `wait`, or later).
+    /// Cycles. For the section that runs once: from reset to the issue of its `wait`, both included. For a period: from the cycle after its
+    /// tick to the issue of its `wait`, provided that the tick comes after the front end has refilled ([`takt_isa::Machine::refill`] cycles
+    /// after the previous `wait`, or later).
     pub cycles: Span,
-    /// The cycles of a period whose tick comes after the previous `wait`, however soon: a tick during the refill adds the rest of
-    /// the refill.
+    /// Cycles of a period whose tick comes after the previous `wait`, however soon: a tick during the refill adds the rest of the refill.
     pub in_time: Span,
-    /// The cycles of a period whose tick came before the previous `wait` (a missed deadline), from the cycle after that `wait`.
+    /// Cycles of a period whose tick came before the previous `wait` (a missed deadline), from the cycle after that `wait`.
     pub missed: Span,
 }
 
-/// The best and the worst case of each section of a program.
+/// Best and worst case of each section of a program.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Bounds {
     /// The section that runs once, then the periods by address: one for each bundle that is the target of a `wait`.
     pub sections: Vec<SectionBounds>,
-    /// The steps that the analysis took, of [`MAX_STEPS`].
+    /// Steps that the analysis took, at most [`MAX_STEPS`].
     pub steps: u64,
 }
 
 impl Bounds {
-    /// The worst case over all periods whose tick comes in time; `None` if there is no period.
+    /// Worst case over all periods whose tick comes in time; `None` without periods.
     pub fn worst_period(&self) -> Option<Cycle> {
         self.sections.iter().filter(|section| !section.once).map(|section| section.in_time.worst).max()
     }
 }
 
-/// The cycles of each section for a host's header file, or the reason why there is no bound.
+/// Cycles of each section for a host's header file, or the reason why there is no bound.
 ///
 /// # Errors
 /// The text of the [`BoundError`].
@@ -103,21 +102,21 @@ pub fn bound(program: &Program) -> Result<Bounds, BoundError> {
             (&mut section.in_time, other.in_time),
             (&mut section.missed, other.missed),
         ];
-        // Each of the two holds, so that the smaller does.
+        // Take the smaller of two valid bounds.
         spans.into_iter().for_each(|(span, other)| span.worst = span.worst.min(other.worst));
     }
     Ok(bounds)
 }
 
-/// For loops with a total, the cycles at which an iteration is priced.
+/// Price of an iteration in cycles, for each loop with a promised total, by the loop's head.
 type Prices = BTreeMap<BundleAddress, Cycle>;
 
-/// The bounds, and the cycles of iterations: [`bound_with`].
+/// Bounds and found iteration cycles ([`bound_with`]); forgets the values of loop counts if the analysis exceeds its steps with them.
 fn bound_by(program: &Program, prices: &Prices) -> Result<(Bounds, Prices), BoundError> {
     let slice = Slice::new(&Graph::new(program)?);
     let has_slice = !slice.is_empty();
     match bound_with(program, slice, prices) {
-        // Without the values of counts, iterations are alike much sooner.
+        // Without the values of counts, the states of iterations coincide much sooner.
         Err(BoundError { refusal: Refusal::Limit { limit: MAX_STEPS, .. }, .. }) if has_slice => {
             bound_with(program, Slice::default(), prices)
         }
@@ -125,11 +124,12 @@ fn bound_by(program: &Program, prices: &Prices) -> Result<(Bounds, Prices), Boun
     }
 }
 
-/// The bounds, by what is known of the registers of a slice; and for each loop with a total, the cycles that its iterations come to take.
+/// Bounds, tracking the registers of `slice`; also returns, for each loop with a total, the cycles of an iteration once iterations are
+/// alike.
 ///
-/// Each iteration of a loop with a price takes so many cycles less where it stands, and a section that enters the loop as many more as
-/// the total of iterations costs. At any price that is no less than the cycles of each path with no more iterations than the total
-/// (Lagrangian relaxation); at the cycles that an iteration comes to take, the longest of these paths are found.
+/// Lagrangian relaxation of the promised totals: each iteration of a loop with a price costs its cycles less the price, and a section that
+/// enters the loop pays the price times the total. At any price the result bounds every path that keeps to the total; at a price equal to
+/// the cycles of a steady iteration, it is the longest such path.
 fn bound_with(program: &Program, slice: Slice, prices: &Prices) -> Result<(Bounds, Prices), BoundError> {
     let graph = Graph::new(program)?;
     let machine = program.machine;
@@ -146,8 +146,8 @@ fn bound_with(program: &Program, slice: Slice, prices: &Prices) -> Result<(Bound
         steps: 0,
     };
     // Worklist over sections and their timing states at entry. A period's tick may come any time after the `wait`, so that results may
-    // still be pending or not when its first bundle is delivered: each such state, up to the empty one, is analysed (`delivered`).
-    // The first of them is also that after a missed deadline.
+    // still be pending or not when its first bundle is delivered: each such state, up to the empty one, is analysed (`delivered`). The
+    // first of these states also arises after a missed deadline.
     let mut sections: BTreeMap<(bool, BundleAddress), SectionBounds> = BTreeMap::new();
     let mut seen = BTreeSet::new();
     let mut left = vec![(true, BundleAddress::RESET, Residue::default())];
@@ -161,11 +161,15 @@ fn bound_with(program: &Program, slice: Slice, prices: &Prices) -> Result<(Bound
         }
         for (later, residue) in delivered.into_iter().enumerate() {
             let region = Region::Subroutine(address);
-            // A period may begin with anything that another one has left.
+            // A period may begin with any register values that another period has left.
             let values = if once { at_reset.clone() } else { Values::default() };
             let summary = explorer.explore(region, &State { residue, values })?;
             if summary.calls > machine.stack_depth {
                 let refusal = Refusal::StackOverflow { needed: summary.calls, depth: machine.stack_depth };
+                return Err(BoundError::new(program, address, refusal));
+            }
+            if summary.counted > machine.loop_depth {
+                let refusal = Refusal::LoopOverflow { needed: summary.counted, depth: machine.loop_depth };
                 return Err(BoundError::new(program, address, refusal));
             }
             let totals = explorer.totals(&summary);
@@ -182,7 +186,7 @@ fn bound_with(program: &Program, slice: Slice, prices: &Prices) -> Result<(Bound
                     }
                     Outcome::Go { .. } => continue,
                 };
-                // Cycles are counted up to and including that of the last issue, hence the 1.
+                // The last issue's cycle counts too, hence the 1.
                 let refill = Cycle::from(machine.refill);
                 let plain = span.after(1 + if once { refill } else { 0 });
                 let missed = span.after(1 + refill);
@@ -233,7 +237,7 @@ fn name(program: &Program, once: bool, address: BundleAddress) -> String {
     }
 }
 
-/// The cycles of a part of a path, least and most. The most is below zero where the iterations in it have a price above their cycles.
+/// Least and most cycles of a part of a path. The most is negative where iterations in it have a price above their cycles.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 struct Cost {
     best: Cycle,
@@ -255,36 +259,36 @@ impl Cost {
         Cost { best: self.best.min(other.best), worst: self.worst.max(other.worst) }
     }
 
-    /// As a section's, with what its loops cost.
+    /// Span of a section: adds the price of its loops' totals to the most.
     fn span(self, totals: Cycle) -> Span {
         let totals = i64::try_from(totals).unwrap_or(i64::MAX);
         Span { best: self.best, worst: self.worst.saturating_add(totals).max(0).cast_unsigned() }
     }
 }
 
-/// The state of a path: its timing state, and what is known of the registers that counts depend on.
+/// State of a path: its timing state, and the known values of the registers that loop counts depend on.
 #[derive(Clone, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 struct State {
     residue: Residue,
     values: Values,
 }
 
-/// A part of the program that is analysed as a unit, entered at one bundle.
+/// Part of the program that is analysed as a unit, entered at one bundle.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 enum Region {
-    /// The code from its first bundle to a return, a `wait` or a `halt`. A section is analysed as one, too.
+    /// Code from a first bundle to a return, a `wait` or a `halt`. A section is analysed as one, too.
     Subroutine(BundleAddress),
-    /// All iterations of the counted loop with this head.
+    /// Iterations of the counted loop with this head, all together.
     Loop(BundleAddress),
-    /// One iteration of that loop.
+    /// Single iteration of the counted loop with this head.
     Turn(BundleAddress),
 }
 
-/// An exit of a region. Its residue is the timing state at the delivery of the next bundle, up to which its cycles are
-/// counted. The cycles of `wait` and `halt` are counted up to their issue.
+/// Exit of a region. Its residue is the timing state at the delivery of the next bundle, up to which its cycles are counted. The cycles of
+/// `wait` and `halt` are counted up to their issue.
 #[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Debug)]
 enum Outcome {
-    /// An edge to a bundle outside of the loop or, from an iteration, also back to the loop's head.
+    /// Edge to a bundle outside of the loop or, from an iteration, also back to the loop's head.
     Go {
         edge: Edge,
         state: State,
@@ -293,7 +297,7 @@ enum Outcome {
         at: BundleAddress,
         state: State,
     },
-    /// The residue is that at the earliest possible delivery of the target.
+    /// Residue: timing state at the earliest possible delivery of the target.
     Wait {
         at: BundleAddress,
         target: BundleAddress,
@@ -304,13 +308,15 @@ enum Outcome {
     },
 }
 
-/// The summary of a region for one timing state at entry: its exits, each with its cycles.
+/// Summary of a region for one timing state at entry: its exits, each with its cycles.
 #[derive(Default, Debug)]
 struct Summary {
     outcomes: BTreeMap<Outcome, Cost>,
-    /// The most entries of the return stack that it uses.
+    /// Most entries of the return stack in use.
     calls: u32,
-    /// The loops with a price.
+    /// Deepest nesting of loops counted by the sequencer.
+    counted: u32,
+    /// Loops with a price.
     priced: BTreeSet<BundleAddress>,
 }
 
@@ -319,9 +325,10 @@ impl Summary {
         add(&mut self.outcomes, outcome, cost);
     }
 
-    /// Takes over what another part of the program needs beside its cycles.
+    /// Takes over the resource needs (not the cycles) of another part of the program.
     fn contain(&mut self, part: &Summary) {
         self.calls = self.calls.max(part.calls);
+        self.counted = self.counted.max(part.counted);
         self.priced.extend(&part.priced);
     }
 }
@@ -330,7 +337,7 @@ fn add<K: Ord>(costs: &mut BTreeMap<K, Cost>, key: K, cost: Cost) {
     costs.entry(key).and_modify(|known| *known = known.or(cost)).or_insert(cost);
 }
 
-/// The states of a place, of which there are no more than a few for each timing state: with too many, their values are forgotten.
+/// Limits the states of a place: beyond [`MAX_VALUES`], drops the register values, which leaves one state for each timing state.
 fn widened(states: BTreeMap<State, Cost>) -> BTreeMap<State, Cost> {
     if states.len() <= MAX_VALUES {
         return states;
@@ -345,13 +352,13 @@ fn widened(states: BTreeMap<State, Cost>) -> BTreeMap<State, Cost> {
 struct Explorer<'p> {
     graph: Graph<'p>,
     slice: Slice,
-    /// The prices of iterations, and the cycles that they were found to take.
+    /// Prices of iterations, and the cycles that iterations were found to take.
     prices: &'p Prices,
     found: Prices,
-    /// For each loop, the registers of the slice that its bundles use.
+    /// Registers of the slice that each loop's bundles use.
     used: HashMap<Region, Rc<BTreeSet<Register>>>,
     known: HashMap<(Region, State), Rc<Summary>>,
-    /// For each region, the position of its bundles in topological order.
+    /// Topological order of each region's bundles, by position.
     orders: HashMap<Region, Rc<HashMap<BundleAddress, usize>>>,
     active: Vec<Region>,
     steps: u64,
@@ -372,7 +379,7 @@ impl Explorer<'_> {
         Ok(())
     }
 
-    /// The cycles that the totals of a section's loops cost.
+    /// Cycles that the totals of a section's loops cost: price times total.
     fn totals(&self, section: &Summary) -> Cycle {
         let of = |head: &BundleAddress| {
             self.prices[head].saturating_mul(self.graph.loops[head].total.unwrap_or(0).into())
@@ -380,7 +387,7 @@ impl Explorer<'_> {
         section.priced.iter().map(of).fold(0, Cycle::saturating_add)
     }
 
-    /// The summary of a region, in which values are known of the registers that it uses alone.
+    /// Summary of a region, reused for equal states at entry.
     fn explore(&mut self, region: Region, entry: &State) -> Result<Rc<Summary>, BoundError> {
         let key = (region, entry.clone());
         if let Some(known) = self.known.get(&key) {
@@ -405,11 +412,11 @@ impl Explorer<'_> {
         Ok(summary)
     }
 
-    /// The summary of a loop: iterates over the set of states at its head, at most `most` times.
+    /// Summary of a loop: iterates over the set of states at its head, at most `most` times.
     fn turns(&mut self, head: BundleAddress, entry: &State) -> Result<Summary, BoundError> {
         let Loop { mut least, mut most, total, counted, .. } = self.graph.loops[&head];
         let price = self.prices.get(&head).copied();
-        // A count of 0, or one that is too large, is a fault.
+        // Counts of 0, or beyond the loop bound, are faults.
         if let Some(count) = entry.values.count.filter(|count| (1..=most).contains(count) && counted) {
             (least, most) = (count, count);
         }
@@ -442,11 +449,11 @@ impl Explorer<'_> {
             let best = best(&next).unwrap_or(0).saturating_sub(best(&heads).unwrap_or(0));
             let worst = worst(&next).unwrap_or(0).saturating_sub(worst(&heads).unwrap_or(0));
             if total.is_some() {
-                // The last one found before iterations are alike, or the first of them.
+                // Cycles of the last iteration before a steady state, or of the first steady iteration.
                 self.found.insert(head, worst.max(0).cast_unsigned());
             }
             for (outcome, cost) in left {
-                // A loop that the sequencer counts is left when its count says so.
+                // A sequencer-counted loop exits only when its count is used up.
                 let is_exit = counted && matches!(outcome, Outcome::Go { .. });
                 let soonest = if is_exit { least.saturating_sub(turn) } else { 0 };
                 if !steady && soonest > 0 {
@@ -464,11 +471,12 @@ impl Explorer<'_> {
             }
             heads = widened(next);
         }
+        summary.counted += u32::from(counted);
         Ok(summary)
     }
 
-    /// The summary of a subroutine or of one iteration of a loop: propagates states along its edges in topological order, so
-    /// that all paths to a bundle have met when it is visited.
+    /// Summary of a subroutine or of one iteration of a loop: propagates states along its edges in topological order, so that all paths to
+    /// a bundle have met when it is visited.
     fn ways(&mut self, region: Region, entry: BundleAddress, state: &State) -> Result<Summary, BoundError> {
         let order = self.order(region, entry)?;
         let mut summary = Summary::default();
@@ -487,7 +495,7 @@ impl Explorer<'_> {
                     let cost = before.and(*cost);
                     match outcome {
                         Outcome::Go { edge, state } if self.stays(region, edge.to) => {
-                            // A missing entry: an inner loop has an exit to outside of this one.
+                            // The bundle has no position if an inner loop has an exit to outside of this one.
                             let number = order.get(&edge.to).copied();
                             let place = number.ok_or_else(|| self.error(address, Refusal::Overlap))?;
                             add(left.entry((place, edge.to)).or_default(), state.clone(), cost);
@@ -500,7 +508,7 @@ impl Explorer<'_> {
         Ok(summary)
     }
 
-    /// The summary of a loop within a region: what it uses is looked at alone, and the rest stays as it is.
+    /// Summary of a loop within a region. Only the registers that the loop uses enter the summary's key; the other values pass unchanged.
     fn inner(&mut self, region: Region, state: &State) -> Result<Rc<Summary>, BoundError> {
         if self.slice.is_empty() {
             return self.explore(region, state);
@@ -526,7 +534,7 @@ impl Explorer<'_> {
         Ok(Rc::new(summary))
     }
 
-    /// True if an edge to this bundle stays in the region; one to the head of a loop leaves the iteration.
+    /// The edge to this bundle stays in the region; an edge to the head of a loop leaves the iteration.
     fn stays(&self, region: Region, to: BundleAddress) -> bool {
         match region {
             Region::Turn(head) => to != head && self.graph.loops[&head].body.contains(&to),
@@ -534,7 +542,7 @@ impl Explorer<'_> {
         }
     }
 
-    /// The summary of straight-line code: from a bundle to the next one that branches or is a branch target. A call's callee is included.
+    /// Summary of straight-line code: from a bundle to the next one that branches or is a branch target. A call's callee is included.
     fn run(&mut self, entry: BundleAddress, state: &State) -> Result<Summary, BoundError> {
         let machine = self.graph.program.machine;
         let mut scoreboard = Scoreboard::resume(machine, &state.residue);
@@ -544,7 +552,7 @@ impl Explorer<'_> {
         let (at, cycle, flow, taken, closes) = loop {
             let node = self.graph.node(address)?;
             let cycle = scoreboard.issue(&node.timing, address, delivered).cycle;
-            // The register that decides where it goes on is read before the bundle writes.
+            // The branch reads its register before the bundle writes.
             let mut taken = node.taken;
             if let Flow::Branch { register, zero, .. } = node.flow {
                 taken = taken.or_else(|| values.get(register).map(|value| (value == 0) == zero));
@@ -618,8 +626,8 @@ impl Explorer<'_> {
         Ok(summary)
     }
 
-    /// Numbers the bundles of a region in topological order. A counted loop inside it counts as a single node; any other cycle is
-    /// an error, since nothing bounds it.
+    /// Numbers the bundles of a region in topological order. A counted loop inside it is a single node; any other cycle is an error, since
+    /// it has no bound.
     fn order(
         &mut self,
         region: Region,

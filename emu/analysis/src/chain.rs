@@ -1,32 +1,32 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The operations of a critical path, which are some of its bundles' operations only; and the loops of a trace.
+//! Operations on a critical path (a subset of its bundles' operations), and the loops of a trace.
 
-use crate::{Issued, Link, LinkKind, StaticIssue, Trace};
+use crate::{IssuedBundle, Link, LinkKind, StaticIssue, Trace};
 use std::collections::BTreeMap;
 use takt_isa::timing::{Cause, Cycle};
 use takt_isa::{BundleAddress, Flow, Instruction, Program, SlotIndex};
 
-/// The slots in which an edge of the critical path begins and ends. `None`: no single operation is the reason.
+/// Slots in which an edge of the critical path begins and ends. `None`: no single operation is the reason.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Ends {
-    /// The operation of the earlier bundle that holds up the later one.
+pub struct EdgeSlots {
+    /// Operation of the earlier bundle that delays the later one.
     pub from: Option<SlotIndex>,
-    /// The operation of the later bundle that is held up.
+    /// Delayed operation of the later bundle.
     pub to: Option<SlotIndex>,
 }
 
-/// A loop of a trace: bundles that are come back to, whichever jump or hardware loop leads there.
+/// Loop of a trace: a range of bundles to which execution returns, by a jump, a branch or a hardware loop.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Loop {
-    /// Its first bundle.
+    /// First bundle, the loop's key.
     pub first: BundleAddress,
-    /// Its last bundle that issued.
+    /// Last bundle that issued.
     pub last: BundleAddress,
-    /// Times that its first bundle issued.
+    /// Issues of the first bundle.
     pub turns: u64,
-    /// Cycles from the issue before each of its bundles to that bundle's own, inner loops included.
+    /// Cycles from the preceding issue to each of its bundles' issues, inner loops included.
     pub cycles: Cycle,
-    /// Stalled cycles of these.
+    /// Stalled cycles among `cycles`.
     pub stalled: Cycle,
 }
 
@@ -35,8 +35,8 @@ fn bundle(program: &Program, address: BundleAddress) -> Vec<Instruction> {
 }
 
 impl Link {
-    /// The operations that an edge of the trace's critical path begins and ends with.
-    pub fn ends(&self, program: &Program, trace: &Trace) -> Ends {
+    /// Operations at both ends of an edge of the trace's critical path.
+    pub fn ends(&self, program: &Program, trace: &Trace) -> EdgeSlots {
         let machine = program.machine;
         let (from, to) = (&trace.issues[self.from], &trace.issues[self.to]);
         let (early, late) = (bundle(program, from.address), bundle(program, to.address));
@@ -49,13 +49,13 @@ impl Link {
         let control =
             |bundle: &[Instruction]| slot(bundle, &|_, instruction| instruction.flow() != Flow::Next);
         match self.kind {
-            LinkKind::Result { register } => Ends {
+            LinkKind::Result { register } => EdgeSlots {
                 from: slot(&early, &|slot, one| one.writes(machine.slot(slot)) == Some(register)),
                 to: slot(&late, &|_, one| one.reads().contains(&register))
                     .or_else(|| slot(&late, &|slot, one| one.writes(machine.slot(slot)) == Some(register))),
             },
             LinkKind::Unit { slot, .. } | LinkKind::WritePort { slot } => {
-                Ends { from: Some(slot), to: Some(slot) }
+                EdgeSlots { from: Some(slot), to: Some(slot) }
             }
             LinkKind::Drain => {
                 let distance = to.cycle - from.cycle;
@@ -64,23 +64,24 @@ impl Link {
                     let latency = host.unit(one.op.row().function).map(|unit| Cycle::from(unit.latency));
                     one.writes(host).is_some() && latency == Some(distance)
                 });
-                Ends { from: last, to: control(&late) }
+                EdgeSlots { from: last, to: control(&late) }
             }
-            LinkKind::FrontEnd => Ends { from: control(&early), to: None },
-            LinkKind::Order => Ends { from: None, to: None },
+            LinkKind::FrontEnd => EdgeSlots { from: control(&early), to: None },
+            LinkKind::Order => EdgeSlots { from: None, to: None },
         }
     }
 }
 
 impl Trace {
-    /// The trace of straight-line code as it was predicted, for its critical path. All cycles count from the same bundle.
+    /// Trace of straight-line code from its predicted issue times, for its critical path. All cycles count from the same bundle.
     pub fn predicted(issues: &[StaticIssue]) -> Trace {
-        let issued = |issue: &StaticIssue| Issued::new(issue.address, issue.cycle, issue.stalls.clone());
+        let issued =
+            |issue: &StaticIssue| IssuedBundle::new(issue.address, issue.cycle, issue.stalls.clone());
         let cycles = issues.last().map_or(0, |issue| issue.cycle);
         Trace::from_reset(cycles, issues.iter().map(issued).collect())
     }
 
-    /// The loops that ran, by the address of their first bundle. A call and a return close no loop.
+    /// Loops that ran, by the address of their first bundle. A call and a return close no loop.
     pub fn loops(&self, program: &Program) -> Vec<Loop> {
         let mut ends: BTreeMap<BundleAddress, BundleAddress> = BTreeMap::new();
         let loop_ends = program.loop_ends();
@@ -114,7 +115,7 @@ impl Trace {
     }
 }
 
-/// True for cycles that are lost: not those in which the program waits for the tick.
+/// Stalled cycles count as lost unless the program waits for the tick.
 fn lost((cause, _): &&(Cause, u32)) -> bool {
     !matches!(cause, Cause::Wait)
 }

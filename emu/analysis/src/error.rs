@@ -1,24 +1,24 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The errors of the static analyses: reasons why a program has no bound.
+//! Errors of the static analyses: reasons why a program has no bound.
 
 use takt_isa::program::Location;
 use takt_isa::{BundleAddress, Program};
 
-/// The reason why there is no bound, and the bundle at fault.
+/// Reason why there is no bound, and the bundle at fault.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{place}: {refusal}")]
 pub struct BoundError {
-    /// The bundle.
+    /// Bundle at which the analysis stopped.
     pub address: BundleAddress,
-    /// Its place in the source, as far as the program knows it.
+    /// Source line of the bundle, if known.
     pub location: Option<Location>,
-    /// The reason.
+    /// Reason for the refusal, with the names that its message needs.
     pub refusal: Refusal,
-    /// The place in words.
+    /// Bundle, source line and label, for the message.
     place: String,
 }
 
-/// The kinds of [`BoundError`]. An analysis that cannot prove a bound refuses the program; it never guesses.
+/// Kinds of [`BoundError`]. An analysis that cannot prove a bound refuses the program; it never guesses.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Refusal {
     /// A loop without a bound.
@@ -27,19 +27,19 @@ pub enum Refusal {
          bundle, N being how often that one is executed each time the loop is entered"
     )]
     Unbounded {
-        /// The bundle with the back edge.
+        /// Bundle with the back edge.
         closed: String,
     },
-    /// A loop with a path back to its head that its bound does not count.
+    /// A loop with a path back to its head that bypasses the count of its bound.
     #[error(
         "this loop has a bound, but {from} leads to it again in a way that restarts the count: let a backward \
          jump or branch close the loop"
     )]
     Uncounted {
-        /// The bundle.
+        /// Bundle whose edge to the head restarts the count.
         from: String,
     },
-    /// Two loops, each of which contains the other's head.
+    /// Overlapping loops: each contains the head of the other.
     #[error("this loop and another each contain the head of the other: their turns cannot be told apart")]
     Overlap,
     /// A loop bound at a bundle that heads no loop: no jump leads back to it.
@@ -47,7 +47,7 @@ pub enum Refusal {
     NoLoop,
     /// A loop that the sequencer counts, whose count is not a constant.
     #[error(
-        "how often this loop is repeated is a register's value: write `.loop_bound N` before its first bundle"
+        "the iteration count of this loop is a register's value: write `.loop_bound N` before its first bundle"
     )]
     UnknownCount,
     /// A loop that the sequencer counts, which is not entered and left only at its ends.
@@ -59,15 +59,25 @@ pub enum Refusal {
     /// A subroutine that calls itself.
     #[error("recursion: {callee} is being executed already when it is called here")]
     Recursion {
-        /// The subroutine.
+        /// Label or address of the subroutine.
         callee: String,
     },
     /// Calls that nest deeper than the return stack.
     #[error("calls nest {needed} deep from here, and the return stack holds {depth}")]
     StackOverflow {
-        /// Entries needed.
+        /// Entries of the return stack that the calls need.
         needed: u32,
-        /// Entries that the stack has.
+        /// Entries of the return stack.
+        depth: u32,
+    },
+    /// Loops that nest deeper than the sequencer counts.
+    #[error(
+        "counted loops nest {needed} deep from here, those of subroutines included, and the sequencer counts {depth}"
+    )]
+    LoopOverflow {
+        /// Nesting depth of counted loops.
+        needed: u32,
+        /// Nesting depth that the sequencer supports.
         depth: u32,
     },
     /// A return without a call.
@@ -79,15 +89,15 @@ pub enum Refusal {
     /// A bundle that cannot execute.
     #[error("illegal word in slot {slot}: {reason}")]
     IllegalWord {
-        /// The slot.
+        /// Name of the slot.
         slot: &'static str,
-        /// The reason.
+        /// Reason why the word is illegal.
         reason: String,
     },
     /// Execution that continues past the end of the program.
     #[error("execution goes on past the end of the program, which has {bundles} bundles")]
     LeavesProgram {
-        /// Bundles in the program.
+        /// Number of bundles in the program.
         bundles: u32,
     },
     /// An input or a state without a range.
@@ -96,9 +106,9 @@ pub enum Refusal {
         if *.input { "the input" } else { "the state" }
     )]
     NoRange {
-        /// Its name.
+        /// Name of the input or state in the source.
         name: String,
-        /// True if it is an input port.
+        /// An input port; else a state.
         input: bool,
     },
     /// A data word that keeps a value from one period to another.
@@ -107,15 +117,15 @@ pub enum Refusal {
          lasts from one period to another has a range only in a `.state` with a `.range`, so that arrays that do are beyond this analysis"
     )]
     NoRangeOfWord {
-        /// The word, and how the source names it.
+        /// Data word, as the source names it.
         word: String,
     },
-    /// A limit of the analysis, exceeded.
+    /// An exceeded limit of the analysis.
     #[error("more than {limit} {what}: the analysis gives up")]
     Limit {
-        /// The limit.
+        /// Value of the limit, in units of `what`.
         limit: u64,
-        /// The things that are limited.
+        /// Unit of the limit, in the plural.
         what: &'static str,
     },
 }
@@ -127,7 +137,7 @@ impl BoundError {
     }
 }
 
-/// `tracking.s:40: bundle 12 (loop)`: a bundle, its line and its label.
+/// Bundle, source line and label: `tracking.s:40: bundle 12 (loop)`.
 pub(crate) fn place(program: &Program, address: BundleAddress) -> String {
     let mut text = format!("bundle {address}");
     if let Some((label, distance)) = program.nearest_label(address) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The control flow of a program, bundle by bundle.
+//! Control flow of a program, bundle by bundle.
 
 use crate::error::{BoundError, Refusal};
 use std::collections::{BTreeMap, BTreeSet};
@@ -7,42 +7,42 @@ use takt_isa::program::{IllegalWord, LoopBound};
 use takt_isa::timing::Bundle;
 use takt_isa::{BundleAddress, Flow, Instruction, Program, Register, SlotIndex};
 
-/// A bundle.
+/// Bundle with its timing and its flow.
 pub(crate) struct Node {
     pub(crate) instructions: Vec<Instruction>,
     pub(crate) timing: Bundle,
     pub(crate) flow: Flow,
-    /// The head of the loop that ends with it, if one does.
+    /// Head of the loop whose last bundle this is, if any.
     pub(crate) closes: Option<BundleAddress>,
-    /// The outcome of its branch, if the tested register holds a constant: true if always taken, false if never.
+    /// Outcome of the branch, if the tested register holds a constant: true if always taken, false if never.
     pub(crate) taken: Option<bool>,
 }
 
-/// A control-flow edge between two bundles of a subroutine. A call's edge leads to the bundle after it.
+/// Control-flow edge between two bundles of a subroutine. A call's edge leads to the bundle after it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Edge {
     pub(crate) to: BundleAddress,
-    /// True for a back edge: a jump or taken branch to the same or an earlier address, which a loop's bound counts.
+    /// Back edge: a jump or taken branch to the same or an earlier address, counted by a loop's bound.
     pub(crate) back: bool,
 }
 
-/// A loop that has a bound.
+/// Loop with a bound.
 #[derive(Debug)]
 pub(crate) struct Loop {
-    /// Its iterations at least and at most, each time that it is entered.
+    /// Least and most iterations per entry.
     pub(crate) least: u32,
     pub(crate) most: u32,
-    /// Its iterations at most in one section, however often it is entered.
+    /// Most iterations in one section, over all entries, if the source promises a total.
     pub(crate) total: Option<u32>,
-    /// True if the sequencer counts it: then it ends by its count alone.
+    /// Counted by the sequencer: the loop ends by its count alone.
     pub(crate) counted: bool,
-    /// Its bundles: those from which a backward jump to the head can be reached without passing the head.
+    /// Bundles from which a backward jump to the head can be reached without passing the head.
     pub(crate) body: BTreeSet<BundleAddress>,
-    /// The edges that leave it.
+    /// Edges that leave the loop.
     pub(crate) exits: BTreeSet<Edge>,
 }
 
-/// A program's control flow.
+/// Control-flow graph of a program.
 pub(crate) struct Graph<'p> {
     pub(crate) program: &'p Program,
     /// Registers with a constant value.
@@ -110,7 +110,7 @@ impl<'p> Graph<'p> {
             let exits: BTreeSet<Edge> = exits.collect();
             let counted = counts.contains_key(&head);
             if counted {
-                // What the sequencer counts is known only if control takes the way through `loop` and the body's end.
+                // The sequencer's count is known only if control enters through `loop` and leaves after the body's end.
                 let enters = |from: &BundleAddress| !body.contains(from) && from.next() != head;
                 let entered = body.iter().any(|at| before.get(at).into_iter().flatten().any(enters));
                 if entered || exits.len() > 1 {
@@ -123,7 +123,7 @@ impl<'p> Graph<'p> {
         Ok(graph)
     }
 
-    /// Marks the bundles that close loops of the sequencer. Returns the heads of these loops, each with its count if that is a constant.
+    /// Marks the bundles that close sequencer-counted loops. Returns the heads of these loops, each with its count if that is a constant.
     fn close_loops(&mut self) -> Result<BTreeMap<BundleAddress, Option<u32>>, BoundError> {
         let mut counts = BTreeMap::new();
         for at in self.program.addresses() {
@@ -144,7 +144,7 @@ impl<'p> Graph<'p> {
         Ok(counts)
     }
 
-    /// The bundle at an address.
+    /// Decoded bundle at an address.
     pub(crate) fn node(&self, address: BundleAddress) -> Result<&Node, BoundError> {
         let refusal = match self.nodes.get(address.index()) {
             Some(Ok(node)) => return Ok(node),
@@ -157,12 +157,12 @@ impl<'p> Graph<'p> {
         Err(BoundError::new(self.program, address, refusal))
     }
 
-    /// True if an address is a leader of a basic block: paths meet there, or a counted loop begins.
+    /// Leader of a basic block: paths meet at this address, or a counted loop begins.
     pub(crate) fn is_leader(&self, address: BundleAddress) -> bool {
         self.leaders.contains(&address)
     }
 
-    /// The edges out of a bundle, each with true if it is a jump.
+    /// Edges out of a bundle; the flag marks jumps.
     fn edges(&self, from: BundleAddress) -> impl Iterator<Item = (bool, Edge)> + use<'p> {
         let (flow, taken, closes) = match self.nodes.get(from.index()) {
             Some(Ok(node)) => (node.flow, node.taken, node.closes),
@@ -183,13 +183,13 @@ impl<'p> Graph<'p> {
         next.into_iter().chain(jump)
     }
 
-    /// The edges out of a bundle.
+    /// Edges out of a bundle.
     pub(crate) fn successors(&self, from: BundleAddress) -> impl Iterator<Item = Edge> + use<'p> {
         self.edges(from).map(|(_, edge)| edge)
     }
 }
 
-/// The outcome of a branch on a constant register: true if always taken, false if never; `None` if it is not known.
+/// Outcome of a branch on a constant register: true if always taken, false if never; `None` if unknown.
 fn taken(flow: Flow, known: &BTreeMap<Register, u32>) -> Option<bool> {
     match flow {
         Flow::Branch { register, zero, .. } => known.get(&register).map(|value| (*value == 0) == zero),
@@ -197,7 +197,7 @@ fn taken(flow: Flow, known: &BTreeMap<Register, u32>) -> Option<bool> {
     }
 }
 
-/// Registers with a constant value: `zero`, and those that the loader sets and nothing writes.
+/// Registers with a constant value: `zero`, and registers that the loader sets and no operation writes.
 fn known_registers(program: &Program) -> BTreeMap<Register, u32> {
     let mut known: BTreeMap<Register, u32> = program.constants.iter().copied().collect();
     known.retain(|register, _| !program.machine.is_input(*register));

@@ -26,7 +26,7 @@ mod values;
 pub mod what_if;
 
 pub use bound::{Bounds, SectionBounds, bound, section_cycles};
-pub use chain::{Ends, Loop};
+pub use chain::{EdgeSlots, Loop};
 pub use error::{BoundError, Refusal};
 pub use static_issue::{StaticIssue, static_issue};
-pub use trace::{Issued, Link, LinkKind, MAX_ISSUES, Stalls, Trace, TraceError, WhatIf, trace};
+pub use trace::{IssuedBundle, Link, LinkKind, MAX_ISSUES, Stalls, Trace, TraceError, WhatIf, trace};

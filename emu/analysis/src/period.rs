@@ -7,14 +7,14 @@ use takt_emu::{Emulator, LoadError, PeriodError, PortError, Status};
 use takt_isa::timing::Cycle;
 use takt_isa::{Program, Register};
 
-/// The cycle limit of one period: a longer one counts as endless.
+/// Cycle limit of one period: a longer period counts as endless.
 pub const PERIOD_LIMIT: Cycle = 1_000_000_000;
-/// The greatest number of periods that a user can ask for.
+/// Greatest number of periods that a user can ask for.
 pub const MOST_PERIODS: u64 = 1_000_000;
-/// The number of periods that are run if the user gives none.
+/// Number of periods to run by default.
 pub const PERIODS: u64 = 2;
 
-/// The reason that there is no trace of a period.
+/// Reason why a period has no trace.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PeriodRunError {
     /// The program does not fit its machine.
@@ -26,45 +26,45 @@ pub enum PeriodRunError {
     /// An input cannot be set.
     #[error(transparent)]
     Port(#[from] PortError),
-    /// A period before the one to be traced failed.
+    /// A period before the traced one failed.
     #[error("period {period}")]
     Period {
-        /// The period.
+        /// Number of the failed period.
         period: u64,
-        /// The cause.
+        /// Fault, or input that cannot be set.
         source: PeriodError,
     },
     /// The period to be traced failed.
     #[error("period {period}")]
     Trace {
-        /// The period.
+        /// Number of the traced period.
         period: u64,
-        /// The cause.
+        /// Reason why the trace failed.
         source: TraceError,
     },
     /// The program halts before the period to be traced.
     #[error("the program halts before period {wanted}; the last is {halted}")]
     Halted {
-        /// The period asked for.
+        /// Number of the requested period.
         wanted: u64,
-        /// The period in which it halts.
+        /// Period in which the program halts.
         halted: u64,
     },
 }
 
-/// A traced period.
+/// Traced period, with its rounding errors.
 #[derive(Clone)]
 pub struct PeriodRun {
-    /// Its trace.
+    /// Issues and stalls of the period.
     pub trace: Trace,
-    /// Its number; 0 is the section that runs once.
+    /// Number of the period, from 1; 0 is the section that runs once.
     pub period: u64,
-    /// The rounding errors made in this period alone: the values at its start count as exact.
+    /// Rounding errors made in this period alone: the values at its start count as exact.
     pub shadow: Shadow,
 }
 
-/// Runs the program up to period `wanted`, by default the period of the last of `rows`, and traces that period. Each row holds the
-/// inputs of one period, as registers and bits.
+/// Runs the program up to period `wanted`, by default the period of the last row, and traces that period. Each of `rows` holds the inputs
+/// of one period, as registers and bits.
 ///
 /// # Errors
 /// See [`PeriodRunError`].
@@ -101,7 +101,7 @@ pub fn run_to_period(
         return Err(PeriodRunError::Halted { wanted, halted: period });
     }
     let mut shadow = Shadow::new(program);
-    // The same period has just been traced without a fault, so this run cannot fail either.
+    // The trace of the same period has shown no fault, so this run has none either.
     let _ = shadow.run_period(&mut before);
     Ok(PeriodRun { trace: found, period, shadow })
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Report of a period as a picture: every bundle, every stall and the critical path, as JSON and as a page for a browser.
 
-use crate::{Ends, Issued, Link, LinkKind, Loop, Trace, WhatIf};
+use crate::{EdgeSlots, IssuedBundle, Link, LinkKind, Loop, Trace, WhatIf};
 use serde_json::{Value, json};
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
@@ -11,51 +11,51 @@ use takt_isa::text::in_script;
 use takt_isa::timing::{Cause, Cycle};
 use takt_isa::{BundleAddress, Instruction, Program, SlotIndex};
 
-/// The effect of a faster unit on the unchanged program, and on the program reassembled for a machine that has it.
+/// Effect of a faster unit on the unchanged program, and on the program reassembled for a machine that has it.
 pub struct Speedup {
-    /// The unit, and the effect on the unchanged program.
+    /// Faster unit, and its effect on the unchanged program.
     pub what: WhatIf,
-    /// The effect on the reassembled program, if that was tried.
-    pub reassembled: Option<Reassembled>,
+    /// Effect on the reassembled program, if that was tried.
+    pub reassembled: Option<FasterUnitCycles>,
 }
 
-/// The program assembled for a machine with a faster unit.
-pub struct Reassembled {
+/// Program assembled for a machine with a faster unit.
+pub struct FasterUnitCycles {
     /// Cycles of the same period.
     pub cycles: Cycle,
-    /// Lower bound of any schedule of its blocks.
+    /// Lower bound on the cycles of any schedule of its blocks.
     pub least: Cycle,
 }
 
-/// All results about a period.
+/// Results about a period, for reports.
 pub struct Picture<'p> {
-    /// The program.
+    /// Program of the traced period.
     pub program: &'p Program,
-    /// Its name.
+    /// Name of the program for the report's title.
     pub name: String,
-    /// The number of the period, from 1; 0 is what runs once.
+    /// Number of the period, from 1; 0 is the section that runs once.
     pub period: u64,
-    /// Its trace.
+    /// Issues and stalls of the period.
     pub trace: Trace,
-    /// Its critical path.
+    /// Edges of the critical path, in time order.
     pub chain: Vec<Link>,
-    /// The effect of each faster unit.
+    /// Effect of each faster unit.
     pub faster: Vec<Speedup>,
-    /// The accuracy of its lines, as in `takt accuracy --json`.
+    /// Accuracy of its lines, as in `takt accuracy --json`.
     pub accuracy: Option<Value>,
-    /// Names and texts of the source files: in the page, a click on an operation leads to its line in them. May be empty.
+    /// Names and texts of the source files, which the page opens at a click on an operation. May be empty.
     pub sources: Vec<(String, String)>,
 }
 
 impl<'p> Picture<'p> {
-    /// The picture of a period, with `faster`, `accuracy` and `sources` left empty.
+    /// Report of a period, with `faster`, `accuracy` and `sources` left empty.
     pub fn new(program: &'p Program, name: impl Into<String>, period: u64, trace: Trace) -> Picture<'p> {
         let chain = trace.critical_path(program);
         let (faster, sources) = (Vec::new(), Vec::new());
         Picture { program, name: name.into(), period, trace, chain, faster, accuracy: None, sources }
     }
 
-    /// The name of a unit, or of the front end.
+    /// Name of a unit, or of the front end.
     pub fn unit(&self, unit: Option<(SlotIndex, u8)>) -> &'static str {
         unit.map_or("front end", |(slot, unit)| self.program.machine.slot(slot).units[usize::from(unit)].name)
     }
@@ -64,13 +64,13 @@ impl<'p> Picture<'p> {
         self.program.bundle(self.trace.issues[issue].address).and_then(Result::ok).unwrap_or_default()
     }
 
-    /// The cycle in which a bundle issues, counted from the tick or from reset: the first is 1.
+    /// Cycle in which a bundle issues, counted from the tick or from reset: the first is 1.
     pub fn cycle(&self, issue: usize) -> Cycle {
         let last = self.trace.issues.last().map_or(0, |issue| issue.cycle);
         self.trace.issues[issue].cycle + self.trace.cycles - last
     }
 
-    /// The unit or rule of an edge of the critical path, and the register concerned.
+    /// Unit or rule of an edge of the critical path, and the register concerned.
     fn through(&self, link: &Link) -> (String, Option<String>) {
         let machine = self.program.machine;
         let text = match link.kind {
@@ -93,7 +93,7 @@ impl<'p> Picture<'p> {
         (text, None)
     }
 
-    /// An edge of the critical path, in words.
+    /// Edge of the critical path, in words.
     pub fn link(&self, link: &Link) -> String {
         match self.through(link) {
             (unit, Some(register)) => format!("{register} through {unit}"),
@@ -124,16 +124,16 @@ impl<'p> Picture<'p> {
         lines
     }
 
-    /// The operations of the critical path: the issue and the slot of each.
+    /// Operations of the critical path: the issue and the slot of each.
     pub fn critical(&self) -> BTreeSet<(usize, SlotIndex)> {
         let ends = self.chain.iter().flat_map(|link| {
-            let Ends { from, to } = link.ends(self.program, &self.trace);
+            let EdgeSlots { from, to } = link.ends(self.program, &self.trace);
             [from.map(|slot| (link.from, slot)), to.map(|slot| (link.to, slot))]
         });
         ends.flatten().collect()
     }
 
-    /// Operations that each slot issued.
+    /// Number of operations that each slot issued.
     pub fn slots(&self) -> Vec<(&'static str, u64)> {
         let mut counts: Vec<_> = self.program.machine.slots.iter().map(|slot| (slot.name, 0)).collect();
         for issue in 0..self.trace.issues.len() {
@@ -163,19 +163,19 @@ impl<'p> Picture<'p> {
         }))
     }
 
-    /// The picture as a page for a browser, which needs nothing else.
+    /// Self-contained page for a browser.
     pub fn html(&self) -> String {
         let mut data = self.json();
         let files: BTreeSet<&str> = self.program.files.iter().map(String::as_str).collect();
         let shown = self.sources.iter().filter(|(name, _)| files.contains(name.as_str()));
         data["sources"] = shown.map(|(name, text)| json!({ "name": name, "text": text })).collect();
         let data = in_script(&data.to_string());
-        // The data last: a source may have the words that the other two stand in place of.
+        // Replaces the data last: a source may contain the other placeholders.
         let page = include_str!("picture.html").replace("/*STYLE*/", include_str!("pipeline.css"));
         page.replace("/*SCRIPT*/", include_str!("pipeline.js")).replace("/*DATA*/", &data)
     }
 
-    /// The data of the picture.
+    /// JSON data of the page.
     pub fn json(&self) -> Value {
         let program = self.program;
         let critical: BTreeSet<usize> = self.chain.iter().flat_map(|link| [link.from, link.to]).collect();
@@ -194,7 +194,7 @@ impl<'p> Picture<'p> {
             })
         };
         let operations_on_chain = self.critical();
-        let bundle = |(i, issue): (usize, &Issued)| {
+        let bundle = |(i, issue): (usize, &IssuedBundle)| {
             let operations = self.bundle(i);
             let operations = SlotIndex::all().zip(&operations);
             json!({
@@ -217,7 +217,7 @@ impl<'p> Picture<'p> {
         };
         let link = |link: &Link| {
             let (through, register) = self.through(link);
-            let Ends { from, to } = link.ends(program, &self.trace);
+            let EdgeSlots { from, to } = link.ends(program, &self.trace);
             let name = |slot: Option<SlotIndex>| slot.map(|slot| program.machine.slot(slot).name);
             json!({
                 "from": link.from, "to": link.to, "cycles": link.cycles, "through": through, "register": register,
@@ -258,7 +258,7 @@ impl<'p> Picture<'p> {
     }
 }
 
-/// The stalls that a faster unit would add or take away, by kind.
+/// Stalls that a faster unit would add or remove, by kind; kinds without a change are left out.
 pub fn gained(what: &WhatIf) -> impl Iterator<Item = (&'static str, i64)> {
     Cause::KINDS.into_iter().zip(what.stalls).filter(|(_, more)| *more != 0)
 }

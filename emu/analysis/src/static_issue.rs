@@ -5,23 +5,23 @@ use std::collections::BTreeSet;
 use takt_isa::timing::{self, Bundle, Cause, Cycle, Issue, Scoreboard};
 use takt_isa::{BundleAddress, Flow, Instruction, Program, Register};
 
-/// The issue of a bundle.
+/// Predicted issue of a bundle.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct StaticIssue {
-    /// Its address.
+    /// Address of the bundle.
     pub address: BundleAddress,
-    /// The bundle from which cycles count: the first of a section, the target of a jump, or the one after a jump.
+    /// Bundle from which cycles count: the first of a section, the target of a jump, or the bundle after a jump.
     pub from: BundleAddress,
-    /// Its cycle. The first bundle's is 1, if no earlier result is in flight.
+    /// Issue cycle. The bundle `from` issues in cycle 1 if no earlier result is in flight.
     pub cycle: Cycle,
-    /// The stalled cycles before it, by cause.
+    /// Stalled cycles before it, by cause.
     pub stalls: Vec<(Cause, u32)>,
-    /// For each slot: the source register whose result comes last in this straight-line code, the cycle from which it is available,
-    /// and the bundle that computes it.
+    /// Latest source operand of each slot: the register whose result comes last in this straight-line code, the cycle from which it is
+    /// available, and the bundle that computes it.
     pub awaits: Vec<Option<(Register, Cycle, BundleAddress)>>,
 }
 
-/// The issue of each bundle of a program, by address. An illegal bundle ends the list.
+/// Predicted issue of each bundle of a program, by address. An illegal bundle ends the list.
 pub fn static_issue(program: &Program) -> Vec<StaticIssue> {
     let machine = program.machine;
     let mut entries: BTreeSet<BundleAddress> = program.sections.iter().map(|section| section.start).collect();
@@ -29,7 +29,7 @@ pub fn static_issue(program: &Program) -> Vec<StaticIssue> {
     let bundles: Vec<Vec<Instruction>> =
         program.addresses().map_while(|address| program.bundle(address)?.ok()).collect();
     entries.extend(bundles.iter().filter_map(|bundle| Flow::of(bundle).target()));
-    // A loop's first bundle and the one after its last are also come to by a back edge.
+    // Back edges lead to a loop's first bundle and to the bundle after its last.
     let loops = program
         .addresses()
         .zip(&bundles)

@@ -9,21 +9,21 @@ use std::collections::hash_map::Entry;
 use std::fmt::Write;
 use takt_isa::timing::Cycle;
 
-/// The number of lines shown of each list; the JSON has all.
+/// Limit on the lines of each list; the JSON has all.
 const SHOWN: usize = 12;
 
-/// A cause of stalls: the first issue that it delayed, the number of times, and the cycles in all.
+/// Cause of stalls: the first issue that it delayed, the number of times, and the total cycles.
 struct StallGroup {
     first: usize,
     times: u32,
     cycles: Cycle,
-    /// True if each of them took the same number of cycles.
+    /// Every delay took the same number of cycles.
     is_even: bool,
     text: String,
 }
 
 impl StallGroup {
-    /// Its text, and the number of times: in a loop, once for each iteration.
+    /// Text with the number of times: in a loop, once for each iteration.
     fn render(&self) -> String {
         match self.times {
             1 => self.text.clone(),
@@ -35,7 +35,7 @@ impl StallGroup {
     }
 }
 
-/// The longest groups, equal texts merged.
+/// Longest groups, equal texts merged.
 fn longest(lines: Vec<StallGroup>) -> Vec<StallGroup> {
     let mut groups: Vec<StallGroup> = Vec::new();
     let mut known: HashMap<String, usize> = HashMap::new();
@@ -59,12 +59,12 @@ fn longest(lines: Vec<StallGroup>) -> Vec<StallGroup> {
 }
 
 impl Picture<'_> {
-    /// The text.
+    /// Complete report as text.
     pub fn text(&self) -> String {
         self.account() + &self.faster_units()
     }
 
-    /// The first part of the text, where the cycles went; it needs no other machine.
+    /// First part of the text, where the cycles went; it needs no other machine.
     pub fn account(&self) -> String {
         let mut text = String::new();
         // Writing to a string cannot fail.
@@ -72,7 +72,7 @@ impl Picture<'_> {
         text
     }
 
-    /// The last part of the text, what a faster unit would bring.
+    /// Last part of the text: the effect of faster units.
     pub fn faster_units(&self) -> String {
         let mut text = String::new();
         let _ = self.write_faster(&mut text);
@@ -141,7 +141,7 @@ impl Picture<'_> {
         Ok(())
     }
 
-    /// Writes the effect of each faster unit and, if it takes more cycles than now, the reason.
+    /// Writes the effect of each faster unit, with the reason if the unit costs cycles.
     fn write_faster(&self, out: &mut String) -> std::fmt::Result {
         let today = self.trace.cycles;
         let has_again = self.faster.iter().any(|faster| faster.reassembled.is_some());

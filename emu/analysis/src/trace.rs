@@ -8,43 +8,43 @@ use takt_isa::{BundleAddress, Instruction, Program, Register, Slot, SlotIndex};
 /// Limit on the bundles of a trace.
 pub const MAX_ISSUES: usize = 1 << 16;
 
-/// A bundle that issued.
+/// Bundle that issued, with the stalls before it.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Issued {
-    /// Its address.
+pub struct IssuedBundle {
+    /// Address of the bundle.
     pub address: BundleAddress,
-    /// The cycle of its issue.
+    /// Cycle of the issue.
     pub cycle: Cycle,
-    /// The stalls before it, as cause and number of cycles, in time order.
+    /// Stalls before it, as cause and number of cycles, in time order.
     pub stalls: Vec<(Cause, u32)>,
     /// Cycles from the previous issue, or from the trace's start, to its delivery.
     distance: Cycle,
 }
 
-impl Issued {
-    /// An issue of which only the critical path is asked for, not a replay.
-    pub(crate) fn new(address: BundleAddress, cycle: Cycle, stalls: Vec<(Cause, u32)>) -> Issued {
-        Issued { address, cycle, stalls, distance: 0 }
+impl IssuedBundle {
+    /// Issue for the critical path only: without the delivery distance that a replay needs.
+    pub(crate) fn new(address: BundleAddress, cycle: Cycle, stalls: Vec<(Cause, u32)>) -> IssuedBundle {
+        IssuedBundle { address, cycle, stalls, distance: 0 }
     }
 }
 
-/// The issues from a tick, or from reset, to a `wait` or `halt`.
+/// Issues from a tick, or from reset, to a `wait` or `halt`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Trace {
-    /// The cycle of the tick, after which cycles are counted; `None` if they are counted from reset.
+    /// Cycle of the tick, after which cycles are counted; `None` if they are counted from reset.
     pub tick: Option<Cycle>,
     /// Cycles that passed, the last issue's included.
     pub cycles: Cycle,
-    /// The bundles, in order.
-    pub issues: Vec<Issued>,
-    /// The bundle that waited for the tick, and the cycle of its issue, since operations of that bundle may still be in flight.
+    /// Bundles that issued, in time order.
+    pub issues: Vec<IssuedBundle>,
+    /// Bundle that waited for the tick, and the cycle of its issue, since operations of that bundle may still be in flight.
     before: Option<(BundleAddress, Cycle)>,
 }
 
-/// The reason why there is no trace.
+/// Reason why there is no trace.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum TraceError {
-    /// The program faulted.
+    /// Fault of the program.
     #[error("{0}")]
     Fault(#[from] Fault),
     /// The program has already halted.
@@ -69,12 +69,12 @@ pub fn trace(emulator: &mut Emulator) -> Result<Trace, TraceError> {
         before = Some((address, since));
     }
     let first = emulator.now();
-    let mut issues: Vec<Issued> = Vec::new();
+    let mut issues: Vec<IssuedBundle> = Vec::new();
     let mut stalls: Vec<(Cause, u32)> = Vec::new();
     loop {
         match emulator.step_cycle()? {
             Step::Halted => return Err(TraceError::Halted),
-            // The last of these cycles is the tick's.
+            // The last waiting cycle is the tick's.
             Step::Stalled { cycle, cause: Cause::Wait, .. } => start = Some(cycle),
             Step::Stalled { cause, .. } => match stalls.last_mut() {
                 Some((last, cycles)) if *last == cause => *cycles += 1,
@@ -88,7 +88,7 @@ pub fn trace(emulator: &mut Emulator) -> Result<Trace, TraceError> {
                 };
                 let previous = issues.last().map_or(start.unwrap_or(first), |issue| issue.cycle);
                 let distance = cycle - stalls.iter().map(held).sum::<Cycle>() - previous;
-                issues.push(Issued { address, cycle, stalls, distance });
+                issues.push(IssuedBundle { address, cycle, stalls, distance });
                 if issues.len() > MAX_ISSUES {
                     return Err(TraceError::TooLong);
                 }
@@ -104,63 +104,63 @@ pub fn trace(emulator: &mut Emulator) -> Result<Trace, TraceError> {
     }
 }
 
-/// The rule that prevented a bundle from issuing sooner after an earlier one.
+/// Rule that prevented a bundle from issuing sooner after an earlier one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LinkKind {
-    /// It reads or overwrites a result of the earlier one (a data hazard), whose unit's latency counts.
+    /// Data hazard: the bundle reads or overwrites a result of the earlier one, whose unit's latency counts.
     Result {
-        /// The register.
+        /// Register of the result.
         register: Register,
     },
-    /// It uses a unit that the earlier one keeps busy.
+    /// Structural hazard: the bundle uses a unit that the earlier one keeps busy.
     Unit {
         /// Slot of the machine.
         slot: SlotIndex,
         /// Unit of the slot.
         unit: u8,
     },
-    /// It drains, and the result of the earlier one is the last to be written.
+    /// Drain: the result of the earlier bundle is the last to be written back.
     Drain,
-    /// Its result would be written in the same cycle as that of the earlier one.
+    /// Write port conflict: both results would be written in the same cycle.
     WritePort {
-        /// The slot whose bank it is.
+        /// Slot whose bank both results go to.
         slot: SlotIndex,
     },
-    /// The earlier one redirected the fetch or resolved a branch.
+    /// The earlier bundle redirected the fetch or resolved a branch.
     FrontEnd,
-    /// The earlier one issued in the previous cycle; only one bundle issues per cycle.
+    /// Order of issue: the earlier bundle issued in the previous cycle, and only one bundle issues per cycle.
     Order,
 }
 
-/// An edge of the critical path.
+/// Edge of the critical path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Link {
     /// Index of the earlier issue.
     pub from: usize,
-    /// Index of the later one.
+    /// Index of the later issue.
     pub to: usize,
-    /// The rule.
+    /// Rule that set the distance between the issues.
     pub kind: LinkKind,
-    /// Cycles between their issues.
+    /// Cycles between the issues.
     pub cycles: Cycle,
 }
 
-/// The effect of a faster unit, or front end, on the unchanged program.
+/// Effect of a faster unit, or front end, on the unchanged program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct WhatIf {
-    /// The unit, by slot and index; `None` is the front end.
+    /// Faster unit, by slot and index; `None` is the front end.
     pub unit: Option<(SlotIndex, u8)>,
-    /// Cycles that the trace would then take.
+    /// Cycles that the trace would take with the faster unit.
     pub cycles: Cycle,
-    /// The stalled cycles that it adds, by kind of cause ([`Cause::KINDS`]), those of the front end excluded. If there are more
-    /// cycles than before, these are the reason.
+    /// Additional stalled cycles, by kind of cause ([`Cause::KINDS`]), without the front end's. They explain why a faster unit may cost
+    /// cycles.
     pub stalls: Stalls,
 }
 
 /// Stalled cycles by kind of cause.
 pub type Stalls = [i64; Cause::KINDS.len()];
 
-/// The properties of an operation on which the rules depend.
+/// Timing properties of an operation.
 struct OperationTiming {
     slot: SlotIndex,
     unit: u8,
@@ -170,20 +170,19 @@ struct OperationTiming {
 }
 
 impl Trace {
-    /// A trace that begins with reset.
-    pub(crate) fn from_reset(cycles: Cycle, issues: Vec<Issued>) -> Trace {
+    /// Trace that begins with reset.
+    pub(crate) fn from_reset(cycles: Cycle, issues: Vec<IssuedBundle>) -> Trace {
         Trace { tick: None, cycles, issues, before: None }
     }
 
-    /// The cycle after which the first bundle could issue at the earliest.
+    /// Cycle after which the first bundle could issue at the earliest.
     pub(crate) fn start(&self) -> Cycle {
         let first = self.issues.last().map_or(0, |last| (last.cycle + 1).saturating_sub(self.cycles));
         self.tick.unwrap_or(first.saturating_sub(1))
     }
 
-    /// The critical path: a chain of issues from the first to the last, each of which could not have been earlier because of the
-    /// one before. Its cycles add up to those between the first and the last issue. If several reasons hold, a data dependence
-    /// takes precedence over the order of issue.
+    /// Critical path: a chain of issues from the first to the last, in which each delayed the next. Its cycles add up to the distance of
+    /// the first and the last issue. If several reasons hold, a data dependence takes precedence over the order of issue.
     pub fn critical_path(&self, program: &Program) -> Vec<Link> {
         let parts: Vec<Vec<OperationTiming>> =
             self.issues.iter().map(|issue| parts(program, issue.address)).collect();
@@ -220,7 +219,7 @@ impl Trace {
                     .map(|from| (from, LinkKind::Drain))
             }
             Some(&(Cause::WritePort { slot }, _)) => {
-                // It prevented the issue in the previous cycle.
+                // The conflict was in the previous cycle: the earlier result is written one cycle before this one.
                 let mine = parts[to].iter().find(|part| part.slot == slot).map_or(0, |part| part.latency);
                 earlier(&|part, cycle| {
                     part.slot == slot && part.dest.is_some() && cycle + part.latency + 1 == issue.cycle + mine
@@ -238,8 +237,8 @@ impl Trace {
         link(from, kind)
     }
 
-    /// The effect of one cycle less in the latency (and interval) of each unit that the trace uses, and in the front end's refill, found
-    /// by replaying the unchanged bundles on the scoreboard.
+    /// Effect of one cycle less in the latency (and interval) of each unit that the trace uses, and in the front end's refill, found by
+    /// replaying the unchanged bundles on the scoreboard.
     pub fn what_if(&self, program: &Program) -> Vec<WhatIf> {
         let machine = program.machine;
         let mut used: Vec<(SlotIndex, u8)> = self
@@ -268,7 +267,7 @@ impl Trace {
         faster.chain([front].into_iter().filter(|_| machine.refill > 0)).collect()
     }
 
-    /// The cycles of a replay without changes. They equal [`Trace::cycles`], unless the emulator and the rules disagree.
+    /// Cycles of a replay without changes. They equal [`Trace::cycles`], unless the emulator and the rules disagree.
     pub fn replayed(&self, program: &Program) -> Cycle {
         self.replay(program, |bundle| bundle, 0).0
     }
@@ -311,7 +310,7 @@ impl Trace {
     }
 }
 
-/// The operations of a bundle that use a unit.
+/// Operations of a bundle that use a unit.
 fn parts(program: &Program, address: BundleAddress) -> Vec<OperationTiming> {
     let instructions: Vec<Instruction> = program.bundle(address).and_then(Result::ok).unwrap_or_default();
     let part = |((s, slot), instruction): ((SlotIndex, &Slot), &Instruction)| {

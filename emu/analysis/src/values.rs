@@ -1,23 +1,23 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Values of the registers that counts of loops are computed from: constant propagation along each path.
+//! Constant propagation along each path, for the registers from which loop counts are computed.
 //!
 //! The count of a triangular loop is a function of the iterations around it. Its registers begin with constants and are advanced by
-//! constants, so that each of its entries has a count that is known, and its bound is exact. The registers followed are the backward slice
-//! of the counts, and of the branches on the same registers.
+//! constants, so that every entry of the loop has a known count, and its bound is exact. The registers followed are the backward slice of
+//! the counts, and of the branches on the same registers.
 
 use crate::graph::Graph;
 use std::collections::{BTreeMap, BTreeSet};
 use takt_isa::fp::Host;
 use takt_isa::{BundleAddress, Effect, Flow, Instruction, Program, Register, Type, compute};
 
-/// The most sets of values with which one place is analysed. Beyond, they are forgotten there.
+/// Limit on the register values that are told apart at one place. Beyond it, they are forgotten there.
 pub(crate) const MAX_VALUES: usize = 64;
 
-/// The known values of some registers, and the count of a loop that begins.
+/// Known values of some registers, and the count of a loop that begins.
 #[derive(Clone, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 pub(crate) struct Values {
     pub(crate) known: BTreeMap<Register, u32>,
-    /// The count with which a loop begins at the next bundle.
+    /// Count with which a loop begins at the next bundle.
     pub(crate) count: Option<u32>,
 }
 
@@ -26,13 +26,13 @@ impl Values {
         self.known.get(&register).copied()
     }
 
-    /// Those of some registers.
+    /// Restricts the known values to these registers, without a count.
     pub(crate) fn of(&self, registers: &BTreeSet<Register>) -> Values {
         let known = self.known.iter().filter(|(register, _)| registers.contains(register));
         Values { known: known.map(|(register, value)| (*register, *value)).collect(), count: None }
     }
 
-    /// These, and for some registers what others say.
+    /// Takes the values of `registers`, and the count, from `others`; keeps the rest.
     pub(crate) fn with(&self, registers: &BTreeSet<Register>, others: &Values) -> Values {
         let mut known = self.known.clone();
         known.retain(|register, _| !registers.contains(register));
@@ -41,19 +41,19 @@ impl Values {
     }
 }
 
-/// The registers that are followed.
+/// Backward slice: the registers to follow.
 #[derive(Default, Debug)]
 pub(crate) struct Slice {
     pub(crate) registers: BTreeSet<Register>,
 }
 
 impl Slice {
-    /// The registers that counts of loops depend on which are no constants, and branches on the same registers: empty if there are none.
+    /// Slice of the loop counts that are not constants, and of branches on the same registers; empty if all counts are constant.
     pub(crate) fn new(graph: &Graph<'_>) -> Slice {
         let program = graph.program;
         let nodes = || program.addresses().filter_map(|address| graph.node(address).ok());
-        // For each register, the sources of the computations that write it. One register holds many values, one after the other: which
-        // of them a count has is known on the path.
+        // Sources of the computations that write each register. A register holds many values, one after the other; the path decides which
+        // of these a count has.
         let mut sources: BTreeMap<Register, BTreeSet<Register>> = BTreeMap::new();
         for (instruction, slot) in
             nodes().flat_map(|node| node.instructions.iter().zip(program.machine.slots))
@@ -93,14 +93,14 @@ impl Slice {
         self.registers.is_empty()
     }
 
-    /// The values at reset.
+    /// Register values at reset.
     pub(crate) fn at_reset(&self, program: &Program) -> Values {
         let known =
             program.constants.iter().copied().filter(|(register, _)| self.registers.contains(register));
         Values { known: known.collect(), count: None }
     }
 
-    /// The registers that bundles read or write, or all if there is a call among them.
+    /// Registers that bundles read or write; all registers of the slice if there is a call among the bundles.
     pub(crate) fn used(&self, graph: &Graph<'_>, bundles: &BTreeSet<BundleAddress>) -> BTreeSet<Register> {
         if self.is_empty() {
             return BTreeSet::new();
@@ -119,7 +119,7 @@ impl Slice {
         used
     }
 
-    /// Executes a bundle: all of it reads before any of it writes.
+    /// Executes a bundle: all operations read before any writes.
     pub(crate) fn execute(&self, graph: &Graph<'_>, instructions: &[Instruction], values: &mut Values) {
         let slots = graph.program.machine.slots;
         let read = |register: Register| graph.known.get(&register).copied().or_else(|| values.get(register));
@@ -139,13 +139,13 @@ impl Slice {
     }
 }
 
-/// True if an instruction's result follows from its sources alone, and has to do with integers: a count does not depend on floats.
+/// Integer instruction whose result follows from its sources alone: counts do not depend on floats.
 fn is_computed(instruction: &Instruction) -> bool {
     let row = instruction.op.row();
     matches!(row.effect, Effect::Compute | Effect::Immediate) && !row.types.contains(&Type::F)
 }
 
-/// An instruction's result, if its sources are known.
+/// Result of an instruction whose sources are known.
 fn value(instruction: &Instruction, read: &dyn Fn(Register) -> Option<u32>) -> Option<u32> {
     match instruction.op.row().effect {
         Effect::Immediate => Some(instruction.constant),

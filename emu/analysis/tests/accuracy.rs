@@ -11,7 +11,7 @@ use takt_emu::testing::Random;
 use takt_isa::program::Range;
 use takt_isa::{F3, MACHINES, Machine, Program, ROWS, Register, Type};
 
-fn source(text: &str, machine: &'static Machine) -> Program {
+pub(crate) fn source(text: &str, machine: &'static Machine) -> Program {
     let options = Options { machine, ..Options::default() };
     let assembled = takt_asm::assemble_bytes("test.s", text.into(), &MemoryLoader::new(&[]), &options);
     assembled.unwrap_or_else(|diagnostics| panic!("{}\n{text}", diagnostics.render(false))).program
@@ -26,7 +26,7 @@ fn input(program: &Program, name: &str) -> Register {
     program.inputs.iter().find(|port| port.name == name).unwrap().register
 }
 
-/// Runs what runs once, if anything, and periods with these inputs.
+/// Runs the section `.once`, if any, and periods with these inputs.
 fn run(program: &Program, mut shadow: Shadow, inputs: &[Vec<(Register, u32)>]) -> (Shadow, Emulator) {
     let mut emulator = Emulator::new(program).unwrap();
     let mut first = true;
@@ -46,10 +46,10 @@ fn floats(program: &Program, values: &[(&str, f32)]) -> Vec<(Register, u32)> {
     values.iter().map(|(name, value)| (input(program, name), value.to_bits())).collect()
 }
 
-const HEAD: &str = ".once\n wait p\n.period\np:\n";
+pub(crate) const HEAD: &str = ".once\n wait p\n.period\np:\n";
 
 #[test]
-fn absorption_and_cancellation_are_found_where_they_are() {
+fn absorption_and_cancellation_are_located() {
     let text = format!(
         ".input x\n.output y, w\n.reg t\n{HEAD} fadd t, x, 1.0\n fsub y, t, 1.0\n fmul w, y, 3.0\n wait p\n"
     );
@@ -57,7 +57,7 @@ fn absorption_and_cancellation_are_found_where_they_are() {
     let (shadow, _) = run(&program, Shadow::new(&program), &[floats(&program, &[("x", 1e-8)])]);
     let [y, w] = shadow.outputs() else { panic!() };
     let x = f64::from(1e-8f32);
-    // 1 + x is 1: all of x is lost, and it is the sum that lost it.
+    // In binary32, 1 + x is 1: the sum loses all of x.
     let worst = y.absolute.unwrap();
     assert_eq!((worst.error, worst.value, worst.period), (1.0 + x - 1.0, 0.0, 1));
     let lines = |word: u32| program.lines[word as usize].unwrap().line;
@@ -65,15 +65,15 @@ fn absorption_and_cancellation_are_found_where_they_are() {
     assert!((w.absolute.unwrap().error / (3.0 * x) - 1.0).abs() < 1e-7);
     let at = |line| shadow.operations().iter().find(|(word, _)| lines(**word) == line).unwrap().1;
     assert_eq!((at(8).absorbed, at(9).absorbed), (1, 0));
-    // The difference leaves nothing of the 24 digits of the sum.
+    // The difference cancels all 24 digits of the sum.
     let cancelled = 1f64.log2() - (1.0f64 + x - 1.0).log2();
     assert!(at(9).cancelled >= 24.0 && cancelled > 24.0, "{}", at(9).cancelled);
     assert_eq!(at(10).cancelled, 0.0);
 }
 
 #[test]
-fn the_exact_values_are_those_of_binary64() {
-    // Constants that binary32 holds, so that a formula in binary64 is the same program.
+fn exact_values_equal_binary64() {
+    // Constants that binary32 holds exactly, so that a formula in binary64 is the same program.
     let text = format!(
         ".input x, z\n.output y\n.reg a b c s\n{HEAD} fmul a, x, x\n fmul b, z, 0.75\n fadd c, a, b\n fsqrt c, c\n \
          fsin s, x\n fatan2 a, s, z\n fdiv c, c, a\n fsub y, c, x\n wait p\n"
@@ -98,7 +98,7 @@ fn the_exact_values_are_those_of_binary64() {
 }
 
 #[test]
-fn decisions_that_rounding_turns_are_told() {
+fn reports_decisions_changed_by_rounding() {
     let text = format!(
         ".input x\n.output y\n.reg t c:int\n{HEAD} fadd t, x, 1e-9\n feq c, t, x\n sel y, c, 2.0, 3.0\n wait p\n"
     );
@@ -107,12 +107,12 @@ fn decisions_that_rounding_turns_are_told() {
         let (shadow, _) = run(&program, Shadow::new(&program), &[floats(&program, &[("x", x)])]);
         let decisions: Vec<u64> = shadow.decisions().values().map(|decision| decision.count).collect();
         assert_eq!(decisions, vec![1; turned], "{x}");
-        // The run's choice is followed: the output is as exact as what was chosen.
+        // The shadow follows the run's choice: the output is as exact as the chosen operand.
         assert_eq!(shadow.outputs()[0].absolute.unwrap().error, 0.0);
     }
 }
 
-/// Inputs within the ranges: now and then an end.
+/// Random inputs within their ranges, ends included.
 fn sample(program: &Program, random: &mut Random) -> Vec<(Register, u32)> {
     let one = |range: &Range| {
         let (low, high) = range.ends();
@@ -132,8 +132,8 @@ fn sample(program: &Program, random: &mut Random) -> Vec<(Register, u32)> {
     inputs.map(one).collect()
 }
 
-/// Checks bounds against so many periods; the largest part of a bound that was seen.
-fn check(program: &Program, enclosure: &Enclosure, periods: usize, random: &mut Random) -> f64 {
+/// Checks bounds against `periods` random periods. Returns the largest measured fraction of a bound.
+pub(crate) fn check(program: &Program, enclosure: &Enclosure, periods: usize, random: &mut Random) -> f64 {
     let rows: Vec<_> = (0..periods).map(|_| sample(program, random)).collect();
     let (shadow, emulator) = run(program, Shadow::new(program).each_period_afresh(), &rows);
     if enclosure.hazards.is_empty() {
@@ -144,7 +144,7 @@ fn check(program: &Program, enclosure: &Enclosure, periods: usize, random: &mut 
         let (Some(error), Some(range)) = (bound.error, bound.range) else { continue };
         let measured = shadow.outputs().iter().find(|output| output.register == bound.register).unwrap();
         let Some(worst) = measured.absolute else { continue };
-        // An allowance for the rounding of binary64 itself.
+        // Allowance for the rounding of binary64 itself.
         let slack = 1e-12 * range.magnitude() + 1e-40;
         assert!(worst.error <= error + slack, "{}: {worst:?} beyond {error}", bound.name);
         for worst in [measured.absolute, measured.ulp].into_iter().flatten() {
@@ -157,7 +157,7 @@ fn check(program: &Program, enclosure: &Enclosure, periods: usize, random: &mut 
     most
 }
 
-/// A straight line of random operations that work on floats, on inputs with ranges.
+/// Straight line of random operations on floats, on inputs with ranges.
 fn random_line(machine: &'static Machine, random: &mut Random) -> String {
     let offered = |row: &&takt_isa::Row| {
         let float = |ty: &Type| *ty == Type::F;
@@ -180,7 +180,7 @@ fn random_line(machine: &'static Machine, random: &mut Random) -> String {
         let row = rows[random.below(rows.len() as u32) as usize];
         write!(text, " {} {name}", row.mnemonic).unwrap();
         for _ in 0..row.shape.sources() {
-            // A constant now and then.
+            // Mixes in constants.
             let operand = match random.below(8) {
                 0 => "0.7".to_owned(),
                 _ => operands[random.below(operands.len() as u32) as usize].clone(),
@@ -213,7 +213,7 @@ fn no_run_exceeds_a_bound() {
         bounded += usize::from(enclosure.outputs.iter().any(|output| output.error.is_some()));
         tight += usize::from(most > 0.3);
     }
-    // Bounds that nothing comes near to would prove little.
+    // Loose bounds would prove little: count the tight ones.
     assert!(bounded > 160 && tight > 40, "{bounded} bounded, {tight} tight");
 }
 
@@ -240,7 +240,7 @@ fn the_shipped_programs_stay_within_their_bounds() {
 }
 
 #[test]
-fn hazards_name_the_operation_and_what_it_reads() {
+fn hazards_name_the_operation_and_its_operands() {
     let cases = [
         ("fdiv y, a, b", "b = -1, 1", Some(Problem::DivisionByZero)),
         ("fdiv y, a, b", "b = 0.5, 1", None),
@@ -269,8 +269,8 @@ fn hazards_name_the_operation_and_what_it_reads() {
     }
 }
 
-/// The problems that the analysis lists for a period, with declarations before it.
-fn problems(declarations: &str, period: &str) -> (Vec<Problem>, Enclosure) {
+/// Problems that the analysis lists for a period, given its declarations.
+pub(crate) fn problems(declarations: &str, period: &str) -> (Vec<Problem>, Enclosure) {
     let text = format!("{declarations}{HEAD}{period} wait p\n");
     let enclosure = enclose(&source(&text, &F3)).unwrap();
     (enclosure.hazards.iter().map(|hazard| hazard.problem).collect(), enclosure)
@@ -280,7 +280,7 @@ const ONE_INPUT: &str = ".input x\n.output y\n.reg t:int u:int f g\n";
 
 #[test]
 fn integers_wrap_as_in_the_machine() {
-    // 0x3f800000 - 0x80000000 wraps to a negative number, whose float cancels the constant at x = 1.
+    // The subtraction 0x3f800000 - 0x80000000 wraps to a negative number, whose float cancels the constant at x = 1.
     let (found, _) = problems(
         &format!("{ONE_INPUT}.range x = 1, 1.5\n"),
         " isub t, x:bits, 0x80000000\n itof f, t\n fadd f, f, 1082130432.0\n fdiv y, 1.0, f\n",
@@ -296,14 +296,14 @@ fn integers_wrap_as_in_the_machine() {
 }
 
 #[test]
-fn an_integer_behind_a_hazard_may_be_any() {
+fn integer_after_a_hazard_is_unbounded() {
     let (found, enclosure) = problems(
         ".input x, z\n.output y\n.reg n:int f\n.range x = 30, 40\n.range z = 0, 40\n",
         " fsub f, x, z\n fsqrt f, f\n ftoi n, f\n itof f, n\n fsub f, f, 5.0\n fdiv y, 1.0, f\n",
     );
     assert_eq!(found, [Problem::Domain, Problem::DivisionByZero]);
     assert_eq!(enclosure.outputs[0].error, None);
-    // A comparison gives 1 or 0 all the same.
+    // A comparison gives 1 or 0 even behind a hazard.
     let (found, enclosure) = problems(
         ".input x\n.output y\n.reg c:int f\n.range x = -1, 40\n",
         " fsqrt f, x\n flt c, f, 2.0\n itof y, c\n",
@@ -320,13 +320,13 @@ fn an_input_that_is_not_latched_may_change_between_reads() {
     assert!(enclosure.outputs[0].range.unwrap().magnitude() < 1e-12);
     let (_, enclosure) = problems(&ports, twice);
     assert_eq!(enclosure.outputs[0].range.unwrap().magnitude(), 1.0);
-    // One bundle reads once.
+    // A bundle reads each input once.
     let (_, enclosure) = problems(&ports, " fsub y, x, x\n");
     assert!(enclosure.outputs[0].range.unwrap().magnitude() < 1e-12);
 }
 
 #[test]
-fn the_first_period_must_begin_in_the_ranges_that_matter() {
+fn first_period_must_begin_in_the_ranges_of_used_states() {
     let first = |once: &str, range: &str| {
         let text = format!(
             ".input x\n.range x = 0, 1\n.output y\n.state s\n{range}\n{once}\n wait q\n.period\nq: nop\np: mov y, s\n mov s, 0.5\n wait p\n"
@@ -342,7 +342,7 @@ fn the_first_period_must_begin_in_the_ranges_that_matter() {
     assert_eq!(first(".preset s = -3\n.once", range), [Some((-3.0, -3.0))]);
     assert_eq!(first(".once\n mov s, x", range), []);
     assert_eq!(first(".once\n mov s, x", ".range s = 0.25, 0.75"), [Some((0.0, 1.0))]);
-    // An integer is taken as an integer.
+    // Integer states are compared as integers.
     let text = ".output y\n.state n:int\n.range n = 0, 5\n.preset n = 0\n.once\n wait p\n.period\np: itof y, n\n mov n, 100\n wait p\n";
     let enclosure = enclose(&source(text, &F3)).unwrap();
     let later: Vec<_> = enclosure.later().map(|state| state.found.unwrap().high).collect();
@@ -359,14 +359,14 @@ fn conversions_and_outputs_are_hazards_too() {
     let range = enclosure.outputs[0].range.unwrap();
     assert_eq!((found, range.low, range.high), (vec![Problem::Conversion], 0.0, 2_147_483_648.0));
     assert!(problems(&format!("{ONE_INPUT}.range x = -2147483648, 2147483520\n"), convert).0.is_empty());
-    // A constant is converted as any number.
+    // Constants are converted like any number.
     assert_eq!(problems(ONE_INPUT, " ftoi t, 3e9\n itof y, t\n").0, [Problem::Conversion]);
     assert_eq!(problems(ONE_INPUT, " mov y:bits, 0x7fc00000\n").0, [Problem::Output]);
     assert_eq!(problems(ONE_INPUT, " li y, 0x7f800000\n").0, [Problem::Output]);
 }
 
 #[test]
-fn what_cannot_be_enclosed_says_what_is_needed() {
+fn unenclosable_program_names_the_missing_range() {
     let refused = |text: &str| enclose(&source(text, &F3)).unwrap_err().to_string();
     let state = format!(
         ".input a\n.range a = 0, 1\n.output y\n.state s\n.preset s = 0\n{HEAD} fadd s, s, a\n mov y, s\n wait p\n"
@@ -377,7 +377,7 @@ fn what_cannot_be_enclosed_says_what_is_needed() {
     let endless =
         format!(".input a\n.range a = 0, 1\n.output y\n{HEAD}q: fmul y, a, a\n bnz a, q\n wait p\n");
     assert!(refused(&endless).contains(".loop_bound"), "{}", refused(&endless));
-    // With a range it is followed; a range that a period does not keep is told.
+    // A range bounds the state; a range that a period does not keep is listed.
     let program = source(&state.replace(".state s", ".state s\n.range s = 0, 10"), &F3);
     let enclosure = enclose(&program).unwrap();
     assert_eq!(enclosure.assumed.len(), 1);
@@ -402,7 +402,7 @@ fn loops_are_followed_turn_by_turn() {
         range.contains(0.9f64.powi(9)) && range.contains(1.1f64.powi(9)) && range.high < 3.0,
         "{range:?}"
     );
-    // Eight roundings, the first of which seven products enlarge.
+    // The first of the eight roundings is amplified by seven products.
     let (error, least) = (output.error.unwrap(), 4.0 * ulp(1.1f64.powi(9)));
     assert!(error > 0.5 * least && error < 4.0 * least, "{error:e}");
     let mut random = Random::new(1);
@@ -433,7 +433,7 @@ p:      fadd    y, s, x
     let program = source(text, &F3);
     let ends: Vec<(f64, f64)> = program.ranges.iter().map(Range::ends).collect();
     let pi = f64::from(std::f32::consts::PI);
-    // The states' bank comes before the inputs'; nothing reads `n`.
+    // Bank order: the states precede the inputs; no instruction reads `n`.
     assert!(ends.contains(&(-pi, 2.0 * pi)) && ends.contains(&(-5.0, 7.0)), "{ends:?}");
     assert_eq!(ends.iter().filter(|ends| **ends == (0.0, 1.0)).count(), 3, "{ends:?}");
     let bytes = takt_asm::image::write(&program).unwrap();
@@ -454,9 +454,9 @@ p:      fadd    y, s, x
     assert!(twice.contains("this register has a range already"), "{twice}");
 }
 
-/// A macro of the library, in line or called as a subroutine, of an input with this range.
+/// Program that applies a macro of the library, inline or as a subroutine, to an input with this range.
 fn of_library(function: &str, (low, high): (f64, f64), called: bool, machine: &'static Machine) -> Program {
-    // The functions read their operand several times.
+    // Latched ports: the functions read their operand several times.
     let once = ".ports latched\n.include <math.s>\n.input x\n.output y\n";
     let text = match called {
         false => format!("{once}.range x = {low}, {high}\n{HEAD} {function} y, x\n wait p\n"),
@@ -471,11 +471,11 @@ fn of_library(function: &str, (low, high): (f64, f64), called: bool, machine: &'
     assembled.unwrap_or_else(|diagnostics| panic!("{}\n{text}", diagnostics.render(false))).program
 }
 
-/// Functions that take numbers apart: their bounds hold, and say something.
+/// Functions that take floats apart: their bounds hold, and are finite and tight.
 #[test]
 fn functions_of_the_library_are_enclosed() {
     type Case = (&'static str, (f64, f64), fn(f64) -> f64, f64);
-    // The bound in ulps of the largest value, at most.
+    // Last column: limit on the bound, in ulps of the largest value.
     let cases: [Case; 14] = [
         ("exp", (-1.0, 1.0), f64::exp, 2.0),
         ("exp", (-10.0, 3.0), f64::exp, 2.0),
@@ -502,12 +502,12 @@ fn functions_of_the_library_are_enclosed() {
                 let output = &enclosure.outputs[0];
                 let range = output.range.unwrap();
                 let ends = [low, high].map(|end| exact(f64::from(end as f32)));
-                // The run's own error aside.
+                // Allow for the error of the run itself.
                 let slack = 4.0 * ulp(range.magnitude());
                 assert!(range.low <= ends[0] + slack && ends[1] - slack <= range.high, "{about}");
                 let ulps = output.ulps().unwrap();
                 assert!(ulps <= most, "{ulps} ulps, {about}");
-                // Not much wider than what there is.
+                // The range is at most three times as wide as the exact one.
                 assert!(range.high - range.low <= 3.0 * (ends[1] - ends[0]).abs() + 3.0, "{about}");
                 let mut random = Random::new(8);
                 check(&program, &enclosure, 60, &mut random);
@@ -516,7 +516,7 @@ fn functions_of_the_library_are_enclosed() {
     }
 }
 
-/// Whatever the range: where a bound is given, no run exceeds it.
+/// Soundness over random ranges: where a bound is given, no run exceeds it.
 #[test]
 fn no_run_of_a_function_exceeds_its_bound() {
     let mut random = Random::new(99);
@@ -547,7 +547,7 @@ fn no_run_of_a_function_exceeds_its_bound() {
     assert!(least.iter().all(|(function, least)| bounded[function] >= *least), "{bounded:?}");
 }
 
-/// The range of the output of a period behind declarations, in which the enclosure lists nothing.
+/// Range of a period's output, given its declarations; the enclosure must list no hazard.
 fn range(declarations: &str, period: &str) -> (f64, f64) {
     let (found, enclosure) = problems(declarations, period);
     let range = enclosure.outputs[0].range.unwrap();
@@ -558,10 +558,10 @@ fn range(declarations: &str, period: &str) -> (f64, f64) {
 #[test]
 fn each_iteration_is_a_place_of_its_own() {
     let ports = ".input n:int, m:int\n.output y\n.reg s\n.range n = 0, 1\n.range m = 0, 1\n";
-    // A loop of one bundle.
+    // A loop whose body is one bundle.
     let one = " mov s, 2.0\n.loop_bound 3\nh: bnz n, h\n mov y, s\n";
     assert_eq!(range(ports, one), (2.0, 2.0));
-    // Two ways back to the head, which is come to three times: the last time by the first way, since the second does not lead out.
+    // Two back edges to the head, which executes three times: the last time by the first edge, since the second does not lead out.
     let two = " mov s, zero\n.loop_bound 3\nh: bz n, far\n fadd s, s, 1.0\n bnz m, h\n jmp out\nfar: fadd s, s, 2.0\n jmp h\n\
                out: mov y, s\n";
     assert_eq!(range(ports, two), (1.0, 5.0));
@@ -569,21 +569,21 @@ fn each_iteration_is_a_place_of_its_own() {
 
 #[test]
 fn an_error_of_one_sign_moves_the_range_to_its_side() {
-    // The sum is 1 in the run and larger exactly, so that the difference begins at 0 in the run.
+    // The sum is 1 in the run and larger exactly, so that the difference's range begins at 0 in the run.
     let (low, high) =
         range(&format!("{ONE_INPUT}.range x = 0.9, 1\n"), " mov f, 1.0\n fadd f, f, 5.9e-8\n fsub y, f, x\n");
     assert!(low <= 0.0 && high >= f64::from(1.0 - 0.9f32), "{low} {high}");
 }
 
 #[test]
-fn the_magnitude_of_what_is_not_negative_is_itself() {
+fn magnitude_of_a_non_negative_value_is_itself() {
     let (low, high) =
         range(&format!(".ports latched\n{ONE_INPUT}.range x = 0, 2\n"), " fabs f, x\n fsub y, f, x\n");
     assert!(-1e-3 < low && high < 1e-3, "{low} {high}");
 }
 
 #[test]
-fn a_load_may_touch_so_many_words() {
+fn rejects_loads_from_too_many_words() {
     let machine = Box::leak(Box::new(Machine { data_depth: 8192, ..F3 }));
     let of = |last: u32| {
         let text = format!(
@@ -606,7 +606,7 @@ fn bits_of_a_float_with_an_error_are_no_integer() {
     assert_eq!(lost, [(1, false)]);
 }
 
-/// What is added to 2^23 is rounded to an integer, unless it is so large that the sum is of another binade.
+/// Terms added to 2^23 are rounded to integers, unless they are so large that the sum lies in another binade.
 #[test]
 fn a_large_term_is_no_integer_to_round_to() {
     let program = source(&format!(".input x\n.output y\n{HEAD} fadd y, x, 8388608.0\n wait p\n"), &F3);

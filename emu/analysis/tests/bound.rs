@@ -21,24 +21,28 @@ fn source(text: &str, machine: &'static Machine) -> Program {
     takt_asm::assemble_bytes("test.s", text.into(), &MemoryLoader::new(&[]), &options).unwrap().program
 }
 
-/// The cycles that a section took, and the way in which it was entered.
+/// Cycles of a section, and the way in which it was entered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Entered {
+enum SectionEntry {
     Reset,
-    /// The tick came so many cycles after the `wait`.
+    /// A tick this many cycles after the `wait`.
     Tick(Cycle),
     Missed,
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Measured {
+struct SectionCycles {
     address: BundleAddress,
-    entered: Entered,
+    entered: SectionEntry,
     cycles: Cycle,
 }
 
-/// Runs a program: what ran once, then so many periods. Ends early where the program halts.
-fn measure(emulator: &mut Emulator, periods: u32, mut inputs: impl FnMut(&mut Emulator)) -> Vec<Measured> {
+/// Runs a program: the section `.once`, then up to `periods` periods. Ends early where the program halts.
+fn measure(
+    emulator: &mut Emulator,
+    periods: u32,
+    mut inputs: impl FnMut(&mut Emulator),
+) -> Vec<SectionCycles> {
     inputs(emulator);
     let mut all = Vec::new();
     let mut waited = match emulator.run_to_wait().unwrap() {
@@ -48,19 +52,23 @@ fn measure(emulator: &mut Emulator, periods: u32, mut inputs: impl FnMut(&mut Em
             emulator.now() - 1
         }
     };
-    all.push(Measured { address: BundleAddress::RESET, entered: Entered::Reset, cycles: waited + 1 });
+    all.push(SectionCycles {
+        address: BundleAddress::RESET,
+        entered: SectionEntry::Reset,
+        cycles: waited + 1,
+    });
     for _ in 0..periods {
         inputs(emulator);
-        // The target of the `wait`, whether or not it had a tick to take.
+        // Target of the `wait`, whether its tick has come or not.
         let address = emulator.next_address();
         match emulator.run_period(&[]) {
             Ok(PeriodReport { tick, start, wait, cycles, .. }) => {
                 let entered = if start == tick && tick > waited {
-                    Entered::Tick(tick - waited)
+                    SectionEntry::Tick(tick - waited)
                 } else {
-                    Entered::Missed
+                    SectionEntry::Missed
                 };
-                all.push(Measured { address, entered, cycles });
+                all.push(SectionCycles { address, entered, cycles });
                 waited = wait;
             }
             Err(PeriodError::Halted) => break,
@@ -70,8 +78,8 @@ fn measure(emulator: &mut Emulator, periods: u32, mut inputs: impl FnMut(&mut Em
     all
 }
 
-fn section(bounds: &Bounds, measured: Measured) -> &SectionBounds {
-    let once = measured.entered == Entered::Reset;
+fn section(bounds: &Bounds, measured: SectionCycles) -> &SectionBounds {
+    let once = measured.entered == SectionEntry::Reset;
     bounds
         .sections
         .iter()
@@ -79,13 +87,13 @@ fn section(bounds: &Bounds, measured: Measured) -> &SectionBounds {
         .unwrap_or_else(|| panic!("{measured:?} has no section in {bounds:?}"))
 }
 
-/// Asserts that what was measured lies within the bounds; whether it is both of them.
-fn check(bounds: &Bounds, measured: Measured, refill: u32) -> bool {
+/// Asserts that the measured cycles lie within the bounds. Returns whether the best and the worst case are equal.
+fn check(bounds: &Bounds, measured: SectionCycles, refill: u32) -> bool {
     let section = section(bounds, measured);
     let span = match measured.entered {
-        Entered::Missed => section.missed,
-        Entered::Tick(after) if after < refill.into() => section.in_time,
-        Entered::Tick(_) | Entered::Reset => section.cycles,
+        SectionEntry::Missed => section.missed,
+        SectionEntry::Tick(after) if after < refill.into() => section.in_time,
+        SectionEntry::Tick(_) | SectionEntry::Reset => section.cycles,
     };
     assert!(
         span.best <= measured.cycles && measured.cycles <= span.worst,
@@ -123,11 +131,11 @@ fn shipped_programs_take_exactly_their_bounds() {
                         "{name} does not branch"
                     );
                 }
-                // The first period begins elsewhere than the others.
+                // The first period begins at a different bundle.
                 let periods = bounds.sections.iter().filter(|section| !section.once);
                 let measured: BTreeSet<BundleAddress> = measured[1..].iter().map(|one| one.address).collect();
                 assert!(measured.into_iter().eq(periods.map(|section| section.address)));
-                // A deadline beyond the worst is kept; one that is not is missed, if only by and by: each late period
+                // A period beyond the worst case keeps its deadlines. A shorter one misses some, if only after a while: each late period
                 // leaves less of the refill hidden in the next.
                 assert_eq!(
                     emulator.deadline_missed(),
@@ -139,7 +147,7 @@ fn shipped_programs_take_exactly_their_bounds() {
     }
 }
 
-/// Random inputs before every period.
+/// Sets random inputs before every period.
 fn random_inputs(random: &mut Random) -> impl FnMut(&mut Emulator) + use<'_> {
     |emulator| {
         for input in input_ports(emulator.machine()) {
@@ -151,7 +159,7 @@ fn random_inputs(random: &mut Random) -> impl FnMut(&mut Emulator) + use<'_> {
 fn random_programs(
     options: testing::Options,
     programs: u64,
-    mut judge: impl FnMut(u64, &Program, &Bounds, &[Measured]),
+    mut judge: impl FnMut(u64, &Program, &Bounds, &[SectionCycles]),
 ) {
     for machine in MACHINES {
         for seed in 0..programs {
@@ -178,17 +186,17 @@ fn straight_programs_take_exactly_their_bounds() {
     random_programs(options, 300, |seed, program, bounds, measured| {
         for &one in measured {
             let exact = check(bounds, one, program.machine.refill);
-            // A period that begins with what the `wait`'s own bundle left in flight may depend on when the tick comes.
+            // The bundle of the `wait` may leave results in flight, so that the period's cycles may depend on when the tick comes.
             let section = section(bounds, one);
-            if one.entered == Entered::Reset {
+            if one.entered == SectionEntry::Reset {
                 assert!(exact, "seed {seed}");
             } else if section.cycles == section.in_time {
                 assert_eq!(section.missed.best, section.missed.worst, "seed {seed}");
             }
             kinds[match one.entered {
-                Entered::Reset => 0,
-                Entered::Tick(_) => 1,
-                Entered::Missed => 2,
+                SectionEntry::Reset => 0,
+                SectionEntry::Tick(_) => 1,
+                SectionEntry::Missed => 2,
             }] += 1;
         }
     });
@@ -210,16 +218,16 @@ fn random_programs_keep_to_their_bounds() {
             }
         }
     });
-    // Bounds that are never reached would be no good: some runs take just the best and the worst.
+    // Bounds must be tight: some runs reach the best and the worst case.
     assert!(
         tight > 1000 && wide > 1000 && reached.iter().all(|&count| count > 20),
         "{tight} {wide} {reached:?}"
     );
 }
 
-/// Sources, and what a bound is refused for. Each names the line.
+/// Sources without a bound, with the refusal; each message names the line.
 #[test]
-fn what_cannot_be_bounded_is_refused() {
+fn rejects_unbounded_programs() {
     let cases = [
         (
             "loop: nop\n jmp loop\n",
@@ -228,7 +236,7 @@ fn what_cannot_be_bounded_is_refused() {
         (".input n\nloop: nop\n bnz n, loop\n halt\n", "test.s:2: bundle 0 (loop): a loop begins here"),
         (".input n\n.loop_bound 3\nloop: nop\n bz n, on\n jmp loop\non: halt\n nop\n", ""),
         (".loop_bound 3\n nop\n halt\n", "test.s:2: bundle 0: .loop_bound stands here"),
-        // Falling into the head restarts the count.
+        // Control that falls into the head restarts the count.
         (
             ".input n\n jmp head\na: jmp head\n.loop_bound 3\nhead: bz n, a\n bnz n, head\n halt\n",
             "test.s:5: bundle 2 (head): this loop has a bound, but test.s:3: bundle 1 (a) leads to it again",
@@ -254,7 +262,22 @@ fn what_cannot_be_bounded_is_refused() {
     assert!(matches!(error.refusal, Refusal::StackOverflow { needed: 21, depth: 16 }), "{error}");
 }
 
-/// `turns` rounds of a loop with another of 3 in it; the counter's register is `n`.
+/// Sequencer-counted loops in subroutines add to the caller's nesting depth, as in a run.
+#[test]
+fn loops_deeper_than_the_sequencer_counts_have_no_bound() {
+    let text = ".reg k:int\n.once\n k = 0\n .for i, 1, 9\n .for j, 1, 9\n call sub\n .endfor\n .endfor\n halt\n\
+                sub:\n .for h, 1, 9\n k = k + 1\n .endfor\n ret\n";
+    let mut program = source(text, &T3);
+    assert!(bound(&program).is_ok());
+    let run = |program: &Program| Emulator::new(program).expect("it fits").run();
+    assert_eq!(run(&program), Ok(Stop::Halted));
+    program.machine = Box::leak(Box::new(Machine { loop_depth: 2, ..T3 }));
+    let error = bound(&program).unwrap_err();
+    assert!(matches!(error.refusal, Refusal::LoopOverflow { needed: 3, depth: 2 }), "{error}");
+    assert!(run(&program).is_err());
+}
+
+/// Loop of `turns` iterations around a loop of 3; the counter's register is `n`.
 fn nest(turns: u32, bound: u32) -> String {
     format!(
         ".reg n:int m:int\n.output k:int\n.once\n li n, {turns}\n.loop_bound {bound}\nouter: li m, 3\n.loop_bound 3\n\
@@ -271,7 +294,7 @@ fn counted_loops_are_bounded_by_their_turns() {
             let mut emulator = Emulator::new(&program).unwrap();
             assert_eq!(emulator.run(), Ok(Stop::Halted));
             assert_eq!(bounds.sections[0].cycles.worst, emulator.now(), "all turns are taken: the worst");
-            // One turn fewer is a fault, in both ways of execution.
+            // A loop bound one less is a fault, in both ways of execution.
             if turns > 1 {
                 let program = source(&nest(turns, turns - 1), machine);
                 for blocks in [true, false] {
@@ -284,7 +307,7 @@ fn counted_loops_are_bounded_by_their_turns() {
                 }
             }
         }
-        // A steady loop takes no longer to bound the longer it turns.
+        // Bounding a steady loop takes no longer for more iterations.
         let bounds = bound(&source(&nest(u32::MAX, u32::MAX), machine)).unwrap();
         let small = bound(&source(&nest(1000, 1000), machine)).unwrap().sections[0].cycles.worst;
         let each = small - bound(&source(&nest(999, 999), machine)).unwrap().sections[0].cycles.worst;
@@ -293,7 +316,7 @@ fn counted_loops_are_bounded_by_their_turns() {
     }
 }
 
-/// A nest of counted loops whose bounds depend on the loops around, on constants and, if `varies`, on an input `n` up to 9.
+/// Nest of counted loops whose bounds depend on the loops around, on constants and, if `varies`, on an input `n` up to 9.
 fn triangular(random: &mut Random, varies: bool) -> String {
     let mut text = String::from(
         ".input n:int, x\n.output y\n.array V[80]\n.reg s\n.schedule on\n.once\n wait period\n.period\nperiod:\n mov s, zero\n",
@@ -360,7 +383,7 @@ fn triangular_nests_take_exactly_their_bounds() {
     assert!(varying > 10, "{varying}");
 }
 
-/// A loop over four rows whose lengths, 1 to 7 each, are the digits of the input `n` to base 8; `work` stands in the inner loop.
+/// Loop over four rows whose lengths, 1 to 7 each, are the digits of the input `n` to base 8; `work` stands in the inner loop.
 fn rows(total: &str, work: &str) -> String {
     format!(
         ".input n:int, x\n.output y\n.reg w:int m:int k:int s\n.schedule on\n.once\n wait period\n\
@@ -370,7 +393,7 @@ fn rows(total: &str, work: &str) -> String {
 }
 
 #[test]
-fn a_total_bounds_a_nest_by_what_its_rows_have_together() {
+fn total_bounds_a_nest_by_the_sum_of_its_rows() {
     for work in ["", " s = s + x\n", " s = s*x + x/s\n"] {
         for machine in MACHINES {
             let total = 4 + 9;
@@ -381,7 +404,7 @@ fn a_total_bounds_a_nest_by_what_its_rows_have_together() {
             for digits in 0..7u32.pow(4) {
                 let lengths: Vec<u32> = (0..4).map(|row| 1 + digits / 7u32.pow(row) % 7).collect();
                 let sum: u32 = lengths.iter().sum();
-                // Those that end the period with the most iterations, and some others.
+                // Inputs that end the period with the most iterations, and a sample of the others.
                 if !(sum == total || sum == 28 || digits % 211 == 0) {
                     continue;
                 }
@@ -395,7 +418,7 @@ fn a_total_bounds_a_nest_by_what_its_rows_have_together() {
                         emulator.set_input_bits(port.register, bits).unwrap();
                     }
                 };
-                // Each period counts anew.
+                // Each period starts the count anew.
                 let measured = measure(&mut emulator, 3, set);
                 for one in &measured {
                     check(if sum <= total { &bounds } else { &without }, *one, machine.refill);
@@ -432,8 +455,8 @@ fn one_iteration_beyond_a_total_is_a_fault() {
     }
 }
 
-/// A tick may come at any distance from the `wait`, while a result of the `wait`'s own bundle is still to come. At one distance alone it
-/// meets the product at the write port, which costs a cycle: an odd one with one first bundle, an even one with the other.
+/// The tick may come at any distance from the `wait`, while a result of the `wait`'s own bundle is still in flight. At one distance alone
+/// that result meets the product at the write port, which costs a cycle: an odd one with one first bundle, an even one with the other.
 #[test]
 fn ticks_at_every_distance_are_bounded_exactly() {
     for first in ["", " nop\n"] {
@@ -450,7 +473,7 @@ fn ticks_at_every_distance_are_bounded_exactly() {
             let mut emulator = Emulator::new(&program).unwrap();
             emulator.set_input_bits(program.inputs[0].register, 1.0f32.to_bits()).unwrap();
             emulator.run_to_wait().unwrap();
-            // In the first period, nothing is left of the one before.
+            // The first period has no predecessor.
             let waited = emulator.run_period(&[]).unwrap().wait;
             emulator.tick_at(waited + after);
             let cycles = emulator.run_period(&[]).unwrap().cycles;
@@ -468,7 +491,7 @@ fn ticks_at_every_distance_are_bounded_exactly() {
 }
 
 #[test]
-fn a_counted_loop_that_calls_what_halts_may_end_at_once() {
+fn counted_loop_may_end_in_a_halting_subroutine() {
     let text = ".input n:int\n.output y:int\n.reg c:int\n.once\n li c, 5\n loop c, done\n.loop_bound 5\n call f\n nop\n\
                 done: halt\nf: bz n, on\n halt\non: ret\n";
     for machine in MACHINES {
@@ -486,7 +509,7 @@ fn a_counted_loop_that_calls_what_halts_may_end_at_once() {
 
 #[test]
 fn a_jump_into_a_counted_loop_is_refused() {
-    // To its first bundle, past the `loop`, and to its second.
+    // Jumps to the first bundle of the body, past the `loop`, and to the second.
     for body in ["in: nop\n nop\n", " nop\nin: nop\n"] {
         let text = format!(
             ".input n:int\n.reg c:int\n bnz n, in\n li c, 3\n loop c, on\n.loop_bound 3\n{body}on: halt\n"
@@ -496,7 +519,7 @@ fn a_jump_into_a_counted_loop_is_refused() {
     }
 }
 
-/// Paths that meet again and again are followed once from where they meet, wherever that stands in the program.
+/// Paths that meet repeatedly are followed once from each meeting point, whatever the layout of the program.
 #[test]
 fn diamonds_laid_out_backwards_take_a_few_steps_each() {
     let diamonds: String = (0..20)
@@ -529,7 +552,7 @@ fn steps_are_counted_and_calls_may_fill_the_stack() {
     assert_eq!((cycles.best, cycles.worst), (emulator.now(), emulator.now()));
 }
 
-/// What a host's header file says of the sections.
+/// Cycles of the sections in a host's header file.
 #[test]
 fn hosts_get_the_cycles_of_ticks_in_time() {
     let text = ".once\n wait p\n.period\np: nop\n wait q\nq: nop\n nop\n nop\n wait p\n";

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! After how many periods an output follows an input: what is claimed of small programs, and of random ones what the emulator shows.
+//! Response times in periods: claims about small programs, and random programs against the emulator.
 
 use std::collections::BTreeSet;
-use takt_analysis::dependence::{Dependence, Periods, Sent};
+use takt_analysis::dependence::{Dependence, OutputEvent, Periods};
 use takt_asm::{MemoryLoader, Options, assemble};
 use takt_emu::Emulator;
 use takt_emu::testing::{self, Random, input_ports, random_program};
@@ -20,15 +20,15 @@ fn port(program: &Program, name: &str) -> Register {
     ports.find(|port| port.name == name).expect("a port").register
 }
 
-/// After how many periods `o` follows `i`, sent with each write and with the `wait`.
+/// Response of `o` to `i` in periods, sent with each write and with the `wait`.
 fn both(text: &str) -> [Option<Periods>; 2] {
     let program = program(text);
     let dependence = Dependence::new(&program, &BTreeSet::new()).expect("it can be followed");
     let on = dependence.on(port(&program, "i"));
-    [Sent::Written, Sent::AtWait].map(|sent| on.output(port(&program, "o"), sent))
+    [OutputEvent::Written, OutputEvent::AtWait].map(|sent| on.output(port(&program, "o"), sent))
 }
 
-/// A program of one period, its registers and states being integers.
+/// Program of one period; registers and states are integers.
 fn one(body: &str) -> String {
     format!(
         ".input i:int j:int\n.output o:int\n.state s1:int s2:int s3:int n:int\n.reg x:int y:int\n.data\nd: .space 4\ne: .word 5\n\
@@ -36,7 +36,7 @@ fn one(body: &str) -> String {
     )
 }
 
-/// Least, most, and whether states carry it on.
+/// Expected response: least and most periods, and whether states carry it on.
 fn follows(least: u32, most: impl Into<Option<u32>>, lasting: bool) -> Option<Periods> {
     Some(Periods { least, most: most.into(), lasting })
 }
@@ -104,7 +104,7 @@ fn what_is_sent_with_the_wait_comes_before_its_bundle() {
     let text =
         ".input i:int\n.output o:int\n.once\n mov o, zero\n wait p\n.period\np: nop\n mov o, i || wait p\n";
     let options = Options { machine: &F3, ..Options::default() };
-    // A slot of its own beside the sequencer's.
+    // The write goes to a slot beside the sequencer's.
     let text = text
         .replace("mov o, i", "fadd o, i, 0.0")
         .replace(":int", "")
@@ -115,21 +115,21 @@ fn what_is_sent_with_the_wait_comes_before_its_bundle() {
     let dependence = Dependence::new(&program, &BTreeSet::new()).expect("it can be followed");
     let on = dependence.on(port(&program, "i"));
     let sent = |sent| on.output(port(&program, "o"), sent);
-    assert_eq!(sent(Sent::Written), follows(0, 0, false));
-    assert_eq!(sent(Sent::AtWait), follows(1, 1, true));
+    assert_eq!(sent(OutputEvent::Written), follows(0, 0, false));
+    assert_eq!(sent(OutputEvent::AtWait), follows(1, 1, true));
 }
 
 #[test]
 fn several_periods_in_turn() {
     let head =
         ".input i:int\n.output o:int\n.state s:int n:int\n.once\n mov s, zero\n mov n, zero\n mov o, zero\n";
-    // Each reads every other period: read in `p`, shown in `q`.
+    // Each period runs every other tick: `p` reads, `q` shows.
     let text = format!("{head} wait p\n.period\np: mov s, i\n wait q\nq: mov o, s\n wait p\n");
     assert_eq!(both(&text)[0], follows(1, 2, true));
-    // An input that only the first period reads answers no later command.
+    // An input read in the first period alone causes no later response.
     let text = format!("{head} wait p\n.period\np: mov s, i\n wait q\nq: mov o, s\n wait q\n");
     assert_eq!(both(&text)[0], None);
-    // The input chooses the period.
+    // The input chooses the next period.
     let text = format!(
         "{head} wait p\n.period\np: mov o, zero\n bz i, l\n wait q\nl: wait p\nq: mov o, 1\n bz i, m\n wait q\nm: wait p\n"
     );
@@ -145,22 +145,22 @@ fn a_port_that_another_one_sends() {
         let program = program(&text);
         let pair = (port(&program, "o"), port(&program, "q"));
         let dependence = Dependence::new(&program, &BTreeSet::from([pair])).expect("it can be followed");
-        dependence.on(port(&program, "i")).output(pair.0, Sent::By(pair.1))
+        dependence.on(port(&program, "i")).output(pair.0, OutputEvent::By(pair.1))
     };
     assert_eq!(sent_by(" mov o, i\n mov q, 1"), follows(0, 0, false));
     assert_eq!(sent_by(" mov q, 1\n nop\n nop\n nop\n nop\n mov o, i"), follows(1, 1, true));
-    // As the input has it, and as a count has it.
+    // Sends conditional on the input, then on a count.
     assert_eq!(sent_by(" mov o, 1\n bz i, l\n mov q, 1\nl: nop"), follows(0, 0, true));
     assert_eq!(
         sent_by(" mov o, i\n isub n, n, 1\n bnz n, l\n mov n, 4\n mov q, 1\nl: nop"),
         follows(0, None, true)
     );
-    // A quotient is not there yet when the next bundle sends.
+    // The quotient is still in flight when the next bundle sends.
     assert_eq!(sent_by(" fdiv o:float, i:float, 3.0\n mov q, 1").map(|periods| periods.most), Some(None));
 }
 
-/// Subroutines that call the next one twice have twice as many call paths at each level: beyond the limit nothing is claimed to be
-/// certain, and nothing to be absent.
+/// Subroutines that call the next one twice have twice as many call paths at each level: beyond the limit no response is claimed to be
+/// certain or absent.
 #[test]
 fn more_call_paths_than_the_limit() {
     const LEVELS: usize = 15;
@@ -172,7 +172,8 @@ fn more_call_paths_than_the_limit() {
     assert_eq!(at_wait, written);
 }
 
-/// Counts of a random program: responses that show, and pairs of ports that were claimed to have none before later periods.
+/// Compares claims about a random program with runs; counts responses that show, and pairs of ports claimed to have none before later
+/// periods.
 fn compare(seed: u64, program: &Program, met: &mut [u64; 3]) {
     let Ok(dependence) = Dependence::new(program, &BTreeSet::new()) else { return };
     let mut random = Random::new(!seed);
@@ -195,7 +196,7 @@ fn compare(seed: u64, program: &Program, met: &mut [u64; 3]) {
                 return;
             }
             for output in &program.outputs {
-                let periods = on.output(output.register, Sent::Written);
+                let periods = on.output(output.register, OutputEvent::Written);
                 met[0] += u64::from(periods.is_none_or(|periods| periods.least > 0));
                 let [one, other] = pair.each_ref().map(|emulator| emulator.output_bits(output.register));
                 if one != other {

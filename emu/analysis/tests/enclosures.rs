@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A falsifier of `takt accuracy`: random programs over all operations, runs that look for values at the ends of ranges, and a
-//! comparison of every statement of an [`Enclosure`] with what the run does.
+//! Falsifier of `takt accuracy`: random programs over all operations, runs that look for values at the ends of ranges, and a comparison of
+//! every statement of an [`Enclosure`] with the run.
 //!
-//! `TAKT_PROGRAMS=10000 cargo test --release -p takt-analysis --test suite enclosures::` is the campaign; `TAKT_SEED` moves its seeds.
+//! Campaign: `TAKT_PROGRAMS=10000 cargo test --release -p takt-analysis --test suite enclosures::`; `TAKT_SEED` moves its seeds.
 #![allow(clippy::print_stdout)]
 
 use std::collections::BTreeSet;
@@ -16,13 +16,13 @@ use takt_isa::program::Range;
 use takt_isa::timing::Cycle;
 use takt_isa::{Effect, Instruction, MACHINES, Machine, Program, ROWS, Register, Row, Type, compute};
 
-/// Programs of a run of the tests, and periods of each.
+/// Programs per run of the tests, and periods of each.
 const PROGRAMS: u64 = 600;
 const PERIODS: usize = 48;
-/// Cycles of a period after which a run is given up.
+/// Limit on the cycles of a period; the run is abandoned beyond it.
 const LONGEST: Cycle = 20_000;
 
-/// Words that operations on bits meet in practice: masks, exponents, integers; and numbers that round to integers.
+/// Words that operations on bits meet in practice: masks, exponents, integers; and constants that round to integers.
 const CONSTANTS: [&str; 24] = [
     "0x7fffffff",
     "0x80000000",
@@ -79,11 +79,11 @@ fn ends(random: &mut Random) -> (f32, f32) {
     if one.is_finite() && other.is_finite() { (one.min(other), one.max(other)) } else { (-1.0, 1.0) }
 }
 
-/// Writes a program of straight lines, branches and loops over all operations that a machine has.
+/// Writes a program of straight lines, branches and loops over all operations of a machine.
 struct Writer<'r> {
     random: &'r mut Random,
     text: String,
-    /// Names that hold floats and integers, of which operands are taken by preference.
+    /// Names that hold floats and integers, preferred as operands.
     floats: Vec<String>,
     integers: Vec<String>,
     temporaries: Vec<String>,
@@ -100,7 +100,7 @@ impl Writer<'_> {
             Type::B => "bits",
         };
         let constants = match ty {
-            // A literal float, or none.
+            // Constants from index 16 on are float literals or rounding constants.
             Type::F => &CONSTANTS[16..],
             _ => &CONSTANTS[..16],
         };
@@ -120,13 +120,13 @@ impl Writer<'_> {
         let row = self.rows[self.random.below(self.rows.len() as u32) as usize];
         let operands: Vec<String> =
             (0..row.shape.sources()).map(|i| self.operand(row.source_type(i))).collect();
-        // Results of operations on bits are floats now and then.
+        // Mark results of operations on bits as floats now and then.
         let float = match row.result_type() {
             Type::F => true,
             Type::I => self.random.once_in(3) && row.source_type(0) == Type::I,
             Type::B => self.random.once_in(2),
         };
-        // Within branches, what was written before is written again, so that paths have something to join.
+        // Branches overwrite earlier names, so that paths have different values to join.
         let again = hot && !self.temporaries.is_empty() && !self.random.once_in(3);
         let name = match again {
             true => {
@@ -168,7 +168,53 @@ impl Writer<'_> {
         writeln!(self.text, "l{label}:").unwrap();
     }
 
-    /// An operation that writes what has a value already.
+    /// Flag of a comparison, or of two combined: preferably of values that later operations read.
+    fn condition(&mut self) -> String {
+        let mut flags = Vec::new();
+        for _ in 0..1 + u32::from(self.random.once_in(4)) {
+            let row = pick(self.random, &["flt", "fle", "feq", "ilt", "ieq", "iltu"]);
+            let ty = if row.starts_with('f') { Type::F } else { Type::I };
+            let mut operands = [self.operand(ty), self.operand(ty)];
+            if self.random.once_in(2) {
+                let few = if ty == Type::F { ["0.0", "1.0", "-0.5", "2.0"] } else { ["0", "1", "3", "-1"] };
+                operands[self.random.below(2) as usize] = pick(self.random, &few).to_owned();
+            }
+            let name = format!("t{}", self.temporaries.len());
+            writeln!(self.text, " {row} {name}:int, {}, {}", operands[0], operands[1]).unwrap();
+            self.temporaries.push(name.clone());
+            flags.push(name);
+        }
+        let [a, b] = &flags[..] else { return flags.remove(0) };
+        let (name, row) =
+            (format!("t{}", self.temporaries.len()), pick(self.random, &["iand", "ior", "ixor"]));
+        writeln!(self.text, " {row} {name}:int, {a}:int, {b}:int").unwrap();
+        self.temporaries.push(name.clone());
+        name
+    }
+
+    /// Decision by a comparison: a selection of values that depend on what is compared, or a branch around operations.
+    fn decision(&mut self) {
+        let flag = self.condition();
+        if self.random.once_in(2) {
+            self.operation(false);
+            self.operation(false);
+            let operands = [self.operand(Type::F), self.operand(Type::F)];
+            let name = format!("t{}", self.temporaries.len());
+            writeln!(self.text, " sel {name}:float, {flag}:int, {}, {}", operands[0], operands[1]).unwrap();
+            self.temporaries.push(name.clone());
+            self.floats.push(name);
+            return;
+        }
+        self.labels += 1;
+        let (label, way) = (self.labels, pick(self.random, &["bz", "bnz"]));
+        writeln!(self.text, " {way} {flag}:int, l{label}").unwrap();
+        for _ in 0..1 + self.random.below(3) {
+            self.again();
+        }
+        writeln!(self.text, "l{label}:").unwrap();
+    }
+
+    /// Overwrites a name that has a value.
     fn again(&mut self) {
         if !self.temporaries.is_empty() {
             let before = self.temporaries.len();
@@ -195,7 +241,7 @@ impl Writer<'_> {
     }
 }
 
-/// The source of a random program.
+/// Source of a random program.
 fn source(random: &mut Random, machine: &'static Machine) -> String {
     let mut text = String::new();
     if random.once_in(2) {
@@ -212,7 +258,7 @@ fn source(random: &mut Random, machine: &'static Machine) -> String {
     let (low, size) = (random.below(200) as i32 - 100, [3, 100, 1 << 20][random.below(3) as usize]);
     writeln!(text, ".range n0 = {low}, {}", low + random.below(size) as i32).unwrap();
     writeln!(text, ".range c0 = 0, {}", random.below(9)).unwrap();
-    // Most programs have a second of each row's kind: arithmetic, or everything.
+    // Restricts a third of the programs to float arithmetic.
     let only_float = random.once_in(3);
     let offered = |row: &&'static Row| {
         let float = row.types.iter().all(|ty| *ty == Type::F);
@@ -232,14 +278,15 @@ fn source(random: &mut Random, machine: &'static Machine) -> String {
         text: String::new(),
     };
     for _ in 0..1 + writer.random.below(10) {
-        match writer.random.below(14) {
+        match writer.random.below(18) {
             0 if !only_float => writer.load(),
             1 | 2 => writer.branch(),
             3 => writer.turns(),
+            4..=7 => writer.decision(),
             _ => writer.operation(false),
         }
     }
-    // Outputs: what was computed last, integers as the numbers that they are, now and then any bits.
+    // Outputs: recent values; integers as numbers, now and then as arbitrary bits.
     for i in 0..4 {
         let random = &mut *writer.random;
         let last = |names: &[String], random: &mut Random| {
@@ -255,8 +302,10 @@ fn source(random: &mut Random, machine: &'static Machine) -> String {
     let states = [writer.operand(Type::F), writer.operand(Type::I)];
     let random = &mut *writer.random;
     let keeps = random.once_in(2);
-    let state = match random.below(3) {
+    let state = match random.below(4) {
         0 => format!(" mov s0:float, {}\n", states[0]),
+        // A filter, which keeps its range over all periods or does not.
+        2 => " fsub s0, s0, x0\n fmul s0, s0, -0.875\n".to_owned(),
         1 => " fmul s0, s0, 0.5\n".to_owned(),
         _ => String::new(),
     };
@@ -273,7 +322,7 @@ fn source(random: &mut Random, machine: &'static Machine) -> String {
         writeln!(text, ".reg {temporaries}").unwrap();
     }
     let enter = match writer.random.below(3) {
-        // The first period has code of its own.
+        // Gives the first period code of its own.
         0 => " wait q\nq: mov s0, 0.25\n.period\np:\n".to_owned(),
         _ => " wait p\n.period\np:\n".to_owned(),
     };
@@ -285,7 +334,7 @@ fn source(random: &mut Random, machine: &'static Machine) -> String {
     text + &presets + &enter + &body + " wait p\n" + data
 }
 
-/// Values of a range that break claims: its ends, what is next to them, zeros, powers of two, subnormals, anything.
+/// Values of a range that break claims: its ends and their neighbours, zeros, powers of two, subnormals, and random members.
 fn draw(range: &Range, random: &mut Random) -> u32 {
     let (low, high) = range.ends();
     if range.ty != Type::F {
@@ -308,16 +357,16 @@ fn draw(range: &Range, random: &mut Random) -> u32 {
         _ => inside,
     };
     let value = if value.is_finite() { value } else { 0.0 };
-    // Zero of either sign stays.
+    // Keeps zeros of either sign.
     if value >= low && value <= high { value.to_bits() } else { value.clamp(low, high).to_bits() }
 }
 
-/// Operations whose result holds, whatever their operands: comparisons, and integers as the numbers that they are.
+/// Operations whose result holds for any operands: comparisons, and conversions of integers to numbers.
 fn settles(row: &Row) -> bool {
     matches!(row.mnemonic, "feq" | "flt" | "fle" | "ieq" | "ilt" | "iltu" | "itof")
 }
 
-/// Registers that may depend on a listed hazard, and whether data memory may: nothing is said of what is computed from them.
+/// Registers whose values may depend on a listed hazard; no statement covers them.
 fn tainted(program: &Program, enclosure: &Enclosure) -> BTreeSet<Register> {
     let listed = |word: usize| {
         let here = enclosure.hazards.iter().filter(|hazard| hazard.word as usize == word);
@@ -342,27 +391,27 @@ fn tainted(program: &Program, enclosure: &Enclosure) -> BTreeSet<Register> {
     }
 }
 
-/// Statements that were compared with a run.
+/// Counts of statements compared with a run.
 #[derive(Default, Debug)]
-struct Checked {
+struct CheckCounts {
     programs: u64,
-    /// Programs that the analysis does not follow, and those with no hazard.
+    /// Programs that the analysis refuses, and programs without a hazard.
     refused: u64,
     safe: u64,
     bounds: u64,
-    /// Bounds of which a run reached a third.
+    /// Tight bounds: a run reached a third of the bound.
     tight: u64,
     states: u64,
     /// Operations that raised a flag, each listed.
     raised: u64,
 }
 
-/// A run of a program against its enclosure.
+/// Run of a program, compared with its enclosure.
 struct Run<'p> {
     program: &'p Program,
     enclosure: &'p Enclosure,
     tainted: BTreeSet<Register>,
-    /// Inputs may change in every cycle.
+    /// Inputs change in every cycle, since ports are not latched.
     restless: bool,
 }
 
@@ -374,8 +423,14 @@ impl Run<'_> {
         }
     }
 
-    /// An operation of the run: a flag that it raises is listed, unless it depends on a listed hazard.
-    fn operation(&self, emulator: &Emulator, word: usize, instruction: &Instruction, checked: &mut Checked) {
+    /// Checks an operation of the run: a flag that it raises is listed, unless it depends on a listed hazard.
+    fn operation(
+        &self,
+        emulator: &Emulator,
+        word: usize,
+        instruction: &Instruction,
+        checked: &mut CheckCounts,
+    ) {
         if instruction.effect() != Effect::Compute {
             return;
         }
@@ -392,8 +447,9 @@ impl Run<'_> {
         }
     }
 
-    /// True as long as the states are in their ranges: then the statements hold for the next period, too.
-    fn states(&self, emulator: &Emulator, checked: &mut Checked) -> bool {
+    /// Checks the states against their ranges. Returns false if a state has left an unproved range: the statements need not hold for the
+    /// next period.
+    fn states(&self, emulator: &Emulator, checked: &mut CheckCounts) -> bool {
         let mut kept = true;
         for range in self.program.ranges.iter().filter(|range| !self.program.machine.is_input(range.register))
         {
@@ -412,7 +468,7 @@ impl Run<'_> {
         kept
     }
 
-    fn run(&self, periods: usize, random: &mut Random, checked: &mut Checked) {
+    fn run(&self, periods: usize, random: &mut Random, checked: &mut CheckCounts) {
         let (program, machine) = (self.program, self.program.machine);
         let mut emulator = Emulator::new(program).unwrap();
         let mut shadow = Shadow::new(program).each_period_afresh();
@@ -430,7 +486,7 @@ impl Run<'_> {
                 if self.restless && random.once_in(3) {
                     self.inputs(&mut emulator, random);
                 }
-                // A fault, or a loop beyond what its source promises.
+                // Faults, and loops beyond their bound, end the run.
                 let Ok(step) = emulator.step_cycle() else { return };
                 let Step::Issued { address, .. } = step else {
                     if emulator.now() > end {
@@ -473,7 +529,7 @@ impl Run<'_> {
             else {
                 continue;
             };
-            // Binary64 rounds, too.
+            // Allowance for the rounding of binary64.
             let slack = error * 1e-6 + 1e-12 * range.magnitude() + 1e-44;
             assert!(worst.error <= error + slack, "{}: {worst:?} beyond {error}", bound.name);
             for worst in [measured.absolute, measured.ulp, measured.relative].into_iter().flatten() {
@@ -494,8 +550,8 @@ fn assembled(text: &str, machine: &'static Machine) -> Option<Program> {
     }
 }
 
-/// Compares the statements about one program with its runs.
-fn check(seed: u64, checked: &mut Checked) {
+/// Compares the statements about a random program with its runs.
+fn check(seed: u64, checked: &mut CheckCounts) {
     let mut random = Random::new(seed);
     let machine = MACHINES[random.below(MACHINES.len() as u32) as usize];
     let text = source(&mut random, machine);
@@ -524,16 +580,16 @@ fn check(seed: u64, checked: &mut Checked) {
 fn no_run_contradicts_an_enclosure() {
     let number = |name: &str| std::env::var(name).ok().map(|text| text.parse::<u64>().unwrap());
     let (programs, first) = (number("TAKT_PROGRAMS").unwrap_or(PROGRAMS), number("TAKT_SEED").unwrap_or(0));
-    let mut checked = Checked::default();
+    let mut checked = CheckCounts::default();
     for seed in first..first + programs {
         check(seed, &mut checked);
     }
-    let Checked { programs, refused, safe, bounds, tight, states, raised } = checked;
+    let CheckCounts { programs, refused, safe, bounds, tight, states, raised } = checked;
     println!(
         "figures: programs={programs} refused={refused} without_hazards={safe} bounds={bounds} tight={tight} states={states} \
          raised={raised}"
     );
-    // Statements that are seldom made, or so wide that nothing comes near, would not be tested by this.
+    // Weak statements would not test the analysis: require enough that are made and nearly reached.
     assert!(refused < programs / 4 && safe > programs / 8 && bounds > programs / 2, "too little is stated");
     assert!(tight > programs / 20 && states > programs && raised > programs / 4, "nothing comes near");
 }

@@ -5,4 +5,5 @@ mod accuracy;
 mod bound;
 mod dependence;
 mod enclosures;
+mod refined;
 mod trace;

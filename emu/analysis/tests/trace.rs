@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Traces against the emulator's own accounts.
+//! Traces against the emulator's statistics.
 
 use takt_analysis::{Trace, static_issue, trace};
 use takt_asm::{MemoryLoader, Options, assemble};
@@ -62,19 +62,19 @@ fn the_tracking_program_waits_for_its_units() {
         for what in period.what_if(&program) {
             // A faster unit may cost cycles: its results meet others at the write port.
             assert!(what.cycles.abs_diff(period.cycles) < 60, "{what:?} {}", period.cycles);
-            // The cycles that it costs are stalls, and it is said which: nothing else but the front end stands still.
+            // The additional cycles are stalls with a named cause, except in the front end.
             let more: i64 = what.stalls.iter().sum();
             if what.unit.is_some() {
                 assert_eq!(period.cycles.cast_signed() + more, what.cycles.cast_signed(), "{what:?}");
             }
             let write_port = what.stalls[Cause::KINDS.iter().position(|kind| *kind == "write port").unwrap()];
-            // (A single one may come out as another kind: what the write port held back is held back by something else.)
+            // (A single cycle may be charged to another kind: the delayed operation delays others.)
             assert!(what.cycles <= period.cycles + 1 || write_port > 0, "{what:?}");
         }
     }
 }
 
-/// A loop's turns and cycles are its own, whether a branch closes it or the hardware does; a call closes none.
+/// Loops have their own iterations and cycles, closed by a branch or by the hardware; a call closes none.
 #[test]
 fn loops_are_found_with_their_turns() {
     let source = "
@@ -114,8 +114,8 @@ half:
     assert!(found.cycles < period.cycles && found.stalled < found.cycles && found.stalled > 0, "{found:?}");
 }
 
-/// Along a straight line, each bundle of the schedule issues when the scheduler says that the block ends, and when the emulator
-/// issues it.
+/// Straight lines: the static prediction issues each block's last bundle in the cycle that the scheduler gives, and accounts for every
+/// stall.
 #[test]
 fn straight_lines_issue_as_scheduled() {
     for machine in MACHINES {

@@ -1,22 +1,22 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A group of lanes that execute the program in lockstep, and the lanes that have diverged from it.
+//! Group of lanes that execute the program in lockstep, and the lanes that have diverged from it.
 //!
-//! The state that all lanes share is held once, in an ordinary [`Emulator`] (the timeline): cycles, fetch, ticks, recently issued
-//! bundles, the set of written registers, the return stack, the list of results in flight. The values, which differ, are rows of
-//! [`Lanes`]. A lane that branches differently from the majority, or is about to fault, leaves the group: with its values and a copy
-//! of the timeline it becomes an ordinary emulator, which runs alone to the end of the period. At the tick it joins the group again,
-//! if its timeline is then the same as that of the others.
+//! The state that all lanes share is held once, in an ordinary [`Emulator`] (the timeline): cycles, fetch, ticks, recently issued bundles,
+//! the set of written registers, the return stack, the list of results in flight. The values, which differ, are rows of [`Lanes`]. A lane
+//! that branches differently from the majority, or is about to fault, leaves the group: with its values and a copy of the timeline it
+//! becomes an ordinary emulator, which runs alone to the end of the period. At the tick it joins the group again, if its timeline then
+//! equals the common one.
 
 use super::lanes::{InFlight, Lanes};
-use crate::block::{Ages, Compiled, ages};
+use crate::block::{Ages, CompilationState, ages};
 use crate::emulator::{CompiledRuns, Emulator, MAX_CYCLE, Recent, Status};
 use crate::event::{PortWrite, Retire};
 use crate::execute::flow_fault;
-use crate::fast::has_required;
+use crate::fast_path::has_required;
 use crate::fault::LoadError;
 use crate::io::{PeriodError, PeriodReport};
 use crate::lane::{LANES, Mask, Row};
-use crate::machine::{Pending, RegisterSet, State};
+use crate::machine::{PendingResult, RegisterSet, State};
 use takt_isa::fp::{Flags, Value};
 use takt_isa::timing::{self, Cycle};
 use takt_isa::{BundleAddress, Flow, Program, Register};
@@ -24,52 +24,52 @@ use takt_isa::{BundleAddress, Flow, Program, Register};
 /// Runs of a single emulator that take about as long as one run of all lanes.
 const RUN: u64 = 4;
 
-/// The whereabouts of a lane.
+/// Presence of a lane in the group.
 enum Presence {
-    /// It runs in the group.
+    /// Runs in the group.
     Present,
-    /// It runs alone, in an emulator of its own. The second field is the outcome of its last period.
+    /// Runs alone, in an emulator of its own. The second field is the outcome of its last period.
     Away(Box<Emulator>, Option<Result<PeriodReport, PeriodError>>),
-    /// It is not used: the batch has fewer lanes.
+    /// Unused, since the batch has fewer lanes.
     Empty,
 }
 
-/// Lanes that run together.
+/// Group of lanes that run together.
 pub(crate) struct Group {
-    /// The common timeline.
+    /// Timeline shared by the present lanes.
     lead: Emulator,
     lanes: Lanes,
     presences: Vec<Presence>,
     present: Mask,
-    /// For each lane, the cycles by which it is later than the timeline.
+    /// Cycles by which each lane is later than the timeline.
     offsets: [i64; LANES],
-    /// For each lane, the registers that it had written before it joined.
+    /// Registers that each lane had written before it joined.
     written: Vec<RegisterSet>,
     published: Vec<RegisterSet>,
-    /// Emulators for reuse.
+    /// Emulators for reuse by lanes that leave.
     #[allow(clippy::vec_box, reason = "they come from lanes, and go to lanes again, in their boxes")]
     spare: Vec<Box<Emulator>>,
     report: Option<PeriodReport>,
     nan_writes: Vec<Vec<PortWrite>>,
-    /// The limit on the cycles of a period.
+    /// Limit on the cycles of a period.
     limit: Cycle,
-    /// The limit on the cycles of all periods together.
+    /// Limit on the cycles of all periods together.
     most: Cycle,
-    /// For each lane, the cycle before which these limits end its current period.
+    /// Cycle before which these limits end each lane's current period.
     limits: [Cycle; LANES],
-    /// The number of periods in which a lane ran alone, at least in part, summed over all lanes.
+    /// Number of periods in which a lane ran alone, at least in part, summed over all lanes.
     pub(crate) apart: u64,
 }
 
-/// The continuation after a step of the common run.
-enum Next {
+/// Continuation after a step of the common run.
+enum GroupContinuation {
     More,
     /// The period has ended, or no lane is present any more.
     End,
 }
 
 impl Group {
-    /// A group whose first `count` lanes are used, with a program loaded.
+    /// Group with a program loaded; its first `count` lanes are used.
     pub(crate) fn new(program: &Program, count: usize) -> Result<Group, LoadError> {
         let lead = Emulator::new(program)?;
         let written = vec![lead.state.written; LANES];
@@ -105,44 +105,54 @@ impl Group {
         }
     }
 
-    /// The number of runs of compiled blocks.
+    /// Number of runs of compiled blocks.
     pub(crate) fn compiled_runs(&self) -> CompiledRuns {
         self.lead.compiled_runs
     }
 
-    /// Cycles that a period may take.
+    /// Limits the cycles of a period.
     pub(crate) fn set_period_limit(&mut self, cycles: Cycle) {
         self.limit = cycles;
     }
 
-    /// Cycles since reset that all periods may take together.
+    /// Limits the cycles since reset, over all periods.
     pub(crate) fn set_cycle_limit(&mut self, limit: Cycle) {
         self.most = limit.min(MAX_CYCLE);
     }
 
-    /// Sets an input port, which the machine has. `values` are those of the first lanes.
+    /// Sets an input port, which the machine must have. `values` belong to the first lanes.
     pub(crate) fn set_input(&mut self, register: Register, values: &[u32]) {
+        let row = match Row::try_from(values) {
+            Ok(row) if self.present == [true; LANES] => row,
+            _ => self.row_of(register, values),
+        };
+        self.lead.state.set_input(register, row[0]);
+        match &mut self.lanes.latches {
+            Some(latches) => latches.inputs[register.index()] = row,
+            None => self.lanes.registers[register.index()] = row,
+        }
+    }
+
+    /// Row of an input port's values if some lanes are absent: absent lanes get the value of a present one, and lanes that run alone get
+    /// their own in their emulators.
+    fn row_of(&mut self, register: Register, values: &[u32]) -> Row {
+        for (presence, &value) in self.presences.iter_mut().zip(values) {
+            if let Presence::Away(emulator, _) = presence {
+                emulator.state.set_input(register, value);
+            }
+        }
         let mut row: Row = std::array::from_fn(|lane| values.get(lane).copied().unwrap_or(0));
         if let Some(model) = self.model() {
             let value = row[model];
             let absent = row.iter_mut().zip(self.present).filter(|(_, present)| !present);
             absent.for_each(|(word, _)| *word = value);
         }
-        self.lead.state.set_input(register, row[0]);
-        match &mut self.lanes.latches {
-            Some(latches) => latches.inputs[register.index()] = row,
-            None => self.lanes.registers[register.index()] = row,
-        }
-        for (presence, &value) in self.presences.iter_mut().zip(values) {
-            if let Presence::Away(emulator, _) = presence {
-                emulator.state.set_input(register, value);
-            }
-        }
+        row
     }
 
     // ---- Inspection.
 
-    /// The outcome of a lane's last period; `None` before the first.
+    /// Outcome of a lane's last period; `None` before the first.
     pub(crate) fn outcome(&self, lane: usize) -> Option<Result<PeriodReport, PeriodError>> {
         match &self.presences[lane] {
             Presence::Away(_, outcome) => outcome.clone(),
@@ -153,7 +163,7 @@ impl Group {
         }
     }
 
-    /// The cycles of a lane's last period; `None` if it had a fault.
+    /// Cycles of a lane's last period; `None` after a fault.
     pub(crate) fn cycles(&self, lane: usize) -> Option<Cycle> {
         match &self.presences[lane] {
             Presence::Away(_, outcome) => Some(outcome.as_ref()?.as_ref().ok()?.cycles),
@@ -223,7 +233,7 @@ impl Group {
             }
         }
         while self.model().is_some() {
-            if let Next::End = self.stretch() {
+            if let GroupContinuation::End = self.stretch() {
                 break;
             }
         }
@@ -243,22 +253,22 @@ impl Group {
         }
     }
 
-    /// The first lane that is present.
+    /// First lane that is present.
     fn model(&self) -> Option<usize> {
         self.present.iter().position(|&present| present)
     }
 
     /// Executes a wait or a block.
-    fn stretch(&mut self) -> Next {
+    fn stretch(&mut self) -> GroupContinuation {
         match self.lead.status {
             Status::Waiting { address, .. } => self.wait_for_tick(address),
             Status::Running => self.run_block(),
-            // The timeline itself neither halts nor faults: such lanes have left it before.
+            // The timeline itself neither halts nor faults: such lanes have left the group before.
             Status::Halted { .. } | Status::Faulted(_) => self.leave_all(),
         }
     }
 
-    fn wait_for_tick(&mut self, address: BundleAddress) -> Next {
+    fn wait_for_tick(&mut self, address: BundleAddress) -> GroupContinuation {
         if self.lead.ticks.next().is_none()
             && let Some(tick) = self.lead.due_tick()
         {
@@ -274,7 +284,7 @@ impl Group {
         self.lanes.write_back_until(&mut self.lead.state, tick, &self.present, &self.offsets);
         self.lead.tally.wait(address, tick + 1 - self.lead.now);
         self.lead.now = tick + 1;
-        Next::More
+        GroupContinuation::More
     }
 
     /// Latches the inputs, if that is due before the next cycle.
@@ -285,7 +295,7 @@ impl Group {
     }
 
     /// Executes the next block in every present lane.
-    fn run_block(&mut self) -> Next {
+    fn run_block(&mut self) -> GroupContinuation {
         let entered = self.lead.front.delivered;
         let Some(id) = self.lead.next_block() else { return self.leave_all() };
         let block = &self.lead.cache.blocks[id as usize];
@@ -315,14 +325,14 @@ impl Group {
         while let Err(outside) = self.try_block(id, last) {
             (0..LANES).filter(|&lane| outside[lane]).for_each(|lane| self.leave(lane));
             if self.model().is_none() {
-                return Next::End;
+                return GroupContinuation::End;
             }
         }
         let address = self.after_block(id, last);
         self.go_on(flow, address, last)
     }
 
-    /// Gives the timeline the value of a register that all lanes share. False if they do not, or if a result for it is in flight.
+    /// Copies a register's value to the timeline. Returns false if the lanes differ, or if a result for it is in flight.
     fn agree_on(&mut self, register: Register) -> bool {
         let row = &self.lanes.registers[register.index()];
         let mut values = (0..LANES).filter(|&lane| self.present[lane]).map(|lane| row[lane]);
@@ -332,7 +342,7 @@ impl Group {
         agree
     }
 
-    /// Runs a block's operations. If some lanes leave their memory, the error is the set of these lanes, and everything is undone.
+    /// Runs a block's operations. If some lanes leave their memory, the error is the set of these lanes, and all effects are undone.
     fn try_block(&mut self, id: u32, last: Cycle) -> Result<(), Mask> {
         let Group { lead, lanes, present, offsets, .. } = self;
         let Emulator { cache, state, compiled_runs, .. } = lead;
@@ -340,13 +350,13 @@ impl Group {
         lanes.begin(state, block, last);
         let before = block.restore.as_ref().map(|_| (state.pending.clone(), state.written));
         lanes.write_back_until(state, last, present, offsets);
-        if let Compiled::Code(code, _) = &block.compiled_lanes {
+        if let CompilationState::Code(code, _) = &block.compiled_lanes {
             if lanes.run_code(block, code) {
                 compiled_runs.done += 1;
                 return Ok(());
             }
             compiled_runs.left += 1;
-            block.compiled_lanes.left(block.runs);
+            block.compiled_lanes.count_exits(block.runs);
         }
         lanes.run(block, present).inspect_err(|_| {
             lanes.undo();
@@ -361,7 +371,7 @@ impl Group {
         let Group { lead, lanes, offsets, .. } = self;
         let entered = lead.front.delivered;
         let block = &lead.cache.blocks[id as usize];
-        // The values are in the lanes, hence 0 here.
+        // The lanes hold the values, hence 0 here.
         let late = block.late.iter().map(|late| late.pending(entered, Value::exact(0), None));
         lead.state.pending.extend(late);
         lanes.end(block, entered, offsets);
@@ -369,7 +379,7 @@ impl Group {
     }
 
     /// Follows the control flow of the bundle at `address`, which issued in cycle `last`. At a branch, the majority of lanes stays.
-    fn go_on(&mut self, flow: Flow, address: BundleAddress, last: Cycle) -> Next {
+    fn go_on(&mut self, flow: Flow, address: BundleAddress, last: Cycle) -> GroupContinuation {
         if let Flow::Branch { register, .. } = flow {
             let row = self.lanes.registers[register.index()];
             let is_zero = |lane: usize| row[lane] == 0;
@@ -392,7 +402,7 @@ impl Group {
         }
         self.lead.follow(flow, address, last, &mut None);
         if !matches!(flow, Flow::Wait(_)) {
-            return Next::More;
+            return GroupContinuation::More;
         }
         let Emulator { state, code, .. } = &self.lead;
         if state.latches.is_some() {
@@ -409,27 +419,27 @@ impl Group {
             self.lanes.publish_outputs(outputs.into_iter());
         }
         self.report = self.lead.report.take();
-        if self.report.is_some() { Next::End } else { Next::More }
+        if self.report.is_some() { GroupContinuation::End } else { GroupContinuation::More }
     }
 
     // ---- Leaving and joining.
 
-    fn leave_all(&mut self) -> Next {
+    fn leave_all(&mut self) -> GroupContinuation {
         for lane in 0..LANES {
             if self.present[lane] {
                 self.leave(lane);
             }
         }
-        Next::End
+        GroupContinuation::End
     }
 
-    /// Takes a lane out of the group, into an emulator with exactly its state.
+    /// Moves a lane out of the group, into an emulator with exactly its state.
     fn leave(&mut self, lane: usize) {
         let by = self.offsets[lane];
         let shift = |cycle: Cycle| cycle.wrapping_add_signed(by);
         self.lead.list_recent();
         let mut emulator = self.spare.pop().unwrap_or_else(|| Box::new(self.lead.clone()));
-        // The blocks may have been verified for a lane that had written more registers.
+        // Blocks may have been verified for a lane that had written more registers.
         emulator.cache.blocks.iter_mut().for_each(|block| block.verified = false);
         let lead = &self.lead;
         emulator.now = shift(lead.now);
@@ -472,7 +482,7 @@ impl Group {
         }
     }
 
-    /// Lets lanes that run alone join at the beginning of a period, if their timeline is that of the others.
+    /// Lets lanes that run alone join at the beginning of a period, if their timeline equals the common one.
     fn rejoin(&mut self) {
         if !self.presences.iter().any(|presence| matches!(presence, Presence::Away(..))) {
             return;
@@ -492,8 +502,8 @@ impl Group {
         }
     }
 
-    /// Makes one lane's timeline the common one, if no lane is present: that of a waiting lane that has written the fewest registers,
-    /// so that others can join.
+    /// Makes a lane's timeline the common one, if no lane is present: chooses a waiting lane with the fewest written registers, so that
+    /// others can join.
     fn adopt(&mut self) -> bool {
         let waiting = self.presences.iter_mut().filter_map(|presence| match presence {
             Presence::Away(emulator, _) if matches!(emulator.status, Status::Waiting { .. }) => {
@@ -512,7 +522,7 @@ impl Group {
         lead.ticks.clone_from(&first.ticks);
         lead.period = first.period;
         lead.state.clone_from(&first.state);
-        // The blocks may have been verified when more registers had been written.
+        // Blocks may have been verified when more registers had been written.
         lead.cache.blocks.iter_mut().for_each(|block| block.verified = false);
         let in_flight = lead.state.pending.iter().map(|pending| InFlight {
             values: [pending.retire.value; LANES],
@@ -523,7 +533,7 @@ impl Group {
         true
     }
 
-    /// Joins a lane, if it waits for the same tick and its state is the same except for values.
+    /// Joins a lane, if it waits for the same tick and its state is equal except for values.
     fn join(&mut self, lane: usize, mut emulator: Box<Emulator>) -> Result<(), Box<Emulator>> {
         let Some(by) = self.distance(&mut emulator) else { return Err(emulator) };
         self.offsets[lane] = by;
@@ -536,7 +546,7 @@ impl Group {
         Ok(())
     }
 
-    /// The cycles by which another timeline is later than the common one; `None` if they differ in anything else.
+    /// Cycles by which another timeline is later than the common one; `None` if they differ in any other respect.
     fn distance(&mut self, other: &mut Emulator) -> Option<i64> {
         let lead = &mut self.lead;
         let (Status::Waiting { since, .. }, Status::Waiting { since: others_since, .. }) =
@@ -566,7 +576,7 @@ impl Group {
     }
 }
 
-/// The recent bundles that can still stall the next one when it is delivered.
+/// Recent bundles that can still stall the next one when it is delivered.
 fn recent_at(emulator: &Emulator, delivered: Cycle) -> Ages {
     let Recent::List(recent) = &emulator.recent else { return Box::new([]) };
     let age = |cycle: Cycle| (delivered - cycle).min(u8::MAX.into()) as u8;
@@ -585,8 +595,8 @@ fn same_latches(common: &State, other: &State) -> bool {
     }
 }
 
-fn same_pending(common: &[Pending], others: &[Pending], by: i64) -> bool {
-    let key = |pending: &Pending, by: i64| {
+fn same_pending(common: &[PendingResult], others: &[PendingResult], by: i64) -> bool {
+    let key = |pending: &PendingResult, by: i64| {
         let Retire { cycle, address, slot, op, .. } = pending.retire;
         (cycle.wrapping_add_signed(by), address, slot, op, pending.register)
     };

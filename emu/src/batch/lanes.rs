@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The values of a group's lanes, and vector execution of operations on all of them.
+//! Values of a group's lanes, and vector execution of operations on all of them.
 
 use crate::block::Block;
 use crate::event::PortWrite;
@@ -9,16 +9,16 @@ use crate::lane::{LANES, Mask, Row};
 use crate::machine::{NanWrites, State, WORDS, Word};
 use crate::micro::{Kind, Micro};
 use pulp::{Arch, NullaryFnOnce};
-use takt_isa::fp::{Flags, Host, Screened, Value, is_nan};
+use takt_isa::fp::{Flags, Host, ScreenedFloat, Value, is_nan};
 use takt_isa::timing::Cycle;
 use takt_isa::{Effect, Register, compute, compute_lanes};
 
-/// The values of a result in flight, for all lanes. Its other properties are in the timeline's list, at the same index.
+/// Values of a result in flight, for all lanes. Its other properties are in the timeline's list, at the same index.
 #[derive(Clone, Debug)]
 pub(crate) struct InFlight {
     pub(crate) values: Row,
     pub(crate) flags: [Flags; LANES],
-    /// The data words from which it was loaded, if it is a load.
+    /// Addresses of the data words from which a load took the values.
     pub(crate) memory: Option<Row>,
 }
 
@@ -29,7 +29,7 @@ pub(crate) struct LatchedRows {
     pub(crate) outputs: Box<[Row]>,
 }
 
-/// Everything that operations read and write, of all lanes.
+/// State that operations read and write, for all lanes.
 #[derive(Clone, Debug)]
 pub(crate) struct Lanes {
     pub(crate) registers: Box<[Row; WORDS]>,
@@ -44,11 +44,11 @@ pub(crate) struct Lanes {
     undo: Undo,
 }
 
-/// The undo log of a block that may fault.
+/// Undo log of a block that may fault.
 #[derive(Clone, Debug, Default)]
 struct Undo {
     registers: Vec<(Register, Row)>,
-    /// True if it may fault.
+    /// The block may fault, so that the log is kept.
     kept: bool,
     /// Rows of memory before a store.
     stored: Vec<(usize, Row)>,
@@ -57,7 +57,7 @@ struct Undo {
     nans: Vec<(usize, u64)>,
 }
 
-/// [`Lanes::run`], compiled once for each width of vectors that the host may have.
+/// Call of [`Lanes::run`], compiled once for each width of vectors that the host may have.
 struct Run<'a> {
     lanes: &'a mut Lanes,
     block: &'a Block,
@@ -74,6 +74,12 @@ impl NullaryFnOnce for Run<'_> {
         }
         Ok(())
     }
+}
+
+/// Finds a NaN in any lane; without branches, so that it compiles to one comparison of vectors.
+#[inline(always)]
+fn any_nan(row: &Row) -> bool {
+    row.iter().fold(false, |any, &bits| any | is_nan(bits))
 }
 
 impl Lanes {
@@ -99,8 +105,8 @@ impl Lanes {
         }
     }
 
-    /// Gives an absent lane the registers and the memory of a present one. It is computed along with the rest, and with ordinary values
-    /// it causes no special cases, which would slow down the others. Its results are not used.
+    /// Gives an absent lane the registers and the memory of a present one. The lane is computed along with the rest, and with ordinary
+    /// values it causes no special cases, which would slow down the others. Its results are not used.
     pub(crate) fn imitate(&mut self, lane: usize, model: usize) {
         self.registers.iter_mut().for_each(|row| row[lane] = row[model]);
         self.memory.iter_mut().for_each(|row| row[lane] = row[model]);
@@ -161,15 +167,15 @@ impl Lanes {
         }
     }
 
-    /// Publishes these outputs.
+    /// Publishes the outputs in these registers.
     pub(crate) fn publish_outputs(&mut self, registers: impl Iterator<Item = Register>) {
         if let Some(rows) = &mut self.latches {
             registers.for_each(|r| rows.outputs[r.index()] = self.registers[r.index()]);
         }
     }
 
-    /// Writes back every result of the timeline that is on its bus in cycle `last` or before. `present` are the lanes that
-    /// count, each `offsets` later.
+    /// Writes back every result of the timeline that is on its bus in cycle `last` or before. `present` selects the lanes; each is
+    /// `offsets` later.
     pub(crate) fn write_back_until(
         &mut self,
         state: &mut State,
@@ -177,18 +183,20 @@ impl Lanes {
         present: &Mask,
         offsets: &[i64; LANES],
     ) {
-        let mut i = 0;
-        while i < state.pending.len() {
-            if state.pending[i].retire.cycle > last {
-                i += 1;
+        let mut kept = 0;
+        for i in 0..state.pending.len() {
+            let pending = state.pending[i];
+            if pending.retire.cycle > last {
+                state.pending.swap(kept, i);
+                self.in_flight.swap(kept, i);
+                kept += 1;
                 continue;
             }
-            let pending = state.pending.remove(i);
-            let InFlight { values, flags, .. } = self.in_flight.remove(i);
-            self.registers[pending.register.index()] = values;
+            let InFlight { values, flags, .. } = &self.in_flight[i];
+            self.registers[pending.register.index()] = *values;
             state.written.insert(pending.register);
-            self.flags.iter_mut().zip(flags).for_each(|(all, flags)| *all |= flags);
-            if pending.output && pending.float {
+            self.flags.iter_mut().zip(flags).for_each(|(all, &flags)| *all |= flags);
+            if pending.output && pending.float && any_nan(values) {
                 let takt = pending.retire;
                 for lane in (0..LANES).filter(|&lane| present[lane] && is_nan(values[lane])) {
                     self.nan_writes[lane].record(PortWrite {
@@ -202,9 +210,11 @@ impl Lanes {
                 }
             }
         }
+        state.pending.truncate(kept);
+        self.in_flight.truncate(kept);
     }
 
-    /// Saves what `block` may change before it faults; its last bundle issues in cycle `last`.
+    /// Saves the state that `block` may change before it faults; its last bundle issues in cycle `last`.
     pub(crate) fn begin(&mut self, state: &State, block: &Block, last: Cycle) {
         self.undo.stored.clear();
         self.nans.clear();
@@ -240,8 +250,8 @@ impl Lanes {
         }
     }
 
-    /// Runs the compiled code of a block. If the result is false, the block must be run by its micros: nothing that it reads has
-    /// changed.
+    /// Runs the compiled code of a block. If the result is false, the block must be run by its micros: the state that it reads is
+    /// unchanged.
     pub(crate) fn run_code(&mut self, block: &Block, code: &jit::LaneCode) -> bool {
         if !code.run(&mut self.registers, &mut self.memory, &mut self.flags, &mut self.rows) {
             return false;
@@ -257,8 +267,8 @@ impl Lanes {
         true
     }
 
-    /// Runs the micros of a block. If some present lanes leave their memory, the error is the set of these lanes, and the caller must
-    /// undo the block.
+    /// Runs the micros of a block. If some present lanes leave their memory, the error is the set of these lanes, and the caller must undo
+    /// the block.
     pub(crate) fn run(&mut self, block: &Block, present: &Mask) -> Result<(), Mask> {
         Arch::new().dispatch(Run { lanes: self, block, present })
     }
@@ -272,7 +282,7 @@ impl Lanes {
                 let sources = [micro.a, micro.b, micro.c].map(|word| &registers[word.index()]);
                 // A separate destination, so that the compiler knows that it does not alias a source.
                 let mut results = [0; LANES];
-                let raised = compute_lanes::<Screened, LANES>(micro.op, sources, &mut results);
+                let raised = compute_lanes::<ScreenedFloat, LANES>(micro.op, sources, &mut results);
                 if raised {
                     return self.exactly(micro);
                 }
@@ -288,9 +298,7 @@ impl Lanes {
             Kind::Watch => return Ok(()),
             Kind::Check => {
                 let row = &registers[micro.a.index()];
-                let mut any = false;
-                row.iter().for_each(|&bits| any |= is_nan(bits));
-                if any {
+                if any_nan(row) {
                     let nans = (0..LANES).filter(|&lane| present[lane] && is_nan(row[lane]));
                     self.nans.extend(nans.map(|lane| (micro.constant, lane, row[lane])));
                 }
@@ -328,8 +336,8 @@ impl Lanes {
         }
     }
 
-    /// The data words that a load or store addresses in each lane; the error is the set of present lanes in which they are outside of
-    /// the memory. (Absent lanes address none.)
+    /// Data words that a load or store addresses in each lane; the error is the set of present lanes that leave the memory. (Absent lanes
+    /// address no word.)
     fn addresses(&self, micro: &Micro, present: &Mask) -> Result<[Option<usize>; LANES], Mask> {
         let bases = &self.registers[micro.a.index()];
         let words = bases.map(|base| {
@@ -339,7 +347,7 @@ impl Lanes {
         if outside == [false; LANES] { Ok(words) } else { Err(outside) }
     }
 
-    /// The address, if it is the same in every lane, and in the memory.
+    /// Address of a load or store, if it is the same in every lane, and in the memory.
     fn common_address(&self, micro: &Micro) -> Option<usize> {
         let bases = &self.registers[micro.a.index()];
         let address = data_address(micro.constant, bases[0]);

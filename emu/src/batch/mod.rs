@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Batches: parallel execution of many runs of one program, in the lanes of vectors.
 //!
-//! Timing and control flow rarely depend on data. Therefore a [`Batch`] computes them once for 16 runs (a [`group`]) and the
-//! arithmetic for all of these *lanes* together, in vectors ([`lanes`]). Each lane has the values, flags, faults and cycles, to
-//! the bit, that an [`crate::Emulator`] of its own would have.
+//! Timing and control flow rarely depend on data. Therefore a [`Batch`] computes them once for 16 runs (a [`group`]) and the arithmetic for
+//! all of these *lanes* together, in vectors ([`lanes`]). Each lane has the values, flags, faults and cycles, to the bit, of an
+//! [`crate::Emulator`] of its own.
 
 mod group;
 mod lanes;
@@ -21,7 +21,7 @@ use takt_isa::program::Port;
 use takt_isa::timing::Cycle;
 use takt_isa::{Program, Register};
 
-/// Many runs of one program, *lanes*, each with its own inputs, values, flags and faults.
+/// Batch: many runs of one program, *lanes*, each with its own inputs, values, flags and faults.
 ///
 /// A lane behaves like an [`crate::Emulator`] that runs the same periods with [`crate::Emulator::run_period`]: outputs,
 /// registers, memory, flags, cycles, reports and faults are the same to the bit. Groups of [`Batch::WIDTH`] lanes run in
@@ -50,7 +50,7 @@ pub struct Batch {
 }
 
 impl Batch {
-    /// Lanes of a group, which share the cost of control flow. A multiple of this number is the best size of a batch.
+    /// Number of lanes of a group, which share the cost of control flow. A multiple of this number is the best size of a batch.
     pub const WIDTH: usize = LANES;
     /// Limit on the number of lanes. (Each takes about 5 kB, and its data memory.)
     pub const MAX_LANES: usize = 1 << 20;
@@ -60,7 +60,7 @@ impl Batch {
     /// Loads a program into `lanes` lanes (from 1 to [`Batch::most_lanes`]; other numbers are clamped) and resets them.
     ///
     /// # Errors
-    /// As [`crate::Emulator::new`].
+    /// Like [`crate::Emulator::new`].
     pub fn new(program: &Program, lanes: usize) -> Result<Batch, LoadError> {
         let lanes = lanes.clamp(1, Batch::most_lanes(program));
         let counts = (0..lanes).step_by(LANES).map(|first| (lanes - first).min(LANES));
@@ -68,29 +68,29 @@ impl Batch {
         Ok(Batch { program: Arc::new(program.clone()), groups, lanes })
     }
 
-    /// The most lanes of a program: fewer of one with a deep data memory.
+    /// Limit on the lanes for a program: lower with a deep data memory.
     pub fn most_lanes(program: &Program) -> usize {
         (Batch::MAX_WORDS / (program.machine.data_depth as usize).max(1)).clamp(1, Batch::MAX_LANES)
     }
 
-    /// Number of lanes.
+    /// Number of lanes of the batch.
     pub fn lanes(&self) -> usize {
         self.lanes
     }
 
-    /// The program.
+    /// Program that all lanes run.
     pub fn program(&self) -> &Program {
         &self.program
     }
 
-    /// As [`crate::Emulator::set_tick_period`], for every lane.
+    /// Schedules regular ticks for every lane, like [`crate::Emulator::set_tick_period`].
     pub fn set_tick_period(&mut self, cycles: Option<NonZeroU64>) {
         self.groups
             .iter_mut()
             .for_each(|group| group.each_emulator(|emulator| emulator.set_tick_period(cycles)));
     }
 
-    /// As [`crate::Emulator::set_compile_after`]; a run of all lanes of a group counts as one.
+    /// Sets the runs before compilation, like [`crate::Emulator::set_compile_after`]; a run of all lanes of a group counts as one.
     pub fn set_compile_after(&mut self, runs: Option<u64>) {
         self.groups
             .iter_mut()
@@ -109,10 +109,10 @@ impl Batch {
         self.groups.iter_mut().for_each(|group| group.set_cycle_limit(limit));
     }
 
-    /// Sets an input port, with one value for each lane. They are read from the next period on (and by the section that runs once).
+    /// Sets an input port, with one value for each lane. The values are read from the next period on (and by the section that runs once).
     ///
     /// # Errors
-    /// If the program has no such port, or one of another type, or there are more values than lanes, or fewer. Nothing is set
+    /// If the program has no such port, or one of another type, or the number of values differs from the number of lanes. No lane is set
     /// then.
     pub fn set_input<N: Into<Number> + Copy>(&mut self, name: &str, values: &[N]) -> Result<(), PortError> {
         let register = input_for(&self.program, name, values.iter().map(|&value| value.into()))?;
@@ -123,7 +123,7 @@ impl Batch {
     /// Sets an input port by its register address: one word for each lane.
     ///
     /// # Errors
-    /// If the machine has no such port, or there are more values than lanes, or fewer.
+    /// If the machine has no such port, or the number of values differs from the number of lanes.
     pub fn set_input_bits(&mut self, register: Register, values: &[u32]) -> Result<(), PortError> {
         if !self.program.machine.is_input(register) {
             return Err(PortError::NoInput { register });
@@ -146,25 +146,25 @@ impl Batch {
         }
     }
 
-    /// The outcome of a lane's last period; `None` before the first, or if there is no such lane.
+    /// Outcome of a lane's last period; `None` before the first, or if there is no such lane.
     pub fn outcome(&self, lane: usize) -> Option<Result<PeriodReport, PeriodError>> {
         let (group, lane) = self.lane(lane)?;
         group.outcome(lane)
     }
 
-    /// The cycles of a lane's last period; `None` if the period did not end with a `wait`.
+    /// Cycles of a lane's last period; `None` if the period did not end with a `wait`.
     pub fn cycles(&self, lane: usize) -> Option<Cycle> {
         let (group, lane) = self.lane(lane)?;
         group.cycles(lane)
     }
 
-    /// The visible value of an output port of a lane, as [`crate::Emulator::output_bits`].
+    /// Visible value of an output port of a lane, like [`crate::Emulator::output_bits`].
     pub fn output_bits(&self, lane: usize, register: Register) -> Option<u32> {
         let (group, lane) = self.lane(lane)?;
         self.program.machine.is_output(register).then(|| group.output(lane, register))?
     }
 
-    /// The value on an output port of a lane; `None` if none was ever written, or there is no such lane.
+    /// Value on an output port of a lane; `None` if the port was never written, or there is no such lane.
     ///
     /// # Errors
     /// If the program has no such port.
@@ -173,18 +173,18 @@ impl Batch {
         Ok(self.output_bits(lane, *register).map(|bits| Number::of(*ty, bits)))
     }
 
-    /// A lane's register, as [`crate::Emulator::register`].
+    /// Register of a lane, like [`crate::Emulator::register`].
     pub fn register(&self, lane: usize, register: Register) -> Option<u32> {
         let (group, lane) = self.lane(lane)?;
         group.register(lane, register)
     }
 
-    /// A lane's data memory; empty if there is no such lane.
+    /// Data memory of a lane; empty if there is no such lane.
     pub fn memory(&self, lane: usize) -> Vec<u32> {
         self.lane(lane).map_or(Vec::new(), |(group, lane)| group.memory(lane))
     }
 
-    /// A lane's sticky exception flags.
+    /// Sticky exception flags of a lane.
     pub fn flags(&self, lane: usize) -> Flags {
         self.lane(lane).map_or(Flags::NONE, |(group, lane)| group.flags(lane))
     }
@@ -194,13 +194,13 @@ impl Batch {
         self.lane(lane).map_or(0, |(group, lane)| group.now(lane))
     }
 
-    /// The number of periods, summed over all lanes, that ran outside of their group, at least in part, because of a branch with another
-    /// outcome than in most lanes, or of a fault. They are slower, and otherwise the same.
+    /// Number of periods, summed over all lanes, that ran outside of their group, at least in part, because of a branch with another
+    /// outcome than in most lanes, or of a fault. They are slower, with the same results.
     pub fn periods_apart(&self) -> u64 {
         self.groups.iter().map(|group| group.apart).sum()
     }
 
-    /// The number of runs of compiled blocks since loading, counted once for all lanes of a group.
+    /// Number of runs of compiled blocks since loading, counted once for all lanes of a group.
     pub fn compiled_runs(&self) -> CompiledRuns {
         let runs = self.groups.iter().map(Group::compiled_runs);
         runs.fold(CompiledRuns::default(), |sum, runs| CompiledRuns {

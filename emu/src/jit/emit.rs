@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Emitter of a block's machine code, scalar for one run, or SIMD for a vector of runs.
 //!
-//! The words of a single run are contiguous. In a batch, each word is a row with the word of every lane; SIMD code handles four
-//! lanes as scalar code handles one word. Booleans are bytes, or masks of a vector's lanes.
+//! The words of a single run are contiguous. In a batch, each word is a row with the word of every lane; SIMD code handles four lanes as
+//! scalar code handles one word. Booleans are bytes, or masks of a vector's lanes.
 
 use cranelift::codegen::ir::condcodes::{FloatCC, IntCC};
 use cranelift::codegen::ir::{ConstantData, Type};
@@ -11,7 +11,7 @@ use cranelift::prelude::{FunctionBuilder, Ieee32, InstBuilder, MemFlagsData, Val
 /// Lanes of a vector.
 pub(super) const VECTOR: usize = 4;
 
-/// The target of code: scalar or SIMD.
+/// Target of code: scalar or SIMD.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Width {
     /// Scalar code for one run.
@@ -21,7 +21,7 @@ pub(super) enum Width {
 }
 
 impl Width {
-    /// The distance between successive words of a run, in words.
+    /// Distance between successive words of a run, in words.
     pub(super) fn stride(self) -> usize {
         match self {
             Width::One => 1,
@@ -29,7 +29,7 @@ impl Width {
         }
     }
 
-    /// The number of runs that one call of the code executes.
+    /// Number of runs that one call of the code executes.
     pub(super) fn lanes(self) -> usize {
         match self {
             Width::One => 1,
@@ -57,7 +57,7 @@ impl Emit<'_> {
         if self.is_vector() { types::I32X4 } else { types::I32 }
     }
 
-    /// The offset in bytes of a word from a run's first word.
+    /// Offset in bytes of a word from a run's first word.
     fn offset(&self, word: usize) -> i32 {
         (4 * word * self.width.stride()) as i32
     }
@@ -82,7 +82,7 @@ impl Emit<'_> {
         self.builder.ins().store(flags, value, words, offset);
     }
 
-    /// The address of word `number`, which is the same in all lanes.
+    /// Address of word `number`, which is the same in all lanes.
     pub(super) fn address(&mut self, words: Value, number: Value) -> Value {
         let wide = self.builder.ins().uextend(types::I64, number);
         let size = i64::from(self.offset(1));
@@ -154,14 +154,14 @@ impl Emit<'_> {
         self.choose(truth, yes, no)
     }
 
-    /// A byte that is not 0 if it is true in any lane.
+    /// Reduces a Boolean over all lanes to a byte: nonzero if it is true in any lane.
     pub(super) fn any(&mut self, truth: Value) -> Value {
         if self.is_vector() { self.builder.ins().vany_true(truth) } else { truth }
     }
 
     // ---- Numbers.
 
-    /// The magnitude of one value with the sign of another.
+    /// Magnitude of one value with the sign of another.
     pub(super) fn with_sign(&mut self, magnitude: Value, sign: Value) -> Value {
         if !self.is_vector() {
             return self.builder.ins().fcopysign(magnitude, sign);
@@ -179,7 +179,7 @@ impl Emit<'_> {
         self.builder.ins().fcvt_from_sint(ty, value)
     }
 
-    /// The nearest integer, ties to even, and a Boolean that is true where it does not fit.
+    /// Nearest integer, ties to even, and a Boolean that marks results out of range.
     pub(super) fn nearest(&mut self, value: Value) -> (Value, Value) {
         let magnitude = self.builder.ins().fabs(value);
         let limit = self.float_constant(2_147_483_648.0);
@@ -188,7 +188,7 @@ impl Emit<'_> {
             let rounded = self.builder.ins().nearest(value);
             return (self.builder.ins().fcvt_to_sint_sat(types::I32X4, rounded), wrong);
         }
-        // The method of `takt_isa::fp::Host`: a sum that is rounded at the units' place has the integer in its low word.
+        // Method of `takt_isa::fp::Host`: a sum that is rounded at the units' place has the integer in its low word.
         let wide = self.builder.ins().fpromote(types::F64, value);
         let units = self.builder.ins().f64const(6_755_399_441_055_744.0);
         let rounded = self.builder.ins().fadd(wide, units);
@@ -198,21 +198,8 @@ impl Emit<'_> {
 
     // ---- Lanes.
 
-    /// Extracts the word of every lane.
-    pub(super) fn words(&mut self, value: Value) -> Vec<Value> {
-        if !self.is_vector() {
-            return vec![value];
-        }
-        (0..VECTOR as u8).map(|lane| self.builder.ins().extractlane(value, lane)).collect()
-    }
-
-    /// Combines a word for every lane: the inverse of [`Emit::words`].
-    pub(super) fn of_words(&mut self, words: &[Value]) -> Value {
-        if let [word] = words {
-            return *word;
-        }
-        let first = self.builder.ins().splat(types::I32X4, words[0]);
-        let rest = words.iter().zip(0..).skip(1);
-        rest.fold(first, |vector, (&word, lane)| self.builder.ins().insertlane(vector, word, lane))
+    /// Extracts the word of the first lane.
+    pub(super) fn first(&mut self, value: Value) -> Value {
+        if self.is_vector() { self.builder.ins().extractlane(value, 0) } else { value }
     }
 }

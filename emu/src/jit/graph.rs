@@ -1,48 +1,48 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Data-flow graph of a block, with the checks under which its compiled code is valid.
 //!
-//! The code is equivalent to the block's micros in the ordinary case: arithmetic and comparisons meet no infinity and no NaN,
-//! and no flag is raised. Few values need a check for that: since sum, difference, product and root propagate infinities and
-//! NaNs, only the last result of a chain of these is checked.
+//! The code is equivalent to the block's micros in the ordinary case: arithmetic and comparisons meet no infinity and no NaN, and no flag
+//! is raised. Few values need a check for that: since sum, difference, product and root propagate infinities and NaNs, only the last result
+//! of a chain of these is checked.
 
 use super::host::Host;
 use crate::machine::{WORDS, Word};
 use crate::micro::{Kind, Micro};
 use takt_isa::{Op, Register};
 
-/// The index of a value in [`Graph::nodes`], which is greater than those of its operands.
+/// Index of a value in [`Graph::nodes`], greater than the indices of its operands.
 pub(super) type Id = usize;
 
-/// A value, or an access to memory.
+/// Value, or access to memory.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) enum Node {
-    /// The value of a register at the block's entry.
+    /// Value of a register at the block's entry.
     Entry(Word),
     Constant(u32),
-    /// The flags, as the block finds them.
+    /// Flags at the block's entry.
     Flags,
-    /// One of the host's instructions.
+    /// Result of one of the host's instructions.
     Host(Host, [Id; 3]),
-    /// The result of [`takt_isa::compute`].
+    /// Result of [`takt_isa::compute`] for operations without a host instruction.
     Call(Op, [Id; 3]),
-    /// `memory[offset + base]`, and the number of the late result that it is.
+    /// Load of `memory[offset + base]`, with the number of its late result, if it is one.
     Load {
         base: Id,
         offset: u32,
         late: Option<usize>,
     },
-    /// `memory[offset + base] = value`
+    /// Store: `memory[offset + base] = value`
     Store {
         base: Id,
         offset: u32,
         value: Id,
     },
-    /// Goes to a watched port.
+    /// Value written to a watched port.
     Watched(Id),
 }
 
 impl Node {
-    /// True if its bits are a finite binary32, false if they are not; `None` if that is known only at run time.
+    /// Classifies the bits as a finite binary32: true or false, or `None` if that is known only at run time.
     fn finite(self) -> Option<bool> {
         match self {
             Node::Constant(bits) => Some(f32::from_bits(bits).is_finite()),
@@ -53,16 +53,16 @@ impl Node {
     }
 }
 
-/// A block's values.
+/// Values of a block in topological order, with its results.
 pub(super) struct Graph {
     pub(super) nodes: Vec<Node>,
-    /// Registers, and words of late results, that the block writes, with their last values.
+    /// Last values of the registers, and words of late results, that the block writes.
     pub(super) results: Vec<(Word, Id)>,
-    /// The flags at the block's end; `None` if they are those that it found.
+    /// Flags at the block's end; `None` if the block does not change them.
     pub(super) flags: Option<Id>,
     /// Numbers of the checks whose port is watched, in the order of [`Node::Watched`].
     pub(super) watches: Vec<u32>,
-    /// For each node, true if it must be finite.
+    /// Marks the nodes that must be finite.
     must: Vec<bool>,
 }
 
@@ -143,21 +143,21 @@ impl Graph {
         self.nodes.len() - 1
     }
 
-    /// True if it reads or changes the flags.
+    /// The block reads or changes the flags.
     pub(super) fn uses_flags(&self) -> bool {
         self.flags.is_some() || self.nodes.contains(&Node::Flags)
     }
 
-    /// The words that are written as soon as their value is computed, for each value, and those that are written only at the end: the ones
-    /// that the block also reads. (If the block must be run again by the interpreter, it reads these again, and writes all others before
-    /// it reads them.)
+    /// Words by the time of their store. First, for each value, the words written as soon as it is computed; then the words that the block
+    /// also reads, which are written only at the end. (If the interpreter must run the block again, it reads the latter again, and writes
+    /// the former before it reads them.)
     pub(super) fn places(&self) -> (Vec<Vec<Word>>, Vec<(Word, Id)>) {
         let mut early = vec![Vec::new(); self.nodes.len()];
         let mut last = Vec::new();
         for &(word, id) in &self.results {
             let is_read = self.nodes.contains(&Node::Entry(word));
             if self.nodes[id] == Node::Entry(word) {
-                // It is there.
+                // The word keeps its value: no store.
             } else if is_read {
                 last.push((word, id));
             } else {
@@ -167,10 +167,10 @@ impl Graph {
         (early, last)
     }
 
-    /// For each value, true if it must be checked; `None` if a check always fails.
+    /// Marks the values that must be checked; `None` if a check always fails.
     pub(super) fn looked_at(&self) -> Option<Vec<bool>> {
         let mut looked_at = vec![false; self.nodes.len()];
-        // A value needs no check if a later value that is checked propagates its infinity or NaN.
+        // A checked later value that propagates an infinity or NaN makes a check superfluous.
         let mut shows = vec![false; self.nodes.len()];
         for (id, &node) in self.nodes.iter().enumerate().rev() {
             looked_at[id] = self.must[id] && !shows[id];

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Instruction selection: the operations for which the host has an instruction.
 //!
-//! They are matched by their meaning: an operation that gives the same results as a host instruction, for many operands, is
-//! that instruction. Thus no instruction of the machine is named here.
+//! Operations are matched by their meaning: an operation that gives the same results as a host instruction, for many operands, is that
+//! instruction. Thus no instruction of the machine is named here.
 
 use std::sync::OnceLock;
 use takt_isa::fp::{self, is_nan};
@@ -43,7 +43,7 @@ pub(super) enum Host {
     Root,
     FromInteger,
     ToInteger,
-    /// `±a · b ± c`: whether the product and whether the addend is negated.
+    /// Fused multiply-add `±a · b ± c`: the flags negate the product and the addend.
     Fused(bool, bool),
 }
 
@@ -83,8 +83,8 @@ const ALL: [Host; 33] = [
     Host::Fused(true, true),
 ];
 
-/// Operands for which an operation is compared with the host's: zeros, ones, halves, ends of the ranges, subnormals, and
-/// numbers without a pattern.
+/// Operands for which an operation is compared with the host's: zeros, ones, halves, ends of the ranges, subnormals, and numbers without a
+/// pattern.
 const PROBES: [u32; 24] = [
     0,
     0x8000_0000,
@@ -113,13 +113,13 @@ const PROBES: [u32; 24] = [
 ];
 
 impl Host {
-    /// True if it is binary32 arithmetic: its result may be infinite or a NaN where its operands are not.
+    /// Binary32 arithmetic: finite operands may give an infinity or a NaN.
     pub(super) fn is_arithmetic(self) -> bool {
         use Host::{Add, Divide, Fused, Multiply, Root, Subtract};
         matches!(self, Add | Subtract | Multiply | Divide | Root | Fused(..))
     }
 
-    /// The operands whose infinity or NaN propagates to the result.
+    /// Operands whose infinity or NaN propagates to the result.
     pub(super) fn passes_on(self) -> [bool; 3] {
         match self {
             Host::Magnitude | Host::Negation | Host::Divide | Host::Root => [true, false, false],
@@ -129,7 +129,7 @@ impl Host {
         }
     }
 
-    /// The operands that must not be a NaN, because the host's instruction treats it differently.
+    /// Operands that must not be NaN, because the host's instruction treats NaNs differently.
     pub(super) fn compares(self) -> [bool; 3] {
         use Host::{Equal, Less, LessOrEqual, Maximum, Minimum, Saturation, Sign};
         match self {
@@ -139,7 +139,7 @@ impl Host {
         }
     }
 
-    /// True if its result is a number if what [`Host::compares`] asks for is one.
+    /// The result is finite if the operands named by [`Host::compares`] are.
     pub(super) fn is_number(self) -> bool {
         use Host::{FromInteger, Maximum, Minimum, Saturation, Sign};
         matches!(self, FromInteger | Sign | Minimum | Maximum | Saturation)
@@ -154,7 +154,7 @@ impl Host {
         }
     }
 
-    /// The value that the compiled instructions compute; `None` where they leave the block to the interpreter.
+    /// Result of the compiled instructions; `None` where they leave the block to the interpreter.
     fn value(self, [a, b, c]: [u32; 3]) -> Option<u32> {
         let [x, y, z] = [a, b, c].map(f32::from_bits);
         let finite = |value: f32| value.is_finite().then_some(value.to_bits());
@@ -200,7 +200,7 @@ impl Host {
         }
     }
 
-    /// True if it is equivalent to `op`: the same bits, and no flag, wherever it has a value.
+    /// Equivalence to `op`: the same bits, and no flag, for all probes with a value.
     fn is(self, op: Op) -> bool {
         let sources = self.sources();
         let probes = |source: usize| if source < sources { &PROBES[..] } else { &PROBES[..1] };
@@ -216,7 +216,7 @@ impl Host {
             })
     }
 
-    /// The host's instruction for an operation; `None` if there is none, and the operation is a call.
+    /// Host instruction for an operation; `None` if the operation must be a call.
     pub(super) fn of(op: Op) -> Option<Host> {
         static FOUND: OnceLock<Vec<Option<Host>>> = OnceLock::new();
         let found = FOUND
@@ -229,7 +229,7 @@ impl Host {
 mod tests {
     use super::*;
 
-    /// No two host instructions are equivalent, and each is an operation of the machine, so that none is taken for another.
+    /// Host instructions are distinct: no two are equivalent, and each is an operation of the machine, so that none is taken for another.
     #[test]
     fn operations_are_told_apart() {
         for host in ALL {

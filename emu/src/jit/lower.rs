@@ -5,20 +5,21 @@
 //! mark is set, the registers that the block also reads are written. Otherwise these are unchanged, the call reports failure, and the
 //! memory words that it has overwritten can be restored from the scratch words.
 
-use super::emit::{Emit, Width};
+use super::emit::{Emit, VECTOR, Width};
 use super::graph::{Graph, Id, Node};
 use super::host::Host;
-use super::native::{Native, signature, target};
+use super::native::{NativeBlock, signature, target};
 use crate::machine::Word;
 use cranelift::codegen::ir::condcodes::{FloatCC, IntCC};
-use cranelift::codegen::ir::{Function, SigRef, UserFuncName};
+use cranelift::codegen::ir::{Function, SigRef, StackSlot, UserFuncName};
 use cranelift::prelude::{
-    AbiParam, FunctionBuilder, FunctionBuilderContext, InstBuilder, Signature, Value, types,
+    AbiParam, FunctionBuilder, FunctionBuilderContext, InstBuilder, MemFlagsData, Signature, StackSlotData,
+    StackSlotKind, Value, types,
 };
-use takt_isa::{Op, ROWS, compute, fp};
+use takt_isa::{Op, ROWS, compute, compute_lanes, fp};
 
-/// The layout of the scratch words, which pass other results than registers and memory: the flags, values of watched ports, data
-/// words of late loads, and for each store its address and the word it replaced (the undo log).
+/// Layout of the scratch words, which pass other results than registers and memory: the flags, values of watched ports, data words of late
+/// loads, and for each store its address and the word it replaced (the undo log).
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Scratch {
     pub(super) watched: usize,
@@ -43,32 +44,70 @@ extern "C" fn call(op: u32, a: u32, b: u32, c: u32) -> u64 {
     u64::from(value.flags.bits()) << 32 | u64::from(value.bits)
 }
 
-/// The representations of a value that have been needed so far.
+/// Operands of an operation, each in all lanes of a vector; the result replaces the first.
+type Operands = [[u32; VECTOR]; 3];
+
+/// Computes an operation without a host instruction in all lanes of a vector. The upper word of the result is nonzero if the operation
+/// raises a flag.
+extern "C" fn call_lanes(op: u32, operands: &mut Operands) -> u64 {
+    let [a, b, c] = *operands;
+    let raised =
+        compute_lanes::<fp::ScreenedFloat, VECTOR>(ROWS[op as usize].op, [&a, &b, &c], &mut operands[0]);
+    u64::from(raised) << 32
+}
+
+/// Representations of a value that have been needed so far.
 #[derive(Clone, Copy, Default)]
 struct Forms {
     float: Option<Value>,
     integer: Option<Value>,
-    /// True if the value is not zero.
+    /// Boolean: the value is not zero.
     truth: Option<Value>,
+    /// Register that holds the value up to the end of the block, if any.
+    home: Option<Word>,
+    /// The value has had a binary32 representation, perhaps dropped since.
+    is_float: bool,
+    /// Node of the value's last use.
+    used: Id,
 }
 
-/// The number of sums that collect the checks for infinities and NaNs: several, so that the additions do not depend on each other.
+/// Number of nodes without a use after which a value is loaded again from its register. The host has few registers: the compiler would
+/// otherwise spill the value to memory, only to load it from there.
+const NEAR: usize = 8;
+
+impl Forms {
+    /// Representations of a value before its first use.
+    fn of(node: Node) -> Forms {
+        let home = if let Node::Entry(word) = node { Some(word) } else { None };
+        Forms { home, ..Forms::default() }
+    }
+
+    fn is_float(&self) -> bool {
+        self.is_float || self.float.is_some()
+    }
+}
+
+/// Number of sums that collect the checks for infinities and NaNs: several, so that the additions do not depend on each other.
 const SUMS: usize = 4;
 
 struct Lowering<'a, 'f> {
     emit: Emit<'f>,
     nodes: &'a [Node],
     forms: Vec<Forms>,
+    /// Index of the node under translation.
+    now: Id,
     depth: u32,
     scratch: Scratch,
     registers: Value,
     memory: Value,
     words: Value,
     call: SigRef,
+    /// Stack slot for a call's [`Operands`], made at the first call.
+    operands: Option<StackSlot>,
     fused: bool,
     sums: [Option<Value>; SUMS],
     looked: usize,
-    /// The condition that leaves the block to the interpreter, in any lane; it includes that of addresses, which all lanes share.
+    /// Condition that leaves the block to the interpreter, in any lane; it includes the condition on addresses, which all lanes share.
     wrong: Option<Value>,
     wrong_address: Option<Value>,
     /// Flags of calls, in their upper words.
@@ -78,7 +117,7 @@ struct Lowering<'a, 'f> {
 }
 
 /// Compiles a block, for a data memory of `depth` words; `None` if the compiled code would not be worth while.
-pub(super) fn lower(graph: &Graph, depth: u32, scratch: Scratch, width: Width) -> Option<Native> {
+pub(super) fn lower(graph: &Graph, depth: u32, scratch: Scratch, width: Width) -> Option<NativeBlock> {
     let target = target()?;
     let has =
         |name: &str| target.isa_flags().iter().any(|flag| flag.name == name && flag.as_bool() == Some(true));
@@ -95,19 +134,25 @@ pub(super) fn lower(graph: &Graph, depth: u32, scratch: Scratch, width: Width) -
     builder.seal_block(entry);
     let &[registers, memory, words] = builder.block_params(entry) else { return None };
     let mut called = Signature::new(target.default_call_conv());
-    called.params.extend([AbiParam::new(types::I32); 4]);
+    called.params.push(AbiParam::new(types::I32));
+    called.params.extend(match width {
+        Width::One => vec![AbiParam::new(types::I32); 3],
+        Width::Vector { .. } => vec![AbiParam::new(types::I64)],
+    });
     called.returns.push(AbiParam::new(types::I64));
     let call = builder.import_signature(called);
     let mut lowering = Lowering {
         emit: Emit { builder, width },
         nodes: &graph.nodes,
-        forms: vec![Forms::default(); graph.nodes.len()],
+        forms: graph.nodes.iter().map(|&node| Forms::of(node)).collect(),
+        now: 0,
         depth,
         scratch,
         registers,
         memory,
         words,
         call,
+        operands: None,
         fused: has("has_fma"),
         sums: [None; SUMS],
         looked: 0,
@@ -119,26 +164,39 @@ pub(super) fn lower(graph: &Graph, depth: u32, scratch: Scratch, width: Width) -
     };
     let (early, last) = graph.places();
     for (id, looked_at) in looked_at.into_iter().enumerate() {
+        lowering.now = id;
         lowering.node(id)?;
         for &word in &early[id] {
             lowering.write(word, id);
+            lowering.forms[id].home = Some(word);
         }
         if looked_at {
             lowering.look_at(id);
         }
     }
     lowering.finish(graph, &last);
-    Native::new(function, width, depth as usize, scratch.end)
+    NativeBlock::new(function, width, depth as usize, scratch.end)
 }
 
 impl Lowering<'_, '_> {
+    /// Drops the representations of a value in a register that was not used in the last [`NEAR`] nodes.
+    fn refresh(&mut self, id: Id) {
+        let forms = &mut self.forms[id];
+        if forms.home.is_some() && self.now - forms.used > NEAR {
+            *forms = Forms { home: forms.home, is_float: forms.is_float(), ..Forms::default() };
+        }
+        forms.used = self.now;
+    }
+
     fn float(&mut self, id: Id) -> Value {
-        if let Some(value) = self.forms[id].float {
+        self.refresh(id);
+        let forms = self.forms[id];
+        if let Some(value) = forms.float {
             return value;
         }
-        let value = match (self.nodes[id], self.forms[id].integer) {
+        let value = match (self.nodes[id], forms.home) {
             (Node::Constant(bits), _) => self.emit.float_constant(f32::from_bits(bits)),
-            (Node::Entry(word), _) => self.emit.load_float(self.registers, word.index()),
+            (_, Some(word)) => self.emit.load_float(self.registers, word.index()),
             _ => {
                 let integer = self.integer(id);
                 self.emit.as_float(integer)
@@ -149,17 +207,18 @@ impl Lowering<'_, '_> {
     }
 
     fn integer(&mut self, id: Id) -> Value {
+        self.refresh(id);
         let forms = self.forms[id];
         if let Some(value) = forms.integer {
             return value;
         }
         let value = match self.nodes[id] {
             Node::Constant(bits) => self.emit.constant(bits),
-            Node::Entry(word) => self.emit.load(self.registers, word.index()),
-            _ => match (forms.float, forms.truth) {
-                (Some(float), _) => self.emit.as_integer(float),
-                (_, Some(truth)) => self.emit.truth_as_integer(truth),
-                // It has none: a store.
+            _ => match (forms.float, forms.truth, forms.home) {
+                (Some(float), ..) => self.emit.as_integer(float),
+                (_, Some(truth), _) => self.emit.truth_as_integer(truth),
+                (.., Some(word)) => self.emit.load(self.registers, word.index()),
+                // Stores have no value.
                 _ => self.emit.constant(0),
             },
         };
@@ -168,6 +227,7 @@ impl Lowering<'_, '_> {
     }
 
     fn truth(&mut self, id: Id) -> Value {
+        self.refresh(id);
         if let Some(value) = self.forms[id].truth {
             return value;
         }
@@ -177,7 +237,7 @@ impl Lowering<'_, '_> {
         value
     }
 
-    /// The OR of two marks, the first of which may be missing.
+    /// Disjunction of two marks; the first may be missing.
     fn either(&mut self, mark: Option<Value>, wrong: Value) -> Option<Value> {
         Some(match mark {
             Some(before) => self.emit.builder.ins().bor(before, wrong),
@@ -206,8 +266,8 @@ impl Lowering<'_, '_> {
         });
     }
 
-    /// The address of a data word, and its index in every lane. If it is outside of the memory, or if lanes differ, sets the mark
-    /// and gives some valid address.
+    /// Address of a data word, and its index in every lane. If it is outside of the memory, or if lanes differ, sets the mark and gives a
+    /// valid address.
     fn address(&mut self, base: Id, offset: u32) -> (Value, Value) {
         let number = match self.nodes[base] {
             Node::Constant(base) if offset.wrapping_add(base) < self.depth => {
@@ -215,7 +275,7 @@ impl Lowering<'_, '_> {
             }
             _ => {
                 let bases = self.integer(base);
-                let base = self.emit.words(bases)[0];
+                let base = self.emit.first(bases);
                 if self.emit.width != Width::One {
                     let first = self.emit.every(base);
                     let differs = self.emit.builder.ins().icmp(IntCC::NotEqual, bases, first);
@@ -235,10 +295,13 @@ impl Lowering<'_, '_> {
         (self.emit.address(self.memory, number), self.emit.every(number))
     }
 
-    /// A value in any existing representation, to be stored.
+    /// Value in any existing representation, to be stored.
     fn any(&mut self, id: Id) -> Value {
-        match self.forms[id].float {
+        self.refresh(id);
+        let Forms { float, integer, .. } = self.forms[id];
+        match float {
             Some(float) => float,
+            None if integer.is_none() && self.forms[id].is_float => self.float(id),
             None => self.integer(id),
         }
     }
@@ -260,7 +323,7 @@ impl Lowering<'_, '_> {
                 self.forms[id].integer = Some(self.emit.load(self.words, 0));
             }
             Node::Host(host, sources) if !self.has(host) => {
-                // The operation is found by its host instruction.
+                // Find the operation of the host instruction.
                 let row = ROWS.iter().find(|row| Host::of(row.op) == Some(host))?;
                 self.call(id, row.op, sources);
             }
@@ -298,7 +361,7 @@ impl Lowering<'_, '_> {
         Some(())
     }
 
-    /// True if there is an instruction for it at this width: vectors have no shift by a different count in each lane.
+    /// The host has an instruction at this width: vectors have no shift by a different count in each lane.
     fn has(&self, host: Host) -> bool {
         match host {
             Host::Fused(..) => self.fused,
@@ -309,19 +372,40 @@ impl Lowering<'_, '_> {
 
     fn call(&mut self, id: Id, op: Op, sources: [Id; 3]) {
         let sources = sources.map(|source| self.integer(source));
-        let [a, b, c] = sources.map(|source| self.emit.words(source));
-        let mut words = Vec::new();
-        for ((a, b), c) in a.into_iter().zip(b).zip(c) {
-            let builder = &mut self.emit.builder;
-            let op = builder.ins().iconst(types::I32, op as i64);
-            let function = call as extern "C" fn(u32, u32, u32, u32) -> u64;
-            let function = builder.ins().iconst(types::I64, function as usize as i64);
-            let inst = builder.ins().call_indirect(self.call, function, &[op, a, b, c]);
-            let both = builder.inst_results(inst)[0];
-            words.push(builder.ins().ireduce(types::I32, both));
-            self.raised = self.either(self.raised, both);
+        if self.emit.width != Width::One {
+            return self.call_lanes(id, op, sources);
         }
-        self.forms[id].integer = Some(self.emit.of_words(&words));
+        let function = call as extern "C" fn(u32, u32, u32, u32) -> u64;
+        let both = self.call_indirect(op, function as usize, &sources);
+        self.forms[id].integer = Some(self.emit.builder.ins().ireduce(types::I32, both));
+    }
+
+    fn call_lanes(&mut self, id: Id, op: Op, sources: [Value; 3]) {
+        let size = size_of::<Operands>() as u32;
+        let builder = &mut self.emit.builder;
+        let slot = *self.operands.get_or_insert_with(|| {
+            builder.create_sized_stack_slot(StackSlotData::new(StackSlotKind::ExplicitSlot, size, 4))
+        });
+        let address = builder.ins().stack_addr(types::I64, slot, 0);
+        let flags = MemFlagsData::new().with_notrap();
+        for (source, offset) in sources.into_iter().zip((0..).step_by(size_of::<Operands>() / 3)) {
+            builder.ins().store(flags, source, address, offset);
+        }
+        let function = call_lanes as extern "C" fn(u32, &mut Operands) -> u64;
+        self.call_indirect(op, function as usize, &[address]);
+        self.forms[id].integer = Some(self.emit.builder.ins().load(types::I32X4, flags, address, 0));
+    }
+
+    /// Calls a function with an operation and further arguments, and keeps the flags that it raises.
+    fn call_indirect(&mut self, op: Op, function: usize, arguments: &[Value]) -> Value {
+        let builder = &mut self.emit.builder;
+        let mut all = vec![builder.ins().iconst(types::I32, op as i64)];
+        all.extend(arguments);
+        let function = builder.ins().iconst(types::I64, function as i64);
+        let inst = builder.ins().call_indirect(self.call, function, &all);
+        let result = builder.inst_results(inst)[0];
+        self.raised = self.either(self.raised, result);
+        result
     }
 
     fn host(&mut self, id: Id, host: Host, sources: [Id; 3]) {
@@ -329,7 +413,7 @@ impl Lowering<'_, '_> {
             Host::Copy => self.forms[id] = self.forms[sources[0]],
             Host::Choose => {
                 let condition = self.truth(sources[0]);
-                let as_float = sources[1..].iter().any(|&source| self.forms[source].float.is_some());
+                let as_float = sources[1..].iter().any(|&source| self.forms[source].is_float());
                 if as_float {
                     let (yes, no) = (self.float(sources[1]), self.float(sources[2]));
                     self.forms[id].float = Some(self.emit.choose_float(condition, yes, no));
@@ -395,7 +479,7 @@ impl Lowering<'_, '_> {
         }
     }
 
-    /// Operations on binary32 that give one.
+    /// Operations on binary32 with a binary32 result.
     fn number(&mut self, host: Host, sources: [Id; 3]) -> Value {
         let a = self.float(sources[0]);
         if matches!(host, Host::Magnitude | Host::Negation | Host::Root | Host::Sign) {
@@ -469,7 +553,7 @@ impl Lowering<'_, '_> {
             builder.ins().return_(&[one]);
             builder.switch_to_block(right);
         }
-        // All are read before any is written, since one may get the old value of another.
+        // Read all values before writing any, since a word may get the old value of another.
         let values: Vec<(Word, Value)> = last.iter().map(|&(word, id)| (word, self.any(id))).collect();
         for (word, value) in values {
             self.emit.store(value, self.registers, word.index());

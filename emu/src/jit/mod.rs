@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Just-in-time compiler of blocks to the host's instructions (feature `jit`, on x86-64).
 //!
-//! A block that has run often enough is compiled, speculatively: its code handles the ordinary case only, and checks that it is
-//! one (`graph`). If it is not, the interpreter runs the block again from the same initial state. So both modes agree. A block
-//! whose checks fail often is left to the interpreter.
+//! A block that has run often enough is compiled, speculatively: its code handles the ordinary case only, and checks for it (`graph`). In
+//! any other case, the interpreter runs the block again from the same initial state. So both modes agree. A block whose checks fail often
+//! is left to the interpreter.
 
 mod emit;
 mod graph;
@@ -13,28 +13,28 @@ mod native;
 
 use crate::lane::{LANES, Row};
 use crate::machine::{State, WORDS, Word};
-use crate::micro::{Kind, Late, Micro};
+use crate::micro::{Kind, LateResult, Micro};
 use emit::{VECTOR, Width};
 use graph::Graph;
 use lower::Scratch;
-use native::Native;
+use native::NativeBlock;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use takt_isa::Effect;
 use takt_isa::fp::Flags;
 
-/// A block's code.
+/// Compiled code of a block.
 #[derive(Clone)]
 pub(crate) struct Code(Arc<Parts>);
 
 struct Parts {
-    native: Native,
+    native: NativeBlock,
     scratch: Scratch,
     /// Numbers of the checks whose ports are watched, in order.
     watches: Box<[u32]>,
 }
 
-/// The output of the code: the data words that late results were loaded from, by number, and values written to watched ports.
+/// Output of the code: the data words that late results were loaded from, by number, and values written to watched ports.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Words(Vec<u32>);
 
@@ -44,10 +44,10 @@ impl std::fmt::Debug for Code {
     }
 }
 
-/// True if the compiler is turned off in this process.
+/// Turns the compiler off in this process.
 static SWITCHED_OFF: AtomicBool = AtomicBool::new(false);
 
-/// True if blocks can be compiled for this host.
+/// Blocks can be compiled on this host, and the compiler is not turned off.
 pub(crate) fn is_available() -> bool {
     !SWITCHED_OFF.load(Ordering::Relaxed) && native::target().is_some()
 }
@@ -57,7 +57,7 @@ pub(crate) fn switch_off() {
 }
 
 /// Compiles a block; `None` if the compiler cannot.
-pub(crate) fn compile(micros: &[Micro], late: &[Late], depth: u32) -> Option<Code> {
+pub(crate) fn compile(micros: &[Micro], late: &[LateResult], depth: u32) -> Option<Code> {
     if !is_available() {
         return None;
     }
@@ -67,12 +67,12 @@ pub(crate) fn compile(micros: &[Micro], late: &[Late], depth: u32) -> Option<Cod
     Some(Code(Arc::new(Parts { native, scratch, watches: graph.watches.into() })))
 }
 
-/// A block's code for the lanes of a batch.
+/// Compiled code of a block for the lanes of a batch.
 #[derive(Clone)]
 pub(crate) struct LaneCode(Arc<LaneParts>);
 
 struct LaneParts {
-    native: Native,
+    native: NativeBlock,
     scratch: Scratch,
     /// Registers that the code writes at its end. If a later vector fails, they must be restored in the earlier ones.
     last: Box<[Word]>,
@@ -85,7 +85,7 @@ impl std::fmt::Debug for LaneCode {
     }
 }
 
-/// The output of the code for lanes, and its undo log.
+/// Output of the code for lanes, and its undo log.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Rows {
     rows: Vec<Row>,
@@ -93,14 +93,14 @@ pub(crate) struct Rows {
 }
 
 impl Rows {
-    /// The data words that a late result was loaded from.
+    /// Data words that a late result was loaded from.
     pub(crate) fn late(&self, code: &LaneCode, number: usize) -> Row {
         self.rows[code.0.scratch.late + number]
     }
 }
 
 /// Compiles a block for the lanes of a batch; `None` if the compiler cannot.
-pub(crate) fn compile_lanes(micros: &[Micro], late: &[Late], depth: u32) -> Option<LaneCode> {
+pub(crate) fn compile_lanes(micros: &[Micro], late: &[LateResult], depth: u32) -> Option<LaneCode> {
     if !is_available() {
         return None;
     }
@@ -114,7 +114,7 @@ pub(crate) fn compile_lanes(micros: &[Micro], late: &[Late], depth: u32) -> Opti
 }
 
 impl LaneCode {
-    /// Runs the block in all lanes. If the result is false, the interpreter must run it; everything that it reads is unchanged.
+    /// Runs the block in all lanes. If the result is false, the interpreter must run it; the state that it reads is unchanged.
     pub(crate) fn run(
         &self,
         registers: &mut [Row; WORDS],
@@ -155,10 +155,10 @@ impl LaneCode {
 }
 
 impl Code {
-    /// Runs the block. If the result is false, the interpreter must run it; everything that it reads is unchanged.
+    /// Runs the block. If the result is false, the interpreter must run it; the state that it reads is unchanged.
     pub(crate) fn run(
         &self,
-        from: &[Late],
+        from: &[LateResult],
         state: &mut State,
         words: &mut Words,
         late: &mut [(Flags, Option<u32>)],

@@ -12,23 +12,23 @@ use cranelift::prelude::{AbiParam, Configurable, Signature, settings, types};
 use memmap2::{Mmap, MmapMut};
 use std::sync::OnceLock;
 
-/// The code of a block.
+/// Entry point of a block's code.
 type Entry = unsafe extern "C" fn(registers: *mut u32, memory: *mut u32, scratch: *mut u32) -> u32;
 
-/// A compiled block.
-pub(super) struct Native {
+/// Compiled block in executable memory.
+pub(super) struct NativeBlock {
     code: Mmap,
     width: Width,
     memory: usize,
     scratch: usize,
 }
 
-/// The host's instruction set; `None` if code cannot be made for it.
+/// Instruction set of the host; `None` if code cannot be made for it.
 pub(super) fn target() -> Option<&'static dyn TargetIsa> {
     static TARGET: OnceLock<Option<OwnedTargetIsa>> = OnceLock::new();
     let target = TARGET.get_or_init(|| {
         let mut flags = settings::builder();
-        // Its optimiser would move operations, and so cause spills to memory.
+        // Cranelift's optimiser would move operations, and so cause spills to memory.
         flags.set("opt_level", "none").ok()?;
         // The verifier checks Cranelift's own output; in release builds it would only cost time.
         flags.set("enable_verifier", if cfg!(debug_assertions) { "true" } else { "false" }).ok()?;
@@ -37,7 +37,7 @@ pub(super) fn target() -> Option<&'static dyn TargetIsa> {
     target.as_deref()
 }
 
-/// The signature of a block's code: registers, data memory, scratch words; the result is 0 if the code succeeded.
+/// Signature of a block's code: registers, data memory, scratch words; the result is 0 if the code succeeded.
 pub(super) fn signature(target: &dyn TargetIsa) -> Signature {
     let mut signature = Signature::new(target.default_call_conv());
     signature.params.extend([AbiParam::new(types::I64); 3]);
@@ -45,25 +45,30 @@ pub(super) fn signature(target: &dyn TargetIsa) -> Signature {
     signature
 }
 
-impl Native {
+impl NativeBlock {
     /// Compiles a function with [`signature`] to machine code. The function must not access more than [`WORDS`] registers, `memory`
     /// words of data memory and `scratch` words, for each run of `width`. `None` if it cannot be compiled, or memory runs out.
-    pub(super) fn new(function: Function, width: Width, memory: usize, scratch: usize) -> Option<Native> {
+    pub(super) fn new(
+        function: Function,
+        width: Width,
+        memory: usize,
+        scratch: usize,
+    ) -> Option<NativeBlock> {
         let target = target()?;
         let mut context = Context::for_function(function);
         let compiled = context.compile(target, &mut ControlPlane::default()).ok()?;
-        // Calls are by address, so that there is nothing to relocate.
+        // Calls are by address, so that no relocations are needed.
         if !compiled.buffer.relocs().is_empty() {
             return None;
         }
         let code = compiled.code_buffer();
         let mut pages = MmapMut::map_anon(code.len()).ok()?;
         pages.copy_from_slice(code);
-        Some(Native { code: pages.make_exec().ok()?, width, memory, scratch })
+        Some(NativeBlock { code: pages.make_exec().ok()?, width, memory, scratch })
     }
 
-    /// Runs the block in the lanes of one vector, from `lane` on (scalar code: in lane 0 only). If a check failed, the result is false,
-    /// and in these lanes every register that the block reads before it writes it is unchanged.
+    /// Runs the block in the lanes of one vector, from `lane` on (scalar code: in lane 0 only). If a check failed, the result is false, and
+    /// in these lanes every register that the block reads before it writes it is unchanged.
     pub(super) fn call(
         &self,
         registers: &mut [u32],
@@ -71,7 +76,7 @@ impl Native {
         scratch: &mut [u32],
         lane: usize,
     ) -> bool {
-        let Native { width, memory: depth, scratch: places, .. } = *self;
+        let NativeBlock { width, memory: depth, scratch: places, .. } = *self;
         let stride = width.stride();
         assert!(lane + width.lanes() <= stride, "the batch has no such lanes");
         assert!(registers.len() >= WORDS * stride, "the block needs more registers");

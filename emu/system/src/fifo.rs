@@ -1,27 +1,27 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A FIFO: what is put in comes out in that order; what does not go in is counted.
+//! FIFO link: entries leave in the order in which they entered; refused pushes and pops are counted.
 
 use std::collections::VecDeque;
 use takt_isa::timing::Cycle;
 
 use takt_isa::system::Status;
 
-/// Counts of the events of a FIFO.
+/// Event counts of a FIFO.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FifoCounts {
-    /// Entries that went in.
+    /// Entries accepted by the FIFO.
     pub pushed: u64,
-    /// Entries that came out.
+    /// Entries removed by pops.
     pub popped: u64,
-    /// Entries refused because it was full.
+    /// Pushes refused because the FIFO was full.
     pub overflows: u64,
-    /// Entries asked for while it was empty.
+    /// Pops refused because the FIFO was empty.
     pub underflows: u64,
-    /// The most that it held.
+    /// Largest number of entries held.
     pub most: u32,
 }
 
-/// The entries and their status.
+/// Entries of a FIFO and its counts.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Store {
     depth: u32,
@@ -29,10 +29,10 @@ pub(crate) struct Store {
     pub(crate) counts: FifoCounts,
 }
 
-/// The changes of a cycle.
+/// Changes of a FIFO in one cycle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Change {
-    /// Another entry is the first.
+    /// A different entry is at the head.
     pub(crate) head: bool,
     pub(crate) pushed: bool,
     pub(crate) popped: bool,
@@ -45,7 +45,7 @@ impl Store {
         Store { depth, ..Store::default() }
     }
 
-    /// One cycle: first one may be taken out, then one may be put in.
+    /// Performs one cycle: the pop first, then the push, so that a full FIFO can do both.
     pub(crate) fn cycle(&mut self, pop: bool, push: Option<Vec<u32>>) -> Change {
         let mut change = Change::default();
         if pop {
@@ -87,13 +87,13 @@ impl Store {
     }
 }
 
-/// A FIFO between two sides that run on their own: what each did, and how far it is carried out.
+/// FIFO between two sides that run ahead independently: the pending actions of each side, and the cycle up to which they are performed.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Fifo {
     pub(crate) store: Store,
     pushes: VecDeque<(Cycle, Vec<u32>)>,
     pops: VecDeque<Cycle>,
-    /// Cycles that are carried out.
+    /// Cycles performed so far.
     pub(crate) done: Cycle,
 }
 
@@ -110,30 +110,30 @@ impl Fifo {
         self.pops.push_back(cycle);
     }
 
-    /// The cycle after the last that is to come already of each side: a host does one thing a cycle.
+    /// First cycle in which each side may push or pop next: the cycle after its last pending action, since a host acts once per cycle.
     pub(crate) fn free(&self) -> (Cycle, Cycle) {
         let push = self.pushes.back().map_or(0, |(cycle, _)| cycle + 1);
         (push, self.pops.back().map_or(0, |cycle| cycle + 1))
     }
 
-    /// Pops that are to come already.
+    /// Number of pending pops.
     pub(crate) fn popping(&self) -> usize {
         self.pops.len()
     }
 
-    /// Pushes that are to come already.
+    /// Number of pending pushes.
     pub(crate) fn pushing(&self) -> usize {
         self.pushes.len()
     }
 
-    /// The next cycle in which something happens, of what each side has done so far.
+    /// Cycle of the first pending action.
     pub(crate) fn next_cycle(&self) -> Option<Cycle> {
         let push = self.pushes.front().map(|(cycle, _)| *cycle);
         push.into_iter().chain(self.pops.front().copied()).min()
     }
 
-    /// The next cycle before `end` in which something happens, with what does; the cycles before `end` are done when there is
-    /// none.
+    /// Performs the next pending action before `end` and returns its cycle and changes; `None`, with all cycles before `end` done, if no
+    /// action is left.
     pub(crate) fn next(&mut self, end: Cycle) -> Option<(Cycle, Change)> {
         let Some(cycle) = self.next_cycle().filter(|cycle| *cycle < end) else {
             self.done = self.done.max(end);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The file as it is written: tables and keys, each value with its place.
+//! Serde model of a system's file: tables and keys, each value with its place.
 
 use serde::Deserialize;
 use toml::Spanned;

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Several cores in one clock, and links between their ports.
+//! Several cores on one clock, and links between their ports.
 //!
-//! [`read`] makes a [`Description`] of a TOML file, or says what is wrong with it and at which line. [`System`] emulates
-//! one exactly, every core's cycle and every link's latency in one global time. [`latency`] bounds the way from a
-//! host's command to an output, [`stale`] finds stale reads of FIFOs, [`Recording`] replays a core by itself.
-//! `docs/system.md` defines in which cycle the other side sees what. Nothing here prints.
+//! [`read`] makes a [`Description`] of a TOML file, or reports its mistakes with their lines. [`System`] emulates a description exactly,
+//! every core's cycle and every link's latency in one global time. [`latency`] bounds the time from a host's command to an output,
+//! [`stale_reads`] finds stale reads of FIFOs, [`Recording`] replays a core by itself. `docs/system.md` defines the cycle in which each side of a
+//! link sees a value. The crate prints nothing.
 
 mod check;
 mod fifo;
@@ -12,7 +12,7 @@ mod file;
 mod gate;
 pub mod latency;
 mod replay;
-pub mod stale;
+pub mod stale_reads;
 mod system;
 #[cfg(feature = "testing")]
 pub mod testing;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Replay of a core by itself: given the inputs and the ticks that it had in a system, in the same cycles, it does the same.
+//! Replay of a core by itself: the recorded inputs and ticks of a system, in the same cycles, reproduce the core's run.
 
 use crate::System;
 use std::collections::VecDeque;
@@ -7,29 +7,29 @@ use takt_emu::{Emulator, Event, LoadError};
 use takt_isa::Register;
 use takt_isa::timing::Cycle;
 
-/// The inputs and ticks of each core of a system.
+/// Recorded inputs and ticks of each core of a system.
 pub struct Recording {
-    cores: Vec<Given>,
+    cores: Vec<RecordedInputs>,
 }
 
-/// The inputs and ticks of a core.
+/// Recorded inputs and ticks of a core.
 #[derive(Clone, Default)]
-struct Given {
+struct RecordedInputs {
     /// Values of input ports, each with the first cycle in which it counts.
     inputs: VecDeque<(Cycle, Register, u32)>,
     ticks: Vec<Cycle>,
-    /// Cycles until its last period ended, or until it halted.
+    /// Cycles until the last period ended, or until the core halted.
     end: Cycle,
 }
 
 impl Recording {
-    /// Begins with a system after reset.
+    /// Starts recording a system after reset.
     pub fn new(system: &mut System) -> Recording {
         system.keep_core_events();
-        Recording { cores: vec![Given::default(); system.description().cores.len()] }
+        Recording { cores: vec![RecordedInputs::default(); system.description().cores.len()] }
     }
 
-    /// Keeps what has happened since the last call: it is to be called after each run of the system.
+    /// Records the events since the last call; call it after each run of the system.
     pub fn record(&mut self, system: &mut System) {
         for input in system.take_input_events() {
             let delay = system.description().cores[input.core].input_delay();
@@ -44,7 +44,7 @@ impl Recording {
         }
     }
 
-    /// A core's replay, of the periods that it has ended.
+    /// Replay of a core, up to its last completed period.
     ///
     /// # Errors
     /// If the core's memories cannot hold its program.
@@ -61,24 +61,24 @@ impl Recording {
     }
 }
 
-/// A core by itself.
+/// Core outside of its system.
 pub struct Replay {
-    /// The core, whose ticks are asked for.
+    /// Emulator of the core, with its ticks scheduled.
     pub emulator: Emulator,
-    /// Its inputs to come.
+    /// Input changes to come.
     pub inputs: Inputs,
-    /// Cycles until its last period has ended, or until it has halted.
+    /// Cycles until the core's last period has ended, or until it has halted.
     pub end: Cycle,
 }
 
-/// Inputs to come of a core.
+/// Future input changes of a core.
 pub struct Inputs(VecDeque<(Cycle, Register, u32)>);
 
 impl Inputs {
-    /// Sets those that count from the core's next cycle on.
+    /// Sets the inputs that count from the core's next cycle on.
     pub fn set(&mut self, emulator: &mut Emulator) {
         while let Some((_, register, value)) = self.0.pop_front_if(|(cycle, ..)| *cycle <= emulator.now()) {
-            // A mailbox's port is an input.
+            // The register is an input port, so that setting it cannot fail.
             let _ = emulator.set_input_bits(register, value);
         }
     }

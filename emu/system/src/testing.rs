@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Random systems from a seed, and a stepper that goes cycle by cycle, with every register of a link in its place: for
-//! tests, of the emulator here and of the circuit against it.
+//! Test support: random systems from a seed, and a reference model that steps cycle by cycle, with every register of a link in its place.
+//! Tests compare the emulator and the circuit with it.
 
 use crate::fifo::{Change, Store};
 use crate::{ProgramError, ReadError, read};
@@ -14,13 +14,13 @@ use takt_isa::system::{Description, End, Link, LinkKind, Side, Source, Status};
 use takt_isa::timing::{Cycle, ENDED_DELAY};
 use takt_isa::{MACHINES, Machine, Program, Register};
 
-/// The random system of a seed, as a file, and its programs by path.
+/// Random system of a seed, as a file, with its programs by path.
 pub fn random_system(seed: u64, machines: &[&'static Machine]) -> (String, BTreeMap<String, Program>) {
     let mut random = Random::new(seed.wrapping_mul(0x9e37_79b9) ^ 0x5157);
     let count = 2 + random.below(3) as usize;
     let mut text = format!("tick = {}\n", 40 + random.below(500));
     let mut programs = BTreeMap::new();
-    // Of each core the names of its ports; inputs are used up.
+    // Names of each core's ports; an input is removed once a link drives it.
     let (mut inputs, mut outputs) = (Vec::new(), Vec::new());
     for core in 0..count {
         let machine = machines[random.below(machines.len() as u32) as usize];
@@ -31,7 +31,7 @@ pub fn random_system(seed: u64, machines: &[&'static Machine]) -> (String, BTree
         outputs.push(program.outputs.iter().map(|port| port.name.clone()).collect::<Vec<_>>());
         let path = format!("core{core}.s");
         let _ = writeln!(text, "\n[[core]]\nname = \"c{core}\"\nprogram = \"{path}\"");
-        // A machine of a test is known by its program alone.
+        // Machines made by tests have no name that a file could use: their programs bring them.
         if Machine::from_name(machine.name).is_ok() {
             let _ = writeln!(text, "machine = \"{}\"", machine.name);
         }
@@ -89,7 +89,7 @@ pub fn random_system(seed: u64, machines: &[&'static Machine]) -> (String, BTree
                 }
                 continue;
             }
-            // Some of them deeper than what the circuit keeps outside of block RAM.
+            // Depths beyond the circuit's limit for FIFOs outside of block RAM.
             let depth = [1, 2, 3, 4, 5, 6, 33, 40][random.below(8) as usize];
             let _ = writeln!(text, "depth = {depth}\npop = \"{}\"", own(&mut random));
             if !host {
@@ -106,7 +106,7 @@ pub fn random_system(seed: u64, machines: &[&'static Machine]) -> (String, BTree
             }
         }
     }
-    // The host's side.
+    // Links to the host.
     let all: Vec<(usize, &String)> = outputs
         .iter()
         .enumerate()
@@ -131,7 +131,7 @@ pub fn random_system(seed: u64, machines: &[&'static Machine]) -> (String, BTree
     (text, programs)
 }
 
-/// The description that a file with its programs makes.
+/// Description of a system from its file and programs.
 ///
 /// # Errors
 /// The mistakes in the file.
@@ -147,7 +147,7 @@ pub fn describe(
     })
 }
 
-/// The random system of a seed. Those that a file cannot say (a tick that is too short) are left out for the next one.
+/// Random system of a seed. Systems that are no valid file (a tick that is too short) are replaced by the next one.
 pub fn random_description(seed: u64, machines: &[&'static Machine]) -> Description {
     let seeds = (0..).map(|i: u64| seed.wrapping_add(i << 32));
     let tries = seeds.map(|seed| random_system(seed, machines));
@@ -158,12 +158,12 @@ pub fn random_description(seed: u64, machines: &[&'static Machine]) -> Descripti
     })
 }
 
-/// Every machine.
+/// Machines of the tables, for [`random_description`].
 pub fn all_machines() -> Vec<&'static Machine> {
     MACHINES.to_vec()
 }
 
-/// A register line of a length: what goes in comes out so many cycles later.
+/// Delay line: outputs each input after `length` steps.
 #[derive(Clone)]
 struct DelayLine<T> {
     stages: VecDeque<Option<T>>,
@@ -183,47 +183,47 @@ impl<T> DelayLine<T> {
 struct ReferenceCore {
     emulator: Emulator,
     mailboxes: Vec<crate::Mailbox>,
-    /// Mailboxes with a value that waits before the pins.
+    /// Values that wait before the pins, by mailbox.
     gate: BTreeMap<usize, u32>,
-    /// From the pins to where it counts.
+    /// Delay from the pins to the cycle in which the value counts.
     pins: DelayLine<(Register, u32)>,
     /// Writes to output ports whose cycle has not come.
     writes: Vec<(Cycle, Register, u32)>,
     waits: BTreeSet<Cycle>,
     waited: Option<Cycle>,
-    /// Arrived in this cycle.
+    /// Arrivals of this cycle, by mailbox.
     arrived: Vec<(usize, u32)>,
     halted: bool,
 }
 
-/// The changes of a FIFO in a cycle: its head, if it has another, and its status.
-type Changed = (Option<Vec<u32>>, Vec<(Status, u32)>);
+/// Changes of a FIFO in a cycle: the new head, if it changed, and the status.
+type FifoChange = (Option<Vec<u32>>, Vec<(Status, u32)>);
 
 struct ReferenceLink {
-    /// Of a wire.
+    /// Values under way on a wire.
     wire: DelayLine<u32>,
-    /// Of a snapshot: writes of a cycle, and whether they are published.
+    /// Writes of a snapshot in each cycle; the flag marks a publication.
     writes: DelayLine<(Vec<(usize, u32)>, bool)>,
     working: Vec<u32>,
     published: Vec<u32>,
-    /// Of a FIFO: entries on their way there, and its status on the way back.
+    /// Entries under way to a FIFO; its status is under way in `back`.
     pushes: DelayLine<Vec<u32>>,
     store: Store,
     back: DelayLine<Vec<(Status, u32)>>,
-    /// The changes of the last cycle.
-    change: Option<Changed>,
-    /// Latched: what is to be sent at the `wait`.
+    /// Changes of the previous cycle.
+    change: Option<FifoChange>,
+    /// Value to be sent at the `wait`, for latched ports.
     changed: Option<u32>,
-    /// The host's, for this cycle.
+    /// Actions of the host in this cycle.
     host_value: Option<u32>,
     host_publish: Option<Vec<u32>>,
     host_push: Option<Vec<u32>>,
     host_pop: bool,
-    /// The values that the host sees.
+    /// Value of the wire that the host sees.
     shown: u32,
 }
 
-/// All cores of a system in cycle lockstep.
+/// Reference model of a system: all cores and links in lockstep, cycle by cycle.
 pub struct Reference {
     description: Arc<Description>,
     cores: Vec<ReferenceCore>,
@@ -233,10 +233,10 @@ pub struct Reference {
 }
 
 impl Reference {
-    /// As [`crate::System::new`].
+    /// Model after reset, like [`crate::System::new`].
     ///
     /// # Errors
-    /// As there.
+    /// If a core's memories cannot hold its program.
     pub fn new(description: &Description) -> Result<Reference, LoadError> {
         let mut cores = Vec::new();
         for (number, core) in description.cores.iter().enumerate() {
@@ -263,7 +263,7 @@ impl Reference {
             let extra = if late { ENDED_DELAY } else { 0 };
             let initial: Vec<u32> = link.fields.iter().map(|field| field.initial).collect();
             let depth = if let LinkKind::Fifo { depth, .. } = link.kind { depth } else { 0 };
-            // The host's values are not two cycles late.
+            // The host publishes without a core's `wait`, which would add two cycles.
             let told = if link.from == End::Host { 0 } else { ENDED_DELAY };
             ReferenceLink {
                 wire: DelayLine::new(link.transit() + extra),
@@ -286,22 +286,22 @@ impl Reference {
         Ok(Reference { description: Arc::new(description.clone()), cores, links, now: 0, start: None })
     }
 
-    /// Cycles that have passed.
+    /// Cycles that have passed since reset.
     pub fn now(&self) -> Cycle {
         self.now
     }
 
-    /// The first base tick.
+    /// Cycle of the first base tick.
     pub fn start(&self) -> Option<Cycle> {
         self.start
     }
 
-    /// A core.
+    /// Emulator of a core.
     pub fn core(&self, core: usize) -> &Emulator {
         &self.cores[core].emulator
     }
 
-    /// The value that the host sees of a wire, of a snapshot, or of a FIFO's head.
+    /// Value that the host sees of a wire, of a snapshot, or of a FIFO's head.
     pub fn output(&self, link: usize, field: usize) -> u32 {
         let state = &self.links[link];
         match self.description.links[link].kind {
@@ -311,12 +311,12 @@ impl Reference {
         }
     }
 
-    /// Entries of a FIFO.
+    /// Entries of a FIFO, the head first.
     pub fn fifo_entries(&self, link: usize) -> Vec<Vec<u32>> {
         self.links[link].store.entries.iter().cloned().collect()
     }
 
-    /// The host writes all fields of a link in the cycle to come: of a snapshot it publishes them, of a FIFO it pushes them.
+    /// Writes all fields of a link for the host in the coming cycle: publishes a snapshot, pushes into a FIFO.
     pub fn write(&mut self, link: usize, values: &[u32]) {
         let state = &mut self.links[link];
         match self.description.links[link].kind {
@@ -326,15 +326,15 @@ impl Reference {
         }
     }
 
-    /// The host takes the head of a FIFO in the cycle to come.
+    /// Pops the head of a FIFO for the host in the coming cycle.
     pub fn pop(&mut self, link: usize) {
         self.links[link].host_pop = true;
     }
 
-    /// One cycle of every core and every link.
+    /// Steps every core and every link by one cycle.
     ///
     /// # Errors
-    /// The core that faults, and how.
+    /// Index and fault of the core that faults.
     pub fn step(&mut self) -> Result<(), (usize, Fault)> {
         let now = self.now;
         let description = Arc::clone(&self.description);
@@ -378,7 +378,7 @@ impl Reference {
         }
     }
 
-    /// Lets values in before the cores' cycle, and puts those of the cycle on the pins.
+    /// Moves waiting values to the pins, and the values that leave the pins' delay into the cores.
     fn begin(&mut self) {
         for core in &mut self.cores {
             let pin = core.gate.pop_first().map(|(mailbox, value)| (core.mailboxes[mailbox].register, value));
@@ -427,7 +427,7 @@ impl Reference {
                 }
             }
             LinkKind::Snapshot { strobe } => {
-                // Taken is what was published before this cycle.
+                // A snapshot takes values that were published before this cycle.
                 if let (End::Core(core), Some(start)) = (link.to, self.start) {
                     let known = &description.cores[core];
                     let (first, period) =
@@ -461,7 +461,7 @@ impl Reference {
                 }
             }
             LinkKind::Fifo { push, pop, sender, receiver, .. } => {
-                // A change of the last cycle arrives in this one.
+                // Changes of the previous cycle arrive in this one.
                 let change = self.links[number].change.take();
                 let (head, status) = change.unzip();
                 if let End::Core(core) = link.to {
@@ -514,7 +514,7 @@ impl Reference {
         }
     }
 
-    /// Values that have arrived wait before the pins; ticks may start.
+    /// Puts arrived values before the pins; starts the ticks once they may start.
     fn end(&mut self, description: &Description, now: Cycle) {
         for core in &mut self.cores {
             core.gate.extend(core.arrived.drain(..));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The emulator, whose cores run ahead, against the stepper that goes cycle by cycle: random systems.
+//! The emulator, whose cores run ahead, against the cycle-by-cycle reference: random systems.
 
 use takt_emu::testing::Random;
 use takt_isa::{Register, timing::Cycle};
@@ -9,7 +9,7 @@ use takt_system::{Description, End, LinkEventKind, LinkKind, System};
 const SYSTEMS: u64 = 60;
 const CYCLES: Cycle = 4000;
 
-/// The host's actions between two chunks.
+/// Random actions of the host between two chunks.
 fn host(random: &mut Random, description: &Description, system: &mut System, reference: &mut Reference) {
     for (number, link) in description.links.iter().enumerate() {
         if link.from == End::Host && random.once_in(2) {
@@ -73,7 +73,7 @@ fn random_systems_agree() {
         let mut system = System::new(&description).unwrap();
         let mut reference = Reference::new(&description).unwrap();
         system.keep_events();
-        // Watched or not, it does the same.
+        // Observation must not change the run.
         if seed % 2 == 0 {
             system.keep_core_events();
         }
@@ -103,7 +103,7 @@ fn random_systems_agree() {
         let cores = 0..description.cores.len();
         missed += cores.map(|core| system.core(core).statistics().missed).sum::<u64>();
     }
-    // The systems show all that can happen.
+    // The systems show events of every kind.
     let kinds: Vec<&str> = seen.keys().map(String::as_str).collect();
     let all = ["Overflow", "Popped", "Published", "Pushed", "Skipped", "Taken", "Underflow", "value"];
     assert_eq!(kinds, all, "{seen:?}");

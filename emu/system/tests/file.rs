@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Mistakes in a system's file: one clear error each, at its line, with what to do about it.
+//! Mistakes in a system's file: one clear error each, at its line, with a mend.
 
 use std::convert::Infallible;
 use std::fmt::Write as _;
@@ -9,7 +9,7 @@ use takt_system::{ProgramError, ReadError, read};
 const A: &str =
     ".input x, n:int\n.output y, k:int\n.once\n wait p\n.period\np: mov y, x\n mov k, n\n wait p\n";
 
-/// The mistakes that are told of a file.
+/// Rendered mistakes of a file.
 fn told(text: &str) -> String {
     let read = read::<Infallible>("system.toml", text, |request| {
         let missing = || ProgramError::Missing {

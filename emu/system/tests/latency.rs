@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Bounds from a command of the host to an output, against what the emulator shows for commands in every cycle.
+//! Bounds from a host's command to an output, against the emulator's response to commands in every cycle.
 
 use std::collections::BTreeMap;
 use takt_analysis::Bounds;
@@ -10,13 +10,13 @@ use takt_system::latency::{Latency, LatencyError, MAX_PHASES, MAX_STEPS, latenci
 use takt_system::testing::describe;
 use takt_system::{Description, System};
 
-/// Cycles of a base tick.
+/// Cycles between base ticks.
 const TICK: u64 = 400;
 
-/// Reads its input at the end of a period of more than 200 cycles.
+/// Program that reads its input at the end of a period of more than 200 cycles.
 const AT_END: &str = ".input i:int\n.output o:int\n.reg x\n.once\n mov o, zero\n mov x, zero\n wait p\n.period\np: nop\n\
                       .rep n, 1, 10\n fdiv x, x, 1.0\n.endr\n mov o, i\n wait p\n";
-/// Reads it at once.
+/// Program that reads its input at once.
 const SHOW: &str =
     ".input i:int\n.output o:int\n.once\n mov o, zero\n wait p\n.period\np: mov o, i\n wait p\n";
 
@@ -25,12 +25,12 @@ fn program(text: &str) -> Program {
     assemble("p.s", &MemoryLoader::of("p.s", text), &options).unwrap_or_else(|e| panic!("{e:?}")).program
 }
 
-/// A command goes over a wire to one core and over a link to another, whose tick is `offset` cycles later.
+/// Two cores: a command goes over a wire to core `a` and over `link` to core `b`, whose tick is `offset` cycles later.
 fn pair(first: &str, link: &str, every: u64, offset: u64) -> Description {
     chain([first, SHOW], link, every, offset)
 }
 
-/// The same, with two programs.
+/// Two cores like [`pair`], with two programs.
 fn chain([first, second]: [&str; 2], link: &str, every: u64, offset: u64) -> Description {
     let text = format!(
         "tick = {TICK}\n[[core]]\nname = \"a\"\nprogram = \"a\"\nmachine = \"f1\"\n[[core]]\nname = \"b\"\nprogram = \"b\"\n\
@@ -41,14 +41,14 @@ fn chain([first, second]: [&str; 2], link: &str, every: u64, offset: u64) -> Des
     describe(&text, &programs).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// The bounds of every way.
+/// Bounds of all paths through a system.
 fn ways(description: &Description) -> Result<Vec<Latency>, LatencyError> {
     let bound = |core: &takt_system::Core| takt_analysis::bound(&core.program).expect("it can be bounded");
     let bounds: Vec<Bounds> = description.cores.iter().map(bound).collect();
     latencies(description, &bounds)
 }
 
-/// The cycles of a command that is given so many cycles after the system's start, and the latest cycle is in which it is looked for.
+/// Response time in cycles of a command given `command` cycles after the first base tick following the start; `latest` limits the search.
 fn response(description: &Description, command: u64, latest: u64) -> u64 {
     let mut system = System::new(description).expect("it can be emulated");
     let start = system.run_to_start(10_000).expect("no fault").expect("it starts") + TICK + command;
@@ -62,7 +62,7 @@ fn response(description: &Description, command: u64, latest: u64) -> u64 {
     (1..latest).find(shows).expect("it follows")
 }
 
-/// The least and the most cycles of a command, given in any cycle of so many base ticks.
+/// Least and most response cycles of commands given in each cycle of `ticks` base ticks.
 fn measured(description: &Description, ticks: u64) -> (u64, u64) {
     let cycles: Vec<u64> =
         (0..ticks * TICK).map(|command| response(description, command, 10 * TICK)).collect();
@@ -75,7 +75,7 @@ fn no_command_takes_fewer_cycles_or_more() {
     let wire = "[[wire]]\nfrom = \"a.o\"\nto = \"b.i\"\nlatency = 7\n";
     let latched = format!(".ports latched\n{SHOW}");
     let cases = [
-        // In a period that is under way, just before the snapshot is taken.
+        // Reads late in a period that is under way, just before the snapshot is taken.
         (AT_END, snapshot, 1, 230),
         (AT_END, wire, 1, 230),
         (AT_END, wire, 2, 50),
@@ -88,7 +88,7 @@ fn no_command_takes_fewer_cycles_or_more() {
         let way = ways(&description).expect("there is a bound").remove(0);
         let (least, most) = measured(&description, every);
         assert!(way.best <= least && most <= way.worst, "{least} to {most}, and not {way:?}");
-        // The best has a core read in the last cycle of a period, the worst in the first.
+        // In the best case, a core reads in the last cycle of a period; in the worst, in the first.
         if first == AT_END && link == snapshot {
             assert!(least <= way.best + 28, "{least}, and not {}", way.best);
         } else if first != AT_END {
@@ -97,14 +97,14 @@ fn no_command_takes_fewer_cycles_or_more() {
     }
 }
 
-/// A program whose output follows its input through so many periods of states, or so many more, and which words say how.
+/// Program whose output follows its input through up to `periods` periods of state: registers, conditions or data words.
 fn delays(random: &mut Random, periods: u32) -> String {
     let random_latched = if random.once_in(3) { ".ports latched\n" } else { "" };
     let mut head = format!("{random_latched}.input i:int\n.output o:int\n.reg x:int y:int\n");
     let mut once = " mov o, zero\n".to_owned();
     let (mut shift, mut value) = (Vec::new(), "i".to_owned());
     for stage in 1..=periods {
-        // Each stage takes on the value of the one before, after the next has taken its own.
+        // Stages run from last to first, so that each takes its predecessor's old value.
         shift.push(match random.below(3) {
             0 => {
                 head += &format!(".state s{stage}:int\n");
@@ -129,7 +129,7 @@ fn delays(random: &mut Random, periods: u32) -> String {
             }
         });
     }
-    // Words are loaded before any is stored.
+    // Loads precede all stores.
     let loads: String = (1..=periods)
         .filter(|stage| shift[*stage as usize - 1].contains(" ; "))
         .map(|stage| format!(" ld y{stage}, d{stage}\n"))
@@ -170,14 +170,14 @@ fn delay_lines_take_the_periods_that_the_bound_counts() {
             told()
         );
         direct += u64::from(periods == [0, 0]);
-        assert_eq!(way.kept(way.worst, false), Some(true));
+        assert_eq!(way.meets_deadline(way.worst, false), Some(true));
         let latest = way.worst + 10 * TICK;
         let cycles: Vec<u64> = (0..40)
             .map(|_| response(&description, u64::from(random.below(TICK as u32 * every as u32)), latest))
             .collect();
         let (least, most) = (*cycles.iter().min().expect("some"), *cycles.iter().max().expect("some"));
         assert!(way.best <= least && most <= way.worst, "{least} to {most}: {}", told());
-        // Not by much more than the place in a period where an output is written, which can decide on a tick of the second core.
+        // The bound is tight up to the place in a period where an output is written, which can decide on a tick of the second core.
         assert!(
             way.worst < most + TICK * every + TICK && least < way.best + TICK * every + TICK,
             "{least} to {most}: {}",
@@ -188,7 +188,7 @@ fn delay_lines_take_the_periods_that_the_bound_counts() {
 }
 
 #[test]
-fn what_is_not_certain_is_not_kept() {
+fn uncertain_dependences_are_dropped() {
     let wire = "[[wire]]\nfrom = \"a.o\"\nto = \"b.i\"\n";
     let ring = ".input i:int\n.output o:int\n.state n:int\n.data\nd: .word 0, 0, 0, 0\n.once\n mov n, zero\n mov o, zero\n wait p\n\
                 .period\np: ld o, d[n]\n st d[n], i\n iadd n, n, 1\n iand n, n, 3\n wait p\n";
@@ -198,15 +198,15 @@ fn what_is_not_certain_is_not_kept() {
         let description = chain([first, SHOW], wire, 1, 0);
         let way = ways(&description).expect("there is a bound").remove(0);
         assert_eq!((&way.least_states[..], &way.most_states), (&[least, 0][..], &None));
-        // Beyond what the shortest path takes, nothing is certain; below, it is certain that it can take longer.
+        // Only the shortest path is certain: a deadline below its time is missed, above it nothing is certain.
         assert_eq!(
-            [way.worst, way.worst - 1, 1 << 40].map(|deadline| way.kept(deadline, true)),
+            [way.worst, way.worst - 1, 1 << 40].map(|deadline| way.meets_deadline(deadline, true)),
             [None, Some(false), None]
         );
         let found = response(&description, 7, 20 * TICK);
         assert!(found >= way.best && found > way.worst, "{found}: {way:?}");
     }
-    // Entries that are queued in a FIFO come first.
+    // Entries queued in a FIFO come first.
     let queue = "[[fifo]]\nname = \"q\"\nfrom = \"a\"\nto = \"b\"\nports = [\"o -> i\"]\ndepth = 4\npush = \"o\"\npop = \"pop\"\n";
     let second = SHOW
         .replace(".output o:int", ".output o:int\n.output pop:int")
@@ -214,13 +214,14 @@ fn what_is_not_certain_is_not_kept() {
     let second = second.replace("p: mov o, i\n", "p: mov o, i\n mov pop, zero\n");
     let way = ways(&chain([SHOW, &second], queue, 1, 0)).expect("there is a bound").remove(0);
     assert_eq!(
-        (way.queues.len(), way.kept(1 << 40, false), way.kept(1 << 40, true)),
+        (way.queues.len(), way.meets_deadline(1 << 40, false), way.meets_deadline(1 << 40, true)),
         (1, None, Some(true)),
         "{way:?}"
     );
 }
 
-/// Cores each of which has a wire to each other one, and none to the host; with ticks of these numbers of base ticks.
+/// Mesh of cores: each has a wire from the host and one to every other core, with ticks of these numbers of base ticks; `out` adds links to
+/// the host.
 fn meshed(every: &[u64], out: &str) -> Description {
     let (mut text, mut programs) = (format!("tick = {TICK}\n"), BTreeMap::new());
     for (core, every) in every.iter().enumerate() {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Each kind of link by itself: in which cycle the other side sees what, as docs/system.md says.
+//! Each kind of link by itself: the cycle in which each side sees a value, as docs/system.md defines it.
 
 use std::collections::BTreeMap;
 use takt_asm::{MemoryLoader, Options, assemble};
@@ -21,9 +21,9 @@ fn system(text: &str, programs: &[(&str, &str)]) -> Description {
     describe(text, &programs).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// Counts its periods on `n`.
+/// Program that counts its periods on `n`.
 const COUNT: &str = ".output n:int\n.state c:int\n.once\n mov c, zero\n mov n, zero\n wait p\n.period\np: iadd c, c, 1\n nop\n nop\n nop\n nop\n nop\n mov n, c\n wait p\n";
-/// Shows its input `i` in each period on `o`.
+/// Program that shows its input `i` in each period on `o`.
 const SHOW: &str =
     ".input i:int\n.output o:int\n.once\n mov o, zero\n wait p\n.period\np: mov o, i\n wait p\n";
 
@@ -37,7 +37,7 @@ fn pair(link: &str, offset: u64) -> Description {
 
 #[test]
 fn a_wire_is_read_from_its_latency_on() {
-    // `n` is written so many cycles after the tick; `b` reads `i` in the cycle after its own.
+    // Delay of the write of `n` after the tick; `b` reads `i` in the cycle after its own tick.
     let mut seen = Vec::new();
     for offset in 0..40 {
         let description = pair("[[wire]]\nfrom = \"a.n\"\nto = \"b.i\"\nlatency = 10\n", offset);
@@ -46,8 +46,8 @@ fn a_wire_is_read_from_its_latency_on() {
         system.run_until(start + 150).unwrap();
         seen.push(system.output("o").unwrap());
     }
-    // mov n issues at the tick + 9 (when c is there), is written 8 later, and read 10 after that: at 27, by the bundle
-    // that issues one after the tick of offset 26.
+    // `mov n` issues at the tick + 9 (when `c` is ready), is written 8 cycles later, and read 10 after that: at 27, by the bundle that
+    // issues one cycle after the tick of offset 26.
     let first = seen.iter().position(|&value| value == 1).unwrap();
     assert_eq!(first, 26);
     assert!(seen[..first].iter().all(|&value| value == 0) && seen[first..].iter().all(|&value| value == 1));
@@ -65,13 +65,13 @@ fn a_snapshot_is_taken_before_the_tick() {
         system.run_until(start + 150).unwrap();
         seen.push(system.output("o").unwrap());
     }
-    // The wait issues when n is written, at 17: T >= 17 + 10 + 1 + 1.
+    // The `wait` issues when `n` is written, at 17: T >= 17 + 10 + 1 + 1.
     assert_eq!(seen.iter().position(|&value| value == 1), Some(29));
 }
 
 #[test]
-fn a_fifo_keeps_the_order_and_says_what_it_refused() {
-    // `a` pushes its count in every period, `b` takes one in every third.
+fn fifo_keeps_the_order_and_counts_refusals() {
+    // Core `a` pushes its count in every period, `b` pops an entry in every third.
     let push = COUNT
         .replace(".output n:int", ".output n:int, push:int")
         .replace(" mov n, c\n", " mov n, c\n mov push, c\n");
@@ -93,7 +93,7 @@ fn a_fifo_keeps_the_order_and_says_what_it_refused() {
     assert_eq!(counts.pushed - counts.popped, system.fifo_entries(fifo).len() as u64);
     assert_eq!(counts.pushed + counts.overflows, 30);
     assert_eq!((counts.most, counts.underflows), (4, 0));
-    // Empty at the first tick; then in order, without the refused ones.
+    // Empty at the first tick; then entries in order, without the refused ones.
     assert_eq!(taken[..4], [0, 1, 2, 3]);
     assert!(taken.windows(2).all(|pair| pair[0] < pair[1]), "{taken:?}");
     let refused = system.take_events().iter().filter(|event| event.kind == LinkEventKind::Overflow).count();

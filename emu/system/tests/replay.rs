@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A core by itself does what it did in its system.
+//! Replays: a core by itself repeats its run in a system.
 
 use takt_emu::Event;
 use takt_isa::{T1, T3};
 use takt_system::testing::random_description;
 use takt_system::{Recording, Replay, System};
 
-/// The events of a core by itself.
+/// Events of a core by itself.
 fn alone(Replay { mut emulator, mut inputs, end }: Replay) -> Vec<Event> {
     let mut events = Vec::new();
     while emulator.now() < end {
@@ -28,7 +28,7 @@ fn replays_are_the_cores_of_random_systems() {
         let [mut system, mut seen] = both;
         let mut recording = Recording::new(&mut system);
         seen.keep_core_events();
-        // A fault ends both at the same cycle.
+        // A fault ends both runs at the same cycle.
         for cycle in (500..5000).step_by(500) {
             let running = system.run_until(cycle).is_ok();
             assert_eq!(seen.run_until(cycle).is_ok(), running);
@@ -42,7 +42,7 @@ fn replays_are_the_cores_of_random_systems() {
             let replay = recording.replay(&system, core).expect("random programs fit");
             let wanted: Vec<Event> =
                 wanted.iter().filter(|(of, _)| *of == core).map(|(_, event)| event.clone()).collect();
-            // The replay ends with the last period that the core has ended.
+            // Replays end with the core's last completed period.
             let is_wait = |event: &Event| matches!(event, Event::Wait { .. });
             let Some(last) = wanted.iter().rposition(is_wait) else { continue };
             waits += wanted.iter().filter(|event| is_wait(event)).count();

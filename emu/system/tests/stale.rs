@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A FIFO's fields read after its pop: what is told, against what the emulator shows.
+//! Stale reads of a FIFO's fields after its pop: reports against the emulator.
 
 use std::collections::BTreeMap;
 use takt_asm::{MemoryLoader, Options, assemble};
 use takt_isa::{F1, Program};
-use takt_system::stale::{Doubt, StaleRead, stale_reads};
+use takt_system::stale_reads::{Doubt, StaleRead, stale_reads};
 use takt_system::testing::describe;
 use takt_system::{Description, System};
 
@@ -16,7 +16,7 @@ fn program(text: &str) -> Program {
     }
 }
 
-/// A core that takes entries of three fields from the host.
+/// Core that takes entries of three fields from the host.
 fn receiver(text: &str) -> Description {
     let system = "tick = 400\n[[core]]\nname = \"a\"\nprogram = \"a\"\nmachine = \"f1\"\n[[fifo]]\nname = \"q\"\nfrom = \"host\"\nto = \"a\"\n\
          ports = [\"x\", \"y\", \"z\"]\ndepth = 8\npop = \"p\"\nreceiver = { count = \"n\" }\n[[wire]]\nfrom = \"a.u\"\nto = \"host.u\"\n\
@@ -33,10 +33,10 @@ fn doubts(description: &Description) -> Vec<(String, Doubt)> {
     stale_reads(description).iter().map(|read| (name(read), read.doubt)).collect()
 }
 
-/// For every distance from a pop to reads of all fields: where the emulator shows this entry, none is told of; where a field is
-/// told of it may be either's; behind, all are the next one's.
+/// For every distance from a pop to reads of all fields: where the emulator shows the old entry, no read is reported; where a read is
+/// reported, the field may belong to either; behind, all fields are the next entry's.
 #[test]
-fn what_is_told_is_what_is_read() {
+fn reported_stale_reads_equal_the_observed_ones() {
     let (mut old, mut between, mut new) = (0, 0, 0);
     for distance in 0..24 {
         let nops = " nop\n".repeat(distance);
@@ -64,7 +64,7 @@ fn what_is_told_is_what_is_read() {
                 (_, true) => between += 1,
                 other => panic!("distance {distance}, {name}: {other:?}"),
             }
-            // A read that is not told of is the old entry's before the pop, and the new one's behind.
+            // Unreported reads get the old entry before the pop, and the new one behind it.
             let cycle = distance as u64 + i as u64;
             assert!(is_told || (seen[i] == 1) == (cycle < 12), "distance {distance}, {name}: {}", seen[i]);
         }
@@ -72,10 +72,10 @@ fn what_is_told_is_what_is_read() {
     assert!(old > 0 && between > 0 && new > 0, "{old} {between} {new}");
 }
 
-/// The scheduler puts a read behind the pop that the source has below it.
+/// The scheduler moves a read behind the pop that follows it in the source.
 #[test]
-fn a_read_that_was_moved_is_told_of() {
-    // The use of `x` waits for a long chain, and its read with it.
+fn reports_reads_moved_after_the_pop() {
+    // The use of `x` waits for a long chain, and the read with it.
     let late = |demand: &str| {
         receiver(&format!(
             ".schedule on\n{HEAD}.reg a:int\n iadd a, n, 1\n{} iadd v, a, x\n mov p, zero\n{demand} wait q\n",
@@ -87,15 +87,15 @@ fn a_read_that_was_moved_is_told_of() {
     let [read] = &stale_reads(&moved)[..] else { panic!("one") };
     let line = |location: Option<takt_isa::program::Location>| location.unwrap().line;
     assert!(line(read.read) < line(read.popped), "{read:?}");
-    // As written, with the demand, and if ports are latched, there is nothing to tell of.
+    // Without the move there is nothing to report: in the order of the source, with `.order`, and with latched ports.
     assert_eq!(doubts(&late(".order x, p\n")), []);
     let written = format!("{HEAD} mov u, x\n mov v, y\n mov p, zero\n wait q\n");
     assert_eq!(doubts(&receiver(&written)), []);
 }
 
-/// Correct reads are not told of: entry after entry in one straight line, and a macro that is written above.
+/// Correct reads are not reported: entry after entry in one straight line, and a macro defined above.
 #[test]
-fn what_is_repeated_is_right() {
+fn corrected_program_has_no_stale_read() {
     let entry = format!(" mov u, x\n mov v, y\n mov w, z\n mov p, zero\n{}", " nop\n".repeat(20));
     let rep = format!("{HEAD} .rep i, 1, 2\n{entry} .endr\n wait q\n");
     assert_eq!(doubts(&receiver(&rep)), []);

@@ -54,7 +54,8 @@ const fn near(t: u64) -> (i64, u32) {
     let h = (t_table >> 6 & 0x3fff) as i64 - 0x2000;
     let g = (1 << 30) + g0 as i64 + ((h * g1 as i64) >> 11);
 
-    // 2t = 4⁻ᵉ·radicand, the radicand in [1, 4): its root begins with 1. 62 bits after the point, of which the next four go to each digit.
+    // 2t = 4⁻ᵉ·radicand, the radicand in [1, 4): its root begins with 1. There are 62 bits after the point; each digit takes the
+    // next four.
     let e = (t.leading_zeros() - 33) / 2;
     let mut radicand = t << 33 << (2 * e);
     let (mut rest, mut root) = ((radicand >> 62) - 1, 1);

@@ -68,7 +68,7 @@ pub const fn atan2(y: u32, x: u32) -> Value {
     let (numerator, denominator) = if steep { (b, a) } else { (a, b) };
     let left = x >> 31 == 1;
 
-    // Quotients that need no division: 0, and of infinities 1. A zero over a zero is 0 here.
+    // Quotients without a division: 0, and 1 for two infinities. A zero over a zero is 0 here.
     let angle = if numerator == 0 || (denominator == INFINITY && numerator != INFINITY) {
         octant(None, 0, steep, left)
     } else {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! IEEE arithmetic by the host's own binary32 instructions.
 //!
-//! Rust promises IEEE 754 results for `f32` (round to nearest even, subnormals kept, no contraction, no fast-math); what
-//! it leaves open is which NaN comes out, and flags it has none. Both show only in results whose exponent is all ones,
-//! so the common path is the host's instruction and that one test. The cold paths then find the flags from the operands.
+//! Rust promises IEEE 754 results for `f32` (round to nearest even, subnormals kept, no contraction, no fast-math), but
+//! neither a NaN's bits nor flags. Both show only in results whose exponent is all ones, so the common path is the host's
+//! instruction and that one test. The cold paths then find the flags from the operands.
 //!
 //! On 32-bit x86 without SSE the promise does not hold, so this module refuses to build there.
 
@@ -16,19 +16,18 @@ compile_error!("x87 arithmetic does not round to binary32; build with SSE2");
 #[derive(Clone, Copy, Debug)]
 pub struct Host;
 
-/// True if `bits` is an infinity or a NaN, the only results that can have raised a flag.
+/// `bits` is an infinity or a NaN, the only results that can have raised a flag.
 #[inline(always)]
 pub(super) const fn is_special(bits: u32) -> bool {
     bits & INFINITY == INFINITY
 }
 
-/// True if `bits` is an infinity.
 #[inline(always)]
 const fn is_infinite(bits: u32) -> bool {
     bits & !SIGN == INFINITY
 }
 
-/// The NaN that `a ∘ b` gave: passed on from an operand, or invalid here.
+/// The NaN result of `a ∘ b`: passed on from an operand, or invalid here.
 const fn nan_result(a: u32, b: u32) -> Value {
     if is_nan(a) || is_nan(b) { propagate_nan(a, b) } else { Value::new(CANONICAL_NAN, Flags::INVALID) }
 }
@@ -105,13 +104,13 @@ const fn saturated_integer(a: u32) -> Value {
     Value::new(bits.cast_unsigned(), Flags::INVALID)
 }
 
-/// The result of a comparison with a NaN: false, and invalid if the comparison or the NaN is a signaling one.
+/// The result of a comparison with a NaN: false, and invalid if the comparison or the NaN is signaling.
 #[cold]
 const fn unordered(signaling: bool) -> Value {
     Value::new(0, if signaling { Flags::INVALID } else { Flags::NONE })
 }
 
-/// The integer nearest to a binary32, ties to even, and true if it fits an `i32`. (If not, the integer means nothing.)
+/// The integer nearest to a binary32, ties to even, and true if it fits an `i32`. (If not, the integer is meaningless.)
 #[inline(always)]
 pub(super) fn to_integer(a: u32) -> (u32, bool) {
     // In binary64 the sum with 1.5·2⁵² is rounded at the units' place, ties to even, and its low word is the integer

@@ -54,8 +54,8 @@ pub const fn saturate(x: u32, bound: u32) -> Value {
 
 /// The sign of `x` as a number: −1.0, +0.0 or 1.0.
 ///
-/// Both zeros give +0.0, since the sign function of control laws has a single value at rest. A NaN gives the canonical NaN;
-/// invalid if it is signaling.
+/// Zeros of either sign give +0.0, since the sign function of control laws has a single value at rest. A NaN gives the
+/// canonical NaN; invalid if it is signaling.
 #[inline(always)]
 #[must_use]
 pub const fn sign(x: u32) -> Value {

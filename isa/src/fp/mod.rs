@@ -21,8 +21,8 @@
 //! [`sign`], [`abs`], [`neg`], [`sin`](sin()), [`cos`], [`atan2`], [`acos`](acos())) are computed in integer arithmetic only.
 //! Each is its own definition: reference and emulator share it, and the circuit computes the same bits.
 //!
-//! A third implementation, [`Screened`], is no complete one: it is a branch-free first attempt for vectorised loops, which
-//! falls back on [`Host`].
+//! A third implementation, [`ScreenedFloat`], is incomplete: it is a branch-free first attempt for vectorised loops, which falls
+//! back on [`Host`].
 
 use std::fmt;
 use std::ops::{BitOr, BitOrAssign};
@@ -55,7 +55,7 @@ mod softfloat;
 mod softfloat {
     /// The implementation of [`Arithmetic`](super::Arithmetic) that replaces Berkeley SoftFloat, which this build leaves out.
     pub type Reference = super::Host;
-    /// True if [`Reference`] is Berkeley SoftFloat.
+    /// [`Reference`] is Berkeley SoftFloat, not the host's arithmetic.
     pub const HAS_SOFTFLOAT: bool = false;
 }
 pub mod tables;
@@ -65,11 +65,11 @@ pub use atan::{ATAN2_MAX_ULP, atan2};
 pub use host::Host;
 pub use kernels::{abs, maximum, minimum, neg, saturate, sign};
 pub use real::{Bitwise, Real};
-pub use screened::Screened;
+pub use screened::ScreenedFloat;
 pub use sin::{COS_MAX_ULP, SIN_IDENTITY, SIN_LIMIT, SIN_MAX_ULP, cos, sin};
 pub use softfloat::*;
 
-/// The one NaN that arithmetic produces: quiet, positive, no payload.
+/// Canonical NaN, the only one that arithmetic produces: quiet, positive, no payload.
 pub const CANONICAL_NAN: u32 = 0x7fc0_0000;
 
 /// Sign bit of a binary32.
@@ -79,12 +79,12 @@ pub(crate) const INFINITY: u32 = 0x7f80_0000;
 /// The bit that makes a NaN quiet.
 const QUIET: u32 = 0x0040_0000;
 
-/// A set of exception flags. The bit positions are those of Berkeley SoftFloat and TestFloat.
+/// A set of exception flags, at the bit positions of Berkeley SoftFloat and TestFloat.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
 pub struct Flags(u8);
 
 impl Flags {
-    /// No flag.
+    /// The empty set of flags.
     pub const NONE: Flags = Flags(0);
     /// A finite result was too large for the format and became infinite.
     pub const OVERFLOW: Flags = Flags(0x04);
@@ -92,7 +92,7 @@ impl Flags {
     pub const DIVIDE_BY_ZERO: Flags = Flags(0x08);
     /// The operation has no useful result: a signaling NaN, 0·∞, ∞−∞, √−1, a number outside the function's range, …
     pub const INVALID: Flags = Flags(0x10);
-    /// Every flag.
+    /// Every flag that this machine keeps.
     pub const ALL: Flags = Flags(0x1c);
 
     /// Each flag with the name under which it is displayed.
@@ -102,7 +102,7 @@ impl Flags {
         (Flags::OVERFLOW, "overflow"),
     ];
 
-    /// The flags as bits.
+    /// The flags as bits of one byte.
     #[inline(always)]
     #[must_use]
     pub const fn bits(self) -> u8 {
@@ -116,21 +116,21 @@ impl Flags {
         Flags(bits & Flags::ALL.0)
     }
 
-    /// The flags that are in either set.
+    /// The union of two sets.
     #[inline(always)]
     #[must_use]
     pub const fn union(self, other: Flags) -> Flags {
         Flags(self.0 | other.0)
     }
 
-    /// True if every flag of `other` is in this set.
+    /// Every flag of `other` is in this set.
     #[inline(always)]
     #[must_use]
     pub const fn contains(self, other: Flags) -> bool {
         self.0 & other.0 == other.0
     }
 
-    /// True if no flag is set.
+    /// No flag is set.
     #[inline(always)]
     #[must_use]
     pub const fn is_empty(self) -> bool {
@@ -170,12 +170,12 @@ impl fmt::Display for Flags {
 pub struct Value {
     /// The result: a binary32, or an integer from [`Arithmetic::ftoi`] and the comparisons.
     pub bits: u32,
-    /// The flags that this one operation raised. They are sticky in the machine, not here.
+    /// Flags that this operation raised. They are sticky in the machine, not here.
     pub flags: Flags,
 }
 
 impl Value {
-    /// A result that raised no flag. (It may be inexact: that is not a flag here.)
+    /// A result that raised no flag. (It may be inexact: there is no such flag here.)
     #[inline(always)]
     #[must_use]
     pub const fn exact(bits: u32) -> Value {
@@ -192,13 +192,13 @@ impl Value {
 
 /// The operations that IEEE 754 defines, on binary32 bit patterns.
 pub trait Arithmetic {
-    /// `a + b`.
+    /// Sum `a + b`, rounded once.
     fn add(a: u32, b: u32) -> Value;
-    /// `a − b`.
+    /// Difference `a − b`, rounded once.
     fn sub(a: u32, b: u32) -> Value;
-    /// `a · b`.
+    /// Product `a · b`, rounded once.
     fn mul(a: u32, b: u32) -> Value;
-    /// `a / b`.
+    /// Quotient `a / b`, rounded once.
     fn div(a: u32, b: u32) -> Value;
     /// Fused multiply-add: `a · b + c`, rounded once. `0 · ∞` is invalid whatever `c` is, even a quiet NaN (as on RISC-V
     /// and x86; IEEE 754 leaves it open).
@@ -218,14 +218,14 @@ pub trait Arithmetic {
     fn le(a: u32, b: u32) -> Value;
 }
 
-/// True if `a` is a NaN, of either kind.
+/// `a` is a NaN, quiet or signaling.
 #[inline(always)]
 #[must_use]
 pub const fn is_nan(a: u32) -> bool {
     a & !SIGN > INFINITY
 }
 
-/// True if `a` is a signaling NaN.
+/// `a` is a NaN without the quiet bit.
 #[inline(always)]
 #[must_use]
 pub const fn is_signaling(a: u32) -> bool {

@@ -9,17 +9,17 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 /// An operation on 32 bits, which has no meaning in the real numbers. Each domain defines its result.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Bitwise {
-    /// Ones where both have ones.
+    /// A one where both operands have a one.
     And,
-    /// Ones where one has a one.
+    /// A one where either operand has a one.
     Or,
-    /// Ones where they differ.
+    /// A one where the operands differ.
     Xor,
-    /// Shifted left by the other's low five bits.
+    /// The first operand, shifted left by the low five bits of the second.
     Left,
-    /// Shifted right by those, zeros shifted in.
+    /// The first operand, shifted right by the same bits; zeros enter.
     Right,
-    /// Shifted right by those, the sign shifted in.
+    /// The first operand, shifted right by the same bits; its sign enters.
     RightSigned,
     /// Equality, as 1 or 0.
     Equal,
@@ -35,7 +35,7 @@ pub enum Bitwise {
 pub trait Real:
     Clone + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
 {
-    /// The square root.
+    /// Square root; negative operands have none.
     #[must_use]
     fn sqrt(self) -> Self;
     /// The sine, in radians.
@@ -50,19 +50,19 @@ pub trait Real:
     /// The arccosine, in [0, π].
     #[must_use]
     fn acos(self) -> Self;
-    /// The magnitude.
+    /// Magnitude, without the sign.
     #[must_use]
     fn abs(self) -> Self;
-    /// -1, 0 or 1.
+    /// Sign as a number: -1, 0 or 1.
     #[must_use]
     fn sign(self) -> Self;
-    /// The smaller one.
+    /// The smaller of the two.
     #[must_use]
     fn minimum(self, other: Self) -> Self;
-    /// The larger one.
+    /// The larger of the two.
     #[must_use]
     fn maximum(self, other: Self) -> Self;
-    /// Kept within ±|`bound`|.
+    /// Self limited to the interval ±|`bound`|.
     #[must_use]
     fn saturate(self, bound: Self) -> Self;
     /// The number that the operand's bits stand for as a signed integer.
@@ -71,13 +71,13 @@ pub trait Real:
     /// The nearest integer, to even, within 32 bits: a decision.
     #[must_use]
     fn nearest(self) -> Self;
-    /// Equality: a decision.
+    /// Equality of the two: a decision.
     #[must_use]
     fn equal(self, other: Self) -> Self;
-    /// Less than: a decision.
+    /// Less than `other`: a decision.
     #[must_use]
     fn less(self, other: Self) -> Self;
-    /// Less than or equal: a decision.
+    /// Less than or equal to `other`: a decision.
     #[must_use]
     fn less_or_equal(self, other: Self) -> Self;
     /// `yes` if any of self's bits is set, else `no`.

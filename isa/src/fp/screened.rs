@@ -5,10 +5,10 @@ use super::host::{is_special, round_to_odd};
 use super::{Arithmetic, Flags, Value, is_nan};
 
 /// Arithmetic by the host's `f32` that detects special cases without handling them. A result without a flag is correct, bit
-/// for bit. If any flag is set, the case is special (an infinity, a NaN, an integer out of range): bits and flags then mean
-/// nothing, and the caller must compute the operation again with [`super::Host`].
+/// for bit. If any flag is set, the case is special (an infinity, a NaN, an integer out of range): bits and flags are then
+/// meaningless, and the caller must compute the operation again with [`super::Host`].
 #[derive(Clone, Copy, Debug)]
-pub struct Screened;
+pub struct ScreenedFloat;
 
 #[inline(always)]
 const fn screened(bits: u32, suspect: bool) -> Value {
@@ -26,7 +26,7 @@ const fn compared(a: u32, b: u32, holds: bool) -> Value {
     screened(holds as u32, is_nan(a) | is_nan(b))
 }
 
-impl Arithmetic for Screened {
+impl Arithmetic for ScreenedFloat {
     #[inline(always)]
     fn add(a: u32, b: u32) -> Value {
         rounded(f32::from_bits(a) + f32::from_bits(b))

@@ -39,7 +39,7 @@ pub const SIN_IDENTITY: u32 = 0x3980_0000;
 /// Largest error of [`sin`](sin()) over every argument that it accepts, in units in the last place of the exact result
 /// (rounded up).
 pub const SIN_MAX_ULP: f64 = 0.79499;
-/// The same of [`cos`].
+/// Largest error of [`cos`], by the same measure as [`SIN_MAX_ULP`].
 pub const COS_MAX_ULP: f64 = 0.78306;
 
 /// Fraction bits of r.
@@ -83,7 +83,7 @@ const fn wave(x: u32, quadrants: u32) -> u32 {
     let fixed = significand << 12 >> (135 - exponent);
     let k = ((fixed >> 21) * 163 + (1 << 13)) >> 14;
     let r = (fixed << (FRACTION - 27)).wrapping_add(QUARTERS[k as usize]) & ((1 << (FRACTION + 1)) - 1);
-    // One's complement is 2⁻⁵⁶ off, and carries nothing.
+    // A one's complement is off by 2⁻⁵⁶, and needs no carry.
     let negative = r >> FRACTION & 1;
     let r = (r ^ negative.wrapping_neg()) & ((1 << FRACTION) - 1);
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! IEEE arithmetic by Berkeley SoftFloat 3, in its RISC-V specialisation: the definition of the machine's operations.
 //!
-//! That specialisation already returns one canonical NaN and RISC-V's values from `ftoi`, so results pass unchanged. The
-//! flags underflow and inexact, which the machine does not keep, are dropped.
+//! SoftFloat's RISC-V specialisation already returns one canonical NaN and RISC-V's values from `ftoi`, so results pass
+//! unchanged. The flags underflow and inexact, which the machine does not keep, are dropped.
 
 use softfloat_wrapper::{ExceptionFlags, F32, Float, RoundingMode::TiesToEven};
 
@@ -14,7 +14,7 @@ pub struct SoftFloat;
 
 /// The implementation of [`Arithmetic`] that defines the machine: Berkeley SoftFloat.
 pub type Reference = SoftFloat;
-/// True if [`Reference`] is Berkeley SoftFloat.
+/// [`Reference`] is Berkeley SoftFloat, not the host's arithmetic.
 pub const HAS_SOFTFLOAT: bool = true;
 
 /// Runs one operation with the library's (thread-local) flags cleared before and read after.

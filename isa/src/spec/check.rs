@@ -26,16 +26,16 @@ pub const MAX_LOOPS: u32 = 8;
 /// The last address of the register space.
 pub(super) const LAST: u32 = Register::COUNT as u32 - 1;
 
-/// An invalid row, and the reason.
+/// An invalid row: the machine's name and the reason.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MachineError {
-    /// The machine.
+    /// Name of the machine.
     pub machine: &'static str,
-    /// The reason.
+    /// First reason in the order of the row.
     pub reason: MachineReason,
 }
 
-/// The reasons for which a row is invalid; names are those of slots, banks and units.
+/// The reasons for which a row is invalid; names belong to slots, banks and units.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs, reason = "the fields are the names and values that the message states")]
 pub enum MachineReason {
@@ -45,7 +45,7 @@ pub enum MachineReason {
     Name { what: &'static str, name: &'static str },
     /// The name of a bank has a digit: it stands before the register's number.
     BankName { bank: &'static str },
-    /// Two slots, or two banks, of one name.
+    /// Two slots, or two banks, share a name.
     Twice { what: &'static str, name: &'static str },
     /// A bank without a register, or with more than a destination can address.
     BankDepth { bank: &'static str, depth: u16, most: u32 },
@@ -79,12 +79,12 @@ pub enum MachineReason {
     NoSequencer,
     /// The sequencer counts loops and has no place for a count, or the other way round, or places for more than [`MAX_LOOPS`].
     LoopDepth { counts: bool, depth: u32 },
-    /// Two slots host a function of which a machine has only one.
+    /// Two slots host a function that only one may.
     TwoSlots { function: Function, slot: &'static str, other: &'static str },
     /// More slots load than the data memory has ports.
     Ports { slot: &'static str },
-    /// A slot loads and comes after the one that stores: a bundle's operations act in the order of the slots, and its loads read what
-    /// was there before its store.
+    /// A slot that loads comes after the storing slot. A bundle's operations act in the order of the slots, and its loads must
+    /// read the words from before its store.
     LoadAfterStore { slot: &'static str, store: &'static str },
 }
 
@@ -276,7 +276,7 @@ const fn same(a: &str, b: &str) -> bool {
     i == a.len() && i == b.len()
 }
 
-/// True if a name can be a part of names in assembly and Verilog.
+/// A name can be part of names in assembly and Verilog.
 const fn is_word(name: &str, digits: bool) -> bool {
     let bytes = name.as_bytes();
     let mut i = 0;
@@ -310,7 +310,7 @@ const fn offers(unit: &Unit, function: Function) -> bool {
     false
 }
 
-/// True if an instruction that the unit executes writes a register.
+/// Some instruction that the unit executes writes a register.
 const fn writes(unit: &Unit) -> bool {
     let mut i = 0;
     while i < ROWS.len() {
@@ -538,7 +538,7 @@ impl Machine {
         }
     }
 
-    /// The error that two slots host a function, if they do.
+    /// The error of two slots that host a function, if there are two.
     const fn shared(&self, function: Function) -> Option<MachineReason> {
         let Some(first) = self.host_from(function, 0) else { return None };
         let Some(second) = self.host_from(function, first + 1) else { return None };

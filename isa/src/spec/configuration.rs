@@ -2,8 +2,8 @@
 //! Machines by name: a row of the table, with memories of other depths if options follow its name.
 //!
 //! The name `t3,code=4096,data=32768` is the machine t3 with 4,096 bundles of program memory and 32,768 words of data memory.
-//! Names are canonical: options stand in the order of [`OPTIONS`], and one that states the row's own depth is left out. Two
-//! machines of one name are the same, and each exists once, for as long as the process runs.
+//! Names are canonical: options stand in the order of [`OPTIONS`], and an option that states the row's own depth is left out.
+//! Two machines of one name are the same, and each exists once, for as long as the process runs.
 
 use super::check::{MAX_CODE, MAX_DATA};
 use super::machines::{MACHINES, Machine};
@@ -13,9 +13,9 @@ use std::sync::{Mutex, PoisonError};
 
 /// A number of a machine's row that a program may set.
 pub struct MachineOption {
-    /// Its name after the machine's.
+    /// Name of the option, after the machine's.
     pub name: &'static str,
-    /// Its meaning.
+    /// Meaning in words, for lists of options.
     pub text: &'static str,
     /// The greatest value. Every power of two from 2 up to it is possible: the circuit addresses memories by bit fields.
     pub most: u32,
@@ -23,7 +23,7 @@ pub struct MachineOption {
     set: fn(&mut Machine, u32),
 }
 
-/// The options of every machine, in the order in which names have them.
+/// The options of every machine, in the order of canonical names.
 pub static OPTIONS: [MachineOption; 2] = [
     MachineOption {
         name: "code",
@@ -53,15 +53,15 @@ pub enum MachineNameError {
     /// An option without a number.
     #[error("`{option}` needs a number, as `{option}=4096`")]
     NoNumber {
-        /// The option.
+        /// Name of the option.
         option: &'static str,
     },
     /// An option's value is no number.
     #[error("`{option}={value}`: `{value}` is no number")]
     Number {
-        /// The option.
+        /// Name of the option.
         option: &'static str,
-        /// Its value.
+        /// Text given as the value.
         value: String,
     },
     /// A depth is no power of two, or out of range.
@@ -70,11 +70,11 @@ pub enum MachineNameError {
         match .next { Some(next) => format!("; the next is {next}"), None => String::new() }
     )]
     Depth {
-        /// The option.
+        /// Name of the option.
         option: &'static str,
-        /// Its value.
+        /// Depth that was asked for.
         value: u64,
-        /// The greatest depth.
+        /// The greatest depth possible.
         most: u32,
         /// The next larger depth, if there is one.
         next: Option<u32>,
@@ -82,13 +82,13 @@ pub enum MachineNameError {
     /// An option is given more than once.
     #[error("`{option}` is given twice")]
     Twice {
-        /// The option.
+        /// Name of the option.
         option: &'static str,
     },
 }
 
 impl MachineNameError {
-    /// The name that is unknown, and the names that are known in its place; `None` if another thing is wrong.
+    /// The unknown name, and the known names of its kind; `None` for other errors.
     pub fn unknown(&self) -> Option<(&str, Vec<&'static str>)> {
         match self {
             MachineNameError::Machine(name) => {
@@ -101,17 +101,17 @@ impl MachineNameError {
         }
     }
 
-    /// What is listed by [`MachineNameError::unknown`]: `machines` or `options`.
+    /// Kind of the names that [`MachineNameError::unknown`] lists: `machines` or `options`.
     pub fn kind(&self) -> &'static str {
         if matches!(self, MachineNameError::Machine(_)) { "machines" } else { "options" }
     }
 }
 
-/// The machines with options, each once, and before each the machine of its row.
+/// Machines with options, each once, paired with the machine of their row.
 static CONFIGURED: Mutex<Vec<[&'static Machine; 2]>> = Mutex::new(Vec::new());
 
-/// The machine of a row and of a name that is not yet among the known ones, kept from here on. The names that
-/// [`Machine::from_name`] can make are finite: a few hundred for each row.
+/// Returns the machine of a row and a name, adding it if it is new. The names that [`Machine::from_name`] can make are
+/// finite: a few hundred for each row.
 fn intern(row: &'static Machine, machine: Machine, name: String) -> &'static Machine {
     let mut known = CONFIGURED.lock().unwrap_or_else(PoisonError::into_inner);
     let is_it = |[of, known]: &&[&Machine; 2]| std::ptr::eq(*of, row) && known.name == name;
@@ -123,7 +123,7 @@ fn intern(row: &'static Machine, machine: Machine, name: String) -> &'static Mac
     machine
 }
 
-/// A depth, checked.
+/// Parses and checks a depth.
 fn depth(option: &MachineOption, text: &str) -> Result<u32, MachineNameError> {
     let (name, most) = (option.name, option.most);
     if text.is_empty() {
@@ -149,8 +149,8 @@ fn depth(option: &MachineOption, text: &str) -> Result<u32, MachineNameError> {
 }
 
 impl Machine {
-    /// The machine of a name: that of a row, fixtures of the tests included, or that and options, as `t3,data=32768`. Spaces
-    /// around commas mean nothing.
+    /// The machine of a name: a row's, fixtures of the tests included, perhaps with options, as `t3,data=32768`. Spaces
+    /// around commas are ignored.
     ///
     /// # Errors
     /// If there is no such machine or option, or a depth is not one that a circuit can have.
@@ -161,7 +161,7 @@ impl Machine {
         row.with_option_list(parts)
     }
 
-    /// The machine with the options of a name behind its first comma: `data=32768`, `code=4096,data=32768`.
+    /// The machine with the options after the first comma of a name: `data=32768`, `code=4096,data=32768`.
     ///
     /// # Errors
     /// As [`Machine::with_options`].
@@ -192,7 +192,7 @@ impl Machine {
         Ok(self.configured(set))
     }
 
-    /// The machine with other depths, valid ones, by the index of their option; `None` leaves a depth as it is.
+    /// The machine with other, valid depths, by the index of their option; `None` keeps a depth.
     fn configured(&'static self, depths: [Option<u32>; OPTIONS.len()]) -> &'static Machine {
         let row = self.row();
         let (mut machine, mut name) = (*self, row.name.to_owned());
@@ -212,7 +212,7 @@ impl Machine {
         }
     }
 
-    /// The name of its row: its own without options.
+    /// Name of the machine's row, without options.
     pub const fn row_name(&self) -> &'static str {
         let (bytes, mut end) = (self.name.as_bytes(), 0);
         while end < bytes.len() && bytes[end] != b',' {
@@ -221,7 +221,7 @@ impl Machine {
         self.name.split_at(end).0
     }
 
-    /// The machine of its row: itself without options.
+    /// The machine of the row, without options.
     pub fn row(&'static self) -> &'static Machine {
         if self.row_name() == self.name {
             return builtin(self.name).filter(|row| *row == self).unwrap_or(self);
@@ -233,13 +233,13 @@ impl Machine {
         }
     }
 
-    /// Its name as a part of names in Verilog and C and of files: `t3_data_32768` for `t3,data=32768`.
+    /// The name as a part of names in Verilog and C and of files: `t3_data_32768` for `t3,data=32768`.
     pub fn identifier(&self) -> String {
         self.name.replace([',', '='], "_")
     }
 
-    /// The directive that names it in a source, `.machine t3 data=32768`; of a file's machine, that in words, for its file's name is
-    /// not a part of it.
+    /// The directive that names the machine in a source, `.machine t3 data=32768`. For a file's machine a description in words: the
+    /// file's name is not known here.
     pub fn directive(&self) -> String {
         let (row, options) = (self.row_name(), self.options());
         match self.is_builtin() {
@@ -249,13 +249,13 @@ impl Machine {
         }
     }
 
-    /// Its options as a source states them after the row's name, with a space before each: ` data=32768`.
+    /// The options as a source states them after the row's name, with a space before each: ` data=32768`.
     pub fn options(&self) -> String {
         self.name.replace(self.row_name(), "").replace(',', " ")
     }
 
-    /// The machine of this row with the least memories that hold so many bundles and words, and are no smaller than its own;
-    /// `None` if none is large enough.
+    /// The machine of this row with the least memories that hold `bundles` and `words`, and are no smaller than its own;
+    /// `None` if no depth is large enough.
     pub fn holding(&'static self, bundles: u64, words: u64) -> Option<&'static Machine> {
         let depth = |of: u32, wanted: u64, most: u32| {
             let depth = u32::try_from(wanted).ok()?.checked_next_power_of_two()?.max(of);

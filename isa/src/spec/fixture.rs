@@ -2,17 +2,17 @@
 //! The fixtures: two machines for tests, whose rows never change.
 //!
 //! Snapshots, messages and tests that state slots, listings or cycles are about these rows, so that a machine of the table
-//! can be rearranged without them. They are machines like any other, valid for every tool and found by their names, but no
-//! list of machines has them: a user never meets one.
+//! can be rearranged without them. Fixtures are machines like any other, valid for every tool and found by their names, but
+//! no list of machines has them: a user never meets one.
 
 use super::instructions::Function;
 use super::machines::{Bank, Machine, Slot};
 use super::units::*;
 
-/// Every fixture.
+/// Every fixture, found by [`Machine::from_name`] only.
 pub static FIXTURES: &[&Machine] = &[&F3, &F1];
 
-/// The inputs of both.
+/// Input bank of the fixtures.
 const INPUTS: Bank = Bank { name: "i", base: 768, depth: 256 };
 
 /// A sequencer without loops.

@@ -6,16 +6,16 @@ use crate::fp;
 use crate::shape::Shape;
 use std::sync::LazyLock;
 
-/// A product, a sum that takes it as a source, and the instruction that does both with one rounding.
+/// A product, a sum with the product as a source, and the instruction that computes both with one rounding.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Fusion {
-    /// The product.
+    /// Instruction of the product.
     pub product: Op,
-    /// The sum or difference.
+    /// Instruction of the sum or difference.
     pub sum: Op,
-    /// The index of its source that is the product.
+    /// Index of the sum's source that is the product.
     pub source: usize,
-    /// The instruction that does both. Its sources are those of the product, then the sum's other one.
+    /// Instruction that computes both. Its sources are the product's, then the sum's other source.
     pub fused: Op,
 }
 
@@ -41,7 +41,7 @@ static FUSIONS: LazyLock<Vec<Fusion>> = LazyLock::new(|| {
     fusions
 });
 
-/// True if the results are the same for operands on which nothing is rounded.
+/// Results agree on operands for which no step rounds.
 fn does_both(product: &Row, sum: &Row, source: usize, fused: &Row) -> bool {
     const EXACT: [f32; 7] = [3.0, -5.0, 0.25, 0.0, -0.0, f32::INFINITY, 15.0];
     let value = |row: &Row, [a, b, c]: [u32; 3]| compute::<fp::Host>(row.op, a, b, c);
@@ -56,7 +56,7 @@ fn does_both(product: &Row, sum: &Row, source: usize, fused: &Row) -> bool {
     })
 }
 
-/// Every pair of instructions that a third one combines.
+/// All combinations of a product and a sum for which a fused instruction exists.
 pub fn fusions() -> &'static [Fusion] {
     &FUSIONS
 }

@@ -6,13 +6,13 @@
 //! and, where the assembler's equations have an operator or a function for it, how an equation writes it ([`Form`]).
 //!
 //! The meaning is either `= expression`, a value computed from the source operands `a`, `b`, `c` (the arithmetic `A` is
-//! Berkeley SoftFloat as the reference, or the host's binary32, which the tests prove identical), or `do Effect`, what
-//! it does to the machine beyond writing its destination. A row without a meaning does not compile.
+//! Berkeley SoftFloat as the reference, or the host's binary32, which the tests prove identical), or `do Effect`, an effect
+//! on the machine beyond the destination. A row without a meaning does not compile.
 //!
-//! After a semicolon follows the meaning of a floating-point operation, or of one that moves any bits, in the real numbers ([`Real`]),
-//! and a bound in ulps on the difference of its result from that: [`ROUNDED`], [`EXACT`], or the kernel's measured bound. Operations
-//! on bits have no such meaning: they name themselves ([`Bitwise`]), for abstract domains that can handle bits. The meaning of an
-//! integer sum does not wrap, even though its value does.
+//! After a semicolon follows, for an operation on floats or one that moves any bits, its meaning in the real numbers ([`Real`]), and a
+//! bound in ulps on the error of the result: [`ROUNDED`], [`EXACT`], or the kernel's measured bound. Operations on bits have no such
+//! meaning: they name themselves ([`Bitwise`]), for abstract domains that can handle bits. The meaning of an integer sum does not
+//! wrap, even though its value does.
 
 use crate::fp::{self, Arithmetic, Bitwise, Flags, Real, Value};
 use crate::shape::Shape;
@@ -28,7 +28,7 @@ macro_rules! functions {
         }
 
         impl Function {
-            /// Its name in the tables.
+            /// Name of the function in the tables.
             pub const fn name(self) -> &'static str {
                 match self {
                     $(Function::$name => stringify!($name),)*
@@ -51,42 +51,42 @@ functions! {
     Store,
     /// Integer, logic, comparison and selection, for which one carry chain is enough.
     Alu,
-    /// binary32 addition.
+    /// Sum and difference of binary32 numbers.
     Add,
     /// Conversion between integer and binary32.
     Convert,
-    /// binary32 multiplication.
+    /// Product of binary32 numbers.
     Multiply,
     /// binary32 product and sum with one rounding.
     Fused,
-    /// binary32 division.
+    /// Quotient of binary32 numbers.
     Divide,
-    /// binary32 square root.
+    /// Square root of a binary32 number.
     Root,
-    /// Sine and cosine.
+    /// Sine and cosine, in radians.
     Sine,
     /// Arctangent of a quotient.
     Arctangent,
-    /// Arccosine.
+    /// Arccosine, in radians, in [0, π].
     Arccosine,
 }
 
 /// The type of an operand, by which literals are converted to bits and bits are shown.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, serde::Serialize)]
 pub enum Type {
-    /// IEEE 754 binary32.
+    /// A binary32 number of IEEE 754.
     #[serde(rename = "float")]
     F,
-    /// 32-bit two's-complement integer.
+    /// A 32-bit integer in two's complement.
     #[serde(rename = "integer")]
     I,
-    /// Any 32 bits.
+    /// Any pattern of 32 bits.
     #[serde(rename = "bits")]
     B,
 }
 
 impl Type {
-    /// The word for it in the language: `float`, `int`, `bits`.
+    /// Name of the type in the language: `float`, `int`, `bits`.
     pub const fn name(self) -> &'static str {
         match self {
             Type::F => "float",
@@ -99,13 +99,13 @@ impl Type {
 /// The effect of an instruction beyond its arithmetic.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Effect {
-    /// Writes `compute(a, b, c)` to its destination and nothing else.
+    /// Writes `compute(a, b, c)` to the destination, and has no other effect.
     Compute,
-    /// Nothing at all.
+    /// No effect at all.
     Nothing,
-    /// Writes its immediate to its destination.
+    /// Writes the immediate to the destination.
     Immediate,
-    /// Writes the data word at `offset + a` to its destination.
+    /// Writes the data word at `offset + a` to the destination.
     Load,
     /// Writes `b` to the data word at `offset + a`.
     Store,
@@ -119,21 +119,21 @@ pub enum Effect {
     Call,
     /// Pops an address from the return stack and continues there.
     Return,
-    /// Repeats the bundles from the next one to the one before the target, `a` times.
+    /// Repeats the bundles from the next one to the bundle before the target, `a` times.
     Loop,
     /// Ends the period: all earlier results are written; continues at the target on the next tick.
     Wait,
     /// Stops the machine for good.
     Halt,
-    /// Writes the sticky exception flags of all earlier operations to its destination.
+    /// Writes the sticky exception flags of all earlier operations to the destination.
     ReadFlags,
-    /// Clears the sticky exception flags, those of all earlier operations included.
+    /// Clears the sticky exception flags, including flags of all earlier operations.
     ClearFlags,
 }
 
 impl Effect {
-    /// True if execution may continue elsewhere than at the next bundle, or if the front end refills before it does so (a short
-    /// loop): such an operation ends a basic block.
+    /// Execution may continue elsewhere than at the next bundle, or the front end refills first (a short loop): the operation
+    /// ends a basic block.
     pub const fn redirects(self) -> bool {
         matches!(
             self,
@@ -148,30 +148,30 @@ impl Effect {
         )
     }
 
-    /// True if execution may continue at the next bundle.
+    /// Execution may continue at the next bundle.
     pub const fn falls_through(self) -> bool {
         !self.redirects() || self.is_conditional() || matches!(self, Effect::Loop)
     }
 
-    /// True if the redirection depends on an operand.
+    /// The redirection depends on an operand.
     pub const fn is_conditional(self) -> bool {
         matches!(self, Effect::BranchZero | Effect::BranchNonzero)
     }
 
-    /// True if issue must wait until every earlier result is written (see `timing`).
+    /// Issue waits until every earlier result is written (see `timing`).
     pub const fn drains(self) -> bool {
         matches!(self, Effect::Wait | Effect::Halt | Effect::ReadFlags | Effect::ClearFlags)
     }
 }
 
-/// One row of the table.
+/// A row of the table of instructions.
 #[derive(Clone, Copy, Debug)]
 pub struct Row {
-    /// The instruction.
+    /// Variant of the instruction.
     pub op: Op,
-    /// Its name in the source.
+    /// Name in the source.
     pub mnemonic: &'static str,
-    /// Bits 47..41 of its word.
+    /// Bits 47..41 of the word.
     pub opcode: u8,
     /// The function that the executing unit must offer.
     pub function: Function,
@@ -179,24 +179,24 @@ pub struct Row {
     pub shape: Shape,
     /// Type of the result, if any, then of the sources.
     pub types: &'static [Type],
-    /// Its effect beyond arithmetic.
+    /// Effect beyond the arithmetic.
     pub effect: Effect,
-    /// One line in symbols.
+    /// Meaning in symbols, one line.
     pub summary: &'static str,
     /// The manual's text: special cases, flags, error bound.
     pub text: &'static str,
-    /// Bound in ulps on the difference of its result from the exact value, [`real`]; `None` if it has no meaning in the reals.
+    /// Bound in ulps on the difference of the result from the exact value, [`real`]; `None` without a meaning in the reals.
     pub ulp: Option<f64>,
-    /// Its forms in equations, with the letters of its sources: `a + b`. Several rows may have one form, if their types differ.
+    /// Forms in equations, with the letters of the sources: `a + b`. Several rows may share a form if their types differ.
     pub forms: &'static [&'static str],
 }
 
 /// The form of an instruction in equations.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Form {
-    /// The operator or the function's name; `?:` of a choice, empty for a value alone.
+    /// The operator or the function's name; `?:` for a choice, empty for a value alone.
     pub symbol: String,
-    /// The instruction's sources (0 = a, 1 = b, 2 = c), in the order in which they occur in the equation. Others are zero.
+    /// Sources of the instruction (0 = a, 1 = b, 2 = c), in the order in which they occur in the equation. Others are zero.
     pub sources: Vec<usize>,
 }
 
@@ -226,7 +226,7 @@ impl Form {
 }
 
 impl Row {
-    /// The type of the destination; `B` where there is none.
+    /// Type of the destination; `B` without a destination.
     #[inline]
     pub fn result_type(&self) -> Type {
         if self.shape.has_dest() { self.types[0] } else { Type::B }
@@ -239,13 +239,13 @@ impl Row {
         self.types.get(skip + index).copied().unwrap_or(Type::B)
     }
 
-    /// Its form in equations.
+    /// Parsed forms in equations.
     pub fn forms(&self) -> impl Iterator<Item = Form> {
         self.forms.iter().map(|form| Form::read(form))
     }
 
-    /// True if the instruction copies its source to its destination, bit for bit, and does nothing else. This is tested by its
-    /// meaning: it must pass 32 bits of which only one is set, or only one is clear, for each of them.
+    /// The instruction copies its source to its destination, bit for bit, and has no other effect. Tested by execution:
+    /// patterns with one bit set, or one bit clear, must pass unchanged.
     pub fn copies(&self) -> bool {
         let of = |a| compute::<fp::Host>(self.op, a, 0, 0);
         self.effect == Effect::Compute
@@ -263,7 +263,7 @@ const fn bits(bits: u32) -> Value {
     Value { bits, flags: Flags::NONE }
 }
 
-/// The name of an instruction, of whose variant Rust demands `r#` where the name is one of its keywords.
+/// Mnemonic of a variant: without the `r#` that Rust demands before its keywords.
 const fn name(variant: &'static str) -> &'static str {
     match variant.as_bytes() {
         [b'r', b'#', ..] => variant.split_at(2).1,
@@ -323,7 +323,7 @@ macro_rules! instructions {
             $(#[doc = $summary] $mnemonic,)*
         }
 
-        /// Every instruction, in the order of the table; `ROWS[op as usize]` is `op`'s row.
+        /// Rows of all instructions; `ROWS[op as usize]` is `op`'s row.
         pub const ROWS: &[Row] = &[
             $(Row {
                 op: Op::$mnemonic,
@@ -368,7 +368,8 @@ macro_rules! instructions {
             sources: [&[u32; L]; 3],
             results: &mut [u32; L],
         ) -> bool {
-            // One word collects the flags of all lanes: with one for each, the loops are not vectorised (a third of the speed).
+            // A single word collects the flags of all lanes: with a word for each lane, the loops are not vectorised (a third of the
+            // speed).
             let mut raised = 0;
             match op {
                 $(Op::$mnemonic => {
@@ -458,7 +459,7 @@ instructions! { [a b c]
 }
 
 impl Op {
-    /// The instruction's row.
+    /// Row of the instruction in [`ROWS`].
     #[inline(always)]
     pub fn row(self) -> &'static Row {
         &ROWS[self as usize]

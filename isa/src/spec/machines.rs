@@ -13,16 +13,16 @@ use crate::number::{BankIndex, Register, SlotIndex};
 /// A register bank: a window of the register space. [`Machine::error`] checks its numbers.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, serde::Serialize)]
 pub struct Bank {
-    /// Prefix of its registers' names: `m` has `m0`, `m1`, ….
+    /// Prefix of the registers' names: `m` has `m0`, `m1`, ….
     pub name: &'static str,
-    /// Address of its first register.
+    /// Address of the first register.
     pub base: u16,
-    /// Number of registers.
+    /// Number of registers, at least 1.
     pub depth: u16,
 }
 
 impl Bank {
-    /// True if a register lies in the window.
+    /// A register lies in the window.
     #[inline]
     pub const fn contains(&self, register: Register) -> bool {
         self.index(register).is_some()
@@ -37,7 +37,7 @@ impl Bank {
         }
     }
 
-    /// The register with an index in the bank; `None` past its end.
+    /// The register with an index in the bank; `None` past the bank's end.
     #[inline]
     pub const fn register(&self, index: BankIndex) -> Option<Register> {
         if index.get() < self.depth { Register::new(self.base as usize + index.index()) } else { None }
@@ -53,11 +53,11 @@ impl Bank {
 /// An issue slot: one operation of a bundle.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, serde::Serialize)]
 pub struct Slot {
-    /// Its name.
+    /// Name of the slot, unique in its machine.
     pub name: &'static str,
-    /// The bank that it writes.
+    /// Bank that the slot writes.
     pub bank: Bank,
-    /// The units that it hosts.
+    /// Units that the slot hosts.
     pub units: &'static [Unit],
 }
 
@@ -83,44 +83,44 @@ impl Slots {
         Slots(1 << slot.get())
     }
 
-    /// True if a slot is in it.
+    /// A slot belongs to the set.
     pub const fn contains(self, slot: SlotIndex) -> bool {
         self.0 >> slot.get() & 1 == 1
     }
 
-    /// True if no slot is in it.
+    /// The set has no slot.
     pub const fn is_empty(self) -> bool {
         self.0 == 0
     }
 
-    /// The number of slots in it.
+    /// Number of slots in the set.
     pub const fn len(self) -> usize {
         self.0.count_ones() as usize
     }
 
-    /// The first slot of it.
+    /// The first slot of the set.
     pub const fn first(self) -> Option<SlotIndex> {
         SlotIndex::new(self.0.trailing_zeros() as usize)
     }
 
-    /// The slots that are in both.
+    /// Intersection with another set.
     #[must_use]
     pub const fn and(self, other: Slots) -> Slots {
         Slots(self.0 & other.0)
     }
 
-    /// The slots that are in either.
+    /// Union with another set.
     #[must_use]
     pub const fn or(self, other: Slots) -> Slots {
         Slots(self.0 | other.0)
     }
 
-    /// True if all its slots are in another set.
+    /// Every slot of the set is in `other`.
     pub const fn is_within(self, other: Slots) -> bool {
         self.0 & !other.0 == 0
     }
 
-    /// Its slots, ascending.
+    /// Iterates over the slots, ascending.
     pub fn iter(self) -> impl DoubleEndedIterator<Item = SlotIndex> {
         SlotIndex::all().filter(move |slot| self.contains(*slot))
     }
@@ -132,16 +132,16 @@ impl FromIterator<SlotIndex> for Slots {
     }
 }
 
-/// One row of the table.
+/// A row of the table of machines.
 #[derive(Clone, Copy, Debug, serde::Serialize)]
 pub struct Machine {
-    /// Its name: that of its row, then the options that differ from it, as `t3,data=32768`.
+    /// Name of the row, then the options that differ from it, as `t3,data=32768`.
     pub name: &'static str,
-    /// Its purpose.
+    /// Purpose, for lists of machines.
     pub text: &'static str,
     /// The slots, in the order of a bundle's words.
     pub slots: &'static [Slot],
-    /// The input ports.
+    /// Input ports, and `zero` as the last register.
     pub inputs: Bank,
     /// The number of registers at the end of each slot's bank that are output ports.
     pub outputs_per_bank: u16,
@@ -149,9 +149,9 @@ pub struct Machine {
     pub code_depth: u32,
     /// Depth of the data memory, in words of 32 bits.
     pub data_depth: u32,
-    /// Depth of the return stack.
+    /// Depth of the return stack, in addresses.
     pub stack_depth: u32,
-    /// Loops inside one another that the sequencer counts; 0 on a machine without.
+    /// Nesting depth of loops that the sequencer counts; 0 on a machine without.
     pub loop_depth: u32,
     /// Cycles in which nothing issues after a taken branch, a call, a return, `wait` or reset, while the front end refills.
     pub refill: u32,
@@ -163,7 +163,7 @@ const fn bank(name: &'static str, base: u16, depth: u16) -> Bank {
     Bank { name, base, depth }
 }
 
-/// The fused unit without sums alone, which are faster in a separate adder.
+/// The fused unit without plain sums, which are faster in a separate adder.
 const PRODUCT_AND_SUM: Unit = Unit { functions: &[Function::Multiply, Function::Fused], ..FUSED };
 
 /// The data memory's second port.
@@ -259,12 +259,12 @@ impl Machine {
         if self.code_depth < MAX_CODE { self.code_depth } else { MAX_CODE - 1 }
     }
 
-    /// The first slot that hosts a unit for `function`, and that unit. Idle operations have none: every slot takes them.
+    /// The first slot that hosts a unit for `function`, with the unit. `None` for idle operations, which every slot takes.
     pub fn host(&self, function: Function) -> Option<(SlotIndex, &'static Unit)> {
         self.numbered_slots().find_map(|(s, slot)| Some((s, slot.unit(function)?)))
     }
 
-    /// The unit of a slot that executes a function; `None` if the slot hosts none, and for idle operations.
+    /// The unit of a slot that executes a function; `None` if the slot hosts no such unit, and for idle operations.
     ///
     /// # Panics
     /// If the machine has no slot of this index.
@@ -272,10 +272,10 @@ impl Machine {
         self.slot(slot).unit(function)
     }
 
-    /// A slot.
+    /// The slot at an index.
     ///
     /// # Panics
-    /// If the machine has none of this index.
+    /// If the machine has no slot of this index.
     pub fn slot(&self, index: SlotIndex) -> &'static Slot {
         &self.slots[index.index()]
     }
@@ -287,12 +287,12 @@ impl Machine {
         SlotIndex::all().zip(self.slots)
     }
 
-    /// The slots that host a unit for `function`. None do for idle operations: every slot takes them.
+    /// The slots that host a unit for `function`; empty for idle operations, which every slot takes.
     pub fn hosts(&self, function: Function) -> Slots {
         self.numbered_slots().filter(|(_, slot)| slot.unit(function).is_some()).map(|(s, _)| s).collect()
     }
 
-    /// The slots whose bank has a register: one at most.
+    /// The slots whose bank has a register: at most one.
     pub fn writers(&self, register: Register) -> Slots {
         self.numbered_slots().filter(|(_, slot)| slot.bank.contains(register)).map(|(s, _)| s).collect()
     }
@@ -302,7 +302,7 @@ impl Machine {
         self.slots.iter().map(|slot| &slot.bank).chain([&self.inputs])
     }
 
-    /// True if the machine has a register at an address: if one of its banks does.
+    /// Some bank has a register at the address.
     pub fn has_register(&self, register: Register) -> bool {
         self.banks().any(|bank| bank.contains(register))
     }
@@ -329,13 +329,13 @@ impl Machine {
         self.banks().find(|bank| bank.name == prefix)?.register(index)
     }
 
-    /// True if the address is an output port.
+    /// The address is an output port of some bank.
     pub fn is_output(&self, register: Register) -> bool {
         self.output_number(register).is_some()
     }
 
-    /// The number of the output port at an address: its index in the output window of its bank. The windows of all banks
-    /// are the same ports: there are [`Machine::outputs_per_bank`] of them, by number, whichever slot writes.
+    /// The number of the output port at an address: its index in the output window of its bank. The windows of all banks are
+    /// the same [`Machine::outputs_per_bank`] ports, by number, whichever slot writes.
     pub fn output_number(&self, register: Register) -> Option<u16> {
         let find = |slot: &Slot| Some((slot.bank.index(register)?, slot.bank.depth));
         let (index, depth) = self.slots.iter().find_map(find)?;
@@ -358,13 +358,13 @@ impl Machine {
         self.inputs.depth - u16::from(self.inputs.contains(Register::ZERO))
     }
 
-    /// True if the address is an input port (`zero` is not).
+    /// The address is an input port (`zero` is not).
     pub fn is_input(&self, register: Register) -> bool {
         self.input_number(register).is_some()
     }
 }
 
-/// Machines are equal if their rows are. Most comparisons are of a machine with itself.
+/// Machines are equal if their rows are. Most comparisons involve a machine and itself.
 impl PartialEq for Machine {
     fn eq(&self, other: &Machine) -> bool {
         let Machine { name, text: _, slots, inputs, outputs_per_bank, code_depth, data_depth, .. } = self;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Rows of machines that are made at run time, as from a file. They pass the checks of the table's rows
-//! ([`Machine::error`]), are kept for as long as the process runs, and each exists once.
+//! Rows of machines made at run time, as from a file. They pass the checks of the table's rows ([`Machine::error`]), are
+//! kept for as long as the process runs, and each exists once.
 
 use super::check::MachineError;
 use super::fixture::FIXTURES;
@@ -11,10 +11,10 @@ use std::collections::HashMap;
 use std::fmt::Write as _;
 use std::sync::{LazyLock, Mutex, PoisonError};
 
-/// The most rows of a process beside the table's, wrong ones included: each takes some 2 KB until the end.
+/// The most rows of a process beside the table's, invalid ones included: each takes some 2 KB until the end.
 pub const MOST_ROWS: usize = 16_384;
 
-/// A machine's row with texts of its own; its fields are those of [`Machine`].
+/// A machine's row that owns its texts; the fields are [`Machine`]'s.
 #[derive(Clone, PartialEq, Eq, Hash, Debug)]
 #[allow(missing_docs, reason = "the fields are those of the machine")]
 pub struct RowOwned {
@@ -31,7 +31,7 @@ pub struct RowOwned {
     pub resolve: u32,
 }
 
-/// A slot of such a row.
+/// A slot of a [`RowOwned`].
 #[derive(Clone, PartialEq, Eq, Hash, Debug)]
 #[allow(missing_docs, reason = "the fields are those of the slot")]
 pub struct SlotOwned {
@@ -40,7 +40,7 @@ pub struct SlotOwned {
     pub units: Vec<UnitOwned>,
 }
 
-/// A bank of such a row.
+/// A bank of a [`RowOwned`].
 #[derive(Clone, PartialEq, Eq, Hash, Debug)]
 #[allow(missing_docs, reason = "the fields are those of the bank")]
 pub struct BankOwned {
@@ -49,12 +49,12 @@ pub struct BankOwned {
     pub depth: u16,
 }
 
-/// A unit of such a row: one of the table of units, with functions and cycles of its own.
+/// A unit of a [`RowOwned`]: a row of the table of units, with functions and cycles of its own.
 #[derive(Clone, PartialEq, Eq, Hash, Debug)]
 pub struct UnitOwned {
-    /// The name of its row in the table of units.
+    /// Name in the table of units.
     pub name: &'static str,
-    /// The functions that it executes here, some of its row's.
+    /// Functions that it executes here, a subset of the table's.
     pub functions: Vec<Function>,
     /// Cycles from issue to the earliest issue of a dependent operation.
     pub latency: u32,
@@ -68,27 +68,27 @@ pub enum RowError {
     /// The row is invalid, by a check that the table's rows pass.
     #[error(transparent)]
     Machine(#[from] MachineError),
-    /// It has the name of a machine of the table, and is another.
+    /// Another machine of the table has this name.
     #[error("`{name}` is a machine of Takt's, and this is another: it needs a name of its own")]
     Taken {
-        /// The name.
+        /// Name of both machines.
         name: &'static str,
     },
-    /// A process has [`MOST_ROWS`] of them.
+    /// The process already holds [`MOST_ROWS`] rows.
     #[error("more than {MOST_ROWS} machines in one run")]
     Many,
 }
 
-/// The part of a row that a message is about, by the names that the row has.
+/// The part of a row that a message points at, by the row's own names.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum RowPlace<'a> {
-    /// The machine's name.
+    /// Name of the machine.
     Name,
-    /// The slots, all of them.
+    /// List of the slots.
     Slots,
     /// A number of the row, by the name of its field.
     Field(&'static str),
-    /// A slot.
+    /// A slot, by its name.
     Slot(&'a str),
     /// A bank, the inputs' included.
     Bank(&'a str),
@@ -98,7 +98,7 @@ pub enum RowPlace<'a> {
 
 static ROWS: LazyLock<Mutex<HashMap<RowOwned, &'static Machine>>> = LazyLock::new(Mutex::default);
 
-/// The machine of the table, fixtures included, that has a name.
+/// The machine of the table, fixtures included, with a name.
 pub(super) fn builtin(name: &str) -> Option<&'static Machine> {
     MACHINES.iter().chain(FIXTURES).copied().find(|machine| machine.name == name)
 }
@@ -108,13 +108,13 @@ fn leak(text: &str) -> &'static str {
 }
 
 impl UnitOwned {
-    /// A unit as the table has it; `None` if there is none of this name.
+    /// A unit of the table, by its name.
     pub fn of(name: &str) -> Option<UnitOwned> {
         UNITS.iter().find(|unit| unit.name == name).map(UnitOwned::from)
     }
 
     fn leaked(&self) -> Unit {
-        // Every `UnitOwned` of the readers is made of a row; one that names none keeps a name that no circuit has.
+        // Readers make every `UnitOwned` from a row; one without a row keeps a name that no circuit has.
         let row = UNITS.iter().find(|unit| unit.name == self.name).unwrap_or(&UNITS[0]);
         let functions = match row.functions == self.functions {
             true => row.functions,
@@ -190,13 +190,13 @@ impl RowOwned {
         }))
     }
 
-    /// The machine of the row: the table's, if it has this row, or else one that is kept from here on.
+    /// The machine of the row: the table's, if it has this row, or else a machine that is kept from here on.
     ///
     /// # Errors
     /// If the row is invalid, or has the name of another machine of the table.
     pub fn machine(&self) -> Result<&'static Machine, RowError> {
         if let Some(builtin) = builtin(&self.name) {
-            // The text says nothing that a program could notice.
+            // The text does not affect programs.
             let same = RowOwned { text: builtin.text.to_owned(), ..self.clone() } == RowOwned::from(builtin);
             return if same { Ok(builtin) } else { Err(RowError::Taken { name: builtin.name }) };
         }
@@ -218,13 +218,13 @@ impl RowOwned {
 }
 
 impl Machine {
-    /// True for a machine of the table, or one of the tests, whatever its memories: every tool finds it by its name. False for
-    /// one of a file.
+    /// A machine of the table, or a fixture, whatever its memories: every tool finds it by its name. A file's machine is not
+    /// built in.
     pub fn is_builtin(&self) -> bool {
         builtin(self.row_name()).is_some()
     }
 
-    /// The row as a file of `-m` has it (TOML), memories as they are.
+    /// The row as a file for `-m` (TOML), memories as they are.
     pub fn to_toml(&self) -> String {
         let mut out = String::new();
         let _ = writeln!(out, "name = \"{}\"", self.identifier());
@@ -258,7 +258,7 @@ impl Machine {
     }
 }
 
-/// A unit as an entry of `units`: its name, or that and what differs from its row.
+/// A unit as an entry of `units`: its name, perhaps with differences from its row.
 fn entry(unit: &Unit) -> String {
     let Some(row) = UNITS.iter().find(|row| row.name == unit.name) else {
         return format!("\"{}\"", unit.name);

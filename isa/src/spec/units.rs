@@ -1,33 +1,33 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The table of units: the circuits that a slot can host.
 //!
-//! **Latency** is the distance in cycles from the issue of an operation to the earliest issue of one that uses its result,
-//! forwarding included: an operation issued in cycle `c` has its result on the slot's result bus in cycle `c + latency`.
-//! **Interval** is the distance between two issues to the same unit. **Cuts** names what each pipeline register after the
-//! operand register holds; a fully pipelined unit has `latency - 1` of them.
+//! **Latency** is the distance in cycles from the issue of an operation to the earliest issue of an operation that uses its
+//! result, forwarding included: an operation issued in cycle `c` has its result on the slot's result bus in cycle `c +
+//! latency`. **Interval** is the distance between two issues to the same unit. **Cuts** names the contents of each pipeline
+//! register after the operand register; a fully pipelined unit has `latency - 1` of them.
 
 use super::instructions::Function;
 
-/// One row of the table.
+/// A row of the table of units.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, serde::Serialize)]
 pub struct Unit {
-    /// Its name.
+    /// Name of the unit, also in Verilog.
     pub name: &'static str,
-    /// The functions that it executes.
+    /// Functions that the unit executes.
     pub functions: &'static [Function],
     /// Cycles from issue to the earliest issue of a dependent operation; 0 for a unit that writes no register.
     pub latency: u32,
     /// Cycles between two issues to this unit.
     pub interval: u32,
-    /// The contents of its pipeline registers, in the order of the data.
+    /// Contents of the pipeline registers, in the order of the data.
     pub cuts: &'static [&'static str],
-    /// The Verilog module.
+    /// Name of the Verilog module.
     pub rtl: &'static str,
-    /// Its description in the manual.
+    /// Description in the manual.
     pub text: &'static str,
 }
 
-/// Latencies stay below this: the write-port bookings of a bank fit a 64-cycle window.
+/// Upper limit of latencies, exclusive: the write-port bookings of a bank fit a 64-cycle window.
 pub const MAX_LATENCY: u32 = 64;
 
 macro_rules! units {
@@ -42,7 +42,7 @@ macro_rules! units {
             text: $text,
         };)*
 
-        /// Every unit.
+        /// Every unit of the table.
         pub const UNITS: &[Unit] = &[$($constant),*];
     };
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Operands for the arithmetic tests, and how many of them.
+//! Operands for the arithmetic tests, and their number.
 //!
 //! Two environment variables set the effort. `TAKT_TEST_SCALE` multiplies the number of random operands (default 1,
 //! which is 10⁶ per operation with debug assertions and 10⁷ without). `TAKT_FULL=1` runs every one of the 2³² operands
@@ -24,12 +24,12 @@ pub(crate) fn random_count() -> u64 {
     count
 }
 
-/// True if every operand is to be run through.
+/// Every operand is tested instead of a sample (`TAKT_FULL=1`).
 pub(crate) fn full() -> bool {
     std::env::var("TAKT_FULL").is_ok_and(|text| text == "1")
 }
 
-/// Cuts `0..count` into one piece per core, runs `work` on each, and returns what each gave.
+/// Cuts `0..count` into one piece per core, runs `work` on each, and returns all results.
 pub(crate) fn parallel<T: Send>(count: u64, work: impl Fn(Range<u64>) -> T + Sync) -> Vec<T> {
     let pieces = thread::available_parallelism().map_or(1, |n| n.get() as u64);
     thread::scope(|scope| {
@@ -62,7 +62,7 @@ impl Random {
         (self.next() >> 32) as u32
     }
 
-    /// Uniform in `low..=high`.
+    /// Uniform integer in `low..=high`.
     pub(crate) fn between(&mut self, low: i32, high: i32) -> i32 {
         let span = (i64::from(high) - i64::from(low) + 1) as u64;
         (i64::from(low) + (((self.next() >> 32) * span) >> 32) as i64) as i32
@@ -265,8 +265,8 @@ impl Pairs {
     }
 }
 
-/// Operands of a fused product and sum: a pair of [`Pairs`], and what is added to their product, most often where cancellation,
-/// rounding, or what both leave of a subnormal number is decided.
+/// Operands of a fused product and sum: a pair of [`Pairs`], and an addend, most often where cancellation, rounding, or the
+/// subnormal remainder of both is decided.
 pub(crate) struct Triples {
     pairs: Pairs,
 }
@@ -286,8 +286,8 @@ impl Triples {
             let exponent = pairs.random.between(if kind == 13 { 100 } else { 60 }, 254);
             b = pairs.with_exponent(a, exponent).1;
         }
-        // (1 + i·2⁻²³)(1 - i·2⁻²³) is closer to 1 than binary64 sees beside an addend of which 1 is half a unit of the last place.
-        // Half of these products are half the smallest subnormal number.
+        // (1 + i·2⁻²³)(1 - i·2⁻²³) is closer to 1 than binary64 sees beside an addend for which 1 is half a unit of the last
+        // place. Half of these products are half the smallest subnormal number.
         let tiny = pairs.random.bits() & 1 == 0;
         if kind == 11 {
             let (i, exponent) =

@@ -1,5 +1,6 @@
 ; inverse-dynamics of panda: joint forces that a motion takes
 ; operations: 539 (sums 261, products 266, divisions and roots 0, trigonometric 12, others 0)
+; passed over: `limit`
 ; frames: z along the joint's axis; of each link: its joint, and where its frame lies in the one before
 ; link 1: panda_joint1, on panda_link0: origin 0 0 0.333 m, axis 0 0 1
 ; link 2: panda_joint2, on link 1: origin 0 0 0 m, axis 0 -1 0
@@ -45,22 +46,23 @@
 ;       id_tau[5]: force of panda_joint5, N m
 ;       id_tau[6]: force of panda_joint6, N m
 ;       id_tau[7]: force of panda_joint7, N m
-.reg    id_s2 id_c2 id_s3 id_c3 id_s4 id_c4 id_s5 id_c5 id_s6 id_c6 id_t1 id_s7 id_c7 id_u1xx_neg id_w2x_neg
-.reg    id_w2y_neg id_u2xz_neg id_u2yz id_u2zy_neg id_t2 id_t3 id_u2zx_neg id_t4 id_u2xy_neg id_u2yx id_t5
-.reg    id_t6 id_t7 id_u2xx_neg id_u2yy_neg id_a2x_neg id_a2y_neg id_w3x id_w3y id_w3z id_u3xz id_u3yz_neg
-.reg    id_t8 id_u3zy id_t9 id_t10 id_u3zx id_t11 id_u3xy_neg id_u3yx id_t12 id_t13 id_t14 id_u3xx_neg
-.reg    id_u3yy_neg id_a3x_neg id_a3y id_t15 id_a4z id_t16 id_w4x_neg id_w4y id_w4z id_u4xz id_u4yz id_t17
-.reg    id_u4zy_neg id_t18 id_t19 id_u4zx_neg id_t20 id_u4xy_neg id_u4yx id_t21 id_t22 id_t23 id_u4xx_neg
-.reg    id_u4yy_neg id_a4x_neg id_a4y id_t24 id_a5z_neg id_t25 id_w5x_neg id_w5y_neg id_w5z id_u5xz_neg
-.reg    id_u5yz id_t26 id_u5zy_neg id_t27 id_t28 id_u5zx_neg id_t29 id_u5xy_neg id_u5yx id_t30 id_t31 id_t32
-.reg    id_u5xx_neg id_u5yy_neg id_a5x_neg id_a5y_neg id_w6x id_w6y id_w6z id_u6xz id_u6yz_neg id_t33 id_t34
-.reg    id_t35 id_u6zy id_u6zx_neg id_t36 id_u6xy_neg id_u6yx id_t37 id_t38 id_t39 id_u6xx_neg id_u6yy_neg
-.reg    id_a6x_neg id_a6y id_a7z id_w7x_neg id_w7y id_w7z id_u7xz id_u7yz id_t40 id_t41 id_u7zy_neg
-.reg    id_u7zx_neg id_t42 id_u7xy_neg id_u7yx id_t43 id_t44 id_t45 id_u7xx_neg id_a7y id_f7x_neg id_f7y
-.reg    id_f7z_neg id_n7x_neg id_n7y id_t46 id_t47 id_f6x id_f6y id_t48 id_n6x_neg id_t49 id_n6y id_t50
-.reg    id_t51 id_f5x_neg id_f5y id_f5z_neg id_t52 id_n5x_neg id_t53 id_n5y_neg id_t54 id_t55 id_t56 id_f4x
-.reg    id_f4y id_f4z_neg id_t57 id_n4x id_t58 id_n4y_neg id_t59 id_t60 id_t61 id_n3x_neg id_t62 id_n3y
-.reg    id_t63 id_t64 id_n2x_neg id_t65 id_n2y_neg id_t66
+.reg    id_s2 id_c2 id_s3 id_c3 id_s4 id_c4 id_s5 id_c5 id_s6 id_c6 id_t1 id_s7 id_c7 id_u1xx_neg
+.reg    id_w2x_neg id_w2y_neg id_u2xz_neg id_u2yz id_u2zy_neg id_t2 id_t3 id_u2zx_neg id_t4 id_u2xy_neg
+.reg    id_u2yx id_t5 id_t6 id_t7 id_u2xx_neg id_u2yy_neg id_a2x_neg id_a2y_neg id_w3x id_w3y id_w3z
+.reg    id_u3xz id_u3yz_neg id_t8 id_u3zy id_t9 id_t10 id_u3zx id_t11 id_u3xy_neg id_u3yx id_t12 id_t13
+.reg    id_t14 id_u3xx_neg id_u3yy_neg id_a3x_neg id_a3y id_t15 id_a4z id_t16 id_w4x_neg id_w4y id_w4z
+.reg    id_u4xz id_u4yz id_t17 id_u4zy_neg id_t18 id_t19 id_u4zx_neg id_t20 id_u4xy_neg id_u4yx id_t21
+.reg    id_t22 id_t23 id_u4xx_neg id_u4yy_neg id_a4x_neg id_a4y id_t24 id_a5z_neg id_t25 id_w5x_neg
+.reg    id_w5y_neg id_w5z id_u5xz_neg id_u5yz id_t26 id_u5zy_neg id_t27 id_t28 id_u5zx_neg id_t29
+.reg    id_u5xy_neg id_u5yx id_t30 id_t31 id_t32 id_u5xx_neg id_u5yy_neg id_a5x_neg id_a5y_neg id_w6x
+.reg    id_w6y id_w6z id_u6xz id_u6yz_neg id_t33 id_t34 id_t35 id_u6zy id_u6zx_neg id_t36 id_u6xy_neg
+.reg    id_u6yx id_t37 id_t38 id_t39 id_u6xx_neg id_u6yy_neg id_a6x_neg id_a6y id_a7z id_w7x_neg id_w7y
+.reg    id_w7z id_u7xz id_u7yz id_t40 id_t41 id_u7zy_neg id_u7zx_neg id_t42 id_u7xy_neg id_u7yx id_t43
+.reg    id_t44 id_t45 id_u7xx_neg id_a7y id_f7x_neg id_f7y id_f7z_neg id_n7x_neg id_n7y id_t46 id_t47
+.reg    id_f6x id_f6y id_t48 id_n6x_neg id_t49 id_n6y id_t50 id_t51 id_f5x_neg id_f5y id_f5z_neg id_t52
+.reg    id_n5x_neg id_t53 id_n5y_neg id_t54 id_t55 id_t56 id_f4x id_f4y id_f4z_neg id_t57 id_n4x id_t58
+.reg    id_n4y_neg id_t59 id_t60 id_t61 id_n3x_neg id_t62 id_n3y id_t63 id_t64 id_n2x_neg id_t65 id_n2y_neg
+.reg    id_t66
 
         id_s2 = sin(id_q[2])
         id_c2 = cos(id_q[2])

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The three cores on the emulator, their loop closed by the plant: the far end of the host's link.
+//! Three cores on the emulator, with the plant in their loop: the far end of the host's link.
 
 use crate::dynamics::{JOINTS, Joints};
 use crate::host::{Inputs, Mode, Robot, TICK, View};
@@ -9,17 +9,17 @@ use std::collections::BTreeMap;
 use takt_emu::LoadError;
 use takt_system::{CorePeriods, Description, HostError, ProgramError, ReadError, Request, System};
 
-/// Cycles in which the cores must have come to their first ticks.
+/// Limit on the cycles until the cores' first ticks.
 const START: u64 = 10_000_000;
-/// Ticks between two records.
+/// Ticks from record to record.
 pub const RECORD_TICKS: u64 = 10;
-/// Records at most; later ones are left out.
+/// Limit on the records; later ones are dropped.
 const RECORDS: usize = 1 << 20;
 
-/// The controller as it comes with the crate.
+/// Controller that comes with the crate.
 ///
 /// # Errors
-/// If its own programs are wrong, in words.
+/// If its own programs are wrong; the text renders the mistakes.
 pub fn standard() -> Result<Description, String> {
     let text =
         |name: &str| takt_programs::THREE.iter().find(|(known, _)| *known == name).map(|(_, text)| *text);
@@ -33,58 +33,58 @@ pub fn standard() -> Result<Description, String> {
     })
 }
 
-/// An error that leaves no controller.
+/// Reason why there is no controller.
 #[derive(Debug, thiserror::Error)]
 pub enum ControllerError {
-    /// A link that the host needs.
+    /// A port or link of the host that the system lacks.
     #[error("the system is no robot controller: {0}")]
     Host(#[from] HostError),
-    /// A core's memory.
+    /// A core's memories cannot hold its program.
     #[error("{0}")]
     Load(#[from] LoadError),
-    /// The cores' first periods.
+    /// A fault before the first ticks, or no ticks within ten million cycles.
     #[error("the cores did not get to their first ticks: {0}")]
     Start(String),
 }
 
-/// The robot at a time.
+/// State of the robot at a time.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Record {
-    /// s.
+    /// Time since power-up, s.
     pub time: f64,
-    /// The plant's joint angles, rad.
+    /// Joint angles of the plant, rad.
     pub joints: Joints,
-    /// The reference that the servo had for this time, rad.
+    /// Servo's reference for this time, rad.
     pub reference: Joints,
-    /// Controls.
+    /// Controls held since this time.
     pub controls: Joints,
     /// Sequence number of the packet of the running segment.
     pub segment: u32,
-    /// Number of the mode.
+    /// Mode as its number on the link.
     pub mode: u32,
 }
 
-/// Figures of the tracking.
+/// Statistics of the tracking error.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Tracking {
-    /// Ticks in which the robot moved.
+    /// Number of ticks in which the robot moved.
     pub ticks: u64,
-    /// Largest differences between reference and plant, rad.
+    /// Largest differences between reference and plant while moving, rad.
     pub largest: Joints,
-    /// Sums of their squares.
+    /// Sums of the squared differences while moving, rad².
     pub squares: Joints,
-    /// The largest while it stood.
+    /// Largest differences while standing, rad.
     pub standing: Joints,
 }
 
 impl Tracking {
-    /// Root of the mean square while it moved, rad.
+    /// Root mean square error while moving, rad.
     pub fn rms(&self) -> Joints {
         self.squares.map(|sum| (sum / self.ticks.max(1) as f64).sqrt())
     }
 }
 
-/// The place of a value in the system: link and field.
+/// Position of a value in the system: link and field.
 type FieldIndex = (usize, usize);
 
 #[derive(Clone)]
@@ -99,7 +99,7 @@ struct Ports {
     reports: usize,
 }
 
-/// Encoders, as the system names them.
+/// Names of the encoder inputs.
 const ENCODERS: [&str; JOINTS] = ["n1", "n2", "n3", "n4", "n5", "n6"];
 /// Fields of the snapshot `state`.
 const STATE: [&str; 15] =
@@ -147,32 +147,32 @@ impl Ports {
     }
 }
 
-/// Cores and plant.
+/// Cores of the controller with the plant.
 #[derive(Clone)]
 pub struct Controller {
     system: System,
     plant: Plant,
     ports: Ports,
-    /// The cycle in which the host writes for the tick to come.
+    /// Cycle in which the host writes for the coming tick.
     next: u64,
     tick: u64,
     ticks: u64,
     words: Vec<u32>,
     view: View,
     inputs: Inputs,
-    /// The joints at the encoders in the last tick, and the controls that were held since.
+    /// Joints at the encoders in the last tick, and the controls held since.
     sampled: Option<(Joints, Joints)>,
-    /// True if the host's side is kept.
+    /// Host actions are recorded ([`Controller::keep_host_actions`]).
     kept: bool,
     records: Vec<Record>,
     tracking: Tracking,
 }
 
 impl Controller {
-    /// After reset, with a plant.
+    /// Controller after reset, with a plant.
     ///
     /// # Errors
-    /// If the system has not the host's ends that the controller has, or its cores do not start.
+    /// If the system lacks a port or link of the host, or its cores do not start.
     pub fn new(description: &Description, plant: Plant) -> Result<Controller, ControllerError> {
         let ports = Ports::of(description)?;
         let mut system = System::new(description)?;
@@ -206,34 +206,34 @@ impl Controller {
         })
     }
 
-    /// Keeps what the host and the encoders say from now on, for [`System::host_actions`]. The line then takes one word a tick, as
-    /// a row of a table does.
+    /// Records the host's and the encoders' actions from now on, for [`System::host_actions`]. The link then takes one word per tick, like
+    /// a row of a table.
     pub fn keep_host_actions(&mut self) {
         self.system.keep_host_actions();
         self.kept = true;
     }
 
-    /// The plant.
+    /// Plant in the loop.
     pub fn plant(&self) -> &Plant {
         &self.plant
     }
 
-    /// The system.
+    /// System of the three cores.
     pub fn system(&self) -> &System {
         &self.system
     }
 
-    /// The robot every [`RECORD_TICKS`] ticks.
+    /// Records of the robot's state, one every [`RECORD_TICKS`] ticks.
     pub fn records(&self) -> &[Record] {
         &self.records
     }
 
-    /// Figures of the tracking.
+    /// Statistics of the tracking error.
     pub fn tracking(&self) -> &Tracking {
         &self.tracking
     }
 
-    /// Each core with its periods.
+    /// Names of the cores with their periods.
     pub fn periods(&self) -> Vec<(String, CorePeriods)> {
         let cores = self.system.description().cores.iter().enumerate();
         cores.map(|(number, core)| (core.name.clone(), self.system.periods(number))).collect()
@@ -247,12 +247,12 @@ impl Controller {
         f64::from(f32::from_bits(self.bits(place)))
     }
 
-    /// The cores' outputs before the tick to come.
+    /// Reads the cores' outputs before the coming tick.
     fn look(&mut self) {
         let state: [u32; STATE.len()] = self.ports.state.map(|place| self.bits(place));
         let float = |i: usize| f64::from(f32::from_bits(state[i]));
         let outputs = self.ports.outputs.map(|place| self.bits(place));
-        // Before the first period of the kinematic core it shows nothing yet.
+        // The outputs are invalid before the first period of the kinematic core.
         if self.ticks > 0 {
             self.view = View {
                 joints: std::array::from_fn(float),
@@ -266,7 +266,7 @@ impl Controller {
         }
     }
 
-    /// Compares the reference of the last period with where the plant was in it.
+    /// Compares the reference of the last period with the plant's joints in that period.
     fn compare(&mut self, controls: Joints) {
         let Some((sampled, _)) = self.sampled else { return };
         let reference = self.ports.reference.map(|place| self.float(place));
@@ -315,7 +315,7 @@ impl Robot for Controller {
             self.system.push(self.ports.commands).map_err(host)?;
         }
         self.sampled = Some((self.plant.joints(), controls));
-        // The controls that are seen now are held until the next tick: those of the period before.
+        // Controls seen now were computed in the period before, and are held until the next tick.
         self.plant.advance(TICK, enabled.then_some(&controls));
         self.ticks += 1;
         Ok(())
@@ -323,7 +323,7 @@ impl Robot for Controller {
 
     fn room(&self) -> usize {
         let taken = self.system.fifo_entries(self.ports.commands).len() + self.words.len();
-        // Entries of the last tick may still be on their way.
+        // Entries of the last tick may still be on the link.
         let room = (self.ports.depth / 2).saturating_sub(taken);
         if self.kept { room.min(1usize.saturating_sub(self.words.len())) } else { room }
     }

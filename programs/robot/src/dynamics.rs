@@ -1,46 +1,46 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The dynamics of the plant's arm in binary64, by recursive Newton-Euler over Denavit-Hartenberg frames. It is not the nominal
-//! model that the kinematic core computes: that one leaves out velocities' products, the offsets `a1` and `a3`, couplings
-//! of the wrist, and what the balancing leaves of gravity.
+//! Dynamics of the plant's arm in binary64, by recursive Newton-Euler over Denavit-Hartenberg frames. The kinematic core's nominal model
+//! differs: it neglects products of velocities, the offsets `a1` and `a3`, couplings of the wrist, and the gravity that the balancing
+//! leaves.
 
 use takt_programs::arm::{A1, A2, A3, D1, D4, D6};
 
-/// Joints.
+/// Number of the arm's joints.
 pub const JOINTS: usize = 6;
-/// A value for each joint.
+/// Value for each joint.
 pub type Joints = [f64; JOINTS];
 /// Mass matrix, N·m s²/rad.
 pub type Matrix = [[f64; JOINTS]; JOINTS];
 type Vector = [f64; 3];
 
-/// m/s².
+/// Acceleration of gravity, m/s².
 pub const GRAVITY: f64 = 9.81;
 
-/// A link: its frame (docs/arm.md has the convention) and its mass.
+/// Link: its frame (docs/arm.md has the convention) and its mass.
 #[derive(Clone, Copy, Debug)]
 pub struct Link {
-    /// Along x of its own frame, m.
+    /// Offset along the x axis of its own frame, m.
     pub a: f64,
-    /// Along the joint's axis, m.
+    /// Offset along the joint's axis, m.
     pub d: f64,
-    /// Turns about x by this many right angles.
+    /// Rotation about x in right angles: -1, 0 or 1.
     pub alpha: i8,
-    /// kg.
+    /// Mass of the link, kg.
     pub mass: f64,
-    /// Centre of mass in its own frame, m.
+    /// Centre of mass in the link's frame, m.
     pub centre: Vector,
-    /// Principal moments about the centre of mass along its frame's axes, kg·m².
+    /// Principal moments of inertia about the centre of mass along the frame's axes, kg·m².
     pub inertia: Vector,
 }
 
-/// An arm with its balancing.
+/// Arm with its balancing springs.
 #[derive(Clone, Debug)]
 pub struct Arm {
-    /// Base first.
+    /// Links from the base to the hand.
     pub links: [Link; JOINTS],
-    /// The acceleration that gravity gives, in the base's frame, m/s².
+    /// Acceleration of gravity in the base's frame, m/s².
     pub gravity: Vector,
-    /// Of the static moments of upper arm and forearm (the hand stretched out), the part that springs carry.
+    /// Fraction of the static moments of upper arm and forearm (with the hand stretched out) that springs carry.
     pub balance: f64,
 }
 
@@ -49,9 +49,9 @@ const fn link(a: f64, d: f64, alpha: i8, mass: f64, centre: Vector, inertia: Vec
 }
 
 impl Arm {
-    /// The arm of docs/arm.md, hanging: its base's z axis points down, which is what the nominal model's signs of gravity
-    /// at the wrist mean. Masses are such that this model's constants are a fair approximation of it: a counterweight
-    /// behind joint 2, motors of the wrist near the elbow, 4 kg of hand.
+    /// The arm of docs/arm.md, hanging: its base's z axis points down, which matches the signs of gravity at the wrist in the nominal
+    /// model. The masses make that model's constants a fair approximation: a counterweight behind joint 2, motors of the wrist near the
+    /// elbow, 4 kg of hand.
     pub const fn hanging() -> Arm {
         Arm {
             links: [
@@ -84,45 +84,45 @@ fn dot(a: Vector, b: Vector) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// A link's rotation against the one before: its sine and cosine, and those of alpha, which are 0 or ±1.
+/// Rotation of a link relative to its predecessor: sine and cosine of the joint angle and of alpha (0 or ±1).
 #[derive(Clone, Copy, Default)]
-struct Turn {
+struct LinkRotation {
     s: f64,
     c: f64,
     sa: f64,
     ca: f64,
 }
 
-impl Turn {
-    fn of(link: &Link, angle: f64) -> Turn {
+impl LinkRotation {
+    fn of(link: &Link, angle: f64) -> LinkRotation {
         let (s, c) = angle.sin_cos();
         let (sa, ca) = (f64::from(link.alpha), f64::from(1 - link.alpha.abs()));
-        Turn { s, c, sa, ca }
+        LinkRotation { s, c, sa, ca }
     }
 
-    /// From the link's frame to the one before.
+    /// Transforms a vector from the link's frame to its predecessor's.
     fn out(self, v: Vector) -> Vector {
         let (y, z) = (self.ca * v[1] - self.sa * v[2], self.sa * v[1] + self.ca * v[2]);
         [self.c * v[0] - self.s * y, self.s * v[0] + self.c * y, z]
     }
 
-    /// From the frame before to the link's.
+    /// Transforms a vector from the predecessor's frame to the link's.
     fn into(self, v: Vector) -> Vector {
         let (x, y) = (self.c * v[0] + self.s * v[1], -self.s * v[0] + self.c * v[1]);
         [x, self.ca * y + self.sa * v[2], -self.sa * y + self.ca * v[2]]
     }
 }
 
-/// All turns of a pose.
-struct Turns([Turn; JOINTS]);
+/// Rotations of all links in a pose.
+struct LinkRotations([LinkRotation; JOINTS]);
 
 impl Arm {
-    fn turns(&self, q: &Joints) -> Turns {
-        Turns(std::array::from_fn(|i| Turn::of(&self.links[i], q[i])))
+    fn turns(&self, q: &Joints) -> LinkRotations {
+        LinkRotations(std::array::from_fn(|i| LinkRotation::of(&self.links[i], q[i])))
     }
 
-    /// The torques that give these accelerations: Newton and Euler, out along the links and back. Springs are not in it.
-    fn newton_euler(&self, turns: &Turns, qd: &Joints, qdd: &Joints, gravity: Vector) -> Joints {
+    /// Torques for given accelerations, N·m: Newton-Euler outward along the links, then back. Springs are left out.
+    fn newton_euler(&self, turns: &LinkRotations, qd: &Joints, qdd: &Joints, gravity: Vector) -> Joints {
         const AXIS: Vector = [0.0, 0.0, 1.0];
         let mut forces = [[0.0; 3]; JOINTS];
         let mut moments = [[0.0; 3]; JOINTS];
@@ -140,7 +140,7 @@ impl Arm {
             moments[i] = add(inertia(wd), cross(w, inertia(w)));
         }
         let mut torques = [0.0; JOINTS];
-        // Of the links beyond, in this link's frame, about its origin.
+        // Force and moment of the outer links, in this link's frame, about its origin.
         let (mut force, mut moment) = ([0.0; 3], [0.0; 3]);
         for (i, link) in self.links.iter().enumerate().rev() {
             let turn = turns.0[i];
@@ -154,7 +154,7 @@ impl Arm {
         torques
     }
 
-    /// The mass matrix.
+    /// Mass matrix at a pose.
     pub fn mass_matrix(&self, q: &Joints) -> Matrix {
         let turns = self.turns(q);
         let mut matrix = [[0.0; JOINTS]; JOINTS];
@@ -166,8 +166,7 @@ impl Arm {
         matrix
     }
 
-    /// The torques that hold these velocities without acceleration: centrifugal and Coriolis terms, gravity,
-    /// springs; N·m.
+    /// Torques that hold these velocities without acceleration: centrifugal and Coriolis terms, gravity and springs; N·m.
     pub fn bias(&self, q: &Joints, qd: &Joints) -> Joints {
         let mut torques = self.newton_euler(&self.turns(q), qd, &[0.0; JOINTS], self.gravity);
         for (torque, spring) in torques.iter_mut().zip(self.springs(q)) {
@@ -176,7 +175,7 @@ impl Arm {
         torques
     }
 
-    /// The torques that give these accelerations, springs included.
+    /// Inverse dynamics: torques for given accelerations, springs included, N·m.
     pub fn inverse(&self, q: &Joints, qd: &Joints, qdd: &Joints) -> Joints {
         let mut torques = self.newton_euler(&self.turns(q), qd, qdd, self.gravity);
         for (torque, spring) in torques.iter_mut().zip(self.springs(q)) {
@@ -199,7 +198,7 @@ impl Arm {
         [upper, across, along]
     }
 
-    /// The springs' torques on the drives: the balanced part of gravity's moments, the other way.
+    /// Torques of the springs on the drives, N·m: opposite to the balanced part of gravity's moments.
     fn springs(&self, q: &Joints) -> Joints {
         let [upper, across, along] = self.moments();
         let weight = self.balance * self.gravity[2];
@@ -224,19 +223,19 @@ impl Arm {
         weights.sum::<f64>() + springs
     }
 
-    /// Kinetic energy, J.
+    /// Kinetic energy of the links, J.
     pub fn kinetic(&self, q: &Joints, qd: &Joints) -> f64 {
         let matrix = self.mass_matrix(q);
         (0..JOINTS).map(|i| (0..JOINTS).map(|j| 0.5 * qd[i] * matrix[i][j] * qd[j]).sum::<f64>()).sum()
     }
 }
 
-/// From the frame before's origin to the link's own, in its own frame.
-fn offset(link: &Link, turn: Turn) -> Vector {
+/// Vector from the predecessor's origin to the link's own, in the link's frame.
+fn offset(link: &Link, turn: LinkRotation) -> Vector {
     [link.a, link.d * turn.sa, link.d * turn.ca]
 }
 
-/// Solves `matrix · x = right` for a symmetric, positive matrix, by Cholesky's decomposition.
+/// Solves `matrix · x = right` for a symmetric positive definite matrix, by Cholesky decomposition.
 pub fn solve(mut matrix: Matrix, mut right: Joints) -> Joints {
     for j in 0..JOINTS {
         for k in 0..j {

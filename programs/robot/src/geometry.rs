@@ -4,17 +4,17 @@
 use crate::dynamics::Joints;
 use takt_programs::arm::{Configuration, Failure, Pose, forward, inverse};
 
-/// A rotation and a shift: where the axes of one frame lie in another.
+/// Rigid transform: the axes and the origin of one frame in another.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Transform {
-    /// Columns are the axes.
+    /// Rotation matrix; its columns are the axes.
     pub rotation: [[f64; 3]; 3],
-    /// mm.
+    /// Origin of the frame, mm.
     pub position: [f64; 3],
 }
 
 impl Transform {
-    /// Of x, y, z, roll, pitch, yaw: the tool's axes u, v, w at a pose (docs/arm.md).
+    /// Transform of a pose x, y, z, roll, pitch, yaw: the tool's axes u, v, w (docs/arm.md).
     pub fn of_pose(pose: &[f64; 6]) -> Transform {
         let [(sr, cr), (sp, cp), (sy, cy)] = [pose[3], pose[4], pose[5]].map(|a| a.to_radians().sin_cos());
         let w = [cp * cy, cp * sy, sp];
@@ -23,7 +23,7 @@ impl Transform {
         Transform { rotation, position: [pose[0], pose[1], pose[2]] }
     }
 
-    /// x, y, z, roll, pitch, yaw.
+    /// Pose of the transform: x, y, z, roll, pitch, yaw.
     pub fn pose(&self) -> [f64; 6] {
         let r = &self.rotation;
         let yaw = r[1][2].atan2(r[0][2]);
@@ -33,7 +33,7 @@ impl Transform {
         [x, y, z, roll.to_degrees(), pitch.to_degrees(), yaw.to_degrees()]
     }
 
-    /// Of x, y, z, rx, ry, rz: turned about x, then about y, then about z of the frame that it is in, and shifted.
+    /// Transform of a frame x, y, z, rx, ry, rz: rotated about x, then y, then z of the outer frame, and shifted.
     pub fn of_frame(frame: &[f64; 6]) -> Transform {
         let [(sx, cx), (sy, cy), (sz, cz)] = [frame[3], frame[4], frame[5]].map(|a| a.to_radians().sin_cos());
         Transform {
@@ -46,7 +46,7 @@ impl Transform {
         }
     }
 
-    /// x, y, z, rx, ry, rz.
+    /// Frame of the transform: x, y, z, rx, ry, rz.
     pub fn frame(&self) -> [f64; 6] {
         let r = &self.rotation;
         let ry = (-r[2][0]).atan2(r[0][0].hypot(r[1][0]));
@@ -55,7 +55,7 @@ impl Transform {
         [x, y, z, rx.to_degrees(), ry.to_degrees(), rz.to_degrees()]
     }
 
-    /// The transform of `inner` in the frame that this one is in.
+    /// Product of transforms: `inner`, given in this frame, in the outer frame.
     #[must_use]
     pub fn times(&self, inner: &Transform) -> Transform {
         let (a, b) = (&self.rotation, &inner.rotation);
@@ -66,7 +66,7 @@ impl Transform {
         }
     }
 
-    /// The way back.
+    /// Inverse of a rigid transform: transposed rotation.
     #[must_use]
     pub fn inverse(&self) -> Transform {
         let r = &self.rotation;
@@ -76,17 +76,17 @@ impl Transform {
     }
 }
 
-/// The pose of joint angles in degrees, with a tool point in mm, and the branch that leads back.
+/// Pose of joint angles in degrees, with a tool point in mm, and the configuration for which the inverse returns them.
 pub fn pose_of(joints: &Joints, tool: [f64; 3]) -> ([f64; 6], Configuration) {
     let (pose, branch) = forward(*joints, tool);
     let ([x, y, z], [roll, pitch, yaw]) = (pose.position, pose.orientation);
     ([x, y, z, roll, pitch, yaw], branch)
 }
 
-/// The joint angles, deg, of a pose on the branch of `near`; of angles that differ by turns, those next to it.
+/// Joint angles, degrees, of a pose in the configuration of `near`; each angle is chosen modulo full turns to be next to `near`.
 ///
 /// # Errors
-/// If there are none.
+/// If the pose is out of reach or singular.
 pub fn joints_of(pose: &[f64; 6], tool: [f64; 3], near: &Joints) -> Result<Joints, Failure> {
     let [x, y, z, roll, pitch, yaw] = *pose;
     let pose = Pose { position: [x, y, z], orientation: [roll, pitch, yaw] };
@@ -108,13 +108,13 @@ mod tests {
     }
 
     #[test]
-    fn there_and_back() {
+    fn poses_round_trip() {
         assert!(near(&Transform::of_pose(&POSE).pose(), &POSE));
         assert!(near(&Transform::of_frame(&POSE).frame(), &POSE));
         let (a, b) = (Transform::of_pose(&POSE), Transform::of_frame(&[1.0, 2.0, 3.0, 10.0, 20.0, 30.0]));
         let back = a.times(&b).times(&b.inverse());
         assert!(near(&back.pose(), &POSE));
-        // A frame that only shifts, on the left along the world's axes, on the right along the tool's.
+        // A pure shift acts along the world's axes from the left, along the tool's axes from the right.
         let shift = Transform::of_frame(&[0.0, 0.0, 10.0, 0.0, 0.0, 0.0]);
         let world = shift.times(&a).pose();
         assert!(near(&world, &[400.0, -120.0, 310.0, 80.0, -40.0, 70.0]));
@@ -128,7 +128,7 @@ mod tests {
         let tool = [0.0, 10.0, 100.0];
         let (pose, _) = pose_of(&joints, tool);
         assert!(near(&joints_of(&pose, tool, &joints).expect("reached"), &joints));
-        // A tool of so much along w lies so far along the third axis.
+        // The tool's offset along w appears along the third axis.
         let (flange, _) = pose_of(&joints, [0.0; 3]);
         let offset = Transform::of_frame(&[0.0, 10.0, 100.0, 0.0, 0.0, 0.0]);
         assert!(near(&Transform::of_pose(&flange).times(&offset).pose(), &pose));

@@ -1,50 +1,50 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The host's side of the link: packets out, reports in, time. What is beyond is a [`Robot`]: the three cores with the
-//! plant ([`crate::controller`]), or a stand-in of a test.
+//! Host's side of the link: sends packets, receives reports, and keeps time. The far side is a [`Robot`]: the three cores with the plant
+//! ([`crate::controller`]), or a stand-in of a test.
 
 use crate::dynamics::{JOINTS, Joints};
 use crate::packet::{Cause, Command, Kind, Report, ReportError, ReportKind};
 use std::collections::{BTreeMap, VecDeque};
 
-/// s from tick to tick.
+/// Time from tick to tick, s.
 pub const TICK: f64 = 1e-4;
-/// Ticks without a packet after which the host says that it is there: half of what the cores bear.
+/// Ticks without a packet after which the host sends a sign of life: half of the cores' limit.
 const NOP_TICKS: u64 = 1000;
-/// Ticks in which a packet must be answered: 2 s.
+/// Limit on the ticks until a packet's answer: 2 s.
 const ANSWER_TICKS: u64 = 20_000;
-/// Ticks in which a packet that is begun lacks its end, if that is to be a fault: 200 ms.
+/// Delay of a packet's second half for the fault `late`, in ticks: 200 ms.
 const LATE_TICKS: u64 = 2_000;
-/// Ticks of silence, if that is to be a fault: 1 s.
+/// Silence for the fault `silent`, in ticks: 1 s.
 const SILENT_TICKS: u64 = 10_000;
-/// Ticks in which the cores must be ready after power-up or reset: 2 s.
+/// Limit on the ticks until the cores are ready after power-up or reset: 2 s.
 const READY_TICKS: u64 = 20_000;
-/// Ticks in which the robot must say why it stands after an error: 2 s. Then nobody waits for it any more.
+/// Limit on the ticks until the robot reports the cause of an error: 2 s. Waits then end.
 const UNTOLD_TICKS: u64 = 20_000;
 
-/// The robot's state of motion.
+/// State of the robot's motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mode {
-    /// It stands.
+    /// Standing, ready for commands.
     Standing,
-    /// Along the queue's segments.
+    /// Moving along the queue's segments.
     Moving,
-    /// At rates.
+    /// Moving at the rates of a jog.
     Jogging,
-    /// To a standstill.
+    /// Decelerating to a standstill.
     Stopping,
-    /// It stands after an error.
+    /// Standing after an error.
     Error,
 }
 
 impl Mode {
-    /// By its number on the link.
+    /// Mode of a number on the link.
     pub fn of(number: u32) -> Option<Mode> {
         [Mode::Standing, Mode::Moving, Mode::Jogging, Mode::Stopping, Mode::Error]
             .get(number as usize)
             .copied()
     }
 
-    /// In a word.
+    /// Description of the mode for messages.
     pub const fn text(self) -> &'static str {
         match self {
             Mode::Standing => "standing",
@@ -56,70 +56,70 @@ impl Mode {
     }
 }
 
-/// The robot as the host sees it.
+/// State of the robot as the host sees it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct View {
     /// Reference joint angles, rad.
     pub joints: Joints,
-    /// Reference pose: m, rad.
+    /// Reference pose in m and rad.
     pub pose: [f64; 6],
-    /// Its state of motion.
+    /// State of the robot's motion.
     pub mode: Mode,
     /// Sequence number of the packet of the running segment.
     pub segment: u32,
-    /// Segments that wait.
+    /// Number of waiting segments.
     pub queued: u32,
-    /// Digital outputs.
+    /// Digital outputs; output n is bit n − 1.
     pub outputs: u32,
-    /// Analogue outputs.
+    /// Analogue outputs, channels 1 and 2.
     pub levels: [f32; 2],
 }
 
 /// Digital and analogue inputs.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Inputs {
-    /// Input n is bit n − 1.
+    /// Digital inputs; input n is bit n − 1.
     pub digital: u32,
-    /// Of channels 1 and 2.
+    /// Analogue inputs, channels 1 and 2.
     pub analogue: [f32; 2],
 }
 
-/// The other end of the link.
+/// Far end of the link.
 pub trait Robot {
-    /// One tick.
+    /// Advances by one tick.
     ///
     /// # Errors
-    /// If the cores cannot go on, in words.
+    /// If the cores cannot go on; the text says why.
     fn tick(&mut self, inputs: &Inputs) -> Result<(), String>;
-    /// Words that can be sent now.
+    /// Number of words that can be sent now.
     fn room(&self) -> usize;
-    /// Sends one.
+    /// Sends a word, for which [`Robot::room`] has room.
     fn send(&mut self, word: u32);
-    /// The fields of the reports that have come.
+    /// Fields of the reports that have arrived.
     fn reports(&mut self) -> Vec<[u32; 4]>;
-    /// The robot as it is seen there.
+    /// State of the robot as the host sees it.
     fn view(&self) -> View;
 }
 
-/// Faults of the link that can be asked for.
+/// Deliberate faults of the link.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LinkFault {
-    /// A bit of the next packet is wrong.
+    /// A bit of the next packet is inverted.
     Corrupt,
-    /// The next packet is lost, so that the one after it is out of order.
+    /// The next packet is lost, so that its successor is out of order.
     Order,
-    /// The next packet stops in its middle.
+    /// The next packet is delayed in its middle.
     Late,
-    /// The host says nothing for a while.
+    /// The host is silent for a second.
     Silent,
 }
 
 impl LinkFault {
-    /// All of them.
+    /// All faults of the link.
     pub const ALL: [LinkFault; 4] =
         [LinkFault::Corrupt, LinkFault::Order, LinkFault::Late, LinkFault::Silent];
 
-    /// Its name.
+    /// Name of the fault in programs.
     pub const fn name(self) -> &'static str {
         match self {
             LinkFault::Corrupt => "corrupt",
@@ -130,39 +130,39 @@ impl LinkFault {
     }
 }
 
-/// Something that happens at a time.
+/// Simulated event around the robot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Event {
-    /// A digital input, by its number from 1.
+    /// Change of a digital input, by its number from 1.
     Input(u32, bool),
-    /// An analogue input, by its channel from 1.
+    /// Change of an analogue input, by its channel from 1.
     Analogue(u32, f32),
-    /// On the link.
+    /// Fault of the link.
     Fault(LinkFault),
 }
 
-/// An error of the host or of the robot.
+/// Error of the host or of the robot.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Problem {
-    /// The controller refused it.
-    #[error("refused: {}", told(.0))]
+    /// The controller refused a command.
+    #[error("refused: {}", cause_text(.0))]
     Refused(Report),
-    /// The controller has stopped the robot.
-    #[error("the robot was stopped: {}", told(.0))]
+    /// The controller stopped the robot.
+    #[error("the robot was stopped: {}", cause_text(.0))]
     Stopped(Report),
-    /// A wait was longer than it may be.
+    /// A wait exceeded its limit.
     #[error("{0}")]
     Late(String),
-    /// The cores or the host's end of the link.
+    /// The cores, or the host's end of the link, failed.
     #[error("{0}")]
     Broken(String),
-    /// Somebody has interrupted it.
+    /// The user interrupted the wait.
     #[error("interrupted")]
     Interrupted,
 }
 
 impl Problem {
-    /// Its cause's number; 0 without one.
+    /// Number of its cause; 0 without a cause.
     pub fn cause(&self) -> u32 {
         match self {
             Problem::Refused(report) | Problem::Stopped(report) => report.cause.map_or(0, Cause::number),
@@ -170,14 +170,14 @@ impl Problem {
         }
     }
 
-    /// True if a program can go on after it.
+    /// A program can catch the error and go on.
     pub fn can_be_caught(&self) -> bool {
         matches!(self, Problem::Refused(_) | Problem::Stopped(_) | Problem::Late(_))
     }
 }
 
-/// A report's cause in words.
-fn told(report: &Report) -> String {
+/// Text of a report's cause.
+fn cause_text(report: &Report) -> String {
     let cause = report.cause.map_or_else(|| "no cause was told".to_owned(), |cause| cause.text().to_owned());
     match report.joint() {
         Some(joint) => format!("{cause} (joint {joint})"),
@@ -185,9 +185,9 @@ fn told(report: &Report) -> String {
     }
 }
 
-/// The answer to a packet.
+/// State of a packet's answer.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Fate {
+enum PacketState {
     Sent,
     Accepted(f32),
     Checked(f32),
@@ -195,48 +195,48 @@ enum Fate {
     Finished,
 }
 
-/// The host's end.
+/// Host's end of the link.
 #[derive(Clone)]
 pub struct Host<R> {
     robot: R,
     ticks: u64,
     sequence: u32,
     out: VecDeque<u32>,
-    /// Words after which the rest waits, and until which tick.
+    /// Number of words to send before a pause, and the tick at which the pause ends.
     hold: Option<(usize, u64)>,
-    /// Until when the host says nothing.
+    /// Tick until which the host is silent.
     silent: u64,
     last_sent: u64,
-    fates: BTreeMap<u32, Fate>,
+    fates: BTreeMap<u32, PacketState>,
     stopped: Option<Report>,
-    /// The tick since which the robot stands after an error without a word of it.
+    /// Tick since which the robot stands after an unreported error.
     untold: Option<u64>,
     ready: bool,
     inputs: Inputs,
     events: Vec<(u64, Event)>,
     faults: Vec<LinkFault>,
     outputs: (u32, [f32; 2]),
-    log: Vec<(f64, News)>,
+    log: Vec<(f64, HostEvent)>,
 }
 
-/// An event that is worth telling.
+/// Change that the host reports to the session.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum News {
-    /// A report of the communication core.
+pub enum HostEvent {
+    /// Report of the communication core.
     Report(Report),
-    /// A digital output, by its number from 1.
+    /// Change of a digital output, by its number from 1.
     Output(u32, bool),
-    /// An analogue output, by its channel from 1.
+    /// Change of an analogue output, by its channel from 1.
     Level(u32, f32),
 }
 
-/// Packets whose fate is remembered: more than can be under way.
+/// Limit on the packets whose state is remembered: more than can be under way.
 const FATES: usize = 1024;
-/// Reports that are kept until they are taken.
+/// Limit on the reports that wait to be taken.
 const LOG: usize = 100_000;
 
 impl<R: Robot> Host<R> {
-    /// The host's end of the link to a robot that has just been powered up.
+    /// Host's end of the link to a robot that has just been powered up.
     pub fn new(robot: R) -> Host<R> {
         Host {
             robot,
@@ -258,37 +258,37 @@ impl<R: Robot> Host<R> {
         }
     }
 
-    /// The robot.
+    /// Far end of the link.
     pub fn robot(&self) -> &R {
         &self.robot
     }
 
-    /// The robot as it is seen there.
+    /// State of the robot as the host sees it.
     pub fn view(&self) -> View {
         self.robot.view()
     }
 
-    /// s since power-up.
+    /// Time since power-up, s.
     pub fn time(&self) -> f64 {
         self.ticks as f64 * TICK
     }
 
-    /// The levels at its inputs.
+    /// Levels at the robot's inputs.
     pub fn inputs(&self) -> Inputs {
         self.inputs
     }
 
-    /// The error after which it stands, if it does.
+    /// Error after which the robot stands, if any.
     pub fn stopped(&self) -> Option<Report> {
         self.stopped
     }
 
-    /// The news since this was last asked, with their times.
-    pub fn take_news(&mut self) -> Vec<(f64, News)> {
+    /// News since the last call, with their times in s.
+    pub fn take_news(&mut self) -> Vec<(f64, HostEvent)> {
         std::mem::take(&mut self.log)
     }
 
-    /// Something is to happen so many s from now.
+    /// Schedules an event in `after` seconds; at once for 0.
     pub fn schedule(&mut self, after: f64, event: Event) {
         let tick = self.ticks + (after.max(0.0) / TICK).round() as u64;
         self.events.push((tick, event));
@@ -319,14 +319,14 @@ impl<R: Robot> Host<R> {
         }
     }
 
-    /// One tick of 100 µs.
+    /// Advances by one tick of 100 µs.
     ///
     /// # Errors
     /// If the cores cannot go on.
     pub fn tick(&mut self) -> Result<(), Problem> {
         self.happen();
         if self.ready && self.out.is_empty() && self.ticks >= self.last_sent + NOP_TICKS {
-            // A line that is silent stays so; a stopped robot needs no sign of life.
+            // A silent link stays silent; a stopped robot needs no sign of life.
             if self.ticks >= self.silent && self.stopped.is_none() {
                 self.send(&Command::Nop);
             }
@@ -346,25 +346,25 @@ impl<R: Robot> Host<R> {
         };
         for bit in 0..u32::BITS {
             if (outputs ^ self.outputs.0) >> bit & 1 != 0 {
-                self.tell(News::Output(bit + 1, outputs >> bit & 1 != 0));
+                self.send_event(HostEvent::Output(bit + 1, outputs >> bit & 1 != 0));
             }
         }
         for (channel, (now, before)) in (1..).zip(levels.into_iter().zip(self.outputs.1)) {
             if now.to_bits() != before.to_bits() {
-                self.tell(News::Level(channel, now));
+                self.send_event(HostEvent::Level(channel, now));
             }
         }
         self.outputs = (outputs, levels);
         Ok(())
     }
 
-    fn tell(&mut self, news: News) {
+    fn send_event(&mut self, news: HostEvent) {
         if self.log.len() < LOG {
             self.log.push((self.time(), news));
         }
     }
 
-    /// Lets words go as far as there is room.
+    /// Sends words as far as there is room.
     fn pump(&mut self) {
         if self.ticks < self.silent {
             return;
@@ -390,12 +390,12 @@ impl<R: Robot> Host<R> {
     }
 
     fn hear(&mut self, report: Report) {
-        self.tell(News::Report(report));
+        self.send_event(HostEvent::Report(report));
         let fate = match report.kind {
-            ReportKind::Accepted => Fate::Accepted(report.value),
-            ReportKind::Checked => Fate::Checked(report.value),
-            ReportKind::Refused => Fate::Refused(report),
-            ReportKind::Finished => Fate::Finished,
+            ReportKind::Accepted => PacketState::Accepted(report.value),
+            ReportKind::Checked => PacketState::Checked(report.value),
+            ReportKind::Refused => PacketState::Refused(report),
+            ReportKind::Finished => PacketState::Finished,
             ReportKind::Started => return,
             ReportKind::Ready => {
                 self.ready = true;
@@ -405,14 +405,14 @@ impl<R: Robot> Host<R> {
             }
             ReportKind::Stopped => {
                 if report.cause.is_some() {
-                    // The first cause is the one that counts.
+                    // Only the first cause counts.
                     self.stopped.get_or_insert(report);
                     return;
                 }
-                // It was asked for, and stands now. What waited in the queue before it was dropped, without a word of it.
+                // A requested stop has ended. The queue's packets before it were dropped without a report.
                 let stop = report.sequence;
                 self.fates.retain(|sequence, _| *sequence >= stop);
-                Fate::Finished
+                PacketState::Finished
             }
         };
         if let Some(known) = self.fates.get_mut(&report.sequence) {
@@ -420,14 +420,14 @@ impl<R: Robot> Host<R> {
         }
     }
 
-    /// Puts a packet on the line; its sequence number.
+    /// Queues a packet and returns its sequence number.
     fn send(&mut self, command: &Command) -> u32 {
         self.sequence = self.sequence.wrapping_add(1);
         let mut words = command.encode(self.sequence);
         let fault = if self.faults.is_empty() { None } else { Some(self.faults.remove(0)) };
         match fault {
             Some(LinkFault::Corrupt) => {
-                // Its sequence number would do as well; the checksum covers every bit.
+                // Any bit does: the checksum covers all.
                 let word = words.len() - 2;
                 words[word] ^= 1 << 13;
             }
@@ -442,7 +442,7 @@ impl<R: Robot> Host<R> {
         }
         self.out.extend(words);
         if command.kind() != Kind::Nop {
-            self.fates.insert(self.sequence, Fate::Sent);
+            self.fates.insert(self.sequence, PacketState::Sent);
             while self.fates.len() > FATES {
                 self.fates.pop_first();
             }
@@ -450,10 +450,10 @@ impl<R: Robot> Host<R> {
         self.sequence
     }
 
-    /// Goes on until it holds.
+    /// Advances until a condition holds, for at most `ticks` ticks.
     ///
     /// # Errors
-    /// If the robot is stopped, or the time is over.
+    /// If the robot stops with an error, the time is over, or the wait is interrupted.
     pub fn wait_until(
         &mut self,
         ticks: u64,
@@ -483,19 +483,19 @@ impl<R: Robot> Host<R> {
         }
     }
 
-    /// Waits for the cores to be ready after power-up.
+    /// Waits for the cores' readiness after power-up.
     ///
     /// # Errors
-    /// If they are not.
+    /// If they do not report within 2 s.
     pub fn power_up(&mut self) -> Result<(), Problem> {
         let late = || "the controller did not get ready".to_owned();
         self.wait_until(READY_TICKS, late, &|| false, |host| Ok(host.ready))
     }
 
-    /// Sends a command and waits for its answer: a time in s, if the answer has one, and the packet's sequence number.
+    /// Sends a command and waits for its answer. Returns the packet's sequence number and the answer's time in s, 0 without one.
     ///
     /// # Errors
-    /// If it is refused, or the robot is stopped.
+    /// If the command is refused, or the robot is stopped.
     pub fn command(&mut self, command: &Command) -> Result<(u32, f64), Problem> {
         if *command == Command::Reset {
             return self.reset();
@@ -508,23 +508,23 @@ impl<R: Robot> Host<R> {
         let mut value = 0.0;
         self.wait_until(ANSWER_TICKS, late, &|| false, |host| {
             Ok(match host.fates.get(&sequence) {
-                Some(Fate::Accepted(time) | Fate::Checked(time)) => {
+                Some(PacketState::Accepted(time) | PacketState::Checked(time)) => {
                     value = f64::from(*time);
                     true
                 }
-                Some(Fate::Refused(report)) => return Err(Problem::Refused(*report)),
-                Some(Fate::Finished) => true,
-                Some(Fate::Sent) | None => false,
+                Some(PacketState::Refused(report)) => return Err(Problem::Refused(*report)),
+                Some(PacketState::Finished) => true,
+                Some(PacketState::Sent) | None => false,
             })
         })?;
         Ok((sequence, value))
     }
 
-    /// Ends the state after an error: whatever is on its way is thrown away. Until the answer comes, the robot counts as stopped.
+    /// Ends the state after an error: drops everything under way. Until the answer comes, the robot counts as stopped.
     fn reset(&mut self) -> Result<(u32, f64), Problem> {
         self.hold = None;
         self.silent = 0;
-        // A packet that was begun would swallow the new one's words.
+        // A partly sent packet would swallow the words of the new one.
         while self.robot.room() > 0 && !self.out.is_empty() {
             self.pump();
         }
@@ -532,7 +532,7 @@ impl<R: Robot> Host<R> {
         self.fates.clear();
         let was_ready = std::mem::replace(&mut self.ready, false);
         let sequence = self.send(&Command::Reset);
-        // Reports that were on their way are of what is over: the answer clears them.
+        // Reports under way belong to the past: the answer clears them.
         let end = self.ticks + READY_TICKS;
         while !self.ready {
             if self.ticks >= end {
@@ -546,7 +546,7 @@ impl<R: Robot> Host<R> {
         Ok((sequence, 0.0))
     }
 
-    /// Sends a command that is answered only when the queue has come to it; its sequence number.
+    /// Sends a command whose answer comes only when the queue has reached it; returns its sequence number.
     ///
     /// # Errors
     /// If the robot is stopped.
@@ -560,24 +560,24 @@ impl<R: Robot> Host<R> {
         Ok(sequence)
     }
 
-    /// True if all that was asked for has come to its end.
+    /// The command has finished; true for an unknown sequence number.
     ///
     /// # Errors
-    /// If it was refused after all.
+    /// If the command was refused after all.
     pub fn finished(&self, sequence: u32) -> Result<bool, Problem> {
         match self.fates.get(&sequence) {
-            None | Some(Fate::Finished) => Ok(true),
-            Some(Fate::Refused(report)) => Err(Problem::Refused(*report)),
+            None | Some(PacketState::Finished) => Ok(true),
+            Some(PacketState::Refused(report)) => Err(Problem::Refused(*report)),
             Some(_) => Ok(false),
         }
     }
 
-    /// Packets that have not been answered. What is posted is answered when the queue has come to it.
+    /// Packets without an answer. A posted command is answered when the queue has reached it.
     pub fn unanswered(&self) -> usize {
-        self.fates.values().filter(|fate| **fate == Fate::Sent).count()
+        self.fates.values().filter(|fate| **fate == PacketState::Sent).count()
     }
 
-    /// True if nothing moves and nothing waits.
+    /// The robot stands, and no segment, packet or answer is under way.
     pub fn stands(&self) -> bool {
         let view = self.view();
         matches!(view.mode, Mode::Standing)
@@ -587,17 +587,17 @@ impl<R: Robot> Host<R> {
     }
 }
 
-/// Ticks of a time in s.
+/// Number of ticks in a time in s.
 pub fn ticks(time: f64) -> u64 {
     (time / TICK).round().max(0.0) as u64
 }
 
-/// Every angle in degrees.
+/// Converts every angle to degrees.
 pub fn degrees(angles: &Joints) -> Joints {
     angles.map(f64::to_degrees)
 }
 
-/// In radians, for the link.
+/// Converts every angle to radians, for the link.
 pub fn radians(angles: &Joints) -> [f32; JOINTS] {
     angles.map(|angle| angle.to_radians() as f32)
 }

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The host of the three-processor robot controller, and the robot that it controls.
+//! Host of the three-processor robot controller, and the robot that it controls.
 //!
 //! ```text
 //! text ─ language ─ level ─ host ─ packet ─▶ controller: three cores (takt-system) ─ plant
 //! ```
 //!
-//! [`language`] reads commands and programs, [`level`] executes them, [`host`] is their end of the link, with packets as
-//! [`packet`] defines them. [`controller`] is the other end: the system of three cores on the emulator, its loop closed by
-//! [`plant`], a six-joint arm in binary64 whose [`dynamics`] are not the nominal ones. docs/robot-commands.md is the
-//! language's contract. Nothing here prints, and nothing opens files.
+//! [`language`] reads commands and programs, [`level`] executes them, [`host`] is their end of the link, with the packets of [`packet`].
+//! [`controller`] is the other end: the system of three cores on the emulator, with [`plant`] in its loop, a six-joint arm in binary64
+//! whose [`dynamics`] differ from the nominal ones. docs/robot-commands.md is the language's contract. The crate prints nothing and opens
+//! no files.
 
 pub mod controller;
 pub mod dynamics;

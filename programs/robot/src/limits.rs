@@ -1,31 +1,31 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Limits of programs and sessions.
 
-/// Bytes of a program at most.
+/// Limit on the bytes of a program.
 pub const PROGRAM_BYTES: usize = 1 << 20;
-/// Depth of nested blocks at most.
+/// Limit on the depth of nested blocks.
 pub const BLOCK_DEPTH: usize = 32;
-/// Depth of nested expressions at most.
+/// Limit on the depth of nested expressions.
 pub const EXPRESSION_DEPTH: usize = 64;
-/// Values and operators of an expression at most, which bounds its depth too.
+/// Limit on the values and operators of an expression, which bounds its depth too.
 pub const EXPRESSION_SIZE: usize = 256;
-/// Calls of subprograms in one another at most.
+/// Limit on the depth of nested calls of subprograms.
 pub const CALL_DEPTH: usize = 64;
-/// Parameters of a subprogram at most.
+/// Limit on the parameters of a subprogram.
 pub const PARAMETERS: usize = 16;
-/// Steps of a program between two that take time: more is a loop that never ends.
+/// Limit on the operations of a program without simulated time passing: more are an endless loop.
 pub const IDLE_STEPS: u64 = 1_000_000;
-/// Mistakes of a program that are shown.
+/// Limit on the mistakes of a program that are reported.
 pub const SHOWN: usize = 20;
-/// Duration of a wait for a signal at most, if the program does not say, s.
+/// Default limit on a wait for a signal, s.
 pub const SIGNAL_TIME: f64 = 60.0;
-/// Duration of a stop at most, s: ten times that of the controller's.
+/// Limit on the duration of a stop, s: ten times the controller's.
 pub const STOP_TIME: f64 = 5.0;
-/// Duration of anything at most, s.
+/// Limit on the duration of any wait, s.
 pub const LONGEST: f64 = 3600.0;
-/// Messages that a session keeps until they are taken.
+/// Limit on the messages that a session keeps until they are taken.
 pub const MESSAGES: usize = 100_000;
-/// Segments that the host lets stand in the robot's queue before it sends another one.
+/// Limit on the segments in the robot's queue for the host to send another.
 pub const QUEUE_AHEAD: u32 = 4;
-/// Outputs and levels that the host lets wait, beside what stands in the queue: with the motions, fewer than the queue holds.
+/// Limit on outputs and levels that wait beside the queue's segments: with the motions, fewer than the queue holds.
 pub const SIGNALS_AHEAD: usize = 16;

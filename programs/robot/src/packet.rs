@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The words between host and communication core: packets with a checksum, and reports. One table for each kind of number;
-//! `programs/three/packets.s` has the same as constants, and a test compares the two.
+//! Words between host and communication core: packets with a checksum, and reports. One table for each kind of number;
+//! `programs/three/packets.s` has the same constants, and a test compares the two.
 
 use std::fmt;
 
-/// Tags of a packet: bits 31 to 24 of its first word.
+/// Tag of a packet: bits 31 to 24 of its first word.
 pub const MAGIC: u32 = 0x54;
 /// Words of a packet besides its payload: header, sequence number, checksum.
 pub const FRAME_WORDS: usize = 3;
-/// Payload words at most.
+/// Limit on the payload words.
 pub const PAYLOAD_WORDS: usize = 12;
-/// [`Motion::flags`]: goes on into the next segment without stopping.
+/// Bit of [`Motion::flags`]: blend into the next segment without stopping.
 pub const FLAG_VIA: u32 = 1;
-/// [`Motion::flags`]: say whether it is possible and how long it takes, and do not move.
+/// Bit of [`Motion::flags`]: report whether the motion is possible and its duration, without moving.
 pub const FLAG_CHECK: u32 = 2;
 
 /// Declares an enumeration whose numbers go over the link.
@@ -23,25 +23,25 @@ macro_rules! numbers {
         pub enum $name { $($(#[$row])* $variant = $number,)* }
 
         impl $name {
-            /// All of them, by number.
+            /// All variants, ascending by number.
             pub const ALL: &[$name] = &[$($name::$variant),*];
 
-            /// The one of this number.
+            /// Variant of this number; `None` if there is no such one.
             pub fn of(number: u32) -> Option<$name> {
                 match number { $($number => Some($name::$variant),)* _ => None }
             }
 
-            /// Its number on the link.
+            /// Number on the link.
             pub const fn number(self) -> u32 {
                 self as u32
             }
 
-            /// Its name for people.
+            /// Description of the variant for messages.
             pub const fn text(self) -> &'static str {
                 match self { $($name::$variant => $text,)* }
             }
 
-            /// The name of its row.
+            /// Identifier of the variant.
             pub const fn name(self) -> &'static str {
                 match self { $($name::$variant => stringify!($variant),)* }
             }
@@ -56,25 +56,25 @@ macro_rules! numbers {
 }
 
 numbers! {
-    /// Kinds of packets.
+    /// Kinds of packets, by number.
     Kind {
-        /// Nothing: the host is there.
+        /// Sign of life of the host.
         Nop = 0, "no operation";
         /// Motion in joint space.
         Move = 1, "motion in joint space";
         /// Motion along a line in the world.
         MoveL = 2, "motion along a line";
-        /// Rates that are held.
+        /// Rates that hold until the next jog.
         Jog = 3, "jog";
-        /// Along the path, as fast as the limits allow.
+        /// Stops along the path, as fast as the limits allow.
         Stop = 4, "stop";
-        /// Digital outputs, when the queue has come to it.
+        /// Digital outputs, set when the queue has reached the packet.
         Output = 5, "digital outputs";
-        /// An analogue output.
+        /// Analogue output, set when the queue has reached the packet.
         Level = 6, "analogue output";
         /// Ends the state after an error.
         Reset = 7, "reset";
-        /// The tool's point in the flange's frame.
+        /// Tool point in the flange's frame.
         Tool = 8, "tool";
         /// Limits of velocities and torques.
         Limits = 9, "limits";
@@ -82,7 +82,7 @@ numbers! {
 }
 
 impl Kind {
-    /// Payload words.
+    /// Number of payload words.
     pub const fn words(self) -> usize {
         match self {
             Kind::Nop | Kind::Stop | Kind::Reset => 0,
@@ -98,13 +98,13 @@ impl Kind {
 numbers! {
     /// Profiles of the acceleration over a segment's time.
     Profile {
-        /// Constant forward, then constant back.
+        /// Constant acceleration, then constant deceleration.
         Rectangular = 0, "rectangular";
-        /// With ramps.
+        /// Ramps of constant jerk.
         Trapezoidal = 1, "trapezoidal";
-        /// Parabolas.
+        /// Parabolic acceleration in each half.
         Parabolic = 2, "parabolic";
-        /// A cosine's.
+        /// Cosine acceleration in each half.
         Cosine = 3, "cosine";
     }
 }
@@ -112,11 +112,11 @@ numbers! {
 numbers! {
     /// Meanings of a motion's amount.
     How {
-        /// The time, s.
+        /// Duration of the motion, s.
         Time = 0, "time";
-        /// The speed: of the fastest joint, rad/s; along the line, m/s, or rad/s if it has no length.
+        /// Speed: of the fastest joint, rad/s; along the line, m/s, or rad/s if it has no length.
         Speed = 1, "speed";
-        /// Nothing: as fast as the limits allow.
+        /// Unused: as fast as the limits allow.
         Fast = 2, "fast";
     }
 }
@@ -124,69 +124,69 @@ numbers! {
 numbers! {
     /// Meanings of a jog's rates.
     JogMode {
-        /// Of the joints, rad/s.
+        /// Rates of the joints, rad/s.
         Joints = 0, "joints";
-        /// Of the tool, along and about the world's axes, m/s and rad/s.
+        /// Rates of the tool along and about the world's axes, m/s and rad/s.
         World = 1, "world";
-        /// Of the tool, along and about its own axes.
+        /// Rates of the tool along and about its own axes, m/s and rad/s.
         Gripper = 2, "gripper";
     }
 }
 
 numbers! {
-    /// Kinds of reports.
+    /// Kinds of reports, by number.
     ReportKind {
-        /// Taken into the queue; the value is its time in s.
+        /// Taken into the queue; the value is the duration in s.
         Accepted = 1, "accepted";
-        /// It begins.
+        /// The motion or command begins.
         Started = 2, "started";
-        /// It has ended.
+        /// The motion or command has ended.
         Finished = 3, "finished";
-        /// Not taken.
+        /// The packet is refused.
         Refused = 4, "refused";
-        /// The robot has stopped or is stopping, because of the cause.
+        /// The robot has stopped or is stopping, for the given cause.
         Stopped = 5, "stopped";
-        /// After power-up or reset.
+        /// Ready after power-up or reset.
         Ready = 6, "ready";
-        /// Possible; the value is its time in s.
+        /// Possible; the value is the duration in s.
         Checked = 7, "possible";
     }
 }
 
 numbers! {
-    /// Reasons for which a packet was refused or the robot stopped.
+    /// Causes for which a packet was refused or the robot stopped.
     Cause {
-        /// The checksum is wrong.
+        /// The checksum of a packet is wrong.
         Crc = 1, "a packet's checksum is wrong";
-        /// The sequence number is not the last one's successor.
+        /// The sequence number does not follow the last one.
         Sequence = 2, "a packet is missing or out of order";
-        /// Magic, kind or length: it stops. Of a motion or a jog, a profile, a mode or flags that are not defined: refused.
+        /// Magic, kind or length: the robot stops. An undefined profile, mode or flag of a motion or a jog: refused.
         Header = 3, "a packet's header, kind or length is wrong";
-        /// Begun, and its words did not come.
+        /// The remaining words of a packet did not arrive in time.
         Late = 4, "a packet was begun and did not arrive in time";
-        /// Silent while the robot moves.
+        /// The host was silent while the robot moved.
         Silent = 5, "the host was silent while the robot moved";
-        /// A value is NaN or infinite.
+        /// A value in a packet is NaN or infinite.
         NotFinite = 6, "a value is not a finite number";
-        /// The value is the joint.
+        /// Joint out of its range; the value is the joint.
         JointLimit = 7, "a joint would leave its range";
-        /// No joint angles lead there.
+        /// The target has no joint angles.
         Unreachable = 8, "the target is out of reach";
-        /// At or near a singularity.
+        /// The path is at or near a singularity.
         Singular = 9, "the path comes too close to a singularity";
-        /// The value is the joint.
+        /// Joint too fast; the value is the joint.
         VelocityLimit = 10, "a joint would be too fast";
-        /// The value is the joint.
+        /// Torque too large; the value is the joint.
         TorqueLimit = 11, "a drive would need too much torque";
-        /// The ring of segments is full.
+        /// The queue of segments is full.
         QueueFull = 12, "the queue is full";
-        /// Only a reset is taken.
+        /// The robot stands after an error and takes only a reset.
         StoppedState = 13, "the robot stands after an error: reset it";
-        /// The value is the joint.
+        /// Joint off its reference; the value is the joint.
         Tracking = 14, "a joint does not follow its reference";
-        /// Nothing came after a motion that was to go on.
+        /// A `via` motion ended without a successor.
         RanDry = 15, "no motion followed one that was to go on without stopping";
-        /// It needs another state of motion.
+        /// The command needs another state of motion.
         NotWhileMoving = 16, "not while the robot moves";
         /// A core missed its period.
         Deadline = 17, "a core missed its period";
@@ -194,7 +194,7 @@ numbers! {
 }
 
 impl Cause {
-    /// True if a report's value is the number of a joint, from 1.
+    /// The report's value is the number of a joint, from 1.
     pub const fn has_joint(self) -> bool {
         matches!(
             self,
@@ -207,85 +207,85 @@ impl Cause {
     }
 }
 
-/// The manner of a motion.
+/// Parameters of a motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion {
-    /// The acceleration's profile.
+    /// Profile of the acceleration.
     pub profile: Profile,
-    /// The meaning of `amount`.
+    /// Meaning of the field `amount`.
     pub how: How,
-    /// Time or speed.
+    /// Duration or speed, by `how`.
     pub amount: f32,
-    /// True if it goes on into the next motion.
+    /// Blends into the next motion.
     pub via: bool,
-    /// True if it is only checked.
+    /// Checks the motion without executing it.
     pub check: bool,
 }
 
 impl Motion {
-    /// The word of flags.
+    /// Word of flags for the packet.
     pub const fn flags(self) -> u32 {
         (if self.via { FLAG_VIA } else { 0 }) | (if self.check { FLAG_CHECK } else { 0 })
     }
 }
 
-/// A command of the host. SI units; NaN among a motion's targets stands for "as it is".
+/// Command of the host. SI units; NaN in a motion's target stands for the present value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Command {
-    /// The host is there.
+    /// Sign of life of the host.
     Nop,
-    /// Joint angles.
+    /// Motion in joint space.
     Move {
-        /// rad.
+        /// Target joint angles, rad.
         joints: [f32; 6],
-        /// The manner of the motion.
+        /// Parameters of the motion.
         motion: Motion,
     },
-    /// A line to a pose.
+    /// Motion along a line to a pose.
     MoveL {
-        /// x, y, z, roll, pitch, yaw.
+        /// Target pose x, y, z, roll, pitch, yaw, m and rad.
         pose: [f32; 6],
-        /// The manner of the motion.
+        /// Parameters of the motion.
         motion: Motion,
     },
-    /// Rates until the next jog; all 0 ends it.
+    /// Rates until the next jog; rates of 0 end it.
     Jog {
-        /// Of what.
+        /// Meaning of the field `rates`.
         mode: JogMode,
-        /// rad/s; or m/s three times, rad/s three times.
+        /// Six rates: rad/s of the joints; or three in m/s and three in rad/s.
         rates: [f32; 6],
     },
-    /// At once.
+    /// Stops the robot at once.
     Stop,
-    /// Digital outputs.
+    /// Sets some of the digital outputs.
     Output {
-        /// Which.
+        /// Outputs to set, as bits.
         mask: u32,
-        /// Their values.
+        /// New values of the outputs in `mask`.
         bits: u32,
     },
-    /// An analogue output.
+    /// Sets an analogue output.
     Level {
-        /// 1 or 2.
+        /// Channel, 1 or 2.
         channel: u32,
-        /// Its value.
+        /// New value of the output.
         value: f32,
     },
     /// Ends the state after an error.
     Reset,
-    /// The tool's point in the flange's frame, m.
+    /// Tool point in the flange's frame, m.
     Tool([f32; 3]),
-    /// Limits.
+    /// Limits of the joints.
     Limits {
-        /// rad/s.
+        /// Limits of the velocities, rad/s.
         velocities: [f32; 6],
-        /// N·m.
+        /// Limits of the torques, N·m.
         torques: [f32; 6],
     },
 }
 
 impl Command {
-    /// Its kind.
+    /// Kind of the packet.
     pub const fn kind(&self) -> Kind {
         match self {
             Command::Nop => Kind::Nop,
@@ -319,7 +319,7 @@ impl Command {
         }
     }
 
-    /// The packet's words.
+    /// Words of the packet with this sequence number.
     pub fn encode(&self, sequence: u32) -> Vec<u32> {
         let payload = self.payload();
         let header = MAGIC << 24 | self.kind().number() << 16 | payload.len() as u32;
@@ -330,7 +330,7 @@ impl Command {
     }
 }
 
-/// CRC-32 (IEEE 802.3, as zlib has it) of words, each with its least significant byte first.
+/// CRC-32 (IEEE 802.3, as in zlib) of words, each with its least significant byte first.
 pub fn checksum(words: &[u32]) -> u32 {
     let mut hasher = crc32fast::Hasher::new();
     for word in words {
@@ -339,35 +339,35 @@ pub fn checksum(words: &[u32]) -> u32 {
     hasher.finalize()
 }
 
-/// An answer of the communication core.
+/// Answer of the communication core.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Report {
-    /// The kind of answer.
+    /// Kind of the answer.
     pub kind: ReportKind,
-    /// The packet that it answers; 0 if none.
+    /// Sequence number of the answered packet; 0 without one.
     pub sequence: u32,
-    /// The reason, if there is one.
+    /// Cause of a refusal or stop.
     pub cause: Option<Cause>,
-    /// A time in s, or what explains the cause.
+    /// Duration in s, or a detail of the cause.
     pub value: f32,
 }
 
-/// Words that are no report.
+/// Reason why words are no report.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ReportError {
-    /// There is no such kind.
+    /// Unknown kind of report.
     #[error("a report of the unknown kind {0}")]
     Kind(u32),
-    /// There is no such cause.
+    /// Unknown cause of a report.
     #[error("a report with the unknown cause {0}")]
     Cause(u32),
 }
 
 impl Report {
-    /// Reads the fields `report`, `sequence`, `cause`, `value`.
+    /// Decodes the fields `report`, `sequence`, `cause`, `value`.
     ///
     /// # Errors
-    /// If kind or cause is unknown.
+    /// If the kind or the cause is unknown.
     pub fn decode([kind, sequence, cause, value]: [u32; 4]) -> Result<Report, ReportError> {
         let kind = ReportKind::of(kind).ok_or(ReportError::Kind(kind))?;
         let cause = match cause {
@@ -377,7 +377,7 @@ impl Report {
         Ok(Report { kind, sequence, cause, value: f32::from_bits(value) })
     }
 
-    /// The joint that the value names, from 1.
+    /// Joint named by the value, from 1.
     pub fn joint(&self) -> Option<u32> {
         let joint = self.value as u32;
         (self.cause.is_some_and(Cause::has_joint) && (1..=6).contains(&joint)).then_some(joint)
@@ -391,7 +391,7 @@ mod tests {
     const FAST: Motion =
         Motion { profile: Profile::Cosine, how: How::Time, amount: 2.0, via: true, check: false };
 
-    /// The checksums are Python's `zlib.crc32`.
+    /// Expected checksums are from Python's `zlib.crc32`.
     #[test]
     fn packets_as_python_makes_them() {
         assert_eq!(Command::Nop.encode(1), [0x5400_0000, 1, 0x100d_d107]);
@@ -428,7 +428,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_go_there_and_back() {
+    fn numbers_round_trip() {
         for (number, cause) in (1..).zip(Cause::ALL) {
             assert_eq!((cause.number(), Cause::of(number)), (number, Some(*cause)));
         }

@@ -1,30 +1,30 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The robot that is controlled: six motors, the arm, brakes and encoders, in binary64.
+//! Controlled robot: six motors, the arm, brakes and encoders, in binary64.
 
 use crate::dynamics::{Arm, JOINTS, Joints, Matrix, solve};
 use std::f64::consts::TAU;
 
-/// A joint's motor: `Da·τ = u − Db·q̇ − Dc·q̈`.
+/// Motor of a joint: `Da·τ = u − Db·q̇ − Dc·q̈`.
 #[derive(Clone, Copy, Debug)]
 pub struct Motor {
-    /// Control for a torque, 1/(N·m).
+    /// Control per torque, 1/(N·m).
     pub da: f64,
-    /// Control for a velocity, s/rad.
+    /// Control per velocity, s/rad.
     pub db: f64,
-    /// Control for an acceleration, s²/rad.
+    /// Control per acceleration, s²/rad.
     pub dc: f64,
 }
 
-/// Of every joint.
+/// Motor of every joint of the standard robot.
 pub const MOTOR: Motor = Motor { da: 1.0 / 60.0, db: 0.8, dc: 0.02 };
-/// Counts of an encoder in a turn of its joint.
+/// Encoder counts per turn of a joint.
 pub const COUNTS: f64 = (1u32 << 18) as f64;
-/// Steps of the integration in a tick.
+/// Integration steps per tick.
 pub const SUBSTEPS: u32 = 2;
-/// The arm's joints at power-up, rad: upper arm up, forearm level, hand half down.
+/// Joint angles at power-up, rad: upper arm up, forearm level, hand half down.
 pub const HOME: Joints = [0.0, std::f64::consts::FRAC_PI_2, 0.0, 0.0, -std::f64::consts::FRAC_PI_4, 0.0];
 
-/// The robot.
+/// Robot with its motors and its state.
 #[derive(Clone, Debug)]
 pub struct Plant {
     arm: Arm,
@@ -34,37 +34,37 @@ pub struct Plant {
 }
 
 impl Plant {
-    /// The robot at rest.
+    /// Robot at rest at joint angles `q`, rad.
     pub fn new(arm: Arm, motors: [Motor; JOINTS], q: Joints) -> Plant {
         Plant { arm, motors, q, qd: [0.0; JOINTS] }
     }
 
-    /// The robot of the three-processor controller, at [`HOME`].
+    /// Robot of the three-processor controller, at [`HOME`].
     pub fn standard() -> Plant {
         Plant::new(Arm::hanging(), [MOTOR; JOINTS], HOME)
     }
 
-    /// Joint angles, rad.
+    /// Joint angles of the arm, rad.
     pub fn joints(&self) -> Joints {
         self.q
     }
 
-    /// Joint velocities, rad/s.
+    /// Joint velocities of the arm, rad/s.
     pub fn velocities(&self) -> Joints {
         self.qd
     }
 
-    /// Gives it velocities: to begin with.
+    /// Sets the joint velocities, rad/s, as an initial condition.
     pub fn set_velocities(&mut self, qd: Joints) {
         self.qd = qd;
     }
 
-    /// The encoders: whole counts, wrapping as 32-bit integers do.
+    /// Encoder counts, which wrap like 32-bit integers.
     pub fn counts(&self) -> [i32; JOINTS] {
         self.q.map(|angle| (angle / TAU * COUNTS).round() as i64 as i32)
     }
 
-    /// Accelerations under these controls.
+    /// Joint accelerations under these controls, rad/s².
     fn accelerations(&self, q: &Joints, qd: &Joints, u: &Joints) -> Joints {
         let mut matrix: Matrix = self.arm.mass_matrix(q);
         let mut torques = self.arm.bias(q, qd);
@@ -76,8 +76,8 @@ impl Plant {
         solve(matrix, torques)
     }
 
-    /// Goes on by `time` s, the controls being held: Runge and Kutta's method of fourth order, in [`SUBSTEPS`] steps. With the
-    /// drives off (`None`) the brakes hold every joint where it is.
+    /// Advances by `time` s with held controls: fourth-order Runge-Kutta in [`SUBSTEPS`] steps. With the drives off (`None`) the brakes
+    /// hold every joint.
     pub fn advance(&mut self, time: f64, controls: Option<&Joints>) {
         let Some(u) = controls else {
             self.qd = [0.0; JOINTS];

@@ -1,31 +1,31 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The programs of the standard controller, assembled ahead of time: the assembler's search takes ten seconds for them.
+//! Images of the standard controller's programs, assembled ahead of time: the assembler's search takes ten seconds for them.
 //!
-//! `standard/*.takt` are their images, `standard/sources.txt` has the checksum of each source that they were made from. An image
-//! whose sources have changed since is not used: the program is assembled. A test keeps the images up to date.
+//! `standard/*.takt` are the images, `standard/sources.txt` has the checksums of their sources. An image whose sources have changed is not
+//! used: the program is assembled instead. A test keeps the images up to date.
 
 use std::fmt::Write as _;
 use takt_asm::diag::Diagnostics;
-use takt_asm::{Assembled, MemoryLoader, Options, Search, assemble, image};
+use takt_asm::{AssembledProgram, MemoryLoader, Options, Search, assemble, image};
 use takt_isa::{Machine, Program, T3};
 
-/// The images, by the names of their programs.
+/// Images by the names of their programs.
 const IMAGES: [(&str, &[u8]); 3] = [
     ("communication.s", include_bytes!("standard/communication.takt")),
     ("dynamic.s", include_bytes!("standard/dynamic.takt")),
     ("kinematic.s", include_bytes!("standard/kinematic.takt")),
 ];
 
-/// For each program a line: its name, its machine, then the name and the checksum of each source that it was made from.
+/// Line per program: its name, its machine, then the name and the checksum of each source.
 const SOURCES: &str = include_str!("standard/sources.txt");
 
 /// Assembles a program of the controller, for a machine or the default one.
-fn assembled(name: &str, machine: Option<&'static Machine>) -> Result<Assembled, Diagnostics> {
+fn assembled(name: &str, machine: Option<&'static Machine>) -> Result<AssembledProgram, Diagnostics> {
     let loader = Search::new(MemoryLoader::new(takt_programs::THREE)).library(takt_programs::LIBRARY);
     assemble(name, &loader, &Options { machine: machine.unwrap_or(&T3), ..Options::default() })
 }
 
-/// The program in an image, if the image was made for that machine from the sources as they are now.
+/// Program of an image, if the image was made for that machine from the present sources.
 fn ready(name: &str, machine: Option<&'static Machine>) -> Option<Program> {
     let mut words =
         SOURCES.lines().map(str::split_whitespace).find(|line| line.clone().next() == Some(name))?.skip(1);
@@ -42,7 +42,7 @@ fn ready(name: &str, machine: Option<&'static Machine>) -> Option<Program> {
     image::read(bytes).ok()
 }
 
-/// A source's text, by the name that diagnostics have for it.
+/// Text of a source, by its name in diagnostics.
 fn text(name: &str) -> Option<&'static str> {
     let (sources, name) = match name.strip_prefix('<').and_then(|name| name.strip_suffix('>')) {
         Some(name) => (takt_programs::LIBRARY, name),
@@ -55,10 +55,10 @@ fn checksum_of(text: &str) -> String {
     format!("{:08x}", crc32fast::hash(text.as_bytes()))
 }
 
-/// A program of the controller.
+/// Program of the controller, from its image or assembled.
 ///
 /// # Errors
-/// If it has to be assembled and is wrong, in words.
+/// If the program must be assembled and is wrong; the text renders the mistakes.
 pub(crate) fn program(name: &str, machine: Option<&'static Machine>) -> Result<Program, String> {
     match ready(name, machine) {
         Some(program) => Ok(program),
@@ -68,10 +68,10 @@ pub(crate) fn program(name: &str, machine: Option<&'static Machine>) -> Result<P
     }
 }
 
-/// The contents that the files of the folder `standard` should have, by their names; takes as long as assembling does.
+/// Expected contents of the files in the folder `standard`, by their names; takes as long as assembling.
 ///
 /// # Errors
-/// If a program is wrong, or does not fit an image, in words.
+/// If a program is wrong, or does not fit an image; the text says why.
 pub fn files() -> Result<Vec<(String, Vec<u8>)>, String> {
     let machine = |name: &str| if name == "kinematic.s" { "t3" } else { "t1" };
     let (mut files, mut sources) = (Vec::new(), String::new());
@@ -95,7 +95,7 @@ pub fn files() -> Result<Vec<(String, Vec<u8>)>, String> {
 mod tests {
     use super::*;
 
-    /// Without this, every start of the robot assembles.
+    /// Up-to-date images: without them, every start of the robot assembles.
     #[test]
     fn images_are_ready() {
         let t1 = takt_isa::MACHINES.iter().copied().find(|machine| machine.name == "t1");
@@ -104,7 +104,7 @@ mod tests {
             let program = ready(name, machine).unwrap_or_else(|| panic!("{name}: its image is stale"));
             assert_eq!(Some(program.machine), machine, "{name}");
         }
-        // One for another machine is not taken, nor one for a program of another name.
+        // Images for another machine or another program are not used.
         assert!(ready("kinematic.s", t1).is_none() && ready("packets.s", t1).is_none());
     }
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The demonstration on the three cores and the plant, from end to end.
+//! Demonstration program on the three cores and the plant, end to end.
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -25,7 +25,7 @@ fn the_demonstration_runs() {
     }
     assert!(!report.contains("not what was expected"), "{report}");
     let counted = |kind: &str| messages.iter().filter(|message| message.kind == kind).count();
-    // Four refusals; a buffer run dry and four faults of the link, each told once.
+    // Nine errors are caught: four refusals, a queue run dry and four faults of the link.
     assert_eq!((counted("caught"), counted("stopped")), (9, 5), "{report}");
     for part in ["profiles", "square", "jogs", "signals", "refusals", "output 1 on", "output 1 off", "end"] {
         assert!(said.contains(&part), "{part} is missing\n{report}");
@@ -33,7 +33,7 @@ fn the_demonstration_runs() {
 
     let controller = session.host().robot();
     let tracking = controller.tracking();
-    // The robot ends by its reference, and the reference is where the program sent it.
+    // The robot ends at its reference, and the reference at the program's last target.
     let home = [0.0, 90.0, 0.0, 0.0, -45.0, 0.0];
     for ((plant, view), home) in
         degrees(&controller.plant().joints()).iter().zip(degrees(&session.host().view().joints)).zip(home)
@@ -44,11 +44,11 @@ fn the_demonstration_runs() {
         let largest = tracking.largest[joint].to_degrees();
         assert!(largest > 0.0 && largest < 0.1, "joint {}: {largest}", joint + 1);
     }
-    // Both steps fit a period of 10 kHz.
+    // The periods of kinematic and dynamic core fit their ticks at 10 kHz.
     for (name, periods) in controller.periods() {
         assert!(name == "communication" || periods.longest < description.tick, "{name}: {periods:?}");
     }
-    // The square goes round its corners without stopping: at the corners, too, the tool moves.
+    // The square's corners are passed without stopping: the tool keeps moving there.
     let square = |from: &str, to: &str| {
         let time =
             |text: &str| messages.iter().find(|message| message.text == text).map(|message| message.time);

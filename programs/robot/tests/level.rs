@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The command level on a stand-in for the cores: what programs do, and what is said of mistakes.
+//! Command level on a stand-in for the cores: effects of programs, and messages for mistakes.
 
 use crate::common::{lines, session};
 use takt_robot::language::table::{COMMANDS, FUNCTIONS};
@@ -7,7 +7,7 @@ use takt_robot::level::Answer;
 use takt_robot::limits;
 use takt_robot::packet::{Cause, Kind};
 
-/// Runs a program; what it says, and its error.
+/// Runs a program; returns its messages and its error.
 fn run(text: &str) -> (Vec<String>, String) {
     let (mut session, _) = session();
     let error = match session.run("test.robot", text).and_then(|()| session.finish()) {
@@ -59,7 +59,7 @@ fn frames_and_poses() {
 }
 
 #[test]
-fn motions_go_there() {
+fn motions_reach_their_target() {
     let said = says(
         "move joints(30, _, _, _, _, 10) in 1\nsay joints()\nlet t = time()\n\
          move joints(10, _, _, _, _, _) at 40\nsay time() - t < 0.6\n\
@@ -124,7 +124,7 @@ fn faults_of_the_link_stop_the_robot() {
     }
 }
 
-/// A reset that stays unanswered leaves the robot stopped: nobody waits for it, and the next reset is the mend.
+/// An unanswered reset leaves the robot stopped: the wait ends, and the next reset is the mend.
 #[test]
 fn a_reset_without_an_answer_ends() {
     let (mut session, _) = session();
@@ -146,7 +146,7 @@ fn a_reset_without_an_answer_ends() {
     }
 }
 
-/// A robot that stands after an error and reports none is not waited for either.
+/// An unreported error ends a wait as well.
 #[test]
 fn an_error_that_is_not_reported_ends_a_wait() {
     let (mut session, robot) = session();
@@ -228,7 +228,7 @@ fn every_command_has_an_example() {
         assert!(function.syntax.starts_with(function.name));
     }
     let text = include_str!("../../../docs/robot-commands.md");
-    // Lines may break anywhere.
+    // Ignore line breaks of the document.
     let one_line = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
     let items = one_line(text);
     let rows = COMMANDS.iter().map(|row| (row.syntax, row.text));
@@ -242,7 +242,7 @@ fn every_command_has_an_example() {
     }
 }
 
-/// The documentation's programs parse, and its examples run.
+/// Programs in the documentation parse, and its examples run.
 #[test]
 fn the_documents_program_is_one() {
     let text = include_str!("../../../docs/robot-commands.md");
@@ -252,7 +252,7 @@ fn the_documents_program_is_one() {
     session.check("docs", listing).unwrap_or_else(|error| panic!("{}", error.render(false)));
 }
 
-/// Each mistake: one error, at its place, with the mend.
+/// Mistakes: each gives one error, at its place, with the mend.
 #[test]
 fn mistakes() {
     let mut all = String::new();
@@ -322,7 +322,7 @@ fn depth_is_limited() {
         let (_, error) = run(&text);
         assert!(error.contains("error[limit]"), "{error}");
     }
-    // As deep as it may be, it is executed.
+    // Expressions at the limit of depth are executed.
     let deep = limits::EXPRESSION_DEPTH - 2;
     assert_eq!(says(&format!("say {}1{}", "(".repeat(deep), ")".repeat(deep))), ["say: 1"]);
 }

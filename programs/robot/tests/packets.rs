@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The two tables of the numbers on the link, in Rust and in assembly, say the same.
+//! Tables of the numbers on the link: Rust and assembly agree.
 
 use takt_robot::packet::{
     Cause, FLAG_CHECK, FLAG_VIA, How, JogMode, Kind, MAGIC, PAYLOAD_WORDS, Profile, ReportKind,
 };
 
-/// `.const NAME = value` of packets.s.
+/// Constants of packets.s, from lines `.const NAME = value`.
 fn constants() -> Vec<(String, u32)> {
     let (_, text) = takt_programs::THREE.iter().find(|(name, _)| *name == "packets.s").expect("the file");
     let number = |text: &str| match text.strip_prefix("0x") {
@@ -45,10 +45,10 @@ fn assembly_has_the_same_numbers() {
         let found = known.iter().find(|(known, _)| known == name);
         assert_eq!(found.map(|(_, number)| number), Some(number), "{name}");
     }
-    // And none that Rust does not know.
+    // Assembly has no constant that Rust lacks.
     let prefixes = ["KIND_", "PROFILE_", "HOW_", "JOG_", "REPORT_", "CAUSE_", "FLAG_"];
     for (name, _) in known.iter().filter(|(name, _)| prefixes.iter().any(|prefix| name.starts_with(prefix))) {
-        // The second half of LIMITS is between the cores only.
+        // The second half of LIMITS exists only between the cores.
         let inner = name == "KIND_TORQUES";
         assert!(inner || expected.iter().any(|(known, _)| known == name), "{name}");
     }

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The plant against forms that share no code with it.
+//! Plant against formulations that share no code with it.
 
 use std::f64::consts::FRAC_PI_2;
 use takt_robot::dynamics::{Arm, GRAVITY, JOINTS, Joints, solve};
 use takt_robot::plant::{HOME, MOTOR, Motor, Plant};
 
-/// Somewhere in the work space, every joint turned.
+/// Poses in the work space with every joint turned.
 const POSES: [Joints; 3] =
     [[0.3, 1.1, -0.4, 0.7, -0.9, 0.5], [-1.2, 2.0, 0.6, -1.4, 1.3, -2.0], [0.0, 0.4, 0.9, 2.5, 0.2, 1.0]];
 const SPEEDS: Joints = [0.8, -1.1, 1.7, -2.0, 1.4, 2.2];
@@ -17,7 +17,7 @@ fn times(a: &Frame, b: &Frame) -> Frame {
     std::array::from_fn(|i| std::array::from_fn(|j| (0..4).map(|k| a[i][k] * b[k][j]).sum()))
 }
 
-/// `Rz(θ)·Tz(d)·Tx(a)·Rx(α)`, written out as a product of four matrices.
+/// Frames `Rz(θ)·Tz(d)·Tx(a)·Rx(α)`, as a product of four matrices.
 fn frames(arm: &Arm, q: &Joints) -> [Frame; JOINTS] {
     let mut whole: Frame = std::array::from_fn(|i| std::array::from_fn(|j| f64::from(u8::from(i == j))));
     std::array::from_fn(|i| {
@@ -35,11 +35,11 @@ fn centre(frame: &Frame, of: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|i| frame[i][3] + (0..3).map(|k| frame[i][k] * of[k]).sum::<f64>())
 }
 
-/// Lagrange's mass matrix: Jacobians of every centre of mass and of every rotation, by differences.
+/// Mass matrix of Lagrange's equations: Jacobians of every centre of mass and every rotation, by differences.
 fn mass_matrix(arm: &Arm, q: &Joints) -> [[f64; JOINTS]; JOINTS] {
     const STEP: f64 = 1e-5;
     let here = frames(arm, q);
-    // For each joint and link: the centre's velocity, and the angular velocity in the link's own frame.
+    // Velocity of the centre, and angular velocity in the link's own frame, for each joint and link.
     let moved = |joint: usize, by: f64| {
         let mut q = *q;
         q[joint] += by;
@@ -52,7 +52,7 @@ fn mass_matrix(arm: &Arm, q: &Joints) -> [[f64; JOINTS]; JOINTS] {
         for (i, link) in arm.links.iter().enumerate() {
             let (a, b) = (centre(&ahead[i], link.centre), centre(&behind[i], link.centre));
             linear[joint][i] = std::array::from_fn(|k| (a[k] - b[k]) / (2.0 * STEP));
-            // RᵀṘ is the cross product's matrix.
+            // The product RᵀṘ is the cross product's matrix.
             let rate = |row: usize, column: usize| {
                 (0..3).map(|k| here[i][k][row] * (ahead[i][k][column] - behind[i][k][column])).sum::<f64>()
                     / (2.0 * STEP)
@@ -68,8 +68,8 @@ fn mass_matrix(arm: &Arm, q: &Joints) -> [[f64; JOINTS]; JOINTS] {
     std::array::from_fn(|a| std::array::from_fn(|b| entry(a, b)))
 }
 
-/// Gravity's energy and the springs': of upper arm and forearm with the wrist straight, the balanced part of gravity's,
-/// the other way.
+/// Potential energy of gravity and springs: the springs' is opposite to the balanced part of gravity's, of upper arm and forearm with the
+/// wrist straight.
 fn potential(arm: &Arm, q: &Joints) -> f64 {
     let weight = |q: &Joints, from: usize| -> f64 {
         let frames = frames(arm, q);
@@ -79,7 +79,7 @@ fn potential(arm: &Arm, q: &Joints) -> f64 {
     weight(q, 0) - arm.balance * weight(&[q[0], q[1], q[2], 0.0, 0.0, 0.0], 1)
 }
 
-/// `τ = d/dt ∂L/∂q̇ − ∂L/∂q`, by differences.
+/// Lagrange's equations `τ = d/dt ∂L/∂q̇ − ∂L/∂q`, by differences.
 fn lagrange(arm: &Arm, q: &Joints, qd: &Joints, qdd: &Joints) -> Joints {
     const STEP: f64 = 1e-4;
     let along = |joint: usize, by: f64| {
@@ -122,7 +122,7 @@ fn newton_and_euler_agree_with_lagrange() {
     }
 }
 
-/// Neither drives nor friction: what the arm has of energy, it keeps.
+/// Conservation of energy, without drives and friction.
 #[test]
 fn energy_is_kept() {
     let motor = Motor { db: 0.0, ..MOTOR };
@@ -148,7 +148,7 @@ fn motors_brakes_and_counts() {
     assert_eq!(counts, [0, 1 << 16, 0, 0, -(1 << 15), 0]);
     plant.advance(0.1, None);
     assert_eq!((plant.counts(), plant.velocities()), (counts, [0.0; JOINTS]));
-    // At constant speed the motor's own friction takes u = Db·q̇, and joint 1 of an arm that stands straight no torque.
+    // Constant speed: the motor's own friction takes u = Db·q̇, and joint 1 of an upright arm needs no torque.
     for _ in 0..2000 {
         plant.advance(1e-3, Some(&[0.4, 0.0, 0.0, 0.0, 0.0, 0.0]));
     }
@@ -161,7 +161,7 @@ fn motors_brakes_and_counts() {
     }
 }
 
-/// The nominal model (three-processor controller): inertias, and gravity at the wrist.
+/// Nominal model of the three-processor controller: inertias, and gravity at the wrist.
 fn nominal(q: &Joints) -> ([f64; JOINTS], [f64; 2]) {
     let [c0, c1, c2, c3, c4, _, c6, c7, c8] = [4.2, 6.1, 3.4, 2.3, 7.9, 1.7, 4.9, 0.12, 0.05];
     let (s23, c23) = (q[1] + q[2]).sin_cos();
@@ -178,7 +178,7 @@ fn nominal(q: &Joints) -> ([f64; JOINTS], [f64; 2]) {
     (inertia, [c6 * q[3].sin() * s5 * s23, -c6 * (q[3].cos() * c5 * s23 + s5 * c23)])
 }
 
-/// The plant is like the nominal model, and not the same: with the motors' inertia, which is the larger part at the wrist.
+/// The plant resembles the nominal model without equalling it; motor inertias are included, the larger part at the wrist.
 #[test]
 fn the_nominal_model_is_a_fair_approximation() {
     let arm = Arm::hanging();

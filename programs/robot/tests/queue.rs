@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The queue of the kinematic core, filled to its end by the host, on the three cores.
+//! Queue of the kinematic core, filled to its end by the host, on the three cores.
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use takt_robot::controller::{Controller, standard};
-use takt_robot::host::{Host, News, Problem};
+use takt_robot::host::{Host, HostEvent, Problem};
 use takt_robot::level::{NoFiles, Session};
 use takt_robot::limits;
 use takt_robot::packet::{Cause, Command};
@@ -15,7 +15,7 @@ fn controller() -> Controller {
     Controller::new(&description, Plant::standard()).expect("a controller")
 }
 
-/// More signals than the queue holds, all at once: each is set.
+/// Signals beyond the queue's capacity, sent at once: each is set.
 #[test]
 fn signals_wait_for_room() {
     let mut session = Session::new(controller(), Arc::new(NoFiles), Arc::new(AtomicBool::new(false)))
@@ -37,9 +37,9 @@ fn signals_wait_for_room() {
     assert_eq!(said.len(), 61, "{said:?}");
 }
 
-/// A host that does not look whether there is room: what finds none is refused, and a stop, which drops what waits, is answered.
+/// A host that ignores the queue's room: packets beyond it are refused, and a stop, which drops the queue, is answered.
 #[test]
-fn a_stop_ends_what_waits() {
+fn stop_ends_waiting_statements() {
     let mut host = Host::new(controller());
     host.power_up().expect("it gets ready");
     let sent: Vec<u32> = (0..60)
@@ -56,12 +56,11 @@ fn a_stop_ends_what_waits() {
     host.wait_until(within, || "it does not stand".to_owned(), &|| false, |host| Ok(host.stands()))
         .unwrap_or_else(|problem| panic!("{problem}"));
     assert_eq!(host.unanswered(), 0);
-    // And it goes on.
+    // Operation goes on after the stop.
     let news = host.take_news();
-    assert!(
-        news.iter()
-            .any(|(_, news)| matches!(news, News::Report(report) if report.cause == Some(Cause::QueueFull)))
-    );
+    assert!(news.iter().any(
+        |(_, news)| matches!(news, HostEvent::Report(report) if report.cause == Some(Cause::QueueFull))
+    ));
     let mask = 1 << 3;
     let last = host.post(&Command::Output { mask, bits: mask }).expect("the line takes it");
     let done = |host: &mut Host<Controller>| -> Result<bool, Problem> { host.finished(last) };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The images of the standard controller's programs are what the assembler makes of their sources.
+//! Images of the standard controller's programs equal the assembler's output for their sources.
 
 use std::path::Path;
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Forward and inverse kinematics in binary64, as the paper prints them.
+//! Forward and inverse kinematics in binary64, from the paper's equations.
 
 use super::{A1, A2, A3, AXIS_RADIUS2, Configuration, D1, D4, D6, Pose, STRAIGHT};
 
-/// Forward kinematics, (2.3)-(2.18): the tool's pose, and the configuration that leads the inverse back to these joints.
+/// Forward kinematics, (2.3)-(2.18): the tool's pose, and the configuration for which the inverse returns these joints.
 #[must_use]
 pub fn forward(joints: [f64; 6], tool: [f64; 3]) -> (Pose<f64>, Configuration) {
     let [th1, th2, th3, th4, th5, th6] = joints.map(f64::to_radians);
@@ -36,43 +36,44 @@ pub fn forward(joints: [f64; 6], tool: [f64; 3]) -> (Pose<f64>, Configuration) {
     (Pose { position, orientation: [roll, pitch, yaw].map(f64::to_degrees) }, configuration)
 }
 
-/// Joint angles that reach a pose, and how far from the singularities.
+/// Joint angles that reach a pose, and the distances from the singularities.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Solution {
-    /// Degrees, in (-180, 180].
+    /// Joint angles in degrees, in (-180, 180].
     pub joints: [f64; 6],
-    /// |sin θ5|.
+    /// Distance from the wrist singularity, |sin θ5|.
     pub wrist: f64,
-    /// |sin ψ|, ψ the angle between the upper arm and the line from the elbow to the wrist's centre.
+    /// Distance from the elbow singularity, |sin ψ|: ψ is the angle between the upper arm and the line from the elbow to the wrist's
+    /// centre.
     pub elbow: f64,
-    /// The wrist's centre's distance from joint 1's axis, mm.
+    /// Distance of the wrist's centre from joint 1's axis, mm.
     pub radius: f64,
 }
 
-/// The reason why there is no solution.
+/// Reason why there is no solution.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum Failure {
-    /// |cos| > 1.
+    /// The law of cosines gives |cos| > 1.
     #[error("the point is out of reach")]
     OutOfReach,
-    /// θ4 and θ6 are not determined.
+    /// Wrist singularity: θ4 and θ6 are not determined.
     #[error("the wrist is singular")]
     WristSingular,
-    /// θ1 is not determined.
+    /// Shoulder singularity: θ1 is not determined.
     #[error("the wrist's centre lies on joint 1's axis")]
     OnAxis,
 }
 
-/// An angle in degrees, brought into (-180, 180].
+/// Normalizes an angle in degrees to (-180, 180].
 fn wrapped(angle: f64) -> f64 {
     let turned = angle.rem_euclid(360.0);
     if turned > 180.0 { turned - 360.0 } else { turned }
 }
 
-/// Inverse kinematics, (2.22)-(2.39).
+/// Inverse kinematics, (2.22)-(2.39), for one of the eight configurations.
 pub fn inverse(pose: &Pose<f64>, tool: [f64; 3], configuration: Configuration) -> Result<Solution, Failure> {
     let [(sr, cr), (sp, cp), (sy, cy)] = pose.orientation.map(|angle| angle.to_radians().sin_cos());
-    // The rotation that gives w its yaw and pitch, and v and u their roll.
+    // Basis of the rotation: w has its yaw and pitch, v and u are turned by its roll.
     let w = [cp * cy, cp * sy, sp];
     let (e, f) = ([-sp * cy, -sp * sy, cp], [-sy, cy, 0.0]);
     let u = [0, 1, 2].map(|i| -cr * e[i] + sr * f[i]);
@@ -89,7 +90,7 @@ pub fn inverse(pose: &Pose<f64>, tool: [f64; 3], configuration: Configuration) -
         - D4 * D4;
     let cosine = k / (2.0 * A2 * A3.hypot(D4));
     let wrist_radius = c[0].hypot(c[1]);
-    // A NaN is not.
+    // Written so that a NaN is out of reach.
     let reachable = cosine.abs() <= 1.0;
     if !reachable {
         return Err(Failure::OutOfReach);
@@ -110,7 +111,7 @@ pub fn inverse(pose: &Pose<f64>, tool: [f64; 3], configuration: Configuration) -
     let across = |a: [f64; 3]| s1 * a[0] - c1 * a[1];
     let (cos4, sin4) = (along(w) * c23 + s23 * w[2], across(w));
     let (cos6, sin6) = (c23 * u[2] - s23 * along(u), s23 * along(v) - c23 * v[2]);
-    // Better conditioned than acos of cos θ5.
+    // This sum of squares is better conditioned than acos of cos θ5.
     let sin5 = cos4.hypot(sin4);
     if sin5 * sin5 < STRAIGHT {
         return Err(Failure::WristSingular);
@@ -127,7 +128,7 @@ pub fn inverse(pose: &Pose<f64>, tool: [f64; 3], configuration: Configuration) -
     })
 }
 
-/// True if a solution is as far from the singularities as stated accuracy asks: the margins of this module.
+/// A solution is clear of the singularities if it keeps the margins of this module, within which accuracy is stated.
 #[must_use]
 pub fn is_clear(pose: &Pose<f64>, solution: &Solution) -> bool {
     let level = pose.orientation[1].to_radians().cos();
@@ -155,7 +156,7 @@ mod tests {
         }
     }
 
-    /// The paper's own circuit errs by up to 0.022°.
+    /// Accuracy of the paper's own circuit: errors up to 0.022°.
     #[test]
     fn the_papers_inverse_example() {
         let example = &INVERSE_EXAMPLE;

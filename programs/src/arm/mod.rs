@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The six-axis articulated arm of the second founding paper: its kinematics in binary64, and the sweep that measures the programs
-//! `arm/forward.s` and `arm/inverse.s` against it.
+//! Six-axis articulated arm of the second founding paper: its kinematics in binary64, and the sweep that compares the programs
+//! `arm/forward.s` and `arm/inverse.s` with it.
 //!
-//! Lengths in mm, angles in degrees, as at the programs' ports. Equation numbers are the paper's; `docs/arm.md`. The files of
-//! this folder import its constants and poses from here, and are re-exported: together they are one module.
+//! Lengths in mm, angles in degrees, like the programs' ports. Equation numbers refer to the paper; see `docs/arm.md`. The files of this
+//! folder import its constants and poses from here, and are re-exported: together they are one module.
 
 mod kinematics;
 pub mod square;
@@ -12,57 +12,57 @@ mod sweep;
 pub use kinematics::{Failure, Solution, forward, inverse, is_clear};
 pub use sweep::{Arm, ForwardResult, InverseResult, RoundTrip, Sweep, angle_between, sweep};
 
-/// Denavit-Hartenberg parameters, mm (Table 1).
+/// Distance of joint 2's axis from joint 1's, mm. Denavit-Hartenberg parameters are from Table 1.
 pub const A1: f64 = 75.0;
-/// Upper arm.
+/// Length of the upper arm, mm.
 pub const A2: f64 = 270.0;
-/// Offset of the forearm.
+/// Offset of the forearm, mm.
 pub const A3: f64 = 90.0;
-/// Height of joint 2.
+/// Height of joint 2, mm.
 pub const D1: f64 = 345.0;
-/// Forearm.
+/// Length of the forearm, mm.
 pub const D4: f64 = 295.0;
-/// From the wrist's centre to the flange.
+/// Distance from the wrist's centre to the flange, mm.
 pub const D6: f64 = 102.0;
 
-/// `status` where a result is good.
+/// `status` of a valid result.
 pub const GOOD: u32 = 0;
-/// `status` of the inverse: out of reach, or an input that is no number.
+/// `status` of the inverse: out of reach, or an input is NaN or infinite.
 pub const OUT_OF_REACH: u32 = 1;
 /// `status` of the inverse: wrist singularity.
 pub const WRIST_SINGULAR: u32 = 2;
 /// `status` of the inverse: the wrist's centre lies on joint 1's axis.
 pub const ON_AXIS: u32 = 3;
-/// `status` of the forward kinematics: the tool points up or down, so that roll and yaw are of little worth.
+/// `status` of the forward kinematics: the tool points nearly up or down, so that roll and yaw are ill-conditioned.
 pub const STEEP: u32 = 1;
-/// `status` of the forward kinematics: an input is out of range or no number.
+/// `status` of the forward kinematics: an input is out of range, NaN or infinite.
 pub const NO_ANGLE: u32 = 2;
 
-/// sin² θ5 below which the inverse reports the wrist singularity.
+/// Threshold on sin² θ5 below which the inverse reports the wrist singularity.
 pub const STRAIGHT: f64 = 1.0 / 1_048_576.0;
-/// Squared distance from joint 1's axis below which the inverse reports it, mm².
+/// Squared distance from joint 1's axis below which the inverse reports the axis singularity, mm².
 pub const AXIS_RADIUS2: f64 = 1.0;
 
-/// Accuracy is stated where the sines of θ5 and of ψ (the angle between upper arm and forearm's line) and cos(pitch) are no less:
-/// 10° from the singularities.
+/// Margin of stated accuracy: the sines of θ5 and of ψ (the angle between upper arm and forearm's line) and cos(pitch) are no less, 10°
+/// from the singularities.
 pub const MARGIN: f64 = 0.173_648_177_666_930_33;
-/// And where the wrist's centre is no closer to joint 1's axis, mm.
+/// Margin of stated accuracy: least distance of the wrist's centre from joint 1's axis, mm.
 pub const AXIS_MARGIN: f64 = 50.0;
 
-/// Position and orientation of the tool: roll, pitch and yaw, so that yaw = atan2(w_y, w_x), pitch is w's elevation, roll =
-/// atan2(v_z, -u_z).
+/// Position and orientation of the tool: roll, pitch and yaw, where yaw = atan2(w_y, w_x), pitch is w's elevation, and roll = atan2(v_z,
+/// -u_z).
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Pose<T> {
-    /// x, y, z, mm.
+    /// Position x, y, z, mm.
     pub position: [T; 3],
-    /// Roll, pitch, yaw, degrees.
+    /// Orientation as roll, pitch, yaw, degrees.
     pub orientation: [T; 3],
 }
 
-/// On which branch a solution lies: θ1 the other way round; elbow; wrist.
+/// Branch of a solution: θ1 turned by 180°; elbow; wrist.
 pub type Configuration = [bool; 3];
 
-/// All eight.
+/// All eight configurations; θ1's branch changes fastest.
 pub const CONFIGURATIONS: [Configuration; 8] = {
     let mut all = [[false; 3]; 8];
     let mut i = 0;
@@ -73,19 +73,19 @@ pub const CONFIGURATIONS: [Configuration; 8] = {
     all
 };
 
-/// The paper's example of forward kinematics.
+/// Example of forward kinematics in the paper.
 pub struct ForwardExample {
-    /// Joint angles.
+    /// Joint angles in degrees.
     pub joints: [f64; 6],
-    /// Tool point.
+    /// Tool point relative to the flange, mm.
     pub tool: [f64; 3],
-    /// The paper's circuit's result.
+    /// Result of the paper's circuit.
     pub circuit: Pose<f64>,
-    /// The result in binary64.
+    /// Result computed in binary64.
     pub binary64: Pose<f64>,
 }
 
-/// Its figures.
+/// Figures of the forward example.
 pub const FORWARD_EXAMPLE: ForwardExample = ForwardExample {
     joints: [109.53, -18.375, 114.56, -11.89, -0.12, 50.32],
     tool: [10.0, -15.0, 100.0],
@@ -99,17 +99,17 @@ pub const FORWARD_EXAMPLE: ForwardExample = ForwardExample {
     },
 };
 
-/// The paper's example of inverse kinematics.
+/// Example of inverse kinematics in the paper.
 pub struct InverseExample {
     /// Position and orientation of the tool.
     pub pose: Pose<f64>,
-    /// Tool point.
+    /// Tool point relative to the flange, mm.
     pub tool: [f64; 3],
-    /// The paper's circuit's result.
+    /// Result of the paper's circuit, joint angles in degrees.
     pub circuit: [f64; 6],
 }
 
-/// Its figures; the configuration is 0, 0, 0.
+/// Figures of the inverse example; the configuration is 0, 0, 0.
 pub const INVERSE_EXAMPLE: InverseExample = InverseExample {
     pose: Pose { position: [500.123, 430.99, 420.256], orientation: [80.5, 10.333, 50.26] },
     tool: [10.0, -15.0, 100.0],

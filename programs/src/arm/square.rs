@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The path demonstration: the tool along a square in space.
+//! Path demonstration: the tool moves along a square in space.
 
 use super::{Configuration, Pose};
 
@@ -7,22 +7,22 @@ use super::{Configuration, Pose};
 pub const SIDE: f64 = 200.0;
 /// Speed of the tool, mm/s.
 pub const SPEED: f64 = 200.0;
-/// Sampling period, s.
+/// Sampling period of the demonstration, s.
 pub const PERIOD: f64 = 1e-3;
-/// Tool point.
+/// Tool point relative to the flange, mm.
 pub const TOOL: [f64; 3] = [0.0, 0.0, 100.0];
-/// The branch on which the arm goes: no joint passes ±180°.
+/// Configuration of the arm along the path: no joint passes ±180°.
 pub const CONFIGURATION: Configuration = [false, false, false];
-/// Periods of one round, the first point counted once.
+/// Periods of one round; the first point counts once.
 pub const PERIODS: u64 = (4.0 * SIDE / SPEED / PERIOD) as u64;
 
-/// A corner, and the directions of the sides that leave it: the plane leans by 30° from the horizontal.
+/// Corner of the square, mm, and the directions of the sides that leave it: the plane leans by 30° from the horizontal.
 const CORNER: [f64; 3] = [350.0, -100.0, 300.0];
 const SIDES: [[f64; 3]; 2] = [[0.866_025_403_784_438_6, 0.0, 0.5], [0.0, 1.0, 0.0]];
-/// The tool stands square to the plane and points down: roll, pitch, yaw.
+/// Orientation of the tool, square to the plane and pointing down: roll, pitch, yaw, degrees.
 const ORIENTATION: [f64; 3] = [90.0, -60.0, 0.0];
 
-/// The tool's pose in a period, from 0 to [`PERIODS`], at constant speed; the last is the first.
+/// Tool pose in a period, from 0 to [`PERIODS`], at constant speed; the last pose equals the first.
 #[must_use]
 pub fn square(period: u64) -> Pose<f64> {
     let way = (period as f64 * PERIOD * SPEED).rem_euclid(4.0 * SIDE);

@@ -1,42 +1,42 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Random poses through the programs, against binary64 and back.
+//! Round trips of random poses through the programs, compared with binary64.
 
 use super::{
     A1, CONFIGURATIONS, Configuration, Failure, GOOD, ON_AXIS, OUT_OF_REACH, Pose, WRIST_SINGULAR, forward,
     inverse, is_clear,
 };
 
-/// The result of a forward program.
+/// Result of a forward program.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ForwardResult {
-    /// The tool's pose.
+    /// Pose of the tool.
     pub pose: Pose<f32>,
-    /// The configuration that leads back.
+    /// Configuration for which the inverse returns the same joints.
     pub configuration: Configuration,
-    /// Its `status` port.
+    /// Value of the `status` port.
     pub status: u32,
     /// Cycles of the period.
     pub cycles: u64,
 }
 
-/// The result of an inverse program.
+/// Result of an inverse program.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InverseResult {
-    /// Joint angles, degrees.
+    /// Joint angles in degrees.
     pub joints: [f32; 6],
-    /// Its `status` port.
+    /// Value of the `status` port.
     pub status: u32,
     /// Cycles of the period.
     pub cycles: u64,
 }
 
-/// The two programs on something that runs them.
+/// Executor of both programs: an emulator or the circuit.
 pub trait Arm {
-    /// The reason why a program could not be run.
+    /// Reason why a program could not be run.
     type Error;
-    /// One period of the forward program.
+    /// Runs one period of the forward program.
     fn forward(&mut self, joints: [f32; 6], tool: [f32; 3]) -> Result<ForwardResult, Self::Error>;
-    /// One period of the inverse program.
+    /// Runs one period of the inverse program.
     fn inverse(
         &mut self,
         pose: &Pose<f32>,
@@ -45,18 +45,18 @@ pub trait Arm {
     ) -> Result<InverseResult, Self::Error>;
 }
 
-/// The error of a round trip: the distance from its start to its end.
+/// Errors of round trips: the distance from start to end.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct RoundTrip {
-    /// Ways tried, by configuration, in the order of [`CONFIGURATIONS`].
+    /// Round trips by configuration, in the order of [`CONFIGURATIONS`].
     pub tried: [u64; 8],
-    /// Largest distance, mm; 0 if the way ends in angles.
+    /// Largest distance, mm; 0 if the trip ends in angles.
     pub max_error_mm: f64,
     /// Largest difference of an angle, degrees.
     pub max_error_deg: f64,
 }
 
-/// The result of a sweep. Errors count where the pose is clear of the singularities ([`is_clear`]).
+/// Result of a sweep. Errors count where the pose is clear of the singularities ([`is_clear`]).
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Sweep {
     /// Poses of the forward program compared with binary64.
@@ -65,39 +65,39 @@ pub struct Sweep {
     pub forward_mm: f64,
     /// Largest error of an angle, degrees.
     pub forward_deg: f64,
-    /// Shortest and longest period of the forward program, cycles.
+    /// Shortest and longest period of the forward program, in cycles.
     pub forward_cycles: Option<(u64, u64)>,
     /// Solutions of the inverse program compared with binary64.
     pub inverse_solutions: u64,
     /// Largest error of a joint, degrees.
     pub inverse_deg: f64,
-    /// Shortest and longest period of the inverse program, cycles.
+    /// Shortest and longest period of the inverse program, in cycles.
     pub inverse_cycles: Option<(u64, u64)>,
-    /// Configurations that do not reach the pose, where binary64 and the program agree.
+    /// Unreachable configurations of poses, where binary64 and the program agree.
     pub unreachable: u64,
     /// Solutions too close to a singularity to count.
     pub near_singular: u64,
-    /// Results whose status, or configuration, is not binary64's, away from where it changes.
+    /// Results whose status or configuration differs from binary64's, other than near a change of these.
     pub disagreements: u64,
-    /// Pose to joints to pose.
+    /// Round trips from pose to joints to pose.
     pub forward_of_inverse: RoundTrip,
-    /// Joints to pose to joints.
+    /// Round trips from joints to pose to joints.
     pub inverse_of_forward: RoundTrip,
 }
 
-/// The difference of two angles, degrees, whatever turns lie between; NaN if one is.
+/// Absolute difference of two angles modulo full turns, degrees; NaN if either is.
 #[must_use]
 pub fn angle_between(a: f64, b: f64) -> f64 {
     let turn = (a - b).rem_euclid(360.0);
     turn.min(360.0 - turn)
 }
 
-/// The larger; a NaN is the largest.
+/// Maximum of two errors, with NaN as the largest.
 fn larger(a: f64, b: f64) -> f64 {
     if a > b || a.is_nan() { a } else { b }
 }
 
-/// Largest difference in position and in orientation.
+/// Largest differences in position, mm, and in orientation, degrees.
 fn distance(a: &Pose<f32>, b: &Pose<f64>) -> (f64, f64) {
     let position = (0..3).map(|i| (f64::from(a.position[i]) - b.position[i]).abs());
     let orientation = (0..3).map(|i| angle_between(a.orientation[i].into(), b.orientation[i]));
@@ -121,11 +121,11 @@ fn span(cycles: &mut Option<(u64, u64)>, period: u64) {
     *cycles = Some((shortest.min(period), longest.max(period)));
 }
 
-/// SplitMix64.
+/// SplitMix64 generator of the sweep's inputs.
 struct Random(u64);
 
 impl Random {
-    /// Uniform in `-limit..limit`, as a binary32.
+    /// Uniform random number in `-limit..limit`, as a binary32.
     fn within(&mut self, limit: f64) -> f32 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -136,7 +136,7 @@ impl Random {
 }
 
 impl Sweep {
-    /// One set of joints and a tool: forward, from there back, and to the other solutions.
+    /// Round trips of one set of joints and a tool: forward, back, and through all other configurations.
     fn add<A: Arm>(&mut self, arm: &mut A, joints: [f32; 6], tool: [f32; 3]) -> Result<(), A::Error> {
         let tool64 = widen(tool);
         let (pose, configuration) = forward(widen(joints), tool64);
@@ -157,7 +157,7 @@ impl Sweep {
             self.disagreements += u64::from(back.status != GOOD);
         }
 
-        // The pose as the inverse gets it.
+        // The inverse program takes the rounded pose.
         let pose = result.pose;
         for configuration in CONFIGURATIONS {
             let found = arm.inverse(&pose, tool, configuration)?;
@@ -181,7 +181,7 @@ impl Sweep {
                 Err(Failure::OutOfReach) if found.status == OUT_OF_REACH => self.unreachable += 1,
                 Err(Failure::WristSingular) if found.status == WRIST_SINGULAR => self.near_singular += 1,
                 Err(Failure::OnAxis) if found.status == ON_AXIS => self.near_singular += 1,
-                // Just beyond a limit that rounding moves, or not.
+                // Rounding may move a pose across a limit: then either status is right.
                 Err(failure) if is_just_beyond(&pose, tool64, configuration, failure) => {
                     self.near_singular += 1
                 }
@@ -196,7 +196,7 @@ fn index(configuration: Configuration) -> usize {
     configuration.iter().rev().fold(0, |index, &bit| 2 * index + usize::from(bit))
 }
 
-/// True if a pose that lies a little closer to the arm does not fail like this.
+/// A pose moved by 0.01 mm along an axis does not have this failure, so that the pose is at the limit of reach or singularity.
 fn is_just_beyond(pose: &Pose<f32>, tool: [f64; 3], configuration: Configuration, failure: Failure) -> bool {
     let pose = wide(pose);
     [-0.01, 0.01].iter().any(|step| {
@@ -208,9 +208,9 @@ fn is_just_beyond(pose: &Pose<f32>, tool: [f64; 3], configuration: Configuration
     })
 }
 
-/// `count` random sets of joints, each anywhere in its turn, and tools up to 2·[`A1`] long in each direction.
+/// Sweeps `count` random sets of joints, each anywhere in its turn, with tools up to 2·[`A1`] long in each direction.
 ///
-/// Every one goes forward, and its pose back by all eight configurations; what is found goes forward again.
+/// Each set goes forward; the pose goes back through all eight configurations, and every solution forward again.
 pub fn sweep<A: Arm>(
     arm: &mut A,
     count: u64,

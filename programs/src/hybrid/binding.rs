@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The registers that an assembled program has for the ports of the tracking algorithm.
+//! Registers of an assembled program for the ports of the tracking algorithm.
 
 use super::controller::Outputs;
 use super::ports::{INPUTS, OUTPUTS, Port};
@@ -9,50 +9,50 @@ use thiserror::Error;
 /// Registers of a program for [`INPUTS`] and [`OUTPUTS`], in their order.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Binding {
-    /// Of the inputs.
+    /// Registers of [`INPUTS`], in their order.
     pub inputs: [Register; INPUTS.len()],
-    /// Of the outputs.
+    /// Registers of [`OUTPUTS`], in their order.
     pub outputs: [Register; OUTPUTS.len()],
 }
 
-/// The reason why a program is no tracking program.
+/// Reason why a program is no tracking program.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum BindingError {
-    /// It has an input that the algorithm does not know.
+    /// An input port that the algorithm does not have.
     #[error("this is no tracking program: nothing gives its input port `{0}` a value")]
     Undriven(String),
-    /// A port is missing.
+    /// A missing port of the algorithm.
     #[error("this is no tracking program: it has no {kind} port `{name}`")]
     Missing {
-        /// `input` or `output`.
+        /// Direction of the port: `input` or `output`.
         kind: &'static str,
-        /// The port.
+        /// Name of the missing port.
         name: &'static str,
-        /// The program's ports of that kind that the algorithm does not have.
+        /// Ports of the program in that direction that the algorithm does not have.
         others: Vec<String>,
     },
-    /// A port has another type.
+    /// A port with a different type.
     #[error("{kind} port `{name}` must carry {}", if *.ty == Type::I { format!("integers: declare it `{name}:int`") } else { format!("binary32: declare it `{name}:float`") })]
     Type {
-        /// `input` or `output`.
+        /// Direction of the port: `input` or `output`.
         kind: &'static str,
-        /// The port.
+        /// Name of the port.
         name: &'static str,
-        /// The type that it should have.
+        /// Type that the algorithm needs.
         ty: Type,
     },
 }
 
-/// An output port, by its name, that the program has not written.
+/// An output port, by name, that the program has not written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 #[error("the program has not written output port `{0}`")]
-pub struct Unwritten(pub &'static str);
+pub struct UnwrittenOutput(pub &'static str);
 
 impl Binding {
-    /// The registers of a program that has the algorithm's ports. It may have further outputs.
+    /// Registers of a program with the algorithm's ports. The program may have further outputs.
     ///
     /// # Errors
-    /// The first port that is missing, has another type, or is an input that nothing drives.
+    /// The first port that is missing or has a different type, or an input that nothing drives.
     pub fn new(program: &Program) -> Result<Binding, BindingError> {
         if let Some(port) = program.inputs.iter().find(|port| !is_among(&INPUTS, &port.name)) {
             return Err(BindingError::Undriven(port.name.clone()));
@@ -68,14 +68,14 @@ impl Binding {
         Ok(binding)
     }
 
-    /// The results of the program, their bits read by register.
+    /// Results of the program; `read` returns the bits of a register, `None` before the first write.
     ///
     /// # Errors
-    /// The first output that was not written.
-    pub fn outputs(&self, read: impl Fn(Register) -> Option<u32>) -> Result<Outputs<f64>, Unwritten> {
+    /// The first unwritten output.
+    pub fn outputs(&self, read: impl Fn(Register) -> Option<u32>) -> Result<Outputs<f64>, UnwrittenOutput> {
         let mut values = [0.0; OUTPUTS.len()];
         for ((value, register), port) in values.iter_mut().zip(&self.outputs).zip(&OUTPUTS) {
-            let bits = read(*register).ok_or(Unwritten(port.name))?;
+            let bits = read(*register).ok_or(UnwrittenOutput(port.name))?;
             *value = f64::from(f32::from_bits(bits));
         }
         Ok(Outputs::from_array(values))
@@ -86,7 +86,7 @@ fn is_among(ports: &[Port], name: &str) -> bool {
     ports.iter().any(|port| port.name == name)
 }
 
-/// The register of one of the algorithm's ports in a program.
+/// Register of a port of the algorithm in a program.
 fn find(
     kind: &'static str,
     wanted: &Port,

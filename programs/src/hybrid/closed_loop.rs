@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A controller and the plant in a loop along a trajectory.
+//! Closed loop of a controller and the plant along a trajectory.
 //!
-//! In each period the encoders are read, the controller computes from the counts and the reference of that
-//! instant, and its forces act until the next period. The tool error of a period is the distance, at the instant
-//! its encoders are read, between the plant's tool point and the unrounded reference of the same instant. Along
-//! the AGH path a binary64 controller stays within 7.80 µm while cutting and 8.71 µm over everything; the
+//! In each period the encoders are read, the controller computes from the counts and the reference of that instant, and its forces act
+//! until the next period. The tool error of a period is the distance, at the instant of reading, between the plant's tool point and the
+//! unrounded reference. Along the AGH path a binary64 controller stays within 7.80 µm while cutting and 8.71 µm overall; the
 //! specification's own implementation has 7.9 µm and 8.8 µm.
 
 use std::convert::Infallible;
@@ -16,17 +15,17 @@ use super::spread::Robot;
 use super::trajectory::{Sample, Samples, Trajectory};
 use crate::real::Real;
 
-/// The inputs of a controller in a period.
+/// Inputs of a controller in a period.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Inputs {
     /// Counts of the five encoders.
     pub counts: [i32; 5],
-    /// The reference, rounded to binary32.
+    /// Reference rounded to binary32.
     pub reference: Reference<f32>,
 }
 
 impl Inputs {
-    /// The twenty inputs as 32-bit words in the order of [`ports::INPUTS`]: integers, then binary32 patterns.
+    /// Inputs as 32-bit words in the order of [`ports::INPUTS`]: five integers, then fifteen binary32 patterns.
     #[must_use]
     pub fn to_words(&self) -> [u32; ports::INPUTS.len()] {
         let reference = self.reference.to_array();
@@ -37,18 +36,18 @@ impl Inputs {
     }
 }
 
-/// Anything that can stand in the loop as the controller.
+/// Controller in the loop.
 ///
 /// Implemented for [`Controller`] and for closures `FnMut(&Inputs) -> Result<Outputs<f64>, E>`.
 pub trait TrackingController {
-    /// The reason for which a period can fail.
+    /// Reason why a period can fail.
     type Error;
 
-    /// Computes one period.
+    /// Computes one period: the outputs from counts and reference.
     ///
     /// # Errors
     ///
-    /// Whatever the controller cannot go on after.
+    /// A failure after which the controller cannot go on.
     fn step(&mut self, inputs: &Inputs) -> Result<Outputs<f64>, Self::Error>;
 }
 
@@ -71,40 +70,40 @@ where
     }
 }
 
-/// One period of a closed loop.
+/// Log of one period of a closed loop.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Record {
     /// Number of the period, from 0.
     pub period: u64,
-    /// The reference in binary64, and where in the program it is.
+    /// Reference in binary64, and its place in the program.
     pub sample: Sample,
-    /// The controller's inputs.
+    /// Inputs of the controller.
     pub inputs: Inputs,
-    /// Its outputs.
+    /// Outputs of the controller.
     pub outputs: Outputs<f64>,
-    /// The plant's tool point at the start of the period, m.
+    /// Tool point of the plant at the start of the period, m.
     pub position: [f64; 3],
-    /// Its distance from the reference at the same instant, m.
+    /// Distance of the tool point from the reference at the same instant, m.
     pub tool_error: f64,
 }
 
-/// The reason why a closed loop cannot go on.
+/// Reason why a closed loop cannot go on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum LoopError<E> {
-    /// The controller failed.
+    /// The controller failed in this period.
     #[error("period {period}: controller failed")]
     Controller {
         /// Number of the period, from 0.
         period: u64,
-        /// Its error.
+        /// Error of the controller.
         source: E,
     },
-    /// The controller computed a force that is infinite or not a number.
+    /// The controller computed an infinite or NaN force or torque.
     #[error("period {period}: {port} is not finite")]
     NotFinite {
         /// Number of the period, from 0.
         period: u64,
-        /// Name of the output.
+        /// Name of the output port.
         port: &'static str,
     },
     /// The plant left the range of its encoders.
@@ -115,7 +114,7 @@ pub enum LoopError<E> {
     },
 }
 
-/// A running loop: an iterator over the periods, which ends after the first error.
+/// Running loop: an iterator over the periods, which ends after the first error.
 #[derive(Debug, Clone)]
 pub struct ClosedLoop<'t, C> {
     samples: Samples<'t>,
@@ -126,17 +125,17 @@ pub struct ClosedLoop<'t, C> {
 }
 
 impl<'t, C: TrackingController> ClosedLoop<'t, C> {
-    /// A loop about to run; the plant stands at the trajectory's start, balanced against gravity.
+    /// Loop before its first period; the plant stands at the trajectory's start, balanced against gravity.
     pub fn new(trajectory: &'t Trajectory, controller: C) -> Self {
         Self::with(Robot::nominal(&trajectory.start()), trajectory, controller)
     }
 
-    /// The same with another robot, which is to stand at the trajectory's start.
+    /// Loop with another robot, which must stand at the trajectory's start.
     pub fn with(robot: Robot, trajectory: &'t Trajectory, controller: C) -> Self {
         Self { samples: trajectory.samples(), robot, controller, period: 0, failed: false }
     }
 
-    /// The controller, to inspect it between periods.
+    /// Controller, to inspect it between periods.
     pub fn controller(&self) -> &C {
         &self.controller
     }
@@ -172,14 +171,14 @@ impl<C: TrackingController> Iterator for ClosedLoop<'_, C> {
     }
 }
 
-/// The name of a force or torque that is infinite or not a number.
+/// Name of the first force or torque that is infinite or NaN.
 #[must_use]
 pub fn not_finite(outputs: &Outputs<f64>) -> Option<&'static str> {
     let efforts = outputs.force.iter().chain(&outputs.torque);
     efforts.zip(ports::OUTPUTS).find(|(effort, _)| !effort.is_finite()).map(|(_, port)| port.name)
 }
 
-/// Distance of two points.
+/// Euclidean distance of two points.
 #[must_use]
 pub fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
     (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>().sqrt()
@@ -188,19 +187,19 @@ pub fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
 /// Largest tool errors of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct TrackingError {
-    /// Over cutting moves, m.
+    /// Largest error over cutting moves, m.
     pub cutting: f64,
-    /// Over everything, m.
+    /// Largest error over all moves, m.
     pub overall: f64,
 }
 
 impl TrackingError {
-    /// Takes one period into account.
+    /// Adds the tool error of a period.
     pub fn add(&mut self, record: &Record) {
         self.add_distance(record.tool_error, record.sample.cutting);
     }
 
-    /// Takes a distance of the tool from its reference into account, m.
+    /// Adds a distance of the tool from its reference, m.
     pub fn add_distance(&mut self, distance: f64, cutting: bool) {
         if cutting {
             self.cutting = self.cutting.max(distance);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The tracking controller: one sampling period, from encoder counts and reference to forces.
+//! Tracking controller: one sampling period, from encoder counts and reference to forces.
 
 use super::dynamics::{gravity, reduced_masses, table_gravity};
 use super::friction::{coupled_inertia, friction};
@@ -8,26 +8,26 @@ use super::kinematics::{JointReference, Reference, forward, inverse};
 use super::params;
 use crate::real::{Real, convert};
 
-/// The results of one period: the forces, and the joint reference that Table 3 measures.
+/// Results of one period: forces and torques, and the joint reference that the paper's Table 3 reports.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Outputs<T> {
     /// Forces `F_1 F_2 F_3` of the arms, N.
     pub force: [T; 3],
     /// Torques `τ_4 τ_5` of the table, N·m.
     pub torque: [T; 2],
-    /// The reference in joint space.
+    /// Reference in joint space.
     pub joint: JointReference<T>,
 }
 
 impl<T: Real> Outputs<T> {
-    /// The same outputs in another precision, each value rounded to nearest.
+    /// Outputs in another precision, each value rounded to nearest.
     #[must_use]
     pub fn convert<U: Real>(&self) -> Outputs<U> {
         Outputs { force: convert(self.force), torque: convert(self.torque), joint: self.joint.convert() }
     }
 }
 
-/// The tracking controller with the state it keeps between periods.
+/// Tracking controller with the state that it keeps between periods.
 ///
 /// `Controller<f64>` is the golden model. `Controller<f32>` is the same algorithm in native binary32.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,7 +35,7 @@ pub struct Controller<T> {
     /// Encoder counts of the previous period; `None` before the first, whose velocity is 0.
     previous: Option<[i32; 5]>,
     integrators: [Integrator<T>; 5],
-    /// True if friction and coupled inertia are fed forward.
+    /// Feeds friction and coupled inertia forward.
     friction: bool,
 }
 
@@ -46,19 +46,19 @@ impl<T: Real> Default for Controller<T> {
 }
 
 impl<T: Real> Controller<T> {
-    /// A controller at power-on.
+    /// Controller at power-on, without feed-forward of friction.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// The variant at power-on that feeds forward friction and coupled inertia (docs/friction.md).
+    /// Variant that feeds friction and coupled inertia forward, at power-on (docs/friction.md).
     #[must_use]
     pub fn with_friction() -> Self {
         Self { friction: true, ..Self::default() }
     }
 
-    /// One period of the tracking algorithm, steps 1-8 of the specification.
+    /// Computes one period of the tracking algorithm, steps 1-8 of the specification.
     ///
     /// `counts` are the five encoders (arms 0.25 µm per count, table 2π/2¹⁸ rad per count, turns included).
     /// The measured velocity comes from the difference of the counts, which is exact in integers, not from
@@ -90,7 +90,7 @@ impl<T: Real> Controller<T> {
         let wanted_velocity = [v[0], v[1], v[2], omega[0], omega[1]];
         let mut wanted_acceleration = [a[0], a[1], a[2], epsilon[0], epsilon[1]];
         if self.friction {
-            // In place of the arms' M·a_d, and beyond the table's.
+            // Friction is added on all axes; coupled inertia replaces the arms' M·a_d.
             for (load, friction) in load.iter_mut().zip(friction(&joint)) {
                 *load += friction;
             }
@@ -119,7 +119,7 @@ mod tests {
     use super::super::dynamics::gravity_general;
     use super::*;
 
-    /// Counts nearest to a pose, and the pose at exactly those counts.
+    /// Nearest counts to a pose, and the pose at exactly those counts.
     fn at_rest() -> ([i32; 5], Reference<f64>) {
         let counts = [3_440_000, 3_441_000, 3_439_000, 13_107, -40_000];
         let length = [0.86, 0.860_25, 0.859_75];
@@ -148,7 +148,7 @@ mod tests {
         counts[4] += 1;
         let second = controller.step(counts, &reference);
         let step = params::TABLE_RESOLUTION;
-        // One count of error in position, one count per period in velocity, and the integral of it.
+        // Expected torque: one count of position error, one count per period of velocity, and the integral over a period.
         let expected = 0.6 * (-params::KP * step - params::KV * step / 1e-4 - params::KI * step * 1e-4);
         assert!((second.torque[1] - first.torque[1] - expected).abs() < 1e-9);
     }
@@ -167,7 +167,7 @@ mod tests {
         let wide = Controller::<f64>::new().step(counts, &reference);
         let narrow = Controller::<f32>::new().step(counts, &reference.convert());
         for (a, b) in wide.force.iter().zip(narrow.force) {
-            // A position ulp of 6e-8 m times KP and 40 kg is 0.6 N.
+            // Bound: a position ulp of 6e-8 m times KP and 40 kg is 0.6 N.
             assert!((a - f64::from(b)).abs() < 2.0, "{a} against {b}");
         }
     }

@@ -44,14 +44,14 @@ pub fn reduced_masses<T: Real>(length: [T; 3]) -> [T; 3] {
     mass
 }
 
-/// Mass `m_z = m_p + Σ(m_s + q/l_i)` in kg that gravity acts on at the platform, at arm lengths in m.
+/// Mass `m_z = m_p + Σ(m_s + q/l_i)` in kg on which gravity acts at the platform, at arm lengths in m.
 #[inline]
 #[must_use]
 pub fn gravity_mass<T: Real>(length: [T; 3]) -> T {
     gravity_mass_of(T::from_f64(params::PLATFORM_MASS + 3.0 * params::SLIDER_MASS), length)
 }
 
-/// [`gravity_mass`] where platform and sliders together have another mass, kg.
+/// [`gravity_mass`] with another mass of platform and sliders together, kg.
 #[inline]
 pub(super) fn gravity_mass_of<T: Real>(fixed: T, length: [T; 3]) -> T {
     let balance = T::from_f64(params::ARM_BALANCE);
@@ -68,7 +68,7 @@ pub fn gravity<T: Real>(length: [T; 3], point: [T; 3]) -> [T; 3] {
     gravity_of(gravity_mass(length), length, point)
 }
 
-/// [`gravity`] where another mass, kg, is to be held.
+/// [`gravity`] of another mass, kg.
 #[inline]
 pub(super) fn gravity_of<T: Real>(mass: T, length: [T; 3], point: [T; 3]) -> [T; 3] {
     let [x, y, z] = point;
@@ -81,9 +81,9 @@ pub(super) fn gravity_of<T: Real>(mass: T, length: [T; 3], point: [T; 3]) -> [T;
     [length[0] * share[0] * scale, length[1] * share[1] * scale, length[2] * share[2] * scale]
 }
 
-/// The same forces as [`gravity`], by solving `Σ u_i·G_i = (0, 0, m_z·g)` as (24) states it.
+/// Gravity forces like [`gravity`], from the linear system `Σ u_i·G_i = (0, 0, m_z·g)` of (24).
 ///
-/// Arms whose directions are coplanar (a platform at `z = 0`) give values that are not finite.
+/// Coplanar arm directions (a platform at `z = 0`) give infinite or NaN values.
 #[must_use]
 pub fn gravity_general(length: [f64; 3], point: [f64; 3]) -> [f64; 3] {
     let mut columns = arms(point);
@@ -149,8 +149,8 @@ mod tests {
 
     #[test]
     fn reduced_masses_have_their_limits() {
-        // Three equal arms of length R·√1.5 meet at right angles (their ends √3·R apart): no slider is
-        // dragged along, each arm only swings.
+        // Three equal arms of length R·√1.5 meet at right angles (their ends are √3·R apart): moving along an arm drags no other slider,
+        // the other arms only swing.
         let l = params::BASE_RADIUS * 1.5_f64.sqrt();
         let swing = (1.5 + 12.0 * (l - 0.35) * (l - 0.35)) / (l * l);
         for mass in reduced_masses([l; 3]) {
@@ -164,7 +164,7 @@ mod tests {
 
     #[test]
     fn cosines_are_those_of_the_arm_directions() {
-        // (23) once more, with the angles taken from the vectors instead of the law of cosines.
+        // Equation (23) again, with the angles from the vectors instead of the law of cosines.
         let point = [0.09, -0.03, 0.68];
         let length = lengths(point);
         let directions = arms(point);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Feed-forward of the variant with friction: the friction of every axis, and the coupled inertia of the arms.
 //!
-//! Both are computed from the reference, in place of the reduced masses' `M·a_d` for the arms and beyond it for the
-//! table (docs/friction.md). [`identify`](super::identify) finds the parameters from a run.
+//! Inputs are taken from the reference. The coupled inertia replaces the reduced masses' `M·a_d` of the arms; the friction is added on all
+//! axes (docs/friction.md). [`identify`](super::identify) finds the parameters from a run.
 
 use super::dynamics::end_inertia;
 use super::kinematics::{JointReference, Reference, arms};
@@ -15,9 +15,9 @@ use crate::real::Real;
 pub struct Friction {
     /// Coulomb friction `Fc`, N or N·m.
     pub coulomb: f64,
-    /// The part that is added to it at low speed, `Fs` (Stribeck's effect), N or N·m.
+    /// Additional friction at low speed, `Fs` (Stribeck's effect), N or N·m.
     pub stribeck: f64,
-    /// Speed over which that is lost, `vs`, m/s or rad/s.
+    /// Speed over which the Stribeck friction decays, `vs`, m/s or rad/s.
     pub stribeck_speed: f64,
     /// Speed over which friction changes sign, `v0`, m/s or rad/s.
     pub sign_speed: f64,
@@ -26,7 +26,7 @@ pub struct Friction {
 }
 
 impl Friction {
-    /// The force or torque that overcomes friction at a speed in m/s or rad/s.
+    /// Force or torque that overcomes friction at a speed in m/s or rad/s.
     #[inline]
     #[must_use]
     pub fn at<T: Real>(&self, speed: T) -> T {
@@ -36,7 +36,7 @@ impl Friction {
     }
 }
 
-/// The friction of the five axes, as identified on the nominal robot with `takt track --fit-friction`. No axis shows Stribeck's effect.
+/// Friction of the five axes, as identified on the nominal robot with `takt track --fit-friction`. No axis shows Stribeck's effect.
 pub const IDENTIFIED: [Friction; 5] = [
     plain(8.018, 2.11e-4, 19.04),
     plain(8.018, 2.11e-4, 19.03),
@@ -45,17 +45,15 @@ pub const IDENTIFIED: [Friction; 5] = [
     plain(0.2031, 5.533e-3, 0.0),
 ];
 
-/// Without Stribeck's effect.
+/// Friction without Stribeck's effect.
 const fn plain(coulomb: f64, sign_speed: f64, viscous: f64) -> Friction {
     Friction { coulomb, stribeck: 0.0, stribeck_speed: 1.0, sign_speed, viscous }
 }
 
-/// Forces of the arms, N, that accelerate platform, sliders and arms as the reference says, each mass moving as it does
-/// when all arms move.
+/// Forces of the arms, N, that accelerate platform, sliders and arms along the reference, each mass with its motion when all arms move.
 ///
-/// The force `F` with `Σ u_i·F_i = (m_p + Σ κ_j)·ẍ + Σ (m_s - κ_j)·u_j·(u_j·ẍ)`: a term of the second sum is a force along its own arm,
-/// and the first is solved in closed form, as gravity is. `length` are the measured lengths, m, that the masses are computed
-/// for, as the reduced masses are.
+/// The force `F` with `Σ u_i·F_i = (m_p + Σ κ_j)·ẍ + Σ (m_s - κ_j)·u_j·(u_j·ẍ)`: a term of the second sum is a force along its own arm, and
+/// the first is solved in closed form, like gravity. `length` holds the measured lengths, m, that also determine the reduced masses.
 #[inline]
 #[must_use]
 pub fn coupled_inertia<T: Real>(
@@ -81,7 +79,7 @@ pub fn coupled_inertia<T: Real>(
     })
 }
 
-/// The friction of each axis at the reference's velocity, N and N·m.
+/// Friction of each axis at the reference's velocity, N and N·m.
 #[inline]
 #[must_use]
 pub fn friction<T: Real>(joint: &JointReference<T>) -> [T; 5] {
@@ -96,7 +94,7 @@ mod tests {
     use super::super::kinematics::inverse;
     use super::*;
 
-    /// The closed form against the plant's mass matrix and the general solution of three equations.
+    /// Coupled inertia in closed form against the plant's mass matrix and the general solution of three equations.
     #[test]
     fn coupled_inertia_is_the_plants() {
         for (position, acceleration) in [
@@ -133,7 +131,7 @@ mod tests {
         for speed in [1e-5, 3e-3, 0.4] {
             assert_eq!(friction.at(speed), -friction.at(-speed));
         }
-        // Slow, but far beyond the change of sign, all of it; fast, Coulomb and viscous friction.
+        // Low speed beyond the change of sign: all three terms. High speed: Coulomb and viscous friction alone.
         assert!((friction.at(2e-3) - (8.0 + 3.0 / 1.04 + 0.04)).abs() < 1e-6);
         assert!((friction.at(10.0) - 208.0).abs() < 1e-4);
     }

@@ -1,60 +1,60 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Blocks for `generation.s`, the trajectory on a core: what a move is to it, in the words of its FIFO's fields.
+//! Motion blocks for `generation.s`, which generates the trajectory on a core: encodes moves as words of its FIFO's fields.
 //!
-//! Positions are integers of [`POSITION_UNIT`], angles of [`ANGLE_UNIT`], so that the way between two of them is exact where
-//! it begins and ends, and a point is rounded once (docs/generation.md).
+//! Positions are integers in [`POSITION_UNIT`], angles in [`ANGLE_UNIT`]: the distance between two of them is exact at both ends, and a
+//! point is rounded once (docs/generation.md).
 
 use super::gcode;
 use super::trajectory::Trajectory;
 use crate::path::{Move, MoveKind, Path, Pose};
 
-/// The unit of an integer position, m.
+/// Unit of integer positions, m.
 pub const POSITION_UNIT: f64 = 1.0 / (1 << 28) as f64;
-/// The unit of an integer angle, rad.
+/// Unit of integer angles, rad.
 pub const ANGLE_UNIT: f64 = 1.0 / (1 << 24) as f64;
 
-/// The fields of a block, by the names of the program's input ports, in the order of [`Block::to_words`].
+/// Fields of a block, by the names of the program's input ports, in the order of [`Block::to_words`].
 pub const FIELDS: [&str; 12] = [
     "kind", "line", "to_1", "to_2", "to_3", "to_4", "to_5", "centre_1", "centre_2", "sweep", "feed",
     "periods",
 ];
 
-/// The kind of a block, by its number.
+/// Kind of a block, by its number in the field `kind`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BlockKind {
-    /// To stand in a pose at once.
+    /// Takes a pose at once.
     Place = 0,
-    /// A positioning move, G0.
+    /// Positioning move at rapid speed, G0.
     Rapid = 1,
-    /// A cutting move along a line, G1.
+    /// Cutting move along a line, G1.
     Line = 2,
-    /// A cutting move along an arc, G2 or G3.
+    /// Cutting move along an arc, G2 or G3.
     Arc = 3,
 }
 
-/// One block.
+/// Motion block with integer coordinates.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Block {
-    /// Its kind.
+    /// Kind of the move.
     pub kind: BlockKind,
-    /// Source line.
+    /// Source line of the move.
     pub line: usize,
-    /// Its end: x, y, z in [`POSITION_UNIT`], tilt and rotation in [`ANGLE_UNIT`].
+    /// End pose: x, y, z in [`POSITION_UNIT`], tilt and rotation in [`ANGLE_UNIT`].
     pub to: [i32; 5],
-    /// An arc's centre, in [`POSITION_UNIT`].
+    /// Centre of an arc, in [`POSITION_UNIT`].
     pub centre: [i32; 2],
-    /// An arc's signed angle, rad.
+    /// Signed angle of an arc, rad.
     pub sweep: f32,
     /// Speed along the path, m/s.
     pub feed: f32,
-    /// Periods of the move; 0 if its feed says.
+    /// Periods of the move; 0 if its feed determines them.
     pub periods: u32,
 }
 
-/// A move that no block can say.
+/// Reason why a move fits no block.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum BlockError {
-    /// A coordinate does not fit.
+    /// A coordinate out of range.
     #[error(
         "line {line}: the move leaves the range of a block: 4 m from the origin, 64 rad (10 turns) of the table"
     )]
@@ -65,7 +65,7 @@ pub enum BlockError {
 }
 
 impl Block {
-    /// The words of the fields, in the order of [`FIELDS`].
+    /// Words of the fields, in the order of [`FIELDS`].
     #[must_use]
     pub fn to_words(&self) -> [u32; FIELDS.len()] {
         let [x, y, z, tilt, rotation] = self.to.map(i32::cast_unsigned);
@@ -109,7 +109,7 @@ impl Block {
     }
 }
 
-/// The blocks of a trajectory: the pose that it starts in, then its moves, each as long as it is planned.
+/// Blocks of a trajectory: its start pose, then its moves, each with its planned duration.
 ///
 /// # Errors
 ///
@@ -134,7 +134,7 @@ fn words(pose: &Pose, line: usize) -> Result<[i32; 5], BlockError> {
     ])
 }
 
-/// The nearest integer. Half the range is kept: the difference of two must fit, too.
+/// Nearest integer in a unit. Half the range is allowed, so that the difference of two integers fits, too.
 fn integer(value: f64, unit: f64, line: usize) -> Result<i32, BlockError> {
     let rounded = (value / unit).round();
     let fits = rounded.abs() <= f64::from(i32::MAX / 2);
@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn blocks_say_what_the_path_says() {
+    fn blocks_describe_the_path() {
         let blocks = of("G0 X0 Y0 Z700\nG1 X500 F1200\nG1 X500\nG2 X0 I-250 J0 A90\n").expect("it fits");
         assert_eq!(blocks.len(), 3, "a move of no length vanishes");
         assert_eq!((blocks[0].kind, blocks[0].periods), (BlockKind::Place, 0));
@@ -159,14 +159,14 @@ mod tests {
         assert_eq!(blocks[2].centre, [1 << 26, 0]);
         assert_eq!(blocks[2].sweep, -std::f32::consts::PI);
         assert_eq!(blocks[2].to[3], (std::f64::consts::FRAC_PI_2 / ANGLE_UNIT).round() as i32);
-        // 0.5 m at 20 mm/s and a ramp of 30 ms.
+        // 0.5 m at 20 mm/s, and a ramp of 30 ms.
         assert_eq!(blocks[1].periods, 250_300);
         assert_eq!(blocks[1].feed, 0.02);
     }
 
     #[test]
-    fn what_does_not_fit_is_named() {
-        // An arc's centre may lie far out of reach.
+    fn names_values_that_do_not_fit() {
+        // Centres of arcs may lie far out of reach.
         assert_eq!(of("G0 X0 Y0 Z700\nG2 X10 R4001 F600\n"), Err(BlockError::Range { line: 2 }));
         assert_eq!(of("G0 X0 Y0 Z700\nG0 C4000\n"), Err(BlockError::Range { line: 2 }));
         assert!(of("G0 X0 Y0 Z700\nG2 X10 R3999 F600\nG0 C3600\n").is_ok());

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Friction identified from a run in closed loop.
+//! Identification of friction from a run in closed loop.
 //!
-//! At a constant speed of the reference nothing accelerates, and the controller's command beyond gravity is
-//! friction. The quantised encoders make each period's command noisy, by tens of N through the velocity's gain, but that noise is
-//! a difference of counts: in a mean with weights that rise and fall slowly it all but cancels. Windows are averaged so, and each
-//! gives one pair of speed and force. Through the pairs of an axis goes [`Friction`]'s curve, and a constant, which takes up what the
-//! model of gravity may be wrong by: least squares, linear in the forces, with a search over the two speeds.
+//! At constant speed of the reference no mass accelerates: the controller's command beyond gravity is friction. The quantised encoders make
+//! each period's command noisy, by tens of N through the velocity gain, but that noise is a difference of counts: a mean with slowly rising
+//! and falling weights nearly cancels it. Each window is averaged in this way to one pair of speed and force. [`Friction`]'s curve and a
+//! constant, which absorbs errors of the gravity model, are fitted to an axis's pairs: least squares, linear in the forces, with a search
+//! over the two speeds.
 
 use super::closed_loop::Record;
 use super::dynamics::{gravity, table_gravity};
@@ -13,36 +13,36 @@ use super::friction::Friction;
 use super::kinematics::{forward, inverse};
 use super::params::RESOLUTION;
 
-/// Periods after the beginning of constant speed that are not used: the controller settles.
+/// Periods to skip after the beginning of constant speed, while the controller settles.
 pub const SETTLE: u32 = 1000;
-/// Periods of a window, whose weights are a triangle.
+/// Periods of a window, with triangular weights.
 pub const WINDOW: u32 = 2000;
-/// Windows that a fit needs, at least.
+/// Least number of windows for a fit.
 pub const FEWEST: usize = 20;
-/// The least ratio of the fastest speed to the slowest.
+/// Least ratio of the fastest speed to the slowest.
 pub const RANGE: f64 = 10.0;
-/// The share of the fit's remaining error that Stribeck's term must take away to be kept.
+/// Share of the residual error that Stribeck's term must remove to be kept.
 const WORTH: f64 = 0.1;
-/// The least ratio of its speed to the speed of the change of sign: closer to that, it is the shape of the change.
+/// Least ratio of Stribeck's speed to the speed of the change of sign: below it, the term only models the shape of that change.
 const APART: f64 = 4.0;
 
 /// Speed and force of the five axes, averaged over a window; m/s and N, rad/s and N·m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pair {
-    /// The reference's speed.
+    /// Speed of the reference.
     pub speed: [f64; 5],
-    /// The command beyond gravity.
+    /// Controller's command beyond gravity.
     pub force: [f64; 5],
 }
 
-/// One axis's friction as fitted.
+/// Fitted friction of one axis.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Fit {
-    /// The curve.
+    /// Parameters of the curve.
     pub friction: Friction,
-    /// The constant beside it, N or N·m.
+    /// Constant beside the curve, N or N·m.
     pub offset: f64,
-    /// Root of the mean square of what the curve leaves, N or N·m.
+    /// Root mean square of the residuals, N or N·m.
     pub rms: f64,
 }
 
@@ -50,26 +50,26 @@ pub struct Fit {
 #[derive(Debug, Clone, Default)]
 pub struct Identification {
     pairs: Vec<Pair>,
-    /// Periods of constant speed in a row, and the move that they belong to.
+    /// Consecutive periods of constant speed, and the move that they belong to.
     steady: u32,
     piece: usize,
     sum: Option<Pair>,
 }
 
 impl Identification {
-    /// Before the first period.
+    /// Identification before the first period.
     #[must_use]
     pub fn new() -> Identification {
         Identification::default()
     }
 
-    /// The pairs so far.
+    /// Pairs gathered so far.
     #[must_use]
     pub fn pairs(&self) -> &[Pair] {
         &self.pairs
     }
 
-    /// Takes a period into account.
+    /// Adds a period of the run.
     pub fn add(&mut self, record: &Record) {
         let reference = &record.sample.reference;
         let still = |values: &[f64]| values.iter().all(|&value| value == 0.0);
@@ -101,7 +101,7 @@ impl Identification {
         }
     }
 
-    /// The curve of each axis; `None` where [`fit`] finds none.
+    /// Friction of each axis; `None` where [`fit`] finds no curve.
     #[must_use]
     pub fn fit(&self) -> [Option<Fit>; 5] {
         std::array::from_fn(|axis| {
@@ -112,8 +112,8 @@ impl Identification {
     }
 }
 
-/// The curve through pairs of speed and force; `None` if there are fewer than [`FEWEST`], or not speeds of both signs of which the
-/// fastest is [`RANGE`] times the slowest.
+/// Fits the curve to pairs of speed and force; `None` with fewer than [`FEWEST`] pairs, with speeds of one sign alone, or if the fastest
+/// speed is less than [`RANGE`] times the slowest.
 #[must_use]
 pub fn fit(pairs: &[[f64; 2]]) -> Option<Fit> {
     let fastest = pairs.iter().map(|pair| pair[0].abs()).fold(0.0, f64::max);
@@ -123,7 +123,7 @@ pub fn fit(pairs: &[[f64; 2]]) -> Option<Fit> {
         return None;
     }
     let best = |with_stribeck: bool| {
-        // The logarithms of both speeds, from the fastest down over five decades, on a grid that is refined about its best point.
+        // Grid search over the logarithms of both speeds, from the fastest down over five decades, refined about the best point.
         let (mut best, mut span) = (None::<([f64; 2], Fit)>, 2.5);
         for _ in 0..24 {
             let centre = best.map_or([fastest.log10() - span; 2], |(centre, _)| centre);
@@ -149,18 +149,18 @@ pub fn fit(pairs: &[[f64; 2]]) -> Option<Fit> {
     Some(best(true).filter(|with| with.rms < (1.0 - WORTH) * without.rms).unwrap_or(without))
 }
 
-/// The forces that fit best with given speeds, none of them negative.
+/// Nonnegative forces that fit best at given speeds.
 fn forces(pairs: &[[f64; 2]], sign_speed: f64, stribeck_speed: Option<f64>) -> Option<Fit> {
     let with = |viscous| linear(pairs, sign_speed, stribeck_speed, viscous);
     let fit = with(true).filter(|fit| fit.friction.viscous >= 0.0).or_else(|| with(false))?;
     (fit.friction.coulomb >= 0.0 && fit.friction.stribeck >= 0.0).then_some(fit)
 }
 
-/// The forces that fit best with given speeds: Coulomb friction, a constant, and, if wanted, Stribeck's and viscous friction.
+/// Forces that fit best at given speeds, by least squares: Coulomb friction, a constant, and optionally Stribeck's and viscous friction.
 fn linear(pairs: &[[f64; 2]], sign_speed: f64, stribeck_speed: Option<f64>, viscous: bool) -> Option<Fit> {
     let active = [true, true, viscous, stribeck_speed.is_some()];
     let stribeck_speed = stribeck_speed.unwrap_or(1.0);
-    // One force at a time is 1, for what it multiplies.
+    // Columns of the design matrix: each force set to 1 in turn.
     let unit =
         |coulomb, stribeck, viscous| Friction { coulomb, stribeck, stribeck_speed, sign_speed, viscous };
     let [only_coulomb, only_viscous, only_stribeck] =
@@ -184,7 +184,7 @@ fn linear(pairs: &[[f64; 2]], sign_speed: f64, stribeck_speed: Option<f64>, visc
     Some(Fit { friction, offset, rms: (squares.sum::<f64>() / pairs.len() as f64).sqrt() })
 }
 
-/// Solves four linear equations, whose right sides stand in the last column; `None` if they are singular in binary64.
+/// Solves four linear equations by Gaussian elimination, with the right sides in the last column; `None` if they are singular in binary64.
 fn gauss(mut equations: [[f64; 5]; 4]) -> Option<[f64; 4]> {
     for column in 0..4 {
         let pivot =
@@ -192,7 +192,7 @@ fn gauss(mut equations: [[f64; 5]; 4]) -> Option<[f64; 4]> {
         equations.swap(column, pivot);
         let chosen = equations[column];
         let scale = chosen[..4].iter().fold(0.0, |largest: f64, value| largest.max(value.abs()));
-        // A NaN is no pivot either.
+        // Written so that a NaN is no pivot.
         let usable = chosen[column].abs() > 1e-13 * scale;
         if !usable {
             return None;
@@ -211,7 +211,7 @@ fn gauss(mut equations: [[f64; 5]; 4]) -> Option<[f64; 4]> {
 mod tests {
     use super::*;
 
-    /// Pairs on a curve at speeds from a crawl to 0.03 in both directions, with a constant.
+    /// Points of a curve at speeds from 2e-5 to about 0.03 in both directions, shifted by a constant.
     fn pairs(friction: &Friction, offset: f64) -> Vec<[f64; 2]> {
         let speeds = (0..30).map(|i| 2e-5 * 10f64.powf(f64::from(i) / 9.0));
         speeds.flat_map(|speed| [speed, -speed]).map(|speed| [speed, friction.at(speed) + offset]).collect()
@@ -236,7 +236,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_there_is_not_found() {
+    fn absent_friction_is_not_identified() {
         let truth =
             Friction { coulomb: 7.0, stribeck: 0.0, stribeck_speed: 1.0, sign_speed: 3e-4, viscous: 0.0 };
         let found = fit(&pairs(&truth, 0.0)).expect("there are enough pairs").friction;
@@ -245,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn too_little_says_nothing() {
+    fn too_few_samples_give_no_result() {
         assert_eq!(fit(&[[1e-3, 8.0]; FEWEST - 1]), None);
         assert_eq!(fit(&[[0.0, 0.1]; FEWEST]), None, "an axis that stands still");
         assert_eq!(fit(&[[1e-3, 8.0]; FEWEST]), None, "one speed is no curve");

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The nonlinear integrator of one axis, (29)-(35) and (37).
+//! Nonlinear integrator of one axis, (29)-(35) and (37).
 //!
-//! After the reference velocity changes sign, friction changes sign with it; the integrator is boosted for
-//! `Tc` so that it unwinds the old friction and winds up the new one sooner.
+//! Friction changes sign with the reference velocity; the integrator is boosted for `Tc` after a reversal, so that it unwinds the old
+//! friction and winds up the new one sooner.
 
 use super::params;
 use crate::real::Real;
@@ -19,15 +19,15 @@ pub struct Integrator<T> {
 }
 
 impl<T: Real> Default for Integrator<T> {
-    /// At power-on: `s = 0`, `sg = 0`, and a clock past the boost.
+    /// Power-on state: `s = 0`, `sg = 0`, and a clock past the boost.
     fn default() -> Self {
         Self { sum: T::ZERO, clock: params::BOOST_CLOCK_START, direction: 0 }
     }
 }
 
 impl<T: Real> Integrator<T> {
-    /// One period: takes the position error `e` (m or rad) and the reference velocity `v_d` (only its sign
-    /// counts), returns the updated `s`. `axis` (0..5) picks the threshold and the limit.
+    /// Advances one period: takes the position error `e` (m or rad) and the reference velocity `v_d` (only its sign counts), returns the
+    /// updated `s`. `axis` (0..5) picks the threshold and the limit.
     #[inline]
     pub fn step(&mut self, axis: usize, error: T, velocity: T) -> T {
         let direction = i8::from(velocity > T::ZERO) - i8::from(velocity < T::ZERO);
@@ -47,7 +47,7 @@ impl<T: Real> Integrator<T> {
         self.sum
     }
 
-    /// The boost `φ_t`: full for the first half of `Tc`, then falling to 0 while the error is large, (31)-(35).
+    /// Boost `φ_t`: full for the first half of `Tc`, then falling to 0 while the error is large, (31)-(35).
     #[inline]
     fn boost(&self, axis: usize, error: T) -> T {
         const HALF: u32 = params::BOOST_PERIODS / 2;
@@ -68,7 +68,7 @@ impl<T: Real> Integrator<T> {
 mod tests {
     use super::*;
 
-    /// The increment of `s` in a period, in units of `e·Ts`.
+    /// Increment of `s` in a period, in units of `e·Ts`.
     fn gain(integrator: &mut Integrator<f64>, error: f64, velocity: f64) -> f64 {
         let before = integrator.sum;
         (integrator.step(0, error, velocity) - before) / (error * 1e-4)

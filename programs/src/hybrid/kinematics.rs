@@ -4,27 +4,27 @@
 use super::params;
 use crate::real::{Real, convert};
 
-/// The reference point in global coordinates, fifteen values; m, rad, s.
+/// Reference point in global coordinates, fifteen values; m, rad, s.
 ///
-/// `T` is `f64` for the trajectory itself and `f32` for what the controller is given.
+/// `T` is `f64` for the trajectory itself and `f32` for the controller's input.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Reference<T> {
     /// Tool point `x y z`, m.
     pub position: [T; 3],
-    /// Its velocity `vx vy vz`, m/s.
+    /// Velocity `vx vy vz` of the tool point, m/s.
     pub velocity: [T; 3],
-    /// Its acceleration `ax ay az`, m/s².
+    /// Acceleration `ax ay az` of the tool point, m/s².
     pub acceleration: [T; 3],
     /// Tilt `α` and rotation `γ` of the table, rad.
     pub angle: [T; 2],
-    /// `ωα ωγ`, rad/s.
+    /// Angular velocities `ωα ωγ`, rad/s.
     pub angular_velocity: [T; 2],
-    /// `εα εγ`, rad/s².
+    /// Angular accelerations `εα εγ`, rad/s².
     pub angular_acceleration: [T; 2],
 }
 
 impl<T: Real> Reference<T> {
-    /// The same reference in another precision, each value rounded to nearest.
+    /// Reference in another precision, each value rounded to nearest.
     #[must_use]
     pub fn convert<U: Real>(&self) -> Reference<U> {
         Reference {
@@ -38,25 +38,25 @@ impl<T: Real> Reference<T> {
     }
 }
 
-/// The reference in joint space, which the paper's Table 3 measures; m, rad, s.
+/// Reference in joint space, which the paper's Table 3 measures; m, rad, s.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct JointReference<T> {
     /// Arm lengths `l_d`, m.
     pub length: [T; 3],
-    /// Their first derivatives `v_d`, m/s.
+    /// First derivatives `v_d` of the arm lengths, m/s.
     pub velocity: [T; 3],
-    /// Their second derivatives `a_d`, m/s².
+    /// Second derivatives `a_d` of the arm lengths, m/s².
     pub acceleration: [T; 3],
     /// Table angles `θ_d` (axes 4, 5), rad.
     pub angle: [T; 2],
-    /// `ω_d`, rad/s.
+    /// Angular velocities `ω_d`, rad/s.
     pub angular_velocity: [T; 2],
-    /// `ε_d`, rad/s².
+    /// Angular accelerations `ε_d`, rad/s².
     pub angular_acceleration: [T; 2],
 }
 
 impl<T: Real> JointReference<T> {
-    /// The same reference in another precision, each value rounded to nearest.
+    /// Joint reference in another precision, each value rounded to nearest.
     #[must_use]
     pub fn convert<U: Real>(&self) -> JointReference<U> {
         JointReference {
@@ -142,7 +142,7 @@ mod tests {
 
     #[test]
     fn derivatives_agree_with_central_differences() {
-        // A smooth curve with known derivatives, sampled on either side of its middle.
+        // Smooth curve with known derivatives, sampled on either side of its middle.
         let at = |t: f64| Reference {
             position: [
                 POINT[0] + 0.3 * t + 2.0 * t * t,
@@ -170,7 +170,7 @@ mod tests {
 
     #[test]
     fn simplified_acceleration_equals_the_printed_one() {
-        // (9)-(11) as the paper prints them: the derivative of ½·(|d|²)'·(|d|²)^-½, un-simplified.
+        // Equations (9)-(11) as the paper prints them: the derivative of ½·(|d|²)'·(|d|²)^-½, not simplified.
         let reference = Reference {
             position: POINT,
             velocity: [0.02, -0.03, 0.01],

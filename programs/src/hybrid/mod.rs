@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The five-axis hybrid robot: its parameters, its paths from G-code to the reference of every period, its tracking algorithm,
-//! and a plant to close the loop with.
+//! Five-axis hybrid robot: its parameters, its paths from G-code to the reference of every period, its tracking algorithm, and a plant to
+//! close the loop with.
 //!
-//! Numbers in parentheses are the equations of the founding paper (Przegląd Elektrotechniczny 98, 7/2022). The
-//! algorithm is generic over [`Real`](crate::real::Real): in `f64` it is the golden model that judges the assembly
-//! program, in `f32` the same algorithm native.
+//! Numbers in parentheses are equations of the founding paper (Przegląd Elektrotechniczny 98, 7/2022). The algorithm is generic over
+//! [`Real`](crate::real::Real): in `f64` it is the golden model that judges the assembly program, in `f32` native binary32 code.
 
 pub mod binding;
 pub mod closed_loop;
@@ -23,7 +22,7 @@ pub mod spread;
 pub mod trajectory;
 pub mod workspace;
 
-pub use binding::{Binding, BindingError, Unwritten};
+pub use binding::{Binding, BindingError, UnwrittenOutput};
 pub use closed_loop::{ClosedLoop, Inputs, LoopError, Record, TrackingController, TrackingError};
 pub use controller::{Controller, Outputs};
 pub use friction::Friction;

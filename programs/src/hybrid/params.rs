@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Every number that describes the five-axis hybrid robot, in SI units.
+//! Parameters of the five-axis hybrid robot, in SI units.
 //!
-//! The paper prints none of these; the specification fixes them. Axes 1-3 are the arms of the parallel
-//! manipulator, axes 4-5 the tilt and the rotation of the table.
+//! The paper prints no values; the specification fixes them. Axes 1-3 are the arms of the parallel manipulator, axes 4-5 the tilt and the
+//! rotation of the table.
 //!
 //! | symbol | value | | symbol | value |
 //! |---|---|---|---|---|
@@ -21,7 +21,7 @@ pub const SAMPLE_TIME: f64 = 1e-4;
 /// Periods per second, the reciprocal of [`SAMPLE_TIME`].
 pub const SAMPLE_RATE: u32 = 10_000;
 
-/// Radius `R` of the circle that the base points lie on, m.
+/// Radius `R` of the circle through the base points, m.
 pub const BASE_RADIUS: f64 = 0.5;
 /// Mass `m_s` of one arm's slider, kg.
 pub const SLIDER_MASS: f64 = 12.0;
@@ -53,7 +53,7 @@ pub const TABLE_RESOLUTION: f64 = TAU / TABLE_COUNTS_PER_TURN as f64;
 pub const RESOLUTION: [f64; 5] =
     [ARM_RESOLUTION, ARM_RESOLUTION, ARM_RESOLUTION, TABLE_RESOLUTION, TABLE_RESOLUTION];
 
-/// Natural frequency that the gains are placed at, rad/s.
+/// Natural frequency for which the gains are placed, rad/s.
 const OMEGA: f64 = 2.0 * PI * 80.0;
 /// Position gain `KP`, s⁻².
 pub const KP: f64 = OMEGA * OMEGA;
@@ -64,9 +64,9 @@ pub const KI: f64 = 0.15 * OMEGA * OMEGA * OMEGA;
 
 /// Factor `ξc` by which the integrator is boosted just after a reversal.
 pub const BOOST: f64 = 3.0;
-/// Length `Tc` of the boost in periods (0.05 s); even, since its half is a threshold too.
+/// Length `Tc` of the boost in periods (0.05 s); even, since half of it is a threshold too.
 pub const BOOST_PERIODS: u32 = 500;
-/// Boost clock `t_c` at power-on in periods (1 s), past the boost so that none runs.
+/// Boost clock `t_c` at power-on in periods (1 s), past the boost so that no boost runs.
 pub const BOOST_CLOCK_START: u32 = SAMPLE_RATE;
 /// Error `ec` from which the second half of the boost acts, m for axes 1-3 and rad for 4-5.
 pub const BOOST_ERROR: [f64; 5] = [2e-6, 2e-6, 2e-6, 3e-5, 3e-5];

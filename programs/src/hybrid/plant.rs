@@ -1,19 +1,18 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The plant: the full coupled manipulator with friction, actuators and encoders, for closing the loop.
+//! Plant for closing the loop: the full coupled manipulator with friction, actuators and encoders.
 //!
-//! Deliberately not what the controller's decoupled model assumes. The specification leaves open how a period is
-//! integrated and how it begins; here each of its [`PLANT_STEPS`](params::PLANT_STEPS) steps first lets the
-//! actuators follow, then the velocity with the acceleration, then the position with the new velocity
-//! (semi-implicit Euler), and the plant begins at rest with its actuators balancing gravity. Explicit Euler, an
-//! exact exponential for the lag and the other order of lag and motion were tried: the largest tool errors move by
-//! less than half a per cent.
+//! Deliberately more than the decoupled model of the controller. The specification leaves open how a period is integrated and how it
+//! begins; here each of its [`PLANT_STEPS`](params::PLANT_STEPS) steps first lets the actuators follow, then the velocity with the
+//! acceleration, then the position with the new velocity (semi-implicit Euler), and the plant begins at rest with its actuators balancing
+//! gravity. Explicit Euler, an exact exponential for the lag and the other order of lag and motion were tried: the largest tool errors move
+//! by less than half a per cent.
 
 use super::dynamics::{dot, end_inertia_of, gravity_mass_of, gravity_of, solve};
 use super::kinematics::{Reference, arms, inverse};
 use super::params;
 use crate::path::Pose;
 
-/// The parameters of one robot. The default is the robot that the controller's model knows, [`params`].
+/// Parameters of one robot. The default is the nominal robot of the controller's model, [`params`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Parameters {
     /// Mass of each arm's slider, kg.
@@ -53,12 +52,12 @@ impl Default for Parameters {
 }
 
 impl Parameters {
-    /// Mass that gravity acts on at the platform, kg, at arm lengths in m.
+    /// Mass on which gravity acts at the platform, kg, at arm lengths in m.
     fn gravity_mass(&self, length: [f64; 3]) -> f64 {
         gravity_mass_of(self.platform_mass + 3.0 * self.slider_mass, length)
     }
 
-    /// Moments that hold the table at a tilt in rad, N·m.
+    /// Torques that hold the table at a tilt in rad, N·m.
     fn table_gravity(&self, tilt: f64) -> [f64; 2] {
         [self.tilt_imbalance * params::GRAVITY * tilt.sin(), 0.0]
     }
@@ -68,26 +67,26 @@ impl Parameters {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plant {
     parameters: Parameters,
-    /// Tool point, m, and its velocity, m/s.
+    /// Tool point, m, with its velocity, m/s.
     position: [f64; 3],
     velocity: [f64; 3],
-    /// Table angles, rad, and their velocities, rad/s.
+    /// Table angles, rad, with their velocities, rad/s.
     angle: [f64; 2],
     angular_velocity: [f64; 2],
-    /// The actuators' three forces, N, and two torques, N·m.
+    /// Three forces, N, and two torques, N·m, of the actuators.
     effort: [f64; 5],
 }
 
 impl Plant {
-    /// The plant at rest in a pose, its actuators holding it against gravity.
+    /// Plant at rest in a pose, its actuators holding it against gravity.
     #[must_use]
     pub fn at_rest(pose: &Pose) -> Self {
-        Self::made_of(Parameters::default(), pose)
+        Self::with_parameters(Parameters::default(), pose)
     }
 
-    /// As [`Plant::at_rest`], of a robot with other parameters.
+    /// Plant at rest like [`Plant::at_rest`], with other parameters.
     #[must_use]
-    pub fn made_of(parameters: Parameters, pose: &Pose) -> Self {
+    pub fn with_parameters(parameters: Parameters, pose: &Pose) -> Self {
         let length = lengths(pose.position);
         let [f1, f2, f3] = gravity_of(parameters.gravity_mass(length), length, pose.position);
         let [t4, t5] = parameters.table_gravity(pose.angle[0]);
@@ -101,13 +100,13 @@ impl Plant {
         }
     }
 
-    /// Tool point, m.
+    /// Tool point `[x, y, z]`, m.
     #[must_use]
     pub fn position(&self) -> [f64; 3] {
         self.position
     }
 
-    /// Table angles, rad.
+    /// Tilt and rotation of the table, rad.
     #[must_use]
     pub fn angle(&self) -> [f64; 2] {
         self.angle
@@ -119,7 +118,7 @@ impl Plant {
         self.counts_off_by([0.0; 5])
     }
 
-    /// The same of encoders that read wrong by so many counts.
+    /// Encoder counts with an offset added to each reading before it is rounded, in counts.
     #[must_use]
     pub fn counts_off_by(&self, counts_off: [f64; 5]) -> Option<[i32; 5]> {
         let [l1, l2, l3] = lengths(self.position);
@@ -127,19 +126,19 @@ impl Plant {
         let mut counts = [0; 5];
         for (axis, count) in counts.iter_mut().enumerate() {
             let rounded = (exact[axis] / params::RESOLUTION[axis] + counts_off[axis]).round();
-            // The cast alone would turn NaN and large values into counts that look sound.
+            // Guards the cast, which would turn NaN and large values into valid counts.
             let fits = rounded.abs() <= f64::from(i32::MAX);
             *count = fits.then_some(rounded as i32)?;
         }
         Some(counts)
     }
 
-    /// Lets one sampling period pass with the actuators commanded to `force` (N) and `torque` (N·m).
+    /// Advances by one sampling period with the actuators commanded to `force` (N) and `torque` (N·m).
     pub fn advance(&mut self, force: [f64; 3], torque: [f64; 2]) {
         self.advance_by(params::SAMPLE_TIME, force, torque);
     }
 
-    /// The same for a period of another length, s.
+    /// Advances by a period of another length, s.
     pub fn advance_by(&mut self, period: f64, force: [f64; 3], torque: [f64; 2]) {
         let command = [force[0], force[1], force[2], torque[0], torque[1]];
         let step = period / f64::from(params::PLANT_STEPS);
@@ -154,7 +153,7 @@ impl Plant {
         }
     }
 
-    /// `Mx·ẍ = Uᵀ(F - friction) - (0, 0, m_z·g)`, solved for `ẍ`, m/s².
+    /// Equation of motion `Mx·ẍ = Uᵀ(F - friction) - (0, 0, m_z·g)`, solved for `ẍ`, m/s².
     fn acceleration(&self) -> [f64; 3] {
         let mut right = [0.0; 3];
         let mut mass = [[0.0; 3]; 3];
@@ -194,7 +193,7 @@ impl Plant {
     }
 }
 
-/// One step of semi-implicit Euler.
+/// Advances by one step of semi-implicit Euler.
 fn drift<const N: usize>(
     position: &mut [f64; N],
     velocity: &mut [f64; N],
@@ -240,7 +239,7 @@ mod tests {
         for _ in 0..3 {
             plant.advance([effort[0], effort[1], effort[2]], [effort[3], effort[4] + 1.0]);
         }
-        // One time constant later about 63 % has arrived.
+        // A lag of first order reaches 63 % after one time constant.
         let arrived = plant.effort[4] - effort[4];
         assert!((arrived - 0.63).abs() < 0.03, "{arrived}");
     }

@@ -5,14 +5,14 @@ use super::controller::Outputs;
 use super::kinematics::{JointReference, Reference};
 use takt_isa::Type;
 
-/// One named value that a program reads or writes each period.
+/// Port of the tracking algorithm: a named value that a program reads or writes each period.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Port {
-    /// Name in programs and as a CSV column.
+    /// Name in programs and in the header of CSV files.
     pub name: &'static str,
-    /// Signed 32-bit integer or binary32.
+    /// Type: signed 32-bit integer or binary32.
     pub ty: Type,
-    /// SI unit; `count` for encoders.
+    /// Unit in SI; `count` for encoders.
     pub unit: &'static str,
 }
 
@@ -24,7 +24,7 @@ const fn real(name: &'static str, unit: &'static str) -> Port {
     Port { name, ty: Type::F, unit }
 }
 
-/// The twenty inputs of one period: five encoder counts, then the fifteen values of the reference.
+/// Inputs of one period, twenty: five encoder counts, then the fifteen values of the reference.
 pub const INPUTS: [Port; 20] = [
     count("n1"),
     count("n2"),
@@ -48,7 +48,7 @@ pub const INPUTS: [Port; 20] = [
     real("eps_gamma", "rad/s^2"),
 ];
 
-/// The twenty outputs of one period: five forces and torques, then the fifteen values of the joint reference.
+/// Outputs of one period, twenty: five forces and torques, then the fifteen values of the joint reference.
 pub const OUTPUTS: [Port; 20] = [
     real("F1", "N"),
     real("F2", "N"),
@@ -72,7 +72,7 @@ pub const OUTPUTS: [Port; 20] = [
     real("ep5d", "rad/s^2"),
 ];
 
-/// Number of values in a reference, which are also the floating-point inputs.
+/// Number of values in a reference, which is also the number of floating-point inputs.
 pub const REFERENCE_LEN: usize = 15;
 
 fn joined<T: Copy>([a, b, c]: [[T; 3]; 3], [d, e, f]: [[T; 2]; 3]) -> [T; REFERENCE_LEN] {
@@ -80,7 +80,7 @@ fn joined<T: Copy>([a, b, c]: [[T; 3]; 3], [d, e, f]: [[T; 2]; 3]) -> [T; REFERE
 }
 
 impl<T: Copy> Reference<T> {
-    /// The fifteen values in the order of [`INPUTS`] after the counts.
+    /// Values of the reference in the order of [`INPUTS`] after the counts.
     #[must_use]
     pub fn to_array(&self) -> [T; REFERENCE_LEN] {
         joined(
@@ -89,7 +89,7 @@ impl<T: Copy> Reference<T> {
         )
     }
 
-    /// A reference from fifteen values in the order of [`INPUTS`] after the counts.
+    /// Reference from fifteen values in the order of [`INPUTS`] after the counts.
     #[must_use]
     pub fn from_array(v: [T; REFERENCE_LEN]) -> Self {
         Self {
@@ -104,7 +104,7 @@ impl<T: Copy> Reference<T> {
 }
 
 impl<T: Copy> JointReference<T> {
-    /// The fifteen values in the order of [`OUTPUTS`] after the forces and torques.
+    /// Values of the joint reference in the order of [`OUTPUTS`] after the forces and torques.
     #[must_use]
     pub fn to_array(&self) -> [T; REFERENCE_LEN] {
         joined(
@@ -115,7 +115,7 @@ impl<T: Copy> JointReference<T> {
 }
 
 impl<T: Copy> Outputs<T> {
-    /// The twenty values in the order of [`OUTPUTS`].
+    /// Values of the outputs in the order of [`OUTPUTS`].
     #[must_use]
     pub fn to_array(&self) -> [T; OUTPUTS.len()] {
         let (f, t, j) = (self.force, self.torque, self.joint.to_array());

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Robots that differ: parameters, sensors and clock drawn at random, as a series of them would come out of a factory.
+//! Random robots for Monte Carlo runs: parameters, sensors and clock drawn like a production series.
 
 use super::params;
 use super::plant::{Parameters, Plant};
@@ -9,32 +9,31 @@ use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
 use serde::{Deserialize, Serialize};
 
-/// Standard deviations, of what is drawn once for each robot and of what is drawn in each period.
+/// Standard deviations of a robot's parameters, drawn once, and of its disturbances, drawn in each period.
 ///
-/// Everything is drawn independently: each arm and each axis of the table for itself, except the masses, of which all sliders
-/// have one.
+/// All draws are independent, for each arm and each axis of the table, except that all sliders share one mass.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Spread {
-    /// The distribution of all values.
+    /// Distribution of all values.
     pub distribution: Shape,
-    /// Of the masses of sliders and platform, relative to their values.
+    /// Masses of sliders and platform, relative to their values.
     pub mass: f64,
-    /// Of the moments of inertia of arms and table and the table's static moment, relative.
+    /// Moments of inertia of arms and table, and the table's static moment, relative.
     pub inertia: f64,
-    /// Of Coulomb and viscous friction, relative.
+    /// Coulomb and viscous friction, relative.
     pub friction: f64,
-    /// Of the actuators' time constant, relative.
+    /// Time constant of the actuators, relative.
     pub actuator_lag: f64,
-    /// Of where an arm's encoder believes zero to be, m.
+    /// Zero error of an arm's encoder, m.
     pub arm_offset: f64,
-    /// Of where a table encoder believes zero to be, rad.
+    /// Zero error of a table encoder, rad.
     pub table_offset: f64,
-    /// Of an arm's reading in each period, before it is rounded to a count, m.
+    /// Noise of an arm's reading in each period, before it is rounded to a count, m.
     pub arm_noise: f64,
-    /// Of a table axis's reading, likewise, rad.
+    /// Noise of a table axis's reading in each period, before it is rounded, rad.
     pub table_noise: f64,
-    /// Of the instant of each tick, s.
+    /// Jitter of each tick, s.
     pub jitter: f64,
 }
 
@@ -55,25 +54,25 @@ impl Default for Spread {
     }
 }
 
-/// The distribution of values about their mean, in units of the standard deviation.
+/// Distribution of values about their mean, in units of the standard deviation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Shape {
-    /// Normal, cut off at three standard deviations: what lies beyond is drawn again.
+    /// Normal, truncated at three standard deviations: values beyond are drawn again.
     #[default]
     Normal,
     /// Uniform, from -√3 to √3 standard deviations.
     Uniform,
 }
 
-/// Relative standard deviations at most: at three of them a mass must still be one.
+/// Limit on relative standard deviations: a mass must be positive at three of them.
 pub const RELATIVE_LIMIT: f64 = 0.3;
 
 impl Spread {
-    /// Checks that every value can be drawn from.
+    /// Checks the range of every value.
     ///
     /// # Errors
-    /// The name of one that cannot, and what it may be.
+    /// The name of the value out of range, and its valid range.
     pub fn check(&self) -> Result<(), (&'static str, String)> {
         let relative = [
             ("mass", self.mass),
@@ -109,7 +108,7 @@ struct Draw {
 }
 
 impl Draw {
-    /// A number of mean 0 and standard deviation 1 (of the normal distribution, before it is cut off).
+    /// Draws a number of mean 0 and standard deviation 1 (of the normal distribution before its truncation).
     fn unit(&mut self) -> f64 {
         match self.shape {
             Shape::Normal => loop {
@@ -130,34 +129,34 @@ impl Draw {
     }
 }
 
-/// A robot with its sensors and its clock.
+/// Robot with its sensors and its clock.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Robot {
     plant: Plant,
-    /// Counts by which each encoder reads wrong, always.
+    /// Zero error of each encoder, counts.
     offset: [f64; 5],
     disturbance: Option<Disturbance>,
 }
 
-/// The state that changes from period to period.
+/// Disturbances that change from period to period.
 #[derive(Debug, Clone, PartialEq)]
 struct Disturbance {
     draw: Draw,
-    /// Counts.
+    /// Standard deviation of each reading, counts.
     noise: [f64; 5],
     jitter: f64,
-    /// The delay of the last tick, s.
+    /// Delay of the last tick, s.
     late: f64,
 }
 
 impl Robot {
-    /// The robot that the controller's model knows, with perfect sensors and clock, at rest in a pose.
+    /// Nominal robot of the controller's model, with perfect sensors and clock, at rest in a pose.
     #[must_use]
     pub fn nominal(pose: &Pose) -> Self {
         Self { plant: Plant::at_rest(pose), offset: [0.0; 5], disturbance: None }
     }
 
-    /// The robot of a seed: the same for the same arguments, whatever else is drawn.
+    /// Random robot of a seed; equal arguments give equal robots.
     #[must_use]
     pub fn drawn(spread: &Spread, seed: u64, pose: &Pose) -> Self {
         let mut draw = Draw { random: Pcg64::seed_from_u64(seed), shape: spread.distribution };
@@ -181,16 +180,16 @@ impl Robot {
         let offset = by_axis(spread.arm_offset, spread.table_offset).map(|counts| counts * draw.unit());
         let noise = by_axis(spread.arm_noise, spread.table_noise);
         let disturbance = Disturbance { draw, noise, jitter: spread.jitter, late: 0.0 };
-        Self { plant: Plant::made_of(parameters, pose), offset, disturbance: Some(disturbance) }
+        Self { plant: Plant::with_parameters(parameters, pose), offset, disturbance: Some(disturbance) }
     }
 
-    /// Its mechanics.
+    /// Mechanics of the robot.
     #[must_use]
     pub fn plant(&self) -> &Plant {
         &self.plant
     }
 
-    /// Reads the encoders; `None` if one does not fit 32 bits.
+    /// Reads the encoders; `None` if a count does not fit 32 bits.
     pub fn counts(&mut self) -> Option<[i32; 5]> {
         let mut off = self.offset;
         if let Some(Disturbance { draw, noise, .. }) = &mut self.disturbance {
@@ -199,7 +198,7 @@ impl Robot {
         self.plant.counts_off_by(off)
     }
 
-    /// Lets the time to the next tick pass with the actuators commanded to `force` (N) and `torque` (N·m).
+    /// Advances to the next tick with the actuators commanded to `force` (N) and `torque` (N·m).
     pub fn advance(&mut self, force: [f64; 3], torque: [f64; 2]) {
         let mut period = params::SAMPLE_TIME;
         if let Some(Disturbance { draw, jitter, late, .. }) = &mut self.disturbance {
@@ -226,7 +225,7 @@ mod tests {
     }
 
     #[test]
-    fn without_a_spread_it_is_the_nominal_robot() {
+    fn zero_spread_gives_the_nominal_robot() {
         let none = Spread {
             mass: 0.0,
             inertia: 0.0,

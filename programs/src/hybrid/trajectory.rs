@@ -1,44 +1,44 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! From moves to the reference of every sampling period.
+//! Trajectory: computes the reference of every sampling period from moves.
 //!
 //! Each move starts and ends at rest. Along a path of length `L` the speed rises to `V` over a ramp of duration
 //! `Tr` as `s' = V/2·(1-cos(πt/Tr))`, stays constant, and falls in the mirror image. Where the ramps alone
 //! would overshoot, `V = L/Tr`. The duration `L/V + Tr` is rounded up to whole periods and the profile
 //! stretched to it, with the derivatives scaled to match. The rotary axes follow the same `s`.
 //!
-//! Rounding up is the plain binary64 `ceil((L/V + Tr)/Ts)`, with lengths in metres, no tolerance taken off. Several
-//! moves of the AGH path last a whole number of periods on paper and an ulp more in binary64; they get one
-//! period more, and only so the path has the 346,666 periods that the specification counts (346,661 otherwise).
+//! Rounding up is the plain binary64 `ceil((L/V + Tr)/Ts)`, with lengths in metres, without a tolerance. Several moves of the AGH path last
+//! a whole number of periods on paper and an ulp more in binary64; each gets one more period, which gives the 346,666 periods that the
+//! specification counts (346,661 otherwise).
 
 use super::gcode::Program;
 use super::kinematics::Reference;
 use super::params::{SAMPLE_RATE, SAMPLE_TIME};
 use crate::path::{Move, MoveKind, Pose};
 
-/// Most periods that a trajectory may have: an hour.
+/// Limit on the periods of a trajectory: an hour.
 pub const MAX_PERIODS: u64 = 3600 * SAMPLE_RATE as u64;
 /// Duration `Tr` of one ramp of a positioning move, s.
 pub const RAPID_RAMP: f64 = 0.06;
 /// Duration `Tr` of one ramp of a cutting move, s.
 pub const CUT_RAMP: f64 = 0.03;
 
-/// The reason why a program has no trajectory.
+/// Reason why a program has no trajectory.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum TrajectoryError {
-    /// The program takes longer than [`MAX_PERIODS`].
+    /// The program takes more periods than [`MAX_PERIODS`].
     #[error("line {line}: the path takes more than {} s up to here; give a higher feed", MAX_PERIODS / u64::from(SAMPLE_RATE))]
     TooLong {
-        /// Source line of the move that exceeds it.
+        /// Source line of the move that exceeds the limit.
         line: usize,
     },
 }
 
-/// The reference of one period, and where in the program it is.
+/// Reference of one period, and its place in the program.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sample {
-    /// The reference point, in binary64.
+    /// Reference point in binary64.
     pub reference: Reference<f64>,
-    /// True if the move cuts.
+    /// The move cuts, instead of positioning.
     pub cutting: bool,
     /// Index of the move in the program.
     pub move_index: usize,
@@ -46,7 +46,7 @@ pub struct Sample {
     pub line: usize,
 }
 
-/// The speed profile of one move.
+/// Speed profile of one move.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Profile {
     /// Path length `L`, m.
@@ -55,9 +55,9 @@ struct Profile {
     speed: f64,
     /// Duration of one ramp `Tr`, s, before stretching.
     ramp: f64,
-    /// Duration of the whole, s, before stretching.
+    /// Duration of the move, s, before stretching.
     duration: f64,
-    /// Duration before stretching over duration after; at most 1.
+    /// Stretching factor: duration before over duration after; at most 1.
     rate: f64,
     /// Duration after stretching, in periods.
     periods: u64,
@@ -67,7 +67,7 @@ impl Profile {
     fn new(length: f64, feed: f64, ramp: f64) -> Self {
         let speed = if feed * ramp > length { length / ramp } else { feed };
         let duration = length / speed + ramp;
-        // Saturates for absurd durations, which the cap then refuses.
+        // The cast saturates for absurd durations, which the limit then refuses.
         let periods = (duration / SAMPLE_TIME).ceil() as u64;
         let rate = duration / (periods as f64 * SAMPLE_TIME);
         Self { length, speed, ramp, duration, rate, periods }
@@ -124,7 +124,7 @@ impl Segment {
     }
 }
 
-/// A planned trajectory; holds the moves, not the samples.
+/// Planned trajectory; holds the moves, not the samples.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trajectory {
     start: Pose,
@@ -137,7 +137,7 @@ impl Trajectory {
     ///
     /// # Errors
     ///
-    /// If the whole takes more than [`MAX_PERIODS`].
+    /// If the trajectory takes more than [`MAX_PERIODS`].
     pub fn plan(program: &Program) -> Result<Self, TrajectoryError> {
         let mut segments = Vec::with_capacity(program.moves.len());
         let mut periods = 0u64;
@@ -160,13 +160,13 @@ impl Trajectory {
         Ok(Self { start: program.start, segments, periods })
     }
 
-    /// The pose of the robot before the first period.
+    /// Pose of the robot before the first period.
     #[must_use]
     pub fn start(&self) -> Pose {
         self.start
     }
 
-    /// The moves that take time, each with its number of periods.
+    /// Moves that take time, each with its number of periods.
     pub fn moves(&self) -> impl Iterator<Item = (&Move, u64)> {
         self.segments.iter().map(|segment| (&segment.piece, segment.profile.periods))
     }
@@ -177,16 +177,16 @@ impl Trajectory {
         self.periods
     }
 
-    /// Duration in s.
+    /// Duration of the trajectory, s.
     #[must_use]
     pub fn duration(&self) -> f64 {
         self.periods as f64 * SAMPLE_TIME
     }
 
-    /// The samples in order, one per period, computed as they are asked for.
+    /// Samples in order, one per period, computed on demand.
     ///
-    /// The sample of a period is the reference at its start, so the first is the start of the first move at
-    /// rest, and the end of a move is the first sample of the next. The very end is not sampled.
+    /// A period's sample is the reference at its start: the first is the start of the first move at rest, and the end of a move is the
+    /// first sample of the next. The end of the trajectory is not sampled.
     #[must_use]
     pub fn samples(&self) -> Samples<'_> {
         Samples { segments: &self.segments, next: 0, left: self.periods }

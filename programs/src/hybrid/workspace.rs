@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Which poses the robot can take at all.
+//! Workspace of the robot: checks poses and moves against its limits.
 
 use super::kinematics::{Reference, inverse};
 use super::params;
@@ -9,45 +9,45 @@ use crate::path::{Arc, Move, Path, Pose};
 pub const MAX_ARM: f64 = (1 << 24) as f64 * params::ARM_RESOLUTION;
 /// Largest tilt of the table either way, rad (180°, with an allowance for the conversion from degrees).
 pub const MAX_TILT: f64 = std::f64::consts::PI + 1e-9;
-/// Most turns of the table either way that its 32-bit encoder count can hold, less one.
+/// Limit on the turns of the table in either direction: the whole turns that its 32-bit encoder count can hold.
 pub const MAX_TURNS: f64 = (i32::MAX as u32 / params::TABLE_COUNTS_PER_TURN) as f64;
 
-/// The reason why a pose or a move is out of reach.
+/// Reason why a pose or a move is out of reach.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum Unreachable {
-    /// The tool would be in the plane of the arms' base points or below it.
+    /// The tool is in the plane of the arms' base points or below it.
     #[error("z = {:.3} mm, but the tool must stay above the plane of the bases, z > 0", .z * 1e3)]
     BelowBase {
-        /// Height, m.
+        /// Height of the tool above the plane, m.
         z: f64,
     },
-    /// An arm would be longer than [`MAX_ARM`].
+    /// An arm is longer than [`MAX_ARM`].
     #[error("arm {} would be {:.3} mm long, but reaches {:.3} mm at most", .arm + 1, .length * 1e3, MAX_ARM * 1e3)]
     ArmTooLong {
         /// Index of the arm, 0..3.
         arm: usize,
-        /// Length it would need, m.
+        /// Length that the pose requires, m.
         length: f64,
     },
-    /// The table would be tilted by more than half a turn.
+    /// The table is tilted by more than half a turn.
     #[error("tilt A = {:.3} deg, but the table tilts by 180 deg at most", .tilt.to_degrees())]
     Tilt {
-        /// Tilt, rad.
+        /// Tilt of the table, rad.
         tilt: f64,
     },
-    /// The table would be turned further than its encoder counts.
+    /// The table is turned beyond the range of its encoder.
     #[error("rotation C = {:.0} deg, but the encoder counts {} turns at most", .rotation.to_degrees(), MAX_TURNS)]
     Rotation {
-        /// Rotation, rad.
+        /// Rotation of the table, rad.
         rotation: f64,
     },
 }
 
-/// Checks one pose.
+/// Checks a pose against all limits.
 ///
 /// # Errors
 ///
-/// The first limit that the pose violates.
+/// The first limit that the pose exceeds.
 pub fn check_pose(pose: &Pose) -> Result<(), Unreachable> {
     check_point(pose.position)?;
     let [tilt, rotation] = pose.angle;
@@ -60,14 +60,14 @@ pub fn check_pose(pose: &Pose) -> Result<(), Unreachable> {
     Ok(())
 }
 
-/// Checks both ends of a move and everything between.
+/// Checks a move between and at its ends.
 ///
-/// On a line the ends suffice: height and angles are linear and an arm's length is convex. On an arc each arm
-/// is longest at an end or, if the arc gets there, on the side away from the arm's base.
+/// For a line the ends suffice: height and angles are linear and an arm's length is convex. On an arc each arm is longest at an end or, if
+/// the arc gets there, on the side away from the arm's base.
 ///
 /// # Errors
 ///
-/// The first limit that the move violates.
+/// The first limit that the move exceeds.
 pub fn check_move(piece: &Move) -> Result<(), Unreachable> {
     check_pose(&piece.from)?;
     check_pose(&piece.to)?;
@@ -100,7 +100,7 @@ fn check_point(position: [f64; 3]) -> Result<(), Unreachable> {
     Ok(())
 }
 
-/// True if a magnitude keeps a limit; NaN does not.
+/// Comparison with a limit that a NaN does not pass.
 fn within(value: f64, limit: f64) -> bool {
     value.abs() <= limit
 }

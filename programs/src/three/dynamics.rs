@@ -1,22 +1,22 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The nominal dynamics of UMS-7.
+//! Nominal dynamics of UMS-7.
 
 use super::profile::Profile;
-use super::{PERIOD, Six, VELOCITIES};
+use super::{PERIOD, SixValues, VELOCITIES};
 
 const C: [f64; 9] = [4.2, 6.1, 3.4, 2.3, 7.9, 1.7, 4.9, 0.12, 0.05];
 
-/// H and G at some angles.
+/// Inertia matrix H and weight torques G at given angles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Nominal {
-    /// Inertia, kg·m².
-    pub inertia: [Six; 6],
-    /// Weight, N·m.
-    pub weight: Six,
+    /// Inertia matrix H, kg·m².
+    pub inertia: [SixValues; 6],
+    /// Weight torques G, N·m.
+    pub weight: SixValues,
 }
 
-/// Of angles in rad.
-pub fn nominal(q: &Six) -> Nominal {
+/// Nominal dynamics at angles in rad.
+pub fn nominal(q: &SixValues) -> Nominal {
     let (s3, c2, s23) = (q[2].sin(), q[1].cos(), (q[1] + q[2]).sin());
     let c23 = (q[1] + q[2]).cos();
     let ((s4, c4), (s5, c5)) = (q[3].sin_cos(), q[4].sin_cos());
@@ -34,28 +34,28 @@ pub fn nominal(q: &Six) -> Nominal {
 }
 
 impl Nominal {
-    /// H·a.
-    pub fn times(&self, a: &Six) -> Six {
+    /// Inertial torques H·a of accelerations in rad/s², N·m.
+    pub fn times(&self, a: &SixValues) -> SixValues {
         self.inertia.map(|row| row.iter().zip(a).map(|(h, a)| h * a).sum())
     }
 
-    /// H·a + G, N·m.
-    pub fn torques(&self, a: &Six) -> Six {
+    /// Torques H·a + G, N·m.
+    pub fn torques(&self, a: &SixValues) -> SixValues {
         let forces = self.times(a);
         std::array::from_fn(|i| forces[i] + self.weight[i])
     }
 }
 
-/// The largest torques of a full-speed trapezoidal move in the middle of the work space: 0.6 s through (0, 60, 0, 0, -60, 0) degrees, all joints at their
-/// largest velocity, ramps of 0.2 s.
-pub fn reference_move() -> Six {
+/// Largest torques of a full-speed trapezoidal move in the middle of the work space: 0.6 s through (0, 60, 0, 0, -60, 0) degrees, all
+/// joints at their largest velocity, ramps of 0.2 s.
+pub fn reference_move() -> SixValues {
     let middle = [0.0, 60.0, 0.0, 0.0, -60.0, 0.0].map(f64::to_radians);
     let course = super::profile::Course { ramp: 500, periods: 1500, profile: Profile::Trapezoidal };
     let mut largest = [0.0; 6];
     for period in 0..=course.periods {
         let [way, _, acceleration] = course.at(f64::from(period) * PERIOD);
-        // With the speed 1/0.4 s along the way, its length is what a joint at its largest velocity covers in 0.4 s.
-        let length: Six = VELOCITIES.map(|v| v * 0.4);
+        // The speed along the path is 1/0.4 s: a joint at its largest velocity covers the path's length in 0.4 s.
+        let length: SixValues = VELOCITIES.map(|v| v * 0.4);
         let q = std::array::from_fn(|i| middle[i] + (way - 0.5) * length[i]);
         let torques = nominal(&q).torques(&length.map(|l| l * acceleration));
         for (largest, torque) in largest.iter_mut().zip(torques) {

@@ -1,22 +1,22 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The arm's kinematics in m and rad, from [`crate::arm`].
+//! Kinematics of the arm in m and rad, from [`crate::arm`].
 
-use super::Six;
+use super::SixValues;
 use crate::arm::{self, Configuration, Failure, Pose};
 
-/// Pose and branch of some joints.
-pub fn pose(joints: &Six, tool: &[f64; 3]) -> (Six, Configuration) {
+/// Pose and configuration of given joint angles.
+pub fn pose(joints: &SixValues, tool: &[f64; 3]) -> (SixValues, Configuration) {
     let (pose, configuration) = arm::forward(joints.map(f64::to_degrees), tool.map(|t| t * 1e3));
     let [x, y, z] = pose.position.map(|p| p * 1e-3);
     let [roll, pitch, yaw] = pose.orientation.map(f64::to_radians);
     ([x, y, z, roll, pitch, yaw], configuration)
 }
 
-/// Joints of a pose on a branch.
+/// Joint angles of a pose in a configuration.
 ///
 /// # Errors
-/// If there are none.
-pub fn joints(pose: &Six, tool: &[f64; 3], configuration: Configuration) -> Result<Six, Failure> {
+/// If the pose is out of reach or singular.
+pub fn joints(pose: &SixValues, tool: &[f64; 3], configuration: Configuration) -> Result<SixValues, Failure> {
     let [x, y, z, roll, pitch, yaw] = *pose;
     let pose =
         Pose { position: [x, y, z].map(|p| p * 1e3), orientation: [roll, pitch, yaw].map(f64::to_degrees) };

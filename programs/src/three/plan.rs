@@ -1,52 +1,53 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Planning of motions: the speed, acceleration and duration of a way.
+//! Motion planning: the speed, acceleration and duration of a path.
 
 use super::dynamics::nominal;
 use super::profile::{Course, Profile};
-use super::{PERIOD, Six};
+use super::{PERIOD, SixValues};
 
 /// Limits of velocities, rad/s, and torques, N·m.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
-    /// rad/s.
-    pub velocities: Six,
-    /// N·m.
-    pub torques: Six,
+    /// Largest velocity of each joint, rad/s.
+    pub velocities: SixValues,
+    /// Largest torque of each joint, N·m.
+    pub torques: SixValues,
 }
 
-/// The request.
+/// Request for a motion's duration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Demand {
-    /// s.
+    /// Duration of the motion, s.
     Time(f64),
-    /// Of the way from 0 to 1, 1/s.
+    /// Speed along the path from 0 to 1, 1/s.
     Speed(f64),
-    /// As fast as the limits allow.
+    /// Shortest duration within the limits.
     Fast,
 }
 
-/// The reason why it is not possible.
+/// Reason why a demand is impossible.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Refusal {
-    /// A joint would be too fast.
+    /// A joint would exceed its velocity limit.
     Velocity,
-    /// A drive would need too much torque.
+    /// A joint would exceed its torque limit.
     Torque,
 }
 
-/// Largest speed, 1/s, and acceleration, 1/s², along a way from 0 to 1, given by its joints at `sigma`.
+/// Largest speed, 1/s, and acceleration, 1/s², along a path from 0 to 1, given by its joint angles at `sigma`.
 ///
-/// Torques are H·(q'·s̈ + q''·ṡ²) + G: on a curved way half of what the weight leaves is for the speed's square, half for the acceleration.
-pub fn admissible(way: impl Fn(f64) -> Six, curved: bool, limits: &Limits, samples: u32) -> (f64, f64) {
+/// Torques are H·(q'·s̈ + q''·ṡ²) + G: on a curved path, the torque left after gravity is split evenly between the velocity term (ṡ²) and
+/// the acceleration (s̈).
+pub fn admissible(way: impl Fn(f64) -> SixValues, curved: bool, limits: &Limits, samples: u32) -> (f64, f64) {
     let (mut velocity, mut acceleration, mut square) = (0f64, 0f64, 0f64);
     let h = 1e-4;
     for sample in 0..=samples {
         let sigma = f64::from(sample) / f64::from(samples);
-        // Inside of the way, where it is known on both sides.
+        // Keep both neighbours of the central differences within the path.
         let middle = sigma.clamp(h, 1.0 - h);
         let [before, at, after] = [middle - h, middle, middle + h].map(&way);
-        let slope: Six = std::array::from_fn(|i| (after[i] - before[i]) / (2.0 * h));
-        let bend: Six = std::array::from_fn(|i| (after[i] - 2.0 * at[i] + before[i]) / (h * h));
+        let slope: SixValues = std::array::from_fn(|i| (after[i] - before[i]) / (2.0 * h));
+        let bend: SixValues = std::array::from_fn(|i| (after[i] - 2.0 * at[i] + before[i]) / (h * h));
         let here = nominal(&at);
         let (forces, bends) = (here.times(&slope), here.times(&bend));
         for i in 0..6 {
@@ -61,12 +62,12 @@ pub fn admissible(way: impl Fn(f64) -> Six, curved: bool, limits: &Limits, sampl
     (speed, half / acceleration)
 }
 
-/// The shortest course that the largest speed and acceleration allow.
+/// Shortest course within the largest speed and acceleration.
 ///
 /// # Errors
-/// If the demand asks for more.
+/// If the demand exceeds them.
 pub fn course(demand: Demand, profile: Profile, (fastest, strongest): (f64, f64)) -> Result<Course, Refusal> {
-    // A ramp of the time t to the speed v has the acceleration top·v/t.
+    // Acceleration of a ramp of duration t to the speed v: top·v/t.
     let root = profile.top() / strongest;
     let whole = |time: f64| (time / PERIOD - 1e-6).ceil().max(1.0) as u32;
     let (ramp, rest) = match demand {

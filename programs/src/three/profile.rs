@@ -1,30 +1,30 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Profiles: the first half of a way from 0 to 1; the second is its mirror image.
+//! Profiles: the first half of a path from 0 to 1; the second half is its mirror image.
 
 use std::f64::consts::{PI, TAU};
 
-/// The acceleration's shape over a ramp.
+/// Shape of the acceleration over a ramp.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Profile {
-    /// Constant. The velocity is continuous.
+    /// Constant acceleration; the velocity is continuous.
     Rectangular,
-    /// Rises for a quarter, is level, falls for a quarter. The acceleration is continuous.
+    /// Acceleration that rises for a quarter, is level for half and falls for a quarter; the acceleration is continuous.
     Trapezoidal,
-    /// A parabola. The acceleration is continuous.
+    /// Parabolic acceleration; the acceleration is continuous.
     Parabolic,
-    /// 1 - cos. The jerk is continuous.
+    /// Acceleration 1 - cos; the jerk is continuous.
     Cosine,
 }
 
-/// Of a trapezoid's time, its rise.
+/// Rise time of a trapezoid, as a fraction of the ramp.
 pub const RISE: f64 = 0.25;
 
 impl Profile {
-    /// All of them, by their number in packets.
+    /// Profiles by their number in packets.
     pub const ALL: [Profile; 4] =
         [Profile::Rectangular, Profile::Trapezoidal, Profile::Parabolic, Profile::Cosine];
 
-    /// The pulse after a part y of the ramp, its integral and that one's: of mean 1.
+    /// Pulse of mean 1 at a fraction y of the ramp, with its first and second integrals.
     pub fn pulse(self, y: f64) -> [f64; 3] {
         let top = self.top();
         match self {
@@ -48,7 +48,7 @@ impl Profile {
         }
     }
 
-    /// The pulse's largest value.
+    /// Largest value of the pulse.
     pub fn top(self) -> f64 {
         match self {
             Profile::Rectangular => 1.0,
@@ -59,19 +59,19 @@ impl Profile {
     }
 }
 
-/// A way from 0 to 1: periods of a ramp, of the whole, and the profile.
+/// Course along a path from 0 to 1: periods of a ramp and of the whole, and the profile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Course {
-    /// Of either ramp; at most half of all.
+    /// Periods of each ramp; at most half of `periods`.
     pub ramp: u32,
-    /// Of the whole.
+    /// Periods of the whole course.
     pub periods: u32,
-    /// Shape.
+    /// Profile of both ramps.
     pub profile: Profile,
 }
 
 impl Course {
-    /// Way, velocity, acceleration after a time, s.
+    /// Position, velocity and acceleration on the path after a time, s.
     pub fn at(&self, time: f64) -> [f64; 3] {
         let total = f64::from(self.periods) * super::PERIOD;
         let time = time.clamp(0.0, total);

@@ -4,33 +4,34 @@
 use super::{PERIOD, SERVO_PERIOD, STEPS};
 use std::collections::VecDeque;
 
-/// Bandwidth, rad/s.
+/// Bandwidth of the servo, rad/s.
 pub const BANDWIDTH: f64 = 2.0 * std::f64::consts::PI * 15.0;
-/// Damping.
+/// Damping ratio of the servo.
 pub const DAMPING: f64 = 0.8;
-/// The integral's gain, of the bandwidth's cube.
+/// Gain of the integral, relative to the bandwidth's cube.
 pub const INTEGRAL: f64 = 0.1;
 /// Periods over which the error's derivative is taken.
 pub const SPAN: usize = 8;
-/// rad per count of an encoder.
+/// Angle of an encoder's count, rad.
 pub const COUNT: f64 = 2.0 * std::f64::consts::PI / 262_144.0;
 
-/// The kinematic core's reference of a joint.
+/// Reference of a joint from the kinematic core.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Point {
-    /// rad.
+    /// Angle of the joint, rad.
     pub q: f64,
-    /// rad/s.
+    /// Velocity of the joint, rad/s.
     pub v: f64,
-    /// rad/s².
+    /// Acceleration of the joint, rad/s².
     pub a: f64,
-    /// Nominal control.
+    /// Nominal control, the feed-forward.
     pub u: f64,
-    /// Da·H + Dc.
+    /// Effective inertia Da·H + Dc, control per rad/s².
     pub inertia: f64,
 }
 
-/// Angle and nominal control at a part of the way between two points: the quintic that has both ends' angles, velocities and accelerations.
+/// Angle and nominal control at a fraction of the period between two points: the angle follows the quintic with both ends' angles,
+/// velocities and accelerations.
 pub fn between(from: &Point, to: &Point, part: f64) -> (f64, f64) {
     let t = PERIOD;
     let way = to.q - from.q - from.v * t - from.a * t * t / 2.0;
@@ -46,7 +47,7 @@ pub fn between(from: &Point, to: &Point, part: f64) -> (f64, f64) {
     (q, from.u + (to.u - from.u) * s)
 }
 
-/// The servo of a joint.
+/// Servo of a joint.
 #[derive(Clone, Debug)]
 pub struct Servo {
     from: Point,
@@ -58,13 +59,13 @@ pub struct Servo {
 }
 
 impl Servo {
-    /// From the first point and what the encoder says; `largest` limits the control.
+    /// Servo at its first point, with the encoder's counts; `largest` limits the control.
     pub fn new(point: Point, counts: i32, largest: f64) -> Servo {
         let error = point.q - f64::from(counts) * COUNT;
         Servo { from: point, to: point, phase: 1, errors: vec![error; SPAN].into(), integral: 0.0, largest }
     }
 
-    /// A period: a new point, if one has come, and the encoder. The control and the reference.
+    /// Advances one period, with a new point if one has come. Returns the control and the reference angle, rad.
     pub fn step(&mut self, point: Option<Point>, counts: i32) -> (f64, f64) {
         match point {
             Some(point) => (self.from, self.to, self.phase) = (self.to, point, 1),
@@ -80,7 +81,7 @@ impl Servo {
             + self.integral * INTEGRAL * BANDWIDTH.powi(3);
         let wanted = feed + self.to.inertia * law;
         let control = wanted.clamp(-self.largest, self.largest);
-        // Anti-windup: in saturation, the integral goes on only where that leads out of it.
+        // Anti-windup: in saturation, the integral changes only in the direction out of it.
         if control == wanted || error * wanted < 0.0 {
             self.integral += error * SERVO_PERIOD;
         }

@@ -1,31 +1,31 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Motion through any number of points: each segment's course, one after the other or overlapping where a point is passed.
+//! Motion through any number of points: courses of the segments one after the other, overlapping where a point is passed without a stop.
 
 use super::profile::Course;
-use super::{PERIOD, Six};
+use super::{PERIOD, SixValues};
 
-/// A segment in the coordinates that it is linear in.
+/// Linear segment in the motion's coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Segment {
-    /// Its end.
-    pub to: Six,
-    /// The course of its motion.
+    /// End of the segment.
+    pub to: SixValues,
+    /// Course of the motion along the segment.
     pub course: Course,
-    /// True if the next one begins while it comes to its end.
+    /// Passes its end: the next segment begins during the final ramp.
     pub via: bool,
 }
 
-/// Segments that run one after the other from a point.
+/// Segments in sequence from a starting point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Motion {
-    from: Six,
-    /// With the period in which each begins.
+    from: SixValues,
+    /// Segments, each with the period in which it begins.
     segments: Vec<(u32, Segment)>,
 }
 
 impl Motion {
-    /// From a point, at rest.
-    pub fn new(from: Six, segments: &[Segment]) -> Motion {
+    /// Motion from a point, at rest.
+    pub fn new(from: SixValues, segments: &[Segment]) -> Motion {
         let mut begin = 0;
         let mut placed: Vec<(u32, Segment)> = Vec::new();
         for segment in segments {
@@ -38,13 +38,13 @@ impl Motion {
         Motion { from, segments: placed }
     }
 
-    /// Periods until it is at rest.
+    /// Periods until the motion ends.
     pub fn periods(&self) -> u32 {
         self.segments.last().map_or(0, |(begin, segment)| begin + segment.course.periods)
     }
 
     /// Coordinates, velocities and accelerations after a time, s.
-    pub fn at(&self, time: f64) -> [Six; 3] {
+    pub fn at(&self, time: f64) -> [SixValues; 3] {
         let mut result = [self.from, [0.0; 6], [0.0; 6]];
         let mut from = self.from;
         for (begin, segment) in &self.segments {

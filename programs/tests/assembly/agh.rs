@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The closed loop along "AGH": the joint reference against the unrounded truth, and the tool against the path.
+//! Closed loop along "AGH": the joint reference against the unrounded truth, and the tool against the path.
 
 use super::inputs::{CIRCLE, LETTER_G, moves};
 use super::measure::ulp;
@@ -11,27 +11,26 @@ use takt_programs::hybrid::ports::REFERENCE_LEN;
 use takt_programs::hybrid::{ClosedLoop, TrackingError};
 use takt_programs::trajectory::Trajectory;
 
-/// Largest `Δv`, m/s, and `Δa`, m/s², of the paper's Table 3, column FPGA1,2,3. Its `Δl` of 1.8651e-6 m is far above
-/// our bound.
+/// Largest `Δv`, m/s, and `Δa`, m/s², in column FPGA1,2,3 of the paper's Table 3. Its `Δl` of 1.8651e-6 m is far above our bound.
 const PAPER: (f64, f64) = (8.2634e-7, 2.9990e-6);
-/// Ours, so that a change is noticed, in ulps of the largest values along the path (below 0.25 m/s and 8 m/s²).
+/// Our own bounds, so that a change is noticed, in ulps of the largest values along the path (below 0.25 m/s and 8 m/s²).
 const VELOCITY_ULPS: f64 = 2.5;
 const ACCELERATION_ULPS: f64 = 2.0;
-/// The tool's distance from the path, m: the requirement is 10 µm, a binary64 controller has 7.8 µm and 8.7 µm.
-/// Without the integrator's boost it is 9.3 µm over everything.
+/// Limits on the tool's distance from the path, m: the requirement is 10 µm, a binary64 controller has 7.8 µm while cutting and 8.7 µm
+/// overall. Without the integrator's boost it is 9.3 µm overall.
 const CUTTING: f64 = 8.5e-6;
 const OVERALL: f64 = 9e-6;
-/// With friction and coupled inertia fed forward a binary64 controller has 0.61 µm and 0.82 µm.
+/// Limits with friction and coupled inertia fed forward: a binary64 controller has 0.61 µm and 0.82 µm.
 const CUTTING_FRICTION: f64 = 0.7e-6;
 const OVERALL_FRICTION: f64 = 0.9e-6;
 
-/// `Δl` in ulps of the largest length (below 1 m). Nearly half of one is the input's own: `z`, most of `l`, is rounded to
-/// binary32 before the program sees it.
+/// Bound on `Δl` in ulps of the largest length (below 1 m). The input alone accounts for nearly half an ulp: `z`, most of `l`, is rounded
+/// to binary32 before the program sees it.
 fn length_ulps(path: &str) -> f64 {
     if path == LITERAL { 2.0 } else { 1.5 }
 }
 
-/// Closed loops one after the other, with their errors taken together.
+/// Consecutive closed loops, with their combined errors.
 #[derive(Default)]
 struct Run {
     accuracy: Accuracy<REFERENCE_LEN>,
@@ -47,7 +46,7 @@ impl Run {
             self.tracking.add(&record);
             let joint = record.outputs.joint.to_array().map(|value| value as f32);
             self.accuracy.add(&joint, &inverse(&record.sample.reference).to_array());
-            // The table's reference is passed through, not only to within half an ulp.
+            // The table's reference passes through bit for bit.
             let table = record.inputs.reference.to_array();
             let same = joint[9..].iter().zip(&table[9..]).all(|(out, into)| out.to_bits() == into.to_bits());
             assert!(same, "period {}: {joint:?} from {table:?}", record.period);
@@ -62,7 +61,7 @@ impl Run {
         let (accelerations, angles) = rest.split_at(3);
         let below = |errors: &[MaxError], bound: f64, what: &str| {
             for (i, error) in errors.iter().enumerate() {
-                // Of numbers only: NaN is above every bound.
+                // Written so that a NaN fails.
                 let good = error.absolute <= bound;
                 assert!(good, "{name}: {what}{} {error} at {}, bound {bound:e}", i + 1, error.worst);
             }
@@ -90,7 +89,7 @@ fn the_tool_stays_on_the_path() {
                 run.add(&moves(..), processor, usize::MAX);
                 assert_eq!(run.periods, 346_666);
             } else {
-                // Both machines compute the same bits (`agreement`), so one of them may go less far.
+                // A shorter run suffices for the other machines, which compute the same bits as t3 (`agreement`).
                 let far = if *machine == T3 { 4 } else { 1 };
                 run.add(&moves(..), processor.clone(), 5_000 * far);
                 run.add(&moves(LETTER_G..), processor.clone(), 2_500 * far);
@@ -101,9 +100,9 @@ fn the_tool_stays_on_the_path() {
     }
 }
 
-/// The windows are what their names say, and in the circle every arm does reverse.
+/// The windows hold the moves of their names, and every arm reverses in the circle.
 #[test]
-fn windows_are_where_they_should_be() {
+fn schedule_windows_have_the_expected_place() {
     let joint = |trajectory: &Trajectory| -> Vec<[f64; 3]> {
         trajectory.samples().map(|sample| inverse(&sample.reference).velocity).collect()
     };

@@ -1,28 +1,28 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Both machines, scheduled or not, compute the same: values, state and flags, bit for bit.
+//! Agreement of all machines, scheduled or not: values, state and flags, bit for bit.
 
 use super::inputs::{CIRCLE, Random, moves, pair, recorded, words};
-use super::integrator::{Off, scenario};
+use super::integrator::{EncoderError, scenario};
 use super::processor::{EQUATIONS, LITERAL, PROGRAMS, Processor, TRACKING, assemble, source};
 use takt_asm::Schedule;
 use takt_isa::{MACHINES, Machine, T1};
 use takt_programs::hybrid::Inputs;
 use takt_programs::hybrid::ports::INPUTS;
 
-/// The names of what a program keeps between periods.
+/// Names of the registers that a program keeps between periods.
 fn state(path: &str) -> Vec<String> {
     let kept = if path == LITERAL { ["pp", "s", "tc", "sg"] } else { ["np", "s", "boost", "sg"] };
     kept.iter().flat_map(|name| (1..=5).map(move |i| format!("{name}{i}"))).collect()
 }
 
-/// Some thousand periods: the path, the workspace, the integrator's scenarios, and at last words without sense (after
-/// which the state has none either).
+/// Thousands of periods: the path, the workspace, the integrator's scenarios, and finally meaningless words (which make the state
+/// meaningless).
 fn stimuli() -> Vec<[u32; INPUTS.len()]> {
     let mut random = Random::new(3);
     let mut inputs: Vec<Inputs> = recorded(&moves(..), 2000);
     inputs.extend(recorded(&moves(CIRCLE..), 2000));
     inputs.extend((0..500).flat_map(|_| pair(&mut random)));
-    inputs.extend(scenario(Off::Mixed, 5));
+    inputs.extend(scenario(EncoderError::Mixed, 5));
     let sensible = inputs.iter().map(Inputs::to_words).collect::<Vec<_>>();
     let senseless = (0..1000).map(|_| words(&mut random));
     sensible.into_iter().chain(senseless).collect()
@@ -56,10 +56,10 @@ fn machines_and_schedules_agree_bit_for_bit() {
     }
 }
 
-/// `tracking_equations.s` is `tracking.s`: outputs, state and flags bit for bit on every machine, every period in the same cycles
-/// on t1 and nearly so elsewhere, from half the lines.
+/// Comparison of `tracking_equations.s` with `tracking.s`: outputs, state and flags bit for bit on every machine, every period in the same
+/// cycles on t1 and nearly so elsewhere, from half the lines.
 #[test]
-fn equations_compute_what_the_hand_written_program_does() {
+fn equations_agree_with_the_hand_written_program() {
     let stimuli = stimuli();
     for &machine in MACHINES {
         let [mut written, mut equations] =
@@ -75,7 +75,7 @@ fn equations_compute_what_the_hand_written_program_does() {
             let (flags, expected) = (equations.emulator().flags(), written.emulator().flags());
             assert_eq!(flags, expected, "{}, period {period}", machine.name);
             let (cycles, expected) = (equations.cycles(), written.cycles());
-            // With several slots, the search for a schedule depends on the order of the lines by a cycle or so.
+            // With several slots, the order of the lines influences the schedule by a cycle or so.
             let apart = if machine == &T1 { 0 } else { expected / 50 };
             assert!(
                 cycles.abs_diff(expected) <= apart,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Time: every period takes the same cycles, those that the scheduler predicted. (`asm/tests/cycles.rs` has how many.)
+//! Timing: every period takes the cycles that the scheduler predicted, whatever the data. (`asm/tests/cycles.rs` has the numbers.)
 
 use super::inputs::{Random, moves, recorded, words};
 use super::processor::{PROGRAMS, Processor, assemble};
@@ -8,9 +8,9 @@ use takt_asm::schedule::BlockReport;
 use takt_isa::MACHINES;
 use takt_programs::hybrid::Inputs;
 
-/// The first period has the block `first` before it, and nothing else.
+/// The first period also runs the block `first`, and no other code.
 #[test]
-fn cycles_depend_on_no_data_and_are_those_predicted() {
+fn cycles_are_independent_of_data_and_as_predicted() {
     let mut random = Random::new(11);
     let path_inputs = recorded(&moves(..), 1000);
     let sensible = path_inputs.iter().map(Inputs::to_words);
@@ -37,7 +37,7 @@ fn cycles_depend_on_no_data_and_are_those_predicted() {
     }
 }
 
-/// Unscheduled periods, too, take the same time whatever the data, and the scheduler gains on them.
+/// Without scheduling, periods take constant time as well; the scheduler makes them shorter.
 #[test]
 fn scheduling_gains() {
     let mut random = Random::new(12);

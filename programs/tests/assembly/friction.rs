@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Tests of what `tracking_friction.s` adds, beside its share in every other test.
+//! Tests of `tracking_friction.s` alone, beside its share in every other test.
 
 use super::inputs::{moves, recorded};
 use super::processor::{FRICTION, Processor, source};
@@ -10,9 +10,9 @@ use takt_programs::hybrid::{ClosedLoop, Controller, Identification};
 use takt_programs::trajectory::Trajectory;
 use takt_programs::{LIBRARY, SOURCES, gcode};
 
-/// The parameters are those that the fit finds on the robot with its own controller, to the digits that are written.
+/// The parameters equal the fit to a run of the nominal robot with its own controller, to the digits in the source.
 #[test]
-fn parameters_are_those_that_a_run_shows() {
+fn parameters_equal_the_identified_ones() {
     let path = gcode::read(takt_programs::FRICTION).expect("the embedded path is sound");
     let trajectory = Trajectory::plan(&path).expect("the embedded path is short");
     let mut identification = Identification::new();
@@ -21,7 +21,7 @@ fn parameters_are_those_that_a_run_shows() {
     }
     for (axis, (fit, written)) in identification.fit().iter().zip(IDENTIFIED).enumerate() {
         let found = fit.expect("every axis moves").friction;
-        // The table's encoders are coarse, and a controller in binary32 moves a little differently.
+        // Tolerance: the table's encoders are coarse, and under a binary32 controller the robot moves slightly differently.
         let tolerance = if axis < 3 { 2e-3 } else { 2e-2 };
         let near = |found: f64, written: f64| (found - written).abs() <= tolerance * written.abs();
         assert!(near(found.coulomb, written.coulomb), "axis {}: {found:?}", axis + 1);
@@ -31,7 +31,7 @@ fn parameters_are_those_that_a_run_shows() {
     }
 }
 
-/// The program with lines of `tracking_friction.s` changed.
+/// Assembles `tracking_friction.s` with its lines changed.
 fn assembled(change: impl Fn(&str) -> String) -> Program {
     let mut loader = MemoryLoader::new(SOURCES);
     let lines: Vec<String> = source(FRICTION).lines().map(change).collect();
@@ -41,7 +41,7 @@ fn assembled(change: impl Fn(&str) -> String) -> Program {
     assembled.unwrap_or_else(|errors| panic!("{}", errors.render(false))).program
 }
 
-/// An axis that sticks: the shipped source with Stribeck's term given.
+/// Stribeck's term: the shipped source with parameters for an axis that sticks.
 #[test]
 fn sticking_is_fed_forward() {
     let plain = IDENTIFIED[4];
@@ -61,7 +61,7 @@ fn sticking_is_fed_forward() {
     };
     let [mut before, mut after] = [&plain, &sticking].map(|friction| Processor::new(&program(friction)));
     let mut largest = 0.0f64;
-    // The table turns in the moves that the G begins with.
+    // The table turns in the moves at the beginning of the letter G.
     for inputs in recorded(&moves(super::inputs::LETTER_G..), 3000) {
         let words = inputs.to_words();
         let torque = |processor: &mut Processor| {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! `generation.s` against the binary64 trajectory: the test plays the host's end of the FIFO.
+//! Points of `generation.s` against the binary64 trajectory: the test plays the host's end of the FIFO.
 
 use super::processor::assemble;
 use takt_asm::Schedule;
@@ -14,13 +14,13 @@ use takt_programs::trajectory::{CUT_RAMP, Trajectory};
 
 const GENERATION: &str = "hybrid/generation.s";
 
-/// Largest errors, in ulps of the largest value that the output takes along the path: position, velocity and acceleration of the tool, and
-/// of the table.
+/// Limits on errors, in ulps of the largest value of each output along the path: position, velocity and acceleration of the tool, then of
+/// the table.
 const ULPS: [f64; 6] = [4.0, 4.0, 5.0, 2.0, 4.5, 4.5];
-/// Of the tool's position, m: an ulp of z.
+/// Limit on the error of the tool's position, m: an ulp of z.
 const POSITION: f64 = 6.2e-8;
 
-/// The program with a FIFO before it.
+/// Program with a FIFO in front of it.
 struct Generator {
     emulator: Emulator,
     empty: Register,
@@ -47,7 +47,7 @@ impl Generator {
             fields: FIELDS.map(|name| find(&program.inputs, name)),
             pop: find(&program.outputs, "pop"),
             standing: find(&program.outputs, "standing"),
-            // Its outputs are tracking's inputs, by the same names.
+            // The outputs have the names of the tracking program's inputs.
             point: std::array::from_fn(|i| {
                 find(&program.outputs, INPUTS[INPUTS.len() - REFERENCE_LEN + i].name)
             }),
@@ -57,7 +57,7 @@ impl Generator {
         }
     }
 
-    /// A period: the point, whether the core stands, and its cycles.
+    /// Runs a period: returns the point, whether the core stands, and the cycles.
     fn period(&mut self) -> ([f32; REFERENCE_LEN], bool, u64) {
         let empty = u32::from(self.head.is_none());
         self.emulator.set_input_bits(self.empty, empty).expect("it is an input");
@@ -82,7 +82,7 @@ fn plan(text: &str) -> Trajectory {
     Trajectory::plan(&gcode::read(text).expect("the path is sound")).expect("the path is short")
 }
 
-/// The errors of the points of a path, which must come one after the other without a period lost.
+/// Errors of the points of a path, without a lost period between moves.
 fn errors(text: &str) -> Accuracy<REFERENCE_LEN> {
     let trajectory = plan(text);
     let mut generator = Generator::new(blocks(&trajectory).expect("the path fits"));
@@ -101,7 +101,7 @@ fn errors(text: &str) -> Accuracy<REFERENCE_LEN> {
 }
 
 #[test]
-fn points_are_those_of_the_trajectory() {
+fn points_equal_the_trajectorys() {
     let accuracy = errors(takt_programs::AGH);
     for (i, error) in accuracy.errors.iter().enumerate() {
         let kind = if i < 9 { i / 3 } else { 3 + (i - 9) / 2 };
@@ -112,15 +112,16 @@ fn points_are_those_of_the_trajectory() {
     }
 }
 
-/// Arcs both ways, more and less than half, with everything else moving along, radii that differ; moves too short for a
-/// plateau, a move of one axis of the table, and a crawl.
+/// Moves of every kind: arcs both ways, shorter and longer than half a turn, with all other axes moving along and with different radii;
+/// moves too short for a plateau, a move of one axis of the table, and a crawl.
 #[test]
 fn moves_of_every_kind() {
     let text = "G0 X10 Y5 Z700 A1 C-20\nG2 X30 Y5 Z702 I10 J0 A3 C-25 F1500\nG3 X10 Y25.005 I-20 J0 F1500\n\
                 G2 X10 Y25 Z701 I5 J0 F800\nG2 X10 Y25.1 R40 F800\nG2 X10 Y25.1 I7 J1 C-24 F1800\n\
                 G0 X10.01\nG1 X10.5 F2000\nG0 C300\nG0 A-90 C300 Z640\nG1 X10.51 F1\n";
     let accuracy = errors(text);
-    // A way of a hundredth of a millimetre is a few thousand units, and rounded to them: at most a unit, in the time of a ramp.
+    // A path of a hundredth of a millimetre is a few thousand units, rounded to whole ones: at most a unit of error, within the time of a
+    // ramp.
     let bounds =
         [POSITION_UNIT, ANGLE_UNIT].map(|unit| [2.0 * unit / CUT_RAMP, 8.0 * unit / CUT_RAMP.powi(2)]);
     let [[speed, acceleration], [turning, spinning]] = bounds;
@@ -129,7 +130,7 @@ fn moves_of_every_kind() {
             0..3 => 8e-8,
             3..6 => speed,
             6..9 => acceleration,
-            // Two ulps of 300°.
+            // Two ulps at 300°.
             9..11 => 1e-6,
             11..13 => turning,
             _ => spinning,
@@ -143,7 +144,7 @@ fn moves_of_every_kind() {
     }
 }
 
-/// If the host does not say how many periods a move has, the feed does, within the period that rounding may cost.
+/// Without the number of periods from the host, the feed determines a move's duration, up to a period of rounding.
 #[test]
 fn the_core_can_plan_its_own_time() {
     let trajectory = plan(takt_programs::AGH);
@@ -152,7 +153,7 @@ fn the_core_can_plan_its_own_time() {
     let own = given.iter().map(|block| Block { periods: 0, ..*block }).collect();
     let mut generator = Generator::new(own);
     let _ = (generator.period(), generator.period());
-    // Each move begins at rest; only there are all derivatives zero.
+    // Count the moves by their starts at rest: only there are all derivatives zero.
     let (mut length, mut moves) = (1u64, 0);
     while moves < 12 {
         let (point, ..) = generator.period();
@@ -165,10 +166,10 @@ fn the_core_can_plan_its_own_time() {
     }
 }
 
-/// A block of no length is taken out and forgotten, and costs nothing; one that comes late begins when it comes; time does not
-/// depend on what is in a block.
+/// Blocks of length zero are dropped without a lost period; a late block begins when it arrives; cycles do not depend on a block's
+/// contents.
 #[test]
-fn blocks_that_are_late_or_nothing() {
+fn late_blocks_and_empty_blocks() {
     let trajectory = plan("G0 X0 Y0 Z700\nG1 X1 F2000\nG1 X2 F2000\n");
     let all = blocks(&trajectory).expect("the path fits");
     let [place, first, second] = all[..] else { panic!("{all:?}") };
@@ -193,6 +194,6 @@ fn blocks_that_are_late_or_nothing() {
     }
     late.head = Some(second);
     assert!(!late.period().1, "it begins at once");
-    // The first period has what runs once before it, too; then there are those in which a block is prepared or begun, or neither.
+    // The first period also runs `.once`; the others prepare a block, begin one, or neither.
     assert!(cycles.len() <= 4 && cycles.last() <= Some(&500), "{cycles:?}");
 }

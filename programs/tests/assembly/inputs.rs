@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Sources of inputs: the path, the workspace at random, words at random.
+//! Sources of inputs: the path, random points of the workspace, random words.
 
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::{Rng as _, SeedableRng as _};
@@ -19,22 +19,22 @@ impl Random {
         Random(Pcg64::seed_from_u64(seed))
     }
 
-    /// The next 64 bits.
+    /// Next 64 random bits.
     pub(crate) fn bits(&mut self) -> u64 {
         self.0.next_u64()
     }
 
-    /// Uniform within `±most`.
+    /// Uniform number within `±most`.
     pub(crate) fn within(&mut self, most: f64) -> f64 {
         most * ((self.bits() >> 11) as f64 / (1u64 << 52) as f64 - 1.0)
     }
 
-    /// Uniform from `0` to `end - 1`.
+    /// Uniform integer from `0` to `end - 1`.
     pub(crate) fn below(&mut self, end: u64) -> u64 {
         self.bits() % end
     }
 
-    /// Either sign, magnitude 10^`least` to 10^`most`, every decade as likely as the next.
+    /// Number of either sign with a magnitude from 10^`least` to 10^`most`, uniform over the decades.
     pub(crate) fn decades(&mut self, least: f64, most: f64) -> f64 {
         let sign = if self.bits() & 1 == 0 { 1.0 } else { -1.0 };
         let middle = (least + most) / 2.0;
@@ -42,32 +42,32 @@ impl Random {
     }
 }
 
-/// The path "AGH".
+/// Program of the path "AGH".
 pub(crate) fn path() -> Program {
     gcode::read(takt_programs::AGH).expect("the embedded path is sound")
 }
 
-/// The trajectory of some moves of the path: it starts, at rest, where the first of them does.
+/// Trajectory of some moves of the path, from rest at the start of the first.
 pub(crate) fn moves(
     range: impl std::slice::SliceIndex<[takt_programs::path::Move], Output = [takt_programs::path::Move]>,
 ) -> Trajectory {
     let moves = path().moves[range].to_vec();
     let start = moves.first().expect("there is a move").from;
-    Trajectory::plan(&Program { start, moves }).expect("the embedded path is short")
+    Trajectory::plan(&Program { start, moves, passed_over: Vec::new() }).expect("the embedded path is short")
 }
 
-/// Index of the first of the moves that draw the full circle, in which every arm reverses.
+/// Index of the first move of the full circle, in which every arm reverses.
 pub(crate) const CIRCLE: usize = 35;
-/// Index of the first of the moves that draw the G, with the table turned.
+/// Index of the first move of the letter G, where the table is turned.
 pub(crate) const LETTER_G: usize = 9;
 
-/// Inputs as the binary64 controller meets them in closed loop along a trajectory.
+/// Inputs of the binary64 controller in closed loop along a trajectory.
 pub(crate) fn recorded(trajectory: &Trajectory, periods: usize) -> Vec<Inputs> {
     let records = ClosedLoop::new(trajectory, Controller::<f64>::new()).take(periods);
     records.map(|record| record.expect("the loop is stable").inputs).collect()
 }
 
-/// A reference anywhere in the workspace, rounded to binary32. Every eighth stands still.
+/// Random reference in the workspace, rounded to binary32. Every eighth stands still.
 pub(crate) fn reference(random: &mut Random) -> Reference<f32> {
     let still = random.below(8) == 0;
     let mut three = |most: f64| [random.within(most), random.within(most), random.within(most)];
@@ -88,8 +88,8 @@ pub(crate) fn reference(random: &mut Random) -> Reference<f32> {
     .convert()
 }
 
-/// Two consecutive periods near a random reference, which is the same in both: the axes are off by a count or two up
-/// to 0.1 m or rad, and move at about the reference's velocity.
+/// Two consecutive periods near a random reference, which is the same in both: the axes are off by between a count or two and 0.1 m or rad,
+/// and move at about the reference's velocity.
 pub(crate) fn pair(random: &mut Random) -> [Inputs; 2] {
     let reference = reference(random);
     let joint = inverse(&reference.convert::<f64>());
@@ -108,7 +108,7 @@ pub(crate) fn pair(random: &mut Random) -> [Inputs; 2] {
     counts.map(|counts| Inputs { counts, reference })
 }
 
-/// Words that no robot sends: NaN, infinities, subnormals, any bits.
+/// Words that no robot sends: NaN, infinities, subnormals, arbitrary bits.
 pub(crate) fn words(random: &mut Random) -> [u32; INPUTS.len()] {
     const SPECIAL: [u32; 10] = [
         0,

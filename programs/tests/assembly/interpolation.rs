@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! `interpolation.s` against the cubics in binary64: the test is the planner, and the host's end of the FIFO.
+//! Points of `interpolation.s` against the cubics in binary64: the test plays the planner and the host's end of the FIFO.
 
 use super::processor::assemble;
 use std::collections::VecDeque;
@@ -12,18 +12,18 @@ use takt_programs::gcode;
 use takt_programs::hybrid::ports::{INPUTS, REFERENCE_LEN};
 use takt_programs::trajectory::Trajectory;
 
-/// Periods from knot to knot, and the time, s.
+/// Periods from knot to knot, and the same time in s.
 const EVERY: usize = 10;
 const TIME: f64 = 1e-3;
-/// Knots that wait before the motion begins, and that the FIFO holds.
+/// Knots in the FIFO at which the motion begins, and the FIFO's depth.
 const BEGIN: usize = 3;
 const DEPTH: usize = 8;
-/// The units of positions and angles, m and rad, and the deceleration, m/s².
+/// Units of positions and angles, m and rad, then the deceleration, m/s².
 const UNITS: [f64; 2] = [1.0 / (1 << 30) as f64, 1.0 / (1 << 26) as f64];
 const BRAKE: f64 = 8.0;
 const AXES: usize = 5;
 
-/// A knot: positions, m and rad, and velocities.
+/// Knot: positions, m and rad, with velocities, m/s and rad/s.
 #[derive(Clone, Copy, Debug)]
 struct Knot {
     position: [f64; AXES],
@@ -35,7 +35,7 @@ fn unit(axis: usize) -> f64 {
 }
 
 impl Knot {
-    /// As it is sent: positions in whole units, velocities in binary32.
+    /// Knot as transmitted: positions in whole units, velocities in binary32.
     fn rounded(self) -> Knot {
         Knot {
             position: std::array::from_fn(|i| (self.position[i] / unit(i)).round() * unit(i)),
@@ -43,18 +43,18 @@ impl Knot {
         }
     }
 
-    /// Where one stands.
+    /// Knot with zero velocities.
     fn at_rest(position: [f64; AXES]) -> Knot {
         Knot { position, velocity: [0.0; AXES] }
     }
 
-    /// The point of the cubic to the next knot, so many periods after this one, in the order of the reference.
+    /// Point of the cubic to the next knot, `phase` periods after this one, in the order of the reference.
     fn to(&self, next: &Knot, phase: usize) -> [f64; REFERENCE_LEN] {
         let s = phase as f64 / EVERY as f64;
         let axis = |i: usize| {
             let d = next.position[i] - self.position[i];
             let (u, w) = (self.velocity[i] * TIME, next.velocity[i] * TIME);
-            // Hermite's basis, derived twice.
+            // Cubic Hermite polynomial with its first and second derivatives.
             let (b, c) = (3.0 * d - 2.0 * u - w, u + w - 2.0 * d);
             [
                 self.position[i] + u * s + b * s * s + c * s * s * s,
@@ -70,7 +70,7 @@ impl Knot {
     }
 }
 
-/// The program with a FIFO before it.
+/// Program with a FIFO in front of it.
 struct Core {
     emulator: Emulator,
     inputs: Vec<Port>,
@@ -80,7 +80,7 @@ struct Core {
 }
 
 impl Core {
-    /// The core has taken the first knot, and waits for its first tick.
+    /// Starts a core that has taken the first knot and waits for its first tick.
     fn new(first: Knot) -> Core {
         let program = &assemble("hybrid/interpolation.s", &T3, Schedule::AsWritten).program;
         let mut core = Core {
@@ -109,7 +109,7 @@ impl Core {
         self.emulator.register(Core::register(&self.outputs, name)).expect("it is written")
     }
 
-    /// The FIFO's head and status on the ports; encoders whose counts tell one from the other.
+    /// Drives the FIFO's head and status on the ports, and encoder counts that identify the axis and the entry.
     fn show(&mut self) {
         self.set("empty", u32::from(self.queue.is_empty()));
         self.set("count", self.queue.len() as u32);
@@ -133,7 +133,7 @@ impl Core {
         }
     }
 
-    /// A period: the point.
+    /// Runs a period and returns the point.
     fn period(&mut self) -> [f32; REFERENCE_LEN] {
         self.show();
         let counts: Vec<u32> = (1..=AXES as u32).map(|axis| 100 * axis + self.popped).collect();
@@ -145,7 +145,7 @@ impl Core {
     }
 }
 
-/// Knots of the AGH path: the end of the first letter, then the first move of the table, with all axes.
+/// Knots from the AGH path: the end of the first letter, then the first move of the table, with all axes.
 fn knots(count: usize) -> Vec<Knot> {
     let trajectory = Trajectory::plan(&gcode::read(takt_programs::AGH).expect("a path")).expect("short");
     let turns = trajectory.samples().position(|sample| sample.reference.angular_velocity[0] != 0.0);
@@ -160,17 +160,17 @@ fn knots(count: usize) -> Vec<Knot> {
     samples.map(knot).collect()
 }
 
-/// Largest errors of velocity and acceleration, of the tool in m/s and m/s², of the table in rad/s and rad/s²: differences of positions
-/// that are 1 ms apart, in binary32. Positions are rounded once.
+/// Limits on errors of velocity and acceleration, of the tool in m/s and m/s², of the table in rad/s and rad/s²: binary32 differences of
+/// positions 1 ms apart. Positions are rounded once.
 const ERRORS: [[f64; 2]; 2] = [[2e-7, 5e-4], [1e-6, 2e-3]];
 
 #[test]
-fn points_are_those_of_the_cubics() {
+fn points_lie_on_the_cubics() {
     let knots = knots(600);
     let first = Knot::at_rest(knots[0].position);
     let mut core = Core::new(first);
     assert_eq!(core.read("standing"), 1);
-    // It stands until enough of them wait.
+    // The core stands until enough knots wait.
     for knot in &knots[..BEGIN] {
         let point = core.period();
         assert_eq!(point[2], first.position[2] as f32, "{} wait", core.queue.len());
@@ -210,7 +210,7 @@ fn points_are_those_of_the_cubics() {
 }
 
 #[test]
-fn without_knots_it_brakes_on_the_tangent_and_stands() {
+fn without_knots_brakes_on_the_tangent_to_rest() {
     let velocity = [0.12, -0.16, 0.0, 0.1, 0.0];
     let position =
         |time: f64| -> [f64; AXES] { std::array::from_fn(|i| 0.01 * i as f64 + velocity[i] * time) };
@@ -221,7 +221,7 @@ fn without_knots_it_brakes_on_the_tangent_and_stands() {
         core.period();
     }
     assert_eq!(core.read("starved"), 0);
-    // 0.2 m/s with 8 m/s²: 25 ms.
+    // Braking from 0.2 m/s at 8 m/s² takes 25 ms.
     let mut before = core.period();
     let mut speeds = Vec::new();
     for period in 1..300 {
@@ -241,7 +241,7 @@ fn without_knots_it_brakes_on_the_tangent_and_stands() {
     for (period, speed) in speeds.iter().enumerate() {
         assert!((speed - expected(period)).abs() < 1e-4, "period {period}: {speed}");
     }
-    // Knots that come now are too late: it stands until it is started again.
+    // Late knots do not restart a core that has stopped.
     core.queue.push_back(knot(40));
     let starved = core.read("starved");
     let point = core.period();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The control law in binary64 from intermediate values: what remains to be judged when the rounding of lengths and
-//! positions, which the gains magnify, is taken as given.
+//! Control law in binary64 from the program's intermediate values: judges the law apart from the rounding of lengths and positions, which
+//! the gains magnify.
 
 use super::measure::ulp;
 use super::processor::FRICTION;
@@ -10,37 +10,37 @@ use takt_programs::hybrid::integrator::Integrator;
 use takt_programs::hybrid::kinematics::{JointReference, forward};
 use takt_programs::hybrid::{Reference, params};
 
-/// The source of a program's measured velocity.
+/// Source of a program's measured velocity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Velocity {
-    /// From differences of counts, which are exact.
+    /// Differences of counts, which are exact.
     Counts,
-    /// From differences of positions in binary32.
+    /// Differences of positions in binary32.
     Positions,
 }
 
-/// The measured positions of the five axes.
+/// Measured positions and velocities of the five axes.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Measured {
-    /// Positions, m and rad.
+pub(crate) struct Measurement {
+    /// Positions in m and rad.
     pub(crate) position: [f64; 5],
-    /// Velocities, m/s and rad/s.
+    /// Velocities in m/s and rad/s.
     pub(crate) velocity: [f64; 5],
 }
 
-impl Measured {
-    /// Positions and velocities without any rounding but that of binary64.
-    pub(crate) fn exact(previous: [i32; 5], counts: [i32; 5]) -> Measured {
+impl Measurement {
+    /// Positions and velocities rounded to binary64 only.
+    pub(crate) fn exact(previous: [i32; 5], counts: [i32; 5]) -> Measurement {
         let moved = |i: usize| f64::from(counts[i].wrapping_sub(previous[i]));
-        Measured {
+        Measurement {
             position: std::array::from_fn(|i| f64::from(counts[i]) * params::RESOLUTION[i]),
             velocity: std::array::from_fn(|i| moved(i) * (params::RESOLUTION[i] / params::SAMPLE_TIME)),
         }
     }
 
-    /// Positions and velocities as they come out in binary32 where every one is a conversion and one operation: `l_i
-    /// = n_i · 0.25e-6`, and `v = Δn · (0.25e-6/Ts)` or `v = Δl/Ts`.
-    pub(crate) fn rounded(previous: [i32; 5], counts: [i32; 5], from: Velocity) -> Measured {
+    /// Positions and velocities in binary32, each from a conversion and one operation: `l_i = n_i · 0.25e-6`, and `v = Δn · (0.25e-6/Ts)`
+    /// or `v = Δl/Ts`.
+    pub(crate) fn rounded(previous: [i32; 5], counts: [i32; 5], from: Velocity) -> Measurement {
         let scaled = |count: i32, by: f64| count as f32 * by as f32;
         let position = |i: usize| scaled(counts[i], params::RESOLUTION[i]);
         let velocity = |i: usize| match from {
@@ -51,48 +51,48 @@ impl Measured {
                 (position(i) - scaled(previous[i], params::RESOLUTION[i])) / params::SAMPLE_TIME as f32
             }
         };
-        Measured {
+        Measurement {
             position: std::array::from_fn(|i| f64::from(position(i))),
             velocity: std::array::from_fn(|i| f64::from(velocity(i))),
         }
     }
 }
 
-/// The force or torque of one axis.
+/// Force or torque of one axis.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Effort {
-    /// Its value, N or N·m.
+    /// Force, N, or torque, N·m.
     pub(crate) value: f64,
-    /// The largest of the terms that it is the sum of, of which the coupled inertia has that of a mass of all that moves: `M·a_d`, `M·KP·e`, `M·KV·v_d`, `M·KV·v`, `M·KI·s`, and of gravity the
-    /// largest over the arms, since an arm that carries little has its share from a difference of thirds. The terms of the
-    /// velocities count each, for one of them can be computed before the other is measured.
+    /// Largest of its terms `M·a_d`, `M·KP·e`, `M·KV·v_d`, `M·KV·v`, `M·KI·s` and gravity; the coupled inertia enters with the mass of all
+    /// moving parts. Gravity enters with the largest over the arms, since the share of an arm that carries little is a difference of
+    /// thirds. Both velocity terms enter by themselves, since one can be computed before the other is measured.
     pub(crate) largest: f64,
-    /// The force for a unit of acceleration: the mass, kg or kg·m².
+    /// Force per unit of acceleration: the mass, kg, or inertia, kg·m².
     pub(crate) mass: f64,
 }
 
 /// Steps 3 to 8 of the specification, with the state that they keep.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Law {
-    /// True if friction and coupled inertia are fed forward.
+    /// Feeds friction and coupled inertia forward.
     friction: bool,
     integrators: [Integrator<f64>; 5],
-    /// The integrators' values `s`.
+    /// Integrator values `s` of the five axes.
     pub(crate) sums: [f64; 5],
-    /// Ulps of each, one for every period, added up.
+    /// Accumulated ulps of each integrator value, one for every period.
     pub(crate) ulps: [f64; 5],
 }
 
 impl Law {
-    /// Of a program, before the first period.
+    /// Law of a program, before the first period.
     pub(crate) fn new(path: &str) -> Law {
         Law { friction: path == FRICTION, ..Law::default() }
     }
 
-    /// One period.
+    /// Computes the efforts of one period.
     pub(crate) fn step(
         &mut self,
-        measured: &Measured,
+        measured: &Measurement,
         joint: &JointReference<f64>,
         reference: &Reference<f64>,
     ) -> [Effort; 5] {

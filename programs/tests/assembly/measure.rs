@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Errors of the outputs, in the units in which a bound means something, and the bounds.
+//! Errors of the outputs, each in a unit in which a bound is meaningful, and the bounds.
 
-use super::law::{Effort, Law, Measured, Velocity};
+use super::law::{Effort, Law, Measurement, Velocity};
 use super::processor::{FRICTION, LITERAL, TRACKING, floats};
 use std::fmt::Write as _;
 use takt_programs::accuracy;
@@ -9,29 +9,29 @@ use takt_programs::hybrid::kinematics::inverse;
 use takt_programs::hybrid::ports::{INPUTS, OUTPUTS};
 use takt_programs::hybrid::{Controller, Inputs, JointReference, Outputs, params};
 
-/// Weight of the last place of the binary32 value nearest to a number.
+/// Unit in the last place of the binary32 value nearest to a number.
 pub(crate) fn ulp(value: f64) -> f64 {
     f64::from(accuracy::ulp(value as f32))
 }
 
-/// A largest value and where it was; NaN is the largest of all.
+/// Largest value with its period and output; NaN counts as the largest.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(crate) struct Largest {
+pub(crate) struct LargestError {
     pub(crate) value: f64,
     pub(crate) period: u64,
     pub(crate) output: &'static str,
 }
 
-impl Largest {
+impl LargestError {
     fn add(&mut self, value: f64, period: u64, output: &'static str) {
         let value = if value.is_nan() { f64::INFINITY } else { value };
         if value > self.value {
-            *self = Largest { value, period, output };
+            *self = LargestError { value, period, output };
         }
     }
 }
 
-/// Bounds of errors, one for each field of [`Figures`].
+/// Bounds on errors, one for each field of [`Figures`].
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Bounds {
     pub(crate) length: f64,
@@ -42,7 +42,7 @@ pub(crate) struct Bounds {
     pub(crate) sums: f64,
 }
 
-/// The bounds of a program, a third above what 100,000 random points and the scenarios show.
+/// Bounds for a program, a third above the errors of 100,000 random points and the scenarios.
 pub(crate) fn bounds(path: &str) -> Bounds {
     let length = if path == LITERAL { 2.0 } else { 1.5 };
     Bounds { length, velocity: 4.6, acceleration: 5.5, ideal: 2.2, law: 12.0, sums: 1.2 }
@@ -51,36 +51,35 @@ pub(crate) fn bounds(path: &str) -> Bounds {
 /// Largest errors of a run against binary64, given the same binary32 inputs.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct Figures {
-    /// `l_d` in ulps of itself.
-    pub(crate) length: Largest,
-    /// `v_d` in ulps of the tool's speed, of which it is a projection and may be any small part.
-    pub(crate) velocity: Largest,
-    /// `a_d` in ulps of the tool's acceleration, or of the centripetal part `|v|²/l` where that is larger.
-    pub(crate) acceleration: Largest,
-    /// `F` and `τ` against the golden controller, in units of what an ulp of the axis's position does to them.
+    /// Error of `l_d` in its own ulps.
+    pub(crate) length: LargestError,
+    /// Error of `v_d` in ulps of the tool's speed: `v_d` is a projection of it, and may be arbitrarily small.
+    pub(crate) velocity: LargestError,
+    /// Error of `a_d` in ulps of the tool's acceleration, or of the centripetal part `|v|²/l` where that is larger.
+    pub(crate) acceleration: LargestError,
+    /// Error of `F` and `τ` against the golden controller, in units of the effect of an ulp of the axis's position.
     ///
-    /// `l_d` and `l` are each rounded to a multiple of an ulp (6·10⁻⁸ m at 0.8 m) before they are subtracted, and the
-    /// difference is multiplied by `KP = 2.5·10⁵` and the mass: 0.6 N, a thousand times what any rounding after it
-    /// does. No program in binary32 is much better, and no bound in ulps of `F` itself could hold. Velocities magnify
-    /// less, except where they are differences of positions: through `KV/Ts`, 28 times as much as through `KP`. The
-    /// farther an axis is off, the more an ulp of the largest term counts. The unit is the sum of these, and of what
-    /// an ulp of position has integrated to so far.
-    pub(crate) ideal: Largest,
-    /// `F` and `τ` against [`Law`], given `l_d`, `v_d`, `a_d` as the program has them and the measured values as
-    /// binary32 has them, in ulps of the largest term and of the integrator's sums. Nothing is magnified here, so
-    /// this sees an error of a millionth in masses, gravity, gains and integrator. A dozen roundings lead to a force.
-    pub(crate) law: Largest,
-    /// The integrators against those of [`Law`], in ulps of the sum, one for each period: adding costs half of one,
-    /// the step another half while it is as large as the sum.
-    pub(crate) sums: Largest,
-    /// Outputs that should be an input bit for bit and are not.
+    /// `l_d` and `l` are each rounded to a multiple of an ulp (6·10⁻⁸ m at 0.8 m) before they are subtracted, and the difference is
+    /// multiplied by `KP = 2.5·10⁵` and the mass: 0.6 N, a thousand times the effect of any later rounding. No program in binary32 is much
+    /// better, and no bound in ulps of `F` itself could hold. Velocities magnify less, except where they are differences of positions:
+    /// through `KV/Ts`, 28 times as much as through `KP`. The farther an axis is off, the more an ulp of the largest term counts. The unit
+    /// is the sum of these, and of the integral of an ulp of position so far.
+    pub(crate) ideal: LargestError,
+    /// Error of `F` and `τ` against [`Law`], given the program's `l_d`, `v_d`, `a_d` and the measured values in binary32, in ulps of the
+    /// largest term and of the integrator's sums. No error is magnified here, so that errors of a millionth in masses, gravity, gains and
+    /// integrator show. A dozen roundings lead to a force.
+    pub(crate) law: LargestError,
+    /// Error of the integrators against [`Law`]'s, in ulps of the sum, one for each period: adding costs half an ulp, the step another half
+    /// while it is as large as the sum.
+    pub(crate) sums: LargestError,
+    /// Outputs that differ from the input that they should pass through.
     pub(crate) altered: u64,
-    /// Periods compared.
+    /// Number of periods compared.
     pub(crate) periods: u64,
 }
 
 impl Figures {
-    /// Checks that everything is within bounds; the error lists all that is not.
+    /// Checks all figures against their bounds; the error lists every violation.
     pub(crate) fn within(&self, bounds: &Bounds) -> Result<(), String> {
         let mut wrong = String::new();
         let pairs = [
@@ -91,7 +90,7 @@ impl Figures {
             ("effort against the law", self.law, bounds.law),
             ("integrator", self.sums, bounds.sums),
         ];
-        for (name, Largest { value, period, output }, bound) in pairs {
+        for (name, LargestError { value, period, output }, bound) in pairs {
             if value > bound {
                 let _ = writeln!(wrong, "{name}: {value:.3} > {bound} (period {period}, {output})");
             }
@@ -103,12 +102,12 @@ impl Figures {
     }
 }
 
-/// The golden controller of a program, at power-on.
+/// Golden controller of a program, at power-on.
 fn golden(path: &str) -> Controller<f64> {
     if path == FRICTION { Controller::with_friction() } else { Controller::new() }
 }
 
-/// The models that a program is compared with, period by period, and the errors so far.
+/// Models for comparison with a program, period by period, with the errors so far.
 #[derive(Clone)]
 pub(crate) struct Comparison {
     pub(crate) figures: Figures,
@@ -117,12 +116,12 @@ pub(crate) struct Comparison {
     controller: Controller<f64>,
     law: Law,
     previous: Option<[i32; 5]>,
-    /// The integral of an ulp of position in every period so far, by axis, as acceleration.
+    /// Integral of an ulp of position over all periods, by axis, as acceleration.
     drift: [f64; 5],
 }
 
 impl Comparison {
-    /// Before the first period.
+    /// Comparison before the first period.
     pub(crate) fn new(path: &str) -> Comparison {
         Comparison {
             figures: Figures::default(),
@@ -135,7 +134,7 @@ impl Comparison {
         }
     }
 
-    /// The models as at power-on; the errors stay.
+    /// Resets the models to power-on; keeps the errors.
     pub(crate) fn restart(&mut self) {
         self.controller = golden(&self.path);
         self.law = Law::new(&self.path);
@@ -143,7 +142,7 @@ impl Comparison {
         self.drift = [0.0; 5];
     }
 
-    /// Compares what a program gave out in a period, and the integrators' values that it kept if they are at hand.
+    /// Compares a program's outputs in a period, and its integrator values if available.
     pub(crate) fn add(&mut self, inputs: &Inputs, words: [u32; OUTPUTS.len()], sums: Option<[f64; 5]>) {
         let period = self.figures.periods;
         let reference = inputs.reference.convert::<f64>();
@@ -166,13 +165,13 @@ impl Comparison {
             let acceleration = (joint.acceleration[i] - truth.acceleration[i]).abs() / ulp(scale);
             figures.acceleration.add(acceleration, period, OUTPUTS[11 + i].name);
         }
-        // th4d th5d om4d om5d ep4d ep5d are the inputs alpha … eps_gamma, which come last on either side.
+        // The outputs th4d th5d om4d om5d ep4d ep5d are the inputs alpha … eps_gamma, which come last on either side.
         let sent = inputs.to_words();
         let passed = words[OUTPUTS.len() - 6..].iter().zip(&sent[INPUTS.len() - 6..]);
         self.figures.altered += passed.filter(|(out, into)| out != into).count() as u64;
 
         let previous = self.previous.replace(inputs.counts).unwrap_or(inputs.counts);
-        let measured = Measured::rounded(previous, inputs.counts, self.from);
+        let measured = Measurement::rounded(previous, inputs.counts, self.from);
         let efforts: [Effort; 5] = self.law.step(&measured, &joint, &reference);
         let golden = golden.to_array();
         let JointReference { length: l, velocity: v, angle, angular_velocity: omega, .. } = joint;
@@ -204,10 +203,10 @@ impl Comparison {
     }
 }
 
-/// The law, given positions without rounding and the golden joint reference, is the golden controller: what is
-/// compared with [`Law`] is compared with the specification.
+/// [`Law`], given unrounded positions and the golden joint reference, equals the golden controller: a comparison with it is a comparison
+/// with the specification.
 #[test]
-fn the_law_is_that_of_the_golden_controller() {
+fn law_equals_the_golden_controllers() {
     let mut random = super::inputs::Random::new(1);
     for turn in 0..1000 {
         let path = [TRACKING, FRICTION][turn % 2];
@@ -217,7 +216,7 @@ fn the_law_is_that_of_the_golden_controller() {
         for inputs in pair {
             let reference = inputs.reference.convert();
             let golden = controller.step(inputs.counts, &reference);
-            let efforts = law.step(&Measured::exact(previous, inputs.counts), &golden.joint, &reference);
+            let efforts = law.step(&Measurement::exact(previous, inputs.counts), &golden.joint, &reference);
             for (effort, golden) in efforts.iter().zip(golden.to_array()) {
                 assert!(
                     (effort.value - golden).abs() <= 1e-13 * effort.largest,

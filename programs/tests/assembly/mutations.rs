@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Single mistakes in `tracking.s` and `tracking_friction.s`, every one of which must be noticed: a test that cannot fail says nothing.
+//! Mutation test: every single mistake in `tracking.s` and `tracking_friction.s` must be noticed.
 //!
-//! Mistakes are made in the source's text: in every line with an instruction another operation, operands exchanged, a
-//! constant off by a ten-thousandth; in every named constant of the robot the same; and some by hand. Exchanged
-//! operands of sums and products are no mistake, and must not be taken for one.
+//! Mistakes change the source's text: in every line with an instruction another operation, operands exchanged, a constant off by a
+//! ten-thousandth; in every named constant of the robot the same; and some by hand. Exchanged operands of sums and products are no mistake,
+//! and must pass.
 
-use super::integrator::{self, Off};
+use super::integrator::{self, EncoderError};
 use super::measure::bounds;
 use super::points;
 use super::processor::{FRICTION, Processor, TRACKING, source};
@@ -15,15 +15,15 @@ use takt_programs::{LIBRARY, SOURCES};
 
 const ROBOT: &str = "hybrid/robot.s";
 
-/// A source with one line changed.
+/// Source with one line changed.
 struct Mutation {
     file: &'static str,
-    /// Line, from 0.
+    /// Line of the change, from 0.
     line: usize,
     to: String,
 }
 
-/// True if a line of `tracking.s` is in the part that only its variant assembles.
+/// The line of `tracking.s` is in a part that only its variant assembles.
 fn is_variants(line: usize) -> bool {
     let mut within = false;
     for text in source(TRACKING).lines().take(line) {
@@ -36,8 +36,8 @@ fn is_variants(line: usize) -> bool {
     within
 }
 
-/// True if a line of `tracking_friction.s` is in the part that only an axis with Stribeck's effect assembles: of that,
-/// [`friction`](super::friction) has a test.
+/// The line of `tracking_friction.s` is in a part that only an axis with Stribeck's effect assembles; [`friction`](super::friction) tests
+/// that part.
 fn is_sticking(line: usize) -> bool {
     let before = source(FRICTION).lines().take(line);
     before.fold(false, |within, text| match text.trim() {
@@ -47,13 +47,13 @@ fn is_sticking(line: usize) -> bool {
     })
 }
 
-/// The program that a mistake is in.
+/// Program that contains the mistake.
 fn victim(mutation: &Mutation) -> &'static str {
     let friction = mutation.file == FRICTION || mutation.file == TRACKING && is_variants(mutation.line);
     if friction { FRICTION } else { TRACKING }
 }
 
-/// The program with mistakes. On the machine with one slot, where any operation may write any register.
+/// Assembles the program with its mistakes, for the machine with one slot, where any operation may write any register.
 fn assemble(path: &str, mutations: &[Mutation]) -> Program {
     let mut loader = MemoryLoader::new(SOURCES);
     for file in [TRACKING, ROBOT, FRICTION] {
@@ -69,19 +69,19 @@ fn assemble(path: &str, mutations: &[Mutation]) -> Program {
     assembled.unwrap_or_else(|errors| panic!("{}", errors.render(false))).program
 }
 
-/// Runs the tests on a program; the error says in short what is wrong with it.
+/// Runs the tests on a program; the error names the first violation.
 fn judge(path: &str, program: &Program) -> Result<(), String> {
     let processor = Processor::new(program);
     let limits = bounds(path);
     points::measure(path, &processor, 250, 5).within(&limits)?;
-    for off in Off::ALL {
+    for off in EncoderError::ALL {
         let figures = integrator::measure(path, processor.clone(), off).map_err(|error| error.to_string())?;
         figures.within(&limits)?;
     }
     Ok(())
 }
 
-/// An instruction of a line: mnemonic and operands.
+/// Instruction of a line: mnemonic and operands.
 fn instruction(line: &str) -> Option<(&str, Vec<&str>)> {
     let code = line.split(';').next().unwrap_or_default().trim();
     let (mnemonic, operands) = code.split_once(' ')?;
@@ -89,7 +89,7 @@ fn instruction(line: &str) -> Option<(&str, Vec<&str>)> {
     known.then(|| (mnemonic, operands.split(',').map(str::trim).collect()))
 }
 
-/// Another operation that takes the same operands, and gives another result.
+/// Operation with the same operands and a different result.
 fn other(mnemonic: &str) -> &'static str {
     match mnemonic {
         "fadd" => "fsub",
@@ -105,31 +105,31 @@ fn other(mnemonic: &str) -> &'static str {
     }
 }
 
-/// True if an operand is a constant expression other than a name.
+/// The operand is a constant expression other than a name.
 fn is_expression(operand: &str) -> bool {
     operand.contains(['*', '/', '^', '(']) || operand.starts_with(|c: char| c.is_ascii_digit())
 }
 
-/// The factor by which a constant is multiplied: as little as must be noticed.
+/// Factor for a mistake in a constant: the smallest that must be noticed.
 ///
 /// - `ec` is a threshold between errors that are whole counts.
-/// - `fall` and what it follows from change only the second half of a boost; by a ten-thousandth, that is less than rounding.
-/// - The threshold for `tc ≤ Tc/2` is half a step off on purpose, and a step is 0.3 % of it.
+/// - `fall` and its sources change only the second half of a boost; a change by a ten-thousandth is less than rounding.
+/// - The threshold for `tc ≤ Tc/2` is deliberately half a step off, and a step is 0.3 % of it.
 fn factor(name: &str) -> &'static str {
     match name {
         "ec{i}" => "2.2",
         "fall" | "Tc" => "1.001",
         "xc*gain - fall/2" => "1.01",
-        // Matters only within a few v0 of standstill, where few points are.
+        // The constant matters only within a few v0 of standstill, where points are rare.
         "1/(v0)" => "1.1",
         _ => "1.0001",
     }
 }
 
-/// Lines that say the same in other words: `wu` and `t23` are only squared.
+/// Changes without effect: `wu` and `t23` are only squared.
 const EQUIVALENT: [&str; 2] = ["fsub wu, u, w", "fsub t23, w, t12"];
 
-/// Every mistake that is made by rule.
+/// Mistakes made by rule, in every line.
 fn by_rule() -> Vec<Mutation> {
     let mut mutations = Vec::new();
     for file in [TRACKING, ROBOT, FRICTION] {
@@ -169,7 +169,7 @@ fn by_rule() -> Vec<Mutation> {
     mutations
 }
 
-/// Mistakes of the kind that is made when formulas are copied: what to replace, and by what, in a line of its own.
+/// Typical mistakes in copying formulas: the text of a line, and its replacement.
 const BY_HAND: [(&str, &str); 12] = [
     ("fmul    xv, x, vx", "fmul    xv, x, vy"),
     ("fmul    za, z, az", "fmul    za, z, vz"),
@@ -212,7 +212,7 @@ fn every_mistake_is_noticed() {
 }
 
 #[test]
-fn what_is_no_mistake_is_not_taken_for_one() {
+fn equivalent_mutations_are_not_reported() {
     assert_eq!(judge(FRICTION, &assemble(FRICTION, &[])), Ok(()));
     assert_eq!(judge(TRACKING, &assemble(TRACKING, &[])), Ok(()));
     let lines = source(TRACKING).lines().enumerate();

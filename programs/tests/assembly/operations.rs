@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Operations of one period, beside Table 1 of the paper.
+//! Operations of one period, compared with Table 1 of the paper.
 
 use super::inputs::{moves, recorded};
 use super::processor::{PROGRAMS, Processor};
@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use takt_isa::{MACHINES, ROWS};
 
-/// Table 1 of the paper: operation, count, our mnemonics for it.
+/// Table 1 of the paper: operation, count, and our mnemonics for the operation.
 const PAPER: [(&str, u64, &[&str]); 7] = [
     ("+ -", 186, &["fadd", "fsub"]),
     ("*", 216, &["fmul"]),
@@ -18,7 +18,7 @@ const PAPER: [(&str, u64, &[&str]); 7] = [
     ("saturation", 5, &["fsat"]),
 ];
 
-/// Operations that the emulator counted in the second period, by mnemonic.
+/// Operations in the second period by mnemonic, counted by the emulator.
 fn counts(processor: &mut Processor) -> BTreeMap<&'static str, u64> {
     let inputs = recorded(&moves(..), 2);
     let before: Vec<_> = inputs

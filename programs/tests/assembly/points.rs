@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Random points of the workspace, all twenty outputs against binary64.
+//! Random points of the workspace: all twenty outputs against binary64.
 
 use super::inputs::{Random, pair};
 use super::measure::{Comparison, Figures, bounds};
 use super::processor::{PROGRAMS, Processor, full};
 use takt_isa::{MACHINES, T3};
 
-/// The errors of a program, fresh from reset for every point: a first period that gives it previous counts, then a
-/// second.
+/// Errors of a program at random points, from reset for every point: a first period supplies previous counts, a second is measured with
+/// them.
 pub(crate) fn measure(path: &str, processor: &Processor, points: u64, seed: u64) -> Figures {
     let mut random = Random::new(seed);
     let mut comparison = Comparison::new(path);
@@ -26,7 +26,7 @@ pub(crate) fn measure(path: &str, processor: &Processor, points: u64, seed: u64)
 fn outputs_are_right_anywhere_in_the_workspace() {
     for path in PROGRAMS {
         for &machine in MACHINES {
-            // Both machines compute the same bits (`agreement`), so one of them may take fewer.
+            // Fewer points suffice for the other machines, which compute the same bits as t3 (`agreement`).
             let many = if full() { 100_000 } else { 5_000 };
             let points = if *machine == T3 { many } else { many / 10 };
             let figures = measure(path, &Processor::shipped(path, machine), points, 2026);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The programs under test, and a program on the emulator as the controller of the hybrid robot.
+//! Programs under test, and an emulated program as the controller of the hybrid robot.
 
 use std::sync::{Arc, Mutex};
-use takt_asm::{Assembled, MemoryLoader, Options, Schedule, Search};
+use takt_asm::{AssembledProgram, MemoryLoader, Options, Schedule, Search};
 use takt_emu::{Emulator, PeriodError, PeriodReport};
 use takt_isa::{Machine, Program, Register};
 use takt_programs::hybrid::Binding;
@@ -10,31 +10,35 @@ use takt_programs::hybrid::ports::{INPUTS, OUTPUTS};
 use takt_programs::hybrid::{Inputs, Outputs, TrackingController};
 use takt_programs::{LIBRARY, SOURCES};
 
-/// `tracking.s`, shared work done once.
+/// Source `tracking.s`, with shared subexpressions computed once.
 pub(crate) const TRACKING: &str = "hybrid/tracking.s";
-/// `tracking_equations.s`, the same in equations.
+/// Source `tracking_equations.s`, the same algorithm as equations.
 pub(crate) const EQUATIONS: &str = "hybrid/tracking_equations.s";
-/// `tracking_literal.s`, every equation as printed.
+/// Source `tracking_literal.s`, every equation as printed.
 pub(crate) const LITERAL: &str = "hybrid/tracking_literal.s";
-/// `tracking_friction.s`, with friction and coupled inertia fed forward.
+/// Source `tracking_friction.s`, with friction and coupled inertia fed forward.
 pub(crate) const FRICTION: &str = "hybrid/tracking_friction.s";
-/// Each computes something else than the others.
+/// Sources that compute different results.
 pub(crate) const PROGRAMS: [&str; 3] = [TRACKING, LITERAL, FRICTION];
 
-/// True if there is time for everything: in release builds, and if `TAKT_FULL=1` asks for it.
+/// Permits long tests: in release builds, or with `TAKT_FULL=1`.
 pub(crate) fn full() -> bool {
     !cfg!(debug_assertions) || std::env::var_os("TAKT_FULL").is_some_and(|value| value == "1")
 }
 
-/// The text of a shipped source.
+/// Text of a shipped source.
 pub(crate) fn source(path: &str) -> &'static str {
     SOURCES.iter().find(|(name, _)| *name == path).map(|(_, text)| *text).expect("it is shipped")
 }
 
-/// A shipped program, assembled as `takt track` does; once, however many tests ask for it.
-pub(crate) fn assemble(path: &'static str, machine: &'static Machine, schedule: Schedule) -> Arc<Assembled> {
-    type Done = Vec<(&'static str, &'static Machine, Schedule, Arc<Assembled>)>;
-    static DONE: Mutex<Done> = Mutex::new(Vec::new());
+/// Assembles a shipped program as `takt track` does; caches the result for all tests.
+pub(crate) fn assemble(
+    path: &'static str,
+    machine: &'static Machine,
+    schedule: Schedule,
+) -> Arc<AssembledProgram> {
+    type AssembledPrograms = Vec<(&'static str, &'static Machine, Schedule, Arc<AssembledProgram>)>;
+    static DONE: Mutex<AssembledPrograms> = Mutex::new(Vec::new());
     let mut done = DONE.lock().expect("every shipped program is sound");
     if let Some((.., assembled)) = done.iter().find(|(p, m, s, _)| (*p, *m, *s) == (path, machine, schedule))
     {
@@ -51,25 +55,25 @@ pub(crate) fn assemble(path: &'static str, machine: &'static Machine, schedule: 
     assembled
 }
 
-/// The binary32 values of words.
+/// Binary32 values of words.
 pub(crate) fn floats<const N: usize>(words: [u32; N]) -> [f32; N] {
     words.map(f32::from_bits)
 }
 
-/// A program that has the tracking algorithm's ports, on the emulator.
+/// Program with the tracking algorithm's ports, on the emulator.
 #[derive(Clone)]
 pub(crate) struct Processor {
     emulator: Emulator,
     inputs: [Register; INPUTS.len()],
     outputs: [Register; OUTPUTS.len()],
-    /// The report of the last period.
+    /// Report of the last period.
     pub(crate) report: Option<PeriodReport>,
-    /// NaNs written to output ports since reset.
+    /// Number of NaNs written to output ports since reset.
     pub(crate) nan_writes: usize,
 }
 
 impl Processor {
-    /// The program loaded and reset. Panics if a port is missing or of another type.
+    /// Loads and resets a program. Panics if a port is missing or has another type.
     pub(crate) fn new(program: &Program) -> Processor {
         let Binding { inputs, outputs } = Binding::new(program).unwrap_or_else(|error| panic!("{error}"));
         Processor {
@@ -81,12 +85,12 @@ impl Processor {
         }
     }
 
-    /// A shipped program on a machine, as written.
+    /// Shipped program on a machine, with the schedule of its source.
     pub(crate) fn shipped(path: &'static str, machine: &'static Machine) -> Processor {
         Processor::new(&assemble(path, machine, Schedule::AsWritten).program)
     }
 
-    /// Runs a period; the outputs' words in the order of [`OUTPUTS`].
+    /// Runs a period; returns the outputs' words in the order of [`OUTPUTS`].
     pub(crate) fn period(
         &mut self,
         inputs: &[u32; INPUTS.len()],
@@ -97,7 +101,7 @@ impl Processor {
         let report = self.emulator.run_period(&[])?;
         self.nan_writes += report.nan_writes.len();
         self.report = Some(report);
-        // A port that was never written is as wrong as a NaN.
+        // An unwritten port counts as a NaN.
         Ok(self.outputs.map(|register| self.emulator.register(register).unwrap_or(f32::NAN.to_bits())))
     }
 
@@ -106,12 +110,12 @@ impl Processor {
         self.report.as_ref().expect("a period has run").cycles
     }
 
-    /// The machine.
+    /// Emulator with the program.
     pub(crate) fn emulator(&self) -> &Emulator {
         &self.emulator
     }
 
-    /// The word of a register by its name in the source.
+    /// Word of a register by its name in the source.
     pub(crate) fn state(&self, name: &str) -> u32 {
         let registers = &self.emulator.program().registers;
         let port = registers.iter().find(|port| port.name == name);

@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Helpers that several tests of the programs share.
+//! Helpers shared by tests of the programs.
 
 use std::path::Path;
 
-/// Compares a table in a document, between the line `<!-- table: NAME -->` and the next blank line, with what it should be;
-/// `TAKT_BLESS=1` writes it. The path is within the workspace.
+/// Compares a table in a document, between the line `<!-- table: NAME -->` and the next blank line, with its expected text; `TAKT_BLESS=1`
+/// writes it. The path is relative to the workspace.
 pub(crate) fn check_table(document: &str, name: &str, table: &str) {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(document);
+    let mut folders = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors();
+    let path = folders.find(|folder| folder.join("Cargo.lock").exists()).expect("a workspace").join(document);
     let text = std::fs::read_to_string(&path).expect("the document is there");
     let marker = format!("<!-- table: {name} -->\n");
     let (before, after) = text.split_once(&marker).unwrap_or_else(|| panic!("{document}: no {marker}"));
-    // A blank line that follows at once means that nothing stands there yet.
+    // A blank line right after the marker means an empty table.
     let (old, rest) = match after.strip_prefix('\n') {
         Some(rest) => ("", rest),
         None => after.split_once("\n\n").unwrap_or((after, "")),

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The listings of documents: each assembles on every machine, and takes the cycles that stand below it.
+//! Listings of documents: each assembles on every machine, and takes the cycles stated below it.
 
 use super::assemble_text;
 use crate::common;
@@ -11,7 +11,7 @@ use takt_programs::listings::{Listing, listings};
 const DOCUMENTS: &[&str] = &["docs/fast-code.md", "docs/library.md"];
 
 #[test]
-fn listings_take_what_the_documents_say() {
+fn listings_take_the_documented_cycles() {
     for document in DOCUMENTS {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(document);
         let text = std::fs::read_to_string(path).expect("the document is there");
@@ -35,9 +35,9 @@ fn listings_take_what_the_documents_say() {
     }
 }
 
-/// The programs that the book opens in the playground.
+/// Programs that the book opens in the playground.
 #[test]
-fn every_listing_is_of_a_program_that_assembles() {
+fn every_listings_program_assembles() {
     let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs");
     let mut documents: Vec<_> = std::fs::read_dir(docs)
         .expect("it is there")
@@ -50,7 +50,7 @@ fn every_listing_is_of_a_program_that_assembles() {
         let text = std::fs::read_to_string(&path).expect("it is text");
         for Listing { line, program, .. } in listings(&text) {
             let name = path.file_name().expect("it has one").to_string_lossy();
-            // The name is in the message if it does not assemble.
+            // The name appears in the message of a failure.
             assemble_text(&takt_isa::T3, &format!("{name}, line {line}.s"), &program);
             count += 1;
         }

@@ -1,24 +1,24 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! `programs/examples/`: each on every machine, over its recorded inputs, against the same written independently in binary64; and
-//! what each costs, in `docs/examples.md`.
+//! Examples in `programs/examples/`: each on every machine, over its recorded inputs, against an independent implementation in binary64;
+//! and their costs, in `docs/examples.md`.
 
 mod listings;
 mod reference;
 
 use reference::Reference;
 use takt_asm::loops::LoopForm;
-use takt_asm::{Assembled, MemoryLoader, Options, Search};
+use takt_asm::{AssembledProgram, MemoryLoader, Options, Search};
 use takt_emu::Emulator;
 use takt_isa::{MACHINES, Machine, Type};
 use takt_programs::{EXAMPLES, LIBRARY};
 
-/// An example, its reference, and how far the two may be apart.
+/// Example with its reference and its tolerance.
 struct Case {
     name: &'static str,
     reference: fn() -> Box<dyn Reference>,
-    /// Absolute, for each output, in its unit.
+    /// Absolute tolerance for each output, in its unit.
     tolerance: f64,
-    /// Periods to run if it has no inputs.
+    /// Number of periods to run without inputs.
     periods: usize,
 }
 
@@ -41,14 +41,14 @@ fn text(name: &str) -> Option<&'static str> {
     EXAMPLES.iter().find(|(file, _)| *file == name).map(|(_, text)| *text)
 }
 
-/// An example, assembled; a warning is an error.
-fn assemble(machine: &'static Machine, name: &str) -> Assembled {
+/// Assembles an example; a warning is an error.
+fn assemble(machine: &'static Machine, name: &str) -> AssembledProgram {
     let file = format!("{name}.s");
     let source = text(&file).unwrap_or_else(|| panic!("there is no {file}"));
     assemble_text(machine, &file, source)
 }
 
-fn assemble_text(machine: &'static Machine, file: &str, source: &str) -> Assembled {
+fn assemble_text(machine: &'static Machine, file: &str, source: &str) -> AssembledProgram {
     let loader = Search::new(MemoryLoader::of(file, source)).library(LIBRARY);
     let options = Options { machine, ..Options::default() };
     let assembled = takt_asm::assemble(file, &loader, &options);
@@ -57,8 +57,8 @@ fn assemble_text(machine: &'static Machine, file: &str, source: &str) -> Assembl
     assembled
 }
 
-/// The rows of an example's inputs, in the order of its ports.
-fn rows(case: &Case, assembled: &Assembled) -> Vec<Vec<f32>> {
+/// Rows of an example's inputs, in the order of its ports.
+fn rows(case: &Case, assembled: &AssembledProgram) -> Vec<Vec<f32>> {
     let Some(csv) = text(&format!("{}.csv", case.name)) else {
         return vec![Vec::new(); case.periods];
     };
@@ -68,8 +68,8 @@ fn rows(case: &Case, assembled: &Assembled) -> Vec<Vec<f32>> {
     rows.lines().map(|row| row.split(',').map(|value| value.parse().expect("a number")).collect()).collect()
 }
 
-/// Runs an example; the cycles of its periods after the first, which `.once` precedes.
-fn run(case: &Case, machine: &'static Machine, assembled: &Assembled, wrong: &mut Vec<String>) -> u64 {
+/// Runs an example; returns the cycles of its periods after the first, which also runs `.once`.
+fn run(case: &Case, machine: &'static Machine, assembled: &AssembledProgram, wrong: &mut Vec<String>) -> u64 {
     let name = format!("{} on {}", case.name, machine.name);
     let program = &assembled.program;
     let mut emulator = Emulator::new(program).expect("it fits");
@@ -96,7 +96,7 @@ fn run(case: &Case, machine: &'static Machine, assembled: &Assembled, wrong: &mu
             }
         }
     }
-    // The tolerance is no looser than it need be.
+    // The tolerance is at most eight times the largest difference.
     if largest > case.tolerance || largest * 8.0 < case.tolerance {
         wrong.push(format!("{name}: {largest:e} apart, {:e} allowed; {worst}", case.tolerance));
     }
@@ -105,7 +105,7 @@ fn run(case: &Case, machine: &'static Machine, assembled: &Assembled, wrong: &mu
 }
 
 #[test]
-fn examples_compute_what_they_ought_to_in_the_documented_time() {
+fn examples_compute_expected_values_in_documented_cycles() {
     let mut table = String::from("| example | operations |");
     let mut rule = String::from("|---|---|");
     for machine in MACHINES {
@@ -121,7 +121,7 @@ fn examples_compute_what_they_ought_to_in_the_documented_time() {
             let assembled = assemble(machine, case.name);
             let cycles = run(case, machine, &assembled, &mut wrong);
             if assembled.counted_loops.iter().any(|counted| !matches!(counted.form, LoopForm::Unrolled(_))) {
-                // Its period is several blocks, some of which run often.
+                // Periods with loops have several blocks, and some blocks run repeatedly.
                 operations = operations.max(assembled.blocks.iter().map(|block| block.operations).sum());
                 row += &format!(" {cycles} | |");
                 continue;

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The examples once more, in binary64, from their equations: with matrices, loops and branches, not from their sources.
+//! References of the examples in binary64, written from their equations with matrices, loops and branches, not from their sources.
 
 use std::f64::consts::PI;
 
-/// A controller in binary64.
+/// Controller of an example in binary64.
 pub(crate) trait Reference {
-    /// The outputs of a period, in the order of the source.
+    /// Outputs of a period, in the order of the source.
     fn period(&mut self, inputs: &[f64]) -> Vec<f64>;
 }
 
@@ -46,7 +46,7 @@ impl Reference for Foc {
         let (resistance, ld, lq, flux) = (0.35, 0.9e-3, 1.1e-3, 0.012);
         let bandwidth = 2.0 * PI * 800.0;
         let third = -ia - ib;
-        // Park's transform straight from the phases.
+        // Park transform straight from the phases.
         let angles = [theta, theta - 2.0 * PI / 3.0, theta + 2.0 * PI / 3.0];
         let sum = |f: fn(f64) -> f64| {
             2.0 / 3.0 * [ia, ib, third].iter().zip(angles).map(|(i, angle)| i * f(angle)).sum::<f64>()
@@ -123,7 +123,7 @@ impl Reference for Kalman {
     fn period(&mut self, inputs: &[f64]) -> Vec<f64> {
         let t = 0.01;
         let model = [[1.0, 0.0, t, 0.0], [0.0, 1.0, 0.0, t], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
-        // The effect on the state of an acceleration in each direction.
+        // Effect of an acceleration in each direction on the state.
         let noise = [[t * t / 2.0, 0.0], [0.0, t * t / 2.0], [t, 0.0], [0.0, t]];
         let state: [f64; 4] = std::array::from_fn(|i| (0..4).map(|k| model[i][k] * self.state[k]).sum());
         let mut p = product(&product(&model, &self.covariance), &transposed(&model));
@@ -141,7 +141,7 @@ impl Reference for Kalman {
         for i in 0..4 {
             self.state[i] = state[i] + (0..2).map(|k| gain[i][k] * (inputs[k] - state[k])).sum::<f64>();
         }
-        // Joseph's form.
+        // Joseph form of the covariance update.
         let rest: Matrix = std::array::from_fn(|i| {
             std::array::from_fn(|j| f64::from(u8::from(i == j)) - if j < 2 { gain[i][j] } else { 0.0 })
         });
@@ -156,7 +156,7 @@ impl Reference for Kalman {
     }
 }
 
-/// A controller in state space, with the matrices that its source has.
+/// Controller in state space, with the matrices of its source.
 pub(crate) struct StateSpace {
     state: Vec<f64>,
     a: Vec<f64>,
@@ -198,7 +198,7 @@ pub(crate) struct Lu {
 }
 
 impl Reference for Lu {
-    /// By Gauss and Jordan.
+    /// Solves by Gauss-Jordan elimination.
     fn period(&mut self, inputs: &[f64]) -> Vec<f64> {
         let mut rows: Vec<Vec<f64>> = inputs.chunks(5).map(<[f64]>::to_vec).collect();
         for k in 0..4 {

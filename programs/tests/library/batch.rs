@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A straight-line program's period, over many operands at once: each operation in the order of its bundles, by the machine's
-//! arithmetic. What a machine computes does not depend on when (interlocks see to that), so that this is the emulator's
-//! result, many times faster; `functions.rs` compares the two.
+//! Period of a straight-line program over many operands at once: each operation in the order of its bundles, by the machine's arithmetic.
+//! The interlocks make a machine's results independent of timing, so that this is the emulator's result, many times faster; `functions.rs`
+//! compares the two.
 
 use std::collections::HashMap;
 use takt_isa::fp::{Flags, Host};
 use takt_isa::spec::check::MAX_SLOTS;
 use takt_isa::{Effect, Program, ROWS, Register, compute};
 
-/// Operands at once: what the first-level cache holds beside some dozens of registers.
+/// Operands at once: as many as the first-level cache holds with some dozens of registers.
 pub(crate) const LANES: usize = 128;
 
 type Column = [u32; LANES];
 type Kernel = fn(&Column, &Column, &Column, &mut Column, &mut [Flags; LANES]);
 
-/// One operation over all lanes, of the row of a number that the compiler knows, so that the loop holds its arithmetic only.
+/// Operation of one row over all lanes; the row is a compile-time constant, so that the loop contains its arithmetic only.
 fn kernel<const ROW: usize>(a: &Column, b: &Column, c: &Column, d: &mut Column, flags: &mut [Flags; LANES]) {
     if ROW >= ROWS.len() {
         return;
@@ -36,7 +36,7 @@ const KERNELS: [Kernel; 64] = kernels!(
 );
 const _: () = assert!(ROWS.len() <= KERNELS.len());
 
-/// An operation on columns.
+/// Operation on columns of registers.
 #[derive(Clone, Copy)]
 struct Step {
     kernel: Kernel,
@@ -44,20 +44,20 @@ struct Step {
     sources: [usize; 3],
 }
 
-/// A program's period on columns of registers.
+/// Period of a program on columns of registers.
 #[derive(Clone)]
 pub(crate) struct Batch {
-    /// Of each bundle, its operations.
+    /// Operations of each bundle.
     bundles: Vec<Vec<Step>>,
     columns: Vec<Column>,
     inputs: Vec<usize>,
     output: usize,
-    /// The flags that each lane has raised.
+    /// Flags that each lane has raised.
     pub(crate) flags: [Flags; LANES],
 }
 
 impl Batch {
-    /// The period of a program with one output, without branches and loads.
+    /// Period of a program with one output, without branches and loads.
     pub(crate) fn new(program: &Program) -> Batch {
         let mut columns = vec![[0; LANES]];
         let mut places = HashMap::from([(Register::ZERO, 0)]);
@@ -98,7 +98,7 @@ impl Batch {
         Batch { bundles, columns, inputs, output, flags: [Flags::NONE; LANES] }
     }
 
-    /// The results of operands, port by port.
+    /// Results for columns of operands, one per port.
     pub(crate) fn run(&mut self, operands: &[Column]) -> &Column {
         self.flags = [Flags::NONE; LANES];
         for (&input, operand) in self.inputs.iter().zip(operands) {
@@ -106,7 +106,7 @@ impl Batch {
         }
         let mut results = [[0; LANES]; MAX_SLOTS];
         for bundle in &self.bundles {
-            // Every operation of a bundle reads before any writes.
+            // All operations of a bundle read before any writes.
             for (step, result) in bundle.iter().zip(&mut results) {
                 let [a, b, c] = step.sources.map(|source| &self.columns[source]);
                 (step.kernel)(a, b, c, result, &mut self.flags);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The cost of each macro, in `docs/library.md`.
+//! Cost of each macro, in `docs/library.md`.
 
 use super::functions::functions;
 use super::pairs::POW_ERROR;
@@ -7,18 +7,18 @@ use super::{assemble, one_use};
 use crate::common::check_table;
 use takt_isa::{MACHINES, Machine};
 
-/// Uses beside one another.
+/// Number of independent uses scheduled together.
 const TOGETHER: u32 = 8;
 
-/// Operations and cycles from operand to result, of one use.
-fn block(assembled: &takt_asm::Assembled) -> (u32, u32) {
+/// Operations, and cycles from operand to result, of one use.
+fn block(assembled: &takt_asm::AssembledProgram) -> (u32, u32) {
     let block = assembled.blocks.iter().find(|block| block.label.as_deref() == Some("period"));
     let block = block.expect("it is scheduled");
-    // The last bundle is that of the `wait`, which issues when the result is written.
+    // Exclude the `wait`, whose bundle issues when the result is written.
     (block.operations - 1, block.cycles - 1)
 }
 
-/// Of a macro whose eight uses are more than a program memory holds.
+/// Cost of a single use, for a macro that fills the program memory with eight uses.
 fn one_use_cost(usage: &str) -> String {
     let costs = MACHINES.iter().map(|machine| {
         let (operations, latency) = block(&one_use(machine, usage, 2, ""));
@@ -27,7 +27,7 @@ fn one_use_cost(usage: &str) -> String {
     costs.collect::<Vec<_>>().join(" | ")
 }
 
-/// Operations, cycles from operand to result, and cycles of each of eight beside one another.
+/// Cost of a macro: operations, cycles from operand to result, and cycles per use with eight independent uses.
 fn cost(machine: &'static Machine, usage: &dyn Fn(&str, &str) -> String, operands: usize) -> String {
     let (operations, latency) = block(&one_use(machine, &usage("d", "x"), operands, ""));
     let mut text = String::from(".input y\n");
@@ -47,8 +47,8 @@ fn cost(machine: &'static Machine, usage: &dyn Fn(&str, &str) -> String, operand
 }
 
 #[test]
-fn the_documented_cost_is_what_it_costs() {
-    // The source states the errors too.
+fn documented_costs_equal_the_measured_ones() {
+    // The source also states the errors.
     let source = takt_programs::LIBRARY.iter().find(|(name, _)| *name == "math.s").expect("it is there").1;
     let states = |name: &str, error: f64| {
         let (before, _) = source.split_once(&format!("\n.macro {name} ")).expect("it is there");

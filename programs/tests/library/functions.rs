@@ -1,58 +1,69 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The macros of one operand: what is known of each, and its measurement.
+//! Macros of one operand: their properties, and the measurement of their errors.
 
-use super::measure::{Measured, check_emulator, every, full};
+use super::measure::{ErrorStatistics, check_emulator, every, full};
 use super::one_use;
 use takt_isa::fp::Flags;
 use takt_isa::{MACHINES, Machine};
 
-/// A macro of one operand.
+/// Macro of one operand.
 pub(crate) struct Function {
     pub(crate) name: &'static str,
-    /// The correctly rounded result.
+    /// Correctly rounded result in binary32.
     pub(crate) nearest: fn(f32) -> f32,
-    /// The same of a wider operand, to measure by.
+    /// Result in binary64, for the measurement of errors.
     pub(crate) exact: fn(f64) -> f64,
-    /// The largest error, ulp, found over every operand, on every machine; 0 where the result is always the nearest.
+    /// Largest error, ulp, over every operand on every machine; 0 for results that are always the nearest.
     pub(crate) error: f64,
-    /// True if that figure is this test's own: an instruction's stands in the manual.
+    /// The error is established by this test; an instruction's is in the manual.
     pub(crate) own: bool,
-    /// Beyond this magnitude, and of a NaN, the result is NaN and invalid.
+    /// Limit of the domain: beyond this magnitude, the result is NaN and invalid.
     pub(crate) limit: f32,
-    /// True if a NaN comes out as it went in, unless `noisy` says that a signaling one raises invalid.
+    /// Pole: finite operand with an infinite result that is no overflow.
+    pub(crate) pole: f32,
+    /// Treatment of a NaN operand.
     pub(crate) passes: Passes,
 }
 
-/// The treatment of a NaN.
+/// Treatment of a NaN.
 #[derive(Clone, Copy, PartialEq)]
 pub(crate) enum Passes {
-    /// The canonical one comes out; invalid of a signaling one.
+    /// The result is the canonical NaN; a signaling NaN raises invalid.
     Canonical,
-    /// It comes out as it is, and raises nothing.
+    /// The result is the operand's NaN, without flags.
     Untouched,
-    /// It comes out as it is; invalid of a signaling one.
+    /// The result is the operand's NaN; a signaling NaN raises invalid.
     Noisy,
-    /// The canonical one comes out, and invalid.
+    /// The result is the canonical NaN and raises invalid.
     Refused,
 }
 
 fn whole(name: &'static str, nearest: fn(f32) -> f32, passes: Passes) -> Function {
-    Function { name, nearest, exact: |x| x, error: 0.0, own: true, limit: f32::INFINITY, passes }
+    Function { name, nearest, exact: |x| x, error: 0.0, own: true, limit: f32::INFINITY, pole: 0.0, passes }
 }
 
 fn smooth(name: &'static str, nearest: fn(f32) -> f32, exact: fn(f64) -> f64, error: f64) -> Function {
-    Function { name, nearest, exact, error, own: true, limit: f32::INFINITY, passes: Passes::Canonical }
+    Function {
+        name,
+        nearest,
+        exact,
+        error,
+        own: true,
+        limit: f32::INFINITY,
+        pole: 0.0,
+        passes: Passes::Canonical,
+    }
 }
 
-/// 2π·64, as for the machine's sine.
+/// Limit 2π·64, like the machine's sine.
 const TURNS: f32 = f32::from_bits(takt_isa::fp::SIN_LIMIT);
 
-/// 1/(1 + e^-x).
+/// Logistic function 1/(1 + e^-x).
 fn logistic(x: f64) -> f64 {
     1.0 / (1.0 + core_math::exp(-x))
 }
 
-/// Every macro of one operand on a machine.
+/// All macros of one operand on a machine.
 pub(crate) fn functions(machine: &Machine) -> Vec<Function> {
     let has_arctangent =
         takt_isa::Op::from_mnemonic("fatan2").is_some_and(|op| machine.host(op.row().function).is_some());
@@ -70,7 +81,9 @@ pub(crate) fn functions(machine: &Machine) -> Vec<Function> {
         whole("round", f32::round, Passes::Untouched),
         whole("rint", f32::round_ties_even, Passes::Noisy),
         smooth("exp", core_math::expf, core_math::exp, 0.81123),
+        smooth("expm1", core_math::expm1f, core_math::expm1, 1.25283),
         smooth("log", core_math::logf, core_math::log, 0.81752),
+        Function { pole: -1.0, ..smooth("log1p", core_math::log1pf, core_math::log1p, 1.4375) },
         Function { limit: TURNS, passes: Passes::Refused, ..tan },
         Function {
             name: "tan_quick",
@@ -83,6 +96,7 @@ pub(crate) fn functions(machine: &Machine) -> Vec<Function> {
         atan,
         smooth("tanh", core_math::tanhf, core_math::tanh, 0.98208),
         smooth("tanh_quick", core_math::tanhf, core_math::tanh, 5.9925),
+        smooth("erf", core_math::erff, core_math::erf, 6.43092),
         smooth("sigmoid", |x| logistic(f64::from(x)) as f32, logistic, 2.40188),
         Function {
             passes: Passes::Noisy,
@@ -97,7 +111,7 @@ pub(crate) fn functions(machine: &Machine) -> Vec<Function> {
 }
 
 impl Function {
-    /// The flags that a use raises.
+    /// Flags that a use raises.
     fn flags(&self, x: f32, result: f32) -> Flags {
         let signaling = x.is_nan() && x.to_bits() & 0x0040_0000 == 0;
         if x.is_nan() {
@@ -110,14 +124,14 @@ impl Function {
         }
         match (result.is_nan(), result.is_infinite() && x.is_finite()) {
             (true, _) => Flags::INVALID,
-            (_, true) if x == 0.0 => Flags::DIVIDE_BY_ZERO,
+            (_, true) if x == self.pole => Flags::DIVIDE_BY_ZERO,
             (_, true) => Flags::OVERFLOW,
             _ => Flags::NONE,
         }
     }
 
-    /// Takes up a result.
-    pub(crate) fn take(&self, measured: &mut Measured, x: u32, result: u32, flags: Flags) {
+    /// Checks and records a result.
+    pub(crate) fn take(&self, measured: &mut ErrorStatistics, x: u32, result: u32, flags: Flags) {
         let operand = f32::from_bits(x);
         let got = f32::from_bits(result);
         let refused = operand.abs() > self.limit;
@@ -151,7 +165,7 @@ fn measure(name: &str) {
         let function = function.expect("it is in the list");
         let program = one_use(machine, &format!("{name} d, x"), 1, "clrflags").program;
         check_emulator(&program, 1);
-        // The same operations compute it on every machine, but for what depends on what the machine has.
+        // Macros compute the same operations on every machine, except `atan`, which depends on the machine's units.
         if full() && machine.name != MACHINES[0].name && name != "atan" {
             continue;
         }
@@ -162,7 +176,7 @@ fn measure(name: &str) {
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
-/// A test for each, so that one can be run alone.
+/// Separate test for each macro, so that each can run alone.
 macro_rules! tests {
     ($($name:ident)*) => {
         $(#[test]
@@ -180,4 +194,4 @@ macro_rules! tests {
     };
 }
 
-tests!(floor ceil trunc round rint exp log tan tan_quick asin atan tanh tanh_quick sigmoid elu);
+tests!(floor ceil trunc round rint exp expm1 log log1p tan tan_quick asin atan tanh tanh_quick erf sigmoid elu);

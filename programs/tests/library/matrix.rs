@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! `programs/library/matrix.s` against the same loops in Rust: in binary32, bit for bit, and in binary64, which says that they
-//! compute what they should.
+//! Macros of `programs/library/matrix.s` against the same loops in Rust: bit for bit in binary32, and in binary64 to check the results.
 
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::{Rng as _, SeedableRng as _};
@@ -9,7 +8,7 @@ use takt_emu::Emulator;
 use takt_isa::{MACHINES, Machine};
 use takt_programs::LIBRARY;
 
-/// The values that the loops are written in.
+/// Number types of the loops.
 trait Number:
     Copy
     + std::ops::Mul<Output = Self>
@@ -39,7 +38,7 @@ impl Number for f64 {
     }
 }
 
-/// A matrix by rows.
+/// Matrix stored by rows.
 #[derive(Clone)]
 struct Matrix<N> {
     columns: usize,
@@ -47,7 +46,7 @@ struct Matrix<N> {
 }
 
 impl<N: Number> Matrix<N> {
-    /// `n` by `columns`, each element from its row and column.
+    /// Matrix of `n` rows and `columns` columns, with elements by row and column.
     fn new(n: usize, columns: usize, element: impl Fn(usize, usize) -> N) -> Matrix<N> {
         let values =
             (0..n).flat_map(|i| (0..columns).map(move |j| (i, j))).map(|(i, j)| element(i, j)).collect();
@@ -63,7 +62,7 @@ impl<N: Number> Matrix<N> {
     }
 }
 
-/// Added up in order.
+/// Sum in order of the index.
 fn sum<N: Number>(count: usize, part: impl Fn(usize) -> N) -> N {
     (1..count).fold(part(0), |sum, i| sum + part(i))
 }
@@ -76,7 +75,7 @@ fn turned<N: Number>(a: &Matrix<N>) -> Matrix<N> {
     Matrix::new(a.columns, a.rows(), |i, j| a.at(j, i))
 }
 
-/// The solution of A·x = b by Cholesky's factors.
+/// Solution of A·x = b by Cholesky factors.
 fn solved<N: Number>(a: &Matrix<N>, b: &[N]) -> Vec<N> {
     let n = b.len();
     let less = |value: N, count: usize, part: &dyn Fn(usize) -> N| {
@@ -105,7 +104,7 @@ fn solved<N: Number>(a: &Matrix<N>, b: &[N]) -> Vec<N> {
     x
 }
 
-/// All that the program below computes, in the order of its outputs, from A (3×4), B (4×2), x (4), y (3).
+/// Expected outputs of the program below, in their order, from A (3×4), B (4×2), x (4), y (3).
 fn computed<N: Number>(inputs: &[f32]) -> Vec<N> {
     let mut inputs = inputs.iter().map(|value| N::of(*value));
     let mut matrix =
@@ -123,12 +122,12 @@ fn computed<N: Number>(inputs: &[f32]) -> Vec<N> {
     all.push(sum(3, |i| u[i] * v[i]));
     all.push(sum(4, |i| x.values[i] * x.values[i]).root());
     all.push(sum(3, |i| v[i] * sum(4, |j| a.at(i, j) * x.values[j])));
-    // A·Aᵀ + 2·1, symmetric and positive definite, and the equations with it.
+    // Matrix A·Aᵀ + 2·1, symmetric and positive definite, and a linear system with it.
     let squared = Matrix::new(3, 3, |i, j| sum(4, |k| a.at(i, k) * a.at(j, k)));
     let one = |i, j| N::of(if i == j { 1.0 } else { 0.0 });
     let definite = Matrix::new(3, 3, |i, j| squared.at(i, j) + N::of(2.0) * one(i, j));
     all.extend(solved(&definite, v));
-    // ½·x·yᵀ, and y + x₁·A·x.
+    // Outputs ½·x·yᵀ, and y + x₁·A·x.
     let outer = Matrix::new(3, 3, |i, j| x.values[i] * v[j]);
     let scaled = Matrix::new(3, 3, |i, j| N::of(0.5) * outer.at(i, j));
     all.extend(&turned(&scaled).values);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Errors in units in the last place, and the operands they are measured over.
+//! Errors in units in the last place, and the operands of their measurement.
 
 use super::batch::{Batch, LANES};
 use std::thread;
@@ -7,7 +7,7 @@ use takt_emu::Emulator;
 use takt_isa::Program;
 use takt_isa::fp::Flags;
 
-/// Operands where functions change their ways, positive.
+/// Positive operands at which functions change their algorithm.
 const NOTABLE: &[u32] = &[
     0,
     1,
@@ -53,12 +53,12 @@ const NOTABLE: &[u32] = &[
     0x7fff_ffff,
 ];
 
-/// The notable operands of both signs.
+/// Notable operands of both signs.
 pub(crate) fn notable() -> impl Iterator<Item = u32> + Clone {
     NOTABLE.iter().flat_map(|&x| [x, x | 1 << 31])
 }
 
-/// SplitMix64.
+/// SplitMix64 generator of operands.
 pub(crate) struct Random(pub(crate) u64);
 
 impl Random {
@@ -70,23 +70,23 @@ impl Random {
     }
 }
 
-/// True if there is time for everything: `TAKT_FULL=1`.
+/// Permits measurements over all operands: `TAKT_FULL=1`.
 pub(crate) fn full() -> bool {
     std::env::var_os("TAKT_FULL").is_some_and(|value| value == "1")
 }
 
-/// The result of a measurement.
+/// Result of a measurement.
 #[derive(Clone, Copy, Default, Debug)]
-pub(crate) struct Measured {
+pub(crate) struct ErrorStatistics {
     pub(crate) operands: u64,
-    /// Results that are not the nearest binary32.
+    /// Results other than the nearest binary32.
     missed: u64,
     largest: f64,
     worst: [u32; 2],
 }
 
-impl Measured {
-    /// Takes up a result that is not the nearest.
+impl ErrorStatistics {
+    /// Records a result other than the nearest.
     pub(crate) fn miss(&mut self, operands: [u32; 2], got: f32, exact: f64) {
         let error = (f64::from(got) - exact).abs() / ulp(exact);
         assert!(error < 16.0, "{operands:08x?} gives {got:e}, not {exact:e}");
@@ -96,13 +96,14 @@ impl Measured {
         }
     }
 
-    pub(crate) fn join(self, other: Measured) -> Measured {
+    pub(crate) fn join(self, other: ErrorStatistics) -> ErrorStatistics {
         let worse = if other.largest > self.largest { other } else { self };
         let (operands, missed) = (self.operands + other.operands, self.missed + other.missed);
-        Measured { operands, missed, ..worse }
+        ErrorStatistics { operands, missed, ..worse }
     }
 
-    /// Checks that it is at most what is documented, and, where it is to be tight, after every operand no less; if not, the figures.
+    /// Checks the largest error against the documented one: it must not exceed it, and with `tight`, after a run over all operands, must
+    /// reach it. Returns the figures of a failure.
     #[must_use]
     pub(crate) fn check(self, name: &str, documented: f64, tight: bool) -> Option<String> {
         let share = 100.0 * self.missed as f64 / self.operands as f64;
@@ -116,20 +117,23 @@ impl Measured {
     }
 }
 
-/// The distance between binary32 numbers at `exact`.
+/// Distance between binary32 numbers at `exact`.
 fn ulp(exact: f64) -> f64 {
     let exponent = (exact.abs().to_bits() >> 52) as i64 - 1023;
     2_f64.powi((exponent.max(-126) - 23) as i32)
 }
 
 /// Runs the notable operands and every operand, or a sample of one in 4,099 (`TAKT_STRIDE=n`: in n), through a program of one operand.
-pub(crate) fn every(program: &Program, take: impl Fn(&mut Measured, u32, u32, Flags) + Sync) -> Measured {
+pub(crate) fn every(
+    program: &Program,
+    take: impl Fn(&mut ErrorStatistics, u32, u32, Flags) + Sync,
+) -> ErrorStatistics {
     let asked = std::env::var("TAKT_STRIDE").ok().map(|text| text.parse().expect("TAKT_STRIDE is a number"));
     let stride = if full() { 1 } else { asked.unwrap_or(4099).max(1_u64) };
     let count = (1_u64 << 32).div_ceil(stride);
     let batch = Batch::new(program);
     let piece = |range: std::ops::Range<u64>| {
-        let (mut batch, mut measured) = (batch.clone(), Measured::default());
+        let (mut batch, mut measured) = (batch.clone(), ErrorStatistics::default());
         let mut run = |operands: &[u32; LANES]| {
             let results = *batch.run(std::slice::from_ref(operands));
             for ((&x, result), flags) in operands.iter().zip(results).zip(batch.flags) {
@@ -152,10 +156,10 @@ pub(crate) fn every(program: &Program, take: impl Fn(&mut Measured, u32, u32, Fl
         }
         measured
     };
-    parallel(count, piece).into_iter().fold(Measured::default(), Measured::join)
+    parallel(count, piece).into_iter().fold(ErrorStatistics::default(), ErrorStatistics::join)
 }
 
-/// Cuts `0..count` into one piece per core, runs `work` on each, and returns what each gave.
+/// Splits `0..count` into one range per core, runs `work` on each, and returns the results.
 pub(crate) fn parallel<T: Send>(count: u64, work: impl Fn(std::ops::Range<u64>) -> T + Sync) -> Vec<T> {
     let pieces = thread::available_parallelism().map_or(1, |n| n.get() as u64);
     thread::scope(|scope| {
@@ -172,7 +176,7 @@ pub(crate) fn parallel<T: Send>(count: u64, work: impl Fn(std::ops::Range<u64>) 
     })
 }
 
-/// That columns give what the emulator does, flags included, over the notable operands and 2,000 random ones.
+/// Columns give the emulator's results, flags included, over the notable operands and 2,000 random ones.
 pub(crate) fn check_emulator(program: &Program, operands: usize) {
     assert_eq!(program.inputs.len(), operands);
     let mut batch = Batch::new(program);

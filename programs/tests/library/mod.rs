@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! `programs/library/math.s`: what each macro's error is, what it raises, what it costs, on every machine; and
-//! `programs/library/matrix.s` ([`matrix`]).
+//! Library `programs/library/math.s`: the error, flags and cost of each macro on every machine; and `programs/library/matrix.s`
+//! ([`matrix`]).
 //!
-//! By default over a sample of operands; with `TAKT_FULL=1` over all 2³², then the figures must come out exactly:
+//! By default over a sample of operands; with `TAKT_FULL=1` over all 2³², which must reproduce the documented figures exactly:
 //!
 //! ```text
 //! TAKT_FULL=1 cargo test --release -p takt-programs --test suite library:: -- --nocapture
@@ -17,12 +17,12 @@ mod matrix;
 mod measure;
 mod pairs;
 
-use takt_asm::{Assembled, MemoryLoader, Options, Search};
+use takt_asm::{AssembledProgram, MemoryLoader, Options, Search};
 use takt_isa::Machine;
 use takt_programs::LIBRARY;
 
-/// A program that includes the library, assembled. Warnings are errors.
-fn assemble(machine: &'static Machine, text: &str) -> Assembled {
+/// Assembles a program that includes the library. Warnings are errors.
+fn assemble(machine: &'static Machine, text: &str) -> AssembledProgram {
     let program = MemoryLoader::of("test.s", format!(".include <math.s>\n.schedule on\n{text}"));
     let loader = Search::new(program).library(LIBRARY);
     let options = Options { machine, ..Options::default() };
@@ -32,8 +32,8 @@ fn assemble(machine: &'static Machine, text: &str) -> Assembled {
     assembled
 }
 
-/// A program whose period is one use of a macro.
-fn one_use(machine: &'static Machine, usage: &str, operands: usize, before: &str) -> Assembled {
+/// Program whose period is one use of a macro.
+fn one_use(machine: &'static Machine, usage: &str, operands: usize, before: &str) -> AssembledProgram {
     let inputs = ["x", "x, y"][operands - 1];
     let text = format!(
         ".input {inputs}\n.output d\n.once\n wait period\n.period\nperiod: {before}\n {usage}\n wait period\n"

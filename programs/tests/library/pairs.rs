@@ -1,41 +1,41 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The macros of two operands: powers, over random pairs and all pairs of notable operands, and the remainder, which is exact.
+//! Macros of two operands: powers, over random pairs and all pairs of notable operands, and the remainder, which is exact.
 
 use super::batch::{Batch, LANES};
-use super::measure::{Measured, Random, check_emulator, full, notable, parallel};
+use super::measure::{ErrorStatistics, Random, check_emulator, full, notable, parallel};
 use super::one_use;
 use takt_isa::fp::{CANONICAL_NAN, Flags};
 use takt_isa::{MACHINES, T3};
 
-/// The largest error of `pow`, ulp, over [`FULL_PAIRS`] random pairs and those of notable operands.
+/// Largest error of `pow`, ulp, over [`FULL_PAIRS`] random pairs and the pairs of notable operands.
 pub(crate) const POW_ERROR: f64 = 0.80832;
-/// Random pairs with `TAKT_FULL=1`.
+/// Number of random pairs with `TAKT_FULL=1`.
 const FULL_PAIRS: u64 = 100_000_000;
-/// Random pairs else.
+/// Number of random pairs by default.
 const PAIRS: u64 = 1_000_000;
-/// Pairs from one seed: what is drawn does not depend on how many cores share the work.
+/// Pairs per seed, so that the pairs do not depend on the number of cores.
 const CHUNK: u64 = 1 << 14;
-/// Steps of the remainder whose domain is small, and the quotient that they allow, 2^22.
+/// Steps of the remainder with the small domain, and the quotient that they permit, 2^22.
 const STEPS: u32 = 2;
 
 fn is_signaling(x: u32) -> bool {
     f32::from_bits(x).is_nan() && x & 0x0040_0000 == 0
 }
 
-/// A random pair of one kind or another.
-type Draw = fn(u64, &mut Random) -> [u32; 2];
+/// Generator of the pair with this index.
+type PairGenerator = fn(u64, &mut Random) -> [u32; 2];
 
-/// Runs pairs through a program and takes up each result.
+/// Runs pairs through a program and records each result.
 fn measure(
     program: &takt_isa::Program,
     count: u64,
-    draw: Draw,
-    take: impl Fn(&mut Measured, [u32; 2], u32, Flags) + Sync,
-) -> Measured {
+    draw: PairGenerator,
+    take: impl Fn(&mut ErrorStatistics, [u32; 2], u32, Flags) + Sync,
+) -> ErrorStatistics {
     let batch = Batch::new(program);
     let special: Vec<[u32; 2]> = notable().flat_map(|x| notable().map(move |y| [x, y])).collect();
     let pieces = parallel(count.div_ceil(CHUNK), |range| {
-        let (mut batch, mut measured) = (batch.clone(), Measured::default());
+        let (mut batch, mut measured) = (batch.clone(), ErrorStatistics::default());
         let drawn = range.flat_map(|chunk| {
             let mut random = Random(chunk);
             (0..CHUNK).map(move |index| draw(index, &mut random))
@@ -55,10 +55,11 @@ fn measure(
         }
         measured
     });
-    pieces.into_iter().fold(Measured::default(), Measured::join)
+    pieces.into_iter().fold(ErrorStatistics::default(), ErrorStatistics::join)
 }
 
-/// Random bits; a base of any size and an exponent that leads to a result of any size; a base near 1; integers and halves.
+/// Operands of a power by turns: random bits; a base of any size and an exponent that leads to a result of any size; a base near 1;
+/// integers and halves.
 fn draw_power(index: u64, random: &mut Random) -> [u32; 2] {
     let bits = random.next();
     let (x, y) = (bits as u32, (bits >> 32) as u32);
@@ -77,7 +78,7 @@ fn draw_power(index: u64, random: &mut Random) -> [u32; 2] {
     }
 }
 
-fn take_power(measured: &mut Measured, [x, y]: [u32; 2], result: u32, flags: Flags) {
+fn take_power(measured: &mut ErrorStatistics, [x, y]: [u32; 2], result: u32, flags: Flags) {
     let (base, exponent, got) = (f32::from_bits(x), f32::from_bits(y), f32::from_bits(result));
     let nearest = core_math::powf(base, exponent);
     let finite = base.is_finite() && exponent.is_finite();
@@ -92,7 +93,7 @@ fn take_power(measured: &mut Measured, [x, y]: [u32; 2], result: u32, flags: Fla
     };
     assert_eq!(flags, expected, "flags of pow of {x:08x}, {y:08x}, which gives {result:08x}");
     measured.operands += 1;
-    // IEEE 754 leaves open what 1 to the power of a signaling NaN is.
+    // The power of 1 to a signaling NaN is left open by IEEE 754.
     let one = y << 1 == 0 || base == 1.0;
     let nearest = if one { 1.0 } else { nearest };
     if nearest.is_nan() {
@@ -118,7 +119,7 @@ fn powers_are_within_the_documented_error() {
     }
 }
 
-/// Random bits; quotients up to 2^24; multiples, and next to them; subnormals.
+/// Operands of a remainder by turns: random bits; quotients up to 2^24; multiples and their neighbours; subnormals.
 fn draw_remainder(index: u64, random: &mut Random) -> [u32; 2] {
     let bits = random.next();
     let (x, y) = (bits as u32, (bits >> 32) as u32);
@@ -136,10 +137,10 @@ fn draw_remainder(index: u64, random: &mut Random) -> [u32; 2] {
     }
 }
 
-fn take_remainder(measured: &mut Measured, [x, y]: [u32; 2], result: u32, flags: Flags, limit: f64) {
+fn take_remainder(measured: &mut ErrorStatistics, [x, y]: [u32; 2], result: u32, flags: Flags, limit: f64) {
     let (a, b) = (f32::from_bits(x), f32::from_bits(y));
     let any_nan = a.is_nan() || b.is_nan();
-    // Both are exact in binary64; their quotient is not, but a power of two separates no two of them.
+    // Compare exponents, which are exact, instead of the quotient, which binary64 would round.
     let digits = |v: f64| (v.abs().to_bits() >> 52).cast_signed();
     let far = a.is_finite() && b.is_finite() && b != 0.0 && a != 0.0 && {
         digits(f64::from(a)) - digits(f64::from(b)) > limit as i64

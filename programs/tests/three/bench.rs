@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The system with a host that sends packets, and a plant.
+//! Test bench: the system with a host that sends packets, and a plant.
 
 use std::collections::VecDeque;
 use std::sync::OnceLock;
@@ -8,17 +8,17 @@ use takt_isa::{Program, Register};
 use takt_programs::three::dynamics::nominal;
 use takt_programs::three::profile::Profile;
 use takt_programs::three::servo::{COUNT, Point};
-use takt_programs::three::{DA, DB, DC, SERVO_PERIOD, Six};
+use takt_programs::three::{DA, DB, DC, SERVO_PERIOD, SixValues};
 use takt_programs::{LIBRARY, THREE};
 use takt_system::{Description, ProgramError, System};
 
 pub(crate) const TICK: u64 = 12_500;
 /// Cycles before a tick in which the host writes: more than any link needs.
 const LEAD: u64 = 64;
-/// Words that the host sends in a tick.
+/// Number of words that the host sends per tick.
 const WORDS: usize = 4;
 
-/// Reports and causes, as `packets.s` numbers them.
+/// Numbers of reports and causes in `packets.s`.
 pub(crate) const ACCEPTED: u32 = 1;
 pub(crate) const STARTED: u32 = 2;
 pub(crate) const FINISHED: u32 = 3;
@@ -33,7 +33,7 @@ pub(crate) const JOG: u32 = 3;
 pub(crate) const STOP: u32 = 4;
 pub(crate) const RESET: u32 = 7;
 
-/// A robot that stands so is in the middle of the work space.
+/// Joint angles in the middle of the work space, rad.
 pub(crate) const HOME: [f64; 6] = [0.1, 1.0, 0.1, 0.2, -1.1, 0.3];
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,7 +44,7 @@ pub(crate) struct Report {
     pub(crate) value: f32,
 }
 
-/// CRC-32 of words, bit by bit: not the core's way.
+/// CRC-32 of words, bit by bit, unlike the core's algorithm.
 pub(crate) fn checksum(words: &[u32]) -> u32 {
     let mut crc = u32::MAX;
     for byte in words.iter().flat_map(|word| word.to_le_bytes()) {
@@ -67,19 +67,19 @@ pub(crate) fn bits(values: &[f64]) -> Vec<u32> {
     values.iter().map(|value| (*value as f32).to_bits()).collect()
 }
 
-/// The fields of a motion's packet beside its target.
+/// Fields of a motion's packet besides its target.
 #[derive(Clone, Copy)]
-pub(crate) struct How {
+pub(crate) struct MotionFields {
     pub(crate) profile: Profile,
-    /// 0 time, 1 speed, 2 fast.
+    /// Meaning of `amount`: 0 time, 1 speed, 2 fast.
     pub(crate) how: u32,
     pub(crate) amount: f64,
-    /// 1 via, 2 check.
+    /// Flags: 1 via, 2 check.
     pub(crate) flags: u32,
 }
 
-pub(crate) const fn fast(profile: Profile) -> How {
-    How { profile, how: 2, amount: 0.0, flags: 0 }
+pub(crate) const fn fast(profile: Profile) -> MotionFields {
+    MotionFields { profile, how: 2, amount: 0.0, flags: 0 }
 }
 
 pub(crate) fn description() -> &'static Description {
@@ -100,8 +100,8 @@ pub(crate) fn description() -> &'static Description {
 
 /// Motors with the arm's nominal dynamics: Da·(H·q̈ + G) + Db·q̇ + Dc·q̈ = u.
 struct Plant {
-    q: Six,
-    v: Six,
+    q: SixValues,
+    v: SixValues,
     blocked: bool,
 }
 
@@ -110,7 +110,7 @@ impl Plant {
         self.q.map(|q| (q / COUNT).round() as i32)
     }
 
-    fn step(&mut self, u: &Six) {
+    fn step(&mut self, u: &SixValues) {
         if self.blocked {
             self.v = [0.0; 6];
             return;
@@ -119,9 +119,9 @@ impl Plant {
         let h = SERVO_PERIOD / PARTS as f64;
         for _ in 0..PARTS {
             let here = nominal(&self.q);
-            let b: Six = std::array::from_fn(|i| u[i] - DB * self.v[i] - DA * here.weight[i]);
+            let b: SixValues = std::array::from_fn(|i| u[i] - DB * self.v[i] - DA * here.weight[i]);
             let m = |i: usize, j: usize| DA * here.inertia[i][j] + if i == j { DC } else { 0.0 };
-            let mut a: Six = std::array::from_fn(|i| b[i] / m(i, i));
+            let mut a: SixValues = std::array::from_fn(|i| b[i] / m(i, i));
             let det = m(1, 1) * m(2, 2) - m(1, 2) * m(2, 1);
             a[1] = (b[1] * m(2, 2) - b[2] * m(1, 2)) / det;
             a[2] = (b[2] * m(1, 1) - b[1] * m(2, 1)) / det;
@@ -133,32 +133,32 @@ impl Plant {
     }
 }
 
-/// The observations of a kinematic period.
+/// Observations of a kinematic period.
 #[derive(Clone, Debug)]
-pub(crate) struct Seen {
-    /// The point that went to the dynamic core.
+pub(crate) struct PeriodObservation {
+    /// Points sent to the dynamic core.
     pub(crate) points: [Point; 6],
-    pub(crate) pose: Six,
+    pub(crate) pose: SixValues,
     pub(crate) mode: u32,
     pub(crate) segment: u32,
 }
 
-impl Seen {
-    pub(crate) fn q(&self) -> Six {
+impl PeriodObservation {
+    pub(crate) fn q(&self) -> SixValues {
         self.points.map(|point| point.q)
     }
-    pub(crate) fn v(&self) -> Six {
+    pub(crate) fn v(&self) -> SixValues {
         self.points.map(|point| point.v)
     }
-    pub(crate) fn a(&self) -> Six {
+    pub(crate) fn a(&self) -> SixValues {
         self.points.map(|point| point.a)
     }
 }
 
-/// The observations of a tick: what went to the drives, the encoders' counts, the point that came, the reference.
-pub(crate) type Served = (Six, [i32; 6], Option<[Point; 6]>, Six);
+/// Observations of a tick: the controls, the encoders' counts, the points received, the reference.
+pub(crate) type TickObservation = (SixValues, [i32; 6], Option<[Point; 6]>, SixValues);
 
-/// Output ports that are looked at often.
+/// Registers of frequently read output ports.
 struct Ports {
     u: [Register; 6],
     r: [Register; 6],
@@ -175,23 +175,23 @@ pub(crate) struct Bench {
     words: VecDeque<u32>,
     pub(crate) sequence: u32,
     quiet: u64,
-    /// True if the host says that it is there.
+    /// The host sends signs of life.
     pub(crate) alive: bool,
     pub(crate) reports: Vec<Report>,
-    pub(crate) seen: Vec<Seen>,
-    /// Each tick.
-    pub(crate) servo: Vec<Served>,
+    pub(crate) seen: Vec<PeriodObservation>,
+    /// Observations of every tick.
+    pub(crate) servo: Vec<TickObservation>,
     links: [usize; 3],
     ports: Ports,
 }
 
 impl Bench {
-    /// The robot stands at [`HOME`].
+    /// Bench with the robot at [`HOME`].
     pub(crate) fn new() -> Bench {
         Bench::at(HOME)
     }
 
-    pub(crate) fn at(joints: Six) -> Bench {
+    pub(crate) fn at(joints: SixValues) -> Bench {
         let description = description();
         let link = |name: &str| {
             description.links.iter().position(|link| link.name == name).expect("the system has this link")
@@ -236,46 +236,46 @@ impl Bench {
         bench
     }
 
-    /// True if something holds the joints.
+    /// Blocks or frees the joints.
     pub(crate) fn block(&mut self, blocked: bool) {
         self.plant.blocked = blocked;
     }
 
-    /// The words go as they are.
+    /// Sends raw words without a header.
     pub(crate) fn send_words(&mut self, words: &[u32]) {
         self.words.extend(words);
     }
 
-    /// The next packet; its sequence number.
+    /// Sends the next packet; returns its sequence number.
     pub(crate) fn send(&mut self, kind: u32, payload: &[u32]) -> u32 {
         self.sequence += 1;
         self.send_words(&packet(kind, self.sequence, payload));
         self.sequence
     }
 
-    pub(crate) fn motion(&mut self, kind: u32, target: Six, how: How) -> u32 {
+    pub(crate) fn motion(&mut self, kind: u32, target: SixValues, how: MotionFields) -> u32 {
         let mut payload = bits(&target);
         payload.extend([how.profile as u32, how.how, (how.amount as f32).to_bits(), how.flags]);
         self.send(kind, &payload)
     }
 
-    pub(crate) fn jog(&mut self, mode: u32, rates: Six) -> u32 {
+    pub(crate) fn jog(&mut self, mode: u32, rates: SixValues) -> u32 {
         let mut payload = vec![mode];
         payload.extend(bits(&rates));
         self.send(JOG, &payload)
     }
 
-    /// An output of the system.
+    /// Output of the system by name.
     pub(crate) fn output(&self, name: &str) -> u32 {
         self.system.output(name).expect("an output")
     }
 
-    /// Sets an input of the system, for the tick to come.
+    /// Sets an input of the system for the coming tick.
     pub(crate) fn input(&mut self, name: &str, bits: u32) {
         self.system.set_input(name, bits).expect("an input");
     }
 
-    /// Entries that any FIFO has refused so far.
+    /// Number of entries refused by any FIFO so far.
     pub(crate) fn overflows(&self) -> u64 {
         let links = 0..self.system.description().links.len();
         links.filter_map(|link| self.system.fifo_counts(link)).map(|counts| counts.overflows).sum()
@@ -285,18 +285,18 @@ impl Bench {
         self.system.core(core).register(register).unwrap_or(0)
     }
 
-    fn six(&self, core: usize, registers: &[Register; 6]) -> Six {
+    fn six(&self, core: usize, registers: &[Register; 6]) -> SixValues {
         registers.map(|register| f64::from(f32::from_bits(self.word(core, register))))
     }
 
-    /// Base ticks.
+    /// Runs for a number of base ticks.
     pub(crate) fn run(&mut self, ticks: u64) {
         for _ in 0..ticks {
             self.step();
         }
     }
 
-    /// Until a report of a kind about a packet, and that.
+    /// Runs until a report of this kind about a packet, and returns it.
     pub(crate) fn until(&mut self, kind: u32, sequence: u32) -> Report {
         for _ in 0..200_000 {
             let known = |report: &&Report| report.kind == kind && report.sequence == sequence;
@@ -327,7 +327,7 @@ impl Bench {
             self.system.set_input("commands.word", word).expect("an input");
             assert!(self.system.push(self.links[0]).expect("a link"), "the queue of words is full");
         }
-        // Points of the kinematic core wait for the dynamic core's tick.
+        // The kinematic core's points wait in the FIFO for the dynamic core's tick.
         let entries = self.system.fifo_entries(self.links[2]);
         let points = (entries.len() == 6).then(|| {
             let field = |entry: &Vec<u32>, i: usize| f64::from(f32::from_bits(entry[i]));
@@ -339,7 +339,7 @@ impl Bench {
         if let Some(points) = points {
             let pose = self.six(1, &self.ports.pose);
             let (mode, segment) = (self.word(1, self.ports.mode), self.word(1, self.ports.segment));
-            self.seen.push(Seen { points, pose, mode, segment });
+            self.seen.push(PeriodObservation { points, pose, mode, segment });
         }
         self.system.run_until(self.next + 2000).expect("no fault");
         let (u, r) = (self.six(0, &self.ports.u), self.six(0, &self.ports.r));
@@ -359,17 +359,17 @@ impl Bench {
         }
     }
 
-    /// The observations from when a segment first ran to the end.
-    pub(crate) fn since(&self, sequence: u32) -> &[Seen] {
+    /// Observations from the first period of a segment to the end.
+    pub(crate) fn since(&self, sequence: u32) -> &[PeriodObservation] {
         let first = self.seen.iter().position(|seen| seen.segment == sequence).expect("it ran");
         &self.seen[first..]
     }
 
-    pub(crate) fn last(&self) -> &Seen {
+    pub(crate) fn last(&self) -> &PeriodObservation {
         self.seen.last().expect("it has run")
     }
 
-    /// Until the robot's mode is this.
+    /// Runs until the robot is in this mode.
     pub(crate) fn until_mode(&mut self, mode: u32) {
         for _ in 0..50_000 {
             if self.last().mode == mode {
@@ -381,7 +381,7 @@ impl Bench {
     }
 }
 
-/// The largest difference of six values.
-pub(crate) fn apart(a: &Six, b: &Six) -> f64 {
+/// Largest absolute difference of six values.
+pub(crate) fn apart(a: &SixValues, b: &SixValues) -> f64 {
     (0..6).map(|i| (a[i] - b[i]).abs()).fold(0.0, f64::max)
 }

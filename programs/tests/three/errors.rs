@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Checks while it runs, the queue, signals.
+//! Checks during motion, the queue, signals.
 
 use super::bench::{
-    ACCEPTED, Bench, FINISHED, HOME, How, JOG, MOVE, READY, REFUSED, RESET, STARTED, STOP, STOPPED, apart,
-    bits, fast,
+    ACCEPTED, Bench, FINISHED, HOME, JOG, MOVE, MotionFields, READY, REFUSED, RESET, STARTED, STOP, STOPPED,
+    apart, bits, fast,
 };
 use takt_programs::three::profile::Profile;
 
-const SLOW: How = How { profile: Profile::Parabolic, how: 0, amount: 0.2, flags: 0 };
+const SLOW: MotionFields = MotionFields { profile: Profile::Parabolic, how: 0, amount: 0.2, flags: 0 };
 
 fn near(by: f64) -> [f64; 6] {
     let mut to = HOME;
@@ -18,7 +18,7 @@ fn near(by: f64) -> [f64; 6] {
 #[test]
 fn a_queue_that_runs_dry_is_reported() {
     let mut bench = Bench::new();
-    let sequence = bench.motion(MOVE, near(0.2), How { flags: 1, amount: 0.4, ..SLOW });
+    let sequence = bench.motion(MOVE, near(0.2), MotionFields { flags: 1, amount: 0.4, ..SLOW });
     let report = bench.until(STOPPED, sequence);
     assert_eq!(report.cause, 15);
     bench.until_mode(0);
@@ -38,7 +38,7 @@ fn a_joint_that_does_not_follow_stops_the_robot() {
     let reset = bench.send(RESET, &[]);
     bench.until(READY, reset);
     bench.until_mode(0);
-    // The reference is now where the joints are.
+    // The reset has set the reference to the joints' position.
     bench.run(40);
     assert!(apart(&bench.last().q(), &HOME) < 3e-5, "{:?}", bench.last().q());
     assert_eq!(
@@ -74,15 +74,18 @@ fn a_full_queue_refuses_and_a_stop_empties_it() {
     let mut bench = Bench::new();
     let mut first = None;
     for number in 0..40 {
-        let sequence =
-            bench.motion(MOVE, near(if number % 2 == 0 { 0.1 } else { 0.0 }), How { amount: 5.0, ..SLOW });
+        let sequence = bench.motion(
+            MOVE,
+            near(if number % 2 == 0 { 0.1 } else { 0.0 }),
+            MotionFields { amount: 5.0, ..SLOW },
+        );
         first = first.or(Some(sequence));
         bench.run(20);
     }
     bench.run(100);
     let refused: Vec<_> = bench.reports.iter().filter(|report| report.kind == REFUSED).collect();
     assert!(refused.len() >= 6 && refused.iter().all(|report| report.cause == 12), "{refused:?}");
-    // Not while it moves.
+    // Requests for a jog are refused while the queue is full.
     let jog = bench.send(JOG, &[vec![0], bits(&[0.1; 6])].concat());
     assert_eq!(bench.until(REFUSED, jog).cause, 12);
     let stop = bench.send(STOP, &[]);
@@ -93,7 +96,7 @@ fn a_full_queue_refuses_and_a_stop_empties_it() {
     assert_eq!(started, 1, "nothing of the queue has run after the stop");
     let jog = bench.send(JOG, &[vec![0], bits(&[0.1; 6])].concat());
     bench.until(ACCEPTED, jog);
-    // A stop where nothing moves is answered at once.
+    // At a standstill, a stop is answered at once.
     let stop = bench.send(STOP, &[]);
     bench.until(STOPPED, stop);
     let stop = bench.send(STOP, &[]);

@@ -1,15 +1,17 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Jog in its three modes.
 
-use super::bench::{ACCEPTED, Bench, FINISHED, HOME, MOVE, REFUSED, STOP, STOPPED, Seen, apart, fast};
+use super::bench::{
+    ACCEPTED, Bench, FINISHED, HOME, MOVE, PeriodObservation, REFUSED, STOP, STOPPED, apart, fast,
+};
 use takt_programs::three::kinematics::pose;
 use takt_programs::three::profile::Profile;
-use takt_programs::three::{HIGHEST, PERIOD, Six};
+use takt_programs::three::{HIGHEST, PERIOD, SixValues};
 
 const TOOL: [f64; 3] = [0.0; 3];
 
-/// Jogs for some ticks, then until it stands; what was seen.
-fn jog(bench: &mut Bench, mode: u32, rates: Six, ticks: u64) -> Vec<Seen> {
+/// Jogs for a number of ticks, then runs until the robot stands; returns the observations.
+fn jog(bench: &mut Bench, mode: u32, rates: SixValues, ticks: u64) -> Vec<PeriodObservation> {
     let first = bench.seen.len();
     let sequence = bench.jog(mode, rates);
     bench.until(ACCEPTED, sequence);
@@ -22,8 +24,8 @@ fn jog(bench: &mut Bench, mode: u32, rates: Six, ticks: u64) -> Vec<Seen> {
     bench.seen[first..].to_vec()
 }
 
-/// The reference agrees with itself: velocities are its derivative, accelerations theirs.
-fn consistent(seen: &[Seen], velocity: f64) {
+/// Consistency of the reference: velocities are the derivative of angles, accelerations of velocities.
+fn consistent(seen: &[PeriodObservation], velocity: f64) {
     for pair in seen.windows(2) {
         let (a, b) = (&pair[0], &pair[1]);
         for i in 0..6 {
@@ -35,13 +37,13 @@ fn consistent(seen: &[Seen], velocity: f64) {
 }
 
 #[test]
-fn joints_turn_at_the_rates_that_are_asked_for() {
+fn joints_turn_at_the_requested_rates() {
     let mut bench = Bench::new();
     let rates = [0.5, 0.0, -0.3, 1.0, 0.0, -2.0];
     let seen = jog(&mut bench, 0, rates, 800);
     let middle = &seen[seen.len() / 2];
     assert!(apart(&middle.v(), &rates) < 1e-6, "{:?}", middle.v());
-    // An ulp of an angle over a period is 6e-4 rad/s.
+    // Rounding: an ulp of an angle over a period is 6e-4 rad/s.
     consistent(&seen, 1e-3);
 }
 
@@ -63,7 +65,7 @@ fn the_tool_moves_along_the_axes_of_the_world() {
         );
     }
     consistent(&seen, 3e-3);
-    // About the world's vertical axis: the point stays, yaw turns.
+    // Rotation about the world's vertical axis: the tool point stays, yaw turns.
     let from = pose(&bench.last().q(), &TOOL).0;
     let seen = jog(&mut bench, 1, [0.0, 0.0, 0.0, 0.0, 0.0, 0.5], 800);
     let here = pose(&seen.last().expect("some").q(), &TOOL).0;
@@ -82,7 +84,7 @@ fn the_tool_moves_along_its_own_axes() {
     let way: f64 = (0..3).map(|i| gone[i] * axis[i]).sum();
     assert!(way > 0.004, "{way}");
     assert!((0..3).all(|i| (gone[i] - way * axis[i]).abs() < 2e-5), "{gone:?}");
-    // About its own axis: only the last joint need turn, and the point stays.
+    // Rotation about the tool's own axis: only the last joint needs to turn, and the tool point stays.
     let from = pose(&bench.last().q(), &TOOL).0;
     let seen = jog(&mut bench, 2, [0.0, 0.0, 0.0, 0.0, 0.0, 0.6], 800);
     let end = pose(&seen.last().expect("some").q(), &TOOL).0;
@@ -99,12 +101,12 @@ fn a_jog_ends_before_a_joints_range_does() {
     bench.until_mode(0);
     let (here, limit) = (bench.last().q()[0], HIGHEST[0].to_radians());
     assert!(here < limit && here > limit - 0.1, "{here} {limit}");
-    // No reset is needed to go back.
+    // Jogging back needs no reset.
     let back = bench.jog(0, [-0.5, 0.0, 0.0, 0.0, 0.0, 0.0]);
     bench.until(ACCEPTED, back);
     bench.run(400);
     assert!(bench.last().q()[0] < here);
-    // A motion has to wait until the jog has ended.
+    // Motions are refused during a jog.
     let refused = bench.motion(MOVE, HOME, fast(Profile::Cosine));
     assert_eq!(bench.until(REFUSED, refused).cause, 16);
     let stop = bench.send(STOP, &[]);
@@ -115,7 +117,7 @@ fn a_jog_ends_before_a_joints_range_does() {
 #[test]
 fn a_jog_in_the_world_stops_short_of_the_wrists_singularity() {
     let mut bench = Bench::at([0.1, 1.0, 0.1, 0.0, -0.25, 0.3]);
-    // The tool nods until the wrist is straight.
+    // The tool tilts until the wrist is straight.
     let sequence = bench.jog(2, [0.0, 0.0, 0.0, 0.8, 0.8, 0.0]);
     bench.until(ACCEPTED, sequence);
     for _ in 0..12_000 {

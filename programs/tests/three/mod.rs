@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The three-processor controller: the three programs run as a system, with packets from a host and a plant behind encoders and drives, and
-//! each module is compared with its binary64 model. docs/controller.md. The largest differences are printed
-//! (`--nocapture`).
+//! Three-processor controller: the three programs run as a system, with packets from a host and a plant behind encoders and drives, and
+//! each module is compared with its binary64 model (docs/controller.md). The largest differences are printed (`--nocapture`).
 #![allow(clippy::print_stdout)]
 
 mod bench;
@@ -14,7 +13,7 @@ mod servo;
 mod signals;
 mod world;
 
-/// Each program is read back from its image, with all that a debugger knows of it.
+/// Images: each program is equal after a round trip through its image, debug information included.
 #[test]
 fn images_are_read_back() {
     use takt_asm::{MemoryLoader, Options, Search, assemble, image};

@@ -2,33 +2,33 @@
 //! Motion in joint space against the binary64 synthesis; limits; stops.
 
 use super::bench::{
-    ACCEPTED, Bench, CHECKED, FINISHED, HOME, How, MOVE, REFUSED, STARTED, STOP, STOPPED, Seen, apart, bits,
-    fast,
+    ACCEPTED, Bench, CHECKED, FINISHED, HOME, MOVE, MotionFields, PeriodObservation, REFUSED, STARTED, STOP,
+    STOPPED, apart, bits, fast,
 };
 use takt_programs::three::dynamics::nominal;
 use takt_programs::three::plan::{Demand, Limits, admissible, course};
 use takt_programs::three::profile::{Course, Profile};
 use takt_programs::three::synthesis::{Motion, Segment};
-use takt_programs::three::{DA, DB, DC, PERIOD, Six, TORQUES, VELOCITIES};
+use takt_programs::three::{DA, DB, DC, PERIOD, SixValues, TORQUES, VELOCITIES};
 
 const LIMITS: Limits = Limits { velocities: VELOCITIES, torques: TORQUES };
 
-/// A target that is away from another by so much of each joint.
-fn away(from: &Six, by: Six) -> Six {
+/// Target at a distance from another, joint by joint, in binary32.
+fn away(from: &SixValues, by: SixValues) -> SixValues {
     std::array::from_fn(|i| f64::from((from[i] + by[i]) as f32))
 }
 
-/// The course that the core plans, by the binary64 model.
-fn planned(from: &Six, to: &Six, demand: Demand, profile: Profile, via: bool) -> Course {
+/// Planned course of the core, by the binary64 model.
+fn planned(from: &SixValues, to: &SixValues, demand: Demand, profile: Profile, via: bool) -> Course {
     let way = |sigma: f64| std::array::from_fn(|i| from[i] + (to[i] - from[i]) * sigma);
     let (speed, acceleration) = admissible(way, false, &LIMITS, 32);
     let share = if via { 0.5 } else { 1.0 };
     course(demand, profile, (speed * 0.999, acceleration * 0.95 * share)).expect("it is possible")
 }
 
-/// The errors of angles, velocities and accelerations against a motion that began in the first period seen; accelerations not in `steps`,
-/// where they have two values.
-fn errors(seen: &[Seen], motion: &Motion, steps: &[u32]) -> [f64; 3] {
+/// Errors of angles, velocities and accelerations against a motion that began in the first period seen; accelerations are left out in
+/// `steps`, where they have two values.
+fn errors(seen: &[PeriodObservation], motion: &Motion, steps: &[u32]) -> [f64; 3] {
     let mut worst = [0f64; 3];
     for (k, seen) in seen.iter().enumerate() {
         let at = motion.at(k as f64 * PERIOD);
@@ -41,8 +41,9 @@ fn errors(seen: &[Seen], motion: &Motion, steps: &[u32]) -> [f64; 3] {
     worst
 }
 
-/// The planned course, or a neighbour: where a duration in binary64 is a whole number of periods, binary32 may round it up. Largest errors allowed: rad, rad/s, rad/s².
-fn matches(seen: &[Seen], from: Six, to: Six, course: Course, allowed: [f64; 3]) {
+/// The motion follows the planned course, or a neighbour: where a duration in binary64 is a whole number of periods, binary32 may round it
+/// up. `allowed` limits the errors: rad, rad/s, rad/s².
+fn matches(seen: &[PeriodObservation], from: SixValues, to: SixValues, course: Course, allowed: [f64; 3]) {
     let neighbours = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(ramp, periods)| Course {
         ramp: course.ramp + ramp,
         periods: course.periods + periods,
@@ -83,12 +84,12 @@ fn each_profile_is_its_binary64_model() {
     }
 }
 
-/// The velocity has no steps; the acceleration has none but with the rectangular profile; with the cosine, the jerk has none.
-fn continuous(seen: &[Seen], course: Course, from: &Six, to: &Six) {
+/// Continuity: of the velocity; of the acceleration, except with the rectangular profile; of the jerk with the cosine.
+fn continuous(seen: &[PeriodObservation], course: Course, from: &SixValues, to: &SixValues) {
     let longest = apart(from, to);
     let ramp = f64::from(course.ramp) * PERIOD;
     let rate = longest / (f64::from(course.periods) * PERIOD - ramp) / ramp;
-    // Of the pulse's slope and of that one's, over the ramp.
+    // Largest slope of the pulse, and of its derivative, over the ramp.
     let (slope, bend) = match course.profile {
         Profile::Rectangular => (f64::INFINITY, f64::INFINITY),
         Profile::Trapezoidal => (course.profile.top() / 0.25, f64::INFINITY),
@@ -100,7 +101,7 @@ fn continuous(seen: &[Seen], course: Course, from: &Six, to: &Six) {
         let [a, b, c] = [0, 1, 2].map(|i| &window[i]);
         assert!(apart(&a.v(), &b.v()) <= rate * course.profile.top() * PERIOD * 1.001 + 1e-5);
         assert!(apart(&a.a(), &b.a()) <= rate * slope * part * 1.001 + 1e-3, "{course:?}");
-        let second: Six = std::array::from_fn(|i| a.a()[i] - 2.0 * b.a()[i] + c.a()[i]);
+        let second: SixValues = std::array::from_fn(|i| a.a()[i] - 2.0 * b.a()[i] + c.a()[i]);
         assert!(apart(&second, &[0.0; 6]) <= rate * bend * part * part * 1.001 + 2e-3, "{course:?}");
     }
 }
@@ -110,25 +111,26 @@ fn times_are_met_and_speeds_are_reached() {
     let mut bench = Bench::new();
     let from = bench.last().q();
     let to = away(&from, [0.1, 0.0, 0.05, -0.1, 0.0, 0.02]);
-    let how = How { profile: Profile::Parabolic, how: 0, amount: 0.25, flags: 0 };
+    let how = MotionFields { profile: Profile::Parabolic, how: 0, amount: 0.25, flags: 0 };
     let sequence = bench.motion(MOVE, to, how);
     bench.until(FINISHED, sequence);
     let moving = bench.seen.iter().filter(|seen| seen.mode == 1).count();
     assert_eq!(moving, 625, "0.25 s");
     let course = planned(&from, &to, Demand::Time(0.25), Profile::Parabolic, false);
     matches(bench.since(sequence), from, to, course, [3e-7, 1e-5, 2e-3]);
-    // Given speed: the fastest joint's.
-    let back = bench.motion(MOVE, from, How { how: 1, amount: 0.7, ..how });
+    // Speed refers to the fastest joint.
+    let back = bench.motion(MOVE, from, MotionFields { how: 1, amount: 0.7, ..how });
     bench.until(FINISHED, back);
-    let fastest = bench.since(back).iter().flat_map(Seen::v).fold(0.0, |a: f64, v| a.max(v.abs()));
+    let fastest =
+        bench.since(back).iter().flat_map(PeriodObservation::v).fold(0.0, |a: f64, v| a.max(v.abs()));
     assert!((0.695..=0.7).contains(&fastest), "{fastest}");
-    // Only checked: no motion.
-    let checked = bench.motion(MOVE, to, How { flags: 2, ..how });
+    // Checked motions do not move the robot.
+    let checked = bench.motion(MOVE, to, MotionFields { flags: 2, ..how });
     let report = bench.until(CHECKED, checked);
     assert!((report.value - 0.25).abs() < 1e-6);
     bench.run(100);
     assert_eq!(bench.last().mode, 0);
-    // A value that is NaN stays as it is.
+    // NaN in a target keeps the joint's present value.
     let mut part = [f64::NAN; 6];
     part[2] = to[2];
     let sequence = bench.motion(MOVE, part, fast(Profile::Cosine));
@@ -153,7 +155,7 @@ fn via_points_are_passed_without_a_pause() {
     for (number, to) in targets.iter().enumerate() {
         let via = number < 2;
         let flags = u32::from(via);
-        sequences.push(bench.motion(MOVE, *to, How { flags, ..fast(Profile::Trapezoidal) }));
+        sequences.push(bench.motion(MOVE, *to, MotionFields { flags, ..fast(Profile::Trapezoidal) }));
         let course = planned(&last, to, Demand::Fast, Profile::Trapezoidal, true);
         segments.push(Segment { to: *to, course, via });
         last = *to;
@@ -161,11 +163,11 @@ fn via_points_are_passed_without_a_pause() {
     bench.until(FINISHED, sequences[2]);
     assert!(bench.reports.iter().all(|report| report.kind != STOPPED), "{:?}", bench.reports);
     let motion = Motion::new(from, &segments);
-    let seen: Vec<Seen> = bench.since(sequences[0]).to_vec();
+    let seen: Vec<PeriodObservation> = bench.since(sequences[0]).to_vec();
     let moving = seen.iter().position(|seen| seen.mode == 0).expect("it has ended");
-    // A course that is longer by a period shifts those after it: durations within 3 periods, and the shape by its continuity.
+    // A course longer by a period shifts its successors: check durations to 3 periods, and the shape by its continuity.
     assert!((moving as i64 - i64::from(motion.periods())).abs() <= 3, "{moving}, {}", motion.periods());
-    let speed = |seen: &Seen| seen.v().iter().map(|v| v * v).sum::<f64>().sqrt();
+    let speed = |seen: &PeriodObservation| seen.v().iter().map(|v| v * v).sum::<f64>().sqrt();
     let top = seen.iter().map(speed).fold(0.0, f64::max);
     let ramp = segments[0].course.ramp as usize;
     let slowest =
@@ -174,7 +176,7 @@ fn via_points_are_passed_without_a_pause() {
     for pair in seen.windows(2) {
         assert!(apart(&pair[0].v(), &pair[1].v()) < 0.02 && apart(&pair[0].a(), &pair[1].a()) < 3.0);
     }
-    // The corner is rounded: by less than what a ramp covers.
+    // Corners are rounded by less than the distance of a ramp.
     for corner in &targets[..2] {
         let nearest = seen.iter().map(|seen| apart(&seen.q(), corner)).fold(f64::MAX, f64::min);
         assert!(nearest > 1e-4 && nearest < 0.06, "{nearest}");
@@ -183,8 +185,8 @@ fn via_points_are_passed_without_a_pause() {
     assert_eq!(bench.last().q(), targets[2].map(|to| f64::from(to as f32)));
 }
 
-/// Torques by the binary64 dynamics stay within a part of the limits; the largest part that is used.
-fn within_limits(seen: &[Seen], torques: &Six, part: f64) -> f64 {
+/// Torques by the binary64 dynamics stay within a fraction of the limits. Returns the largest fraction used.
+fn within_limits(seen: &[PeriodObservation], torques: &SixValues, part: f64) -> f64 {
     let mut used = 0f64;
     for seen in seen {
         let torque = nominal(&seen.q()).torques(&seen.a());
@@ -204,14 +206,14 @@ fn torque_limits_are_met_and_hit() {
     let sequence = bench.motion(MOVE, to, fast(Profile::Rectangular));
     let free = bench.until(ACCEPTED, sequence).value;
     bench.until(FINISHED, sequence);
-    // As fast as may be: close to the limit, and not beyond.
+    // With pace `fast`, torques come close to the limit and do not exceed it.
     assert!(within_limits(bench.since(sequence), &TORQUES, 1.0) > 0.9);
-    // In half the time it is not possible, and joint 1 is why.
-    let how = How { profile: Profile::Rectangular, how: 0, amount: f64::from(free) / 2.0, flags: 0 };
+    // Half the time is refused, with joint 1 as the cause.
+    let how = MotionFields { profile: Profile::Rectangular, how: 0, amount: f64::from(free) / 2.0, flags: 0 };
     let refused = bench.motion(MOVE, from, how);
     let report = bench.until(REFUSED, refused);
     assert_eq!((report.cause, report.value), (11, 1.0));
-    // Limits that are lowered in mid-motion are hit: the nominal torque is held there.
+    // Limits lowered during a motion take effect: the nominal torque is held at the limit.
     let back = bench.motion(MOVE, from, fast(Profile::Rectangular));
     bench.until(STARTED, back);
     let mut lower = TORQUES;
@@ -227,11 +229,11 @@ fn torque_limits_are_met_and_hit() {
         held += usize::from(torque.abs() == 60.0);
     }
     assert!(held > 100, "{held}");
-    // And with them, what is planned takes longer.
+    // Planning with lowered limits takes longer.
     let slower = bench.motion(MOVE, to, fast(Profile::Rectangular));
     let value = bench.until(ACCEPTED, slower).value;
     assert!(value > free * 1.5, "{value} {free}");
-    // Higher than those built in is refused, with the joint.
+    // Limits above the built-in ones are refused, with the joint.
     let mut higher = TORQUES;
     higher[3] = 20.0;
     let limits = bench.send(9, &bits(&[VELOCITIES, higher].concat()));
@@ -252,7 +254,7 @@ fn a_stop_stays_on_the_path_and_within_the_torques() {
     let report = bench.until(STOPPED, stop);
     assert_eq!(report.cause, 0);
     bench.run(40);
-    let seen: Vec<Seen> = bench.seen[before..].to_vec();
+    let seen: Vec<PeriodObservation> = bench.seen[before..].to_vec();
     let stopping = seen.iter().filter(|seen| seen.mode == 3).count();
     assert!(stopping > 20 && stopping < 400, "{stopping} periods");
     for seen in &seen {
@@ -266,8 +268,12 @@ fn a_stop_stays_on_the_path_and_within_the_torques() {
         assert!(apart(&pair[0].v(), &pair[1].v()) < 0.03, "velocities have no step");
     }
     assert_eq!((bench.last().mode, bench.last().v()), (0, [0.0; 6]));
-    // The queue is empty, and the next motion begins there.
-    let next = bench.motion(MOVE, from, How { profile: Profile::Trapezoidal, how: 1, amount: 2.0, flags: 0 });
+    // The stop has emptied the queue, and the next motion begins at the present position.
+    let next = bench.motion(
+        MOVE,
+        from,
+        MotionFields { profile: Profile::Trapezoidal, how: 1, amount: 2.0, flags: 0 },
+    );
     bench.until(FINISHED, next);
     assert!(apart(&bench.last().q(), &from) < 1e-6);
 }

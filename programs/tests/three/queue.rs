@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The queue between communication and kinematic core, filled to its end.
+//! Queue between communication and kinematic core, filled to its end.
 
 use super::bench::{
-    ACCEPTED, Bench, CHECKED, FINISHED, HOME, How, JOG, MOVE, READY, REFUSED, RESET, STARTED, STOP, STOPPED,
-    bits,
+    ACCEPTED, Bench, CHECKED, FINISHED, HOME, JOG, MOVE, MotionFields, READY, REFUSED, RESET, STARTED, STOP,
+    STOPPED, bits,
 };
 use takt_programs::three::profile::Profile;
 
@@ -11,12 +11,12 @@ const OUTPUT: u32 = 5;
 const LEVEL: u32 = 6;
 const TOOL: u32 = 8;
 const LIMITS: u32 = 9;
-/// Items that the queue holds.
+/// Capacity of the queue in items.
 const QUEUE: u32 = 32;
 const FULL: u32 = 12;
 
 #[test]
-fn its_depth_stands_in_both_places() {
+fn queue_depth_agrees_in_both_sources() {
     let text =
         |name: &str| takt_programs::THREE.iter().find(|(known, _)| *known == name).expect("the file").1;
     let after = |text: &str, key: &str| -> u32 {
@@ -28,24 +28,24 @@ fn its_depth_stands_in_both_places() {
     assert_eq!(after(items, "depth ="), QUEUE);
 }
 
-/// A motion of three seconds, and so many outputs that wait for its end.
+/// Starts a motion of three seconds, with `outputs` outputs that wait for its end.
 fn filled(bench: &mut Bench, outputs: u32) -> u32 {
     bench.reports.clear();
     let mut to = HOME;
     to[0] += if bench.last().q()[0] > HOME[0] + 0.2 { 0.0 } else { 0.5 };
-    let slow = How { profile: Profile::Trapezoidal, how: 0, amount: 3.0, flags: 0 };
+    let slow = MotionFields { profile: Profile::Trapezoidal, how: 0, amount: 3.0, flags: 0 };
     let motion = bench.motion(MOVE, to, slow);
     bench.until(STARTED, motion);
     for i in 0..outputs {
         bench.send(OUTPUT, &[1, i & 1]);
     }
-    // Four words a tick, and what the cores take.
+    // The host sends four words per tick; the cores need some more.
     bench.run(u64::from(outputs) * 5 / 4 + 40);
     assert!(bench.reports.iter().all(|report| report.kind != REFUSED), "{:?}", bench.reports);
     motion
 }
 
-/// One packet of each kind is answered; what needs no room in the queue does what it does.
+/// Packets of each kind are answered by a full queue; checks and stops, which need no room in it, take effect.
 #[test]
 fn every_packet_is_answered() {
     let mut bench = Bench::new();
@@ -65,13 +65,13 @@ fn every_packet_is_answered() {
         let sequence = bench.send(kind, &payload);
         assert_eq!(bench.until(REFUSED, sequence).cause, FULL, "kind {kind}");
     }
-    // A motion that is only checked waits for nothing.
+    // Checked motions need no room.
     let check = bench.send(MOVE, &motion(2));
     assert_eq!(bench.until(CHECKED, check).cause, 0);
     let stop = bench.send(STOP, &[]);
     assert_eq!(bench.until(STOPPED, stop).cause, 0);
     bench.until_mode(0);
-    // And it goes on.
+    // Operation goes on after the stop.
     bench.run(60);
     let output = bench.send(OUTPUT, &[2, 2]);
     bench.until(FINISHED, output);
@@ -85,7 +85,7 @@ fn every_packet_is_answered() {
     assert_eq!(bench.output("outputs"), 3);
 }
 
-/// Limits are two items: they are not taken by half.
+/// Limits take two items, which are accepted or refused together.
 #[test]
 fn limits_need_room_for_both_halves() {
     let mut bench = Bench::new();
@@ -93,7 +93,7 @@ fn limits_need_room_for_both_halves() {
     let limits = bits(&[1.0; 12]);
     let refused = bench.send(LIMITS, &limits);
     assert_eq!(bench.until(REFUSED, refused).cause, FULL);
-    // One item still finds its place.
+    // Single items still fit.
     let output = bench.send(OUTPUT, &[2, 2]);
     bench.run(60);
     assert!(bench.reports.iter().all(|report| report.sequence != output), "{:?}", bench.reports);
@@ -106,7 +106,7 @@ fn limits_need_room_for_both_halves() {
     assert_eq!(bench.overflows(), 0);
 }
 
-/// A motion that is planned while outputs wait begins where the robot stands: after power-up, and after a stop on its way.
+/// A motion planned while outputs wait begins where the robot stands: after power-up, and after a stop during a motion.
 #[test]
 fn a_motion_behind_an_output_begins_where_the_robot_stands() {
     let mut bench = Bench::new();
@@ -115,7 +115,7 @@ fn a_motion_behind_an_output_begins_where_the_robot_stands() {
         bench.reports.clear();
         let output = bench.send(OUTPUT, &[1, round & 1]);
         to[0] += 0.02;
-        let how = How { profile: Profile::Cosine, how: 0, amount: 0.3, flags: 0 };
+        let how = MotionFields { profile: Profile::Cosine, how: 0, amount: 0.3, flags: 0 };
         let motion = bench.motion(MOVE, to, how);
         bench.until(FINISHED, output);
         bench.until(STARTED, motion);

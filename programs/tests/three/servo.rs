@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The dynamic core against the binary64 servo, period by period, and how well the robot follows.
+//! Dynamic core against the binary64 servo, period by period, and the tracking error of the robot.
 
 use super::bench::{Bench, FINISHED, HOME, MOVE, fast};
 use takt_programs::three::largest_control;
 use takt_programs::three::profile::Profile;
 use takt_programs::three::servo::{COUNT, Servo};
 
-/// Largest |control - binary64|: the error's derivative over 0.8 ms, times a gain, of angles with an ulp of 1.2e-7 rad.
+/// Limit on |control - binary64|: the error's derivative over 0.8 ms, times a gain, of angles with an ulp of 1.2e-7 rad.
 const CONTROL: f64 = 0.02;
 
-/// The largest difference of the controls from the model's, the reference's, how far the joints were behind, and the largest control.
+/// Largest differences of controls and reference from the model, then the largest tracking error and the largest control.
 fn against_binary64(bench: &Bench) -> [f64; 4] {
     let mut servos: Vec<Servo> = Vec::new();
     let mut worst = [0f64; 4];
@@ -60,7 +60,7 @@ fn a_saturated_control_does_not_wind_up() {
     let limit = largest_control(0);
     let saturated = bench.servo.iter().filter(|(u, ..)| (u[0].abs() - limit).abs() < 1e-5).count();
     assert!(saturated > 100, "{saturated}");
-    // It is free again: it goes to the reference without much of an overshoot.
+    // Freed, the joint returns to the reference without much overshoot.
     bench.block(false);
     bench.run(1500);
     let overshoot = bench.servo[1100..].iter().map(|(_, counts, _, r)| f64::from(counts[0]) * COUNT - r[0]);

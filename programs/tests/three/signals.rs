@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Inputs as they are tracked, and a kinematic core that misses its periods.
+//! Tracking of inputs, and a kinematic core that misses its periods.
 
 use super::bench::{Bench, READY, STOPPED, TICK, description};
 use takt_system::System;
 
-/// Ticks of a communication period.
+/// Ticks per communication period.
 const PERIOD: u64 = 16;
 
 #[test]
@@ -20,7 +20,7 @@ fn analogue_inputs_are_smoothed_over_four_periods() {
             seen.push(now);
         }
     }
-    // Each period a quarter of what is missing.
+    // First-order filter: each period reduces the difference by a quarter.
     for (period, pair) in seen.windows(2).enumerate() {
         let [expected1, expected2] = [1f32, -8.0].map(|goal| [goal, goal * 0.75f32.powi(period as i32)]);
         for ([goal, missing], (before, now)) in
@@ -45,7 +45,7 @@ fn a_digital_input_counts_once_it_has_stood_for_two_periods() {
         }
         seen
     };
-    // In one period only, bit 1 bounces; bit 0 stays.
+    // Bit 1 bounces within a period; bit 0 stays.
     assert!(tracked(0b11, PERIOD).iter().all(|bits| *bits == 0));
     let seen = tracked(0b01, 3 * PERIOD);
     assert_eq!(seen.last(), Some(&1));
@@ -57,7 +57,7 @@ fn a_digital_input_counts_once_it_has_stood_for_two_periods() {
     assert_eq!(tracked(0b10, 3 * PERIOD).last(), Some(&0b10));
 }
 
-/// With a tick of its own that comes a quarter as often, the kinematic core misses half of the periods that are wanted.
+/// A kinematic core with ticks a quarter as often misses half of the requested periods.
 #[test]
 fn a_kinematic_core_behind_its_time_is_an_error() {
     let mut description = description().clone();

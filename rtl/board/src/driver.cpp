@@ -4,17 +4,38 @@
 //   cycles, faults, then for each input pin its level (0, 1), then a count and that many encoders (pin a, pin b, count, difference):
 //   in these cycles the encoder goes that far, evenly; then a count and that many bytes, a word each, which follow those not sent yet
 //   on the UART. faults: 1 in so many bits of the UART, in either direction, is turned; 0: none.
-// stdout: a count and that many bytes that came from the UART, a word each; for each output pin the cycles in which it was 1, and its level.
+// stdout: a count and that many bytes that came from the UART, a word each; for each output pin the cycles in which it was 1, and its level;
+// a count and that many moments in which outputs of a core became safe, or trips rose: the cycle, the core, and the words of `look` but
+// the first. The last word has the trips that rose; it is 0 where outputs of the core became safe.
 //
-// pins.h, which is generated, gives DIVIDE, INPUTS, OUTPUTS and the pins.
+// pins.h, which is generated, gives DIVIDE, INPUTS, OUTPUTS and the pins; watch.h CORES and look, whose first word is whether a core's
+// outputs drive. Of a circuit that is not watched, CORES is 0.
 
 #include "Vtop.h"
+#include "Vtop___024root.h"
 #include "verilated.h"
-#include "pins.h"
 #include <cstdint>
 #include <cstdio>
 #include <deque>
 #include <vector>
+
+static uint32_t bits(uint64_t value, unsigned low, unsigned width) {
+    return uint32_t(value >> low & ((uint64_t(1) << width) - 1));
+}
+
+template <std::size_t N> static uint32_t bits(const VlWide<N> &value, unsigned low, unsigned width) {
+    uint32_t result = 0;
+    for (unsigned i = 0; i < width; i++) result |= uint32_t(value.at((low + i) / 32) >> (low + i) % 32 & 1) << i;
+    return result;
+}
+
+#include "pins.h"
+#include "watch.h"
+
+static const unsigned LOOKED = 9;   // words of `look`
+#if CORES == 0
+static void look(Vtop *, unsigned, uint32_t *) {}
+#endif
 
 static uint64_t seed = 88172645463325252ull;
 static uint32_t chance() {
@@ -45,6 +66,7 @@ int main(int argc, char **argv) {
     std::deque<uint32_t> sends;
     uint32_t shift = 0, bits = 0, left = 0;              // what is being sent to the board
     uint32_t got = 0, got_bits = 0, got_left = 0;        // what comes from it
+    uint32_t drove[CORES + 1] = {}, held = 0;
     for (uint32_t cycles; word(cycles);) {
         uint32_t faults, count, value;
         if (!word(faults)) return 1;
@@ -67,7 +89,7 @@ int main(int argc, char **argv) {
             if (!word(value)) return 1;
             sends.push_back(value);
         }
-        std::vector<uint32_t> answer, high(OUTPUTS);
+        std::vector<uint32_t> answer, high(OUTPUTS), moments;
         for (uint32_t cycle = 0; cycle < cycles; cycle++) {
             for (const Encoder &e : encoders) {
                 uint32_t at = e.count + uint32_t(int64_t(e.difference) * (int64_t(cycle) + 1) / int64_t(cycles));
@@ -90,6 +112,20 @@ int main(int argc, char **argv) {
             top.clk_in = 0;
             top.eval();
             for (unsigned i = 0; i < OUTPUTS; i++) high[i] += *outputs[i];
+            for (unsigned core = 0; core < CORES; core++) {
+                uint32_t words[LOOKED];
+                look(&top, core, words);
+                uint32_t trips = core ? 0 : words[LOOKED - 1] & ~held;
+                if (!core) held = words[LOOKED - 1];
+                auto tell = [&](uint32_t risen) {
+                    words[LOOKED - 1] = risen;
+                    moments.insert(moments.end(), {cycle, core});
+                    moments.insert(moments.end(), words + 1, words + LOOKED);
+                };
+                if (trips) tell(trips);
+                if (drove[core] && !words[0]) tell(0);
+                drove[core] = words[0];
+            }
             if (got_bits == 0) {
                 if (!top.uart_send) {
                     got_bits = 10;
@@ -116,6 +152,9 @@ int main(int argc, char **argv) {
             uint32_t level = *outputs[i];
             fwrite(&level, sizeof level, 1, stdout);
         }
+        size = moments.size() / (LOOKED + 1);
+        fwrite(&size, sizeof size, 1, stdout);
+        fwrite(moments.data(), sizeof(uint32_t), moments.size(), stdout);
         fflush(stdout);
     }
     return 0;

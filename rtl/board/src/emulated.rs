@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A board whose cores and links are the emulator's, and whose registers are as docs/protocol.md has them: many times faster than the circuit
-//! in Verilator. It is exact from base tick to base tick; between two of them no time passes for the line and the peripherals: requests are
-//! answered at once, and an output that a core writes acts from the tick on.
+//! Emulated board: cores and links run on the emulator, registers behave as in docs/protocol.md. This is many times faster than the circuit
+//! in Verilator. Behaviour is exact at base ticks. Between two base ticks no time passes for the line and the peripherals: requests are
+//! answered at once, and a core's write to an output acts from the tick on.
 
 use crate::application::Application;
 use crate::endpoints::{Endpoints, Fifo};
 use crate::host::Status;
+use crate::interlock::{Figures, command};
 use crate::kind::Direction;
 use crate::protocol::{
     self, CORE, DONE, DRIVEN, ENABLE, FIFO_WORDS, FIFOS, HOLD, READ_ONLY, RESTART, RUN, Request, SEEN,
@@ -20,7 +21,7 @@ use takt_isa::timing::Cycle;
 use takt_system::{Description, System};
 use thiserror::Error;
 
-/// The causes that stop the drive, as bits of the register `status`.
+/// Causes that stop the drive, as bits of the register `status`.
 const CAUSES: u32 = 12;
 const FAULT: u32 = 1 << CAUSES;
 const HALT: u32 = 1 << (CAUSES + 1);
@@ -29,18 +30,18 @@ const SILENT: u32 = 1 << (CAUSES + 3);
 const STOP: u32 = 1 << (CAUSES + 4);
 const NAN: u32 = 1 << (CAUSES + 5);
 
-/// Registers that are only kept: in an emulation the period is the system's tick, whatever `period` says.
+/// Registers that only store values: the emulated period is the system's tick, whatever `period` says.
 const KEPT: [&str; 3] = ["period", "lead", "stream"];
 
-/// The reason for which a board cannot be emulated.
+/// Reason why a board cannot be emulated.
 #[derive(Debug, Error)]
 pub enum EmulatedError {
-    /// It carries a single program.
+    /// A single program, which has no system to emulate.
     #[error(
         "a single program's board is simulated as a circuit only: emulated is one with a system of several cores"
     )]
     Program,
-    /// There is no circuit of which this would be the emulation.
+    /// No circuit exists that could be emulated.
     #[error(transparent)]
     Top(#[from] TopError),
     /// A core's memories cannot hold its program.
@@ -48,53 +49,59 @@ pub enum EmulatedError {
     Load(String),
 }
 
-/// A register of a peripheral that takes a core's output.
+/// Register of a peripheral that takes a core's output.
 #[derive(Clone, Debug)]
 struct Output {
     peripheral: String,
+    /// The host's endpoint.
+    number: usize,
     /// Link and field of the host's endpoint.
     place: (usize, usize),
     ty: Type,
-    /// The power of two by which a float is multiplied.
+    /// Exponent of the power of two by which a float is multiplied.
     scale: i32,
 }
 
 impl Output {
-    /// The register's value; `None` of a NaN.
+    /// The register's value; `None` for a NaN.
     fn value(&self, bits: u32) -> Option<i32> {
         if self.ty != Type::F {
             return Some(bits.cast_signed());
         }
         let scaled = (f64::from(f32::from_bits(bits)) * f64::from(self.scale).exp2()).round_ties_even();
-        // The cast saturates.
+        // Rust's cast saturates, like the circuit.
         (!scaled.is_nan()).then_some(scaled as i32)
     }
 }
 
-/// An emulated board.
-pub struct Emulated {
+/// Emulated board with its host interface.
+pub struct EmulatedBoard {
     description: Description,
     endpoints: Endpoints,
-    /// The host's inputs that peripherals drive, with what they have captured.
+    /// Captured values of the host's inputs that peripherals drive.
     captured: BTreeMap<usize, u32>,
-    /// Those that the computer sets.
+    /// Values of the host's inputs that the computer sets.
     set: BTreeMap<usize, u32>,
     /// Fields of the next entry of each FIFO.
     next: BTreeMap<u16, u32>,
     outputs: Vec<Output>,
     values: Vec<i32>,
-    /// Missed deadlines in a row, and periods without a request, at which outputs become safe.
+    /// Missed deadlines in a row, and periods without a request, that make outputs safe.
     limits: [u32; 2],
     circuit: u32,
     period: u32,
     lead: u32,
     control: u32,
     causes: u32,
-    /// From the end of the first period on.
+    /// Names of the outputs that were NaN when NaN became a cause.
+    nan: Vec<String>,
+    /// Receives the reason when outputs become safe.
+    pub tell: Option<fn(&str)>,
+    /// The first period has ended.
     begun: bool,
     stop: bool,
     system: Option<System>,
-    /// The cycle in which the host's values of the next base tick are written; `None` before ticks begin.
+    /// Cycle in which the host's values for the next base tick are written; `None` before ticks begin.
     tick: Option<Cycle>,
     steps: u32,
     ticks: u32,
@@ -105,11 +112,11 @@ pub struct Emulated {
     frames: u8,
     bytes: Vec<u8>,
     errors: u32,
-    /// The last write, and the status of its answer.
+    /// Number of the last write request, and the status of its answer.
     last: Option<(u8, u8)>,
 }
 
-impl std::fmt::Debug for Emulated {
+impl std::fmt::Debug for EmulatedBoard {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Emulated")
             .field("status", &self.state())
@@ -118,15 +125,15 @@ impl std::fmt::Debug for Emulated {
     }
 }
 
-impl Emulated {
-    /// A board from power-up on.
+impl EmulatedBoard {
+    /// A board at power-up.
     ///
     /// # Errors
-    /// If it carries a program, or there is no circuit of it.
+    /// If the application is a program, or there is no circuit of it.
     pub fn new<'a>(
         wiring: &Wiring,
         application: impl Into<Application<'a>>,
-    ) -> Result<Emulated, EmulatedError> {
+    ) -> Result<EmulatedBoard, EmulatedError> {
         let application = application.into();
         if application.is_program() {
             return Err(EmulatedError::Program);
@@ -143,13 +150,14 @@ impl Emulated {
             let end = &endpoints.outputs[sink.number];
             Output {
                 peripheral: sink.peripheral.name.clone(),
+                number: sink.number,
                 place: (end.link, end.field),
                 ty: end.ty,
                 scale: sink.written.scale.unwrap_or(0),
             }
         });
         let outputs: Vec<Output> = outputs.collect();
-        let mut board = Emulated {
+        let mut board = EmulatedBoard {
             captured,
             set: BTreeMap::new(),
             next: BTreeMap::new(),
@@ -161,6 +169,8 @@ impl Emulated {
             lead: wiring.lead,
             control: 0,
             causes: 0,
+            nan: Vec::new(),
+            tell: None,
             begun: false,
             stop: false,
             system: None,
@@ -184,28 +194,28 @@ impl Emulated {
         Ok(board)
     }
 
-    /// The number of the host's input that a register of a peripheral is.
+    /// Number of the host's input that a peripheral drives.
     pub fn input(&self, port: &str) -> Option<usize> {
         let found = Application::from(&self.description).connect(Direction::Input, port).ok()?.number;
         self.captured.contains_key(&found).then_some(found)
     }
 
-    /// Sets what a peripheral captures at the next tick.
+    /// Sets the word that a peripheral captures at the next tick.
     pub fn capture(&mut self, input: usize, word: u32) {
         self.captured.insert(input, word);
     }
 
-    /// The level of the pin `stop`.
+    /// Sets the level of the pin `stop`.
     pub fn set_stop(&mut self, level: bool) {
         self.stop = level;
     }
 
-    /// True if outputs drive.
+    /// True while the outputs drive.
     pub fn drives(&self) -> bool {
         self.control & (RUN | ENABLE) == RUN | ENABLE && self.begun && self.causes == 0
     }
 
-    /// The value of a peripheral's first register that takes an output: 0 while outputs are safe.
+    /// Value in a peripheral's first register that takes an output; 0 while outputs are safe.
     pub fn output(&self, peripheral: &str) -> Option<i32> {
         let at = self.outputs.iter().position(|output| output.peripheral == peripheral)?;
         Some(if self.drives() { self.values[at] } else { 0 })
@@ -218,23 +228,49 @@ impl Emulated {
 
     /// Takes bytes from the line, and answers the requests among them.
     pub fn receive(&mut self, bytes: &[u8]) -> Vec<u8> {
+        let drove = self.drives();
         self.bytes.extend(bytes);
         let mut answers = Vec::new();
         while let Some(request) = protocol::take_request(&mut self.bytes, &mut self.errors) {
             self.silent = 0;
             answers.extend(self.answer(&request));
         }
+        self.report_safe_outputs(drove);
         answers
     }
 
-    /// A line that has been silent: a frame that has begun is dropped.
+    /// Reports the reason once outputs that drove become safe.
+    fn report_safe_outputs(&self, drove: bool) {
+        let Some(tell) = self.tell.filter(|_| drove && !self.drives()) else { return };
+        let figures = Figures {
+            misses: self.missed,
+            period: u32::try_from(self.description.tick).unwrap_or(u32::MAX),
+            nan: self.nan.clone(),
+            ..Figures::default()
+        };
+        let mut reasons: Vec<String> =
+            Status(self.causes).causes().map(|cause| figures.reason(cause)).collect();
+        if reasons.is_empty() {
+            reasons.push(command(self.control & RUN != 0, self.control & ENABLE != 0).to_owned());
+        }
+        tell(&format!("tick {}: the outputs become safe: {}", self.ticks, reasons.join("; ")));
+    }
+
+    /// Handles a silent line: drops an incomplete frame.
     pub fn pause(&mut self) {
         self.errors += u32::from(!self.bytes.is_empty());
         self.bytes.clear();
     }
 
-    /// Lets a base tick pass, and what follows until the next one. Bytes that the board sends by itself.
+    /// Simulates from a base tick to the next. Returns the bytes that the board sends on its own.
     pub fn pass(&mut self) -> Vec<u8> {
+        let drove = self.drives();
+        let sent = self.run_period();
+        self.report_safe_outputs(drove);
+        sent
+    }
+
+    fn run_period(&mut self) -> Vec<u8> {
         if self.stop {
             self.causes |= STOP;
         }
@@ -245,7 +281,7 @@ impl Emulated {
         {
             return Vec::new();
         }
-        // A step is for a tick; until every core waits for its first one, none is due.
+        // Steps count ticks; before every core waits for its first tick, no tick is due.
         self.steps -= u32::from(held && self.tick.is_some());
         if self.run().is_err() {
             self.causes |= FAULT;
@@ -278,7 +314,7 @@ impl Emulated {
         Ok(())
     }
 
-    /// The end of a period: outputs, what makes them safe, and a frame of the stream.
+    /// Handles the end of a period: outputs, causes that make them safe, and a frame of the stream.
     fn ended(&mut self) -> Vec<u8> {
         let Some(system) = &self.system else { return Vec::new() };
         if self.ticks == 0 {
@@ -295,12 +331,17 @@ impl Emulated {
             (SILENT, host > 0 && self.silent >= host),
         ];
         self.causes |= reasons.iter().filter(|(_, holds)| *holds).fold(0, |all, (bit, _)| all | bit);
+        let mut nan = Vec::new();
         for (output, value) in self.outputs.iter().zip(&mut self.values) {
             let (link, field) = output.place;
             match output.value(system.field_bits(link, field).unwrap_or(0)) {
                 Some(found) => *value = found,
-                None => self.causes |= NAN,
+                None => nan.push(format!("`{}`", self.endpoints.outputs[output.number].name)),
             }
+        }
+        if !nan.is_empty() {
+            self.causes |= NAN;
+            self.nan = nan;
         }
         self.begun = true;
         let (first, words, every) = (self.stream as u16, self.stream >> 16 & 15, self.stream >> 20);
@@ -321,7 +362,7 @@ impl Emulated {
             return protocol::answer(request.number, DONE, &words);
         };
         let status = match self.last {
-            // Made again: it is not carried out twice.
+            // A repeated request is not carried out twice.
             Some((number, status)) if number == request.number => status,
             _ if (0..words.len()).all(|i| self.is_writable(at(i))) => {
                 words.iter().enumerate().for_each(|(i, word)| self.write(at(i), *word));
@@ -333,13 +374,13 @@ impl Emulated {
         protocol::answer(request.number, status, &[])
     }
 
-    /// The FIFO at an address, and what of it: 0 is its status.
+    /// FIFO at an address, and the part of it: 0 is its status.
     fn fifo(&self, at: u16) -> Option<(&Fifo, u16)> {
         let fifo = self.endpoints.fifos.get(usize::from(at.checked_sub(FIFOS)? / FIFO_WORDS))?;
         Some((fifo, at - fifo.address))
     }
 
-    /// A register that is only kept, by its address.
+    /// Register that only stores its value, by address.
     fn register(&mut self, at: u16) -> Option<&mut u32> {
         let registers = [&mut self.period, &mut self.lead, &mut self.stream];
         KEPT.iter().zip(registers).find(|(name, _)| address(name) == at).map(|(_, register)| register)
@@ -370,7 +411,7 @@ impl Emulated {
             self.silent = 0;
             self.set.clear();
             self.values.fill(0);
-            // `new` has shown that it fits.
+            // `Emulated::new` has checked that the program fits.
             self.system = starts.then(|| System::new(&self.description).ok()).flatten();
         }
         if starts {
@@ -399,7 +440,7 @@ impl Emulated {
         }
     }
 
-    /// Puts an entry into a FIFO, or takes one out.
+    /// Pushes an entry into a FIFO, or pops one.
     fn act(&mut self, fifo: &Fifo) {
         let Some(system) = &mut self.system else { return };
         if fifo.to_host {
@@ -413,7 +454,7 @@ impl Emulated {
         let _ = system.push(fifo.link);
     }
 
-    /// The status of a core.
+    /// Word of a core's register `status`.
     fn status(&self, core: usize) -> u32 {
         let Some(system) = &self.system else { return 1 << 10 | self.causes };
         let fault = system.fault().is_some_and(|fault| fault.core == core);
@@ -425,7 +466,7 @@ impl Emulated {
             | self.causes
     }
 
-    /// The status of the first core.
+    /// Status of the first core.
     pub fn state(&self) -> Status {
         Status(self.status(0))
     }

@@ -5,53 +5,53 @@ use crate::protocol::{DRIVEN, FIFO_WORDS, FIFOS, Place, SEEN};
 use takt_isa::Type;
 use takt_system::{Description, End, LinkKind, SystemPort};
 
-/// Values of wires and snapshots in one direction, at most.
+/// Most values of wires and snapshots in one direction.
 pub const MOST_VALUES: usize = (SEEN - DRIVEN) as usize;
-/// FIFOs of the host, at most.
+/// Most FIFOs of the host.
 pub const MOST_FIFOS: usize = ((0x4000 - FIFOS) / FIFO_WORDS) as usize;
-/// Fields of an entry, at most.
+/// Most fields of a FIFO's entry.
 pub const MOST_FIELDS: usize = FIFO_WORDS as usize - 2;
 
-/// A FIFO with an end at the host.
+/// FIFO with an end at the host.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Fifo {
-    /// Its name.
+    /// Name of the link.
     pub name: String,
-    /// The link.
+    /// Index of the link.
     pub link: usize,
-    /// The address of its status; fields and act follow.
+    /// Address of the status; fields and act follow.
     pub address: u16,
-    /// The fields of an entry, as the host calls them.
+    /// Fields of an entry, by the host's names.
     pub fields: Vec<(String, Type)>,
-    /// True if the host takes entries out; else it puts them in.
+    /// The host pops entries; otherwise it pushes them.
     pub to_host: bool,
 }
 
 impl Fifo {
-    /// The address of a field.
+    /// Address of a field.
     pub fn field(&self, field: usize) -> u16 {
         self.address + 1 + field as u16
     }
 
-    /// The address that is written to push or pop.
+    /// Address whose write pushes or pops.
     pub fn act(&self) -> u16 {
         self.field(self.fields.len())
     }
 }
 
-/// The host endpoints of a system.
+/// Host endpoints of a system.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Endpoints {
     /// Values of wires and snapshots that the host, or a peripheral, drives.
     pub inputs: Vec<SystemPort>,
-    /// Values of wires and snapshots that it sees.
+    /// Values of wires and snapshots that the host sees.
     pub outputs: Vec<SystemPort>,
-    /// FIFOs.
+    /// FIFOs between the host and cores.
     pub fifos: Vec<Fifo>,
 }
 
 impl Endpoints {
-    /// The endpoints of a system.
+    /// Finds the endpoints of a system.
     pub fn of(description: &Description) -> Endpoints {
         let is_fifo = |link: usize| matches!(description.links[link].kind, LinkKind::Fifo { .. });
         let plain = |ports: Vec<SystemPort>| ports.into_iter().filter(|port| !is_fifo(port.link)).collect();
@@ -74,7 +74,7 @@ impl Endpoints {
         }
     }
 
-    /// A sentence if there are too many for a board.
+    /// A message, if there are too many for a board.
     pub fn too_many(&self) -> Option<String> {
         for (all, what) in [(&self.inputs, "drives"), (&self.outputs, "sees")] {
             if all.len() > MOST_VALUES {
@@ -98,17 +98,17 @@ impl Endpoints {
         ))
     }
 
-    /// The address of a value that the host drives.
+    /// Address of a value that the host drives.
     pub fn input(number: usize) -> u16 {
         DRIVEN + number as u16
     }
 
-    /// The address of one that it sees.
+    /// Address of a value that the host sees.
     pub fn output(number: usize) -> u16 {
         SEEN + number as u16
     }
 
-    /// The address of an endpoint's value, by its name: `x`, or `link.x`.
+    /// Address of an endpoint's value, by name: `x`, or `link.x`.
     pub fn place(&self, name: &str) -> Option<Place> {
         let at = |all: &[SystemPort]| all.iter().position(|port| port.name == name);
         if let Some(number) = at(&self.inputs) {
@@ -119,10 +119,10 @@ impl Endpoints {
         Some(Place { read: Endpoints::output(number), set: None, ty: self.outputs[number].ty })
     }
 
-    /// The FIFO of this name that the host pops, or pushes.
+    /// Finds a FIFO by name that the host pops (`to_host`), or pushes.
     ///
     /// # Errors
-    /// In words, what is wrong with the name.
+    /// A message about the name.
     pub fn fifo(&self, name: &str, to_host: bool) -> Result<&Fifo, String> {
         let found = self.fifos.iter().find(|fifo| fifo.name == name);
         let way = if to_host { "to" } else { "from" };

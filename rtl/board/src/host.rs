@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The host's side of the protocol: requests with retries, over any line.
+//! Host's side of the protocol: requests with retries, over any line.
 
 use crate::application::Application;
 use crate::endpoints::Fifo;
@@ -10,91 +10,94 @@ use std::time::Duration;
 use takt_isa::fp::Flags;
 use takt_system::MAX_CORES;
 
-/// The registers that count: of a program's periods since its start, and of the line's frames since power-up.
+/// Counting registers: of a program's periods since its start, and of the line's frames since power-up.
 pub const COUNTERS: [&str; 6] = ["periods", "misses", "cycles", "most_cycles", "errors", "lost"];
 
-/// Times that a request is made.
+/// Attempts at a request.
 const ATTEMPTS: u32 = 8;
 
-/// Bytes among which an answer is looked for until the request is made again: many times the longest answer.
+/// Bytes searched for an answer before a request is repeated: many times the longest answer.
 const BYTES: usize = 4096;
 
-/// Times as long as usual for which the last attempt listens where the request waits for the program: the board refuses it after 2²²
-/// cycles, which a simulated one takes long for.
+/// Factor for the last attempt's patience if the request waits for the program: the board refuses it after 2²² cycles, which take a
+/// simulated board long.
 const GRANT: u32 = 60;
 
-/// Records that are written before they are read back.
+/// Records written before they are read back.
 const PART: usize = 64;
 
-/// The time that a request may take, with all its attempts.
+/// Time limit of a request with all its attempts.
 const LIMIT: Duration = Duration::from_secs(90);
 
-/// Times that a program is asked whether it has come to its `wait`, a pause of the line between two of them.
+/// Times that a program is asked for its `wait`, with a pause of the line in between.
 const ASKED: u32 = 30;
 
-/// A board that answers.
+/// Connection to a board that answers.
 #[derive(Debug)]
 pub struct Host<L> {
-    /// The line to it.
+    /// Line to the board.
     pub line: L,
     receiver: Receiver,
     number: u8,
     stream: VecDeque<Frame>,
-    /// Requests that had to be made again.
+    /// Number of requests that were repeated.
     pub retries: u64,
-    /// Cores that the board carries; a single program's is one.
+    /// Cores of the board's system; 1 for a single program.
     pub cores: usize,
-    /// Records that its image has room for.
+    /// Records for which the board's image has room.
     room: usize,
 }
 
-/// Times in a row that a stream may bring nothing until it is given up.
+/// Times in a row that a stream may bring nothing before it is given up.
 const STILL: u32 = 50;
 
-/// Words for ports with consecutive numbers, the address of the first one ahead.
+/// Words for ports with consecutive numbers, after the address of the first port.
 pub type Ports = (u16, Vec<u32>);
 
-/// The result of rows that were fed.
+/// Result of feeding rows.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Fed {
-    /// The first period that had each row.
+pub struct FeedResult {
+    /// First period that used each row.
     pub used: Vec<u32>,
-    /// Periods that had the row of the period before once more, or of which nobody knows.
+    /// Periods that repeated the last row, or for which that is unknown.
     pub late: u32,
 }
 
-/// The status of a FIFO: its first word.
+/// Status of a FIFO: its first word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FifoStatus(pub u32);
 
 impl FifoStatus {
-    /// Entries in it.
+    /// Number of entries in the FIFO.
     pub fn count(self) -> u32 {
         self.0 >> 16
     }
 
-    /// There is none.
+    /// The queue has no entry.
     pub fn empty(self) -> bool {
         self.0 & 1 != 0
     }
 
-    /// There is no room.
+    /// The queue has no room.
     pub fn full(self) -> bool {
         self.0 & 2 != 0
     }
 
-    /// An entry was refused because it was full.
+    /// Sticky: an entry was refused because the queue was full.
     pub fn overflow(self) -> bool {
         self.0 & 4 != 0
     }
 
-    /// One was asked for while it was empty.
+    /// Sticky: a pop was refused because the queue was empty.
     pub fn underflow(self) -> bool {
         self.0 & 8 != 0
     }
 }
 
-/// The status of a core: the register `status`.
+/// Cause of peripherals that are safe while others may drive.
+pub(crate) const TRIP: &str = "trip";
+
+/// Status of a core: the register `status`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Status(pub u32);
 
@@ -104,38 +107,38 @@ impl Status {
         self.0 & 1 != 0
     }
 
-    /// It has halted.
+    /// The program has halted.
     pub fn halted(self) -> bool {
         self.0 & 2 != 0
     }
 
-    /// It has stopped with a fault.
+    /// The program has stopped with a fault.
     pub fn fault(self) -> bool {
         self.0 & 4 != 0
     }
 
-    /// The slot of the operation that faulted.
+    /// Slot of the operation that faulted.
     pub fn fault_slot(self) -> usize {
         (self.0 >> 4 & 7) as usize
     }
 
-    /// The sticky exception flags.
+    /// Sticky exception flags of the core.
     pub fn flags(self) -> Flags {
-        // In the same order, from overflow on.
+        // The register has them in the same order, from overflow on.
         Flags::from_bits((self.0 >> 7 & 7) as u8 * Flags::OVERFLOW.bits())
     }
 
-    /// It is in reset.
+    /// The core is in reset.
     pub fn in_reset(self) -> bool {
         self.0 >> 10 & 1 != 0
     }
 
-    /// Its outputs drive.
+    /// The core's outputs drive.
     pub fn drives(self) -> bool {
         self.0 >> 11 & 1 != 0
     }
 
-    /// The core's activity in words; `control` is the value of that register.
+    /// Activity of the core, as text; `control` is the value of that register.
     pub fn activity(self, control: u32) -> &'static str {
         match self {
             _ if self.fault() => "stopped with a fault",
@@ -146,14 +149,14 @@ impl Status {
         }
     }
 
-    /// The causes that stopped the drive.
+    /// Causes that stopped the drive; last of them `trip`, which stops the peripherals that the wiring names.
     pub fn causes(self) -> impl Iterator<Item = &'static str> {
-        let names = ["fault", "halt", "missed deadline", "host silent", "stop", "NaN output"];
+        let names = ["fault", "halt", "missed deadline", "host silent", "stop", "NaN output", TRIP];
         names.into_iter().enumerate().filter(move |(i, _)| self.0 >> (12 + i) & 1 != 0).map(|(_, name)| name)
     }
 }
 
-/// The kind of a fault, in words, from the value of the register `fault`.
+/// Kind of a fault, as text, from the value of the register `fault`.
 pub fn fault_kind(register: u32) -> &'static str {
     match register >> 16 & 7 {
         1 => "illegal word",
@@ -168,10 +171,10 @@ pub fn fault_kind(register: u32) -> &'static str {
 }
 
 impl<L: Line> Host<L> {
-    /// Asks who is there. `number` is that of the first request: any, but not the same each time.
+    /// Connects to a board. `number` is the number of the first request and should differ from run to run.
     ///
     /// # Errors
-    /// If nobody answers, or a stranger does.
+    /// If there is no answer, or the answer is no Takt board's.
     pub fn connect(line: L, number: u8) -> Result<Host<L>, LinkError> {
         let receiver = Receiver::default();
         let mut host =
@@ -188,10 +191,10 @@ impl<L: Line> Host<L> {
         Ok(host)
     }
 
-    /// Checks that the board's circuit is one for this program, or system: then it can be loaded, and its names have the right addresses.
+    /// Checks that the board's circuit was built for this program or system: then it can be loaded, and its names have the right addresses.
     ///
     /// # Errors
-    /// If it is not, or the board does not answer.
+    /// If the circuit differs, or the board does not answer.
     pub fn fits<'a>(&mut self, application: impl Into<Application<'a>>) -> Result<(), LinkError> {
         let application = application.into();
         let (there, wanted) = (self.cores, application.description().cores.len());
@@ -203,7 +206,7 @@ impl<L: Line> Host<L> {
         if self.register("circuit")? == circuit { Ok(()) } else { Err(LinkError::OtherCircuit) }
     }
 
-    /// Makes a request until it is answered with so many words, so often and so long as is allowed.
+    /// Repeats a request until it is answered with `wanted` words, within the limits of attempts and time.
     fn request(
         &mut self,
         bytes: &[u8],
@@ -235,8 +238,7 @@ impl<L: Line> Host<L> {
         Err(error)
     }
 
-    /// Listens for an answer until the line has been silent for so long. A line brings an answer in as many pieces as it likes; noise
-    /// and a stream can come without end.
+    /// Listens for an answer until the line has been silent `patience` times. Answers may come in pieces; noise and a stream may never end.
     fn listen(&mut self, number: u8, patience: u32, until: Duration) -> Result<Option<Frame>, LinkError> {
         let (mut silent, mut bytes) = (0, 0);
         while silent < patience && bytes < BYTES && self.line.time() < until {
@@ -257,7 +259,7 @@ impl<L: Line> Host<L> {
         Ok(None)
     }
 
-    /// Reads words.
+    /// Reads `count` words from `address` on.
     ///
     /// # Errors
     /// If the board does not answer, or refuses.
@@ -273,7 +275,7 @@ impl<L: Line> Host<L> {
         Ok(words)
     }
 
-    /// Writes words; 16 at most go together, between two periods.
+    /// Writes words; up to 16 go together, between two periods.
     ///
     /// # Errors
     /// If the board does not answer, or refuses.
@@ -287,8 +289,19 @@ impl<L: Line> Host<L> {
         Ok(())
     }
 
-    /// Sets ports, which must be in ascending order of their addresses. Ports with consecutive addresses change together, between two
-    /// periods.
+    /// Reads words at any addresses, runs of consecutive ones together.
+    ///
+    /// # Errors
+    /// If the board does not answer.
+    pub fn read_each(&mut self, addresses: &[u16]) -> Result<Vec<u32>, LinkError> {
+        let mut words = Vec::with_capacity(addresses.len());
+        for together in addresses.chunk_by(|a, b| Some(*b) == a.checked_add(1)) {
+            words.extend(self.read(together[0], together.len())?);
+        }
+        Ok(words)
+    }
+
+    /// Sets ports, in ascending order of addresses. Ports with consecutive addresses change together, between two periods.
     ///
     /// # Errors
     /// If the board does not answer, or refuses.
@@ -300,7 +313,7 @@ impl<L: Line> Host<L> {
         Ok(())
     }
 
-    /// A register's value, by its name.
+    /// Reads a register, by name.
     ///
     /// # Errors
     /// If the board does not answer.
@@ -308,7 +321,7 @@ impl<L: Line> Host<L> {
         self.register_of(0, name)
     }
 
-    /// A register of a core: `status`, `fault`, `misses`, `periods`, `cycles`, `most_cycles`, `issued`. A single program's is core 0.
+    /// Reads a register of a core: `status`, `fault`, `misses`, `periods`, `cycles`, `most_cycles`, `issued`. A single program's core is 0.
     ///
     /// # Errors
     /// If the board does not answer.
@@ -317,7 +330,7 @@ impl<L: Line> Host<L> {
         Ok(self.read(at, 1)?.first().copied().unwrap_or(0))
     }
 
-    /// Sets a register, by its name.
+    /// Writes a register, by name.
     ///
     /// # Errors
     /// If the board does not answer.
@@ -325,7 +338,7 @@ impl<L: Line> Host<L> {
         self.write(address(name), &[value])
     }
 
-    /// The status of core 0.
+    /// Reads the status of core 0.
     ///
     /// # Errors
     /// If the board does not answer.
@@ -333,7 +346,7 @@ impl<L: Line> Host<L> {
         self.status_of(0)
     }
 
-    /// The status of a core.
+    /// Reads the status of a core.
     ///
     /// # Errors
     /// If the board does not answer.
@@ -341,8 +354,8 @@ impl<L: Line> Host<L> {
         Ok(Status(self.register_of(core, "status")?))
     }
 
-    /// Waits until the program, or every core of a system, is between two periods or has stopped. Unlike a read of what it holds, this
-    /// asks again and again, so that a program that never waits is soon known.
+    /// Waits until the program, or every core of a system, is between two periods or has stopped. Polls the status, unlike a read of the
+    /// program's values, so that a program that never waits is detected early.
     ///
     /// # Errors
     /// [`LinkError::Busy`] if that does not happen soon, or the board does not answer.
@@ -367,7 +380,7 @@ impl<L: Line> Host<L> {
         Err(LinkError::Busy)
     }
 
-    /// The status of a FIFO.
+    /// Reads the status of a FIFO.
     ///
     /// # Errors
     /// If the board does not answer.
@@ -379,7 +392,7 @@ impl<L: Line> Host<L> {
         if self.register("control")? & protocol::RUN == 0 { Err(LinkError::Stopped) } else { Ok(()) }
     }
 
-    /// Puts an entry into a FIFO from the host; false if it is full. A request that is repeated does not push twice.
+    /// Pushes an entry into a FIFO from the host; false if it is full. A repeated request does not push twice.
     ///
     /// # Errors
     /// If the system is stopped, or the board does not answer.
@@ -388,13 +401,14 @@ impl<L: Line> Host<L> {
         if self.fifo(fifo)?.full() {
             return Ok(false);
         }
-        // The entry goes in with the last word.
+        // The last word pushes the entry.
         let words: Vec<u32> = entry.iter().copied().chain([1]).collect();
         self.write(fifo.field(0), &words)?;
         Ok(true)
     }
 
-    /// Takes the head of a FIFO to the host; none if it is empty. It is read first, and then taken out: nothing is lost with an answer.
+    /// Pops the head of a FIFO to the host; `None` if it is empty. The head is read before it is removed, so that a lost answer loses no
+    /// entry.
     ///
     /// # Errors
     /// If the system is stopped, or the board does not answer.
@@ -409,18 +423,18 @@ impl<L: Line> Host<L> {
         Ok(Some(entry))
     }
 
-    /// Stops the program, and loads another one, which is read back. It does not start.
+    /// Stops the program, loads another, and reads it back. Does not start it.
     ///
     /// # Errors
-    /// If the image is too big or comes back different, or the board does not answer: it is then stopped.
+    /// If the image is too big or comes back different, or the board does not answer: then the program stays stopped.
     pub fn load(&mut self, records: &[[u32; 3]]) -> Result<(), LinkError> {
         self.load_with(records, |_| ())
     }
 
-    /// As [`Host::load`]; `loaded` is told how many more records have been written and compared.
+    /// Loads a program, as [`Host::load`]; `loaded` gets the number of records that each step has written and compared.
     ///
     /// # Errors
-    /// As there.
+    /// See [`Host::load`].
     pub fn load_with(
         &mut self,
         records: &[[u32; 3]],
@@ -433,7 +447,7 @@ impl<L: Line> Host<L> {
         self.set("records", 0)?;
         for (page, some) in records.chunks(PAGE).enumerate() {
             self.set("page", page as u32)?;
-            // Four words of address for each record, of which the last is not there.
+            // Each record has four words of address space, the last of them unused.
             for (part, some) in some.chunks(PART).enumerate() {
                 let words: Vec<u32> =
                     some.iter().flat_map(|[low, high, place]| [*low, *high, *place, 0]).collect();
@@ -449,14 +463,14 @@ impl<L: Line> Host<L> {
         self.set("records", records.len() as u32)
     }
 
-    /// The number of the first of these records that the board's image has differently. The register `records` tells how many it has.
+    /// Index of the first record that differs in the board's image. The register `records` tells how many the board has.
     ///
     /// # Errors
     /// If the board does not answer.
     pub fn first_difference(&mut self, records: &[[u32; 3]]) -> Result<Option<usize>, LinkError> {
         for (page, some) in records.chunks(PAGE).enumerate() {
             self.set("page", page as u32)?;
-            // Four words of address for each record, of which the last is not there.
+            // Each record has four words of address space, the last of them unused.
             let words = self.read(protocol::IMAGE, 4 * some.len())?;
             let differs =
                 some.iter().zip(words.chunks(4)).position(|(record, words)| record[..] != words[..3]);
@@ -467,14 +481,14 @@ impl<L: Line> Host<L> {
         Ok(None)
     }
 
-    /// Sets input ports once for each period, a row each: what they have in the period after the one that has just ended. The stream
-    /// says when one has.
+    /// Sets input ports once per period, a row each: row by row, the values for the period after the period that has just ended. The stream
+    /// reports the ends of periods.
     ///
     /// # Errors
     /// If the board does not answer, or no period ends.
-    pub fn feed(&mut self, rows: impl IntoIterator<Item = Vec<Ports>>) -> Result<Fed, LinkError> {
-        let mut fed = Fed::default();
-        // Every period; a stream has a word at least, and that of the register is with every frame.
+    pub fn feed(&mut self, rows: impl IntoIterator<Item = Vec<Ports>>) -> Result<FeedResult, LinkError> {
+        let mut fed = FeedResult::default();
+        // A frame in every period. A stream has at least one word, which every frame carries besides the register.
         self.set("stream", 1 << 20 | 1 << 16 | u32::from(address("periods")))?;
         self.stream.clear();
         let mut period = self.period()?;
@@ -482,7 +496,7 @@ impl<L: Line> Host<L> {
             for (address, words) in row {
                 self.write(address, &words)?;
             }
-            // Periods that ended before the answer did not have it.
+            // Periods that ended before the answer did not use the row.
             if let Some(ended) =
                 self.stream.drain(..).filter_map(|frame| frame.words.first().copied()).next_back()
             {
@@ -499,7 +513,7 @@ impl<L: Line> Host<L> {
         Ok(fed)
     }
 
-    /// The next period that ends, as the stream says.
+    /// Next period that ends, from the stream.
     fn period(&mut self) -> Result<u32, LinkError> {
         for _ in 0..STILL {
             if let Some(frame) = self.streamed()?
@@ -511,7 +525,7 @@ impl<L: Line> Host<L> {
         Err(LinkError::Still)
     }
 
-    /// The next frame of the stream: what stands in the line, or after waiting a little.
+    /// Next frame of the stream: received already, or within a short wait.
     ///
     /// # Errors
     /// If the line is gone.
@@ -522,7 +536,7 @@ impl<L: Line> Host<L> {
         Ok(self.stream.pop_front())
     }
 
-    /// Takes what stands in the line, or comes within a little while: frames of the stream.
+    /// Receives frames of the stream, waiting a short time at most.
     fn hear(&mut self) -> Result<(), LinkError> {
         let received = self.line.receive()?;
         self.receiver.put(&received);

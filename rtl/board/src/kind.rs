@@ -1,83 +1,93 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The table of peripherals: what each has of pins, registers and parameters. The generator, the models' tests, the reader of
-//! wiring files and `takt board` take names and limits from here.
+//! Table of peripherals: pins, registers and parameters of each. The generator, the models' tests, the reader of wiring files and `takt
+//! board` take names and limits from here.
 
-/// Which way a signal goes, seen from the peripheral.
+/// Direction of a signal, seen from the peripheral.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Direction {
-    /// Into it.
+    /// Into the peripheral, from outside.
     Input,
-    /// Out of it.
+    /// Out of the peripheral.
     Output,
 }
 
-/// A pin of a peripheral: port `pin_<name>` of its module.
+/// Pin of a peripheral: port `pin_<name>` of its module.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pin {
-    /// Its name.
+    /// Name in wiring files.
     pub name: &'static str,
-    /// Its direction.
+    /// Direction, seen from the peripheral.
     pub direction: Direction,
-    /// True if it may be left unconnected; an input is then 0.
+    /// The pin may stay unconnected; an input is then 0.
     pub optional: bool,
 }
 
-/// A register of 32 bits: port `r_<name>` of its module if the program reads it, `w_<name>` if it writes it.
+/// Register of 32 bits: port `r_<name>` of the module if the program reads it, `w_<name>` if the program writes it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Register {
-    /// Its name.
+    /// Name in wiring files.
     pub name: &'static str,
-    /// True if a float may be scaled into it, of one that is written.
+    /// A float may be scaled into the register, which the program writes.
     pub scaled: bool,
-    /// Its contents.
+    /// Optional pin that the register needs.
+    pub pin: Option<&'static str>,
+    /// Contents of the register, for documentation.
     pub text: &'static str,
 }
 
-/// A parameter.
+/// Parameter of a peripheral's module.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Parameter {
-    /// Its name in wiring files; in the module the same in capitals.
+    /// Name in wiring files; in capitals, the parameter of the module.
     pub name: &'static str,
-    /// The least value; one below 0 is a register's two's complement.
+    /// Least value; below 0 for a register's two's complement.
     pub least: i64,
-    /// The greatest.
+    /// Greatest value that the module supports.
     pub most: i64,
-    /// Unless stated.
+    /// Value of a parameter that a wiring leaves out.
     pub default: u32,
-    /// Its meaning, with its unit.
+    /// Meaning and unit, for documentation.
     pub text: &'static str,
+    /// Names of the values from `least` on, with which a wiring states the parameter; empty of a number.
+    pub names: &'static [&'static str],
 }
 
-/// The strobes that a module takes besides clock, reset, pins and registers.
+/// Signals that a module takes besides clock, reset, pins and registers, or gives to other peripherals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Strobes {
-    /// `enable`: the outputs may drive.
+    /// Input `enable`: the outputs may drive.
     pub enable: bool,
-    /// `start`: a conversion begins.
+    /// Input `trip`: the outputs are at their tripped level. Other kinds with `enable` are disabled by a trip.
+    pub trip: bool,
+    /// Input `start`: a conversion begins.
     pub start: bool,
+    /// Inputs `place` and `back`: the carrier, whose half period in cycles is the module's parameter `HALF`.
+    pub carrier: bool,
+    /// Input `clear` and output `trip`: the module trips other peripherals, until it is cleared.
+    pub trips: bool,
 }
 
-/// A port of a module: its name and its bits.
+/// Port of a module: name and width.
 pub type Port = (String, u32);
 
-/// A kind of peripheral.
+/// Kind of a peripheral.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Kind {
-    /// Its name in wiring files.
+    /// Name in wiring files.
     pub name: &'static str,
-    /// Its module.
+    /// Name of the Verilog module.
     pub module: &'static str,
-    /// Its description in a few words.
+    /// Short description, for documentation.
     pub text: &'static str,
-    /// Its pins.
+    /// Pins, in the order of the module's ports.
     pub pins: &'static [Pin],
-    /// The registers that the program reads: captured together at the tick.
+    /// Registers that the program reads: captured together at the tick.
     pub reads: &'static [Register],
-    /// The registers that the program writes: published together at its `wait`.
+    /// Registers that the program writes: published together at its `wait`.
     pub writes: &'static [Register],
-    /// Its parameters.
+    /// Parameters of the module.
     pub parameters: &'static [Parameter],
-    /// Its strobes.
+    /// Strobes of the module.
     pub strobes: Strobes,
 }
 
@@ -94,26 +104,46 @@ const fn optional(pin: Pin) -> Pin {
 }
 
 const fn register(name: &'static str, text: &'static str) -> Register {
-    Register { name, scaled: false, text }
+    Register { name, scaled: false, pin: None, text }
 }
 
 const fn scaled(name: &'static str, text: &'static str) -> Register {
-    Register { name, scaled: true, text }
+    Register { name, scaled: true, pin: None, text }
+}
+
+const fn at(pin: &'static str, register: Register) -> Register {
+    Register { pin: Some(pin), ..register }
 }
 
 const fn parameter(name: &'static str, least: i64, most: i64, default: u32, text: &'static str) -> Parameter {
-    Parameter { name, least, most, default, text }
+    Parameter { name, least, most, default, text, names: &[] }
+}
+
+const fn choice(
+    name: &'static str,
+    names: &'static [&'static str],
+    default: u32,
+    text: &'static str,
+) -> Parameter {
+    Parameter { name, least: 0, most: names.len() as i64 - 1, default, text, names }
 }
 
 const FILTER: Parameter =
     parameter("filter", 1, 256, 3, "cycles for which a level must stand before it counts");
 const SIGNED: Parameter = parameter("signed", 0, 1, 1, "1: the value is signed, and 0 is 50 % duty");
 
-const ENABLED: Strobes = Strobes { enable: true, start: false };
-const PLAIN: Strobes = Strobes { enable: false, start: false };
-const STARTED: Strobes = Strobes { enable: false, start: true };
+const PLAIN: Strobes = Strobes { enable: false, trip: false, start: false, carrier: false, trips: false };
+const ENABLED: Strobes = Strobes { enable: true, ..PLAIN };
+const STARTED: Strobes = Strobes { start: true, ..PLAIN };
+const MODULATED: Strobes = Strobes { trip: true, carrier: true, ..ENABLED };
+const TRIPPING: Strobes = Strobes { trips: true, ..PLAIN };
 
-/// Every kind of peripheral.
+/// Names of the levels of a half bridge at rest.
+const RESTS: &[&str] = &["off", "low", "high"];
+/// Times from which a `pwm3` acts on new duties: the names of the parameter `update`.
+pub const UPDATES: &[&str] = &["now", "valley", "peak", "either"];
+
+/// Table of all kinds of peripherals.
 pub const KINDS: &[Kind] = &[
     Kind {
         name: "quadrature",
@@ -122,8 +152,8 @@ pub const KINDS: &[Kind] = &[
         pins: &[input("a"), input("b"), optional(input("index"))],
         reads: &[
             register("count", "the position in counts; wraps at 32 bits"),
-            register("at_index", "the count at the last pulse of the index"),
-            register("indices", "pulses of the index so far"),
+            at("index", register("at_index", "the count at the last pulse of the index")),
+            at("index", register("indices", "pulses of the index so far")),
             register("errors", "times that both pins changed at once"),
         ],
         writes: &[],
@@ -164,6 +194,76 @@ pub const KINDS: &[Kind] = &[
         strobes: ENABLED,
     },
     Kind {
+        name: "pwm3",
+        module: "takt_pwm3",
+        text: "three half bridges on a carrier, with dead time",
+        pins: &[
+            output("high_a"),
+            optional(output("low_a")),
+            output("high_b"),
+            optional(output("low_b")),
+            output("high_c"),
+            optional(output("low_c")),
+        ],
+        reads: &[],
+        writes: &[
+            scaled(
+                "a",
+                "cycles of phase a's pulse, 0 to 2·half of the carrier; signed: -half to half, 0 is 50 % duty",
+            ),
+            scaled("b", "the same of phase b"),
+            scaled("c", "the same of phase c"),
+        ],
+        parameters: &[
+            parameter("dead", 0, 1023, 0, "dead time in cycles"),
+            parameter(
+                "minimum",
+                0,
+                1023,
+                0,
+                "least cycles for which a switch is on; a shorter pulse is left out",
+            ),
+            choice(
+                "update",
+                UPDATES,
+                0,
+                "when duties act: `\"now\"`, from the next `\"valley\"` or `\"peak\"` on, or from `\"either\"`",
+            ),
+            Parameter { default: 0, ..SIGNED },
+            parameter("invert_high", 0, 1, 0, "1: the pins of high switches are active low"),
+            parameter("invert_low", 0, 1, 0, "1: the pins of low switches are active low"),
+            choice(
+                "safe",
+                RESTS,
+                0,
+                "switches while the drive is not enabled: `\"off\"`, or those of the `\"low\"` or `\"high\"` side on",
+            ),
+            choice(
+                "tripped",
+                RESTS,
+                0,
+                "the same while a trip is held; `\"low\"` brakes a motor by its windings",
+            ),
+        ],
+        strobes: MODULATED,
+    },
+    Kind {
+        name: "trip",
+        module: "takt_trip",
+        text: "fault of a driver, or a comparator, which makes peripherals safe without the core",
+        pins: &[input("in")],
+        reads: &[
+            register("state", "bit 0: the trip is held, bit 1: the pin asks for it"),
+            register("trips", "trips so far; wraps at 32 bits"),
+        ],
+        writes: &[register("clear", "not 0: clears the trip if the pin no longer asks")],
+        parameters: &[
+            parameter("filter", 0, 255, 3, "cycles for which a level must stand before it counts; 0: none"),
+            parameter("invert", 0, 1, 0, "1: the pin is active low"),
+        ],
+        strobes: TRIPPING,
+    },
+    Kind {
         name: "sigma-delta",
         module: "takt_sigma_delta",
         text: "analogue output: a stream of pulses on one pin",
@@ -179,18 +279,18 @@ pub const KINDS: &[Kind] = &[
         text: "SPI master for a converter: one frame each period",
         pins: &[output("clock"), output("select"), optional(output("out")), optional(input("in"))],
         reads: &[
-            register("received", "what the last frame brought"),
+            at("in", register("received", "value received in the last frame")),
             register("frames", "frames so far"),
             register("lost", "starts that came during a frame and were dropped"),
         ],
-        writes: &[scaled("send", "what the next frames send")],
+        writes: &[at("out", scaled("send", "value to send in the next frames"))],
         parameters: &[
             parameter("half", 3, 65535, 4, "half a bit in cycles"),
             parameter("bits", 1, 32, 16, "bits of a frame"),
             parameter("polarity", 0, 1, 0, "level of the clock at rest"),
             parameter("phase", 0, 1, 0, "0: data is sampled at the clock's first edge, 1: at its second"),
             parameter("signed", 0, 1, 0, "1: the highest bit received is a sign"),
-            parameter("send", 0, u32::MAX as i64, 0, "what is sent until the program has written `send`"),
+            parameter("send", 0, u32::MAX as i64, 0, "value to send until the program has written `send`"),
         ],
         strobes: STARTED,
     },
@@ -220,18 +320,23 @@ pub const KINDS: &[Kind] = &[
 ];
 
 impl Kind {
-    /// The kind of this name.
+    /// Finds a kind by name.
     pub fn from_name(name: &str) -> Option<&'static Kind> {
         KINDS.iter().find(|kind| kind.name == name)
     }
 
-    /// The ports of its module in the order in which tests and generator connect them, with widths; first those that it takes, then
-    /// those that it drives. The clock is not among them.
+    /// Ports of the module in the order in which tests and generator connect them, with widths: first the inputs, without the clock, then
+    /// the outputs.
     pub fn ports(&self) -> (Vec<Port>, Vec<Port>) {
         let mut takes = vec![("rst".to_owned(), 1)];
         let strobe = |name: &str, there: bool| there.then(|| (name.to_owned(), 1));
         takes.extend(strobe("enable", self.strobes.enable));
+        takes.extend(strobe("trip", self.strobes.trip));
+        takes.extend(strobe("clear", self.strobes.trips));
         takes.extend(strobe("start", self.strobes.start));
+        if self.strobes.carrier {
+            takes.extend([("place".to_owned(), 16), ("back".to_owned(), 1)]);
+        }
         takes.extend(strobe("take", !self.reads.is_empty()));
         takes.extend(strobe("put", !self.writes.is_empty()));
         let pins = |direction| {
@@ -241,11 +346,12 @@ impl Kind {
         takes.extend(pins(Direction::Input));
         takes.extend(self.writes.iter().map(|register| (format!("w_{}", register.name), 32)));
         let reads = self.reads.iter().map(|register| (format!("r_{}", register.name), 32));
-        (takes, pins(Direction::Output).chain(reads).collect())
+        let trip = strobe("trip", self.strobes.trips);
+        (takes, pins(Direction::Output).chain(trip).chain(reads).collect())
     }
 }
 
-/// Every kind as a row of the table in docs/board.md.
+/// Rows of the table in docs/board.md, one per kind.
 pub fn markdown() -> String {
     let registers = |registers: &[Register]| {
         let texts = registers.iter().map(|register| format!("`{}`: {}", register.name, register.text));
@@ -256,7 +362,11 @@ pub fn markdown() -> String {
             true => format!("{} (optional)", pin.name),
             false => pin.name.to_owned(),
         });
-        let parameters = kind.parameters.iter().map(|p| format!("`{}` ({}): {}", p.name, p.default, p.text));
+        let value = |p: &Parameter| match p.names.get(p.default as usize) {
+            Some(name) => format!("\"{name}\""),
+            None => p.default.to_string(),
+        };
+        let parameters = kind.parameters.iter().map(|p| format!("`{}` ({}): {}", p.name, value(p), p.text));
         format!(
             "| `{}`: {} | {} | {} | {} | {} |\n",
             kind.name,

@@ -8,17 +8,20 @@
 mod application;
 pub mod boards;
 pub mod build;
+pub mod carrier;
+mod consistency;
 mod document;
 pub mod emulated;
 pub mod endpoints;
 pub mod host;
+mod interlock;
 pub mod kind;
 pub mod latency;
 pub mod model;
 pub mod netlist;
 pub mod place;
-pub mod pll;
 pub mod protocol;
+mod safety_watch;
 pub mod serial;
 pub mod simulation;
 mod sinks;
@@ -29,8 +32,9 @@ pub mod tools;
 pub mod top;
 pub mod wiring;
 
-pub use application::Application;
+pub use application::{Application, Array};
 pub use boards::Board;
+pub use consistency::Findings;
 pub use document::Mistake;
 pub use host::Host;
 pub use kind::Kind;
@@ -38,10 +42,12 @@ pub use protocol::Place;
 pub use stream::{STREAMED, Stream};
 pub use wiring::Wiring;
 
-/// The Verilog of the peripherals and of what is around the core, by file name.
+/// The Verilog of the peripherals, and of the modules around the core, by file name.
 pub const VERILOG: &[(&str, &str)] = &[
+    ("takt_align.v", include_str!("../verilog/takt_align.v")),
     ("takt_boot.v", include_str!("../verilog/takt_boot.v")),
     ("takt_bridge.v", include_str!("../verilog/takt_bridge.v")),
+    ("takt_carrier.v", include_str!("../verilog/takt_carrier.v")),
     ("takt_digital_in.v", include_str!("../verilog/takt_digital_in.v")),
     ("takt_digital_out.v", include_str!("../verilog/takt_digital_out.v")),
     ("takt_exchange.v", include_str!("../verilog/takt_exchange.v")),
@@ -49,6 +55,8 @@ pub const VERILOG: &[(&str, &str)] = &[
     ("takt_interlock.v", include_str!("../verilog/takt_interlock.v")),
     ("takt_output_latch.v", include_str!("../verilog/takt_output_latch.v")),
     ("takt_pwm.v", include_str!("../verilog/takt_pwm.v")),
+    ("takt_pwm3.v", include_str!("../verilog/takt_pwm3.v")),
+    ("takt_pwm_phase.v", include_str!("../verilog/takt_pwm_phase.v")),
     ("takt_quadrature.v", include_str!("../verilog/takt_quadrature.v")),
     ("takt_scale.v", include_str!("../verilog/takt_scale.v")),
     ("takt_shadow_memory.v", include_str!("../verilog/takt_shadow_memory.v")),
@@ -57,6 +65,7 @@ pub const VERILOG: &[(&str, &str)] = &[
     ("takt_step.v", include_str!("../verilog/takt_step.v")),
     ("takt_tick.v", include_str!("../verilog/takt_tick.v")),
     ("takt_tick_divider.v", include_str!("../verilog/takt_tick_divider.v")),
+    ("takt_trip.v", include_str!("../verilog/takt_trip.v")),
     ("takt_uart_receive.v", include_str!("../verilog/takt_uart_receive.v")),
     ("takt_uart_send.v", include_str!("../verilog/takt_uart_send.v")),
 ];

@@ -7,7 +7,7 @@ use takt_isa::load::LoadRecord;
 use takt_system::MAX_CORES;
 use thiserror::Error;
 
-/// Bits 31:16 of the register `id`: "TK".
+/// Magic number in bits 31:16 of the register `id`: "TK".
 pub const MAGIC: u32 = 0x544b;
 /// The version of this protocol, bits 15:8 of `id`. Bits 7:0 are the number of cores.
 pub const VERSION: u32 = 2;
@@ -15,7 +15,8 @@ pub const VERSION: u32 = 2;
 pub const INPUTS: u16 = 0x1000;
 /// Address of output port 0.
 pub const OUTPUTS: u16 = 0x2000;
-/// Addresses of each core's board registers, of its input ports and of its output ports: core *n*'s are *n* times as many further on.
+/// Addresses that each core has for its board registers, its input ports and its output ports: core *n*'s begin *n* times as many addresses
+/// further on.
 pub const CORE: u16 = 0x100;
 /// Address of the first value of a link that the host drives.
 pub const DRIVEN: u16 = 0x3000;
@@ -23,19 +24,19 @@ pub const DRIVEN: u16 = 0x3000;
 pub const SEEN: u16 = 0x3400;
 /// Address of the first FIFO with an endpoint at the host.
 pub const FIFOS: u16 = 0x3800;
-/// Addresses of a FIFO: its status, its fields, and the one that is written to push or pop.
+/// Addresses that a FIFO has: its status, its fields, and the address whose writes push or pop.
 pub const FIFO_WORDS: u16 = 0x20;
 /// Address of the first part of the image's first record.
 pub const IMAGE: u16 = 0x4000;
 /// Address of register 0 of core 0.
 pub const CORE_REGISTERS: u16 = 0x8000;
-/// Address of its data word 0.
+/// Address of data word 0 of core 0.
 pub const CORE_DATA: u16 = 0xc000;
-/// Records of the image that have addresses at a time.
+/// Records in a page of the image: a single page has addresses at a time.
 pub const PAGE: usize = 0x1000;
-/// Pages of the image, at most.
+/// Most pages of an image.
 pub const PAGES: usize = 8;
-/// Words of a request, at most.
+/// Most words of a request.
 pub const WORDS: usize = 16;
 
 /// Bits of a core's number in an address from [`CORE_REGISTERS`] on.
@@ -43,34 +44,34 @@ pub const fn core_bits(cores: usize) -> u32 {
     cores.next_power_of_two().trailing_zeros()
 }
 
-/// Addresses of each core's registers, and of its data words: as many as [`core_bits`] leaves.
+/// Addresses that each core has for its registers, and for its data words: as many as [`core_bits`] leaves.
 pub const fn core_words(cores: usize) -> u16 {
     0x4000 >> core_bits(cores)
 }
 
-/// The register `id` of a board with so many cores.
+/// The register `id` of a board with `cores` cores.
 pub const fn id(cores: usize) -> u32 {
     MAGIC << 16 | VERSION << 8 | cores as u32
 }
 
-/// The address of a value, as the host finds it.
+/// The addresses of a value, as the host finds it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Place {
-    /// The address at which it is read.
+    /// The address at which the host reads the value.
     pub read: u16,
-    /// The address at which it is set, if the host can.
+    /// The address at which the host sets the value; `None` if the host cannot set it.
     pub set: Option<u16>,
-    /// Its type.
+    /// The type of the value.
     pub ty: Type,
 }
 
-/// Bit of the register `control`: the program runs; while it is 0 the core is in reset.
+/// Bit of the register `control`: the program runs. While the bit is 0, the core is in reset.
 pub const RUN: u32 = 1;
-/// No ticks but those of the register `step`.
+/// Bit of the register `control`: the only ticks are the ticks of the register `step`.
 pub const HOLD: u32 = 1 << 1;
-/// Outputs may drive.
+/// Bit of the register `control`: the outputs may drive.
 pub const ENABLE: u32 = 1 << 2;
-/// Written, it starts the program again.
+/// Bit of the register `control`: writing it starts the program again.
 pub const RESTART: u32 = 1 << 8;
 
 /// First byte of a request.
@@ -80,28 +81,28 @@ pub const ANSWER: u8 = 0x5a;
 /// First byte of a frame that the board sends by itself.
 pub const STREAM: u8 = 0x3c;
 
-/// Status of an answer: it is done.
+/// Status of an answer: the request is done.
 pub const DONE: u8 = 0;
-/// Status of an answer: an address of the write is not one that can be written now, and nothing was written.
+/// Status of an answer: the host cannot write an address of the request now, and nothing was written.
 pub const READ_ONLY: u8 = 1;
 /// Status of an answer: the program did not wait.
 pub const BUSY: u8 = 2;
 
-/// True if a request to this address waits until the program is between two periods.
+/// Tells if a request to this address waits until the program is between two periods.
 pub const fn waits(address: u16) -> bool {
     matches!(address >> 12, 1..=3 | 8..)
 }
 
-/// A register of the host.
+/// A register of the board that the host reads or writes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Register {
-    /// Its address.
+    /// The address of the register.
     pub address: u16,
-    /// Its name.
+    /// The name of the register.
     pub name: &'static str,
-    /// `r`, `w` or `rw`.
+    /// The access that the host has: `r`, `w` or `rw`.
     pub access: &'static str,
-    /// Its contents.
+    /// The register's contents, in words.
     pub text: &'static str,
 }
 
@@ -109,8 +110,8 @@ const fn register(address: u16, name: &'static str, access: &'static str, text: 
     Register { address, name, access, text }
 }
 
-/// The host's registers. Generator, host and docs/protocol.md take them from here.
-pub const REGISTERS: [Register; 20] = [
+/// The board's registers. Generator, host and docs/protocol.md take the registers from this table.
+pub const REGISTERS: [Register; 21] = [
     register(
         0,
         "id",
@@ -129,7 +130,7 @@ pub const REGISTERS: [Register; 20] = [
         "status",
         "r",
         "bit 0 waiting, 1 halted, 2 fault, 6:4 slot of the fault, sticky flags: 7 overflow, 8 divide by zero, 9 invalid; 10 in reset, \
-         11 drive, 17:12 what stopped the drive: fault, halt, deadline, host, stop, a NaN output",
+         11 drive, 17:12 what stopped the drive: fault, halt, deadline, host, stop, a NaN output; 18 a trip is held",
     ),
     register(3, "fault", "r", "15:0 bundle, 18:16 kind, as of the Wishbone slave (docs/hardware.md)"),
     register(4, "period", "rw", "cycles from tick to tick"),
@@ -153,6 +154,7 @@ pub const REGISTERS: [Register; 20] = [
     register(17, "page", "rw", "the 4096 records of the image that have addresses: 0 for the first"),
     register(18, "observed", "r", "1: registers and data memory can be read; 0: the wiring leaves that out"),
     register(19, "issued", "r", "15:0 the bundle that issued last, if `observed` is 1"),
+    register(20, "trips", "r", "the trips that are held, the wiring's first in bit 0"),
 ];
 
 /// The registers as rows of the table in docs/protocol.md.
@@ -178,7 +180,7 @@ pub fn checksum(bytes: &[u8]) -> u16 {
     })
 }
 
-/// A record of a core's image as it lies in its three words: low, high, place.
+/// The record of a core's image as its three words: low, high, place.
 pub fn record_words(core: usize, record: &LoadRecord) -> [u32; 3] {
     let place = (core as u32) << 21
         | u32::from(record.slot) << 18
@@ -190,13 +192,13 @@ pub fn record_words(core: usize, record: &LoadRecord) -> [u32; 3] {
 /// A frame from the board.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Frame {
-    /// True if it is of the stream, not an answer.
+    /// Tells a frame of the stream from an answer.
     pub stream: bool,
-    /// The request's number; of the stream, a number that goes up by one with each frame sent.
+    /// The number of the answered request; in the stream, a number that goes up by 1 with each frame sent.
     pub number: u8,
-    /// [`DONE`], [`READ_ONLY`] or [`BUSY`].
+    /// The status: [`DONE`], [`READ_ONLY`] or [`BUSY`].
     pub status: u8,
-    /// The words that were read.
+    /// The words that the request has read, or that the stream carries.
     pub words: Vec<u32>,
 }
 
@@ -210,7 +212,7 @@ pub fn write(number: u8, address: u16, words: &[u32]) -> Vec<u8> {
     request(number, 2, words.len() as u8, address, words)
 }
 
-/// True if these bytes begin with a whole request.
+/// Tells if the bytes begin with a whole request.
 pub fn has_request(bytes: &[u8]) -> bool {
     let [_, _, command, count, ..] = bytes else { return false };
     let words = if *command == 2 { usize::from(*count) } else { 0 };
@@ -223,13 +225,13 @@ pub(crate) struct Request {
     pub(crate) number: u8,
     /// The address of the first word.
     pub(crate) address: u16,
-    /// Words to read; of a write, their number.
+    /// The number of words to read, or to write.
     pub(crate) count: usize,
-    /// Words to write; of a read `None`.
+    /// The words to write; `None` if the request reads.
     pub(crate) words: Option<Vec<u32>>,
 }
 
-/// The first whole request among bytes, from which it is taken; bytes that begin none are dropped, and `errors` counts broken ones.
+/// Takes the first whole request out of `bytes`. Bytes that begin no request are dropped, and `errors` counts broken requests.
 pub(crate) fn take_request(bytes: &mut Vec<u8>, errors: &mut u32) -> Option<Request> {
     loop {
         let begins = bytes.iter().position(|&byte| byte == REQUEST).unwrap_or(bytes.len());
@@ -272,7 +274,7 @@ pub(crate) fn streamed(number: u8, words: &[u32]) -> Vec<u8> {
     from_board(STREAM, number, DONE, words)
 }
 
-/// True if these bytes begin with a whole request that writes.
+/// Tells if the bytes begin with a whole request that writes.
 pub fn has_write(bytes: &[u8]) -> bool {
     has_request(bytes) && bytes[2] == 2
 }
@@ -294,12 +296,12 @@ pub struct Receiver {
 }
 
 impl Receiver {
-    /// Takes bytes.
+    /// Appends the bytes that have come.
     pub fn put(&mut self, bytes: &[u8]) {
         self.bytes.extend(bytes);
     }
 
-    /// The next whole frame. What cannot begin one is dropped.
+    /// The next whole frame. Bytes that cannot begin a frame are dropped.
     pub fn frame(&mut self) -> Option<Frame> {
         loop {
             let drop = match self.bytes.as_slice() {
@@ -335,7 +337,7 @@ impl Receiver {
         }
     }
 
-    /// Drops the first byte: a frame that has begun and not ended before a pause never will.
+    /// Drops the first byte: a frame that has begun, but has not ended before a pause, will not end any more.
     pub fn give_up(&mut self) {
         if !self.bytes.is_empty() {
             self.bytes.remove(0);
@@ -346,85 +348,86 @@ impl Receiver {
 
 /// A line to a board.
 pub trait Line {
-    /// Sends bytes.
+    /// Sends bytes over the line.
     ///
     /// # Errors
     /// If the line is gone.
     fn send(&mut self, bytes: &[u8]) -> std::io::Result<()>;
 
-    /// Receives the bytes that have come, after waiting a little for them; none is no error.
+    /// Receives the bytes that have come, after waiting a little for them; to receive no byte is no error.
     ///
     /// # Errors
     /// If the line is gone.
     fn receive(&mut self) -> std::io::Result<Vec<u8>>;
 
-    /// Times in a row that nothing may come until a request is made again.
+    /// The number of reads in a row that may stay without a byte until the host repeats a request.
     fn patience(&self) -> u32;
 
-    /// Time that has passed on the line since any beginning: what comes without end on it is heard no longer than a request may take.
+    /// The time that has passed on the line since any beginning: the host hears an endless stream of bytes no longer than a request may
+    /// take.
     fn time(&self) -> Duration;
 }
 
-/// The reason for which the board did not do what was asked.
+/// The reason why the board did not do what the host asked for.
 #[derive(Debug, Error)]
 pub enum LinkError {
     /// The line is gone.
     #[error("the line is gone: {0}")]
     Line(#[from] std::io::Error),
-    /// No answer, however often it was asked.
+    /// The board did not answer, however often it was asked.
     #[error(
         "no answer in {0} attempts: is this the right port, with the right baud rate, and the board's bitstream loaded?"
     )]
     Silence(u32),
-    /// Answers came, but with another number of words each time.
+    /// Each answer came with another number of words than was asked for.
     #[error(
         "the board answers with {came} words where {wanted} were asked for, in {attempts} attempts: its circuit is not one of `takt board build`, or of another version"
     )]
     Words {
-        /// Words that were to be read; of a write 0.
+        /// Words that the host wanted to read; 0 for a write.
         wanted: usize,
         /// Words of the last answer.
         came: usize,
         /// The number of attempts.
         attempts: u32,
     },
-    /// An address that cannot be written.
+    /// An address of a write cannot be written.
     #[error(
         "the board refuses to write {words} words from address {address:#06x} on: an address of them is read only, a peripheral drives it, or it can be written only while the program is stopped, or held (docs/protocol.md)"
     )]
     ReadOnly {
         /// The address of the first word.
         address: u16,
-        /// Words that were to be written.
+        /// Words that the host wanted to write.
         words: usize,
     },
-    /// A status that the protocol does not have.
+    /// The answer has a status that the protocol does not have.
     #[error("the board answers with status {0}, which docs/protocol.md does not have")]
     Status(u8),
-    /// More cores than a system can have, or none.
+    /// The board has no core, or more cores than a system can have.
     #[error("the board says that it carries {0} cores; there can be 1 to {MAX_CORES}")]
     Cores(usize),
-    /// Another version of the protocol.
+    /// The board speaks another version of the protocol.
     #[error(
         "the board speaks version {0} of the protocol, this is version {VERSION}: `takt board build` of this `takt` makes a circuit for it"
     )]
     Version(u32),
     /// The program does not wait.
     #[error(
-        "the program does not wait for its tick, so there is no time between periods to read or set anything of it; `takt live PORT stop` stops it"
+        "the program does not wait for its tick, so its values cannot be read or set between periods; `takt live PORT stop` stops it"
     )]
     Busy,
-    /// No period ends.
+    /// No period ends any more.
     #[error(
         "no period has ended for a while: the program has stopped, or is held; `takt live PORT status` says which"
     )]
     Still,
-    /// Something else answers.
+    /// The port's other end is no board of Takt.
     #[error("what answers is no board of Takt: its register `id` is {0:#010x}")]
     Stranger(u32),
-    /// The image came back different.
+    /// A record of the image came back different from the record that was written.
     #[error(
-        "record {0} of the program came back different from what was written: the board stays stopped; try again"
+        "record {0} of the program reads back different from the written value: the board stays stopped; try again"
     )]
     Image(usize),
     /// The board has another number of cores.
@@ -432,23 +435,23 @@ pub enum LinkError {
         "number of cores: {there} on the board, {wanted} in the program or system; `takt board build` makes a circuit for it"
     )]
     OtherCores {
-        /// The board's.
+        /// The number of cores on the board.
         there: usize,
-        /// Those of the program, or system.
+        /// The number of cores of the program, or system.
         wanted: usize,
     },
-    /// The circuit of other machines, links or ports is there.
+    /// The board has the circuit of other machines, links or ports.
     #[error(
         "the board's circuit is that of another program or system: machines, ticks, links or ports differ; `takt board build` makes one for this"
     )]
     OtherCircuit,
-    /// There is no circuit to compare the board's with.
+    /// The host has no circuit to compare the board's circuit with.
     #[error("{0}")]
     NoCircuit(String),
-    /// Entries would be lost.
+    /// The system is stopped: its FIFOs would lose the entries.
     #[error("the system is stopped, and its FIFOs are empty; `takt live PORT start` starts it")]
     Stopped,
-    /// The image is too big.
+    /// The image is too big for the board.
     #[error("the program takes {0} records; the board has room for {1}")]
     TooBig(usize, usize),
 }
@@ -477,7 +480,7 @@ mod tests {
             receiver.put(&[byte]);
             assert!(receiver.frame().is_none(), "what noise seems to begin waits for its end");
         }
-        // After a pause it is known for noise.
+        // A pause tells the receiver that the bytes are noise.
         receiver.give_up();
         while let Some(frame) = receiver.frame() {
             found.push((frame.number, frame.words));

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 /// The time that a read waits for a byte.
 const READ: Duration = Duration::from_millis(100);
-/// Reads without a byte after which a request counts as lost: of a line that can lose bytes, and of one that cannot.
+/// Reads without a byte after which a request counts as lost: `SILENT` on a line that can lose bytes, `PATIENT` on a line that cannot.
 const SILENT: u32 = 5;
 const PATIENT: u32 = 100;
 /// The time that a write may take.
@@ -24,17 +24,17 @@ pub struct Serial {
 }
 
 impl Serial {
-    /// The line to a simulated board, which loses no byte, and whose board is as slow as the machine is busy: a request that was repeated
-    /// would come a second time.
+    /// The line to a simulated board, which loses no byte, and which is slow while the machine is busy: a request that was repeated would
+    /// come a second time.
     #[must_use]
     pub fn patient(self) -> Serial {
         Serial { patience: PATIENT, ..self }
     }
 
-    /// Opens a port with this baud rate, 8 data bits, no parity, one stop bit.
+    /// Opens a port with this baud rate, 8 data bits, no parity and 1 stop bit.
     ///
     /// # Errors
-    /// If it cannot be opened or is no terminal.
+    /// Fails if the port cannot be opened, or is no terminal.
     pub fn open(path: &Path, baud: u32) -> io::Result<Serial> {
         let mut port = SerialPort::open(path, |mut settings: Settings| {
             settings.set_raw();
@@ -52,7 +52,7 @@ impl Serial {
     }
 }
 
-/// An error of an open port: it is gone.
+/// The error of an open port that is gone.
 fn gone(error: &io::Error) -> io::Error {
     io::Error::new(
         io::ErrorKind::NotConnected,

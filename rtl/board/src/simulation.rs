@@ -5,6 +5,7 @@ use crate::application::Application;
 use crate::boards::Board;
 use crate::kind::Direction;
 use crate::protocol::{self, Line};
+use crate::safety_watch::{self, Watch};
 use crate::top::{self, TOP, TopError};
 use crate::wiring::Wiring;
 use std::fmt::Write as _;
@@ -14,11 +15,10 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::time::Duration;
 use takt_rtl::export::DesignFile;
-use takt_rtl::verilator::{self, Sources, VerilatorError};
+use takt_rtl::verilator::{Sources, VerilatorError};
 use thiserror::Error;
 
 const DRIVER: &str = include_str!("driver.cpp");
-const PLL: &str = include_str!("../verilog/simulation/EHXPLLL.v");
 
 /// The reason for which a board cannot be simulated.
 #[derive(Debug, Error)]
@@ -39,8 +39,8 @@ pub enum SimulationError {
 
 /// An encoder that turns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Turn {
-    /// Its pins, as numbers of inputs.
+pub struct EncoderMotion {
+    /// Pins of the encoder, as numbers of inputs.
     pub pins: [usize; 2],
     /// The count at which it begins.
     pub from: i32,
@@ -57,13 +57,16 @@ pub struct Simulation {
     inputs: Vec<(String, u32)>,
     outputs: Vec<String>,
     /// Encoders that turn in the next cycles, once.
-    pub turns: Vec<Turn>,
+    pub turns: Vec<EncoderMotion>,
     /// One in so many bits of the UART is turned, in either direction; 0: none.
     pub noise: u32,
     /// Bytes to the board are lost while this is true.
     pub unplugged: bool,
-    /// Cycles so far.
+    /// Cycles simulated since reset.
     pub cycles: u64,
+    /// Is told, of a board that was made of a program or a system, when and why outputs become safe.
+    pub tell: Option<fn(&str)>,
+    watch: Option<Watch>,
     high: Vec<u32>,
     levels: Vec<u32>,
     received: Vec<u8>,
@@ -80,7 +83,10 @@ impl Simulation {
         application: impl Into<Application<'a>>,
         folder: &Path,
     ) -> Result<Simulation, SimulationError> {
-        Simulation::of(&top::circuit(board, wiring, application)?.files, board, wiring, folder)
+        let application = application.into();
+        let watch = Watch::new(wiring, &application);
+        let files = top::circuit(board, wiring, application)?.files;
+        Simulation::start(&files, board, wiring, folder, 0, Some(watch))
     }
 
     /// Builds a board from files, of which the top level is [`TOP`] with the wiring's pins, and starts it in a folder, where memory images
@@ -97,7 +103,7 @@ impl Simulation {
         Simulation::with_fault(files, board, wiring, folder, 0)
     }
 
-    /// As [`Simulation::of`], with one of the faults that [`verilator::plant`] has planted in the files; 0: with none.
+    /// Starts as [`Simulation::of`] does, with one of the faults that [`takt_rtl::verilator::plant`] has planted in the files; 0: without.
     ///
     /// # Errors
     /// If Verilator is missing or fails.
@@ -108,7 +114,18 @@ impl Simulation {
         folder: &Path,
         fault: usize,
     ) -> Result<Simulation, SimulationError> {
-        let (built, inputs, outputs) = build(files, board, wiring, folder)?;
+        Simulation::start(files, board, wiring, folder, fault, None)
+    }
+
+    fn start(
+        files: &[DesignFile],
+        board: &Board,
+        wiring: &Wiring,
+        folder: &Path,
+        fault: usize,
+        watch: Option<Watch>,
+    ) -> Result<Simulation, SimulationError> {
+        let (built, inputs, outputs) = build(files, board, wiring, folder, watch.as_ref())?;
         let start = |error| SimulationError::Start(built.display().to_string(), error);
         let mut process = Command::new(&built)
             .current_dir(folder)
@@ -132,6 +149,8 @@ impl Simulation {
             noise: 0,
             unplugged: false,
             cycles: 0,
+            tell: None,
+            watch,
             received: Vec::new(),
         })
     }
@@ -146,12 +165,12 @@ impl Simulation {
         self.inputs.iter().map(|(name, level)| (name.as_str(), *level != 0))
     }
 
-    /// The outputs' names.
+    /// Names of the outputs, by number.
     pub fn outputs(&self) -> &[String] {
         &self.outputs
     }
 
-    /// Sets an input.
+    /// Sets an input by its number, from the next cycle on.
     pub fn set(&mut self, name: &str, level: bool) {
         if let Some(at) = self.input(name) {
             self.inputs[at].1 = level.into();
@@ -164,7 +183,7 @@ impl Simulation {
         Some((self.levels[at] != 0, self.high[at]))
     }
 
-    /// Runs so many cycles, in which these bytes begin to go to the board.
+    /// Runs `cycles` cycles, in which these bytes begin to go to the board.
     ///
     /// # Errors
     /// If the simulation has ended.
@@ -172,7 +191,7 @@ impl Simulation {
         let mut words = vec![cycles, self.noise];
         words.extend(self.inputs.iter().map(|(_, level)| *level));
         words.push(self.turns.len() as u32);
-        for Turn { pins: [a, b], from, by } in self.turns.drain(..) {
+        for EncoderMotion { pins: [a, b], from, by } in self.turns.drain(..) {
             words.extend([a as u32, b as u32, from as u32, by as u32]);
             // They stay where the turn ends.
             let end = from.wrapping_add(by) as u32;
@@ -185,6 +204,7 @@ impl Simulation {
         let words: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
         self.stdin.write_all(&words)?;
         self.stdin.flush()?;
+        let begun = self.cycles;
         self.cycles += u64::from(cycles);
         let count = self.words(1)?[0] as usize;
         let received = self.words(count)?;
@@ -193,6 +213,12 @@ impl Simulation {
         }
         self.high = self.words(self.outputs.len())?;
         self.levels = self.words(self.outputs.len())?;
+        let moments = self.words(1)?[0] as usize;
+        for moment in self.words(safety_watch::WORDS * moments)?.chunks_exact(safety_watch::WORDS) {
+            if let (Some(watch), Some(tell)) = (&self.watch, self.tell) {
+                tell(&watch.text(begun, moment));
+            }
+        }
         Ok(())
     }
 
@@ -242,6 +268,7 @@ fn build(
     board: &Board,
     wiring: &Wiring,
     folder: &Path,
+    watch: Option<&Watch>,
 ) -> Result<Pins, SimulationError> {
     // Verilog, which is compiled, and files that a simulation reads when it runs.
     let (verilog, read): (Vec<_>, Vec<_>) =
@@ -282,20 +309,22 @@ fn build(
         }
         let _ = writeln!(header, "    (void)top; (void)pins;\n}}");
     }
+    let watched = watch.map_or_else(|| "#define CORES 0\n".to_owned(), Watch::header);
+    let kept = watch.map_or_else(|| "`verilator_config\n".to_owned(), Watch::configuration);
     let verilog = verilog.into_iter().map(|file| (file.name.as_str(), file.text.as_str()));
     let sources = Sources {
         name: TOP,
         top: TOP,
         prefix: "Vtop",
-        files: [("EHXPLLL.v", PLL)].into_iter().chain(verilog).collect(),
+        files: board.family.pll.iter().map(|pll| pll.stand_in).chain(verilog).collect(),
         driver: DRIVER,
-        headers: vec![("pins.h", &header)],
-        arguments: vec!["-Wno-fatal".to_owned()],
+        headers: vec![("pins.h", &header), ("watch.h", &watched), ("watch.vlt", &kept)],
+        arguments: vec!["-Wno-fatal".to_owned(), "watch.vlt".to_owned()],
         defines: Vec::new(),
         optimise: "-O1",
         trace: false,
     };
-    Ok((sources.build(&verilator::cache_folder())?, inputs, outputs))
+    Ok((sources.build(&takt_cache::folder().map_err(VerilatorError::Cache)?)?, inputs, outputs))
 }
 
 const _: () = assert!(protocol::WORDS == 16, "takt_bridge keeps 16 words");

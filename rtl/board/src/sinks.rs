@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Sinks: the registers of peripherals that take what cores send out, at each core's `wait`.
+//! Sinks: the registers of peripherals that take the outputs of cores, at the `wait` of each core.
 
 use crate::application::Application;
 use crate::kind::Direction;
@@ -9,10 +9,10 @@ use crate::wiring::{Peripheral, Wiring, Write};
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sink<'a> {
     pub(crate) peripheral: &'a Peripheral,
-    /// The register's name.
+    /// The name of the register.
     pub(crate) register: &'static str,
     pub(crate) written: &'a Write,
-    /// The output that it takes, as [`Connection::number`](crate::application::Connection::number) counts.
+    /// The number of the output that the sink takes, as [`Connection::number`](crate::application::Connection::number) counts.
     pub(crate) number: usize,
 }
 
@@ -30,7 +30,7 @@ pub(crate) fn sinks<'a>(application: &Application<'_>, wiring: &'a Wiring) -> Ve
     all
 }
 
-/// The largest number of pipeline registers on a link that these come over: they are taken once the slowest value has arrived.
+/// The largest number of pipeline registers on a link to `sinks`: the sinks take their values once the slowest value has arrived.
 pub(crate) fn transit(application: &Application<'_>, sinks: &[Sink<'_>]) -> u64 {
     let (links, outputs) = (&application.description().links, &application.endpoints().outputs);
     sinks.iter().map(|sink| links[outputs[sink.number].link].transit()).max().unwrap_or(0)

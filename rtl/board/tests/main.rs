@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Tests of the crate from outside, one program: a module for each subject.
 
+mod carrier;
+mod consistency;
+mod drive;
 mod emulated;
+mod family;
 mod files;
 mod harness;
 mod observe;

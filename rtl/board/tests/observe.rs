@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Every register and data word that a host reads of a running core, against the emulator's, in the complete top level.
+//! Compares every register and data word that a host reads of a running core with the emulator's, in the complete top level.
 
 use std::ops::Range;
 use std::panic::AssertUnwindSafe;
@@ -12,7 +12,7 @@ use takt_emu::{Emulator, Status};
 use takt_isa::{Program, Register, T3};
 use takt_rtl::verilator;
 
-/// All slots write registers, with the longest latencies just before the `wait`; a table changes from period to period.
+/// Program in which all slots write registers, with the longest latencies just before the `wait`; a table changes from period to period.
 const PROGRAM: &str = "
 .schedule on
 .input n:int x
@@ -59,7 +59,7 @@ fn wiring(program: &Program) -> Wiring {
     Wiring { period: 2000, baud: 10_000_000, clock: 50.0, ..Wiring::none(&board(), program) }
 }
 
-/// A period at a time: everything that the emulator knows, the board has; of the data words, those in the ranges.
+/// Compares the board with the emulator, period by period: every value that the emulator knows, and the data words in the ranges.
 fn compare(host: &mut Host<Simulation>, program: &Program, periods: u32, ranges: &[Range<u32>]) {
     let on_board = Application::from(program);
     let port = |name: &str| on_board.settable(name).expect("an input port").0;
@@ -78,7 +78,7 @@ fn compare(host: &mut Host<Simulation>, program: &Program, periods: u32, ranges:
         host.set("step", 1).expect("step");
         emulator.run_period(&[]).expect("no fault");
         let Status::Waiting { address, .. } = *emulator.status() else { panic!("it waits") };
-        // A read of a core's own waits until the period is over; that of a register of the board does not.
+        // A read of a core's own addresses waits until the period is over; a read of a register of the board does not.
         for bank in program.machine.banks() {
             let first = Register::new(bank.base.into()).expect("a register");
             let at = on_board.register(0, first).expect("it can be read");
@@ -110,8 +110,8 @@ fn connect(sim: Simulation) -> Host<Simulation> {
     Host::connect(sim, 3).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// A core with more data memory than the host has addresses for, and an image with more records than four pages: the words that
-/// have addresses are the emulator's, tables beyond these included, and the host reads the records on the last page.
+/// Program with more data memory than the host has addresses for, and with an image of more than four pages: the words that have addresses
+/// equal the emulator's, tables beyond the addresses included, and the host reads the records on the last page.
 #[test]
 fn memories_of_other_depths() {
     let zeros_and_records =
@@ -145,7 +145,7 @@ fn registers_and_data_are_the_emulators() {
     let mut host = connect(sim.unwrap_or_else(|error| panic!("{error}")));
     compare(&mut host, &first, 12, std::slice::from_ref(&(0..1024)));
 
-    // Between two ticks of a program that runs by itself, and of one that has stopped, with the same names.
+    // The host reads, with the same names, between two ticks of a program that runs by itself, and of a program that has stopped.
     let on_board = Application::from(&first);
     let at = |name: &str| on_board.find(name).unwrap_or_else(|text| panic!("{text}")).read;
     host.set("control", RUN | RESTART).expect("control");
@@ -153,7 +153,7 @@ fn registers_and_data_are_the_emulators() {
     host.line.run(20_000, &[]).expect("it runs");
     let [a, b] = [at("table"), at("table[0]")].map(|at| host.read(at, 1).expect("a word")[0]);
     assert!(f32::from_bits(a) > 10.0 && f32::from_bits(b) >= f32::from_bits(a), "it grows by 2.0 a period");
-    // Of a stream, too, and what the period's last operations leave: `g` is the sine.
+    // The stream, too, has the results of the period's last operations: `g` is the sine.
     host.set("stream", 1 << 20 | 1 << 16 | u32::from(at("g"))).expect("stream");
     let mut frames = Vec::new();
     while frames.len() < 5 {
@@ -177,7 +177,7 @@ fn registers_and_data_are_the_emulators() {
     }
     assert!(on_board.settable("table[1]").is_err_and(|text| text.contains("only its program writes")));
 
-    // A program that has stopped with a fault can be looked at; one that never waits cannot.
+    // A host can look at a program that has stopped with a fault, but not at a program that never waits.
     let fault =
         PROGRAM.replace("        mov     k, i\n", "        mov     k, i\n        ld      a, table[n]\n");
     let fault = program(&fault);

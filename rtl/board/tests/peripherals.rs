@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Every peripheral's circuit against its model, in every cycle; and faults planted in the circuits, which must be found.
+//! Compares every peripheral's circuit with its model, in every cycle; faults planted in the circuits must be found.
 #![allow(clippy::print_stdout)]
 
 use crate::harness::{Part, build, compare, run};
@@ -9,7 +9,7 @@ use std::cell::RefCell;
 use std::fs;
 use std::path::PathBuf;
 use std::rc::Rc;
-use takt_board::model::{self, Tick, UartReceive, UartSend};
+use takt_board::model::{self, Carrier, Tick, UartReceive, UartSend};
 use takt_board::{Kind, VERILOG, kind};
 
 /// Cycles of a comparison.
@@ -32,7 +32,7 @@ impl Random {
         self.bits().is_multiple_of(n)
     }
 
-    /// Numbers near the edges of `span`, within it, and any.
+    /// A random number near an edge of `span`, within `span`, or anywhere.
     fn value(&mut self, span: u32) -> u32 {
         let near = self.bits() % 3;
         let value = match self.bits() % 6 {
@@ -46,12 +46,20 @@ impl Random {
     }
 }
 
-/// Parameters to test a kind with, in the order of its table: shortest, usual, longest that a short run can see.
+/// Parameters to test a kind with, in the order of its table: the shortest, the usual, and the longest that a short run can see.
 fn variants(kind: &Kind) -> Vec<Vec<u32>> {
     match kind.name {
         "quadrature" => vec![vec![1, 0], vec![3, 3_572_338], vec![10, u32::MAX - 3]],
         "step" => vec![vec![1], vec![3], vec![10]],
         "pwm" => vec![vec![1, 0, 1], vec![20, 3, 1], vec![33, 0, 0], vec![50, 60, 0], vec![7, 1, 0]],
+        "pwm3" => vec![
+            vec![0, 0, 0, 0, 0, 0, 0, 0, 9],
+            vec![3, 2, 0, 1, 1, 0, 1, 2, 20],
+            vec![2, 6, 1, 0, 0, 1, 2, 1, 12],
+            vec![0, 5, 2, 1, 1, 1, 0, 1, 15],
+            vec![5, 0, 3, 0, 0, 0, 2, 0, 11],
+        ],
+        "trip" => vec![vec![0, 0], vec![1, 1], vec![7, 0]],
         "sigma-delta" => vec![vec![0], vec![1]],
         "spi" => vec![
             vec![3, 1, 0, 0, 0, 1],
@@ -66,14 +74,19 @@ fn variants(kind: &Kind) -> Vec<Vec<u32>> {
     }
 }
 
-/// The values on a kind's inputs, the reset apart.
+/// The values on a kind's inputs, except for the reset.
 fn stimulus(kind: &'static Kind, parameters: &[u32], seed: u64) -> Box<dyn FnMut(u32) -> Vec<u32>> {
     let mut random = Random::new(seed);
     let (takes, _) = kind.ports();
     let names: Vec<String> = takes.into_iter().skip(1).map(|(name, _)| name).collect();
-    let hold = if matches!(kind.name, "quadrature" | "step" | "digital-in") { parameters[0] } else { 1 };
-    let span = if kind.name == "pwm" { parameters[0] } else { 1 << 15 };
-    // Pins that stay for a while, near what the filter lets pass, and those of an encoder: in order, mostly.
+    let hold = match kind.name {
+        "quadrature" | "step" | "digital-in" => parameters[0],
+        "trip" => parameters[0].max(1),
+        _ => 1,
+    };
+    let half = parameters.get(kind.parameters.len()).copied();
+    let span = if kind.name == "pwm" { parameters[0] } else { half.unwrap_or(1 << 15) };
+    // Most pins stay for about as long as the filter needs to pass a level; an encoder's pins change in order most of the time.
     let mut levels = vec![(0, 0); names.len()];
     let (mut place, mut upward, mut until, mut disabled) = (0_u32, true, 0, 0);
     Box::new(move |cycle| {
@@ -94,6 +107,12 @@ fn stimulus(kind: &'static Kind, parameters: &[u32], seed: u64) -> Box<dyn FnMut
         let mut value = |i: usize, name: &str| match name {
             "enable" => u32::from(cycle >= disabled),
             "start" => random.one_in(if cycle % 4096 < 1024 { 20 } else { 400 }).into(),
+            // It outlasts the time without enable.
+            "trip" => u32::from(cycle < disabled + 5 && disabled.is_multiple_of(2)),
+            "clear" => random.one_in(50).into(),
+            "place" => cycle % half.expect("a carrier"),
+            "back" => cycle / half.expect("a carrier") % 2,
+            "w_clear" => random.bits() % 2,
             "take" => random.one_in(11).into(),
             "put" => random.one_in(if cycle % 4096 < 1024 { 5 } else { 150 }).into(),
             "pin_a" => u32::from((place + 1) & 2 != 0),
@@ -113,18 +132,20 @@ fn stimulus(kind: &'static Kind, parameters: &[u32], seed: u64) -> Box<dyn FnMut
     })
 }
 
-/// Every kind with every variant, then what every board has.
+/// Every kind with every variant of its parameters, then the parts that every board has.
 fn parts() -> Vec<Part> {
     let mut parts = Vec::new();
     for kind in kind::KINDS {
         for (i, values) in variants(kind).into_iter().enumerate() {
             let (takes, drives) = kind.ports();
-            assert_eq!(values.len(), kind.parameters.len());
-            let parameters = kind.parameters.iter().zip(&values);
+            let on_carrier = usize::from(kind.strobes.carrier);
+            assert_eq!(values.len(), kind.parameters.len() + on_carrier);
+            let names = kind.parameters.iter().map(|parameter| parameter.name).chain(["half"]);
+            let parameters = names.zip(&values);
             parts.push(Part {
                 name: format!("{}_{i}", kind.module),
                 module: kind.module.to_owned(),
-                parameters: parameters.map(|(p, &value)| (p.name.to_uppercase(), value)).collect(),
+                parameters: parameters.map(|(name, &value)| (name.to_uppercase(), value)).collect(),
                 takes,
                 drives,
                 model: model::of(kind, &values).expect("every kind has a model"),
@@ -145,7 +166,7 @@ fn parts() -> Vec<Part> {
         stimulus: Box::new(move |_| {
             if random.one_in(100) {
                 settings = [u32::from(!random.one_in(3)), random.bits() % 30, random.bits() % 40];
-                // A long period, of which the beginning is seen.
+                // A long period shows its beginning.
                 if random.one_in(5) {
                     settings[1] = random.bits();
                 }
@@ -153,9 +174,20 @@ fn parts() -> Vec<Part> {
             settings.to_vec()
         }),
     });
-    for divide in [4_u32, 7, 16] {
+    for (half, start) in [(8, 0), (9, 13), (300, 300)] {
+        parts.push(Part {
+            name: format!("carrier_{half}"),
+            module: "takt_carrier".to_owned(),
+            parameters: vec![("HALF".to_owned(), half), ("START".to_owned(), start)],
+            takes: ports(&[("rst", 1)]),
+            drives: ports(&[("place", 16), ("back", 1)]),
+            model: Box::new(Carrier::new(half, start)),
+            stimulus: Box::new(|_| Vec::new()),
+        });
+    }
+    for divide in [4_u32, 7, 16, 300] {
         let mut random = Random::new(u64::from(divide));
-        // Bytes as another sender makes them, up to 1/40 too fast or too slow, and noise between them.
+        // The line carries bytes as another sender makes them, up to 1/40 too fast or too slow, and noise between them.
         let (mut line, mut next) = (Vec::new(), 0);
         parts.push(Part {
             name: format!("receive_{divide}"),
@@ -205,9 +237,9 @@ fn every_peripheral_is_its_model() {
     assert!(found.is_empty(), "{}", found.join("\n"));
 }
 
-/// Says what is tested with which settings, for `cargo xtask mutants`.
+/// Prints each tested part with its settings, for `cargo evidence mutants`.
 #[test]
-#[ignore = "a list for `cargo xtask mutants`"]
+#[ignore = "a list for `cargo evidence mutants`"]
 fn settings() {
     for part in parts() {
         let values: String = part.parameters.iter().map(|(name, value)| format!(" {name}={value}")).collect();
@@ -215,10 +247,10 @@ fn settings() {
     }
 }
 
-/// Mutants that yosys has planted in netlists of peripherals, `cargo xtask mutants`: `TAKT_MUTANTS` names a folder with a netlist for
-/// each setting, in which the plusarg `fault` chooses one, and a file with the numbers of those to be tried.
+/// Tries the mutants that yosys has planted in netlists of peripherals for `cargo evidence mutants`. `TAKT_MUTANTS` names a folder with a
+/// netlist for each setting, in which the plusarg `fault` chooses a mutant, and with a file of the mutants' numbers to be tried.
 #[test]
-#[ignore = "of netlists that `cargo xtask mutants` makes"]
+#[ignore = "of netlists that `cargo evidence mutants` makes"]
 fn mutants() {
     let folder = PathBuf::from(std::env::var_os("TAKT_MUTANTS").expect("TAKT_MUTANTS names a folder"));
     let of = |name: &str, kind: &str| fs::read_to_string(folder.join(format!("{name}.{kind}")));
@@ -244,12 +276,12 @@ fn mutants() {
             }
         }
     }
-    // Of netlists that nobody will ask for again.
+    // Nobody will ask for these netlists' simulation again.
     let _ = fs::remove_file(program);
 }
 
-/// Faults: file, text that occurs there once, and what takes its place. Those of one round are planted together, for every module
-/// is compared by itself.
+/// Faults: file, text that occurs there once, and the text that takes its place. The faults of a round are planted together, for every
+/// module is compared by itself.
 const FAULTS: &[&[(&str, &str, &str)]] = &[
     &[
         ("takt_quadrature.v", "at_index <= count", "at_index <= count + 32'd1"),
@@ -260,6 +292,9 @@ const FAULTS: &[&[(&str, &str, &str)]] = &[
         ("takt_digital_out.v", "SAFE != 0;", "1'b0;"),
         ("takt_spi.v", "~active & half != END - 7'd1", "~active"),
         ("takt_tick.v", "lead < period", "lead <= period"),
+        ("takt_carrier.v", "START - HALF : START", "START - HALF : START + 1"),
+        ("takt_pwm_phase.v", "on[16:1] + {15'd0, on[0]}", "on[16:1]"),
+        ("takt_trip.v", "asks | held;", "held;"),
         ("takt_uart_receive.v", "bits == 4'd10 & s1 ? 4'd0 : ", ""),
         ("takt_uart_send.v", "bits  <= 4'd10;", "bits  <= 4'd9;"),
     ],
@@ -272,10 +307,13 @@ const FAULTS: &[&[(&str, &str, &str)]] = &[
         ("takt_digital_out.v", "|w_level", "w_level[0]"),
         ("takt_spi.v", "if (start & busy) lost", "if (start & ~busy) lost"),
         ("takt_tick.v", "left == ahead + 32'd1", "left == ahead"),
+        ("takt_carrier.v", "if (place == TOP) back", "if (place == TOP - 16'd1) back"),
+        ("takt_pwm_phase.v", "(~first & was)", "(1'b0 & was)"),
+        ("takt_trip.v", "if (asks) held", "if (asks & take) held"),
         ("takt_uart_receive.v", "DIVIDE / 2 - 1", "DIVIDE / 2 - 2"),
         ("takt_uart_send.v", "{1'b1, shift[9:1]}", "{1'b0, shift[9:1]}"),
     ],
-    &[("takt_filter.v", "rst | s1 == level", "rst")],
+    &[("takt_filter.v", "rst | s1 == level", "rst"), ("takt_pwm3.v", "enable & ~trip;", "enable;")],
     &[
         (
             "takt_quadrature.v",
@@ -283,6 +321,11 @@ const FAULTS: &[&[(&str, &str, &str)]] = &[
             "{count, at_index, indices, errors} <= {32'd0",
         ),
         ("takt_pwm.v", "wanted[33] ? 17'd0 :", ""),
+        ("takt_pwm_phase.v", "is_all ? MOST : ", ""),
+        ("takt_trip.v", "clear | (put & |w_clear)", "clear | put"),
+        // A bit of more than 256 cycles.
+        ("takt_uart_receive.v", "left <= LAST;", "left <= {8'd0, LAST[7:0]};"),
+        ("takt_uart_send.v", "left  <= LAST;", "left  <= {8'd0, LAST[7:0]};"),
         ("takt_spi.v", "(shift & mask) | extend", "shift & mask"),
     ],
 ];
@@ -300,15 +343,19 @@ fn planted_faults_are_found() {
         let differences = compare(&format!("faults{round}"), &files, &mut parts, CYCLES / 3);
         for (name, what, _) in *faults {
             let module = name.trim_end_matches(".v");
-            // The filter's fault shows where a filter is.
-            let is_hit = |part: &Part| part.module == module || module == "takt_filter";
+            // The faults of modules within others show in those.
+            let is_hit = |part: &Part| match module {
+                "takt_filter" => true,
+                "takt_pwm_phase" => part.module == "takt_pwm3",
+                _ => part.module == module,
+            };
             let hit = parts.iter().zip(&differences).any(|(part, found)| is_hit(part) && found.is_some());
             assert!(hit, "{name}: the fault in `{what}` was not found");
         }
     }
 }
 
-/// The numbers that contracts promise hold for the models, which the circuits are equal to.
+/// The models keep the numbers that contracts promise, and the circuits are equal to the models.
 #[test]
 fn contracts_hold() {
     let (pwm, spi) = (Kind::from_name("pwm").expect("a kind"), Kind::from_name("spi").expect("a kind"));

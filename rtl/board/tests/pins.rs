@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! From pin to pin over several cores, measured in a complete board: links of every kind, ticks that differ, a period under way.
+//! Latencies from pin to pin over several cores, measured in a complete board: links of every kind, ticks that differ, a period under way.
 
 use crate::harness::board::{STRETCH, Ticks};
 use std::path::Path;
 use takt_asm::{MemoryLoader, Options, assemble};
 use takt_board::kind::KINDS;
-use takt_board::latency::{Answer, Part, Way, undivided, ways};
-use takt_board::simulation::{Simulation, Turn};
+use takt_board::latency::{Answer, Part, PinPath, undivided, ways};
+use takt_board::simulation::{EncoderMotion, Simulation};
 use takt_board::{Application, Board, Wiring};
 use takt_isa::T1;
 use takt_system::{Description, ProgramError, Request};
@@ -49,8 +49,9 @@ pins = { out = "gp4" }
 ports = { level = "third.p" }
 "#;
 
-/// The first has every base tick; the second every second one, with latched ports; the third every third one. The third's period is longer than
-/// two base ticks and reads its input first and last, so that a value can arrive while it is under way. What is queued has no bound.
+/// System whose first core has every base tick; the second has every second base tick, and latched ports; the third has every third base
+/// tick. The third core's period is longer than two base ticks and reads its input first and last, so that a value can arrive while the
+/// period is under way. Ways over the FIFO have no bound.
 const SYSTEM: &str = r#"
 tick = 1000
 [[core]]
@@ -110,13 +111,13 @@ pop = "pop"
 depth = 4
 "#;
 
-/// A wire over which a value takes nearly a base tick, to one more output of the first core.
+/// A wire over which a value takes nearly a base tick, to another output of the first core.
 const DELAYED: [&str; 2] = [
     "[[wire]]\nfrom = \"first.n\"\nto = \"host.m\"\nlatency = 990\n",
     "[peripheral.delayed]\nkind = \"digital-out\"\npins = { out = \"gp5\" }\nports = { level = \"first.n\" }\n",
 ];
 
-/// A switch that is on makes the period longer.
+/// The first core's program, whose period is longer while the switch is on.
 const FIRST: &str = "
 .schedule on
 .input i:int
@@ -181,7 +182,7 @@ fn system(text: &str) -> Description {
     read.unwrap_or_else(|_| panic!("the system is right"))
 }
 
-/// The bound of the way to each of these outputs, and the least and the most that were measured, in cycles.
+/// The bound of the way to each of the outputs, and the least and the most measured cycles.
 fn bound_and_measured<const N: usize>(
     [system_text, wiring_text]: [&str; 2],
     folder: &str,
@@ -202,11 +203,11 @@ fn bound_and_measured<const N: usize>(
     assert_eq!(sim.output("signal_drive").map(|(level, _)| level), Some(true), "it drives");
     let (ticks, mut on) = (Ticks::of(&mut sim, TICK), false);
     outputs.map(|output| {
-        let ends = |way: &&Way| way.outputs.iter().any(|end| end.peripheral == output);
+        let ends = |way: &&PinPath| way.outputs.iter().any(|end| end.peripheral == output);
         let way = ways.ways.iter().find(ends).expect("a way");
         let edge = way.inputs[0].parts[0].best;
         let mut cycles = Vec::new();
-        // After six base ticks, all ticks come again. Just in time for one, just too late, and between; on and off.
+        // All ticks come again after six base ticks. The switch turns on and off just in time for a tick, just too late, and between.
         for (more, before) in (0..6).flat_map(|more| [edge, edge - 1, 600].map(|before| (more, before))) {
             for _ in 0..2 {
                 sim.run((1 + more) * TICK, &[]).expect("it runs");
@@ -223,16 +224,17 @@ fn bound_and_measured<const N: usize>(
 }
 
 #[test]
-fn ways_over_links_of_every_kind_take_what_the_bound_says() {
+fn paths_over_every_kind_of_link_keep_their_bound() {
     let outputs = ["direct", "slow", "far", "other"];
     let [direct, slow, last, first] = bound_and_measured([SYSTEM, WIRING], "board-pins", outputs);
     assert_eq!((direct[0], slow[0]), (direct[1], slow[1]));
-    // The third core writes to one output what it reads last, the best that there can be, and to the other what it reads first, the worst.
+    // The third core writes to an output the value that it reads last, which makes the best case, and to the other the value that it reads
+    // first, which makes the worst.
     assert_eq!((last[0], last[0].0, first[0].1), (first[0], last[1].0, first[1].1));
 }
 
-/// If one output of a core comes over a much longer way than another, the other's values can be taken before their own `wait`, and one
-/// `wait` while what came with the one before is being put.
+/// An output of a core may come over a much longer way than another output. The other output's values can then be taken before their own
+/// `wait`, and a `wait` can come while the values of the `wait` before are being put.
 #[test]
 fn a_slow_link_beside_a_fast_one_is_within_the_bound() {
     let text = [SYSTEM, WIRING].iter().zip(DELAYED).map(|(text, more)| format!("{text}{more}"));
@@ -242,7 +244,7 @@ fn a_slow_link_beside_a_fast_one_is_within_the_bound() {
     assert!(direct[1].0 < delayed[0].0, "{direct:?} {delayed:?}");
 }
 
-/// Every register of every input peripheral that states a bound, each with a lamp that shows its lowest bit, and a stream.
+/// Wiring with every register of every input peripheral that states a bound, each with a lamp that shows its lowest bit, and with streams.
 const KINDS_WIRING: &str = r#"
 clock = 50
 period = 40
@@ -305,7 +307,7 @@ signed = 0
 ports = { value = "faint" }
 "#;
 
-/// The level also makes the stream `full` all ones, and `faint` a pulse in 32768 cycles.
+/// Program of that wiring, in which the level also makes the stream `full` all ones, and `faint` a pulse in 32768 cycles.
 const KINDS_PROGRAM: &str = "
 .schedule on
 .input count:int at_index:int indices:int errors:int steps:int level:int rises:int
@@ -320,10 +322,10 @@ period: l0, l1, l2, l3 = count & 1, at_index & 1, indices & 1, errors & 1
         wait    period
 ";
 
-/// Each kind of peripheral keeps the latency that it states, in the complete top level: an edge just in time for a tick shows at the lamp after the best
-/// case, one that comes a cycle later after the worst case.
+/// Each kind of peripheral keeps the latency that it states, in the complete top level: an edge just in time for a tick shows at the lamp
+/// after the best case, an edge a cycle later after the worst case.
 #[test]
-fn each_kind_keeps_what_it_states() {
+fn each_peripheral_keeps_its_stated_latency() {
     const PERIOD: u32 = 2000;
     let options = Options { machine: &T1, ..Options::default() };
     let program = assemble("kinds.s", &MemoryLoader::new(&[("kinds.s", KINDS_PROGRAM)]), &options);
@@ -333,9 +335,10 @@ fn each_kind_keeps_what_it_states() {
     wiring.check("w.toml", KINDS_WIRING, &program).expect("ports fit");
     let bounds = takt_analysis::bound(&program).expect("it can be bounded");
     let period = bounds.sections.iter().find(|section| !section.once).expect("a period").cycles;
-    let way = undivided(&wiring, period).expect("inputs and outputs");
-    // A kind that is not here has no pin to state a bound of (`spi`), or has a test of its own (`pwm`, in top.rs).
-    for kind in KINDS.iter().filter(|kind| !["spi", "pwm"].contains(&kind.name)) {
+    let way = undivided(&wiring, period).into_iter().next().expect("inputs and outputs");
+    // A kind that the wiring leaves out has no pin to state a bound of (`spi`), or has a test of its own (`pwm` in top.rs, `pwm3` and `trip`
+    // in drive.rs).
+    for kind in KINDS.iter().filter(|kind| !["spi", "pwm", "pwm3", "trip"].contains(&kind.name)) {
         assert!(wiring.peripherals.iter().any(|known| known.kind == kind), "{} is not tried", kind.name);
     }
 
@@ -347,7 +350,7 @@ fn each_kind_keeps_what_it_states() {
     let encoder = ["encoder_a", "encoder_b"].map(|name| sim.input(name).expect("a pin"));
     let mut at = 0;
     let mut turn = |sim: &mut Simulation, by: i32| {
-        sim.turns.push(Turn { pins: encoder, from: at, by });
+        sim.turns.push(EncoderMotion { pins: encoder, from: at, by });
         at += by;
     };
     for (end, lamp) in way.inputs.iter().zip(0..) {
@@ -356,7 +359,7 @@ fn each_kind_keeps_what_it_states() {
         assert_eq!(out.answer, Answer::Edge);
         let bound = Part::sum("", end.parts.iter().chain(&way.between).chain(&out.parts));
         for (before, expected) in [(end.parts[0].best, bound.best), (end.parts[0].best - 1, bound.worst)] {
-            // Pins at rest, long enough for every filter; the pulse of an index is at an odd count, and then at an even one.
+            // The pins are at rest long enough for every filter; the pulse of an index comes at an odd count, and then at an even count.
             for pin in ["encoder_index", "stepper_step"] {
                 sim.set(pin, false);
             }
@@ -369,7 +372,7 @@ fn each_kind_keeps_what_it_states() {
             let change = |sim: &mut Simulation| match &*end.port {
                 "count" => turn(sim, 1),
                 "at_index" | "indices" => sim.set("encoder_index", true),
-                // Both pins at once.
+                // A turn of both pins at once counts as an error.
                 "errors" => turn(sim, 2),
                 "steps" => sim.set("stepper_step", true),
                 "level" => {
@@ -387,8 +390,8 @@ fn each_kind_keeps_what_it_states() {
         }
     }
 
-    // A stream: the modulator takes its value on as stated, which only a value of ones alone shows at once: with the next bit. The first bit
-    // of a small value comes any time later, so that no bound of the pin is stated.
+    // The modulator takes a stream's value on as stated. A value of ones alone shows that at once, with the next bit; the first bit of a
+    // small value comes any time later, so that the pin has no stated bound.
     for stream in ["full", "faint"] {
         let out = way.outputs.iter().find(|output| output.peripheral == stream).expect("a stream");
         assert_eq!(out.answer, Answer::Density);
@@ -404,7 +407,7 @@ fn each_kind_keeps_what_it_states() {
         // All pulses of a small value are over.
         sim.run(2 * PERIOD + (1 << 16), &[]).expect("it runs");
         let on = |sim: &mut Simulation| sim.set("switch_in", true);
-        // The bit that the modulator makes of its value is at the pin one cycle later.
+        // The bit that the modulator makes of its value is at the pin a cycle later.
         assert_eq!(ticks.measured(&mut sim, before, on, "full_out"), expected + 1);
     }
     let mut silent = 0;
@@ -414,7 +417,7 @@ fn each_kind_keeps_what_it_states() {
         assert!(silent <= 1 << 16, "a pulse comes");
     }
     assert!(silent > total.worst, "{silent}");
-    // Over any stretch, the pin is 1 for as many cycles as the value says, less or more than one.
+    // Over any stretch, the cycles in which the pin is 1 differ from the value by less than 1.
     for cycles in [100_000, 65_536, 12_345] {
         sim.run(cycles, &[]).expect("it runs");
         let high = sim.output("faint_out").expect("a pin").1;

@@ -8,7 +8,7 @@ use takt_asm::{MemoryLoader, Options, assemble};
 use takt_board::endpoints::{Endpoints, Fifo};
 use takt_board::latency::{Part, ways};
 use takt_board::protocol::{IMAGE, LinkError};
-use takt_board::simulation::{Simulation, Turn};
+use takt_board::simulation::{EncoderMotion, Simulation};
 use takt_board::{Application, Board, Host, Wiring, top};
 use takt_isa::Program;
 use takt_rtl::verilator;
@@ -21,7 +21,7 @@ const SOURCES: [(&str, &str); 3] = [
     ("watch.s", include_str!("../../../programs/examples/board/axis/watch.s")),
 ];
 
-/// The example's wiring, with all that makes outputs safe.
+/// The example's wiring, with every condition that makes outputs safe.
 fn wiring_text() -> String {
     let text = include_str!("../../../programs/examples/board/axis/wiring.toml");
     text.replace("baud = 1_000_000", "baud = 10_000_000\ndeadlines = 2")
@@ -81,7 +81,7 @@ fn safe(board: &mut Simulation) -> bool {
     ["signal_drive", "motor_high", "motor_low", "lamp_out"].iter().all(|name| level(name) == (false, 0))
 }
 
-/// Cycles in which the upper switch conducts in a period of the PWM.
+/// Cycles of a period of the PWM in which the upper switch conducts.
 fn pulse(board: &mut Simulation) -> i32 {
     board.run(2 * PWM.0 as u32, &[]).expect("it runs");
     board.output("motor_high").expect("a pin").1 as i32
@@ -128,8 +128,9 @@ fn float(value: f32) -> u32 {
     value.to_bits()
 }
 
-/// Cycles from an edge of the encoder, so many cycles before a tick, to the first one in which the PWM's pulse is not that of before.
-fn measured_of_pulse(ticks: &Ticks, board: &mut Simulation, before: u64, turn: Turn) -> u64 {
+/// Cycles from an edge of the encoder, `before` cycles before a tick, to the first cycle in which the PWM's pulse differs from the period
+/// before.
+fn measured_of_pulse(ticks: &Ticks, board: &mut Simulation, before: u64, turn: EncoderMotion) -> u64 {
     let period = 2 * PWM.0 as u32;
     ticks.run_to(board, before, period);
     let is_high = |board: &mut Simulation| {
@@ -145,7 +146,7 @@ fn measured_of_pulse(ticks: &Ticks, board: &mut Simulation, before: u64, turn: T
     (0..4 * PERIOD as usize).find(differs).expect("the motor follows") as u64
 }
 
-/// From an edge of the encoder, which stands at 0, to the motor's and the lamp's, in many phases to the ticks.
+/// Measures from an edge of the encoder, which stands at 0, to the edges of motor and lamp, in many phases to the ticks.
 fn pins_follow_as_the_bound_says(host: &mut Host<Simulation>, description: &Description, pins: [usize; 2]) {
     let bound = |core: &takt_system::Core| takt_analysis::bound(&core.program).expect("it can be bounded");
     let bounds: Vec<_> = description.cores.iter().map(bound).collect();
@@ -154,15 +155,15 @@ fn pins_follow_as_the_bound_says(host: &mut Host<Simulation>, description: &Desc
     assert_eq!((motor.cores.join(" "), lamp.cores.join(" ")), ("servo".into(), "servo watch".into()));
     let edge = lamp.inputs[0].parts[0].best;
     let (ticks, mut count) = (Ticks::of(&mut host.line, PERIOD), 0);
-    // Both of the base ticks that one tick of the watch follows.
-    let mut all = |before: &[u64], measured: &dyn Fn(&mut Simulation, u64, Turn) -> u64| {
+    // The phases include both of the base ticks that a tick of the watch follows.
+    let mut all = |before: &[u64], measured: &dyn Fn(&mut Simulation, u64, EncoderMotion) -> u64| {
         let phases = before.iter().flat_map(|&before| [(before, 0), (before, 1)]);
         let cycles = phases.map(|(before, more)| {
-            // The host is there, so that outputs drive.
+            // The host sends a request, so that outputs drive.
             assert!(host.status().expect("status").drives());
             periods(&mut host.line, more);
             let by = if count == 0 { 1 } else { -1 };
-            let cycles = measured(&mut host.line, before, Turn { pins, from: count, by });
+            let cycles = measured(&mut host.line, before, EncoderMotion { pins, from: count, by });
             count += by;
             periods(&mut host.line, 2);
             cycles
@@ -170,13 +171,13 @@ fn pins_follow_as_the_bound_says(host: &mut Host<Simulation>, description: &Desc
         let cycles: Vec<u64> = cycles.collect();
         (*cycles.iter().min().expect("some"), *cycles.iter().max().expect("some"))
     };
-    // Just in time for a tick, just too late, and between.
+    // The edge comes just in time for a tick, just too late, and between.
     let total = lamp.total().expect("an edge");
     let found = all(&[edge, edge - 1, 4999, 4000, 2600, 2500, 1234, 400, 20], &|sim, before, turn| {
         ticks.measured(sim, before, |sim| sim.turns.push(turn), "lamp_out")
     });
     assert_eq!(found, (total.best, total.worst));
-    // Base ticks are a whole number of the PWM's periods apart, so that values always come at the same place of one.
+    // Base ticks are a whole number of the PWM's periods apart, so that values always come at the same place of a period.
     let (fixed, pwm) =
         (Part::sum("", motor.inputs[0].parts.iter().chain(&motor.between)), motor.total().expect("an edge"));
     let (least, most) =
@@ -192,7 +193,7 @@ fn a_system_runs_talks_and_fails_safe() {
     let mut sim = board(&description, "system-board");
     let encoder = [sim.input("encoder_a").expect("a pin"), sim.input("encoder_b").expect("a pin")];
 
-    // From power-up, without a host: safe, then it drives, with an error of 0.
+    // After power-up, without a host, the board is safe; then it drives, with an error of 0.
     sim.run(1000, &[]).expect("it runs");
     assert_eq!(sim.output("signal_drive"), Some((false, 0)), "before the first periods");
     periods(&mut sim, 10);
@@ -202,14 +203,14 @@ fn a_system_runs_talks_and_fails_safe() {
     let mut host = connect(sim);
     pins_follow_as_the_bound_says(&mut host, &description, encoder);
 
-    // The loop through the pins: the servo reads the encoder, the watch lights the lamp.
-    host.line.turns.push(Turn { pins: encoder, from: 0, by: 20 });
+    // The loop through the pins is closed: the servo reads the encoder, and the watch lights the lamp.
+    host.line.turns.push(EncoderMotion { pins: encoder, from: 0, by: 20 });
     periods(&mut host.line, 3);
     periods(&mut host.line, 3);
     assert_eq!(pulse(&mut host.line), expected(-20.0));
     assert_eq!(host.line.output("lamp_out").map(|(level, _)| level), Some(true));
 
-    // Ports of each core, and what the host drives.
+    // The host reads and sets ports of each core, and the values that the host drives.
     assert_eq!(host.cores, 3);
     host.fits(&description).expect("it is this system's circuit");
     assert!((0..3).all(|core| host.status_of(core).expect("status").drives()));
@@ -224,7 +225,7 @@ fn a_system_runs_talks_and_fails_safe() {
     assert_eq!(names.read(&mut host, "watch.limit"), float(25.0));
     assert_eq!(host.line.output("lamp_out").map(|(level, _)| level), Some(false), "below the limit");
 
-    // FIFOs: two moves go in, where they end comes out.
+    // Two moves go into a FIFO, and the places where they end come out of another.
     let (moves, reached) = (names.fifo("moves", false), names.fifo("reached", true));
     assert_eq!(host.pop(&reached).expect("a FIFO"), None);
     for target in [10.0, 15.0] {
@@ -238,8 +239,8 @@ fn a_system_runs_talks_and_fails_safe() {
     assert_eq!(host.pop(&reached).expect("a FIFO"), Some(vec![float(15.0)]));
     assert_eq!(host.pop(&reached).expect("a FIFO"), None);
 
-    // A write to an address that cannot be written is refused: registers, a core's ports, a value that the encoder drives or that a link brings, a FIFO's status
-    // and the fields of one to the host, the image of what runs.
+    // A write to an address that cannot be written is refused: registers, a core's ports, a value that the encoder drives or that a link
+    // brings, a FIFO's status, the fields of a FIFO to the host, the image of a running program.
     let drives = names.at("n");
     for address in [0, 15, 16, 0x102, names.at("servo.n"), drives, names.at("watch.lit"), 0x3400, 0x8000] {
         refuses(&mut host, address, &[1]);
@@ -248,7 +249,7 @@ fn a_system_runs_talks_and_fails_safe() {
         refuses(&mut host, address, &[1]);
     }
 
-    // Counters by core: the watch has every second base tick.
+    // Each core has counters: the watch has every second base tick.
     let all = |host: &mut Host<Simulation>, name: &str| {
         [0, 1, 2].map(|core| host.register_of(core, name).expect("a register"))
     };
@@ -256,7 +257,7 @@ fn a_system_runs_talks_and_fails_safe() {
     assert!(counted[0].abs_diff(2 * counted[2]) <= 4 && counted[0].abs_diff(counted[1]) <= 2, "{counted:?}");
     assert_eq!(all(&mut host, "misses"), [0; 3]);
 
-    // A stream of a core's port.
+    // The stream carries a core's port.
     host.set("stream", 2 << 20 | 1 << 16 | u32::from(names.at("watch.values"))).expect("stream");
     let mut seen = Vec::new();
     while seen.len() < 4 {
@@ -268,7 +269,7 @@ fn a_system_runs_talks_and_fails_safe() {
     assert!(seen.iter().all(|(period, values)| period == values), "periods are the watch's: {seen:?}");
     host.set("stream", 0).expect("stream");
 
-    // Noise on the line: no entry is lost, and none goes in or comes out twice.
+    // Noise on the line loses no entry, and no entry goes in or comes out twice.
     host.line.noise = 300;
     let mut ended = Vec::new();
     for target in 0..24 {
@@ -289,7 +290,7 @@ fn a_system_runs_talks_and_fails_safe() {
     assert!(host.retries > 0, "there was no noise");
     assert!(!host.fifo(&reached).expect("a FIFO").overflow());
 
-    // A FIFO that nobody takes from refuses, and says so; so does one that is full.
+    // A FIFO that nobody takes from refuses an entry, and says so; so does a full FIFO.
     host.set("control", 0b111).expect("hold");
     let pushed = (0..6).filter(|_| host.push(&moves, &[float(1.0), float(9.0)]).expect("a FIFO")).count();
     assert_eq!(pushed, 4);
@@ -308,7 +309,7 @@ fn a_system_runs_talks_and_fails_safe() {
         host.status_of(core).expect("status").causes().collect()
     };
     assert_eq!(causes(&mut host, 1), ["host silent"]);
-    // A start: FIFOs and what the host had set are empty again. What is set at once waits until all is loaded.
+    // A start empties FIFOs, and clears the values that the host had set. A value that the host sets at once waits until all is loaded.
     host.set("control", 0x105).expect("control");
     host.write(names.set("limit"), &[float(7.0)]).expect("a port");
     assert_eq!(names.read(&mut host, "limit"), float(7.0));
@@ -317,7 +318,7 @@ fn a_system_runs_talks_and_fails_safe() {
     assert!(host.status().expect("status").drives());
     assert_eq!(names.read(&mut host, "watch.limit"), float(7.0));
 
-    // The stop input; a reset in mid-period.
+    // The stop input makes outputs safe, and so does a reset in mid-period.
     host.line.set("signal_stop", true);
     periods(&mut host.line, 1);
     assert!(safe(&mut host.line), "stopped");
@@ -333,7 +334,8 @@ fn a_system_runs_talks_and_fails_safe() {
     periods(&mut host.line, 6);
     assert!(host.status().expect("status").drives(), "after a reset");
 
-    // Other programs for the same circuit: each core's fault, halt, missed deadline or NaN makes outputs safe, and says which it is.
+    // With other programs in the same circuit, each core's fault, halt, missed deadline or NaN makes outputs safe, and the status says the
+    // cause.
     let slow = "        mov     k, 9000\nagain:  isub    k, k, 1\n        bnz     k, again\n        wait    period\n";
     let in_place = |of: &'static str, from: &'static str, to: String| {
         system(&move |name, source| if name == of { source.replace(from, &to) } else { source.to_owned() })
@@ -374,17 +376,17 @@ fn a_system_runs_talks_and_fails_safe() {
         }
         let status = host.status_of(core).expect("status");
         assert_eq!((status.fault(), status.halted()), (cause == "fault", cause == "halt"));
-        // Ports can be read of a core that has stopped, and of the others; not of one that never waits.
+        // The host can read ports of a core that has stopped, and of the other cores, but no ports of a core that never waits.
         let is_late = |name: &str| cause == "missed deadline" && name == "watch.peak";
         for name in ["profile.wanted", "servo.n", "watch.peak"].into_iter().filter(|name| !is_late(name)) {
             names.read(&mut host, name);
         }
         let misses = all(&mut host, "misses");
-        // To one that has halted, every tick comes too early.
+        // Every tick comes too early to a core that has halted.
         assert_eq!(misses[core] > 1, ["missed deadline", "halt"].contains(&cause), "{cause}: {misses:?}");
     }
 
-    // A core that waits for an entry before its first period: the host can push, and then base ticks begin.
+    // A core waits for an entry before its first period: the host can push an entry, and then base ticks begin.
     let first = "        mov     wanted, zero\n";
     let waits = in_place("profile.s", first, format!("{first}boot:   bnz     empty, boot\n"));
     host.load(&top::image(&waits).expect("it fits").records).expect("it is loaded");
@@ -396,7 +398,7 @@ fn a_system_runs_talks_and_fails_safe() {
     assert!(host.status().expect("status").drives());
     assert_eq!(host.pop(&reached).expect("a FIFO"), Some(vec![float(4.0)]));
 
-    // Back to the first ones; and another system's are refused before anything happens.
+    // The board has the first programs again, and another system's programs are refused before anything happens.
     host.load(&top::image(&description).expect("it fits").records).expect("it is loaded");
     host.set("control", 5).expect("control");
     periods(&mut host.line, 12);
@@ -412,14 +414,14 @@ fn a_system_runs_talks_and_fails_safe() {
     assert!(matches!(host.fits(&**single), Err(LinkError::OtherCores { there: 3, wanted: 1 })));
 }
 
-/// A base tick at a time, with the same inputs and noise on the UART: every output port of every core, what the host sees and what it pops
-/// have the same words as in the emulator, and the PWM has the pulse that belongs to them.
+/// Compares board and emulator, a base tick at a time, with the same inputs and noise on the UART: every output port of every core, the
+/// values that the host sees and the entries that it pops have the same words, and the PWM has the pulse that belongs to the words.
 fn compare(description: &Description, sim: Simulation, ticks: u32) {
     let names = Names::of(description);
     let mut host = connect(sim);
     host.line.noise = 1000;
     let encoder = ["encoder_a", "encoder_b"].map(|pin| host.line.input(pin).expect("a pin"));
-    // Held from the beginning on.
+    // The board is held from the beginning on.
     host.set("control", 0x107).expect("control");
     let mut system = System::new(description).expect("it can be emulated");
     let start = system.run_to_start(1 << 20).expect("no fault").expect("it starts");
@@ -433,7 +435,7 @@ fn compare(description: &Description, sim: Simulation, ticks: u32) {
     let mut compared = 0;
     for tick in 0..ticks {
         let by = chance(25) as i32 - 12;
-        host.line.turns.push(Turn { pins: encoder, from: position, by });
+        host.line.turns.push(EncoderMotion { pins: encoder, from: position, by });
         host.line.run(3000, &[]).expect("it runs");
         position += by;
         let limit = float(chance(200) as f32 / 16.0);
@@ -458,7 +460,7 @@ fn compare(description: &Description, sim: Simulation, ticks: u32) {
             for port in &core.program.outputs {
                 let name = format!("{}.{}", core.name, port.name);
                 let circuit = names.read(&mut host, &name);
-                // A port that was never written may hold anything.
+                // A port that was never written may hold any value.
                 if let Some(emulated) = system.core(number).output_bits(port.register) {
                     assert_eq!(circuit, emulated, "tick {tick}: {name}");
                     compared += 1;
@@ -469,7 +471,7 @@ fn compare(description: &Description, sim: Simulation, ticks: u32) {
         // The PWM takes the new duty with its next period.
         pulse(&mut host.line);
         let pulse = pulse(&mut host.line);
-        // Outputs drive with the end of the first periods, and take on what comes after it.
+        // Outputs drive from the end of the first periods on, and take on the values that come after it.
         assert!(tick == 0 || pulse == expected(error), "tick {tick}: error {error}: {pulse}");
         for end in &names.ends.outputs {
             let emulated = system.output(&end.name).expect("an output");
@@ -481,7 +483,7 @@ fn compare(description: &Description, sim: Simulation, ticks: u32) {
         }
     }
     assert!(compared > 6 * ticks, "{compared}");
-    // And all that each core holds in the end, in answers so long that noise would get most of them.
+    // At the end, the host compares all registers and data words of each core, in answers so long that noise would break most of them.
     host.line.noise = 0;
     let on_board = Application::from(description);
     for (number, core) in description.cores.iter().enumerate() {
@@ -515,19 +517,19 @@ fn circuit_and_emulator_have_the_same_words() {
     compare(&description, board(&description, "system-words"), 60);
 }
 
-/// Faults in the module around the system, one at a time.
+/// Faults in the module around the system, planted one at a time, are noticed.
 #[test]
 fn planted_faults_are_noticed() {
     let description = unchanged();
     let wiring = wiring(&description);
     let circuit = top::circuit(&ulx3s(), &wiring, &description).expect("there is a circuit");
     let faults = [
-        // A repeated request is made twice; a core has every base tick, or no offset; a float is not scaled.
+        // The faults: a repeated request is made twice; a core has every base tick, or no offset; a float is not scaled.
         ("board/takt_bridge.v", "has_data & known", "has_data & ~known"),
         ("board/takt_tick_divider.v", "turns == LAST ? 32'd0 : turns + 32'd1", "32'd0"),
         ("board/takt_tick_divider.v", "begins ? FIRST : left - 32'd1", "begins ? LEAD - 2 : left - 32'd1"),
         ("board/takt_output_latch.v", "EXPONENTS[10*which1 +: 10]", "10'd0"),
-        // A core has what another one is loaded with.
+        // A core is loaded with the records of another core.
         ("takt_peripherals.v", "loads[1]", "loads[0]"),
     ];
     let mut files = circuit.files.clone();

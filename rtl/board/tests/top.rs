@@ -4,11 +4,12 @@
 use crate::harness::board::{Ticks, refuses};
 use std::panic::AssertUnwindSafe;
 use std::path::{Path, PathBuf};
+use std::sync::Mutex;
 use takt_asm::{MemoryLoader, Options, assemble};
 use takt_board::latency::{self, Part};
 use takt_board::protocol::{IMAGE, INPUTS, LinkError, OUTPUTS};
-use takt_board::simulation::{Simulation, Turn};
-use takt_board::tools::{NEXTPNR, Venv, YOSYS};
+use takt_board::simulation::{EncoderMotion, Simulation};
+use takt_board::tools::Venv;
 use takt_board::wiring::Peripheral;
 use takt_board::{Application, Board, Host, Wiring, build, model, netlist, top};
 use takt_isa::timing::Span;
@@ -52,7 +53,7 @@ fn periods(board: &mut Simulation, count: u32) {
     board.run(count * PERIOD, &[]).expect("it runs");
 }
 
-/// True if the outputs are safe: nothing drives.
+/// The outputs are safe: nothing drives.
 fn safe(board: &mut Simulation) -> bool {
     periods(board, 1);
     let level = |name: &str| board.output(name).expect("a pin");
@@ -97,7 +98,7 @@ fn shows(pwm: &Peripheral, half: i32) -> [(u64, u64); 2] {
 
 /// Of a PWM with any dead time, the first cycle in which a new duty shows at one of its pins.
 #[test]
-fn a_duty_shows_as_late_as_the_bound_says() {
+fn duty_latency_equals_the_bound() {
     let board = Board::from_name("ulx3s-85f").expect("a board").expect("a right one");
     for (half, dead) in [(13, 3), (4, 0), (5, 1), (6, 2), (6, 7), (9, 8), (2, 5), (3, 20), (1, 9)] {
         let bound = |pins: &str| {
@@ -105,10 +106,8 @@ fn a_duty_shows_as_late_as_the_bound_says() {
                 "period = 40\n[peripheral.encoder]\nkind = \"quadrature\"\npins = {{ a = \"gp0\", b = \"gn0\" }}\nports = {{ count = \"n\" }}\n[peripheral.motor]\nkind = \"pwm\"\npins = {{ {pins} }}\nhalf = {half}\ndead = {dead}\nports = {{ duty = \"force\" }}\n"
             );
             let wiring = Wiring::read("w.toml", &text, &board).expect("a right wiring");
-            let sum = Part::sum(
-                "",
-                &latency::undivided(&wiring, Span { best: 0, worst: 0 }).expect("a way").outputs[0].parts,
-            );
+            let sum =
+                Part::sum("", &latency::undivided(&wiring, Span { best: 0, worst: 0 })[0].outputs[0].parts);
             ((sum.best, sum.worst), wiring.peripherals[1].clone())
         };
         let (both, pwm) = bound("high = \"gp2\", low = \"gn2\"");
@@ -135,6 +134,69 @@ fn board_runs_talks_and_fails_safe() {
     runs_talks_and_fails_safe(sim, &wiring, &first);
 }
 
+static TOLD: Mutex<Vec<String>> = Mutex::new(Vec::new());
+
+/// Each reason for safe outputs is told as it comes about: by a pin, by the host, by a value that the program meets.
+#[test]
+fn reports_the_reason_for_safe_outputs_at_once() {
+    let (board, wiring, first, folder) = target("board-reasons");
+    let mut sim = Simulation::new(&board, &wiring, &first, &folder).unwrap_or_else(|error| panic!("{error}"));
+    sim.tell = Some(|text| TOLD.lock().expect("no panic").push(text.to_owned()));
+    let mut host = Host::connect(sim, 7).unwrap_or_else(|error| panic!("{error}"));
+    let drives = |host: &mut Host<Simulation>| {
+        host.set("control", 0x105).expect("it starts");
+        periods(&mut host.line, 8);
+        assert!(host.status().expect("status").drives());
+        TOLD.lock().expect("no panic").clear();
+    };
+    let told = |host: &mut Host<Simulation>, says: &str| {
+        periods(&mut host.line, 6);
+        let told = std::mem::take(&mut *TOLD.lock().expect("no panic"));
+        let [told] = &told[..] else { panic!("{says}: {told:?}") };
+        let (time, reason) = told.split_once(" ms: the outputs become safe: ").expect("a time");
+        let now = host.line.cycles as f64 / wiring.clock / 1e3;
+        let time: f64 = time.parse().expect("a number");
+        // A period has 0.04 ms; the request that brought it about takes some.
+        assert!(reason.starts_with(says) && (now - 1.0..now).contains(&time), "{says}: {told} at {now}");
+    };
+    // By the host, and by the pin.
+    drives(&mut host);
+    host.set("control", 0x105).expect("control");
+    told(&mut host, "it is started again");
+    drives(&mut host);
+    host.set("control", 1).expect("control");
+    told(&mut host, "outputs are not enabled any more");
+    drives(&mut host);
+    host.set("control", 0).expect("control");
+    told(&mut host, "it is stopped");
+    drives(&mut host);
+    host.line.set("signal_stop", true);
+    told(&mut host, "stop: the pin `stop` was 1, or open");
+    host.line.set("signal_stop", false);
+    // By programs that run until the host sets a value.
+    let lit = "        iand    lit, n, 1\n";
+    let instead = |what: &str| PROGRAM.replace(lit, &format!("{what}{lit}"));
+    let slow =
+        ".reg k:int\n        iadd    k, wanted, 1\nagain:  isub    k, k, 1\n        bnz     k, again\n";
+    for (source, wanted, says) in [
+        (PROGRAM.replace("fmul    force, f, 0.25", "fsqrt   force, f"), -1, "NaN output: `force`"),
+        (instead(".reg t\n        ld      t, [wanted]\n"), 5000, "fault: data address at bundle "),
+        (instead("        bz      wanted, goes\n        halt\ngoes:\n"), 1, "halt"),
+        (instead(slow), 2000, "missed deadline: 2 of them; a period took "),
+    ] {
+        let program = program(&source);
+        host.load(&top::image(&program).expect("it fits").records).expect("it is loaded");
+        drives(&mut host);
+        host.write(port(&program, "wanted"), &[wanted as u32]).expect("a port");
+        told(&mut host, says);
+    }
+    // By silence.
+    host.load(&top::image(&first).expect("it fits").records).expect("it is loaded");
+    drives(&mut host);
+    periods(&mut host.line, 410);
+    told(&mut host, "host silent: no request for as many periods as the wiring's `host` allows");
+}
+
 /// The same, with what nextpnr has placed and routed, from which the bitstream is made; and a fault planted there is noticed.
 ///
 /// Synthesis, place and route take minutes: with `TAKT_ROUTED=1` only, as `cargo xtask test` sets it, in the tools' environment that
@@ -147,24 +209,25 @@ fn the_routed_design_does_the_same() {
     let (board, wiring, first, folder) = target("board-routed");
     let venv = std::env::var_os("TAKT_VENV")
         .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../.venv"), PathBuf::from);
-    let venv = Venv::with(&venv, &[YOSYS, NEXTPNR]).unwrap_or_else(|error| panic!("{error}"));
+    let venv =
+        Venv::with(&venv, &build::packages(&board).expect("tools")).unwrap_or_else(|error| panic!("{error}"));
+    let models = board.family.models.as_ref().expect("models of the cells");
     let options = build::Options { seed: 1, netlist: true };
     std::fs::create_dir_all(&folder).expect("the target folder can be written");
     build::build(&venv, &board, &wiring, &first, options, &folder, &|_| ()).unwrap_or_else(|e| panic!("{e}"));
     let simulated = |change: &dyn Fn(&mut serde_json::Map<String, serde_json::Value>)| {
-        let files = netlist::verilog(&venv, &folder, change).unwrap_or_else(|error| panic!("{error}"));
+        let files =
+            netlist::verilog(&venv, models, &folder, change).unwrap_or_else(|error| panic!("{error}"));
         Simulation::of(&files, &board, &wiring, &folder.join("simulation")).unwrap_or_else(|e| panic!("{e}"))
     };
     runs_talks_and_fails_safe(simulated(&|_| ()), &wiring, &first);
     // One table of the PWM's logic inverted.
     let faulty = simulated(&|cells| {
-        let is_pwm = |(name, cell): &(&String, &mut serde_json::Value)| {
-            name.contains("u_motor") && cell["type"] == "TRELLIS_COMB" && cell["parameters"]["MODE"].is_null()
-        };
-        let (_, cell) = cells.iter_mut().find(is_pwm).expect("the PWM has logic");
-        let table = cell["parameters"]["INITVAL"].as_str().expect("a table");
-        let inverted: String = table.chars().map(|bit| if bit == '0' { '1' } else { '0' }).collect();
-        cell["parameters"]["INITVAL"] = inverted.into();
+        let mut pwm = cells.iter_mut().filter(|(name, _)| name.contains("u_motor")).map(|(_, cell)| cell);
+        let table = pwm.find_map(|cell| (models.truth_table)(cell)).expect("the PWM has logic");
+        let bits = table.as_str().expect("a table").chars();
+        let inverted: String = bits.map(|bit| if bit == '0' { '1' } else { '0' }).collect();
+        *table = inverted.into();
     });
     let noticed = std::panic::catch_unwind(AssertUnwindSafe(|| {
         runs_talks_and_fails_safe(faulty, &wiring, &first);
@@ -184,7 +247,7 @@ fn runs_talks_and_fails_safe(mut sim: Simulation, wiring: &Wiring, first: &Progr
     assert_eq!(pulse(&mut sim), 250 - 5, "half of the time, less the dead time");
 
     // The loop through the pins: 40 counts forward are a force of -10, which is 160 cycles less.
-    sim.turns.push(Turn { pins: encoder, from: 0, by: 40 });
+    sim.turns.push(EncoderMotion { pins: encoder, from: 0, by: 40 });
     periods(&mut sim, 3);
     periods(&mut sim, 3);
     assert_eq!(pulse(&mut sim), 250 - 160 - 5);
@@ -197,10 +260,10 @@ fn runs_talks_and_fails_safe(mut sim: Simulation, wiring: &Wiring, first: &Progr
     let bound = Part::sum("", edge.iter().chain(&way.between).chain(lamp));
     let ticks = Ticks::of(&mut sim, PERIOD);
     for (before, from, cycles) in [(edge[0].best, 40, bound.best), (edge[0].best - 1, 41, bound.worst)] {
-        let turn = |sim: &mut Simulation| sim.turns.push(Turn { pins: encoder, from, by: 1 });
+        let turn = |sim: &mut Simulation| sim.turns.push(EncoderMotion { pins: encoder, from, by: 1 });
         assert_eq!(ticks.measured(&mut sim, before, turn, "lamp_out"), cycles);
     }
-    sim.turns.push(Turn { pins: encoder, from: 42, by: -2 });
+    sim.turns.push(EncoderMotion { pins: encoder, from: 42, by: -2 });
     periods(&mut sim, 2);
 
     // Glitches shorter than the filter are not counted.

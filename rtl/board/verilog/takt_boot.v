@@ -3,7 +3,7 @@
 //
 // Contract
 //   The memory holds records {core, slot, space, address, value}, as a core's loader takes them; space 3 is an input port. A single
-//   core has no number. Its contents at power-up are those of the file IMAGE. count of them are valid.
+//   core has no number. The file IMAGE has its contents at power-up. count of them are valid.
 //   boot: high for a cycle starts it, at any time: reset is high from the next cycle on, until program and data memories have been
 //   written with zeros, input ports too, and all records have been written, and SETTLE cycles longer. A boot during a boot begins it
 //   again. load and input_write have a bit for each core; zeros go to all cores at once.

@@ -7,8 +7,8 @@
 //   a gap of 20 bytes within a frame ends it.
 //   Before a write, each of its addresses stands for a few cycles: if writable is 0 for one of them CHECK cycles later, nothing is
 //   written (status 1).
-//   A write whose number is that of the request before is answered as that one was, not made again.
-//   Bus: address and bus_value, or bus_write, stand for a cycle; what is read is on bus_read READ cycles later. Accesses to addresses
+//   A write with the number of the request before gets that request's answer and is not repeated.
+//   Bus: address and bus_value, or bus_write, stand for a cycle; the value read is on bus_read READ cycles later. Accesses to addresses
 //   1000 to 3fff and from 8000 on (hexadecimal) wait for grant, which may depend on address, but not longer than 2^PATIENCE cycles:
 //   then they are refused (status 2).
 //   due, high for a cycle: the word at periods_at is sent, and then `stream` words (1 to 15) from stream_at on, unless the bridge is busy:
@@ -138,7 +138,7 @@ module takt_bridge #(
     end
     always @(posedge clk) if (comes & part == 4'd6 & bytes[1:0] == 2'd3) in_words[bytes[5:2]] <= {byte_in, word};
 
-    // ---- what is done
+    // ---- actions
 
     reg  [31:0] out_words [0:15];
     reg  [2:0]  state;       // 0 rest, 1 waits for grant, 2 writes, 3 reads, 4 sends, 5 checks addresses

@@ -27,7 +27,7 @@ module takt_exchange #(
     output reg  [7:0] number,
     output reg        input_write,
     output reg        core_tick,
-    output reg        reads,     // in the cycle in which `number` is that of an output
+    output reg        reads,     // in the cycle in which `number` names an output
     output reg        put,
     output reg [31:0] periods,
     output reg [31:0] cycles,

@@ -46,7 +46,7 @@ module takt_output_latch #(
 
     always @(posedge clk) begin
         begun   <= begun | tick;
-        // Of two periods that are under way, `since` counts the later.
+        // `since` counts the later of two periods that are under way.
         since   <= begins ? 32'd1 : since + 32'd1;
         elapsed <= begins & (~busy | (done & ~late)) ? 32'd1 : done & late ? since + 32'd1 : elapsed + 32'd1;
         if (done) span <= elapsed;

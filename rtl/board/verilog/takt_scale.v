@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-// takt_scale: from what a program has written to what a peripheral takes.
+// takt_scale: conversion of a program's value to a peripheral's register.
 //
 // Contract
 //   valid, is_float, exponent, value: stand together. result: three cycles later. An integer stays as it is. A number with point is

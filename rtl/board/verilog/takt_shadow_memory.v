@@ -2,7 +2,7 @@
 // takt_shadow_memory: copies of a core's registers and data memory, which a host can read while the core runs.
 //
 // Contract
-//   The copies take what the core writes, as its ports for verification report it, and what it is loaded with. The core's own memories
+//   The copies take the core's writes, as its ports for verification report them, and its loaded values. The core's own memories
 //   have no port to spare, and copies do not slow the core down.
 //   at: the address of a register and of a data word. Two cycles later, register_value and data_value are what these hold. A register
 //   that is in no slot's bank reads as 0; a data word beyond the copied ones, as one of these; what has not been written since power-up may read as anything.

@@ -8,7 +8,7 @@
 //   put: w_send is taken; start sends what was taken last, bits BITS - 1 to 0.
 //   received is what the last whole frame brought (SIGNED: with its highest bit as sign), frames how many there were.
 //   take: registers r_… hold from the next cycle on what they are in this one.
-//   rst: pins at rest, registers 0. A converter is not switched off by enable: what is safe for it is a value that is sent.
+//   rst: pins at rest, registers 0. A converter is not switched off by enable: its safe state is a value that is sent.
 
 module takt_spi #(
     parameter HALF     = 4,   // 3 to 65535: pin_in is two cycles late
@@ -16,7 +16,7 @@ module takt_spi #(
     parameter POLARITY = 0,
     parameter PHASE    = 0,
     parameter SIGNED   = 0,
-    parameter SEND     = 0    // what is sent until the first put
+    parameter SEND     = 0    // sent until the first put
 ) (
     input  wire        clk,
     input  wire        rst,

@@ -3,7 +3,7 @@
 //
 // Contract
 //   A bit lasts DIVIDE cycles. valid is high for a cycle with the byte when its stop bit is seen, in the middle; broken, instead, if
-//   that is 0. A start bit that is gone in its middle is none.
+//   that is 0. A start bit that is high again in its middle is a glitch.
 //   rst: nothing is being received.
 
 module takt_uart_receive #(

@@ -1,22 +1,22 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Comparison of the events of both sides.
+//! Comparison of the events of emulator and circuit.
 
 use crate::event::{CircuitEvent, instruction, show};
 use takt_isa::Program;
 use takt_isa::timing::Cycle;
 
-/// The first thing in which the two sides differ.
+/// First difference between emulator and circuit.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Difference {
-    /// Its cycle.
+    /// Cycle of the event.
     pub cycle: Cycle,
-    /// The core, the link or the pin, in a system; empty for a core by itself.
+    /// Core, link or pin of a system; empty for a core by itself.
     pub place: String,
-    /// The instruction and its place in the source, as far as the event has them.
+    /// Instruction and its place in the source, if the event has one.
     pub instruction: String,
-    /// The emulator's event, in words.
+    /// The emulator's event, as text.
     pub emulator: String,
-    /// The circuit's event, in words.
+    /// The circuit's event, as text.
     pub circuit: String,
 }
 
@@ -35,13 +35,13 @@ impl std::fmt::Display for Difference {
 
 impl std::error::Error for Difference {}
 
-/// Events of both sides, until they are compared.
+/// Events of emulator and circuit that wait for comparison.
 pub(crate) struct Comparison<E> {
-    /// The emulator's.
+    /// Events of the emulator.
     pub(crate) expected: Vec<E>,
-    /// The circuit's.
+    /// Events of the circuit.
     pub(crate) found: Vec<E>,
-    /// The number of events that were the same on both sides.
+    /// Number of equal events.
     pub(crate) compared: u64,
 }
 
@@ -51,21 +51,21 @@ impl<E> Default for Comparison<E> {
     }
 }
 
-/// Events of one place that differ, or one that the other side lacks.
-pub(crate) struct Unequal<E> {
+/// A pair of different events at one place, or an event that the other side lacks.
+pub(crate) struct EventMismatch<E> {
     pub(crate) emulator: Option<E>,
     pub(crate) circuit: Option<E>,
 }
 
 impl<E: PartialEq + Copy> Comparison<E> {
-    /// Compares the events of which the answer is `known`, in the order of `key`. Events of one `place` are shown side by side;
-    /// else the earlier one is what the other side lacks.
+    /// Compares the events whose counterparts are `known`, in the order of `key`. Different events of one `place` are reported as a pair;
+    /// otherwise the other side lacks the earlier event.
     pub(crate) fn check<K: Ord, P: Ord>(
         &mut self,
         known: impl Fn(&E) -> bool,
         key: impl Fn(&E) -> K,
         place: impl Fn(&E) -> P,
-    ) -> Result<(), Unequal<E>> {
+    ) -> Result<(), EventMismatch<E>> {
         let take = |events: &mut Vec<E>| {
             let (mut taken, left): (Vec<_>, Vec<_>) = events.drain(..).partition(|event| known(event));
             *events = left;
@@ -77,30 +77,34 @@ impl<E: PartialEq + Copy> Comparison<E> {
         self.compared += same as u64;
         match (expected.get(same).copied(), found.get(same).copied()) {
             (None, None) => Ok(()),
-            (Some(a), Some(b)) if place(&a) < place(&b) => Err(Unequal { emulator: Some(a), circuit: None }),
-            (Some(a), Some(b)) if place(&a) > place(&b) => Err(Unequal { emulator: None, circuit: Some(b) }),
-            (emulator, circuit) => Err(Unequal { emulator, circuit }),
+            (Some(a), Some(b)) if place(&a) < place(&b) => {
+                Err(EventMismatch { emulator: Some(a), circuit: None })
+            }
+            (Some(a), Some(b)) if place(&a) > place(&b) => {
+                Err(EventMismatch { emulator: None, circuit: Some(b) })
+            }
+            (emulator, circuit) => Err(EventMismatch { emulator, circuit }),
         }
     }
 }
 
-impl<E> Unequal<E> {
-    /// Both sides in words.
+impl<E> EventMismatch<E> {
+    /// Texts of both sides.
     pub(crate) fn sides(&self, text: impl Fn(&E) -> String) -> [String; 2] {
         [&self.emulator, &self.circuit].map(|event| event.as_ref().map_or("nothing".to_owned(), &text))
     }
 
-    /// The event that tells where it is.
+    /// Event that locates the difference.
     pub(crate) fn first(&self) -> Option<&E> {
         self.emulator.as_ref().or(self.circuit.as_ref())
     }
 }
 
-/// A core of a circuit: its name, which is empty for one by itself, and its program.
+/// A core of a circuit: its name, empty for a core by itself, and its program.
 pub(crate) type Core<'a> = (&'a str, &'a Program);
 
 impl Comparison<CircuitEvent> {
-    /// Compares the events of which the answer is `known`, in order; the difference is told with the names of cores and links.
+    /// Compares the events whose counterparts are `known`, in order; the difference names cores and links.
     pub(crate) fn check_events(
         &mut self,
         known: impl Fn(&CircuitEvent) -> bool,
@@ -131,7 +135,7 @@ impl Comparison<CircuitEvent> {
 mod tests {
     use super::*;
 
-    /// A difference of each kind: in the value, and an event that a side lacks.
+    /// A difference of each kind: in the value, and an event that one side lacks.
     #[test]
     fn the_first_difference_is_found() {
         let check = |expected: &[(u64, char)], found: &[(u64, char)]| {

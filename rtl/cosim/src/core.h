@@ -1,17 +1,18 @@
-// A core by itself. Behind what is generated: SLOTS, RESET_CYCLES, OUTPUTS, LATCHED and the output ports by slot.
+// Driver of a core by itself. The generated part before it defines SLOTS, RESET_CYCLES, OUTPUTS, LATCHED and the output ports
+// by slot.
 //
 //   3 load   count, then that many (space, slot, address, low, high); space 3 is an input port. Resets, then loads
 
-// As `takt_isa::load::Space`.
+// Spaces of the loader, as in `takt_isa::load::Space`; 3 is an input port.
 enum Space { TO_PROGRAM, TO_DATA, TO_REGISTER, TO_INPUT };
 
 static Was was;
-// Of each output port: whether it was written since the last `wait`, and ever before that, and what it showed then.
+// For each output port: written since the last `wait`; written at all before it; value shown at that time.
 static bool written[OUTPUTS], known[OUTPUTS];
 static uint32_t shown[OUTPUTS];
 
-// Contents of the memories, as far as they are known: a word that is there already is not loaded again. Of a random program that
-// is nearly all, and loading both memories as a whole takes several times as long as the program.
+// Known contents of a memory: equal words are not loaded again. Most words of random programs are equal, and loading both
+// memories completely takes several times as long as the program.
 struct Shadow {
     std::vector<uint64_t> words;
     std::vector<bool> known;
@@ -36,7 +37,7 @@ static uint32_t read_output(unsigned number) {
     return top->read_value;
 }
 
-// The outside sees, after a `wait`, all that was written; if ports are latched, nothing else in between.
+// After a `wait`, all written values are visible outside; with latched ports, outputs change at no other time.
 static void observe_outputs() {
     if (top->ended) {
         for (unsigned n = 0; n < OUTPUTS; n++) {
@@ -64,7 +65,7 @@ static void observe() {
 
 static void look(bool watch) {
     if (watch) observe();
-    // The memory's write port itself: whatever is written shows here, in the cycle before it is there.
+    // The memory's write port shows every write, one cycle before the memory holds it.
     if (top->stored) data_memory.set(top->stored_address, top->stored_value);
 }
 
@@ -91,7 +92,7 @@ static void clear_strobes() {
     top->input_write = 0;
 }
 
-// Before a program is loaded there is nothing to run.
+// A core starts only when a program is loaded.
 static void reset() {
     top->clk = 0;
 }

@@ -1,15 +1,15 @@
-// Runs a circuit in simulation for a host: the other half of `simulation.rs`.
+// Simulates a circuit for a host: the counterpart of `simulation.rs`.
 //
 // stdin, words of 32 bits, little-endian:
 //   1 run    until, count, then that many (cycle, pin, value): the value stands on the pin from that cycle on; a strobe is high
 //            for that cycle
 //   2 trace  first, last: writes a waveform of these cycles (built with -DTRACE)
-//   3 load   of a core: what core.h says
+//   3 load   for a core only: see core.h
 // stdout, for each run: a count and that many events of 8 words:
-//   kind, cycle, address, slot, register, value, flags, place: the core, or the link for kinds from LINK on
-// and then the value of each of PINS pins, as it stands in cycle `until`. Cycle 0 is the first in which the cores run.
+//   kind, cycle, address, slot, register, value, flags, place (the core, or the link for kinds from LINK on)
+// and then the value of each of PINS pins in cycle `until`. Cycle 0 is the first in which the cores run.
 //
-// circuit.h gives PINS, set_pin, pin, clear_strobes, look, reset and load: it is core.h or system.h, behind what is generated.
+// circuit.h defines PINS, set_pin, pin, clear_strobes, look, reset and load: a generated part, followed by core.h or system.h.
 
 #include "Vcircuit.h"
 #include "verilated.h"
@@ -21,7 +21,7 @@
 #include <cstdlib>
 #include <vector>
 
-// As `EventKind` in event.rs, then those of links.
+// Kinds of events, in the order of `EventKind` in event.rs, followed by the kinds for links.
 enum Kind { ISSUE, STORE, RETIRE, PORT, MISSED, LOST, HALT, FAULT, PUBLISH, INPUT, LINK };
 enum LinkKind { VALUE = LINK, PUBLISHED, TAKEN, SKIPPED, PUSHED, POPPED, OVERFLOWS, UNDERFLOWS };
 
@@ -101,7 +101,7 @@ static void dump(int edge) {
 #endif
 }
 
-// A cycle. `look` is called in its middle, where all nets stand.
+// Simulates a cycle. `look` is called in its middle, when all nets are stable.
 template <class F> static void clock(F look) {
     top->clk = 0;
     top->eval();
@@ -141,7 +141,7 @@ static int finish() {
 
 // ---- words
 
-// False at the end.
+// Reads a word; false at the end of input.
 static bool word(uint32_t &value) {
     return fread(&value, sizeof value, 1, stdin) == 1;
 }
@@ -165,7 +165,7 @@ static void put(uint32_t value) {
     fwrite(&value, sizeof value, 1, stdout);
 }
 
-// A count and so many events, which are then forgotten.
+// Sends the number of events and the events, and clears them.
 static void put_events() {
     put(events.size());
     fwrite(events.data(), sizeof(Event), events.size(), stdout);
@@ -175,10 +175,10 @@ static void put_events() {
 
 // ---- the circuit
 
-// A cycle, of which the events are kept if `watch` is true.
+// Simulates a cycle; records its events if `watch` is true.
 static void pass(bool watch);
 
-// No strobe is high, and the nets behind the pins stand.
+// Clears the strobes and updates the nets that depend on pins.
 static void settle();
 
 #include "circuit.h"

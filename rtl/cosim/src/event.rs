@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Events of both sides, and the words that a driver sends for them.
+//! Events of emulator and circuit, and their encoding in words, which the driver sends.
 
 use std::fmt::Write as _;
 use takt_emu::{Event, Fault, FaultKind};
@@ -7,22 +7,22 @@ use takt_isa::timing::Cycle;
 use takt_isa::{BundleAddress, Program, Register, SlotIndex};
 use takt_system::{LinkEvent, LinkEventKind};
 
-/// Something that happens in a circuit.
+/// Observable event of a circuit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CircuitEvent {
-    /// In a core; a circuit of one core has number 0.
+    /// Event in a core; the core of a single-core circuit has number 0.
     Core {
-        /// The core.
+        /// Index of the core.
         core: usize,
-        /// The event.
+        /// Event within the core.
         event: CoreEvent,
     },
-    /// On a link between cores, or between a core and the host.
+    /// Event on a link between cores, or between a core and the host.
     Link(LinkEvent),
 }
 
 impl CircuitEvent {
-    /// The cycle in which it happens.
+    /// Cycle of the event.
     pub fn cycle(&self) -> Cycle {
         match self {
             CircuitEvent::Core { event, .. } => event.cycle,
@@ -30,7 +30,7 @@ impl CircuitEvent {
         }
     }
 
-    /// The order of events: by cycle, cores before links, each by its number, and the event itself.
+    /// Sort key: cycle, cores before links, each by index, and the event itself.
     pub(crate) fn key(&self) -> (Cycle, u8, usize, Option<CoreEvent>, Option<LinkEventKind>) {
         match *self {
             CircuitEvent::Core { core, event } => (event.cycle, 0, core, Some(event), None),
@@ -38,7 +38,7 @@ impl CircuitEvent {
         }
     }
 
-    /// The place of an event, at which the other side has the same one, or another one.
+    /// Place at which the other side must have an equal event: a different event there is reported as its counterpart.
     pub(crate) fn place(&self) -> impl Ord + use<> {
         match *self {
             CircuitEvent::Core { core, event } => (event.cycle, 0, core, Some((event.kind, event.slot))),
@@ -46,7 +46,7 @@ impl CircuitEvent {
         }
     }
 
-    /// An event from a driver's words; `None` if there is none of this kind.
+    /// Decodes an event from a driver's words; `None` for an unknown kind.
     pub(crate) fn read(words: &[u32]) -> Option<CircuitEvent> {
         let (cycle, number) = (Cycle::from(words[1]), words[7] as usize);
         let Some(&kind) = KINDS.get(words[0] as usize) else {
@@ -76,50 +76,50 @@ impl CircuitEvent {
     }
 }
 
-/// Words of an event, as the driver sends it.
+/// Number of words of an event.
 pub(crate) const EVENT_WORDS: usize = 8;
 
-/// Something that happens in a core.
+/// Observable event of a core.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct CoreEvent {
-    /// The cycle: that of the issue, the writeback, the tick.
+    /// Cycle of the issue, the writeback or the tick.
     pub cycle: Cycle,
-    /// Its kind.
+    /// Kind of the event, which decides about the meaning of the other fields.
     pub kind: EventKind,
-    /// The slot, where it is one's.
+    /// Slot of the operation, if any.
     pub slot: u8,
-    /// The bundle; of a store, the data word.
+    /// Address of the bundle; of the data word for a store.
     pub address: u32,
-    /// The register that is written; of a fault, its kind; of an output that is published, its number.
+    /// Register written; kind of a fault; number of a published output.
     pub register: u16,
-    /// The value that is written.
+    /// Value written to the register, the data word or the port.
     pub value: u32,
-    /// The flags that were raised, as the status register has them.
+    /// Flags raised, as in the status register.
     pub flags: u8,
 }
 
-/// The kind of an event in a core.
+/// Kind of an event in a core.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum EventKind {
-    /// A bundle issues.
+    /// Issue of a bundle.
     Issue,
-    /// A store issues.
+    /// Issue of a store.
     Store,
-    /// A register is written.
+    /// Writeback to a register.
     Retire,
-    /// An output port is written.
+    /// Write to an output port.
     Port,
-    /// A deadline is missed.
+    /// Deadline missed by the program.
     Missed,
-    /// A tick is lost.
+    /// Tick lost because the last one is still pending.
     Lost,
-    /// The machine halts.
+    /// Halt of the machine.
     Halt,
-    /// A fault.
+    /// Fault of a bundle.
     Fault,
-    /// A `wait` issues, and the outside sees the last value written to an output port since the last one.
+    /// Publication: a `wait` issues, and the last value written to an output port since the last `wait` becomes visible.
     Publish,
-    /// A value stands on the input pins: of a system, where the driver shows it.
+    /// Value on the input pins; of a system only, whose driver reports it.
     Input,
 }
 
@@ -136,7 +136,7 @@ const KINDS: [EventKind; 10] = [
     EventKind::Input,
 ];
 
-/// The instruction of an event that has one.
+/// Instruction of an event, if it has one.
 pub(crate) fn instruction(program: &Program, event: &CoreEvent) -> String {
     match event.kind {
         EventKind::Issue | EventKind::Fault | EventKind::Retire => {
@@ -147,7 +147,7 @@ pub(crate) fn instruction(program: &Program, event: &CoreEvent) -> String {
     }
 }
 
-/// `bundle 12 (tracking.s:40): fadd a1, a2, a3`, with one slot's instruction or all.
+/// Text such as `bundle 12 (tracking.s:40): fadd a1, a2, a3`, with one slot's instruction or all.
 fn describe(program: &Program, address: BundleAddress, slot: Option<u8>) -> String {
     let mut text = program.bundle_text(address);
     let machine = program.machine;
@@ -204,12 +204,12 @@ pub(crate) fn show(program: &Program, event: &CoreEvent) -> String {
     }
 }
 
-/// True if the circuit stops at the fault too; it does not look at everything that the emulator refuses (`docs/timing.md`).
+/// The circuit stops at the fault, too. It does not detect every fault of the emulator (`docs/timing.md`).
 pub fn circuit_stops(fault: &Fault) -> bool {
     fault_code(&fault.kind).is_some()
 }
 
-/// The circuit's number for a fault; `None` for one that only the emulator knows.
+/// The circuit's number of a fault; `None` for a fault that only the emulator detects.
 pub(crate) fn fault_code(kind: &FaultKind) -> Option<u16> {
     match kind {
         FaultKind::IllegalWord(_) | FaultKind::ProgramCounter { .. } => Some(1),
@@ -226,12 +226,12 @@ pub(crate) fn fault_code(kind: &FaultKind) -> Option<u16> {
     }
 }
 
-/// An event of which only kind and cycle are known.
+/// An event with a kind and a cycle only.
 pub(crate) fn bare(kind: EventKind, cycle: Cycle) -> CoreEvent {
     CoreEvent { cycle, kind, slot: 0, address: 0, register: 0, value: 0, flags: 0 }
 }
 
-/// The event that the circuit is expected to show for one of the emulator; `None` if it shows nothing.
+/// Event that the circuit must report for an event of the emulator; `None` if the circuit reports nothing.
 pub(crate) fn expect(event: &Event) -> Option<CoreEvent> {
     Some(match *event {
         Event::Issue { cycle, address } => {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A program on both sides.
+//! Lockstep of a program on emulator and circuit.
 
 use crate::compare::{Comparison, Difference};
 use crate::event::{CircuitEvent, CoreEvent, EventKind, bare, circuit_stops, expect};
@@ -13,35 +13,35 @@ use takt_rtl::export::{INPUT_DELAY, LATCHED_INPUT_DELAY, TICK_DELAY};
 use takt_system::HostError;
 use thiserror::Error;
 
-/// The circuit tells of an event at most so many cycles after it.
+/// Most cycles between an event and its report by the circuit.
 pub(crate) const REPORT_DELAY: Cycle = 3;
 
-/// An error that ends a lockstep run.
+/// Error that ends a lockstep run.
 #[derive(Debug, Error)]
 pub enum LockstepError {
-    /// The emulator does not take the program.
+    /// The emulator does not accept the program.
     #[error(transparent)]
     Load(#[from] LoadError),
     /// The simulation does not run.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// The circuit's ports are not the program's.
+    /// The circuit was built for other ports than the program's.
     #[error("the program's ports are {}, and the circuit was built with {circuit} latched inputs, where it needs {program}", if *.program > 0 { "latched" } else { "not latched" })]
     Ports {
-        /// Latched inputs that the program needs.
+        /// Number of latched inputs that the program needs.
         program: u16,
-        /// Those of the circuit.
+        /// Number of latched inputs of the circuit.
         circuit: u16,
     },
-    /// The host of a system cannot do what it was to do.
+    /// Invalid action of a system's host.
     #[error(transparent)]
     Host(#[from] HostError),
-    /// The two sides differ.
+    /// Emulator and circuit differ.
     #[error(transparent)]
     Difference(#[from] Box<Difference>),
 }
 
-/// The pins of a core's circuit, as the driver numbers them; the first two are strobes.
+/// Pins of a core's circuit, numbered as in the driver; the first two are strobes.
 enum Pin {
     Tick,
     InputWrite,
@@ -49,30 +49,30 @@ enum Pin {
     InputValue,
 }
 
-/// A program on the emulator and on the circuit.
+/// A program running on the emulator and on the circuit.
 ///
-/// The emulator goes ahead; [`Lockstep::compare`] lets the circuit follow. Inputs and ticks that the emulator is given are
-/// put on the circuit's pins so much earlier that they are seen in the same cycle.
+/// The emulator runs ahead; [`Lockstep::compare`] lets the circuit follow. Inputs and ticks for the emulator are put on the circuit's pins
+/// so many cycles earlier that both see them in the same cycle.
 pub struct Lockstep {
     emulator: Emulator,
     simulation: Simulation,
     events: Comparison<CircuitEvent>,
     pins: Vec<PinAction>,
-    /// The first cycle whose input pin is free.
+    /// First cycle in which the input pins are free.
     free_pin: Cycle,
     simulated: Cycle,
     stopped: Option<Fault>,
     /// Values written to output ports since the last `wait`, by number.
     written: BTreeMap<u16, u32>,
-    /// Cycles between an input on its pin and the cycle in which the emulator is given it.
+    /// Cycles from an input on its pins to the cycle in which the emulator gets it.
     input_delay: Cycle,
 }
 
 impl Lockstep {
-    /// Loads a program and the first values of input ports, by register.
+    /// Loads a program and the initial values of input ports, by register.
     ///
     /// # Errors
-    /// If a side does not take it.
+    /// If the emulator or the circuit does not accept the program.
     pub fn new(
         program: &Program,
         mut simulation: Simulation,
@@ -84,7 +84,7 @@ impl Lockstep {
         }
         let mut emulator = Emulator::new(program)?;
         for &(register, bits) in inputs {
-            // A register that is no input is refused by both sides alike.
+            // Neither side accepts a register that is no input.
             let _ = emulator.set_input_bits(register, bits);
         }
         simulation.load(program, inputs)?;
@@ -101,36 +101,35 @@ impl Lockstep {
         })
     }
 
-    /// The emulator.
+    /// Emulator of the program.
     pub fn emulator(&self) -> &Emulator {
         &self.emulator
     }
 
-    /// The fault that the emulator stopped with.
+    /// Fault at which the emulator stopped.
     pub fn fault(&self) -> Option<&Fault> {
         self.stopped.as_ref()
     }
 
-    /// Events that were the same on both sides.
+    /// Number of equal events so far.
     pub fn compared(&self) -> u64 {
         self.events.compared
     }
 
-    /// The simulation, to be used for another program.
+    /// Simulation, for use with another program.
     pub fn into_simulation(self) -> Simulation {
         self.simulation
     }
 
-    /// Asks for the tick in a cycle to come.
+    /// Schedules a tick for a future cycle.
     pub fn tick_at(&mut self, cycle: Cycle) {
         if cycle >= TICK_DELAY + self.simulated && self.emulator.tick_at(cycle) {
             self.pins.push((cycle - TICK_DELAY, Pin::Tick as usize, 1));
         }
     }
 
-    /// Sets an input port, by its register: bundles that issue from now on see the value; if ports are latched, those of the
-    /// period whose tick comes from now on. Inputs that are set at the same
-    /// time reach the circuit one a cycle; returns the cycle in which this one does.
+    /// Sets an input port, by its register. Bundles that issue from now on see the value; with latched ports, the bundles of the next
+    /// period to begin. Inputs set at the same time reach the circuit one per cycle; returns the cycle in which this one does.
     pub fn set_input(&mut self, register: Register, bits: u32) -> Cycle {
         let pin = self.emulator.now().saturating_sub(self.input_delay).max(self.free_pin);
         let number = self.emulator.machine().input_number(register);
@@ -144,13 +143,13 @@ impl Lockstep {
         pin + self.input_delay
     }
 
-    /// Lets the emulator run until `cycle` cycles have passed; false if it stopped before.
+    /// Runs the emulator until `cycle` cycles have passed; false if it stops earlier.
     pub fn run_until(&mut self, cycle: Cycle) -> bool {
         self.drive(|observed| observed.run_until(cycle)) == Some(Stop::Reached)
     }
 
-    /// Sets inputs, raises the tick as soon as the circuit has them and the front end is refilled, and lets the emulator run
-    /// until the next `wait` issues; false if it stopped before. The first call also runs the part before the first `wait`.
+    /// Runs a period: sets inputs, ticks as soon as the circuit has them and the front end is refilled, and runs the emulator until the
+    /// next `wait` issues; false if it stops earlier. The first call also runs the program up to its first `wait`.
     pub fn run_period(&mut self, inputs: &[(Register, u32)]) -> bool {
         let limit = self.emulator.now() + 1_000_000;
         self.emulator.set_cycle_limit(limit);
@@ -170,7 +169,7 @@ impl Lockstep {
 
     fn drive(
         &mut self,
-        run: impl FnOnce(&mut takt_emu::Observed<'_>) -> Result<Stop, Fault>,
+        run: impl FnOnce(&mut takt_emu::ObservedEmulator<'_>) -> Result<Stop, Fault>,
     ) -> Option<Stop> {
         let machine = self.emulator.machine();
         let (expected, written) = (&mut self.events.expected, &mut self.written);
@@ -200,12 +199,12 @@ impl Lockstep {
         }
     }
 
-    /// Lets the circuit follow, as far as the inputs to come allow, and compares.
+    /// Runs the circuit up to the emulator, as far as future inputs allow, and compares.
     ///
     /// # Errors
-    /// A difference, or a simulation that ended.
+    /// A difference, or the end of the simulation.
     pub fn compare(&mut self) -> Result<(), LockstepError> {
-        // The host's next action stands on the pins INPUT_DELAY cycles before now.
+        // An action of the host may still reach the pins INPUT_DELAY cycles before now.
         let now = self.emulator.now().saturating_sub(INPUT_DELAY + 1);
         if now > self.simulated {
             self.simulate(now)?;
@@ -214,20 +213,20 @@ impl Lockstep {
         self.check(|event| event.cycle < horizon)
     }
 
-    /// Lets the circuit run to the end and compares the rest.
+    /// Runs the circuit to the end and compares the rest.
     ///
     /// # Errors
-    /// As [`Lockstep::compare`].
+    /// See [`Lockstep::compare`].
     pub fn finish(&mut self) -> Result<(), LockstepError> {
         let now = self.emulator.now();
         self.simulate((now + Cycle::from(MAX_LATENCY)).max(self.simulated) + REPORT_DELAY)?;
         match (&self.stopped, self.emulator.status()) {
-            // A tick that comes after the halt is no event to the emulator.
+            // The emulator reports no ticks after the halt.
             (None, &Status::Halted { cycle, .. }) => self.check(|event| {
                 event.cycle <= cycle || !matches!(event.kind, EventKind::Missed | EventKind::Lost)
             }),
             (None, _) => self.check(|event| event.cycle < now),
-            // Bundles that issued before the fault still write, and nothing else does; the emulator leaves them in flight.
+            // Bundles that issued before the fault still write, and no others; the emulator leaves their results in flight.
             (Some(fault), _) if circuit_stops(fault) => {
                 let cycle = fault.cycle;
                 let machine = self.emulator.machine();
@@ -244,7 +243,7 @@ impl Lockstep {
                     event.cycle <= cycle || !matches!(event.kind, EventKind::Missed | EventKind::Lost)
                 })
             }
-            // The circuit knows nothing of this fault and goes on.
+            // The circuit does not detect this fault and goes on.
             (Some(fault), _) => {
                 let cycle = fault.cycle;
                 self.check(|event| event.cycle < cycle)
@@ -261,14 +260,14 @@ impl Lockstep {
         Ok(())
     }
 
-    /// Compares the events of which the answer is known, in order.
+    /// Compares the events whose counterparts are known, in order.
     fn check(&mut self, known: impl Fn(&CoreEvent) -> bool) -> Result<(), LockstepError> {
         let known = |event: &CircuitEvent| matches!(event, CircuitEvent::Core { event, .. } if known(event));
         Ok(self.events.check_events(known, &[("", self.emulator.program())], |_| String::new())?)
     }
 }
 
-/// An event of a core by itself.
+/// Event of a core by itself.
 fn alone(event: CoreEvent) -> CircuitEvent {
     CircuitEvent::Core { core: 0, event }
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A core in Verilator: built once for each design and kept.
+//! A core in Verilator, compiled once per design.
 
 use crate::simulation::{ModelError, Simulation};
 use std::ffi::OsStr;
@@ -8,9 +8,9 @@ use takt_rtl::Design;
 use takt_rtl::export::RESET_CYCLES;
 use takt_rtl::verilator::Sources;
 
-/// The program around a circuit: the other half of [`Simulation`].
+/// Main program around a circuit: the counterpart of [`Simulation`].
 const DRIVER: &str = include_str!("driver.cpp");
-/// Its part for a core by itself.
+/// Part of the main program for a core by itself.
 const CORE: &str = include_str!("core.h");
 
 /// A design compiled for simulation.
@@ -20,7 +20,7 @@ pub struct Model {
     latched: u16,
 }
 
-/// The driver's header for a machine.
+/// Header of the driver for a machine.
 fn header(design: &Design) -> String {
     let slots = design.machine.slots;
     let mut text = format!(
@@ -40,7 +40,7 @@ fn header(design: &Design) -> String {
     text + CORE
 }
 
-/// The sources of a simulation, from its top, its Verilog, and the driver's header that knows the circuit.
+/// Sources of a simulation, from its top, its Verilog, and the driver's header for the circuit.
 pub(crate) fn sources<'a>(
     top: &'a str,
     files: Vec<(&'a str, &'a str)>,
@@ -54,7 +54,7 @@ pub(crate) fn sources<'a>(
 }
 
 impl Model {
-    /// Compiles a design, or finds it in the folder as it was compiled before. With `trace` it can write waveforms.
+    /// Compiles a design, or finds an earlier build in the folder. With `trace` the model can write waveforms.
     ///
     /// # Errors
     /// If Verilator or a C++ compiler is missing or fails.
@@ -66,7 +66,7 @@ impl Model {
         Ok(Model { program: sources.build(folder)?, latched: design.latched })
     }
 
-    /// Starts a simulation. A model that can trace writes its waveform to the first argument; others are Verilog's plusargs.
+    /// Starts a simulation. A model with `trace` writes its waveform to the first argument; other arguments are Verilog's plusargs.
     ///
     /// # Errors
     /// If the process cannot be started.

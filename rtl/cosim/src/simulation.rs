@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A compiled circuit that runs as a process: what is told to it, and what it tells.
+//! A compiled circuit running as a process, and the protocol on its pipes.
 
 use crate::event::{CircuitEvent, EVENT_WORDS};
 use std::ffi::OsStr;
@@ -13,21 +13,21 @@ use takt_isa::{Program, Register};
 use takt_rtl::verilator::VerilatorError;
 use thiserror::Error;
 
-/// An error that ends a simulation, or leaves none.
+/// Error that ends or prevents a simulation.
 #[derive(Debug, Error)]
 pub enum ModelError {
-    /// Verilator made no program of the circuit.
+    /// Verilator or the C++ compiler failed.
     #[error(transparent)]
     Verilator(#[from] VerilatorError),
     /// A file cannot be written or read.
     #[error("{path}: {source}")]
     File {
-        /// The file.
+        /// Path of the file.
         path: String,
-        /// The reason.
+        /// Error of the file system.
         source: std::io::Error,
     },
-    /// The simulation ended.
+    /// The simulation ended early; with its standard error.
     #[error("the simulation ended early: {0}")]
     Ended(String),
 }
@@ -37,7 +37,7 @@ pub(crate) fn file_error(path: &Path) -> impl FnOnce(std::io::Error) -> ModelErr
     move |source| ModelError::File { path, source }
 }
 
-/// The process of a simulation, and the pipes to it.
+/// Process of a simulation, with its pipes.
 #[derive(Debug)]
 struct Process {
     process: Child,
@@ -68,7 +68,7 @@ impl Process {
         if matches!(sent, Some(Ok(()))) { Ok(()) } else { Err(self.ended()) }
     }
 
-    /// Receives so many words.
+    /// Receives `count` words from the driver.
     fn receive(&mut self, count: usize) -> Result<Vec<u32>, ModelError> {
         let mut bytes = vec![0; 4 * count];
         let read = self.stdout.as_mut().map(|stdout| stdout.read_exact(&mut bytes));
@@ -91,13 +91,13 @@ impl Process {
 
 impl Drop for Process {
     fn drop(&mut self) {
-        // It ends when nobody speaks or listens to it.
+        // The process ends when its pipes are closed.
         (self.stdin, self.stdout) = (None, None);
         let _ = self.process.wait();
     }
 }
 
-/// A folder that goes when this does.
+/// A temporary folder, removed on drop.
 #[derive(Debug)]
 pub(crate) struct Folder(pub(crate) PathBuf);
 
@@ -107,22 +107,22 @@ impl Drop for Folder {
     }
 }
 
-/// A value that stands on a pin, by its number, from a cycle on; of a strobe, for that cycle.
+/// Value of a pin, by its number, from a cycle on; a strobe's value holds for that cycle only.
 pub(crate) type PinAction = (Cycle, usize, u32);
 
-/// A running simulation. Once it is dropped, its waveform is whole.
+/// A running simulation. Dropping it completes its waveform.
 #[derive(Debug)]
 pub struct Simulation {
     process: Process,
     latched: u16,
-    /// Pins of a system's host.
+    /// Number of a system's host pins; 0 for a core.
     pins: usize,
-    /// The memory image of a system, which goes after the process.
+    /// Folder of a system's memory image, removed after the process ends.
     _folder: Option<Folder>,
 }
 
 impl Simulation {
-    /// Starts a compiled circuit of a core.
+    /// Starts a core's compiled circuit.
     pub(crate) fn of_core(
         program: &Path,
         arguments: &[&OsStr],
@@ -131,7 +131,7 @@ impl Simulation {
         Ok(Simulation { process: Process::start(program, arguments, None)?, latched, pins: 0, _folder: None })
     }
 
-    /// Starts a compiled circuit of a system in the folder of its memory image.
+    /// Starts a system's compiled circuit in the folder of its memory image.
     pub(crate) fn of_system(
         program: &Path,
         arguments: &[&OsStr],
@@ -142,12 +142,12 @@ impl Simulation {
         Ok(Simulation { process, latched: 0, pins, _folder: Some(folder) })
     }
 
-    /// The input ports of a core's circuit that are latched; 0 if its ports are not.
+    /// Number of latched input ports of a core's circuit; 0 with direct ports.
     pub fn latched(&self) -> u16 {
         self.latched
     }
 
-    /// Resets a core and loads a program and the first values of input ports.
+    /// Resets a core and loads a program and the initial values of input ports.
     ///
     /// # Errors
     /// If the process has ended.
@@ -165,8 +165,8 @@ impl Simulation {
         self.process.send(&words)
     }
 
-    /// Runs until so many cycles have passed. `actions` are sorted by cycle; none is of a cycle that has passed. The events, and
-    /// the value of each of the host's pins in the cycle to come.
+    /// Runs until `until` cycles have passed. `actions` are sorted by cycle and lie in the future. Returns the events, and the value of
+    /// each of the host's pins in cycle `until`.
     ///
     /// # Errors
     /// If the process has ended.
@@ -184,7 +184,7 @@ impl Simulation {
         Ok((events.chunks_exact(EVENT_WORDS).filter_map(CircuitEvent::read).collect(), pins))
     }
 
-    /// Writes a waveform of these cycles of the next run; the model must have been built for it.
+    /// Traces these cycles of the next run to the waveform; the model must have been built for it.
     ///
     /// # Errors
     /// If the process has ended.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The exported test bench in a second simulator, Icarus Verilog, on the tracking program.
+//! Exported test bench in a second simulator, Icarus Verilog, with the tracking program.
 
 use crate::common::{assemble, drive, folder};
 use std::collections::BTreeMap;
@@ -32,7 +32,7 @@ fn latched_outputs_come_together() {
 
 fn tracking(latched: bool) {
     let program = Program { latched, ..assemble(&T3, "hybrid/tracking.s") };
-    // On the emulator: inputs of each period, and what went out, number and value, with the cycles until the period's end.
+    // Reference from the emulator: inputs of each period; outputs by number with value, and the cycles from the write to the period's end.
     let mut emulator = Emulator::new(&program).expect("it fits");
     let mut periods = Vec::new();
     let mut expected = Vec::new();
@@ -50,7 +50,7 @@ fn tracking(latched: bool) {
         let number = |register| T3.output_number(register).expect("an output");
         let first = expected.len();
         if latched {
-            // Only the last value of each, in the order of their numbers.
+            // Latched: only the last value of each port, in the order of numbers.
             let last: BTreeMap<u16, u32> =
                 writes.iter().map(|write| (number(write.register), write.value)).collect();
             expected.extend(last.into_iter().map(|(number, value)| (0, number, value)));

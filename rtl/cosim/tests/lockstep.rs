@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The circuit of every machine against the emulator.
+//! Lockstep of every machine's circuit and the emulator.
 #![allow(clippy::print_stdout)]
 
 use crate::common::{assemble, drive, latched_model, model};
@@ -8,18 +8,19 @@ use std::collections::BTreeSet;
 use std::ops::Range;
 use std::sync::OnceLock;
 use takt_asm::{MemoryLoader, Options, Schedule};
+use takt_cosim::corners::corners;
 use takt_cosim::{Lockstep, LockstepError, Simulation, random};
 use takt_isa::timing::Cause;
 use takt_isa::{Bank, Function, Instruction, MACHINES, Machine, Program, ROWS, Slot, SlotIndex, T1, T3};
 
-/// The seeds of random programs: `TAKT_PROGRAMS` of them, 200 unless stated, from `TAKT_SEED` on, or else 0.
+/// Seeds of random programs: `TAKT_PROGRAMS` of them (by default 200), from `TAKT_SEED` (by default 0) on.
 fn seeds() -> Range<u64> {
     let number = |name: &str| Some(std::env::var(name).ok()?.parse::<u64>().expect("a number"));
     let first = number("TAKT_SEED").unwrap_or(0);
     first..first + number("TAKT_PROGRAMS").unwrap_or(200)
 }
 
-/// Prints what programs did, for `cargo xtask campaign`.
+/// Prints the coverage, for `cargo evidence campaign`.
 fn figures(machine: &Machine, coverage: &random::Coverage) {
     let (name, random::Coverage { programs, cycles, events, missed, .. }) = (machine.name, coverage);
     let words = |names: &BTreeSet<&str>| names.iter().map(|name| name.replace(' ', "-")).collect::<Vec<_>>();
@@ -69,7 +70,7 @@ fn random_programs() {
     }
 }
 
-/// Short programs, each with a bit or two of one word changed: most stop at once, with results in flight.
+/// Short programs with one or two bits of a word changed: most stop at once, with results in flight.
 #[test]
 fn short_programs() {
     let seeds = seeds();
@@ -92,7 +93,7 @@ fn changed_words() {
         let mut simulation = model(machine).start(&[]).unwrap_or_else(|error| panic!("{error}"));
         let (mut coverage, mut refused) = (random::Coverage::default(), 0);
         let programs = random::words(machine);
-        // 49 programs an instruction, so that no bit is left out.
+        // Each instruction has 49 programs, no multiple of 5, so that the sample covers every bit.
         for program in programs.iter().step_by(if is_full { 1 } else { 5 }) {
             simulation = random::run_directed(program, simulation, &mut coverage)
                 .unwrap_or_else(|error| panic!("{}: {:x?}: {error}", machine.name, program.code));
@@ -116,7 +117,23 @@ fn results_at_every_distance() {
     }
 }
 
-/// Programs whose loops have counts of 2^k + 1: all that may end them early is one bit. They are not run to their end.
+/// Calls to every depth, faults beside results and other faults, loops around each carry of an address: each program ends as it must, in
+/// the same cycle on both sides.
+#[test]
+fn directed_programs_end_with_their_expected_event() {
+    for machine in MACHINES {
+        let mut simulation = model(machine).start(&[]).unwrap_or_else(|error| panic!("{error}"));
+        for corner in corners(machine) {
+            let (name, mut coverage) =
+                (format!("{}: {}", machine.name, corner.name), random::Coverage::default());
+            simulation = random::run_corner(&corner, simulation, &mut coverage)
+                .unwrap_or_else(|error| panic!("{name}: {error}"));
+            assert_eq!(coverage.faults, corner.fault.into_iter().collect(), "{name}");
+        }
+    }
+}
+
+/// Programs with loops of 2^k + 1 iterations, which a single wrong bit would end early. They are not run to the end.
 pub(crate) fn early_ends(machine: &'static Machine) -> Vec<Program> {
     let program = |(bit, body): (u32, usize)| {
         let source = format!(
@@ -132,7 +149,7 @@ pub(crate) fn early_ends(machine: &'static Machine) -> Vec<Program> {
     (4..16).flat_map(|bit| (1..10).map(move |body| (bit, body))).map(program).collect()
 }
 
-/// Runs one of [`early_ends`] for a few iterations; the simulation comes back.
+/// Runs a program of [`early_ends`] for a few iterations; returns the simulation.
 pub(crate) fn runs_early_end(program: &Program, simulation: Simulation) -> Result<Simulation, LockstepError> {
     let mut lockstep = Lockstep::new(program, simulation, &[])?;
     assert!(lockstep.run_until(120), "{:?}", lockstep.emulator().status());
@@ -151,7 +168,7 @@ fn loops_do_not_end_early() {
     }
 }
 
-/// A program whose counted loops have many iterations: each bit of a count is 1 in one of them, and one is in the other.
+/// A program with long counted loops: each bit of a count is 1 in one loop and 0 in another; two loops are nested.
 pub(crate) fn long_loops(machine: &'static Machine) -> Program {
     let counted = |count: u32| {
         format!(
@@ -189,7 +206,7 @@ pub(crate) fn long_loops(machine: &'static Machine) -> Program {
     assembled.unwrap_or_else(|errors| panic!("{source}\n{}", errors.render(false))).program
 }
 
-/// Counted loops of up to 42,405 iterations end where they must.
+/// Counted loops of up to 42,405 iterations end at the right iteration.
 #[test]
 fn loops_of_many_iterations() {
     for machine in MACHINES {
@@ -198,7 +215,7 @@ fn loops_of_many_iterations() {
     }
 }
 
-/// Runs [`long_loops`]; the simulation comes back.
+/// Runs [`long_loops`]; returns the simulation.
 pub(crate) fn runs_long_loops(
     machine: &'static Machine,
     simulation: Simulation,
@@ -211,11 +228,10 @@ pub(crate) fn runs_long_loops(
     Ok(lockstep.into_simulation())
 }
 
-/// The circuit is what the row says, and not only for the table's rows: four slots, of which two have an adder and two an ALU; two
-/// slots with iterative units, of banks of different depths that leave gaps in the register space. What the assembler makes for the
-/// first uses all that its slots share.
+/// Rows other than the table's: four slots with two adders and two ALUs; two slots with iterative units, and banks of different depths that
+/// leave gaps in the register space. The assembler's programs for the first row use both of its adders and ALUs.
 #[test]
-fn rows_of_a_strangers() {
+fn rows_of_an_independent_author() {
     use takt_isa::spec::units::*;
     let slot = |name, bank, base, depth, units| Slot { name, bank: Bank { name: bank, base, depth }, units };
     static FOUR: OnceLock<Machine> = OnceLock::new();
@@ -266,8 +282,8 @@ fn rows_of_a_strangers() {
     }
 }
 
-/// A machine of a file (docs/machines.md): t3 with a second adder, with random programs and with the controller, whose sums both
-/// adders execute.
+/// A machine from a file (docs/machines.md): t3 with a second adder, with random programs and with scheduled ones, whose sums both adders
+/// execute.
 #[test]
 fn machine_of_a_file() {
     let text =
@@ -288,8 +304,8 @@ fn machine_of_a_file() {
     }
 }
 
-/// Memories of other depths: random programs, which use both ends of the data memory, and a program that calls, branches, loads and
-/// stores at the ends of both, without and with an index, and then leaves the memory at either end.
+/// Memories of other depths: random programs, which use both ends of the data memory, and a program that calls, branches, loads and stores
+/// at the ends of both memories, with and without an index, and then leaves the memory at either end.
 #[test]
 fn memories_of_other_depths() {
     for (name, count) in
@@ -361,7 +377,7 @@ fn memories_of_other_depths() {
     }
 }
 
-/// The same with latched ports, half as many.
+/// Half as many random programs with latched ports.
 #[test]
 fn random_programs_with_latched_ports() {
     let seeds = seeds();
@@ -378,7 +394,7 @@ fn random_programs_with_latched_ports() {
     }
 }
 
-/// A circuit is for direct ports or for latched ones, and for so many of them.
+/// A circuit has direct or latched ports, and a fixed number of latched ones.
 #[test]
 fn ports_of_program_and_circuit_must_agree() {
     let program = assemble(&T1, "hybrid/tracking.s");
@@ -390,14 +406,14 @@ fn ports_of_program_and_circuit_must_agree() {
     }
 }
 
-/// A tracking program in closed loop with the robot, a number of periods.
+/// Runs a tracking program in closed loop with the robot for some periods.
 fn tracking(machine: &'static Machine, source: &str, latched: bool, periods: usize) {
     let program = Program { latched, ..assemble(machine, source) };
     let model = latched_model(machine, program.latched_inputs());
     track(&program, model.start(&[]).unwrap_or_else(|error| panic!("{error}")), periods);
 }
 
-/// The same with a circuit that was built for it.
+/// Runs a tracking program on a given circuit, in closed loop.
 pub(crate) fn track(program: &Program, simulation: Simulation, periods: usize) {
     let mut lockstep = Lockstep::new(program, simulation, &[]).unwrap_or_else(|error| panic!("{error}"));
     drive(program, periods, |inputs| -> Result<_, LockstepError> {
@@ -419,7 +435,7 @@ fn tracking_programs() {
     }
 }
 
-/// A scheduled program runs on the circuit as on the emulator, and gives the same results as the unscheduled program.
+/// Scheduled programs run alike on circuit and emulator, and give the results of the unscheduled ones.
 #[test]
 fn scheduled_programs() {
     for machine in MACHINES {
@@ -428,7 +444,7 @@ fn scheduled_programs() {
     }
 }
 
-/// Random sources on a machine, as written and scheduled. Gives the programs.
+/// Runs random sources on a machine, as written and scheduled; returns the programs.
 fn scheduled(machine: &'static Machine, mut simulation: Simulation, seeds: Range<u64>) -> Vec<Program> {
     let mut programs = Vec::new();
     for seed in seeds {
@@ -463,7 +479,7 @@ fn scheduled(machine: &'static Machine, mut simulation: Simulation, seeds: Range
     programs
 }
 
-/// The number of operations of a function in a slot of some programs.
+/// Number of operations of a function in a slot of some programs.
 fn operations(programs: &[Program], function: Function, slot: SlotIndex) -> usize {
     let words = |program: &Program| {
         let slots = program.machine.slots.len();

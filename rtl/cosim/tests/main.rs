@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Tests of the crate from outside, one program: a module for each subject.
 
+mod axi;
+mod bus;
 mod common;
 mod faults;
 mod icarus;

@@ -1,31 +1,32 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Netlists that yosys has made of a core, in lockstep with the emulator: with mutants planted, and as mapped to the cells of an FPGA.
+//! Netlists that yosys made of a core, in lockstep with the emulator: with planted mutants, and mapped to the cells of an FPGA.
 //!
-//! `TAKT_NETLIST` names a folder with `machine.txt` (its name), `netlist.v`, and of mutants `mutants.txt`, the numbers of those to be
-//! tried. `cargo xtask mutants` and `cargo xtask netlist` call this.
+//! `TAKT_NETLIST` names a folder with `machine.txt` (its name), `netlist.v` and, for mutants, `mutants.txt`, the numbers to be tried.
+//! `cargo evidence mutants` and `cargo evidence netlist` call this.
 #![allow(clippy::print_stdout)]
 
 use crate::common::{assemble, folder};
 use crate::lockstep::{early_ends, runs_early_end, runs_long_loops, track};
 use std::fs;
 use std::path::PathBuf;
+use takt_cosim::corners::{Corner, corners};
 use takt_cosim::{LockstepError, Model, random};
 use takt_isa::{Machine, Program};
 use takt_rtl::export::DesignFile;
 use takt_rtl::{Design, Library, export};
 
-/// Programs that a mutant may pass before it counts as not found: random ones, and short ones.
+/// Programs that a mutant may survive before it counts as not found: random and short ones.
 const PROGRAMS: u64 = 300;
 const SHORT: u64 = 6000;
 
-/// A netlist's machine, compiled.
+/// Machine and compiled circuit of the netlist, and its folder.
 fn netlist() -> (&'static Machine, Model, PathBuf) {
     let place = PathBuf::from(std::env::var_os("TAKT_NETLIST").expect("TAKT_NETLIST names a folder"));
     let read =
         |name: &str| fs::read_to_string(place.join(name)).unwrap_or_else(|error| panic!("{name}: {error}"));
     let machine = takt_asm::machine(read("machine.txt").trim()).unwrap_or_else(|error| panic!("{error}"));
     let design = export(machine, &Library::builtin()).expect("every machine has a circuit");
-    // The mapped netlist has cells that yosys' library has no behaviour of.
+    // The mapped netlist comes with models of cells that yosys' library lacks.
     let names = ["netlist.v", "cells.v"].into_iter().filter(|name| place.join(name).exists());
     let files = names.map(|name| DesignFile { name: name.to_owned(), text: read(name) }).collect();
     let model = Model::build(&Design { files, ..design }, &folder(), false);
@@ -37,11 +38,12 @@ enum Case {
     Random(u64),
     Short(u64),
     Directed(Program),
+    Corner(Corner),
     Loop(Program),
     LongLoops,
 }
 
-/// So many random and short programs, and all that are directed.
+/// Random and short programs of the given numbers, and all directed programs.
 fn cases(machine: &'static Machine, random: u64, short: u64) -> Vec<(String, Case)> {
     let numbered = |name: &str, i| format!("{name} {i}");
     let loops = early_ends(machine).into_iter().enumerate();
@@ -49,6 +51,7 @@ fn cases(machine: &'static Machine, random: u64, short: u64) -> Vec<(String, Cas
     let distances = random::distances(machine).into_iter().enumerate();
     (0..random)
         .map(|seed| (numbered("random program", seed), Case::Random(seed)))
+        .chain(corners(machine).into_iter().map(|corner| (corner.name.clone(), Case::Corner(corner))))
         .chain(loops.map(|(i, program)| (numbered("loop", i as u64), Case::Loop(program))))
         .chain(distances.map(|(i, program)| (numbered("distances", i as u64), Case::Directed(program))))
         .chain(words.map(|(i, program)| (numbered("word", i as u64), Case::Directed(program))))
@@ -57,7 +60,7 @@ fn cases(machine: &'static Machine, random: u64, short: u64) -> Vec<(String, Cas
         .collect()
 }
 
-/// The program that shows a difference, and the difference.
+/// First case that shows a difference, and the difference.
 fn difference<'a>(
     machine: &'static Machine,
     model: &Model,
@@ -72,6 +75,7 @@ fn difference<'a>(
             Case::Random(seed) => random::run(*seed, machine, simulation, coverage),
             Case::Short(seed) => random::run_short(*seed, machine, simulation, coverage),
             Case::Directed(program) => random::run_directed(program, simulation, coverage),
+            Case::Corner(corner) => random::run_corner(corner, simulation, coverage),
             Case::Loop(program) => runs_early_end(program, simulation),
             Case::LongLoops => runs_long_loops(machine, simulation),
         };
@@ -85,7 +89,7 @@ fn difference<'a>(
 }
 
 #[test]
-#[ignore = "of netlists that `cargo xtask mutants` makes"]
+#[ignore = "of netlists that `cargo evidence mutants` makes"]
 fn mutants() {
     let (machine, model, place) = netlist();
     let numbers = fs::read_to_string(place.join("mutants.txt")).expect("there are numbers");
@@ -101,9 +105,9 @@ fn mutants() {
     }
 }
 
-/// The mapped netlist does what the emulator does: random programs (`TAKT_PROGRAMS`, 100), and the robot along the letters.
+/// The mapped netlist agrees with the emulator on random programs (`TAKT_PROGRAMS`, by default 100) and on the robot's tracking.
 #[test]
-#[ignore = "of netlists that `cargo xtask netlist` makes"]
+#[ignore = "of netlists that `cargo evidence netlist` makes"]
 fn mapped() {
     let (machine, model, _) = netlist();
     let programs =

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Systems of several cores: their circuit against their emulator.
+//! Lockstep of systems of several cores.
 #![allow(clippy::print_stdout)]
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::sync::OnceLock;
 use takt_cosim::LockstepError;
+use takt_cosim::random::{places, with_inputs_at};
 use takt_cosim::system::{PROBE, SystemModel, random};
 use takt_emu::testing::{Options, random_program};
 use takt_isa::spec::units::*;
@@ -18,8 +19,8 @@ fn folder() -> PathBuf {
     PathBuf::from(env!("CARGO_TARGET_TMPDIR"))
 }
 
-/// Small cores, which compile soon: it is what is between them that is tested here. One with a single slot, one with two, whose
-/// output ports are in two banks.
+/// Small cores, which compile fast, because the test is about their surroundings: one with a single slot, and one with two, whose output
+/// ports are in two banks.
 fn machines() -> [&'static Machine; 2] {
     static ONE: OnceLock<Machine> = OnceLock::new();
     static TWO: OnceLock<Machine> = OnceLock::new();
@@ -46,7 +47,7 @@ fn machines() -> [&'static Machine; 2] {
     [one, two]
 }
 
-/// The circuit of a system for the programs of several.
+/// Circuit of a system, with room for the programs of all the given ones.
 fn design(systems: &[Description], name: &str) -> SystemDesign {
     let designs = systems.iter().map(|system| {
         export_system(system, name, &Library::builtin()).unwrap_or_else(|error| panic!("{error}"))
@@ -54,7 +55,7 @@ fn design(systems: &[Description], name: &str) -> SystemDesign {
     designs.max_by_key(|design| design.records).expect("a system")
 }
 
-/// The kinds of a system's links, in words.
+/// Kinds of a system's links, as text.
 fn kinds(description: &Description) -> Vec<&'static str> {
     let kind = |link: &takt_system::Link| match (&link.kind, link.from, link.to) {
         (LinkKind::Wire, End::Host, _) => "wire from the host",
@@ -74,7 +75,7 @@ fn kinds(description: &Description) -> Vec<&'static str> {
     description.links.iter().map(kind).collect()
 }
 
-/// `TAKT_SYSTEMS` random systems, 3 unless stated, each with several sets of programs.
+/// Random systems (`TAKT_SYSTEMS`, by default 3), each with several sets of programs.
 #[test]
 fn random_systems() {
     let count: u64 = std::env::var("TAKT_SYSTEMS").map_or(3, |text| text.parse().expect("a number"));
@@ -93,12 +94,12 @@ fn random_systems() {
         }
     }
     println!("{coverage:?}\n{seen:?}");
-    // Every kind of link, and every kind of end.
+    // Every kind of link occurred, with every kind of end.
     assert!(count < 3 || seen.len() == 11, "{seen:?}");
     assert!(coverage.started == coverage.runs && coverage.missed > 0, "{coverage:?}");
 }
 
-/// Three cores with a link of every kind, on ways of every kind: none, flip-flops, a ring.
+/// Three cores with a link of every kind, with delays of every kind: none, flip-flops, a ring.
 const LINKS: &str = r#"
 tick = 61
 
@@ -188,12 +189,13 @@ latency = 5
 push = "B1"
 "#;
 
-/// [`LINKS`] with random programs; those of a have latched ports.
+/// The system [`LINKS`] with random programs, whose input ports are all over their bank; core a has latched ports.
 fn with_every_link() -> Description {
     let [one, two] = machines();
     let programs: BTreeMap<String, Program> = [("a.s", one, 1), ("b.s", two, 2), ("c.s", one, 3)]
         .map(|(path, machine, seed)| {
             let program = random_program(seed, machine, Options::TAME);
+            let program = with_inputs_at(program, &places(machine));
             (path.to_owned(), Program { latched: seed == 1, ..program })
         })
         .into();
@@ -210,25 +212,25 @@ fn with_every_link() -> Description {
     describe(&text, &programs).unwrap_or_else(|error| panic!("{error:?}"))
 }
 
-/// A module, an expression that occurs once in it, and what takes its place.
+/// Fault: module, an expression that occurs once in it, and its replacement.
 type Fault = (&'static str, &'static str, &'static str);
 
 #[rustfmt::skip]
 const FAULTS: &[Fault] = &[
-    // The way: a cycle too short, a cycle too long.
+    // Delay: a cycle too short, a cycle too long.
     ("takt_delay", "all[(LENGTH+1)*(WIDTH+1)-1 -: WIDTH+1]", "all[LENGTH*(WIDTH+1)-1 -: WIDTH+1]"),
     ("takt_delay", "ring[next]", "ring[at]"),
-    // A wire: another value. From latched ports: sent though nothing was written, sent twice.
+    // Wire: another value. From latched ports: sent without a write, sent twice.
     ("takt_wire", "{write, value}", "{write, value[30:0], 1'b0}"),
     ("takt_wire", "ended & changed", "ended"),
     ("takt_wire", "write | (changed & ~ended)", "write | changed"),
-    // A snapshot: half old and half new, or what is on its way; taken a cycle early, or by a core that does not wait.
+    // Snapshot: half old and half new; values still in transit; taken a cycle early, or by a core that does not wait.
     ("takt_snapshot", "HOST ? arrived : working", "(working & {FIELDS{32'hffff0000}}) | (shown & {FIELDS{32'h0000ffff}})"),
     ("takt_snapshot", "HOST ? arrived : working", "arrived"),
     ("takt_snapshot", "HOST ? arrived : working", "working"),
     ("takt_pace", "left == TAKE[BITS-1:0]", "left == TAKE[BITS-1:0] + 1'b1"),
     ("takt_system_links", "c_take & c_waiting", "c_take"),
-    // A FIFO: flags that do not stick, room that a pop makes not used, a refusal not told of, and the like.
+    // FIFO: flags that do not stick, room that a pop makes left unused, an unreported refusal, and the like.
     ("takt_fifo", "overflow | refused", "refused"),
     ("takt_fifo", "underflow | missed", "missed"),
     ("takt_fifo", "~full | popped", "~full"),
@@ -239,28 +241,32 @@ const FAULTS: &[Fault] = &[
     ("takt_fifo", "words[first]", "words[free]"),
     ("takt_fifo", "{empty, full, count, overflow, underflow}", "{empty, full, count, 1'b0, underflow}"),
     ("takt_fifo", "write[f] ? value[32*f +: 32] : working[32*f +: 32]", "working[32*f +: 32]"),
-    // The loader: a record that is left out.
+    // FIFO: its end where a power of two has one, for the next entry and for the first.
+    ("takt_fifo", "free == LAST[ADDRESS-1:0]", "&free"),
+    ("takt_fifo", "first == LAST[ADDRESS-1:0]", "&first"),
+    // Loader: a record left out.
     ("takt_loader", "state == 2'd1", "state == 2'd1 & next != 3"),
-    // The gate: the last mailbox first, an older value that stays, a newer one that is lost.
+    // Gate: one of two ports whose numbers differ in a bit, the last mailbox first, an older value that stays, a newer one that is lost.
+    ("takt_gate", "NUMBERS[INDEX*i +: INDEX]", "(NUMBERS[INDEX*i +: INDEX] & ~64)"),
     ("takt_gate", "next & (~next + 1'b1)", "next & ~((next >> 1) | (next >> 2) | (next >> 3))"),
     ("takt_gate", "arrives[k]", "arrives[k] & ~waits[k]"),
     ("takt_gate", "arrives | (waits & ~goes)", "(arrives & ~waits) | (waits & ~goes)"),
-    // Ticks: before all cores have waited, no multiple of their distance, a wrong distance.
+    // Ticks: before all cores have waited, at no multiple of their distance, at a wrong distance.
     ("takt_start", "&(waited | waiting | halted)", "|(waited | waiting | halted)"),
     ("takt_start", "left == {BITS{1'b0}} ? LAST[BITS-1:0] : left - 1'b1", "left == {BITS{1'b0}} ? LAST[BITS-1:0] - 1'b1 : left - 1'b1"),
     ("takt_pace", "left == {BITS{1'b0}} ? LAST[BITS-1:0] : left - 1'b1", "left == {BITS{1'b0}} ? LAST[BITS-1:0] - 1'b1 : left - 1'b1"),
 ];
 
-/// Sets of programs that a fault may pass before it counts as not found.
+/// Sets of programs that a fault may survive before it counts as not found.
 const VARIANTS: u64 = 32;
 
-/// Every fault is found. All stand in one simulation, which chooses one by `+fault=`.
+/// A single simulation holds all faults, and `+fault=` selects a fault; each fault is found.
 #[test]
 fn planted_faults_are_found() {
     let systems = random::variants(with_every_link(), 1, VARIANTS);
     let whole = design(&systems, "links");
     let mut design = whole.clone();
-    // Faults in one place make one expression.
+    // Faults that replace the same expression share a multiplexer.
     let mut places: BTreeMap<(&str, &str), String> = BTreeMap::new();
     for (number, &(module, from, to)) in FAULTS.iter().enumerate() {
         let text = places.entry((module, from)).or_insert_with(|| format!("({from})"));

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The three-processor controller as a circuit: what its host and the robot's encoders say at the beginning of a motion, on the
-//! circuit and on the emulator.
+//! The three-processor controller as a circuit, in lockstep with the emulator: host and encoders act as at the beginning of a motion.
 #![allow(clippy::print_stdout)]
 
 use std::path::PathBuf;
@@ -14,8 +13,8 @@ use takt_robot::plant::Plant;
 use takt_rtl::{Library, export_system};
 use takt_system::HostAction;
 
-/// Packets are taken and answered, a motion is planned and begins, and the servo follows it. With `TAKT_FULL=1` more of the
-/// demonstration's beginning.
+/// The controller takes and answers packets, plans a motion, begins it, and the servo follows. `TAKT_FULL=1` runs a longer part of the
+/// demonstration.
 #[test]
 fn the_controller_is_its_emulator() {
     let description = standard().unwrap_or_else(|error| panic!("{error}"));
@@ -33,11 +32,11 @@ fn the_controller_is_its_emulator() {
         panic!("{}", mistakes.render(false));
     }
     let controller = session.host().robot();
-    // A motion has begun, and the servo has followed it off the spot.
+    // A motion has begun, and the servo has followed it.
     let view = session.host().view();
     assert_eq!(view.mode, takt_robot::host::Mode::Moving);
     assert_eq!(view.outputs, 1);
-    // By more than a count of the encoders.
+    // The joint moved by more than one count of its encoder.
     let moved = (controller.plant().joints()[0] - takt_robot::plant::HOME[0]).abs();
     assert!(moved > 2.4e-5, "{moved} rad");
     let actions = controller.system().host_actions();
@@ -65,6 +64,6 @@ fn the_controller_is_its_emulator() {
         lockstep.compared()
     );
     assert!(lockstep.compared() > end / 10);
-    // The same host, the same motion.
+    // The output of both runs is equal.
     assert_eq!(lockstep.system().output("r1"), controller.system().output("r1"));
 }

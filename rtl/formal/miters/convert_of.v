@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-// Conversions in the plainest way: from a number with enough places, what is kept and what is cut off; rounded up if the rest is more
-// than a half, or a half and what is kept is odd.
+// Conversions in the plainest way: a number with enough places is split into a kept part and a rest; it is rounded up
+// if the rest is more than a half, or a half with the kept part odd.
 
 module to_float (
     input      [31:0] x,
@@ -37,7 +37,7 @@ module to_integer (
     reg         up;
     reg  [31:0] magnitude;
     always @* begin
-        // 2^(exponent - 150) is the weight of the significand's last place; what is less than 2^-24 is below every half.
+        // The significand's last place weighs 2^(exponent - 150). Bits below 2^-24 stay below every half.
         wide      = exponent < 126 ? 56'd0 : {32'd0, 1'b1, x[22:0]} << (exponent - 126);
         up        = wide[23:0] > 24'h800000 | (wide[23:0] == 24'h800000 & wide[24]);
         magnitude = wide[55:24] + up;

@@ -33,7 +33,7 @@ module miter (
     wire signed [9:0] exponent;
 
 `ifdef EXACT
-    // One multiplication for both: the reference's is of the same significands, normalised.
+    // A single multiplication serves both: the reference multiplies the same significands, normalised.
     assign exponent = sum;
     assign assumed  = 1'b1;
     wire [4:0]  x_zeros, y_zeros;

@@ -25,7 +25,7 @@ module product_of (
     assign product = x * y;
     assign proper  = 1'b1;
 `else
-    // Between them the normalised significands have 2^46 to 2^48 - 1, and are multiples of what they were shifted by.
+    // The product of the normalised significands is 2^46 to 2^48 - 1, and a multiple of 2^zeros.
     wire [5:0]  zeros = {1'b0, x_zeros} + {1'b0, y_zeros};
     assign product = (|x & |y) ? p : 48'd0;
     assign proper  = ~(|x & |y) | (((normal >> zeros) == product) & (normal[47] | normal[46]));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_recurrence's fdiv against IEEE 754's quotient, for all operands, with the digits cut out. The reference's quotient and remainder
-// are arbitrary. The circuit's digits are the bits of that quotient that recurrence_digits.v finds from what the registers hold before
+// are arbitrary. The circuit's digits are the bits of that quotient that recurrence_digits.v finds from the registers' contents before
 // the first step, and the rest is 0 if that is all of it. A quotient without remainder has no more significant bits than the
 // dividend. Cases: as divide.v.
 
@@ -44,13 +44,13 @@ module miter (
     wire        less     = x_normal < y_normal;
     assign finite = ~&a[30:23] & ~&b[30:23] & (|x) & (|y);
 
-    // The circuit's dividend X is that of the quotient, or twice it; 13 digits less those that it waits for. With 13 digits, X is less
-    // than twice the divisor, so that they have 25 bits.
+    // The circuit's dividend X is the quotient's dividend, or twice as much. The circuit finds 13 digits, less the
+    // digits that it waits for. With all 13 digits, X is less than twice the divisor, so that the digits have 25 bits.
     wire        doubled = rest_6 == {2'd0, x_normal, 1'b0};
     wire        loaded  =
         (doubled ? less | wait_digits_6 != 0 : rest_6 == {3'd0, x_normal}) & known_6 == {1'b0, y_normal} & (place_6 & 26'h2aaaaaa) == 0 &
         digits_6 == 0;
-    // The digits are X / divisor with 24 bits after the point, less 2 for each digit that it waits for.
+    // The digits are X / divisor with 24 bits after the point, less 2 for each digit that the unit waits for.
     wire [5:0]  missing = {1'b0, wait_digits_6, ~doubled};
     wire [25:0] moved   = quotient >> missing;
     wire        whole   = remainder == 0 & moved << missing == quotient;

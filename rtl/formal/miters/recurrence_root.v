@@ -41,7 +41,7 @@ module miter (
         digits_6 == 0 & wait_digits_6 == 0;
     assign bad = (result != exact) | (flags != {invalid, 2'b00}) | (number & ~loaded);
 
-    // The root is at most that of 4 - 2^-22. It is never halfway between two numbers.
+    // The root is at most the root of 4 - 2^-22. It is never halfway between two numbers.
     wire proper = digits_19[24] & digits_19 <= 25'h1fffffe & (rest_19 != 0 | ~digits_19[0]);
     assign assumed = op & (~number | proper);
     assign part = number ? {1'b0, exponent[0]} : 2'd2;

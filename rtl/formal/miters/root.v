@@ -38,7 +38,7 @@ module miter (
     wire        invalid = (nan & ~a[22]) | (a[31] & ~zero & ~nan);
     assign bad = (result != exact) | (flags != {invalid, 2'b00});
 
-    // The root is at most that of 4 - 2^-22. (s + 1)^2 is at most twice the root away from the radicand.
+    // The root is at most the root of 4 - 2^-22. (s + 1)^2 is at most twice the root away from the radicand.
     wire proper = truncated[24] & truncated <= 25'h1fffffe & (~whole | (~truncated[0] & above));
     wire sign   = above ? ~residual[26] & ((residual == 0) == whole) : residual[26];
     assign assumed = ~number | (proper & sign);

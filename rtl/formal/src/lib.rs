@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Bit-parallel simulation of a unit's netlist for every operand, beside the specification: 512 operands in one pass over the gates.
+//! Bit-parallel simulation of a unit's netlist for every operand, compared with the specification: 512 operands in one pass over the gates.
 //!
-//! `prove.py` makes an and-inverter graph of a unit of one operand. Sign and exponent divide the operands into 512 cases. In a case
+//! `prove.py` makes an and-inverter graph of a unit with one operand. Sign and exponent divide the operands into 512 cases. In each case
 //! they are constants, which leave few gates where the result is the operand, a constant or NaN.
 
 use std::array::from_fn;
@@ -10,42 +10,42 @@ use takt_isa::fp::Reference;
 use takt_isa::{Op, compute};
 use thiserror::Error;
 
-/// Operands of one pass.
+/// Operands in each pass.
 const LANES: usize = 512;
-/// 64 lanes each.
+/// Values of a literal in all lanes, 64 per element.
 type Word = [u64; LANES / 64];
-/// Bits of an operand that number the lanes, and of its fraction.
+/// Bits of an operand that number the lanes, and all bits of its fraction.
 const LANE_BITS: usize = LANES.ilog2() as usize;
 const FRACTION_BITS: usize = 23;
-/// Bits of result and flags.
+/// Width of the result, and of the flags.
 const RESULT_BITS: usize = 32;
 const FLAG_BITS: usize = 3;
 
-/// Cases: sign and exponent.
+/// Number of cases: combinations of sign and exponent.
 pub const CASES: u32 = 512;
 
-/// A text that is no graph of a function of one operand.
+/// Error of a text that is no graph of a function of one operand.
 #[derive(Debug, Error, PartialEq, Eq)]
 #[error("no and-inverter graph of a function of one operand: {0}")]
 pub struct GraphError(String);
 
-/// An and-inverter graph without registers: a function of one operand. Literals are those of AIGER: twice the variable, plus one if
-/// negated; 0 is false.
+/// And-inverter graph without registers: a function of one operand. A literal is AIGER's: twice the variable, plus one if negated; 0 is
+/// false.
 #[derive(Debug)]
 pub struct Graph {
-    /// Those of the operand, the lowest bit first.
+    /// Literals of the operand, the lowest bit first.
     operand: Vec<u32>,
-    /// Those of the result, then of the flags.
+    /// Literals of the result, then of the flags.
     outputs: Vec<u32>,
-    /// Output, left and right operand of each gate, after the gates that it uses.
+    /// Output, left and right operand of each gate, in topological order.
     gates: Vec<[u32; 3]>,
 }
 
 impl Graph {
-    /// Reads AIGER's ASCII form, with inputs a\[0\] to a\[31\], outputs result\[0\] to result\[31\] and flags\[0\] to flags\[2\].
+    /// Parses AIGER's ASCII form, with inputs a\[0\] to a\[31\], outputs result\[0\] to result\[31\] and flags\[0\] to flags\[2\].
     ///
     /// # Errors
-    /// If it is another text.
+    /// If the text has another form.
     pub fn parse(text: &str) -> Result<Graph, GraphError> {
         let error = |what: &str| GraphError(what.to_owned());
         let mut lines = text.lines();
@@ -99,15 +99,15 @@ impl Graph {
         Ok(Graph { operand, outputs, gates: ordered })
     }
 
-    /// The first operand of a case, below [`CASES`], of which result or flags are not those of the specification.
+    /// Finds the first operand of a case, below [`CASES`], whose result or flags differ from the specification's.
     #[must_use]
     pub fn differs(&self, case: u32, op: Op) -> Option<u32> {
         self.of_case(case).differs(case, op)
     }
 
-    /// The gates that are left where sign and exponent are those of a case.
+    /// Gates that remain with a case's sign and exponent as constants.
     fn of_case(&self, case: u32) -> Program {
-        // Each variable has become this literal.
+        // Literal that replaces each variable.
         let mut value: BTreeMap<u32, u32> = BTreeMap::from([(0, 0)]);
         for (i, &literal) in self.operand.iter().enumerate() {
             let constant = (i >= FRACTION_BITS).then(|| case >> (i - FRACTION_BITS) & 1);
@@ -134,11 +134,11 @@ impl Graph {
     }
 }
 
-/// Gates in the order of their evaluation, on words that are used again.
+/// Gates in order of evaluation, on words that are reused.
 struct Program {
-    /// Word of the output, words of the operands, each twice, plus one if negated.
+    /// Word of the output; words of the operands, each times two, plus one if negated.
     steps: Vec<[u32; 3]>,
-    /// Word of each bit of the fraction, if any gate needs it.
+    /// Word of each bit of the fraction, if a gate needs it.
     fraction: Vec<Option<u32>>,
     outputs: Vec<u32>,
     words: usize,
@@ -146,7 +146,7 @@ struct Program {
 
 impl Program {
     fn new(fraction: &[u32], outputs: &[u32], gates: &[[u32; 3]]) -> Program {
-        // The last use of each variable: counted from the end, so the first that is met.
+        // Last use of each variable: the first one met when iterating backwards.
         let mut last: BTreeMap<u32, usize> = BTreeMap::new();
         outputs.iter().for_each(|literal| _ = last.insert(literal & !1, usize::MAX));
         let mut kept = Vec::new();
@@ -191,7 +191,7 @@ impl Program {
         Program { steps, fraction, outputs, words: words as usize }
     }
 
-    /// The first operand of a case for which result or flags are not those of the specification.
+    /// Finds the first operand of a case whose result or flags differ from the specification's.
     fn differs(&self, case: u32, op: Op) -> Option<u32> {
         let mut words = vec![[0; LANES / 64]; self.words];
         for (bit, word) in self.fraction[..LANE_BITS].iter().enumerate() {
@@ -214,7 +214,7 @@ impl Program {
                 words[out as usize] = from_fn(|i| (a[i] ^ left) & (b[i] ^ right));
             }
             let first = case << FRACTION_BITS | first;
-            let differs = self.operand_that_differs(&words, first, op);
+            let differs = self.differing_operand(&words, first, op);
             if differs.is_some() {
                 return differs;
             }
@@ -222,7 +222,7 @@ impl Program {
         None
     }
 
-    fn operand_that_differs(&self, words: &[Word], first: u32, op: Op) -> Option<u32> {
+    fn differing_operand(&self, words: &[Word], first: u32, op: Op) -> Option<u32> {
         for (block, first) in (first..).step_by(64).enumerate().take(LANES / 64) {
             let mut expected: [u64; 64] = from_fn(|lane| {
                 let value = compute::<Reference>(op, first + lane as u32, 0, 0);
@@ -262,7 +262,7 @@ mod tests {
     use super::{FLAG_BITS, Graph, RESULT_BITS, transpose};
     use takt_isa::Op;
 
-    /// The function whose result is the operand with these bits changed: (bit, the literals of which it is the conjunction).
+    /// Graph of a function that returns its operand with some bits replaced: (bit, two literals whose conjunction it becomes).
     fn graph(changed: &[(usize, [u32; 2])]) -> String {
         let operand = |bit: usize| 2 * (bit as u32 + 1);
         let mut outputs: Vec<u32> = (0..RESULT_BITS).map(operand).collect();
@@ -284,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn what_differs_is_found() {
+    fn finds_differing_operands() {
         // The magnitude: the operand without its sign.
         let magnitude = Graph::parse(&graph(&[(31, [0, 1])])).expect("a graph");
         for case in [0, 127, 255, 256, 383, 511] {

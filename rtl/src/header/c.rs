@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A header for C99.
+//! Writer of headers for C99.
 
 use super::names::{Names, identifier};
 use super::{BusPort, Header};
 use std::fmt::Write as _;
 
-/// A text within a comment.
+/// Escapes a text for use within a comment.
 fn comment(text: &str) -> String {
     text.replace("*/", "* /").replace("/*", "/ *")
 }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Generator of header files for hosts: a program's ports with their bus addresses, the loader's words, and cycle bounds.
 //!
-//! Addresses are those of [`wishbone`], which count words of 32 bits. The same [`Header`] is written in every [`Language`]; the JSON
-//! is the structure itself.
+//! Addresses count words of 32 bits, as in [`wishbone`]. A writer for each [`Language`] writes the same [`Header`]; JSON is the structure
+//! itself.
 
 mod c;
 mod names;
@@ -16,120 +16,120 @@ use takt_isa::load::{LoadRecord, Space, load_records};
 use takt_isa::program::{Port, SectionCycles};
 use takt_isa::text::one_line;
 
-/// The version of [`Header`]'s JSON.
+/// Version of [`Header`]'s JSON.
 pub const SCHEMA: u32 = 1;
 
-/// A language that a header can be written in.
+/// Output language of a header.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Language {
-    /// C99.
+    /// A C99 header file.
     C,
-    /// Rust, without the standard library.
+    /// A Rust module without the standard library.
     Rust,
-    /// JSON: `docs/headers.md`.
+    /// JSON, as documented in `docs/headers.md`.
     Json,
-    /// CMSIS-SVD: the bus slave as a peripheral.
+    /// CMSIS-SVD, with the bus slave as a peripheral.
     Svd,
 }
 
-/// The header of a program, as data.
+/// Header of a program, as data.
 #[derive(Clone, Debug, Serialize)]
 pub struct Header {
-    /// [`SCHEMA`].
+    /// Version of this structure: [`SCHEMA`].
     pub schema: u32,
-    /// The program's name.
+    /// Name of the program's file.
     pub name: String,
-    /// The machine's name.
+    /// Machine that the program is for.
     pub machine: &'static str,
-    /// True if the ports are latched.
+    /// The program's ports are latched.
     pub latched: bool,
-    /// The value of the circuit's parameter LATCHED: the number of latched input ports.
+    /// Number of latched input ports, for the circuit's parameter LATCHED.
     pub latched_inputs: u16,
-    /// The bus slave's own registers.
+    /// Control and status registers of the bus slave.
     pub registers: Vec<BusRegister>,
-    /// Input ports, in the order of their declaration.
+    /// Input ports, in order of declaration.
     pub inputs: Vec<BusPort>,
-    /// Output ports, in the order of their declaration.
+    /// Output ports, in order of declaration.
     pub outputs: Vec<BusPort>,
-    /// The words that the loader writes, apart from zeros.
+    /// Words that the loader writes.
     pub load: Load,
-    /// The cycles of each section; `None` where they cannot be bounded.
+    /// Cycle bounds of each section; `None` if the analysis finds none.
     pub cycles: Option<Vec<SectionCycles>>,
-    /// The reason why they cannot.
+    /// Reason why there are no bounds.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub no_bound: Option<String>,
 }
 
-/// A register of the bus slave.
+/// Control or status register of the bus slave.
 #[derive(Clone, Debug, Serialize)]
 pub struct BusRegister {
-    /// Its name.
+    /// Name, in lower case.
     pub name: &'static str,
-    /// Its address, in words.
+    /// Address on the bus, in words.
     pub address: u16,
     /// `r`, `w` or `rw`.
     pub access: &'static str,
-    /// Its purpose.
+    /// Purpose of the register, for a comment.
     pub text: &'static str,
-    /// Its parts.
+    /// Bit fields; empty if the register is a single value.
     pub fields: Vec<BusField>,
 }
 
-/// A part of a register.
+/// Bit field of a register.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct BusField {
-    /// Its name.
+    /// Name within the register, in lower case.
     pub name: &'static str,
-    /// Its lowest bit.
+    /// Index of the lowest bit.
     pub low: u32,
-    /// Its bits.
+    /// Width of the field, in bits.
     pub width: u32,
-    /// Its meaning.
+    /// Meaning of the field, for a comment.
     pub text: &'static str,
 }
 
-/// A port.
+/// Port of the program on the bus.
 #[derive(Clone, Debug, Serialize)]
 pub struct BusPort {
-    /// Its name in the source.
+    /// Name in the source.
     pub name: String,
-    /// Its number.
+    /// Number among the inputs or the outputs.
     pub number: u16,
-    /// Its address on the bus, in words.
+    /// Address on the bus, in words.
     pub address: u16,
-    /// The type that it carries: `float` (binary32), `int` or `bits`.
+    /// Type of the value: `float` (binary32), `int` or `bits`.
     #[serde(rename = "type")]
     pub ty: &'static str,
 }
 
-/// The words that the loader writes. All else in program and data memory is zero, and is written too.
+/// Words that the loader writes. It also clears the rest of program and data memory.
 #[derive(Clone, Debug, Serialize)]
 pub struct Load {
-    /// Bundles of the program memory.
+    /// Depth of the program memory, in bundles.
     pub bundles: u32,
-    /// Words of a bundle.
+    /// Words per bundle, which is the number of slots.
     pub slots: u32,
-    /// Words of the data memory.
+    /// Depth of the data memory, in words.
     pub data_words: u32,
-    /// Words that are not zero.
+    /// Nonzero words; registers and inputs also with zeros.
     pub records: Vec<Record>,
 }
 
-/// A word that the loader writes.
+/// Word that the loader writes.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Record {
-    /// 0 program memory, 1 data memory, 2 registers, 3 input ports.
+    /// Space: 0 program memory, 1 data memory, 2 registers, 3 input ports.
     pub space: u8,
-    /// The slot of the word within its bundle, in program memory.
+    /// In program memory, the slot of the word; otherwise 0.
     pub slot: u8,
     /// Bundle, data word, register, or number of the input port.
     pub address: u16,
-    /// The word.
+    /// Value to write: 48 bits in program memory, 32 elsewhere.
     pub value: u64,
 }
 
 impl Header {
-    /// The header of a program, with the cycles of its sections or the reason why they cannot be bounded.
+    /// Header of a program, with the cycle bounds of its sections or the reason for their absence.
     pub fn new(program: &Program, name: &str, cycles: Result<Vec<SectionCycles>, String>) -> Header {
         let machine = program.machine;
         let port = |port: &Port, number: Option<u16>, base: u16| {
@@ -140,7 +140,7 @@ impl Header {
         let output = |of: &Port| port(of, machine.output_number(of.register), wishbone::OUTPUTS);
         let records = load_records(program).into_iter();
         let records = records.filter(|record| {
-            // A register that the loader sets to zero must be written: only the memories are cleared.
+            // Only the memories are cleared, so zeros in registers and inputs must be written.
             record.value != 0 || matches!(record.space, Space::Register | Space::Input)
         });
         let record =
@@ -178,25 +178,25 @@ impl Header {
         }
     }
 
-    /// The header's text.
+    /// Writes the header in a language.
     pub fn text(&self, language: Language) -> String {
         match language {
             Language::C => c::write(self),
             Language::Rust => rust::write(self),
-            // Strings and numbers only: nothing that JSON cannot hold.
+            // Strings and numbers only, so that serialisation cannot fail.
             Language::Json => serde_json::to_string_pretty(self).unwrap_or_default() + "\n",
             Language::Svd => svd::write(self),
         }
     }
 
-    /// The title line. The name in it is that of a file, and may contain anything.
+    /// Title line. The name comes from a file's name and may contain anything.
     fn title(&self) -> String {
         let ports = if self.latched { ", ports latched" } else { "" };
         let name = one_line(&self.name);
         format!("{name}: the program on {}, as its host sees it on the bus{ports}.", self.machine)
     }
 
-    /// The figures of the program's cycles, each with a name and a description.
+    /// Cycle bounds: name, cycles and description of each.
     fn figures(&self) -> Vec<(String, u64, String)> {
         let mut figures = Vec::new();
         for SectionCycles { name, once, cycles, missed, .. } in self.cycles.iter().flatten() {

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Conversion of the source's names to identifiers of other languages.
+//! Converts names of the source to identifiers of other languages.
 
 use std::collections::HashSet;
 
-/// An allocator of unique identifiers.
+/// Allocator of unique identifiers.
 pub(super) struct Names {
     taken: HashSet<String>,
-    /// True if identifiers that differ in case alone are the same.
+    /// Identifiers that differ only in case collide.
     fold: bool,
 }
 
@@ -15,12 +15,12 @@ impl Names {
         Names { taken: reserved.iter().map(|&name| name.to_owned()).collect(), fold: false }
     }
 
-    /// An allocator for a language whose identifiers are not case-sensitive.
+    /// Allocator for a case-insensitive language.
     pub(super) fn without_case() -> Names {
         Names { taken: HashSet::new(), fold: true }
     }
 
-    /// A unique identifier for a name: letters, digits and `_`, with a number appended if it is already used.
+    /// Allocates an identifier for a name, with a number appended if the plain one is taken.
     pub(super) fn give(&mut self, name: &str) -> String {
         let plain = identifier(name);
         let key = |name: &str| if self.fold { name.to_lowercase() } else { name.to_owned() };
@@ -35,7 +35,7 @@ impl Names {
     }
 }
 
-/// Letters, digits and `_`, not beginning with a digit.
+/// Replaces every character that identifiers cannot contain by `_`, and prefixes `_` to a leading digit.
 pub(super) fn identifier(name: &str) -> String {
     let letter = |c: char| if c.is_ascii_alphanumeric() { c } else { '_' };
     let mut text: String = name.chars().map(letter).collect();

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A module for Rust, without the standard library.
+//! Module for Rust, without the standard library.
 
 use super::Header;
 use super::names::Names;
 use std::fmt::Write as _;
 
-/// Words that are no names of constants.
+/// Keywords, which cannot be names of constants.
 const KEYWORDS: &[&str] = &[
     "_", "Self", "abstract", "as", "async", "await", "become", "box", "break", "const", "continue", "crate",
     "do", "dyn", "else", "enum", "extern", "false", "final", "fn", "for", "gen", "if", "impl", "in", "let",
@@ -14,12 +14,12 @@ const KEYWORDS: &[&str] = &[
     "virtual", "where", "while", "yield",
 ];
 
-/// A text as a literal.
+/// Text as a string literal.
 fn quoted(text: &str) -> String {
     format!("{text:?}")
 }
 
-/// A text in a line of documentation.
+/// Escapes a text for a line of documentation.
 fn line(text: &str) -> String {
     text.replace('[', "\\[")
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! CMSIS-SVD: the bus slave with the program's ports as a peripheral, for debuggers and generators of drivers.
+//! CMSIS-SVD: the bus slave with the program's ports as a peripheral, for debuggers and driver generators.
 //!
 //! SVD counts bytes: a register's offset is four times its address.
 
@@ -7,7 +7,7 @@ use super::names::{Names, identifier};
 use super::{BusField, Header};
 use std::fmt::Write as _;
 
-/// A text between tags.
+/// Escapes a text for use between tags.
 fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }

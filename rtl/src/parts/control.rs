@@ -6,7 +6,7 @@ use crate::plan::{ControlBit, Plan, SlotPlan, Stage};
 use crate::verilog::{Expr, Instance, Module, any, choose, concat, decimal, no, number, set, when};
 use takt_isa::Effect;
 
-/// Declares the positions of the control bits.
+/// Declares the positions of the control bits as parameters.
 pub(super) fn parameters(plan: &Plan, m: &mut Module) {
     m.banner("control bits of each slot, from its decoder");
     m.comment(
@@ -32,7 +32,7 @@ pub(super) fn write(plan: &Plan, m: &mut Module) {
     }
 }
 
-/// Selects the buffer that each source reads, if it is a latched input port.
+/// Selects the buffer of each source that reads a latched input port.
 fn places(plan: &Plan, m: &mut Module) {
     let (bits, [decode, matched]) =
         (plan.input_bits, [Stage::Decode, Stage::Match].map(|stage| plan.place(stage)));

@@ -89,7 +89,7 @@ fn ports(plan: &Plan, slot: &SlotPlan) -> Vec<Port> {
     ports
 }
 
-/// Generates the checks that the bits which an instruction does not use are 0.
+/// Generates checks that the unused bits of a word are 0.
 fn stray(slot: &SlotPlan, m: &mut Module) {
     let mut shapes: Vec<Shape> = Vec::new();
     for row in &slot.rows {
@@ -103,7 +103,7 @@ fn stray(slot: &SlotPlan, m: &mut Module) {
     }
 }
 
-/// Generates the decoding table, a case for each opcode.
+/// Generates the decoding table: a case statement over the opcode.
 fn rows(slot: &SlotPlan, m: &mut Module) {
     let width = slot.width();
     let control = || decode::control(slot);
@@ -134,7 +134,8 @@ fn rows(slot: &SlotPlan, m: &mut Module) {
     m.combinational(body);
 }
 
-/// Generates the bank and the index of a source. Returns the condition that the source is in no bank; `None` if banks leave no gap.
+/// Generates the bank and the index of a source. Returns the condition that no bank contains the source; `None` if the banks cover all
+/// addresses.
 fn source(plan: &Plan, operand: usize, m: &mut Module) -> Option<Expr> {
     let bits = [Field::A, Field::B, Field::C][operand].bits();
     let (low, high) = (bits.low, bits.low + bits.width - 1);

@@ -95,8 +95,7 @@ fn memory(plan: &Plan, m: &mut Module) {
     let issues = |slot: &SlotPlan, effect| {
         net::ISSUE & !net::FAULT & slot.bit(Stage::Issue, ControlBit::Effect(effect))
     };
-    // The offset of a load, and of the store of the slot that stores, which has the high bits where other words have their
-    // destination (isa/src/shape.rs).
+    // Offset of a load or store. A store's high bits are in the field where other words have their destination (isa/src/shape.rs).
     let offset = |slot: &SlotPlan| {
         let (constant, low) = (slot.constant(Stage::Issue), Field::OffsetLow.bits().width);
         let of_load = constant.slice(Field::Offset.bits().width - 1, low);
@@ -150,7 +149,7 @@ fn memory(plan: &Plan, m: &mut Module) {
     m.assign(net::STORED_ADDRESS, concat(address));
 }
 
-/// Generates a slot's units and its result bus, which is driven by one of them, the data memory or the loader.
+/// Generates a slot's units and its result bus, which one of them, the data memory or the loader drives.
 fn units(plan: &Plan, slot: &SlotPlan, m: &mut Module) {
     let units: Vec<_> = slot.circuits.iter().map(|circuit| &circuit.unit).collect();
     let mut body = Vec::new();
@@ -199,7 +198,7 @@ fn instance(slot: &SlotPlan, circuit: &Circuit) -> Instance {
         instance = instance.port("op", slot.code().low(circuit.op_bits));
     }
     for (operand, letter) in LETTERS.iter().enumerate().take(circuit.operands) {
-        // A unit may have more operands than the operations that the slot uses it for.
+        // A unit may have more operand ports than the slot's operations have sources.
         instance = if operand < slot.sources {
             instance.port(*letter, slot.operand(operand))
         } else {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Generator of the remaining hazard detection (destinations, units, write ports, drain) and of the decision to issue.
 //!
-//! Each rule is evaluated one cycle ahead, to shorten the critical path, for both possible cases: for the bundle in read, in case it
-//! moves to issue, and for the bundle in issue, in case it stays there.
+//! Each rule is evaluated one cycle ahead, to shorten the critical path, for both cases: for the bundle in read, in case it moves to issue,
+//! and for the bundle in issue, in case it stays there.
 
 use super::operands;
 use crate::plan::names::net;
@@ -34,7 +34,7 @@ pub(super) fn write(plan: &Plan, m: &mut Module) {
     issue(plan, m);
 }
 
-/// Rule 3, write after write: detection for a slot's destination.
+/// Rule 3 (write after write): detects hazards of a slot's destination.
 fn destination(plan: &Plan, slot: &SlotPlan, m: &mut Module) {
     use Stage::{Issue, Match, Read};
     // Outputs of takt_hazard that only sources need, for forwarding.
@@ -81,7 +81,7 @@ fn destination(plan: &Plan, slot: &SlotPlan, m: &mut Module) {
     m.instance(hazard);
 }
 
-/// Rule 4, structural: the unit does not accept an operation yet.
+/// Rule 4 (structural): the unit accepts no operation yet.
 fn unit_busy(slot: &SlotPlan, stage: Stage) -> Expr {
     any(slot.late.iter().map(|late| {
         let uses = |stage| slot.bit(stage, ControlBit::Unit(late.unit.name));
@@ -93,7 +93,7 @@ fn unit_busy(slot: &SlotPlan, stage: Stage) -> Expr {
     }))
 }
 
-/// Rule 6, structural: the write port is booked for the same cycle.
+/// Rule 6 (structural): the write port is booked for the same cycle.
 fn port_taken(slot: &SlotPlan, stage: Stage) -> Expr {
     let taken = slot.latencies.iter().filter_map(|&latency| {
         let mut taken = slot.booked(latency + 1);
@@ -106,7 +106,7 @@ fn port_taken(slot: &SlotPlan, stage: Stage) -> Expr {
     any(taken)
 }
 
-/// Rule 5, drain: a result will still be in flight.
+/// Rule 5 (drain): a result will still be in flight.
 fn drain(plan: &Plan, m: &mut Module) {
     let pending = plan.slots.iter().flat_map(|slot| {
         let late = slot.late.iter().map(|late| Expr::from(slot.late_in_flight(late)));
@@ -122,7 +122,7 @@ fn drain(plan: &Plan, m: &mut Module) {
     m.define(net::I_DRAIN, drains(Stage::Issue) & net::PENDING);
 }
 
-/// Combines the rules and instantiates takt_issue, which decides which bundle issues and if the stages advance.
+/// Combines the rules and instantiates takt_issue, which decides whether a bundle issues and whether the stages advance.
 fn issue(plan: &Plan, m: &mut Module) {
     m.comment("Rules 2, 3, 4, 6 and 5, in this order. takt_issue enforces rule 1: no bundle is in issue before it is delivered.");
     for (stage, ready, drain) in

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Generator of the scoreboard's shift registers, which hold the register and the time of every result in flight, and of the buses.
+//! Generator of the result buses and of the scoreboard's shift registers, which hold the register and the time of every result in flight.
 
 use crate::plan::names::net;
 use crate::plan::{ControlBit, LateUnit, Plan, SlotPlan, Stage};

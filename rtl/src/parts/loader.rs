@@ -24,7 +24,7 @@ pub(super) fn write(plan: &Plan, m: &mut Module) {
     m.regs([plan.input1_index()]);
     m.regs([net::INPUT1_VALUE, net::INPUT2_VALUE]);
     m.regs([net::TICKS]);
-    // The index of an input port is the low bits of its address: its bank is made as deep as the deepest.
+    // Index of an input port: the low bits of its address, because its bank is as deep as the deepest.
     let base = u32::from(plan.machine.inputs.base) & ((1 << plan.index) - 1);
     let missing = plan.index - plan.input_bits;
     let index = match missing {

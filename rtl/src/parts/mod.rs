@@ -24,7 +24,7 @@ impl Plan {
     }
 }
 
-/// The core, with a default for its parameter `LATCHED`.
+/// Generates the core. `latched` is the default of its parameter `LATCHED`.
 pub(crate) fn core(plan: &Plan, latched: u16) -> Result<String, ModuleError> {
     let mut m = Module::new(&plan.top(), heading(plan), ports::ports(plan));
     m.takes(Parameter {
@@ -52,7 +52,7 @@ pub(crate) fn core(plan: &Plan, latched: u16) -> Result<String, ModuleError> {
     m.finish()
 }
 
-/// A slot's decoder.
+/// Generates the decoder of a slot.
 pub(crate) fn decoder(plan: &Plan, slot: &SlotPlan) -> Result<String, ModuleError> {
     decoder::module(plan, slot)
 }

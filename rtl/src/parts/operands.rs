@@ -74,7 +74,7 @@ fn source(plan: &Plan, slot: &SlotPlan, operand: usize, number: u32, m: &mut Mod
     );
 }
 
-/// The bits of all sources that stall the bundle in a stage.
+/// Stall signals of all sources, for the bundle in a stage.
 pub(super) fn waits(plan: &Plan, stage: Stage) -> Vec<Expr> {
     plan.sources().map(|(slot, operand)| slot.source_waits(stage, operand).into()).collect()
 }

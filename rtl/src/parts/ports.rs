@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Declaration of the core's ports.
 
-use crate::export::{INPUT_DELAY, RESET_CYCLES};
-use crate::plan::Plan;
 use crate::plan::names::net;
+use crate::plan::{Plan, RESET_CYCLES};
 use crate::verilog::{Direction, Port};
+use takt_isa::timing::INPUT_DELAY;
 
-/// The ports, in order.
+/// Ports of the core, in order.
 pub(super) fn ports(plan: &Plan) -> Vec<Port> {
     let machine = plan.machine;
     let input = |net| Port::new(Direction::Input, net);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The plan of a core: widths, depths and control bits derived from a machine's row and checked against the limits of the modules
-//! in `rtl/core/`, and every name in the generated Verilog ([`names`]). The parts of the core ([`crate::parts`]) are generated from
-//! it, and so are the properties for formal verification and the planted faults.
+//! Plan of a core: widths, depths and control bits derived from a machine's row and checked against the limits of the modules in
+//! `rtl/core/`, and every name in the generated Verilog ([`names`]). The parts of the core ([`crate::parts`]), the properties for formal
+//! verification and the planted faults are generated from it.
 
 pub mod names;
 mod slot;
@@ -17,20 +17,20 @@ use takt_isa::spec::check::{MAX_CODE, MAX_DATA};
 use takt_isa::{Bank, Function, Machine, MachineError, RowPlace, Slot, SlotIndex, Unit};
 use thiserror::Error;
 
-/// The reason why a machine has no circuit.
+/// Reason why a machine has no circuit.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum PlanError {
-    /// The row does not describe a valid machine.
+    /// The row describes no valid machine.
     #[error(transparent)]
     Machine(#[from] MachineError),
     /// A unit's circuit is missing or does not fit its row.
     #[error("machine `{machine}`: slot `{slot}`: {error}")]
     Circuit {
-        /// The machine.
+        /// Name of the machine.
         machine: &'static str,
-        /// The slot.
+        /// Name of the slot.
         slot: &'static str,
-        /// The reason.
+        /// Error of the unit's header or parameters.
         error: CircuitError,
     },
     /// The machine has no data memory, which the core needs.
@@ -38,7 +38,7 @@ pub enum PlanError {
         "machine `{machine}`: no slot hosts the data memory (functions Load and Store), which the core has"
     )]
     NoMemory {
-        /// The machine.
+        /// Name of the machine.
         machine: &'static str,
     },
     /// The sequencer's branches and loops are in different slots.
@@ -47,25 +47,25 @@ pub enum PlanError {
          slot"
     )]
     TwoSequencers {
-        /// The machine.
+        /// Name of the machine.
         machine: &'static str,
-        /// The slot of the loops.
+        /// Slot that hosts the loops.
         loops: &'static str,
-        /// The slot of the branches.
+        /// Slot that hosts the branches.
         branches: &'static str,
     },
     /// A depth is not a power of two, or is out of range: memories are addressed by bit fields.
     #[error("machine `{machine}`: {what} is {value}; the circuit needs a power of two from 2 to {most}")]
     PowerOfTwo {
-        /// The machine.
+        /// Name of the machine.
         machine: &'static str,
-        /// The field of the row, or the bank's depth, in words.
+        /// Field of the row or depth of a bank, in words.
         what: String,
-        /// The field of the row, or else the bank.
+        /// Field of the row (`Ok`), or bank (`Err`).
         field: Result<&'static str, &'static str>,
-        /// The value.
+        /// Value in the row.
         value: u32,
-        /// The largest value allowed.
+        /// Largest value that the circuit supports.
         most: u32,
     },
     /// A bank is not aligned: the low bits of its registers' addresses would not be their indices.
@@ -74,71 +74,71 @@ pub enum PlanError {
         if *.inputs { ", its depth" } else { ", the depth of the deepest bank" }
     )]
     Base {
-        /// The machine.
+        /// Name of the machine.
         machine: &'static str,
-        /// The bank.
+        /// Name of the bank.
         bank: &'static str,
-        /// Its first register.
+        /// Address of the bank's first register.
         base: u16,
-        /// The alignment that it needs.
+        /// Alignment that the circuit needs.
         multiple: u32,
-        /// True if it is the bank of the inputs.
+        /// The bank holds the input ports.
         inputs: bool,
     },
-    /// A unit is too fast for the circuit's scoreboard.
+    /// A unit's latency is too short for the circuit's scoreboard.
     #[error(
         "machine `{machine}`: slot `{slot}`: unit `{unit}` has latency {latency}; the circuit needs 2 at least"
     )]
     Fast {
-        /// The machine.
+        /// Name of the machine.
         machine: &'static str,
-        /// The slot.
+        /// Name of the slot.
         slot: &'static str,
-        /// The unit.
+        /// Name of the unit.
         unit: &'static str,
-        /// Its latency.
+        /// Latency in the row, in cycles.
         latency: u32,
     },
-    /// An iterative unit's latency does not exceed that of the slot's pipelined units by as much as the circuit needs.
+    /// An iterative unit's latency exceeds the slot's shift register by too little.
     #[error(
         "machine `{machine}`: slot `{slot}`: unit `{unit}` has latency {latency} and interval {interval}; beside results that are \
          in flight for {depth} cycles, a unit of interval above 1 needs a latency of {} and an interval of 3 at least",
         depth + 2
     )]
     Late {
-        /// The machine.
+        /// Name of the machine.
         machine: &'static str,
-        /// The slot.
+        /// Name of the slot.
         slot: &'static str,
-        /// The unit.
+        /// Name of the unit.
         unit: &'static str,
-        /// Its latency.
+        /// Latency in the row, in cycles.
         latency: u32,
-        /// Its interval.
+        /// Initiation interval in the row, in cycles.
         interval: u32,
-        /// The length of the slot's shift register of results in flight.
+        /// Length of the slot's shift register of results in flight.
         depth: u32,
     },
-    /// A module of the core does not support a value of the row.
+    /// A value of the row exceeds the limit of a module in `rtl/core/`.
     #[error("machine `{machine}`: {what} is {value}; rtl/core/{part}.v needs {limit}")]
     Part {
-        /// The machine.
+        /// Name of the machine.
         machine: &'static str,
-        /// The field of the row, in words.
+        /// Field of the row, in words.
         what: String,
-        /// The part of the row that has it.
+        /// Place of the field in the row.
         place: RowPlace<'static>,
-        /// Its value.
+        /// Value of the field.
         value: u32,
-        /// The module.
+        /// Name of the module, without `.v`.
         part: &'static str,
-        /// The values that the module supports.
+        /// Values that the module supports.
         limit: Box<Limit>,
     },
 }
 
 impl PlanError {
-    /// The machine's name, the part of its row that the error is about, and the mend.
+    /// Name of the machine, place of the error in its row, and remedy.
     pub fn place(&self) -> (&'static str, RowPlace<'_>, String) {
         match self {
             PlanError::Machine(error) => (error.machine, error.reason.place(), error.reason.mend()),
@@ -187,55 +187,58 @@ impl PlanError {
     }
 }
 
-/// An iterative unit. A `takt_long_latency` tracks its result until it enters the slot's shift register of results in flight.
+/// An iterative unit. A `takt_long_latency` tracks each result until it enters the slot's shift register of results in flight.
 #[derive(Clone, Copy, Debug)]
 pub struct LateUnit {
-    /// Its row.
+    /// Row in the table of units.
     pub unit: &'static Unit,
-    /// Cycles for which it is tracked there: its latency less the length of the shift register (`takt_in_flight`).
+    /// Cycles in the tracker: the latency minus the length of the shift register (`takt_in_flight`).
     pub beyond: u32,
 }
 
-/// The plan of a core.
+/// Sizes and names of a core.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    /// The machine.
+    /// Row from which the core is generated.
     pub machine: &'static Machine,
-    /// Its slots.
+    /// Plans of the slots, in order.
     pub slots: Vec<SlotPlan>,
-    /// Bits of an index into a bank, for the deepest bank.
+    /// Width of an index into a bank, for the deepest bank.
     pub index: u32,
-    /// Bits of a program address.
+    /// Width of a program address.
     pub code_bits: u32,
-    /// Bits of a data address.
+    /// Width of a data address.
     pub data_bits: u32,
-    /// Bits of the number of a bank's output port.
+    /// Width of the number of an output port.
     pub port_bits: u32,
-    /// Bits of the number of an input port.
+    /// Width of the number of an input port.
     pub input_bits: u32,
     /// Length of the longest shift register of results in flight.
     pub depth: u32,
-    /// The most iterative units in a slot, and at least 1, since Verilog has no vectors of width 0.
+    /// Most iterative units in a slot, but at least 1, since Verilog has no vectors of width 0.
     pub late: u32,
-    /// The slot of the sequencer.
+    /// Index of the sequencer's slot.
     pub control_slot: usize,
-    /// The slots of the data memory's ports: that which stores, and one more if it only loads.
+    /// Slots of the data memory's ports: first the slot that stores, then possibly another slot that only loads.
     pub memory_slots: Vec<usize>,
 }
 
-/// The name of the top module for synthesis without a board.
+/// Cycles for which reset must be held to empty every pipeline.
+pub const RESET_CYCLES: u64 = takt_isa::spec::units::MAX_LATENCY as u64;
+
+/// Name of the top module for synthesis without a board.
 pub fn synthesis_top(machine: &Machine) -> String {
     format!("takt_{}_synthesis", machine.identifier())
 }
 
-/// The slot's units that write registers.
+/// Units of a slot that write registers.
 fn writing(slot: &'static Slot) -> impl Iterator<Item = &'static Unit> {
     slot.units.iter().filter(|unit| unit.latency > 0)
 }
 
-/// Length of a slot's shift register of results in flight (`takt_in_flight`). It holds the whole latency of pipelined units and, of an
-/// iterative unit's, the part that is left when the unit accepts the next operation, so that a single tracker is enough for the rest.
-/// It is 4 at least, as takt_hazard requires.
+/// Length of a slot's shift register of results in flight (`takt_in_flight`): the largest latency of a pipelined unit or, for an iterative
+/// unit, the latency left when the unit accepts its next operation, so that a single tracker covers the rest. At least 4, as takt_hazard
+/// requires.
 fn depth(slot: &'static Slot) -> u32 {
     let places = |unit: &Unit| match unit.interval {
         1 => unit.latency,
@@ -245,7 +248,7 @@ fn depth(slot: &'static Slot) -> u32 {
 }
 
 impl Plan {
-    /// The plan of a machine's core.
+    /// Derives the plan of a machine's core.
     ///
     /// # Errors
     /// If the machine is invalid, or the core's modules do not support it, or a unit has no circuit.
@@ -299,39 +302,39 @@ impl Plan {
         })
     }
 
-    /// A slot by its name.
+    /// Finds a slot by name.
     pub fn slot(&self, name: &str) -> Option<&SlotPlan> {
         self.slots.iter().find(|slot| slot.name() == name)
     }
 
-    /// Every source operand, as its slot and its number there.
+    /// Every source operand, as its slot and its number within the slot.
     pub fn sources(&self) -> impl Iterator<Item = (&SlotPlan, usize)> {
         self.slots.iter().flat_map(|slot| (0..slot.sources).map(move |operand| (slot, operand)))
     }
 
-    /// The slot that hosts the sequencer.
+    /// Slot that hosts the sequencer.
     pub fn control(&self) -> &SlotPlan {
         &self.slots[self.control_slot]
     }
 
-    /// The slots of the data memory's ports, the one that stores first.
+    /// Slots of the data memory's ports, starting with the slot that stores.
     pub fn memory(&self) -> impl Iterator<Item = &SlotPlan> {
         self.memory_slots.iter().map(|&slot| &self.slots[slot])
     }
 
-    /// The ports of the data memory.
+    /// Number of ports of the data memory.
     pub fn ports(&self) -> u32 {
         self.memory_slots.len() as u32
     }
 
-    /// The port of the data memory that a slot uses, if it loads.
+    /// Port of the data memory that a slot uses; `None` if it does not load.
     pub fn port_of(&self, slot: &SlotPlan) -> Option<u32> {
         self.memory_slots.iter().position(|&other| other == slot.number as usize).map(|port| port as u32)
     }
 }
 
 impl SlotPlan {
-    /// The bits of which one is set if a result has its writeback in `place` cycles: none, or one for each place that can hold it.
+    /// Scoreboard bits that announce a writeback in `place` cycles: a bit of the shift register, or a bit of each tracker.
     pub fn booked(&self, place: u32) -> Vec<Expr> {
         if place < self.depth {
             return vec![self.in_flight().at(place)];
@@ -341,19 +344,19 @@ impl SlotPlan {
     }
 }
 
-/// True if a unit is a module of its own, false if it is a part of the core (sequencer, data memory).
+/// The unit is a module of its own; sequencer and data memory are parts of the core.
 fn is_instance(unit: &Unit) -> bool {
     !unit.functions.iter().all(|function| {
         matches!(function, Function::Control | Function::Loop | Function::Load | Function::Store)
     })
 }
 
-/// Bits of an index into a bank.
+/// Width of an index into a bank.
 fn bits(bank: &Bank) -> u32 {
     bank.depth.trailing_zeros()
 }
 
-/// Checks the sizes and the alignment of banks, ports and memories, which are addressed by bit fields.
+/// Checks sizes and alignments of banks, ports and memories, which bit fields address.
 fn check_windows(machine: &'static Machine) -> Result<(), PlanError> {
     let power = |field: Result<&'static str, &'static str>, value: u32, most: u32| match value {
         2.. if value.is_power_of_two() && value <= most => Ok(()),
@@ -374,7 +377,7 @@ fn check_windows(machine: &'static Machine) -> Result<(), PlanError> {
             return Err(PlanError::Base { machine: machine.name, bank, base, multiple, inputs });
         }
     }
-    // An output port is recognised by ones in all bits of the index above the port's number.
+    // Output ports are recognised by ones in all bits of the index above the port's number.
     let smallest = machine.slots.iter().map(|slot| slot.bank.depth).min().unwrap_or(0);
     power(Ok("outputs_per_bank"), machine.outputs_per_bank.into(), u32::from(smallest) / 2)?;
     power(Ok("code_depth"), machine.code_depth, MAX_CODE)?;
@@ -382,8 +385,8 @@ fn check_windows(machine: &'static Machine) -> Result<(), PlanError> {
     power(Ok("stack_depth"), machine.stack_depth, 1 << 6)
 }
 
-/// Checks the row's values against the limits of the core's modules. A module states a limit in the name of the missing module that
-/// it instantiates for an unsupported value.
+/// Checks the row's values against the limits of the core's modules. A module states a limit in the name of the missing module that it
+/// instantiates for an unsupported value.
 fn check_parts(machine: &'static Machine) -> Result<(), PlanError> {
     let memory = machine.slots.iter().flat_map(|slot| {
         let units = slot.units.iter().filter(|unit| unit.functions.contains(&Function::Load));
@@ -414,7 +417,7 @@ fn check_parts(machine: &'static Machine) -> Result<(), PlanError> {
     Ok(())
 }
 
-/// The slot's iterative units (interval above 1), checked.
+/// Iterative units of a slot (interval above 1), checked.
 fn late(machine: &'static Machine, slot: &'static Slot) -> Result<Vec<LateUnit>, PlanError> {
     let depth = depth(slot);
     let mut late = Vec::new();

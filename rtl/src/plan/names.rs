@@ -2,7 +2,7 @@
 //! Naming of a generated core: every net, register, parameter, instance and module, with its width.
 //!
 //! A slot's names begin with the name of the slot, and before that with the letter of the stage if they belong to one, as in
-//! `r_mul_control`. A comment on a net of one bit states what is true if the bit is 1.
+//! `r_mul_control`. A comment on a net of one bit states the condition under which it is 1.
 
 pub mod decode;
 pub mod net;
@@ -12,16 +12,16 @@ use crate::verilog::{Expr, Net, no};
 use std::fmt;
 use takt_isa::{Bank, Unit};
 
-/// A pipeline stage before execution, through which a bundle's control bits accompany it.
+/// Pipeline stage before execution, through which a bundle's control bits accompany it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
-    /// The words of the bundle are decoded.
+    /// Decode of the bundle's words.
     Decode,
-    /// Hazard detection: register addresses are compared with those of results in flight.
+    /// Hazard detection: comparison of register addresses with the results in flight.
     Match,
-    /// The register banks are read.
+    /// Read of the register banks.
     Read,
-    /// The bundle waits until it can issue.
+    /// Issue: the bundle waits until it can issue.
     Issue,
 }
 
@@ -38,12 +38,12 @@ impl fmt::Display for Stage {
 
 /// Nets of the core that belong to no slot and whose widths depend on the machine's row.
 impl Plan {
-    /// The core's module.
+    /// Module name of the core.
     pub fn top(&self) -> String {
         format!("takt_{}", self.machine.identifier())
     }
 
-    /// The module of a slot's decoder.
+    /// Module name of a slot's decoder.
     pub fn decoder(&self, slot: &SlotPlan) -> String {
         format!("{}_decode_{}", self.top(), slot.name())
     }
@@ -52,77 +52,77 @@ impl Plan {
         self.slots.len() as u32
     }
 
-    /// Port: the number of the input port that is written.
+    /// Port: number of the input port that is written.
     pub fn input_index(&self) -> Net {
         Net::bus("input_index", self.input_bits)
     }
 
-    /// The number of that input port as an index into the bank of inputs.
+    /// Registered number of the written input port, as an index into the bank of inputs.
     pub fn input1_index(&self) -> Net {
         Net::bus("input1_index", self.index)
     }
 
-    /// Port: a bank's output port is written.
+    /// Port: an output port of the bank is written.
     pub fn output_write(&self, bank: &Bank) -> Net {
         Net::named(format!("output_{}_write", bank.name))
     }
 
-    /// Port: the number of that output port.
+    /// Port: number of the written output port.
     pub fn output_index(&self, bank: &Bank) -> Net {
         Net::named(format!("output_{}_index", bank.name)).wide(self.port_bits)
     }
 
-    /// Port: the value that it gets.
+    /// Port: value written to the output port.
     pub fn output_value(&self, bank: &Bank) -> Net {
         Net::named(format!("output_{}_value", bank.name)).wide(32)
     }
 
-    /// Port: the number of the output port to be read from outside.
+    /// Port: number of the output port to be read from outside.
     pub fn read_output(&self) -> Net {
         Net::bus("read_output", self.port_bits)
     }
 
-    /// For each source of [`Plan::sources`], the buffer (0 or 1) that it reads, if it is a latched input port.
+    /// For each source of [`Plan::sources`], the buffer (0 or 1) from which a latched input port is read.
     pub fn place(&self, stage: Stage) -> Net {
         Net::named(format!("{stage}_place")).wide(self.sources().count() as u32)
     }
 
-    /// Port: for each slot, its bus is written back to a register.
+    /// Port: for each slot, its result is written back.
     pub fn retire(&self) -> Net {
         Net::bus("retire", self.slot_count())
     }
 
-    /// Port: the addresses of their bundles.
+    /// Port: for each slot, address of the bundle whose result is written back.
     pub fn retire_address(&self) -> Net {
         Net::bus("retire_address", 16 * self.slot_count())
     }
 
-    /// Port: the registers.
+    /// Port: for each slot, register of the writeback.
     pub fn retire_register(&self) -> Net {
         Net::bus("retire_register", 10 * self.slot_count())
     }
 
-    /// Port: the values.
+    /// Port: for each slot, value of the writeback.
     pub fn retire_value(&self) -> Net {
         Net::bus("retire_value", 32 * self.slot_count())
     }
 
-    /// Port: the flags raised.
+    /// Port: for each slot, flags of the writeback.
     pub fn retire_flags(&self) -> Net {
         Net::bus("retire_flags", 3 * self.slot_count())
     }
 
-    /// The address of the next fetch from the program memory.
+    /// Address of the next fetch from the program memory.
     pub fn fetch(&self) -> Net {
         Net::bus("fetch", self.code_bits)
     }
 
-    /// For each port of the data memory, a load is executed.
+    /// For each port of the data memory, a load is in execute.
     pub fn x_load(&self) -> Net {
         Net::bus("x_load", self.ports())
     }
 
-    /// For each port of the data memory, the offset of the load or store that is executed.
+    /// For each port of the data memory, offset of the load or store in execute.
     pub fn x_offset(&self) -> Net {
         Net::bus("x_offset", 16 * self.ports())
     }
@@ -132,32 +132,32 @@ impl Plan {
         Net::bus("x_address_fault", self.slot_count())
     }
 
-    /// For each port of the data memory, that address is outside.
+    /// For each port of the data memory, the address is outside.
     pub fn port_fault(&self) -> Net {
         Net::bus("port_fault", self.ports())
     }
 
-    /// For each port of the data memory, a load's result is valid.
+    /// For each port of the data memory, the result of a load is valid.
     pub fn load_valid(&self) -> Net {
         Net::bus("load_valid", self.ports())
     }
 
-    /// For each port of the data memory, a load's result.
+    /// For each port of the data memory, result of a load.
     pub fn load_result(&self) -> Net {
         Net::bus("load_result", 32 * self.ports())
     }
 
-    /// The address at which a word is stored, two cycles after issue.
+    /// Address of a store, two cycles after issue.
     pub fn memory_address(&self) -> Net {
         Net::bus("memory_address", self.data_bits)
     }
 
-    /// For each slot, the valid bits of its shift register of results in flight.
+    /// For each slot, valid bits of its shift register of results in flight.
     pub fn in_flight(&self) -> Net {
         Net::bus("in_flight", self.slot_count() * self.depth)
     }
 
-    /// Their registers.
+    /// For each slot, register indices in its shift register of results in flight.
     pub fn in_flight_index(&self) -> Net {
         Net::bus("in_flight_index", self.slot_count() * self.depth * self.index)
     }
@@ -167,22 +167,22 @@ impl Plan {
         Net::bus("late", self.slot_count() * self.late)
     }
 
-    /// Their registers.
+    /// For each slot and iterative unit, register index of that result.
     pub fn late_index(&self) -> Net {
         Net::bus("late_index", self.slot_count() * self.late * self.index)
     }
 
-    /// For each slot, the bundle writes a register.
+    /// For each slot, the operation writes a register.
     pub fn writes_at(&self, stage: Stage) -> Net {
         Net::named(format!("{stage}_writes")).wide(self.slot_count())
     }
 
-    /// For each slot, the bundle writes a register with the least latency, 2.
+    /// For each slot, the operation writes a register with the least latency, 2.
     pub fn early_at(&self, stage: Stage) -> Net {
         Net::named(format!("{stage}_early")).wide(self.slot_count())
     }
 
-    /// For each slot, the index of the register that the bundle writes.
+    /// For each slot, index of the operation's destination.
     pub fn dest_at(&self, stage: Stage) -> Net {
         Net::named(format!("{stage}_dest")).wide(self.slot_count() * self.index)
     }
@@ -192,12 +192,12 @@ impl Plan {
         Net::bus("i_illegal", self.slot_count())
     }
 
-    /// For each slot, the value on its result bus.
+    /// For each slot, value on its result bus.
     pub fn result(&self) -> Net {
         Net::bus("result", 32 * self.slot_count())
     }
 
-    /// The same one cycle later.
+    /// For each slot, value of its result bus in the previous cycle.
     pub fn was_result(&self) -> Net {
         Net::bus("was_result", 32 * self.slot_count())
     }
@@ -210,12 +210,12 @@ impl Plan {
 
 /// Nets of a slot.
 impl SlotPlan {
-    /// Its name.
+    /// Slot name in the machine's row.
     pub fn name(&self) -> &'static str {
         self.slot.name
     }
 
-    /// The name of a source operand, `0` for a.
+    /// Name of a source operand: `0` is a.
     pub fn source(&self, operand: usize) -> String {
         format!("{}_{}", self.name(), LETTERS[operand])
     }
@@ -233,37 +233,37 @@ impl SlotPlan {
         self.own("load")
     }
 
-    /// The same one cycle later, when the value is on the bus.
+    /// The loader's value is on the bus, one cycle after [`SlotPlan::load`].
     pub fn loaded(&self) -> Net {
         self.own("loaded")
     }
 
-    /// The instance of its program memory.
+    /// Instance of the slot's program memory.
     pub fn program(&self) -> String {
         self.own("program").to_string()
     }
 
-    /// The word that the program memory delivers.
+    /// Word delivered by the program memory.
     pub fn fetched(&self) -> Net {
         self.own("fetched").wide(48)
     }
 
-    /// The word in decode.
+    /// Word in the decode stage.
     pub fn word(&self) -> Net {
         self.staged(Stage::Decode, "word").wide(48)
     }
 
-    /// The instance of its decoder.
+    /// Instance of the slot's decoder.
     pub fn decode(&self) -> String {
         self.own("decode").to_string()
     }
 
-    /// The position of a control bit.
+    /// Position of a control bit.
     pub fn parameter(&self, bit: ControlBit) -> Net {
         Net::named(format!("{}_{bit}", self.name()).to_uppercase())
     }
 
-    /// The control bits.
+    /// Control bits of the slot's operation.
     pub fn control(&self, stage: Stage) -> Net {
         self.staged(stage, "control").wide(self.width())
     }
@@ -278,22 +278,22 @@ impl SlotPlan {
         self.staged(stage, "illegal")
     }
 
-    /// The register that is written, as an index into the bank.
+    /// Destination, as an index into the bank.
     pub fn dest(&self, stage: Stage) -> Net {
         self.staged(stage, "dest").wide(self.index)
     }
 
-    /// The bank of a source, one-hot: a bit for each slot's bank, then one for the inputs.
+    /// Bank of a source, one-hot: a bit for each slot's bank, then one for the inputs.
     pub fn source_bank(&self, stage: Stage, operand: usize) -> Net {
         self.staged(stage, &format!("{}_bank", LETTERS[operand])).wide(self.slot_count + 1)
     }
 
-    /// The index of a source in its bank.
+    /// Index of a source in its bank.
     pub fn source_index(&self, stage: Stage, operand: usize) -> Net {
         self.staged(stage, &format!("{}_index", LETTERS[operand])).wide(self.index)
     }
 
-    /// Immediate, target or offset; in the stages read and issue, targets and offsets only.
+    /// Immediate, target or offset; in read and issue, targets and offsets only.
     pub fn constant(&self, stage: Stage) -> Net {
         let bits = match stage {
             Stage::Decode | Stage::Match => self.constant_bits(),
@@ -302,7 +302,7 @@ impl SlotPlan {
         self.staged(stage, "constant").wide(bits)
     }
 
-    /// The operation's operand is its immediate; in the stage read, the net is the immediate itself.
+    /// The operand is the immediate; in read, the net is the immediate's value.
     pub fn immediate(&self, stage: Stage) -> Net {
         let net = self.staged(stage, "immediate");
         if stage == Stage::Read { net.wide(32) } else { net }
@@ -320,7 +320,7 @@ impl SlotPlan {
 
     // ---- in flight
 
-    /// The instance that holds the results in flight.
+    /// Instance that holds the results in flight.
     pub fn results(&self) -> String {
         self.own("results").to_string()
     }
@@ -330,7 +330,7 @@ impl SlotPlan {
         self.own("in_flight").wide(self.depth)
     }
 
-    /// The register of each result in flight, for each place.
+    /// Register index of each result in flight, for each place.
     pub fn in_flight_index(&self) -> Net {
         self.own("in_flight_index").wide(self.depth * self.index)
     }
@@ -340,22 +340,22 @@ impl SlotPlan {
         self.own("writes")
     }
 
-    /// The address of its bundle.
+    /// Address of the bundle whose result is written back.
     pub fn retire_address(&self) -> Net {
         self.own("retire_address").wide(16)
     }
 
-    /// The slot's bus.
+    /// Result bus of the slot.
     pub fn result(&self) -> Net {
         self.own("result").wide(32)
     }
 
-    /// The same one cycle later.
+    /// Value of the result bus in the previous cycle.
     pub fn was_result(&self) -> Net {
         self.own("was_result").wide(32)
     }
 
-    /// The flags raised by the operation whose result is on the bus.
+    /// Flags of the operation whose result is on the bus.
     pub fn flags(&self) -> Net {
         self.own("flags").wide(3)
     }
@@ -364,7 +364,7 @@ impl SlotPlan {
         self.own(&format!("{}_{what}", unit.name))
     }
 
-    /// The instance that keeps a late unit's result in flight.
+    /// Instance that tracks the result of an iterative unit.
     pub fn late_instance(&self, late: &LateUnit) -> String {
         self.of_unit(late.unit, "late").to_string()
     }
@@ -374,7 +374,7 @@ impl SlotPlan {
         self.of_unit(late.unit, "at").range(late.beyond, 1)
     }
 
-    /// A dummy that keeps a linter from reporting unused bits of [`SlotPlan::late_at`].
+    /// Dummy that keeps a linter from reporting unused bits of [`SlotPlan::late_at`].
     pub fn late_unused(&self, late: &LateUnit) -> Net {
         self.of_unit(late.unit, "unused")
     }
@@ -394,19 +394,19 @@ impl SlotPlan {
         self.of_unit(late.unit, "busy")
     }
 
-    /// The register that the unit's operation will write.
+    /// Register index of the unit's operation.
     pub fn late_index(&self, late: &LateUnit) -> Net {
         self.of_unit(late.unit, "index").wide(self.index)
     }
 
-    /// The address of its bundle.
+    /// Address of the bundle with the unit's operation.
     pub fn late_address(&self, late: &LateUnit) -> Net {
         self.of_unit(late.unit, "address").wide(16)
     }
 
     // ---- operands and hazards
 
-    /// An operand in the execute stage.
+    /// Operand in the execute stage.
     pub fn operand(&self, operand: usize) -> Net {
         Net::named(format!("x_{}", self.source(operand))).wide(32)
     }
@@ -416,7 +416,7 @@ impl SlotPlan {
         Net::named(format!("{}_{stage}_waits", self.source(operand)))
     }
 
-    /// The instance that detects hazards of the destination.
+    /// Instance that detects hazards of the destination.
     pub fn dest_instance(&self) -> String {
         self.own("dest").to_string()
     }
@@ -426,7 +426,7 @@ impl SlotPlan {
         self.own(&format!("{stage}_waits"))
     }
 
-    /// An output of [`SlotPlan::dest_instance`] that only sources use.
+    /// Output of [`SlotPlan::dest_instance`] that only sources use.
     pub fn dest_unused(&self, what: &str) -> Net {
         self.own(&format!("unused_{what}"))
     }
@@ -436,24 +436,24 @@ impl SlotPlan {
         self.own(&format!("{stage}_busy"))
     }
 
-    /// The write port is taken (rule 6).
+    /// The write port is booked (rule 6).
     pub fn port_taken(&self, stage: Stage) -> Net {
         self.own(&format!("{stage}_port"))
     }
 
     // ---- units
 
-    /// The instance of a unit.
+    /// Instance of a unit.
     pub fn unit(&self, unit: &Unit) -> String {
         format!("{}_{}", self.name(), unit.name)
     }
 
-    /// The unit gets an operation.
+    /// An operation enters the unit.
     pub fn unit_starts(&self, unit: &Unit) -> Net {
         Net::named(format!("x_{}", self.unit(unit)))
     }
 
-    /// The unit's code of the operation.
+    /// Operation code for the unit.
     pub fn code(&self) -> Net {
         Net::named(format!("x_{}_code", self.name())).wide(self.code_bits())
     }
@@ -463,16 +463,16 @@ impl SlotPlan {
         self.of_unit(unit, "valid")
     }
 
-    /// The unit's result.
+    /// Result of the unit, in its writeback cycle.
     pub fn unit_result(&self, unit: &Unit) -> Net {
         self.of_unit(unit, "result").wide(32)
     }
 
-    /// The flags that it raises.
+    /// Flags of the unit's operation.
     pub fn unit_flags(&self, unit: &Unit) -> Net {
         self.of_unit(unit, "flags").wide(3)
     }
 }
 
-/// Names of source operands.
+/// Letters of the source operands.
 pub const LETTERS: [&str; 3] = ["a", "b", "c"];

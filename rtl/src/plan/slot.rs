@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The plan of a slot: its instructions, the layout of their control bits, its units' circuits, its results in flight.
+//! Plan of a slot: its instructions, the layout of their control bits, the circuits of its units, and its results in flight.
 
 use super::LateUnit;
 use crate::circuit::Circuit;
@@ -8,14 +8,14 @@ use takt_isa::shape::Field;
 use takt_isa::spec::machines::Slot;
 use takt_isa::{Effect, Row};
 
-/// The meaning of a control bit, or of a field of several.
+/// Meaning of a control bit, or of a field of several bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ControlBit {
     /// The operation goes to the unit of this name.
     Unit(&'static str),
     /// The operation writes a register, with this latency.
     Result(u32),
-    /// The unit's own code for the operation.
+    /// Operation code for the unit.
     Code,
     /// The operation drains (rule 5).
     Drains,
@@ -51,45 +51,45 @@ impl fmt::Display for ControlBit {
     }
 }
 
-/// A field of the control bits.
+/// Field of the control bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Control {
-    /// Its meaning.
+    /// Meaning of the field.
     pub bit: ControlBit,
-    /// Its lowest bit.
+    /// Index of the lowest bit.
     pub low: u32,
-    /// The number of bits.
+    /// Width of the field, in bits.
     pub width: u32,
 }
 
-/// The plan of a slot.
+/// Instructions, control bits and scoreboard of a slot.
 #[derive(Clone, Debug)]
 pub struct SlotPlan {
-    /// Its row.
+    /// Row from which the slot is generated.
     pub slot: &'static Slot,
-    /// Its number in the bundle.
+    /// Number in the bundle, from 0.
     pub number: u32,
     /// Circuits of the arithmetic units, in the order of the slot's units.
     pub circuits: Vec<Circuit>,
-    /// The fields of the control bits, from bit 0 on.
+    /// Fields of the control bits, from bit 0 on.
     pub controls: Vec<Control>,
-    /// The largest number of sources of any operation.
+    /// Largest number of sources of any operation.
     pub sources: usize,
     /// Latencies of results, ascending.
     pub latencies: Vec<u32>,
     /// Length of the slot's shift register of results in flight (`takt_in_flight`), in cycles before writeback.
     pub depth: u32,
-    /// Iterative units, each of which has a `takt_long_latency`.
+    /// Iterative units; each gets a `takt_long_latency`.
     pub late: Vec<LateUnit>,
     /// Instructions that the slot can execute.
     pub rows: Vec<&'static Row>,
-    /// Bits of an index into a bank, on this machine.
+    /// Width of an index into a bank, for the machine's deepest bank.
     pub(super) index: u32,
-    /// Slots of the machine.
+    /// Number of slots of the machine.
     pub(super) slot_count: u32,
 }
 
-/// True if an effect has a control bit. Plain arithmetic needs none.
+/// The effect has a control bit; plain arithmetic needs none.
 fn has_bit(effect: Effect) -> bool {
     !matches!(effect, Effect::Compute | Effect::Nothing | Effect::Immediate)
 }
@@ -148,7 +148,7 @@ impl SlotPlan {
         self.slot.unit(row.function).map_or(0, |unit| unit.latency)
     }
 
-    /// The number of control bits.
+    /// Number of control bits.
     pub fn width(&self) -> u32 {
         self.controls.last().map_or(0, |control| control.low + control.width)
     }
@@ -157,17 +157,17 @@ impl SlotPlan {
         self.controls.iter().find(|control| control.bit == bit)
     }
 
-    /// True if the slot has a control bit.
+    /// The slot has this control bit.
     pub fn has(&self, bit: ControlBit) -> bool {
         self.find(bit).is_some()
     }
 
-    /// Bits of the units' operation code; 0 if no unit needs one.
+    /// Width of the units' operation code; 0 if no unit needs one.
     pub fn code_bits(&self) -> u32 {
         self.find(ControlBit::Code).map_or(0, |control| control.width)
     }
 
-    /// True if an instruction of the slot has an effect.
+    /// An instruction of the slot has this effect.
     pub fn has_effect(&self, effect: Effect) -> bool {
         self.rows.iter().any(|row| row.effect == effect)
     }
@@ -177,17 +177,17 @@ impl SlotPlan {
         used.filter(|field| fields.contains(field)).map(|field| field.bits().width).max().unwrap_or(0)
     }
 
-    /// Bits of the constant: those of an immediate, or else of a target or offset; 0 if there is none.
+    /// Width of the constant: an immediate's, or else a target's or an offset's; 0 without a constant.
     pub fn constant_bits(&self) -> u32 {
         self.widest(&[Field::Immediate, Field::Target, Field::Offset, Field::OffsetLow])
     }
 
-    /// Bits of the constant in the issue stage, which needs targets and offsets only; 0 if there is none.
+    /// Width of the constant in the issue stage, which needs targets and offsets only; 0 without these.
     pub fn address_bits(&self) -> u32 {
         self.widest(&[Field::Target, Field::Offset, Field::OffsetLow])
     }
 
-    /// The value of the control bits for an instruction.
+    /// Value of the control bits for an instruction.
     pub fn control_of(&self, row: &Row) -> u64 {
         let mut value = 0;
         let mut put = |bit: ControlBit, bits: u64| {

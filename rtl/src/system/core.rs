@@ -8,19 +8,19 @@ use crate::plan::names::net;
 use crate::verilog::{Direction, Expr, Instance, Module, ModuleError, Net, Port, choose, concat, decimal};
 use takt_isa::{Bank, BankIndex, Register};
 
-/// 1 if the loader writes an input port of this core.
+/// The loader writes an input port of this core.
 pub(super) const LOAD_INPUT: Net = Net::bit("load_input");
 
-/// Ports of a core's module for a board: first the one that it drives, then those that it reads. In the board's top, they have the
-/// names of [`SystemPlan::board_port`].
+/// Ports of a core's module for a board: an input, the number of the output port to read, then outputs. In the board's top they are named
+/// by [`SystemPlan::board_port`].
 pub(super) fn watched(plan: &SystemPlan, core: usize) -> (Net, Vec<Net>) {
     let own = &plan.cores[core];
     let inputs = [net::INPUT_WRITE, own.input_index(), net::INPUT_VALUE];
-    (own.read_output(), inputs.into_iter().chain(told(own)).collect())
+    (own.read_output(), inputs.into_iter().chain(board_outputs(own)).collect())
 }
 
-/// Output ports of a core that only a board uses.
-fn told(own: &Plan) -> Vec<Net> {
+/// Outputs of a core that only a board uses.
+fn board_outputs(own: &Plan) -> Vec<Net> {
     vec![
         net::READ_VALUE,
         net::TICK_MISSED,
@@ -42,7 +42,7 @@ pub(super) fn arrives(mailboxes: usize) -> Net {
     Net::bus("arrives", mailboxes as u32)
 }
 
-/// The arriving values, for each mailbox.
+/// For each mailbox, the arriving value.
 pub(super) fn values(mailboxes: usize) -> Net {
     Net::bus("values", 32 * mailboxes as u32)
 }
@@ -162,7 +162,8 @@ pub(super) fn module(plan: &SystemPlan, core: usize) -> Result<String, ModuleErr
             }
         }
     }
-    let (seen, unseen) = if is_watched { (told(own), Vec::new()) } else { (Vec::new(), told(own)) };
+    let (seen, unseen) =
+        if is_watched { (board_outputs(own), Vec::new()) } else { (Vec::new(), board_outputs(own)) };
     open.extend(unseen);
     open.extend([own.retire_address(), own.retire_flags()]);
     let mut pins: [(Net, Expr); 4] = [
@@ -219,12 +220,12 @@ pub(super) fn module(plan: &SystemPlan, core: usize) -> Result<String, ModuleErr
     m.finish()
 }
 
-/// The beginning of an output port's names in the core's module.
+/// Stem of an output port's names in the core's module.
 pub(super) fn port_name(name: &str) -> String {
     format!("port_{name}")
 }
 
-/// The bank that has an output port, and the port's number in it.
+/// Bank of an output port, and the port's number in the bank.
 fn place<'a>(
     plan: &SystemPlan,
     core: usize,

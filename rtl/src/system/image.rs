@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The records that the loader writes into the cores in reset, once their memories have been cleared.
+//! Records that the loader writes into the cores in reset, after clearing their memories.
 
 use super::SystemPlan;
 use crate::export::DesignFile;
@@ -7,10 +7,10 @@ use std::fmt::Write as _;
 use takt_isa::load::{LoadRecord, Space, load_records};
 use takt_isa::system::{Description, Mailbox};
 
-/// A record, with the core that it is for.
+/// A record, with the index of its core.
 pub(super) type Record = (usize, LoadRecord);
 
-/// Programs, data, presets and initial values of input ports. Zeros are left out, since memories have been cleared.
+/// Programs, data, presets and initial values of input ports. Zeros of cleared memories are left out.
 pub(super) fn records(description: &Description, mailboxes: &[Vec<Mailbox>]) -> Vec<Record> {
     let mut records = Vec::new();
     for (number, core) in description.cores.iter().enumerate() {
@@ -28,7 +28,7 @@ pub(super) fn records(description: &Description, mailboxes: &[Vec<Mailbox>]) -> 
     records
 }
 
-/// The records for `$readmemh`, padded to `count` by repeating the last one.
+/// Text of the records for `$readmemh`, padded to `count` by repeating the last record.
 pub(super) fn file(plan: &SystemPlan, records: &[Record], count: usize) -> DesignFile {
     let mut text =
         String::from("// {core, space, slot, address, value}: what takt_loader writes into the cores\n");

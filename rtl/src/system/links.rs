@@ -6,7 +6,7 @@ use crate::plan::names::net;
 use crate::verilog::{Expr, Instance, Module, Net, concat, decimal, no};
 use takt_isa::system::{End, Link, LinkKind, Side, Source, Status};
 
-/// Writes every link: its nets, and its instance.
+/// Generates every link: its nets and its instance.
 pub(super) fn write(plan: &SystemPlan, m: &mut Module, reset: &Net) {
     for (number, link) in plan.description.links.iter().enumerate() {
         m.blank();
@@ -40,7 +40,7 @@ fn instance(plan: &SystemPlan, module: &str, number: usize, link: &Link, reset: 
         .port("rst", reset)
 }
 
-/// Declares nets of a link and connects ports of their names.
+/// Declares nets for the outputs of a link's instance, and connects them.
 fn outputs(
     plan: &SystemPlan,
     m: &mut Module,
@@ -57,7 +57,7 @@ fn outputs(
     m.instance(instance);
 }
 
-/// The write enable and the value of each field, concatenated.
+/// Write enables and values of the link's fields, each concatenated.
 fn fields(plan: &SystemPlan, number: usize, link: &Link) -> (Expr, Expr) {
     let write = link.fields.iter().map(|field| plan.write(link.from, field.output));
     let value = link.fields.iter().enumerate().map(|(i, field)| {
@@ -67,12 +67,12 @@ fn fields(plan: &SystemPlan, number: usize, link: &Link) -> (Expr, Expr) {
     (concat(write.collect::<Vec<_>>()), concat(value.collect::<Vec<_>>()))
 }
 
-/// The host's pin of a value, or a core's port.
+/// The host's pin of this kind; constant 0 without one.
 fn pin(plan: &SystemPlan, number: usize, kind: PinKind) -> Expr {
     plan.pin(number, kind).map_or_else(no, Expr::from)
 }
 
-/// 1 if a core's `wait` ended a period two cycles ago.
+/// Expression that is 1 if a core's `wait` ended a period two cycles ago.
 fn ended(plan: &SystemPlan, end: End) -> Expr {
     match end {
         End::Core(core) => plan.of_core(core, net::ENDED.name()).into(),
@@ -134,7 +134,7 @@ fn snapshot(plan: &SystemPlan, m: &mut Module, number: usize, link: &Link, reset
     host_fields(plan, m, number, link, "shown");
 }
 
-/// The host's pins of a link's fields.
+/// Assigns the host's pins of a link's fields.
 fn host_fields(plan: &SystemPlan, m: &mut Module, number: usize, link: &Link, port: &str) {
     let shown = plan.of_link(number, port).wide(32 * link.fields.len() as u32);
     if link.to == End::Host {
@@ -204,7 +204,7 @@ fn status_net(plan: &SystemPlan, link: usize, prefix: &str, status: Status, coun
     if status == Status::Count { net.wide(count) } else { net }
 }
 
-/// The arrival in a mailbox of a core's gate: valid bit and value.
+/// Arrival at a mailbox of a core's gate: valid bit and value.
 pub(super) fn arrival(plan: &SystemPlan, core: usize, source: Source) -> (Expr, Expr) {
     let link = source.link();
     let known = &plan.description.links[link];

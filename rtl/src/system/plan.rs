@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Naming of the generated part of a system, and the top's pins.
+//! Names in the generated part of a system, and the top's pins.
 
 use crate::plan::Plan;
 use crate::plan::names::net;
@@ -8,10 +8,10 @@ use takt_isa::Register;
 use takt_isa::system::{Description, End, LinkKind, Mailbox, Status};
 use takt_isa::timing::Cycle;
 
-/// The base tick is due.
+/// A base tick is due.
 pub(super) const DUE: Net = Net::bit("due");
 
-/// Status ports that every core's module passes on from its core unchanged.
+/// Status outputs that a core's module passes on from its core.
 pub(super) const STATUS: [Net; 8] = [
     net::ENDED,
     net::WAITING,
@@ -23,61 +23,61 @@ pub(super) const STATUS: [Net; 8] = [
     net::FAULT_ADDRESS,
 ];
 
-/// The driver of a system's cores, which loads them and gives them their ticks.
+/// Driver of a system's cores, which loads them and sends their ticks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Driver {
-    /// The top itself: its loader, and base ticks that start by themselves.
+    /// The top: it has a loader, and base ticks that start by themselves.
     Itself,
-    /// The surroundings, as on a board: the top has ports for that, and shows the cores' ports.
+    /// A board around the top: the top has ports for loading and ticks, and exposes the cores' ports.
     Board,
 }
 
-/// The plan of a system's circuit.
+/// Names and mailboxes of a system's circuit.
 #[derive(Clone, Debug)]
 pub struct SystemPlan {
-    /// The driver.
+    /// Source of loading and ticks.
     pub driver: Driver,
-    /// Cores and links.
+    /// Cores and links of the system.
     pub description: Description,
-    /// The plan of each core.
+    /// Plan of each core, in order.
     pub cores: Vec<Plan>,
-    /// The top's module.
+    /// Module name of the top.
     pub top: String,
-    /// The mailboxes of each core's gate.
+    /// Mailboxes of each core's gate.
     pub mailboxes: Vec<Vec<Mailbox>>,
 }
 
-/// A pin of the top that is a host's end of a link.
+/// Pin of the top: a host's end of a link.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Pin {
-    /// Its name and width.
+    /// Name and width of the pin.
     pub net: Net,
-    /// Input or output.
+    /// Direction, as seen from the top.
     pub direction: Direction,
-    /// Its kind; for a value carried by several wires, that on the first.
+    /// Kind of the pin; wires that share a value have one pin, of the first wire's kind.
     pub kind: PinKind,
-    /// The link.
+    /// Index of the link.
     pub link: usize,
 }
 
-/// The kinds of a host's pins.
+/// Kind of a host's pin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PinKind {
-    /// A field of the link.
+    /// Field of the link, by index.
     Field(usize),
     /// Input, high for one cycle to write the wire, publish the snapshot or push the entry.
     Send,
     /// Input, high for one cycle to pop the FIFO's head.
     Pop,
-    /// A status of the FIFO.
+    /// Status output of the FIFO.
     Status(Status),
 }
 
-/// The output ports of a core that a link uses, with the names of their nets.
+/// Output port of a core that links use.
 pub(super) struct OutputPort {
     pub(super) register: Register,
     pub(super) name: String,
-    /// True if its value is sent; false if only the event of a write is used.
+    /// A link sends the value; otherwise links use only the event of a write.
     pub(super) sent: bool,
 }
 
@@ -88,17 +88,17 @@ impl SystemPlan {
         SystemPlan { driver, description, cores, top: format!("takt_system_{plain}"), mailboxes }
     }
 
-    /// The module of a core with its gate.
+    /// Module name of a core with its gate.
     pub fn core_module(&self, core: usize) -> String {
         format!("{}_{}", self.top, self.description.cores[core].name)
     }
 
-    /// Its instance in the top.
+    /// Instance of a core's module in the top.
     pub fn core_instance(&self, core: usize) -> String {
         format!("core_{}", self.description.cores[core].name)
     }
 
-    /// The instance of a link in the top.
+    /// Instance of a link in the top.
     pub fn link_instance(&self, link: usize) -> String {
         let known = &self.description.links[link];
         match known.kind {
@@ -108,22 +108,22 @@ impl SystemPlan {
         }
     }
 
-    /// The net that a port of a link's instance is connected to.
+    /// Net at a port of a link's instance.
     pub(super) fn of_link(&self, link: usize, port: &str) -> Net {
         Net::named(format!("{}_{port}", self.link_instance(link)))
     }
 
-    /// A net of a core in the top.
+    /// Net of a core in the top.
     pub fn of_core(&self, core: usize, what: &str) -> Net {
         Net::named(format!("{}_{what}", self.description.cores[core].name))
     }
 
-    /// Bits of the number of a FIFO's entries.
+    /// Width of the number of a FIFO's entries.
     pub fn count_bits(depth: u32) -> u32 {
         (u32::BITS - depth.leading_zeros()).max(2)
     }
 
-    /// The output ports of a core that links use, each once.
+    /// Output ports of a core that links use, each once.
     pub(super) fn outputs(&self, core: usize) -> Vec<OutputPort> {
         let here = End::Core(core);
         let mut used: Vec<(Register, bool)> = Vec::new();
@@ -153,7 +153,7 @@ impl SystemPlan {
         used.into_iter().map(|(register, sent)| OutputPort { register, name: name(register), sent }).collect()
     }
 
-    /// True if a link sends at the `wait`s of a core.
+    /// Some link sends when the core's `wait` ends a period.
     pub(super) fn is_waited_for(&self, core: usize) -> bool {
         let latched = self.description.cores[core].program.latched;
         let own = self.description.links.iter().filter(|link| link.from == End::Core(core));
@@ -170,12 +170,12 @@ impl SystemPlan {
         Some(self.of_core(core, &format!("{}_{what}", port.name)))
     }
 
-    /// 1 if an output port of a core is written in this cycle; constant 0 if there is no such port.
+    /// Expression that is 1 if an output port of a core is written in this cycle; constant 0 without a port.
     pub(super) fn write(&self, end: End, register: Option<Register>) -> Expr {
         self.port_net(end, register, "write").map_or_else(no, Into::into)
     }
 
-    /// The value that is written to an output port of a core.
+    /// Value that is written to an output port of a core.
     pub(super) fn value(&self, end: End, register: Option<Register>) -> Option<Expr> {
         Some(self.port_net(end, register, "value")?.wide(32).into())
     }
@@ -185,7 +185,7 @@ impl SystemPlan {
         self.description.lead()
     }
 
-    /// The host's ends of links, in the order of the links.
+    /// Host's ends of links, in the order of the links.
     pub fn pins(&self) -> Vec<Pin> {
         let mut pins: Vec<Pin> = Vec::new();
         for (link, known) in self.description.links.iter().enumerate() {
@@ -197,7 +197,7 @@ impl SystemPlan {
                 let prefix = if direction == Direction::Input { "in" } else { "out" };
                 let net = Net::named(format!("{prefix}_{name}"));
                 let net = if width > 1 { net.wide(width) } else { net };
-                // A value of the host may be carried by several wires.
+                // Several wires may carry one value of the host.
                 if !(known.from == End::Host
                     && matches!(known.kind, LinkKind::Wire)
                     && pins.iter().any(|pin: &Pin| pin.net == net))
@@ -237,7 +237,7 @@ impl SystemPlan {
         pins
     }
 
-    /// The top's status pins: `due`, then the status of all cores, core 0 lowest.
+    /// Status pins of the top: `due`, then the status of all cores, core 0 lowest.
     pub fn status_pins(&self) -> Vec<Net> {
         let cores = self.cores.len() as u32;
         let told =
@@ -245,17 +245,17 @@ impl SystemPlan {
         [DUE].into_iter().chain(told).collect()
     }
 
-    /// The name, in a top that a board drives, of a port that belongs to a core.
+    /// Name of a core's port in a top that a board drives.
     pub fn board_port(&self, core: usize, port: &Net) -> Net {
         let net = Net::named(format!("board{core}_{}", port.name()));
         if port.width() > 1 { net.wide(port.width()) } else { net }
     }
 
-    /// The pin of a host's end.
+    /// Net of the pin of a host's end.
     pub(super) fn pin(&self, link: usize, kind: PinKind) -> Option<Net> {
         let pins = self.pins();
         let own = pins.iter().find(|pin| pin.link == link && pin.kind == kind);
-        // The value of a wire may be that of an earlier one.
+        // A wire may share its value with an earlier wire, whose pin it uses.
         let first = || {
             let known = &self.description.links[link];
             let same = |pin: &&Pin| {

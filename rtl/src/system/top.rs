@@ -12,7 +12,7 @@ use takt_isa::system::{End, LinkKind};
 
 const RUNNING: Net = Net::bit("running");
 const STARTS: Net = Net::bit("starts");
-/// Reset of cores and links: the loader's.
+/// Reset of cores and links, from the loader or the board.
 const RESET: Net = Net::bit("reset");
 const STOP: Net = Net::bit("stop");
 static IMAGE: Net = Net::bit("IMAGE");
@@ -30,7 +30,7 @@ pub(super) fn module(plan: &SystemPlan, records: &[Record]) -> Result<String, Mo
     }
     m.banner("status of the cores");
     for core in 0..plan.cores.len() {
-        for status in STATUS.into_iter().filter(|status| shown(plan, core, status)) {
+        for status in STATUS.into_iter().filter(|status| uses_output(plan, core, status)) {
             m.wires([of(plan, core, &status)]);
         }
         for port in plan.outputs(core) {
@@ -46,7 +46,7 @@ pub(super) fn module(plan: &SystemPlan, records: &[Record]) -> Result<String, Mo
             m.define(STOP, concat(faults.collect::<Vec<_>>()).any_bit());
             ticks(plan, &mut m);
         }
-        Driver::Board => given_ticks(plan, &mut m),
+        Driver::Board => board_ticks(plan, &mut m),
     }
     m.banner("links");
     links::write(plan, &mut m, &RESET);
@@ -57,20 +57,20 @@ pub(super) fn module(plan: &SystemPlan, records: &[Record]) -> Result<String, Mo
     if plan.driver == Driver::Itself {
         m.assign(RUNNING, !RESET);
     }
-    for (status, pin) in told(plan) {
+    for (status, pin) in status_outputs(plan) {
         let each = (0..plan.cores.len()).map(|core| of(plan, core, &status).into());
         m.assign(pin, concat(each.collect::<Vec<Expr>>()));
     }
     m.finish()
 }
 
-/// True if the top uses an output of a core: everything but its `ended`, which is for some links.
-fn shown(plan: &SystemPlan, core: usize, status: &Net) -> bool {
+/// The top uses this output of a core. `ended` serves only some links.
+fn uses_output(plan: &SystemPlan, core: usize, status: &Net) -> bool {
     *status != net::ENDED || plan.driver == Driver::Board || plan.is_waited_for(core)
 }
 
-/// The status outputs of the cores, each with the pin of the top that concatenates it over all cores, core 0 lowest.
-fn told(plan: &SystemPlan) -> Vec<(Net, Net)> {
+/// Status outputs of the cores, each with the pin of the top that concatenates it over all cores, core 0 lowest.
+fn status_outputs(plan: &SystemPlan) -> Vec<(Net, Net)> {
     let ended = match plan.driver {
         Driver::Itself => None,
         Driver::Board => Some(Net::named(net::ENDED.name().to_owned()).wide(plan.cores.len() as u32)),
@@ -79,7 +79,7 @@ fn told(plan: &SystemPlan) -> Vec<(Net, Net)> {
     STATUS.into_iter().skip(usize::from(plan.driver == Driver::Itself)).zip(pins).collect()
 }
 
-/// A net of a core's status.
+/// Net of a core's status output.
 fn of(plan: &SystemPlan, core: usize, net: &Net) -> Net {
     let named = plan.of_core(core, net.name());
     if net.width() > 1 { named.wide(net.width()) } else { named }
@@ -167,7 +167,7 @@ fn ports(plan: &SystemPlan) -> Vec<Port> {
         });
         last = Some(pin.link);
     }
-    for (i, (_, pin)) in told(plan).into_iter().enumerate() {
+    for (i, (_, pin)) in status_outputs(plan).into_iter().enumerate() {
         let port = Port::new(Direction::Output, pin);
         ports.push(if i == 0 {
             port.heading(
@@ -199,12 +199,12 @@ fn loads_input(cores: u32) -> Net {
     Net::bus("loads_input", cores)
 }
 
-/// The cores' ticks, in a top that a board drives.
+/// For each core, its tick, in a top that a board drives.
 fn ticks_of(cores: u32) -> Net {
     Net::bus("ticks", cores)
 }
 
-/// The cycles in which the cores latch their snapshots.
+/// For each core, the cycle in which it latches its snapshots.
 fn takes_of(cores: u32) -> Net {
     Net::bus("takes", cores)
 }
@@ -308,8 +308,8 @@ fn ticks(plan: &SystemPlan, m: &mut Module) {
     }
 }
 
-/// Connects the ticks and the timing of snapshots that the board gives.
-fn given_ticks(plan: &SystemPlan, m: &mut Module) {
+/// Connects the ticks and the timing of snapshots from the board.
+fn board_ticks(plan: &SystemPlan, m: &mut Module) {
     let cores = plan.cores.len() as u32;
     for core in 0..plan.cores.len() {
         let [tick, takes] = ["tick", "takes"].map(|what| plan.of_core(core, what));
@@ -351,7 +351,7 @@ fn instance(plan: &SystemPlan, m: &mut Module, core: usize) {
         }
     }
     for status in STATUS {
-        instance = match shown(plan, core, &status) {
+        instance = match uses_output(plan, core, &status) {
             true => instance.port(status.name(), of(plan, core, &status)),
             false => instance.open([status.name()]),
         };

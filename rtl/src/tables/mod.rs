@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The tables of the arithmetic units, as Verilog: one module per table, with a registered output, which synthesis places
-//! into block RAM.
+//! Tables of the arithmetic units, as Verilog: a module for each table, with a registered output, which synthesis places into block RAM.
 //!
-//! The contents stand in the module itself rather than in a file for `$readmemh`, so that no tool depends on the folder it
-//! runs in. `tests/tables.rs` keeps the files in `units/common` equal to what is computed here (`TAKT_BLESS=1` writes
-//! them) and proves what the circuits rely on.
+//! The module itself holds the contents, rather than a file for `$readmemh`, so that no tool depends on the folder in which it runs.
+//! `tests/tables.rs` compares the files in `units/common` with the tables computed here (`TAKT_BLESS=1` writes them). The proofs of the
+//! units also compare the words that yosys reads from those files.
 
 pub mod angle;
 pub mod reciprocal;
@@ -12,55 +11,91 @@ pub mod sine;
 
 use std::fmt::Write;
 
-/// A read-only memory within a table's module.
-struct Memory<'a> {
+/// Read-only memory within a table's module.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Memory {
     /// Name of the output port.
-    name: &'a str,
+    pub name: &'static str,
     /// Name of the address port; memories may share one.
-    address: &'a str,
-    /// Width of a word.
-    bits: u32,
-    /// The words.
-    words: &'a [u64],
+    pub address: &'static str,
+    /// Width of a word, in bits.
+    pub bits: u32,
+    /// Contents, in order of addresses.
+    pub words: Vec<u64>,
 }
 
-/// The text of the module `name`, whose memories are `memories`; `contract` is its header, without comment marks. Memories
-/// are read in every cycle or, if `enable`, in those in which a port of that name is 1.
-fn module(name: &str, contract: &str, enable: bool, memories: &[Memory<'_>]) -> String {
-    let mut text = String::from("// SPDX-License-Identifier: MIT OR Apache-2.0\n");
-    for line in contract.lines() {
-        let _ = writeln!(text, "{}", format!("// {line}").trim_end());
-    }
-    text.push_str("//\n// Generated from rtl/src/tables; not to be edited.\n\n");
-    let _ = writeln!(text, "module {name} (\n    input  wire clk,");
-    if enable {
-        text.push_str("    input  wire enable,\n");
-    }
-    for (i, memory) in memories.iter().enumerate() {
-        if memories[..i].iter().all(|earlier| earlier.address != memory.address) {
-            let _ =
-                writeln!(text, "    input  wire [{}:0] {},", memory.words.len().ilog2() - 1, memory.address);
+/// A table: a module of memories that are read in every cycle.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Table {
+    /// Name of the module and of its file.
+    pub name: &'static str,
+    /// Header of the file, without comment marks.
+    contract: &'static str,
+    /// Memories in the order of the output ports.
+    pub memories: Vec<Memory>,
+}
+
+/// All tables of the units, after checking the bounds on their words that proofs in `rtl/formal` assume.
+///
+/// # Errors
+/// A word beyond such a bound.
+pub fn checked() -> Result<Vec<Table>, String> {
+    let reciprocals = reciprocal::Tables::new();
+    reciprocals.check()?;
+    angle::check()?;
+    Ok(vec![
+        reciprocals.table(),
+        sine::multiples(),
+        sine::polynomials(),
+        angle::arctangents(),
+        angle::arccosines(),
+    ])
+}
+
+impl Table {
+    /// Verilog text of the module.
+    #[must_use]
+    pub fn verilog(&self) -> String {
+        let Table { name, contract, memories } = self;
+        let mut text = String::from("// SPDX-License-Identifier: MIT OR Apache-2.0\n");
+        for line in contract.lines() {
+            let _ = writeln!(text, "{}", format!("// {line}").trim_end());
         }
+        text.push_str("//\n// Generated from rtl/src/tables; not to be edited.\n\n");
+        let _ = writeln!(text, "module {name} (\n    input  wire clk,");
+        for (i, memory) in memories.iter().enumerate() {
+            if memories[..i].iter().all(|earlier| earlier.address != memory.address) {
+                let _ = writeln!(
+                    text,
+                    "    input  wire [{}:0] {},",
+                    memory.words.len().ilog2() - 1,
+                    memory.address
+                );
+            }
+        }
+        let outputs: Vec<_> = memories
+            .iter()
+            .map(|memory| format!("    output reg  [{}:0] {}", memory.bits - 1, memory.name))
+            .collect();
+        let _ = writeln!(text, "{}\n);\n", outputs.join(",\n"));
+        for Memory { name, bits, words, .. } in memories {
+            let _ = writeln!(text, "    reg [{}:0] {name}_words [0:{}];", bits - 1, words.len() - 1);
+        }
+        text.push_str("\n    always @(posedge clk) begin\n");
+        for Memory { name, address, .. } in memories {
+            let _ = writeln!(text, "        {name} <= {name}_words[{address}];");
+        }
+        text.push_str("    end\n");
+        memories.iter().for_each(|memory| memory.initial(&mut text));
+        text.push_str("\nendmodule\n");
+        text
     }
-    let outputs: Vec<_> = memories
-        .iter()
-        .map(|memory| format!("    output reg  [{}:0] {}", memory.bits - 1, memory.name))
-        .collect();
-    let _ = writeln!(text, "{}\n);\n", outputs.join(",\n"));
-    for memory in memories {
-        let Memory { name, bits, words, .. } = memory;
-        let _ = writeln!(text, "    reg [{}:0] {name}_words [0:{}];", bits - 1, words.len() - 1);
-    }
-    text.push_str(if enable {
-        "\n    always @(posedge clk) if (enable) begin\n"
-    } else {
-        "\n    always @(posedge clk) begin\n"
-    });
-    for Memory { name, address, .. } in memories {
-        let _ = writeln!(text, "        {name} <= {name}_words[{address}];");
-    }
-    text.push_str("    end\n");
-    for Memory { name, bits, words, .. } in memories {
+}
+
+impl Memory {
+    /// Writes the block that initialises the memory.
+    fn initial(&self, text: &mut String) {
+        let Memory { name, bits, words, .. } = self;
         let digits = bits.div_ceil(4) as usize;
         text.push_str("\n    initial begin\n");
         for (row, chunk) in words.chunks(4).enumerate() {
@@ -73,6 +108,4 @@ fn module(name: &str, contract: &str, enable: bool, memories: &[Memory<'_>]) -> 
         }
         text.push_str("    end\n");
     }
-    text.push_str("\nendmodule\n");
-    text
 }

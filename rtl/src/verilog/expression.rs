@@ -5,29 +5,29 @@ use std::borrow::Cow;
 use std::fmt::{self, Write as _};
 use std::ops::{BitAnd, BitOr, BitXor, Not};
 
-/// Columns for what continues an expression.
+/// Width of the continuation lines of an expression.
 const LINE: usize = 118;
 
-/// A name that a module declares: a port, a wire, a register, a parameter. It is written as its name.
+/// Declared name: a port, a wire, a register or a parameter. It prints as its name.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Net {
     name: Cow<'static, str>,
-    /// Highest and lowest bit; a single bit without a range has none.
+    /// Highest and lowest bit; `None` for a bit without a range.
     range: Option<(u32, u32)>,
 }
 
 impl Net {
-    /// A single bit.
+    /// Net of a single bit.
     pub const fn bit(name: &'static str) -> Net {
         Net { name: Cow::Borrowed(name), range: None }
     }
 
-    /// Bits `width - 1` to 0, of which there is one at least.
+    /// Net with bits `width - 1` to 0; at least one bit.
     pub const fn bus(name: &'static str, width: u32) -> Net {
         Net { name: Cow::Borrowed(name), range: Some((width.saturating_sub(1), 0)) }
     }
 
-    /// As [`Net::bit`], with a name that is made.
+    /// Net of a single bit, with a computed name.
     pub fn named(name: String) -> Net {
         Net { name: Cow::Owned(name), range: None }
     }
@@ -42,17 +42,17 @@ impl Net {
         Net { range: Some((high, low)), ..self }
     }
 
-    /// Its name.
+    /// Name in the module.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// Its width in bits.
+    /// Number of bits of the net.
     pub fn width(&self) -> u32 {
         self.range.map_or(1, |(high, low)| high - low + 1)
     }
 
-    /// `[7:0] `, or nothing for a bit.
+    /// Text of the range, such as `[7:0] `; empty for a bit without a range.
     pub(super) fn range_text(&self) -> String {
         self.range.map_or_else(String::new, |(high, low)| format!("[{high}:{low}] "))
     }
@@ -61,7 +61,7 @@ impl Net {
         Expr::Net { net: self.clone(), select: Some(select) }
     }
 
-    /// One of its bits.
+    /// Bit at an index.
     pub fn at(&self, place: impl Into<Offset>) -> Expr {
         self.select(Select::Bit(place.into()))
     }
@@ -71,12 +71,12 @@ impl Net {
         self.select(Select::Slice(high, low))
     }
 
-    /// The lowest bits.
+    /// The lowest `width` bits.
     pub fn low(&self, width: u32) -> Expr {
         self.slice(width.saturating_sub(1), 0)
     }
 
-    /// `width` bits from a place upwards.
+    /// Bits from an index upwards, `width` of them.
     pub fn part(&self, place: impl Into<Offset>, width: u32) -> Expr {
         self.select(Select::Part(place.into(), width))
     }
@@ -88,12 +88,12 @@ impl fmt::Display for Net {
     }
 }
 
-/// A range of a net's bits.
+/// Index of a bit in a net.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Offset {
-    /// A number.
+    /// Index that is known when generating.
     Number(u32),
-    /// A parameter or a loop's variable, times a number.
+    /// Multiple of a parameter or of a loop variable: factor, then net.
     Multiple(u32, Net),
 }
 
@@ -119,66 +119,66 @@ impl fmt::Display for Offset {
     }
 }
 
-/// The part of a net that an expression uses.
+/// Part of a net that an expression uses.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Select {
-    /// A bit.
+    /// Single bit at an index.
     Bit(Offset),
-    /// Bits from the first number down to the second.
+    /// Bits from the first index down to the second.
     Slice(u32, u32),
-    /// So many bits from a place upwards.
+    /// Bits from an index upwards; the second field is their number.
     Part(Offset, u32),
 }
 
 /// An expression. Nested operators are always put in parentheses, whatever their precedence.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Expr {
-    /// A number with its width, as it is written.
+    /// Literal, in Verilog's syntax.
     Literal(String),
-    /// A net, or a part of it.
+    /// Net, or a part of it.
     Net {
-        /// The net.
+        /// Net that is read.
         net: Net,
-        /// The part; all of it without.
+        /// Selected part; `None` for the whole net.
         select: Option<Select>,
     },
-    /// `~x`.
+    /// Negation of every bit: `~x`.
     Not(Box<Expr>),
-    /// `&x`, `|x`, `^x`: all bits of x.
+    /// Reduction over all bits: `&x`, `|x`, `^x`.
     Reduce(&'static str, Box<Expr>),
-    /// `x & y & z`; with a single term it is that term.
+    /// Terms with an associative operator: `x & y & z`; a single term prints alone.
     Chain(&'static str, Vec<Expr>),
-    /// `x == y`.
+    /// Comparison: `x == y`.
     Compare(&'static str, Box<Expr>, Box<Expr>),
-    /// `x ? y : z`.
+    /// Choice: `x ? y : z`.
     Choose(Box<[Expr; 3]>),
-    /// `{x, y}`, the most significant first; with a single term it is that term.
+    /// Concatenation `{x, y}`, the most significant first; a single term prints alone.
     Concat(Vec<Expr>),
-    /// `{n{x}}`.
+    /// Repetition of a term: `{n{x}}`.
     Repeat(u32, Box<Expr>),
 }
 
-/// A number in decimal.
+/// Literal with its width, in decimal.
 pub fn decimal(width: u32, value: impl Into<u64>) -> Expr {
     Expr::Literal(format!("{width}'d{}", value.into()))
 }
 
-/// A number without a width, as parameters are.
+/// Literal without a width, for parameters.
 pub fn number(value: u32) -> Expr {
     Expr::Literal(value.to_string())
 }
 
-/// A string, as parameters are.
+/// String literal, for parameters.
 pub fn string(text: &str) -> Expr {
     Expr::Literal(format!("\"{text}\""))
 }
 
-/// A number in hexadecimal, of all its digits.
+/// Literal in hexadecimal, with leading zeros.
 pub fn hexadecimal(width: u32, value: u64) -> Expr {
     Expr::Literal(format!("{width}'h{value:0digits$x}", digits = width.div_ceil(4) as usize))
 }
 
-/// Fields in binary, the most significant first, each with its width, an underscore between them.
+/// Literal of several binary fields, the most significant first, each with its width, separated by underscores.
 pub fn binary(fields: &[(u32, u64)]) -> Expr {
     let width: u32 = fields.iter().map(|(width, _)| width).sum();
     let digits: Vec<_> =
@@ -186,66 +186,66 @@ pub fn binary(fields: &[(u32, u64)]) -> Expr {
     Expr::Literal(format!("{width}'b{}", digits.join("_")))
 }
 
-/// A bit that is 0.
+/// Literal of a bit that is 0.
 pub fn no() -> Expr {
     Expr::Literal("1'b0".to_owned())
 }
 
-/// A bit that is 1.
+/// Literal of a bit that is 1.
 pub fn yes() -> Expr {
     Expr::Literal("1'b1".to_owned())
 }
 
-/// The disjunction of the terms: 1 if any of them is.
+/// Disjunction of the terms; 0 without terms.
 pub fn any<T: Into<Expr>>(terms: impl IntoIterator<Item = T>) -> Expr {
     let terms: Vec<Expr> = terms.into_iter().map(Into::into).collect();
     if terms.is_empty() { no() } else { Expr::Chain("|", terms) }
 }
 
-/// Terms one after the other, the least significant first.
+/// Concatenation of the terms, the least significant first.
 pub fn concat<T: Into<Expr>>(terms: impl IntoIterator<Item = T, IntoIter: DoubleEndedIterator>) -> Expr {
     Expr::Concat(terms.into_iter().rev().map(Into::into).collect())
 }
 
-/// A bit or a few, so many times.
+/// Replication of a term.
 pub fn repeat(times: u32, of: impl Into<Expr>) -> Expr {
     Expr::Repeat(times, Box::new(of.into()))
 }
 
-/// `value`, where `valid`, a bit, is 1; else 0.
+/// `value` if the bit `valid` is 1, otherwise 0.
 pub fn gated(width: u32, valid: impl Into<Expr>, value: impl Into<Expr>) -> Expr {
     repeat(width, valid) & value
 }
 
-/// `yes` where `condition` is 1, else `no`.
+/// `yes` if `condition` is 1, otherwise `no`.
 pub fn choose(condition: impl Into<Expr>, yes: impl Into<Expr>, no: impl Into<Expr>) -> Expr {
     Expr::Choose(Box::new([condition.into(), yes.into(), no.into()]))
 }
 
 impl Expr {
-    /// 1 if any bit is.
+    /// 1 if any bit is 1.
     pub fn any_bit(self) -> Expr {
         Expr::Reduce("|", Box::new(self))
     }
 
-    /// 1 if every bit is.
+    /// 1 if every bit is 1.
     pub fn every_bit(self) -> Expr {
         Expr::Reduce("&", Box::new(self))
     }
 
-    /// 1 if it equals another one.
+    /// 1 if both expressions are equal.
     pub fn is(self, other: impl Into<Expr>) -> Expr {
         Expr::Compare("==", Box::new(self), Box::new(other.into()))
     }
 
-    /// 1 if it differs from another one.
+    /// 1 if the expressions differ.
     pub fn is_not(self, other: impl Into<Expr>) -> Expr {
         Expr::Compare("!=", Box::new(self), Box::new(other.into()))
     }
 
     fn chain(self, operator: &'static str, other: Expr) -> Expr {
         match self {
-            // `any` of one term stays a term of its own.
+            // A chain of one term, as `any` makes it, stays a term of its own.
             Expr::Chain(own, mut terms) if own == operator && terms.len() > 1 => {
                 terms.push(other);
                 Expr::Chain(own, terms)
@@ -254,7 +254,7 @@ impl Expr {
         }
     }
 
-    /// Calls `see` with every net that the expression uses.
+    /// Calls `see` with every net of the expression.
     pub(super) fn nets<'a>(&'a self, see: &mut dyn FnMut(&'a Net)) {
         match self {
             Expr::Literal(_) => {}
@@ -277,7 +277,7 @@ impl Expr {
         }
     }
 
-    /// As an operator's operand.
+    /// Text as an operand of an operator.
     fn nested(&self) -> String {
         match self {
             Expr::Chain(_, terms) if terms.len() == 1 => terms[0].nested(),
@@ -286,8 +286,8 @@ impl Expr {
         }
     }
 
-    /// The expression, if it is longer than `room`, broken before its operators or after its commas, with `indent` before each
-    /// line but the first.
+    /// Text of the expression. If it is longer than `room`, it is broken before operators or after commas, with `indent` at the start of
+    /// each further line.
     pub(super) fn broken(&self, room: usize, indent: &str) -> String {
         let whole = self.to_string();
         if whole.len() <= room {
@@ -296,7 +296,7 @@ impl Expr {
         match self {
             Expr::Chain(operator, terms) if terms.len() > 1 => {
                 let terms: Vec<_> = terms.iter().map(Expr::nested).collect();
-                // Names stand several in a line, anything longer alone.
+                // Names fill a line; longer terms stand alone.
                 let long = terms.iter().any(|term| term.contains(' '));
                 let mut text = String::new();
                 let mut left = if long { 0 } else { room };

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Syntax tree of a Verilog module (ports, nets, assignments, always blocks, instances), and its printer.
 //!
-//! A [`Module`] keeps its items in the order in which they are added, which is that of the file. [`Module::finish`] checks that every
-//! name is declared once, and before its use. An [`Expr`] is built from [`Net`]s, which know their widths, with Rust's operators
-//! `&`, `|`, `^`, `!`.
+//! A [`Module`] prints its items in the order in which they were added. [`Module::finish`] checks that every name is declared once, and
+//! before its use. An [`Expr`] is built from [`Net`]s, which know their widths, with Rust's operators `&`, `|`, `^`, `!`.
 
 mod expression;
 mod print;
@@ -16,15 +15,15 @@ pub use expression::{
 use std::collections::BTreeSet;
 use thiserror::Error;
 
-/// The reason why a module is not valid Verilog.
+/// Reason why a module is not valid Verilog.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum ModuleError {
-    /// A name is used before it is declared, or never declared.
+    /// A name is used before its declaration, or never declared.
     #[error("module {module}: `{name}` is used before it is declared")]
     Undeclared {
-        /// The module.
+        /// Name of the module.
         module: String,
-        /// The name.
+        /// Name that is used.
         name: String,
     },
     /// A name is declared twice.
@@ -32,34 +31,34 @@ pub enum ModuleError {
         "module {module}: `{name}` is declared twice: names of slots, banks and units must not make the name of something else"
     )]
     Twice {
-        /// The module.
+        /// Name of the module.
         module: String,
-        /// The name.
+        /// Name that is declared again.
         name: String,
     },
 }
 
-/// The direction of a port.
+/// Direction of a port.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Direction {
-    /// Driven from outside.
+    /// Driven from outside the module.
     Input,
-    /// Driven by the module.
+    /// Driven by an assignment or an instance.
     Output,
-    /// Driven by an always block of the module.
+    /// Driven by an always block.
     OutputRegister,
 }
 
-/// A port of a module.
+/// Port of a module.
 #[derive(Clone, Debug)]
 pub struct Port {
-    /// Its direction.
+    /// Direction, as seen from the module.
     pub direction: Direction,
-    /// Its name and width.
+    /// Name and width of the port.
     pub net: Net,
-    /// A comment on a line of its own before it.
+    /// Comment on lines of its own before the port.
     pub heading: Option<String>,
-    /// A comment after it, on the same line.
+    /// Comment on the port's line.
     pub remark: Option<&'static str>,
 }
 
@@ -69,46 +68,46 @@ impl Port {
         Port { direction, net, heading: None, remark: None }
     }
 
-    /// The port with a line of comment before it.
+    /// Adds a comment before the port.
     pub fn heading(self, text: impl Into<String>) -> Port {
         Port { heading: Some(text.into()), ..self }
     }
 
-    /// The port with a comment behind it.
+    /// Adds a comment on the port's line.
     pub fn remark(self, text: &'static str) -> Port {
         Port { remark: Some(text), ..self }
     }
 }
 
-/// A parameter of a module.
+/// Parameter of a module.
 #[derive(Clone, Debug)]
 pub(crate) struct Parameter {
     pub(crate) net: Net,
-    /// The default value.
+    /// Default of the parameter.
     pub(crate) value: Expr,
-    /// A comment on a line of its own before it.
+    /// Comment on lines of its own before the parameter.
     pub(crate) heading: String,
 }
 
-/// The driver of a net, in its declaration.
+/// Keyword of a net's declaration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
     Wire,
     Reg,
 }
 
-/// A statement of an always block.
+/// Statement of an always block.
 #[derive(Clone, Debug)]
 pub(crate) enum Statement {
-    /// An assignment: nonblocking in a clocked block, blocking in a combinational one.
+    /// Assignment: nonblocking in a clocked block, blocking in a combinational one.
     Set { left: Expr, right: Expr, remark: Option<&'static str> },
-    /// Statements that are executed only if the condition is 1.
+    /// Statements executed while a condition is 1.
     If { condition: Expr, body: Vec<Statement> },
-    /// A case statement on `of`.
+    /// Case statement on `of`.
     Case { of: Expr, arms: Vec<Arm>, default: Vec<Statement> },
 }
 
-/// An arm of a case statement.
+/// Arm of a case statement.
 #[derive(Clone, Debug)]
 pub(crate) struct Arm {
     pub(crate) value: Expr,
@@ -116,18 +115,18 @@ pub(crate) struct Arm {
     pub(crate) remark: &'static str,
 }
 
-/// The assignment of `right` to `left`.
+/// Assignment of `right` to `left`.
 pub(crate) fn set(left: impl Into<Expr>, right: impl Into<Expr>) -> Statement {
     Statement::Set { left: left.into(), right: right.into(), remark: None }
 }
 
-/// Statements that are executed only if `condition` is 1.
+/// Statements under a condition.
 pub(crate) fn when(condition: impl Into<Expr>, body: Vec<Statement>) -> Statement {
     Statement::If { condition: condition.into(), body }
 }
 
 impl Statement {
-    /// The assignment with a comment behind it.
+    /// Adds a comment on the assignment's line.
     pub(crate) fn remark(self, text: &'static str) -> Statement {
         match self {
             Statement::Set { left, right, .. } => Statement::Set { left, right, remark: Some(text) },
@@ -157,7 +156,7 @@ impl Statement {
     }
 }
 
-/// An instance of another module.
+/// Instance of another module.
 #[derive(Clone, Debug)]
 pub(crate) struct Instance {
     module: String,
@@ -176,13 +175,13 @@ impl Instance {
         self
     }
 
-    /// A parameter that is a parameter of this module.
+    /// Passes on a parameter of this module.
     pub(crate) fn parameter_as(mut self, name: &'static str, value: &Net) -> Instance {
         self.parameters.push((name, value.into()));
         self
     }
 
-    /// A parameter that is more than a number.
+    /// Sets a parameter to an expression.
     pub(crate) fn parameter_is(mut self, name: &'static str, value: Expr) -> Instance {
         self.parameters.push((name, value));
         self
@@ -193,20 +192,20 @@ impl Instance {
         self
     }
 
-    /// Outputs that are left open.
+    /// Leaves output ports of the instance open.
     pub(crate) fn open(mut self, names: impl IntoIterator<Item = impl Into<String>>) -> Instance {
         self.ports.extend(names.into_iter().map(|name| (name.into(), Expr::Literal(String::new()))));
         self
     }
 
-    /// Ports that are connected to the nets of their names.
+    /// Connects ports to the nets of the same names.
     pub(crate) fn same(mut self, nets: impl IntoIterator<Item = Net>) -> Instance {
         self.ports.extend(nets.into_iter().map(|net| (net.name().to_owned(), net.into())));
         self
     }
 }
 
-/// An item of a module.
+/// Item of a module.
 #[derive(Clone, Debug)]
 enum Item {
     Blank,
@@ -218,7 +217,7 @@ enum Item {
     Instance(Instance),
 }
 
-/// A module under construction.
+/// Module under construction, checked as it grows.
 #[derive(Clone, Debug)]
 pub(crate) struct Module {
     name: String,
@@ -230,11 +229,11 @@ pub(crate) struct Module {
     error: Option<ModuleError>,
 }
 
-/// The name of the clock in every module.
+/// Clock of every module.
 pub(crate) const CLK: Net = Net::bit("clk");
 
 impl Module {
-    /// A module with its ports; `heading` is what the file begins with.
+    /// A module with its ports; `heading` becomes the comment at the head of the file.
     pub(crate) fn new(name: &str, heading: Vec<String>, ports: Vec<Port>) -> Module {
         let mut module = Module {
             name: name.to_owned(),
@@ -252,7 +251,7 @@ impl Module {
         module
     }
 
-    /// Adds a parameter.
+    /// Adds a parameter to the module's interface.
     pub(crate) fn takes(&mut self, parameter: Parameter) {
         self.declare(&parameter.net);
         self.parameters.push(parameter);
@@ -312,7 +311,7 @@ impl Module {
         self.add(Item::Blank);
     }
 
-    /// A line of comment.
+    /// Adds lines of comment.
     pub(crate) fn comment(&mut self, text: impl Into<String>) {
         self.add(Item::Comment(text.into()));
     }
@@ -323,14 +322,14 @@ impl Module {
         self.comment(format!("---- {text}"));
     }
 
-    /// A `localparam`.
+    /// Adds a `localparam` with a number.
     pub(crate) fn parameter(&mut self, net: Net, value: u32) {
         self.add(Item::Parameter { net, value });
     }
 
     fn nets(&mut self, kind: Kind, nets: impl IntoIterator<Item = Net>) {
         let nets: Vec<Net> = nets.into_iter().collect();
-        // A declaration has one range.
+        // A declaration has one range, so nets of equal ranges share one.
         for same in nets.chunk_by(|a, b| a.range_text() == b.range_text()) {
             self.add(Item::Nets { kind, nets: same.to_vec(), value: None, remark: None });
         }
@@ -344,12 +343,12 @@ impl Module {
         self.nets(Kind::Reg, nets);
     }
 
-    /// A register with a comment behind it.
+    /// Adds a register with a comment on its line.
     pub(crate) fn reg(&mut self, net: Net, remark: &'static str) {
         self.add(Item::Nets { kind: Kind::Reg, nets: vec![net], value: None, remark: Some(remark) });
     }
 
-    /// A wire and what it is.
+    /// Declares a wire with its value.
     pub(crate) fn define(&mut self, net: Net, value: impl Into<Expr>) {
         self.add(Item::Nets { kind: Kind::Wire, nets: vec![net], value: Some(value.into()), remark: None });
     }
@@ -378,10 +377,10 @@ impl Module {
         self.add(Item::Instance(instance));
     }
 
-    /// The text of the module.
+    /// Text of the module.
     ///
     /// # Errors
-    /// If a name is declared twice, or used and not declared before.
+    /// If a name is declared twice, or used before its declaration.
     pub(crate) fn finish(self) -> Result<String, ModuleError> {
         match self.error {
             Some(error) => Err(error),

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Printer of a Verilog module: lines below 120 columns if expressions allow it, assignments and ports aligned.
+//! Printer of a Verilog module: lines of up to 120 columns where expressions allow it, with assignments and ports aligned.
 
 use super::{Direction, Expr, Instance, Item, Kind, Module, Port, Statement};
 use std::fmt::Write as _;
@@ -41,9 +41,9 @@ pub(super) fn module(module: &Module) -> String {
     v
 }
 
-/// Writes a comment, wrapped; further lines are indented like the text of the first.
+/// Writes a comment, wrapped; continuation lines are indented like the text of the first.
 fn comment(v: &mut String, indent: &str, text: &str) {
-    // Names of files and links come from outside.
+    // Names of files and links come from outside and may contain control characters.
     let text = &*visible(text);
     let inner = &text[..text.len() - text.trim_start().len()];
     let mut line = format!("{indent}//");
@@ -135,7 +135,7 @@ fn write_item(v: &mut String, item: &Item) {
     };
 }
 
-/// Writes `head` and its body: on the same line if that is one assignment, else between `begin` and `end`.
+/// Writes `head` and its body: on the same line if the body is one assignment, otherwise between `begin` and `end`.
 fn write_body(v: &mut String, head: &str, body: &[Statement], operator: &str, indent: usize) {
     match body {
         [Statement::Set { left, right, remark: None }]

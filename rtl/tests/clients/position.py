@@ -22,7 +22,7 @@ def expected(n, wanted):
 
 
 def described():
-    """Addresses and records, as tools/xtask/src/clients.rs writes them."""
+    """Addresses and records, as tools/evidence/src/clients.rs writes them."""
     return json.loads(Path("core.json").read_text())
 
 
@@ -59,5 +59,5 @@ async def load_and_run(write, read):
         outputs = {name: await read(core["outputs"][name]) for name in ("duty", "error")}
         error = (wanted - n + 2**31) % 2**32 - 2**31  # as the integer unit wraps
         assert outputs == expected(wanted - error, wanted), (n, wanted, outputs)
-    # What is read nowhere is 0.
+    # An address without a register reads 0.
     assert await read(0x7FF0) == 0

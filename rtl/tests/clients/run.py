@@ -1,4 +1,4 @@
-"""Builds each circuit in Icarus Verilog and runs its client: run.py FOLDER. What is in FOLDER: tools/xtask/src/clients.rs."""
+"""Builds each circuit in Icarus Verilog and runs its client: run.py FOLDER. What is in FOLDER: tools/evidence/src/clients.rs."""
 
 import sys
 from pathlib import Path
@@ -20,7 +20,7 @@ def run(folder, module, top, files):
         always=True,
         timescale=("1ns", "1ps"),
     )
-    # Memory images are found where it runs.
+    # The simulator finds memory images in its working folder.
     results = runner.test(
         hdl_toplevel=top,
         test_module=module,

@@ -23,7 +23,7 @@ def request(number, command, address, words, count=None):
 async def frames_are_answered(dut):
     board = json.loads(Path("board.json").read_text())
     at = board["registers"]
-    # 25 MHz.
+    # The clock has 25 MHz.
     cocotb.start_soon(Clock(dut.clk_in, 40, units="ns").start())
     dut.button.value = board["released"]
     dut.encoder_a.value = 0
@@ -53,7 +53,7 @@ async def frames_are_answered(dut):
         assert await answer(number) == []
 
     assert await read(1, at["id"]) == [0x544B0201]
-    # A wrong checksum is no request, and is counted.
+    # A frame with a wrong checksum is no request, and counts as an error.
     [before] = await read(2, at["errors"])
     broken = bytearray(request(3, 2, at["period"], [5]))
     broken[-1] ^= 0x10
@@ -63,13 +63,13 @@ async def frames_are_answered(dut):
     assert sink.empty()
     assert await read(4, at["errors"]) == [before + 1]
     assert await read(5, at["period"]) == [board["period"]]
-    # The program runs, and answers what the host sets.
+    # The program runs, and answers the inputs that the host sets.
     await write(6, board["inputs"]["wanted"], [33])
     await Timer(250, units="us")
     outputs = expected(0, 33)
     assert await read(7, board["outputs"]["error"]) == [outputs["error"]]
     assert await read(8, board["outputs"]["duty"]) == [outputs["duty"]]
-    # A write of the same number is answered again, not done again.
+    # The board answers a repeated write of the last number again, but does not do it again.
     await write(9, at["control"], [0b111])
     [held] = await read(10, at["periods"])
     for _ in range(3):

@@ -26,7 +26,7 @@ async def loads_and_runs(dut):
     await ClockCycles(dut.clk_i, 3)
     dut.rst_i.value = 0
 
-    # The first load waits for a whole reset, in which what was kept is written again.
+    # The first load waits for a whole reset, which writes the kept words again.
     async def write(address, word):
         await master.send_cycle([WBOp(address, word, acktimeout=5000)])
 

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use takt_isa::fp::{Flags, Reference, SIN_IDENTITY, SIN_LIMIT, Value};
-use takt_isa::{Effect, Op, Row, Type, Unit, compute};
+use takt_isa::{Effect, Function, Op, Row, Type, Unit, compute};
 use takt_rtl::verilator::{Sources, VerilatorError};
 use takt_rtl::{Circuit, Library};
 
@@ -19,10 +19,10 @@ mod fp_common;
 pub(crate) use fp_common::full;
 use fp_common::{Pairs, Random, Triples, special_values};
 
-/// The other half of [`Simulation`].
+/// The C++ half of [`Simulation`].
 const DRIVER: &str = include_str!("driver.cpp");
 
-/// Operations that go through the circuit in one batch.
+/// Most operations that go through the circuit in a batch.
 const BATCH: usize = 1 << 15;
 
 /// The Verilog files of the project.
@@ -31,12 +31,12 @@ pub(crate) fn library() -> Library {
     Library::load(&folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display()))
 }
 
-/// A unit's circuit.
+/// The circuit of a unit.
 pub(crate) fn circuit(library: &Library, unit: &Unit) -> Result<Circuit, String> {
     library.circuit(unit).map_err(|error| format!("unit `{}`: {error}", unit.name))
 }
 
-/// Runs a tool and returns what it wrote; `Err` if it failed.
+/// Runs a tool and returns its output; `Err` with the output if it failed.
 fn run(command: &mut Command) -> Result<String, String> {
     let program = command.get_program().to_string_lossy().into_owned();
     let output = match command.output() {
@@ -56,7 +56,7 @@ const WAIVERS: &[&str] = &[
     "-Wno-DECLFILENAME",
 ];
 
-/// Verilator's lint of a circuit. This is also how elaboration is tried.
+/// Verilator's lint of a circuit, which also tries the elaboration.
 pub(crate) fn lint(library: &Library, circuit: &Circuit) -> Result<String, String> {
     let folder = Folder::new(circuit, "lint");
     run(Command::new("verilator")
@@ -67,7 +67,7 @@ pub(crate) fn lint(library: &Library, circuit: &Circuit) -> Result<String, Strin
         .args(folder.write(library, circuit)))
 }
 
-/// Elaboration by Icarus Verilog, which knows nothing of what Verilator accepts beyond Verilog-2005.
+/// Elaboration by Icarus Verilog, which refuses the extensions of Verilog-2005 that Verilator accepts.
 pub(crate) fn elaborate(library: &Library, circuit: &Circuit) -> Result<String, String> {
     let folder = Folder::new(circuit, "elaborate");
     let top = circuit.unit.rtl;
@@ -90,7 +90,7 @@ impl Folder {
         Folder(folder)
     }
 
-    /// Writes the files that the circuit needs and returns their paths.
+    /// Writes the files that the circuit needs, and returns their paths.
     fn write(&self, library: &Library, circuit: &Circuit) -> Vec<PathBuf> {
         let write = |name: &String| {
             let path = self.0.join(name.replace('/', "-"));
@@ -123,7 +123,7 @@ pub(crate) struct Request {
     pub(crate) op: Op,
     pub(crate) code: u32,
     pub(crate) sources: [u32; 3],
-    /// Cycles without an operation before it, on top of the unit's interval.
+    /// Cycles without an operation before this operation, on top of the unit's interval.
     pub(crate) idle: u32,
 }
 
@@ -150,7 +150,7 @@ impl Simulation {
         Ok(Simulation { circuit: circuit.clone(), program, stdin, stdout: stdout.expect("piped"), process })
     }
 
-    /// Removes the program, of a circuit that nobody will ask for again.
+    /// Removes the program of a circuit that nobody will ask for again.
     pub(crate) fn remove(self) {
         let _ = fs::remove_file(&self.program);
     }
@@ -203,9 +203,9 @@ impl Simulation {
         Ok(())
     }
 
-    /// All pairs of special values, for every operation; a third operand takes a few. Of three numbers the third takes every
-    /// seventh of those that are numbers, another seventh for each pair, and with `TAKT_FULL=1` all.
-    pub(crate) fn check_special_values(&mut self) -> Result<u64, String> {
+    /// Passes all pairs of special values through, for every operation; a third operand takes a few values. Of three numbers, the third
+    /// takes every seventh special value that is a number, another seventh for each pair; with `TAKT_FULL=1`, it takes all.
+    fn check_special_values(&mut self) -> Result<u64, String> {
         let values = self.special_values();
         let mut count = 0;
         for operation in self.circuit.operations.clone() {
@@ -254,23 +254,65 @@ impl Simulation {
 
     fn special_values(&self) -> Vec<u32> {
         let mut values = special_values();
-        // As integers: bounds, powers of two and their neighbours, shift counts.
+        // Special integers are bounds, powers of two and their neighbours, shift counts.
         values.extend((0..=33).chain([0x8000_0000, 0x8000_0001, 0xffff_ffff, 0xffff_ffe0, 0xffff_fffe]));
         values.extend((6..31).flat_map(|k| [(1 << k) - 1, 1 << k, (1 << k) + 1, 1u32.wrapping_neg() << k]));
         // The sine's limits, and the numbers closest to a multiple of π and of π/2 (3π, 80.5π).
         for edge in [SIN_LIMIT, SIN_IDENTITY, 0x4116_cbe4, 0x437c_e5f1] {
             values.extend((edge - 2..=edge + 2).flat_map(|magnitude| [magnitude, magnitude | 0x8000_0000]));
         }
-        // By infinity it has the exponent that the smallest normal number would come from.
+        // Divided by infinity, the value has the exponent that the smallest normal number would come from.
         values.push(0x40a0_0000);
         values.sort_unstable();
         values.dedup();
         values
     }
 
+    /// Passes sums and differences of numbers whose exponents are up to 60 apart through, for every operation that adds. The larger number
+    /// varies in its first and last bits; the smaller number has each bit alone, each bit with the lowest bit, and runs of ones from either
+    /// end. Every distance therefore has a tie, a tie that a single bit decides, and a cancellation. A product of a third operand is a
+    /// product by 1.
+    fn check_sums(&mut self) -> Result<u64, String> {
+        const MASK: u32 = 0x007f_ffff;
+        const EXPONENT: u32 = 150;
+        let larger = [0, 1, 2, 3, MASK - 3, MASK - 2, MASK - 1, MASK];
+        let smaller: Vec<u32> = (0..23)
+            .flat_map(|place| [1 << place, 1 << place | 1, (1 << place) - 1, u32::MAX << place & MASK])
+            .collect();
+        let one = 1.0_f32.to_bits();
+        let mut count = 0;
+        for operation in self.circuit.operations.clone() {
+            let row = operation.op.row();
+            if !matches!(row.function, Function::Add | Function::Fused) {
+                continue;
+            }
+            let mut requests = Vec::new();
+            for (distance, large) in (0..=60).flat_map(|distance| larger.map(|large| (distance, large))) {
+                for (i, small) in smaller.iter().enumerate() {
+                    for sign in [0, 0x8000_0000] {
+                        let large = EXPONENT << 23 | large;
+                        let small = sign | (EXPONENT - distance) << 23 | small;
+                        // Pairs alternate between the two orders.
+                        let (first, second) = if i % 2 == 0 { (large, small) } else { (small, large) };
+                        let sources = if is_fused(row) { [first, one, second] } else { [first, second, 0] };
+                        requests.push(Request { op: operation.op, code: operation.code, sources, idle: 0 });
+                    }
+                }
+            }
+            count += requests.len() as u64;
+            self.check(&requests)?;
+        }
+        Ok(count)
+    }
+
+    /// Passes special values, sums, and `count` random operands through, and returns the number of each.
+    pub(crate) fn check_all(&mut self, count: u64) -> Result<[u64; 3], String> {
+        Ok([self.check_special_values()?, self.check_sums()?, self.check_random(count, 1)?])
+    }
+
     /// `count` random operands for each operation; operations of the unit alternate at random. Half of the batches run
     /// back to back, the others with random gaps.
-    pub(crate) fn check_random(&mut self, count: u64, seed: u64) -> Result<u64, String> {
+    fn check_random(&mut self, count: u64, seed: u64) -> Result<u64, String> {
         let operations = self.circuit.operations.clone();
         let mut operands = Operands::new(seed);
         let total = count * operations.len() as u64;
@@ -279,7 +321,7 @@ impl Simulation {
             requests.clear();
             let gaps = (done / BATCH as u64) % 2 == 1;
             while requests.len() < BATCH && done < total {
-                // Each operation once in every round, in an order of the round's own.
+                // Every round has each operation once, in an order of the round's own.
                 let n = operations.len() as u64;
                 let (round, turn) = (done / n, done % n);
                 let operation = operations[((turn + round * 7 + round / n) % n) as usize];
@@ -304,13 +346,13 @@ impl Drop for Simulation {
     }
 }
 
-/// True if an instruction takes three numbers.
+/// Tells if an instruction takes three numbers.
 fn is_fused(row: &Row) -> bool {
     row.shape.sources() == 3 && (0..3).all(|index| row.source_type(index) == Type::F)
 }
 
-/// The result of an operation by the specification. What the core puts in place of a source (an immediate, the status
-/// register) passes through.
+/// The result of an operation by the specification. The values that the core puts in place of a source (an immediate, the status register)
+/// pass through.
 fn meaning(request: &Request) -> Value {
     let [a, b, c] = request.sources;
     match request.op.row().effect {
@@ -336,7 +378,7 @@ fn mismatch(request: &Request, expected: Value, got: Value) -> String {
     )
 }
 
-/// Builds a circuit.
+/// Builds a circuit into a program.
 pub(crate) fn compile(library: &Library, circuit: &Circuit) -> Result<PathBuf, VerilatorError> {
     let unit = &circuit.unit;
     let text = |name: &'_ String| library.text(name).expect("the circuit's files are those of the library");

@@ -5,7 +5,7 @@
 //   p = a * b. SIGNED_A, SIGNED_B: 1 if a, b is in two's complement. INPUT_REGS, OUTPUT_REG: 1 for a register before, after the
 //   product. There is no reset.
 //   This is a behavioural model. For a device in whose multiplier blocks synthesis does not place the registers by itself, a
-//   module of the same name replaces it: ../../ecp5/takt_product.v.
+//   module of the same name replaces it: that of the device's family, in rtl/family.
 
 module takt_product #(
     parameter SIGNED_A   = 0,

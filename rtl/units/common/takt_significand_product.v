@@ -39,7 +39,7 @@ module takt_significand_product #(
         ones1      <= ones;
     end
 
-    // The sum's low 18 bits are those of low_low.
+    // The low 18 bits of the sum equal the low bits of low_low.
     wire [29:0] upper;
     wire        unused_high = |{high_low[35:24], low_high[35:24]};  // zero: 6 x 18 bits
 

@@ -1,86 +1,19 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Takt: assemble, emulate and time controllers for robots. One command per module; this is the only crate that knows the
-//! terminal.
+//! Takt: assembles, emulates and times controllers for robots. Each command is a module of `commands`; only this crate knows the terminal.
 
-mod absent;
-mod account;
-mod accuracy;
-mod analyse;
-mod application;
-mod arm;
-mod asm;
-mod batch;
-#[cfg(feature = "board")]
-mod board;
-mod bound;
-mod cache;
-mod completions;
-mod controller;
-mod cosim;
-#[cfg(feature = "editor")]
-mod dap;
-mod debug;
-mod deny;
-mod disasm;
-mod drive;
-mod eval;
-mod explore;
-mod fault;
-mod files;
-mod fmt;
-mod friction;
-mod interrupt;
-mod isa;
-#[cfg(feature = "board")]
-mod live;
-mod load;
-#[cfg(feature = "editor")]
-mod lsp;
-mod machine_mistake;
-mod machines;
-mod man;
-#[cfg(feature = "model")]
-mod model;
-mod monte_carlo;
-mod nan;
-mod number;
-mod output;
-mod page;
-mod plot;
-mod ports;
-mod progress;
-mod ran;
-mod report;
-#[cfg(feature = "robot")]
-mod robot;
-mod rtl;
+mod commands;
 mod run;
-mod select;
-#[cfg(feature = "board")]
-mod shadow;
-mod spills;
-mod synthesis;
-mod system;
-mod trace;
-mod track;
-mod verify;
-mod wrong;
+mod terminal;
 
-#[cfg(not(feature = "model"))]
-use absent::model;
-#[cfg(not(feature = "robot"))]
-use absent::robot;
-#[cfg(not(feature = "board"))]
-use absent::{board, live};
-#[cfg(not(feature = "editor"))]
-use absent::{dap, lsp};
 use anyhow::Result;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
-use files::Out;
-use output::{Color, Failure};
-use page::Page;
+use run::machine_mistake;
 use std::io::Write;
 use std::process::ExitCode;
+use terminal::files::Out;
+use terminal::output::{self, Color, Failure};
+use terminal::page::Page;
+use terminal::suggest;
 
 /// Robot controllers on a floating-point processor whose every cycle is accounted for.
 #[derive(Parser)]
@@ -112,36 +45,37 @@ Examples:
 
 #[derive(Subcommand)]
 enum Command {
-    Track(track::Track),
-    Arm(arm::Arm),
-    Robot(robot::Robot),
-    Asm(asm::Asm),
-    Model(model::Model),
-    Disasm(disasm::Disasm),
-    Verify(verify::Verify),
-    Run(run::Run),
-    Debug(debug::Debug),
-    Analyse(analyse::Analyse),
-    Bound(bound::Bound),
-    Accuracy(accuracy::Accuracy),
-    Eval(eval::Eval),
-    Fmt(fmt::Fmt),
-    Lsp(lsp::Lsp),
-    Dap(dap::Dap),
-    Rtl(rtl::Rtl),
-    Board(board::Boards),
-    Load(live::LoadBoard),
-    Live(live::Live),
-    Cosim(cosim::Cosim),
-    Isa(isa::Isa),
-    Machines(machines::Machines),
-    Explore(explore::Explore),
-    Completions(completions::Completions),
-    Man(man::Man),
+    Track(commands::track::Track),
+    Arm(commands::arm::Arm),
+    Robot(commands::robot::Robot),
+    Asm(commands::asm::Asm),
+    Model(commands::model::Model),
+    Cc(commands::cc::Cc),
+    Disasm(commands::disasm::Disasm),
+    Verify(commands::verify::Verify),
+    Run(commands::run::Run),
+    Debug(commands::debug::Debug),
+    Analyse(commands::analyse::Analyse),
+    Bound(commands::bound::Bound),
+    Accuracy(commands::accuracy::Accuracy),
+    Eval(commands::eval::Eval),
+    Fmt(commands::fmt::Fmt),
+    Lsp(commands::lsp::Lsp),
+    Dap(commands::dap::Dap),
+    Rtl(commands::rtl::Rtl),
+    Board(commands::board::Boards),
+    Load(commands::live::LoadBoard),
+    Live(commands::live::Live),
+    Cosim(commands::cosim::Cosim),
+    Isa(commands::isa::Isa),
+    Machines(commands::machines::Machines),
+    Explore(commands::explore::Explore),
+    Completions(commands::completions::Completions),
+    Man(commands::man::Man),
 }
 
 impl Command {
-    /// True if results are tables and sentences, which are folded at a terminal's width; others are sources, or go on interactively.
+    /// Results are tables and sentences, folded at the terminal's width; other commands print sources, or are interactive.
     fn is_for_people(&self) -> bool {
         use Command::{
             Accuracy, Analyse, Arm, Asm, Bound, Cosim, Explore, Isa, Machines, Robot, Run, Track, Verify,
@@ -167,60 +101,61 @@ impl Command {
 
 fn run(arguments: &Arguments, color: bool, out: &mut Out) -> Result<()> {
     match &arguments.command {
-        Command::Track(track) => track::run(track, color, out),
-        Command::Arm(arm) => arm::run(arm, color, out),
-        Command::Robot(robot) => robot::run(robot, color, out),
-        Command::Asm(asm) => asm::run(asm, color, out),
-        Command::Model(model) => model::run(model, color, out),
-        Command::Disasm(disasm) => disasm::run(disasm, color),
-        Command::Verify(verify) => verify::run(verify, color, out),
-        Command::Run(run) => run::run(run, color, out),
-        Command::Debug(debug) => debug::run(debug, color, out),
-        Command::Analyse(analyse) => analyse::run(analyse, color, out),
-        Command::Bound(bound) => bound::run(bound, color, out),
-        Command::Accuracy(accuracy) => accuracy::run(accuracy, color, out),
-        Command::Eval(eval) => eval::run(eval, out),
-        Command::Fmt(fmt) => fmt::run(fmt, out),
-        Command::Lsp(lsp) => lsp::run(lsp, color, out),
-        Command::Dap(dap) => dap::run(dap, color, out),
-        Command::Rtl(rtl) => rtl::run(rtl, color, out),
-        Command::Board(board) => board::run(board, color, out),
-        Command::Load(load) => live::load(load, color, out),
-        Command::Live(live) => live::live(live, color, out),
-        Command::Cosim(cosim) => cosim::run(cosim, color, out),
-        Command::Isa(isa) => isa::run(isa, out),
-        Command::Machines(machines) => machines::run(machines, color, out),
-        Command::Explore(explore) => explore::run(explore, color, out),
-        Command::Completions(completions) => completions::run(completions, out),
-        Command::Man(man) => man::run(man, out),
+        Command::Track(track) => commands::track::run(track, color, out),
+        Command::Arm(arm) => commands::arm::run(arm, color, out),
+        Command::Robot(robot) => commands::robot::run(robot, color, out),
+        Command::Asm(asm) => commands::asm::run(asm, color, out),
+        Command::Model(model) => commands::model::run(model, color, out),
+        Command::Cc(cc) => commands::cc::run(cc, color, out),
+        Command::Disasm(disasm) => commands::disasm::run(disasm, color),
+        Command::Verify(verify) => commands::verify::run(verify, color, out),
+        Command::Run(run) => commands::run::run(run, color, out),
+        Command::Debug(debug) => commands::debug::run(debug, color, out),
+        Command::Analyse(analyse) => commands::analyse::run(analyse, color, out),
+        Command::Bound(bound) => commands::bound::run(bound, color, out),
+        Command::Accuracy(accuracy) => commands::accuracy::run(accuracy, color, out),
+        Command::Eval(eval) => commands::eval::run(eval, out),
+        Command::Fmt(fmt) => commands::fmt::run(fmt, out),
+        Command::Lsp(lsp) => commands::lsp::run(lsp, color, out),
+        Command::Dap(dap) => commands::dap::run(dap, color, out),
+        Command::Rtl(rtl) => commands::rtl::run(rtl, color, out),
+        Command::Board(board) => commands::board::run(board, color, out),
+        Command::Load(load) => commands::live::load(load, color, out),
+        Command::Live(live) => commands::live::live(live, color, out),
+        Command::Cosim(cosim) => commands::cosim::run(cosim, color, out),
+        Command::Isa(isa) => commands::isa::run(isa, out),
+        Command::Machines(machines) => commands::machines::run(machines, color, out),
+        Command::Explore(explore) => commands::explore::run(explore, color, out),
+        Command::Completions(completions) => commands::completions::run(completions, out),
+        Command::Man(man) => commands::man::run(man, out),
     }
 }
 
-/// A command, and those below it, with examples that fit the terminal.
+/// A command with its subcommands, with examples folded to the terminal.
 fn fit(command: clap::Command, page: Page) -> clap::Command {
     let below = command.get_after_help().map(|text| page.below_help(&text.to_string()));
     let command = below.into_iter().fold(command, clap::Command::after_help);
     command.mut_subcommands(|command| fit(command, page))
 }
 
-/// The arguments, or the status to end with where clap has already answered (help, version, a mistake).
+/// Parses the arguments; the error is the exit status after an answer of clap (help, version, a mistake).
 fn parse(out: &mut Out) -> Result<Arguments, ExitCode> {
     let command = fit(Arguments::command(), Page::of_stdout(None));
     let parsed = command.try_get_matches().and_then(|matches| Arguments::from_arg_matches(&matches));
     parsed.map_err(|mut answer| {
-        wrong::suggest(&mut answer);
+        suggest::suggest(&mut answer);
         if answer.use_stderr() {
             let text = answer.render();
             let color = Color::Auto.on_stderr();
             output::message(&if color { text.ansi().to_string() } else { text.to_string() });
             return ExitCode::from(2);
         }
-        // Help goes where results go, so that a full disk or a closed pipe is treated alike.
+        // Print help like results, so that a full disk or a closed pipe has the same effect.
         end(write!(out, "{}", answer.render()).and_then(|()| out.flush()).map_err(Into::into), false)
     })
 }
 
-/// Reports an error, if there is one, and gives the exit status. A closed pipe, as under `| head`, is none.
+/// Reports an error, and returns the exit status. A closed pipe, as in `| head`, is no error.
 fn end(result: Result<()>, color: bool) -> ExitCode {
     let Err(error) = result else { return ExitCode::SUCCESS };
     if output::is_closed_pipe(&error) {
@@ -255,10 +190,10 @@ fn main() -> ExitCode {
         takt_emu::Emulator::switch_compiler_off();
     }
     if arguments.command.is_for_people() {
-        out.set_page(Page::of_stdout(arguments.color.asked()));
+        out.set_page(Page::of_stdout(arguments.color.explicit_choice()));
     }
     let result = run(&arguments, color, &mut out);
-    // Results written before an error still go out; the first error is the one that counts.
+    // Results before an error are still written; the first error decides.
     let flushed = out.flush().map_err(anyhow::Error::from);
     end(result.and(flushed), color)
 }

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Many runs at once: `takt run --batch`, `takt track --monte-carlo`, and that each is what it is alone.
+//! Batches (`takt run --batch`, `takt track --monte-carlo`): each run gives the same result as alone.
 
 use crate::common;
 use crate::common::Folder;
 use serde_json::Value;
 
-/// A state, a branch that data decides, and a division that may fail.
+/// A law with a state, a data-dependent branch, and a division that may fail.
 const LAW: &str = "\
 .input x, limit
 .output y, count:int
@@ -25,7 +25,7 @@ small:  fadd    y, sum, zero
         wait    period
 ";
 
-/// Inputs of runs: name and rows.
+/// Inputs of runs: names and rows.
 fn runs() -> Vec<(String, Vec<String>)> {
     (0..21)
         .map(|run| {
@@ -35,9 +35,9 @@ fn runs() -> Vec<(String, Vec<String>)> {
         .collect()
 }
 
-/// A limit that ends a run alone ends it in a batch, at the same period.
+/// A cycle limit ends a run in a batch in the same period as alone.
 #[test]
-fn a_limit_of_cycles_is_as_alone() {
+fn cycle_limit_acts_as_in_a_single_run() {
     let folder = Folder::new();
     folder.write("law.s", LAW);
     std::fs::create_dir(folder.path().join("runs")).unwrap();
@@ -83,7 +83,7 @@ fn a_limit_of_cycles_is_as_alone() {
 }
 
 #[test]
-fn each_run_of_a_batch_is_as_alone() {
+fn each_run_of_a_batch_equals_a_single_run() {
     let folder = Folder::new();
     folder.write("law.s", LAW);
     std::fs::create_dir(folder.path().join("runs")).unwrap();
@@ -103,7 +103,7 @@ fn each_run_of_a_batch_is_as_alone() {
     let of_folder = folder.line("run law.s --tick 500 --batch runs --outputs -").ok();
     assert_eq!(of_folder, expected);
 
-    // The same in one file, the runs' rows in turn.
+    // Interleaved rows of the same runs in one file.
     let mut csv = "limit,run,x\n".to_owned();
     for row in 0..8 {
         for (name, rows) in runs() {
@@ -116,7 +116,7 @@ fn each_run_of_a_batch_is_as_alone() {
     folder.write("all.csv", csv);
     assert_eq!(folder.line("run law.s --tick 500 --batch all.csv --outputs -").ok(), expected);
 
-    // Who raised a flag?
+    // Runs that raised a flag are named.
     let json = folder.line("run law.s --tick 500 --batch all.csv --json").ok();
     let json: Value = serde_json::from_str(&json).unwrap();
     for run in json["runs"].as_array().unwrap() {
@@ -135,7 +135,7 @@ fn each_run_of_a_batch_is_as_alone() {
 }
 
 #[test]
-fn a_run_that_fails_is_named_and_the_others_end() {
+fn names_a_failed_run_and_completes_the_others() {
     let folder = Folder::new();
     folder.write("law.s", ".input n:int\n.output y\n.once\nwait p\n.period\np: ld y, 0[n]\nwait p\n");
     folder.write("in.csv", "run,n\ngood,1\nbad,2\ngood,3\nbad,-9\ngood,4\nbad,5\n");
@@ -170,7 +170,7 @@ fn mistakes_in_batches() {
     }
 }
 
-/// The JSON of a line that must succeed.
+/// JSON output of a command that must succeed.
 fn json(folder: &Folder, line: &str) -> Value {
     serde_json::from_str(&folder.line(line).ok()).unwrap()
 }
@@ -183,7 +183,7 @@ fn robots_do_not_depend_on_threads_and_return_by_their_seeds() {
     let drives = |threads: &str| {
         let mut command = folder.command(&line.split_whitespace().collect::<Vec<_>>());
         command.env("RAYON_NUM_THREADS", threads);
-        common::Done::of(command).ok()
+        common::RunOutput::of(command).ok()
     };
     let one = drives("1");
     assert_eq!(one, drives("3"));
@@ -204,7 +204,7 @@ fn robots_do_not_depend_on_threads_and_return_by_their_seeds() {
             json(&folder, &format!("track -q --json --periods 400 --seed {seed} --spread spread.toml"));
         assert_eq!(alone["tracking_error_m"], drive["tracking_error_m"], "seed {seed}");
     }
-    // Another seed is another robot.
+    // Another seed gives another robot.
     assert_ne!(all["drives"][0]["tracking_error_m"], all["drives"][1]["tracking_error_m"]);
 }
 

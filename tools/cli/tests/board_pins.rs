@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Pins of a simulated board and their drivers, the board that a wiring names, and bounds of pins that answer with a density.
+//! Pins of a simulated board and their drivers, the board named in a wiring, and bounds of pins with pulse-density outputs.
 #![cfg(unix)]
 
-use crate::common::{Done, Folder};
+use crate::common::{Folder, RunOutput};
 use std::io::{BufRead, BufReader, Write};
 use std::process::{Command, Stdio};
 
@@ -59,16 +59,16 @@ fn folder() -> Folder {
 
 const TARGET: &str = "--wiring limit.toml --program limit.s --machine t1";
 
-/// A simulation, which Verilator needs more memory for than other tests have.
-fn sim(folder: &Folder, more: &str, input: &str) -> Done {
+/// Runs a simulation; Verilator needs a higher memory limit than other tests.
+fn sim(folder: &Folder, more: &str, input: &str) -> RunOutput {
     let mut command = Command::new(env!("CARGO_BIN_EXE_takt"));
     let line = format!("board sim {TARGET} {more}");
     command.args(line.split_whitespace()).current_dir(folder.path());
     command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut child = command.spawn().unwrap();
-    // It may well end before it has read everything.
+    // The process may end before it has read everything.
     let _ = child.stdin.take().unwrap().write_all(input.as_bytes());
-    Done::from(child.wait_with_output().unwrap())
+    RunOutput::from(child.wait_with_output().unwrap())
 }
 
 #[test]
@@ -80,7 +80,7 @@ fn the_wiring_names_the_board() {
     folder.line(&format!("board build {TARGET} --sources -o out")).ok();
     let pins = folder.line("board pins --wiring limit.toml").ok();
     assert!(pins.contains("limit.in"), "{pins}");
-    // If neither names one, the message says what to write.
+    // Without a board in wiring and arguments, the message says what to write.
     folder.write("limit.toml", WIRING.split_once('\n').unwrap().1);
     for line in [
         &format!("board check {TARGET}"),
@@ -96,13 +96,13 @@ fn the_wiring_names_the_board() {
     assert!(done.status == Some(2) && done.stderr.contains("--board"), "{done:?}");
 }
 
-/// A limit switch, from a script in a file and from standard input; the host at the UART sees it, too.
+/// A limit switch, driven by a script file and by standard input; the host at the UART sees it, too.
 #[test]
 fn a_script_drives_a_limit_switch() {
     let folder = folder();
     let script = "set limit=0   # not there yet\nwait 1ms\nshow\n\nset limit.in=1\nwait 50000\nshow\nquit\n";
     folder.write("script.txt", script);
-    let shown = |done: Done| {
+    let shown = |done: RunOutput| {
         assert_eq!((done.status, done.stderr.as_str()), (Some(0), "compiling the circuit …\n"));
         let (_, shown) = done.stdout.split_once('\n').unwrap();
         shown.to_owned()
@@ -112,19 +112,23 @@ fn a_script_drives_a_limit_switch() {
     assert!(before.starts_with("1.000 ms\n") && before.contains("  limit.in = 0\n"), "{text}");
     assert!(before.contains("  lamp.out = 0 (output)\n"), "{text}");
     assert!(after.contains("  limit.in = 1\n") && after.contains("  lamp.out = 1 (output)\n"), "{text}");
-    // A level from power-up on, and commands as they come.
+    // A level from power-up on, and interactive commands.
     let done = sim(&folder, "--script - --set limit=1", "wait 1ms\nshow\nfly\n");
     assert!(done.stdout.ends_with("  lamp.out = 1 (output)\n"), "{done:?}");
     assert!(done.status == Some(1) && done.stderr.contains("standard input:3: no command `fly`"), "{done:?}");
 
-    // Mistakes are reported before the circuit is compiled; of standard input, with the line.
+    // Mistakes are reported before the circuit is compiled, and in standard input with the line.
     for (line, text, says) in [
         ("--set limt=1", "", "--set no input pin `limt`; did you mean `limit`?; there are "),
         ("--set limit", "", "--set `limit` is not `pin=level`"),
         ("--set limit=7", "", "--set `limit=7`: a pin's level is 0 or 1"),
         ("--set lamp.out=1", "", "`lamp.out` is an output pin, which the board drives"),
         ("--axis motor,encoder,1 --set encoder.a=1", "", "no input pin `encoder.a`"),
-        ("--script bad.txt", "wait 1ms\nwait 3 parsecs\n", "bad.txt:2: `wait 3 parsecs`: `parsecs` is none"),
+        (
+            "--script bad.txt",
+            "wait 1ms\nwait 3 parsecs\n",
+            "bad.txt:2: `wait 3 parsecs`: `parsecs` is not one of the units",
+        ),
         ("--script bad.txt", "jump\n", "bad.txt:1: no command `jump`; there are `set pin=level …`"),
         ("--script bad.txt", "set\n", "bad.txt:1: `set` wants `pin=level`"),
         ("--script bad.txt", "quit now\n", "bad.txt:1: `quit` stands alone; `now` follows it"),
@@ -141,7 +145,7 @@ fn a_script_drives_a_limit_switch() {
     }
 }
 
-/// A plant at two pipes: it answers the motor's pulses with an encoder's counts, and has a limit switch at its end.
+/// A plant at two pipes: converts the motor's pulses to encoder counts, and has a limit switch at its end.
 #[test]
 fn a_plant_closes_the_loop_at_the_pins() {
     let folder = folder();
@@ -161,22 +165,22 @@ fn a_plant_closes_the_loop_at_the_pins() {
         writeln!(stdin, "{limit},{}", position as i32).unwrap();
         let values: Vec<f64> = row().split(',').map(|field| field.parse().unwrap()).collect();
         (fastest, lit) = (fastest.max(values[0]), values[1]);
-        // Safe before the program drives, and then one half stands for 0.
+        // The outputs are safe first; later one half means 0.
         position += (4.0 * (values[0] - 0.5)).max(0.0);
         if lit == 1.0 {
             break;
         }
     }
     drop(stdin);
-    let done = Done::from(child.wait_with_output().unwrap());
+    let done = RunOutput::from(child.wait_with_output().unwrap());
     assert_eq!(done.status, Some(0), "{done:?}");
     let mut said = done.stderr.lines();
     assert!(said.any(|line| line.starts_with("/dev/") && line.ends_with(" 1000000")), "the port: {done:?}");
-    // Of half a period, 0.5 of full duty are 512 of 1250 cycles; beyond 10 counts all of it, 1024.
+    // In half a period, 0.5 of full duty is 512 of 1250 cycles; beyond 10 counts full duty, 1024.
     assert!(lit == 1.0 && position >= 20.0, "it has come to its end: {position}");
     assert!((fastest - (1250.0 + 1024.0) / 2500.0).abs() < 1e-9, "{fastest}");
 
-    // From a file, whose rows are answered up to one that cannot be read.
+    // From a file: rows are answered up to the first malformed one.
     folder.write("in.csv", "limit\n1\n1\n1\n1\n1\n1\n1\n1\n2\n");
     let done = sim(&folder, "--inputs in.csv --outputs -", "");
     let says = "in.csv:10: column limit.in: a pin's level is 0 or 1, not 2";
@@ -193,7 +197,82 @@ fn a_plant_closes_the_loop_at_the_pins() {
     }
 }
 
-/// A pin with a stream of pulses has no bound; what is bounded is the way to its modulator.
+/// Each cause for which outputs become safe, by what the pins do: `/` by 0, a word before the memory, an iteration too many.
+const MISTAKES: &str = "\
+.input  at_end:int, n:int
+.output duty, lit:int
+.reg    t, k:int
+.data
+table:  .float 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0
+        .space 100
+.once
+        duty, lit = 0, 0
+        wait    period
+.period
+period: ld      t, table[n]
+        fdiv    t, t, t
+        sel     duty, at_end, t, zero
+        mov     lit, at_end
+        li      k, 20
+        isub    k, n, k
+        bnz     k, done
+        li      k, 6000
+        loop    k, done
+        .loop_bound 6000
+        nop
+done:   wait    period
+";
+
+/// The moment at which outputs become safe, and the reason, are told as it happens, however it comes.
+#[test]
+fn reports_the_reason_for_safe_outputs_at_once() {
+    let folder = folder();
+    folder.write("limit.s", MISTAKES);
+    folder.write(
+        "limit.toml",
+        WIRING.replace("autostart = true", "autostart = true\nhost = 12\n[signals]\nstop = \"gp4\""),
+    );
+    let row = |i: usize, case: usize| match (case, i >= 6) {
+        (0, true) => "0,1,5",
+        (1, true) => "1,0,5",
+        (2, true) => "0,0,-3",
+        (3, true) => "0,0,20",
+        _ => "0,0,5",
+    };
+    for (case, says) in [
+        "stop: the pin `stop` was 1, or open\n",
+        "NaN output: `duty`\n",
+        "fault: data address at bundle 3\n",
+        "missed deadline: 1 of them; a period took ",
+        "host silent: no request for as many periods as the wiring's `host` allows\n",
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let rows: Vec<&str> =
+            ["limit,stop,encoder"].into_iter().chain((0..20).map(|i| row(i, case))).collect();
+        folder.write("in.csv", rows.join("\n") + "\n");
+        let done = sim(&folder, "--inputs in.csv --outputs out.csv", "");
+        assert_eq!(done.status, Some(0), "{done:?}");
+        let told: Vec<&str> =
+            done.stderr.split_inclusive('\n').filter(|line| line.contains("become safe")).collect();
+        let [told] = told[..] else { panic!("{done:?}") };
+        let (time, told) = told.split_once(" ms: the outputs become safe: ").unwrap();
+        assert!(told.starts_with(says), "{told}");
+        // Twelve periods of 0.1 ms without a host; all else after six, and the period in which it is noticed.
+        let time: f64 = time.parse().unwrap();
+        let from = if case == 4 { 1.2 } else { 0.6 };
+        assert!((from..from + 0.25).contains(&time), "{case}: {time}");
+        // Its end says the same.
+        assert!(
+            done.stderr
+                .contains(&format!("at the end the outputs are safe: {}", told.split(':').next().unwrap())),
+            "{done:?}"
+        );
+    }
+}
+
+/// A pin with a pulse-density stream has no bound; the path to its modulator has one.
 #[test]
 fn a_density_has_no_bound_at_its_pin() {
     let folder = folder();
@@ -211,7 +290,7 @@ fn a_density_has_no_bound_at_its_pin() {
     let way = &json["ways"][0];
     assert!(way["total"].is_null() && way["total_to_modulator"]["worst"].is_u64(), "{json}");
     assert_eq!(way["outputs"][0]["answer"], "density");
-    // A way has a total if one of its pins answers with an edge.
+    // A path has a total if one of its pins answers with an edge.
     let json: serde_json::Value = serde_json::from_str(&bound("both.toml", "--json")).unwrap();
     let mut totals = 0;
     for way in json["ways"].as_array().unwrap() {

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The commands as users run them.
+//! Commands as users run them.
 
-use crate::common::{Done, Folder, source};
+use crate::common::{Folder, RunOutput, source};
 use std::collections::BTreeMap;
 use std::process::{Command, Stdio};
 use takt_isa::fp::HAS_SOFTFLOAT;
 
-/// The columns of a CSV by title.
+/// Columns of a CSV text by title.
 fn columns(csv: &str) -> BTreeMap<String, Vec<String>> {
     let mut lines = csv.lines().map(|line| line.split(',').map(str::to_owned).collect::<Vec<_>>());
     let titles = lines.next().unwrap();
@@ -16,7 +16,7 @@ fn columns(csv: &str) -> BTreeMap<String, Vec<String>> {
     titles.into_iter().enumerate().map(|(i, title)| (title, column(i))).collect()
 }
 
-/// Floating-point numbers to three digits: the last ones are the host's sine's.
+/// Rounds floating-point numbers to three digits; further digits depend on the host's sine.
 fn round(value: &mut serde_json::Value) {
     match value {
         serde_json::Value::Object(map) => map.values_mut().for_each(round),
@@ -56,7 +56,7 @@ fn arm() {
     assert_eq!(folder.line("arm -m f3 --poses 200 -q").ok(), text, "the same every time");
     insta::assert_snapshot!("arm", text);
 
-    // The keys that issue 5 promises.
+    // Keys promised in issue 5.
     let json: serde_json::Value =
         serde_json::from_str(&folder.line("arm -m f3 --poses 200 --json").ok()).unwrap();
     let number = |pointer: &str| json.pointer(pointer).and_then(serde_json::Value::as_f64).unwrap();
@@ -79,7 +79,7 @@ fn arm() {
     assert_eq!(folder.list(), [""; 0]);
 }
 
-/// Joint angles along a square in space, which lead back to it; and their picture.
+/// Joint angles along a closed square in space, and their plot.
 #[test]
 fn the_arm_draws_a_square() {
     let folder = Folder::new();
@@ -95,7 +95,7 @@ fn the_arm_draws_a_square() {
     assert!((number("y", 2000) - number("y", 1000) - 200.0).abs() < 1e-3);
     let svg = folder.read_text("s.svg");
     assert!(svg.starts_with("<svg") && svg.matches("<polyline").count() >= 7 && svg.contains("θ6"));
-    // The tool's path, of all lines the one that comes back to where it began: seen from afar, a square is a parallelogram.
+    // The tool's path is the line that returns to its start: in projection, the square is a parallelogram.
     let points = |line: &str| -> Vec<(f64, f64)> {
         let points = line.split("points=\"").nth(1).unwrap().split('"').next().unwrap().split_whitespace();
         let point = |point: &str| {
@@ -128,7 +128,7 @@ fn the_small_machine_has_no_arctangent() {
     assert_eq!(refused.stderr, "error: f1 has no arctangent, which the arm's programs need; t3 has\n");
 }
 
-/// The keys that issue 2 promises, on every program and machine.
+/// Keys promised in issue 2, on every program and machine.
 #[test]
 fn track_as_json() {
     let folder = Folder::new();
@@ -146,15 +146,14 @@ fn track_as_json() {
         }
         assert_eq!(json["max_error"].as_object().unwrap().len(), 15);
         assert!(json["tracking_error_m"]["cutting"].is_f64() && json["tracking_error_m"]["overall"].is_f64());
-        // Every cycle of the last period issued or is charged to a cause.
+        // Each cycle of the last period either issues or is charged to a cause.
         let stalls: u64 =
             json["stalls"].as_object().unwrap().values().map(|count| count.as_u64().unwrap()).sum();
         assert_eq!(json["bundles"].as_u64().unwrap() + stalls, 12_500, "125 MHz, 100 µs");
     }
 }
 
-/// The lines that --fit-friction prints are those that the source has, every table says whose it is, and a run that shows no
-/// friction is refused.
+/// The source contains the lines that --fit-friction prints, each table names its program, and a run without friction is refused.
 #[test]
 fn friction_is_identified_from_a_run() {
     let folder = Folder::new();
@@ -252,7 +251,7 @@ fn an_image_is_proved_to_be_its_source() {
     assert!(folder.line("verify a.s a.s").stderr.contains("a.s is no image"));
 }
 
-/// A program with all that the tracking programs lack: data, branches, calls, integers, bits, several bundles by hand.
+/// A program with everything that the tracking programs lack: data, branches, calls, integers, bits, bundles by hand.
 #[test]
 fn a_program_that_halts() {
     let folder = Folder::new();
@@ -311,17 +310,17 @@ fn bounds_of_the_programs() {
 }
 
 #[test]
-fn where_the_cycles_of_a_period_go() {
+fn analyse_accounts_for_the_cycles_of_a_period() {
     let folder = Folder::new();
     let text = folder.line(&format!("analyse {} -m f3", source("tracking.s"))).ok();
     folder.line(&format!("asm {} -m f1 -o small", source("tracking.s"))).ok();
     insta::assert_snapshot!("analyse", format!("{text}\n{}", folder.line("analyse small").ok()));
-    // Asked for, the same with a column more, and without the line that says how to ask.
+    // With --reassemble: the same, with an additional column and without the hint.
     let again = folder.line(&format!("analyse {} -m f3 --reassemble", source("tracking.s"))).ok();
     let (same, table) = again.split_once("\none cycle less in").unwrap();
     assert!(text.starts_with(same));
     insta::assert_snapshot!("analyse_reassembled", table);
-    // The same cycles as the run counts, on recorded inputs; an image has no source to assemble again.
+    // The account equals the run's cycles on recorded inputs; an image has no source to reassemble.
     folder.line("track --periods 4 --csv rec.csv -q").ok();
     folder.line(&format!("asm {} -o image", source("tracking.s"))).ok();
     let run: serde_json::Value =
@@ -332,7 +331,7 @@ fn where_the_cycles_of_a_period_go() {
         assert_eq!(json["cycles"], run["cycles"][cycles], "{periods}");
         assert_eq!(json["one_cycle_less"][0]["reassembled"], serde_json::Value::Null);
     }
-    // A change that would take more cycles is said to, and why: every cycle more is a stall of some kind.
+    // A change that costs cycles is reported with the reason: each additional cycle is a stall of some kind.
     let json: serde_json::Value = serde_json::from_str(&folder.line("analyse small --json").ok()).unwrap();
     let less = json["one_cycle_less"].as_array().unwrap();
     let cycles = |value: &serde_json::Value| value.as_i64().unwrap();
@@ -340,7 +339,7 @@ fn where_the_cycles_of_a_period_go() {
     let told = worse.map(|unit| {
         let stalls: i64 = unit["stalls"].as_object().unwrap().values().map(cycles).sum();
         assert_eq!(cycles(&unit["as_it_is"]) - cycles(&json["cycles"]), stalls, "{unit}");
-        // But for a single cycle, that has to do with the write port.
+        // Unless it is a single cycle, the reason is the write port.
         assert!(stalls == 1 || cycles(&unit["stalls"]["write port"]) > 0, "{unit}");
     });
     assert!(told.count() > 2);
@@ -354,7 +353,7 @@ fn where_the_cycles_of_a_period_go() {
     assert!(folder.line("analyse halts.s -m f3").ok().starts_with("what runs once on f3: "));
 }
 
-/// A loop that ends early or late, and its branch inside: best and worst; a deadline at its edge.
+/// A loop with an early or late end and a branch inside: best and worst case, and a deadline at the limit.
 #[test]
 fn a_deadline_decides_the_status() {
     let folder = Folder::new();
@@ -383,11 +382,12 @@ skip:   isub    i, i, 1
     let kept = folder.line(&format!("bound loop.s --deadline {}", worst + 1)).ok();
     assert!(kept.ends_with("kept, 0 to spare\n"), "{kept}");
     for json in ["", " --json"] {
-        let Done { status, stdout, stderr } = folder.line(&format!("bound loop.s --deadline {worst}{json}"));
+        let RunOutput { status, stdout, stderr } =
+            folder.line(&format!("bound loop.s --deadline {worst}{json}"));
         assert_eq!((status, stderr.as_str()), (Some(1), ""));
         assert!(stdout.contains("not kept") || stdout.contains("\"kept\": false"), "{stdout}");
     }
-    // Eight nanoseconds more are a cycle more.
+    // Eight nanoseconds are a cycle.
     let time = |cycles: u64| folder.line(&format!("bound loop.s --deadline {}ns", cycles * 8)).status;
     assert_eq!((time(worst), time(worst + 1)), (Some(1), Some(0)));
 }
@@ -395,7 +395,7 @@ skip:   isub    i, i, 1
 #[test]
 fn eval_in_the_format_of_testfloat() {
     let folder = Folder::new();
-    // Operands, result, flags; TestFloat's own columns follow, and are ignored.
+    // Operands, result, flags; TestFloat's further columns are ignored.
     let cases: [(&str, &[(&str, &str)]); 8] = [
         (
             "fadd",
@@ -450,10 +450,10 @@ fn eval_in_the_format_of_testfloat() {
             );
         }
     }
-    // Longer than any buffer, in pieces that end anywhere.
+    // Input longer than any buffer, split at arbitrary places.
     let many = "3F800000 40000000\n".repeat(100_000);
     assert_eq!(folder.fed("eval fsub", many.as_bytes()).ok(), "BF800000 00\n".repeat(100_000));
-    // An answer comes before the end of the questions.
+    // An answer comes before the end of the input.
     let mut command = folder.command(&["eval", "fneg"]);
     let mut child = command.stdin(Stdio::piped()).spawn().unwrap();
     let (mut stdin, stdout) = (child.stdin.take().unwrap(), child.stdout.take().unwrap());
@@ -465,7 +465,7 @@ fn eval_in_the_format_of_testfloat() {
     assert!(child.wait().unwrap().success());
 }
 
-/// `in cycle 12` as `in cycle N`: which cycle depends on latencies, which are not the matter here.
+/// Replaces `in cycle 12` by `in cycle N`: cycles depend on latencies, which are not under test here.
 fn without_cycles(text: &str) -> String {
     let mut pieces = text.split("in cycle ");
     let mut out = pieces.next().unwrap().to_owned();
@@ -488,13 +488,13 @@ fn nan_on_an_output_is_a_warning() {
     assert_eq!(columns(&folder.read_text("out.csv"))["F"], [["NaN"; 7].as_slice(), &["inf"]].concat());
     let json = folder.line("run nan.s --inputs in.csv --json").stdout;
     assert!(json.contains("\"nan_writes\": 7"), "{json}");
-    // A program without periods is no exception.
+    // A program without periods is treated alike.
     folder.write("once.s", ".output F\n fdiv F, zero, zero\n halt\n");
     let done = folder.line("run once.s");
     assert_eq!(without_cycles(&done.stderr), "warning: NaN written to F in cycle N by bundle 0 (once.s:2)\n");
 }
 
-/// A row is limited, not the table; and a table may come from anywhere, with any line ends.
+/// Rows have a maximal length, tables have none; any source and any line ends are accepted.
 #[test]
 fn long_tables() {
     let folder = Folder::new();
@@ -504,12 +504,12 @@ fn long_tables() {
     let json = folder.fed("run sum.s --inputs - --json", table.as_bytes()).ok();
     let json: serde_json::Value = serde_json::from_str(&json).unwrap();
     assert_eq!((&json["periods"], &json["outputs"]["k"]), (&rows.into(), &rows.into()));
-    // Fewer, if fewer are asked for.
+    // --periods stops earlier.
     let text = folder.fed("run sum.s --inputs - --outputs - --periods 3", table.as_bytes()).ok();
     assert_eq!(columns(&text)["k"], ["1", "2", "3"]);
 }
 
-/// Input ports that nobody gives a value are 0, whoever runs the program.
+/// Input ports without a value are 0 in all commands that run programs.
 #[test]
 fn without_inputs_the_ports_are_zero() {
     let folder = Folder::new();
@@ -526,7 +526,7 @@ fn without_inputs_the_ports_are_zero() {
     );
     let debug = folder.fed("debug law.s", b"goto period 1\nprint F, k, a\n").ok();
     assert!(debug.contains("F = 1.0") && debug.contains("k = 2"), "{debug}");
-    // A program without periods is no exception.
+    // A program without periods is treated alike.
     folder.write("once.s", ".input a\n.output F\n fadd F, a, 1.0\n halt\n");
     assert!(folder.line("run once.s").ok().contains("F = 1.0"));
 }
@@ -536,12 +536,12 @@ fn a_missed_deadline_is_counted() {
     let folder = Folder::new();
     let json = |line: &str| -> serde_json::Value { serde_json::from_str(&folder.line(line).ok()).unwrap() };
     assert_eq!(json("track --periods 20 --json")["deadlines_missed"], 0);
-    // 100 cycles in 100 µs.
+    // 100 cycles take 100 µs at this clock.
     assert!(json("track --periods 20 --json --clock 1")["deadlines_missed"].as_u64().unwrap() >= 19);
 }
 
 #[test]
-fn asm_tells_what_became_of_the_source() {
+fn asm_reports_transformations_of_the_source() {
     let folder = Folder::new();
     let source = source("tracking.s");
     let text = folder.line(&format!("asm {source} -o image")).ok();
@@ -567,7 +567,7 @@ fn asm_tells_what_became_of_the_source() {
     folder.line(&format!("asm {source} --readmemh memories")).ok();
     let code = folder.read_text("memories/code_mul.hex");
     assert_eq!(code.lines().count() as u64, json["bundles"].as_u64().unwrap());
-    // Of unscheduled code, only its size and the memories are printed: nothing of blocks.
+    // For unscheduled code only size and memories are printed, without blocks.
     let unscheduled = folder.line(&format!("asm {source} -o image --schedule off")).ok();
     assert_eq!(unscheduled.lines().count(), 2, "{unscheduled}");
 }
@@ -595,7 +595,7 @@ fn the_plot_shows_the_path() {
     ] {
         assert!(svg.contains(text), "{text}");
     }
-    // The cutting moves are one line, as wide as it is high; the legend's is shorter.
+    // The cutting moves form one polyline, as wide as high; the legend's is shorter.
     let lines = svg.lines().filter(|line| line.starts_with("<polyline") && line.contains("1F4E9C"));
     let line = lines.max_by_key(|line| line.len()).unwrap();
     let points = line.split("points=\"").nth(1).unwrap().split('"').next().unwrap();
@@ -615,11 +615,11 @@ fn the_plot_shows_the_path() {
         extent(|p| p.1)
     );
     assert_eq!(folder.line("track --gcode square.ngc --plot -").ok(), svg);
-    // The deviations are lines beside the path, by some millimetres: their ends are not the path's.
+    // Deviations are lines beside the path, some millimetres away: their end points are not on it.
     let deviating = svg.lines().filter(|line| line.starts_with("<polyline") && line.contains("D08810"));
     let longest = deviating.map(|line| line.matches(',').count()).max().unwrap_or(0);
     assert!(longest > 20, "{longest} points");
-    // The same on the terminal, in dots; in a pipe without colours.
+    // The plot on the terminal, in dots; in a pipe without colours.
     let drawn = folder.line("track --gcode square.ngc --plot").ok();
     for text in [
         "Tool path of square.ngc",
@@ -663,7 +663,7 @@ fn references() {
     }
 }
 
-/// Depths of memories in a machine's name, on the command line or in the source, from the assembler to the circuit.
+/// Memory depths in a machine's name, on the command line or in the source, from assembler to circuit.
 #[test]
 fn memories_of_other_depths() {
     let folder = Folder::new();
@@ -708,7 +708,7 @@ fn memories_of_other_depths() {
     assert!(folder.read_text("circuit/takt_t3_data_8192.v").contains("module takt_t3_data_8192 "));
 }
 
-/// Lines of help that introduce an option or an operand: its spelling, and whether a text explains it, beside or below it.
+/// Options and operands introduced in a help text, and whether each has an explanation beside or below it.
 fn explained(help: &str) -> BTreeMap<String, bool> {
     let lines: Vec<&str> = help.lines().collect();
     let begins = |line: &str, what: &[&str]| what.iter().any(|what| line.starts_with(what));
@@ -725,21 +725,21 @@ fn explained(help: &str) -> BTreeMap<String, bool> {
     entries.map(entry).collect()
 }
 
-/// Options a text names, without what follows them: `--gcode`, `-m`.
+/// Options named in a text, without their values: `--gcode`, `-m`.
 fn options(text: &str) -> Vec<&str> {
     let words = text.split(|c: char| !(c.is_ascii_alphanumeric() || c == '-'));
     words.filter(|word| word.starts_with('-') && !word.trim_start_matches('-').is_empty()).collect()
 }
 
-/// The commands that the help lists.
+/// Commands listed in a help text.
 fn commands(help: &str) -> Vec<&str> {
     let list = help.split_once("\nCommands:\n").unwrap().1.split("\n\n").next().unwrap();
     let names = list.lines().filter(|line| line.starts_with("  ") && !line.starts_with("   "));
     names.map(|line| line.split_whitespace().next().unwrap()).filter(|name| *name != "help").collect()
 }
 
-/// Every command has help, long and short; each option and operand in it is explained; the examples use options there
-/// are; and nothing is wider than the terminal that is promised.
+/// Every command has short and long help; each option and operand is explained; examples use existing options; and no line exceeds the
+/// promised width.
 #[test]
 fn help() {
     let folder = Folder::new();
@@ -768,7 +768,7 @@ fn help() {
         for line in text.lines() {
             assert!(line.chars().count() <= 100, "{line}");
         }
-        // The text beside an example is a comment; a bar divides programs.
+        // Text beside an example is a comment; a bar separates programs.
         let programs = text.lines().filter_map(|line| line.trim().split("  ").next()?.split(" | ").into());
         for example in programs.flatten().filter_map(|program| program.strip_prefix("takt ")) {
             let command = example.split(' ').next().unwrap();
@@ -800,10 +800,10 @@ fn a_closed_pipe_is_no_error() {
         let mut command = folder.command(&line.split(' ').collect::<Vec<_>>());
         let mut child = command.spawn().unwrap();
         drop(child.stdout.take());
-        let done = Done::from(child.wait_with_output().unwrap());
+        let done = RunOutput::from(child.wait_with_output().unwrap());
         assert_eq!((done.status, done.stderr.as_str()), (Some(0), ""), "{line}");
     }
-    // In the middle of the work.
+    // Interrupted in the middle of its work.
     let mut child = folder.command(&["eval", "fneg"]).stdin(Stdio::piped()).spawn().unwrap();
     let mut stdin = child.stdin.take().unwrap();
     drop(child.stdout.take());
@@ -812,7 +812,7 @@ fn a_closed_pipe_is_no_error() {
             .try_for_each(|_| std::io::Write::write_all(&mut stdin, "00000000\n".repeat(1000).as_bytes()))
     };
     assert!({ feed }().is_err(), "it has stopped reading");
-    let done = Done::from(child.wait_with_output().unwrap());
+    let done = RunOutput::from(child.wait_with_output().unwrap());
     assert_eq!((done.status, done.stderr.as_str()), (Some(0), ""));
 }
 
@@ -822,7 +822,7 @@ fn a_full_disk_is_an_error() {
     for line in WORDY {
         let mut command = folder.command(&line.split(' ').collect::<Vec<_>>());
         command.stdout(std::fs::File::options().write(true).open("/dev/full").unwrap());
-        let done = Done::of(command);
+        let done = RunOutput::of(command);
         let text = "error: cannot write standard output: No space left on device\n";
         assert_eq!((done.status, done.stderr.as_str()), (Some(1), text), "{line}");
     }
@@ -866,10 +866,10 @@ fn names_of_files_need_not_be_text() {
     assert_eq!(done.stderr, "error: cannot open no\u{fffd}: No such file or directory\n");
 }
 
-/// Through a symbolic link the file behind it is written, and keeps its permissions; devices are written as they are.
+/// An output through a symbolic link writes the target and keeps its permissions; devices are written directly.
 #[cfg(unix)]
 #[test]
-fn outputs_go_where_they_are_sent() {
+fn outputs_go_to_the_named_files() {
     use std::os::unix::fs::{PermissionsExt, symlink};
     let folder = Folder::new();
     folder.write("prog.s", " halt\n");
@@ -881,7 +881,7 @@ fn outputs_go_where_they_are_sent() {
     assert!(folder.path().join("link").is_symlink());
     assert!(folder.read("real").starts_with(b"\x7fELF"));
     assert_eq!(std::fs::metadata(&real).unwrap().permissions().mode() & 0o777, 0o640);
-    // A path that is no regular file is written, never replaced. A pipe stands for /dev/null, which a mistake here would destroy.
+    // Anything but a regular file is written, never replaced. The test uses a pipe: a bug would destroy /dev/null.
     let pipe = folder.path().join("pipe");
     assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
     let reader = std::thread::spawn({
@@ -897,10 +897,10 @@ fn outputs_go_where_they_are_sent() {
     assert_eq!((done.status, done.stderr.as_str()), (Some(1), "error: cannot write real: it is read-only\n"));
 }
 
-/// Rows completed before a fault are written, to a file as to a pipe; where there are none, and after a mistake in the inputs, a
-/// file stays what it was.
+/// Rows completed before a fault are written to files and pipes alike; without rows, and after a mistake in the inputs, a file stays
+/// unchanged.
 #[test]
-fn what_was_completed_before_a_fault_is_kept() {
+fn keeps_rows_completed_before_a_fault() {
     const TABLE: &str = ".input i:int\n.output y\n.once\n wait loop\n.period\nloop: ld y, table[i]\n wait loop\n.data\ntable: .float 1.0, 2.0\n";
     let folder = Folder::new();
     folder.write("table.s", TABLE);
@@ -908,7 +908,7 @@ fn what_was_completed_before_a_fault_is_kept() {
     folder.write("faults.csv", "i\n0\n1\n0\n99999\n1\n");
     folder.write("at-once.csv", "i\n99999\n1\n");
     folder.write("wrong.csv", "i\n1\n0\nx\n");
-    // A program with its inputs, the rows that it completes, and whether they are kept.
+    // Program, inputs, completed rows, and whether they are kept.
     for (program, inputs, rows, keeps) in [
         ("table.s", "faults.csv", 3, true),
         ("table.s", "wrong.csv", 2, false),
@@ -930,7 +930,7 @@ fn what_was_completed_before_a_fault_is_kept() {
     assert!(folder.list().iter().all(|name| !name.contains("partial")), "{:?}", folder.list());
 }
 
-/// Turns of a loop that say the same are one line with a count.
+/// Equal loop iterations share a line with a count.
 #[test]
 fn stalls_of_a_loop_are_one_line() {
     const LOOP: &str = ".input x\n.output y\n.reg n:int s\n.once\n wait p\n.period\np: li n, 12\n mov s, x\nturn: fmul s, s, x\n fadd s, s, x\n isub n, n, 1\n bnz n, turn\n mov y, s\n wait p\n";
@@ -957,9 +957,9 @@ fn stalls_of_a_loop_are_one_line() {
     assert!(json["cycles"].as_u64().unwrap() > all);
 }
 
-/// A command of another tool, or a near meaning, is answered with the one that does that.
+/// A command name of another tool, or of similar meaning, is answered with Takt's command.
 #[test]
-fn a_command_that_is_not_there_leads_to_one_that_is() {
+fn unknown_commands_suggest_existing_ones() {
     let folder = Folder::new();
     for (wrong, tip) in [
         ("simulate x.s", "`takt run` runs a program on the emulator"),
@@ -975,9 +975,9 @@ fn a_command_that_is_not_there_leads_to_one_that_is() {
     assert!(!done.stderr.contains("takt run"), "{}", done.stderr);
 }
 
-/// A state that does not begin in its range is told, and decides the status; so do hazards.
+/// States outside their range at the start, and hazards, are reported and decide the exit status.
 #[test]
-fn what_is_not_shown_decides_the_status_of_accuracy() {
+fn hidden_rows_count_for_the_status_of_accuracy() {
     let folder = Folder::new();
     let program = |once: &str, period: &str| {
         format!(
@@ -1006,20 +1006,50 @@ fn what_is_not_shown_decides_the_status_of_accuracy() {
 }
 
 #[test]
+fn accuracy_shows_literals_by_their_values() {
+    let folder = Folder::new();
+    folder.write(
+        "literal.s",
+        ".input x\n.output y\n.range x = 0, 1\n.schedule on\n.period\np: y = 0.3 / (x - 0.5)\n wait p\n",
+    );
+    let done = folder.line("accuracy literal.s");
+    assert_eq!(done.status, Some(1));
+    assert!(done.stdout.contains("6:8-22: the divisor may be zero: 0.3, "), "{}", done.stdout);
+    assert!(!done.stdout.contains("x14"), "{}", done.stdout);
+}
+
+#[test]
 fn run_shows_words_of_data_memory() {
     let folder = Folder::new();
     folder.write(
         "sums.s",
-        ".input x\n.output y\n.array P[2,2] = 1, 2, 3, 4\n.once\n wait period\n.period\nperiod:\n P[2,1] = P[2,1] + x\n \
+        ".input x\n.output y\n.array P[2,2] = 1, 2, 3, 4\n.array k[2]:int = 7, -8\n.data\ntable: .float 5, 6\n.once\n wait period\n.period\nperiod:\n k[1] = k[1] + 1\n P[2,1] = P[2,1] + x\n \
          y = P[2,1]\n wait period\n",
     );
     folder.write("in.csv", "x\n1\n10\n");
-    let done = folder.line("run sums.s --inputs in.csv --outputs - --memory P+2 --memory P").ok();
+    let done =
+        folder.line("run sums.s --inputs in.csv --outputs - --memory P[2,1] --memory P --memory k[2]").ok();
     assert_eq!(
         done.lines().map(|line| line.rsplit_once(',').unwrap().0).collect::<Vec<_>>(),
-        ["y,P+2,P,P+1,P+2,P+3", "4.0,4.0,1.0,2.0,4.0,4.0", "14.0,14.0,1.0,2.0,14.0,4.0"]
+        [
+            "y,\"P[2,1]\",\"P[1,1]\",\"P[1,2]\",\"P[2,1]\",\"P[2,2]\",k[2]",
+            "4.0,4.0,1.0,2.0,4.0,4.0,-8",
+            "14.0,14.0,1.0,2.0,14.0,4.0,-8"
+        ]
     );
-    assert!(folder.line("run sums.s --periods 1 --memory P").ok().contains("  P+3 = 4.0\n"));
+    assert!(folder.line("run sums.s --periods 1 --memory P").ok().contains("  P[2,2] = 4.0\n"));
+    // Words behind a label count from 0, as addresses do.
+    let table = folder.line("run sums.s --periods 1 --memory table --memory table[1]").ok();
+    assert!(table.contains("  table[0] = 5.0\n  table[1] = 6.0\n  table[1] = 6.0\n"), "{table}");
+    for (name, says) in [
+        ("P[0,1]", "`P` has no element `P[0,1]`; there are `P[1,1]` to `P[2,2]`"),
+        ("P[3]", "`P` has no element `P[3]`; there are `P[1,1]` to `P[2,2]`"),
+        ("table[2]", "`table` has no element `table[2]`; there are `table[0]` to `table[1]`"),
+        ("P+2", "nothing in data memory is called `P+2`"),
+    ] {
+        let done = folder.line(&format!("run sums.s --periods 1 --memory {name}"));
+        assert!(done.status == Some(2) && done.stderr.contains(says), "{}", done.stderr);
+    }
     let done = folder.line("run sums.s --periods 1 --memory p");
     assert_eq!(done.status, Some(2));
     assert!(

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! `takt dap` as clients meet it: over standard input and output, on a socket, and with Microsoft's test client.
+//! The command `takt dap` with clients: on standard input and output, on a socket, and with Microsoft's test client.
 
 use crate::common;
 mod systems;
@@ -9,7 +9,7 @@ use crate::common::{Folder, SUM};
 use serde_json::{Value, json};
 use std::process::Command;
 
-/// A session that is launched and stands at its beginning.
+/// A launched session, stopped at its beginning.
 fn launched(folder: &Folder, configuration: Value) -> Client {
     let mut client = Client::start(folder, "dap");
     assert_eq!(client.command("initialize", json!({ "adapterID": "takt" }))["success"], true);
@@ -30,7 +30,7 @@ fn ok(client: &mut Client, command: &str, arguments: Value) -> Value {
     answer["body"].clone()
 }
 
-/// Does something that ends in a stop: why, and the line.
+/// Sends a request that ends in a stop; returns the reason and the line.
 fn go(client: &mut Client, command: &str, arguments: Value) -> (String, u64) {
     ok(client, command, arguments);
     let body = client.event("stopped")["body"].clone();
@@ -50,7 +50,7 @@ fn end(mut client: Client) {
 }
 
 #[test]
-fn a_broken_configuration_is_told() {
+fn reports_a_broken_configuration() {
     let folder = Folder::new();
     folder.write("wrong.s", "fad a, b\n");
     folder.write("sum.s", SUM);
@@ -92,11 +92,11 @@ fn a_broken_configuration_is_told() {
         let text = answer["body"]["error"]["variables"]["text"].as_str().unwrap();
         assert!(text.contains(told), "{configuration}: {text}");
     }
-    // Many clients show one line of it: it has the place.
+    // Many clients show only one line, so it contains the place.
     let answer = client.command("launch", json!({ "program": "wrong.s" }));
     let line = answer["message"].as_str().unwrap();
     assert_eq!(line, "wrong.s:1:1: error[unknown-instruction]: there is no instruction or macro `fad`");
-    // And after all that, it can be launched; what a client adds for itself is no mistake.
+    // After all errors a launch still succeeds; fields added by clients are accepted.
     let socket = json!({ "program": "sum.s", "host": "localhost", "debugServer": 4711 });
     assert_eq!(client.command("launch", socket)["success"], true);
     assert_eq!(client.command("launch", json!({ "program": "sum.s" }))["success"], false);
@@ -104,7 +104,7 @@ fn a_broken_configuration_is_told() {
 }
 
 #[test]
-fn nonsense_is_told_and_survived() {
+fn survives_and_reports_invalid_messages() {
     let folder = Folder::new();
     folder.write("sum.s", SUM);
     let mut client = Client::start(&folder, "dap");
@@ -159,7 +159,7 @@ fn nonsense_is_told_and_survived() {
 }
 
 #[test]
-fn it_goes_forward_and_back() {
+fn steps_forward_and_back_in_the_editor() {
     let folder = Folder::new();
     folder.write("sum.s", SUM);
     let path = folder.path().join("sum.s");
@@ -169,7 +169,7 @@ fn it_goes_forward_and_back() {
     let answer = ok(&mut client, "setBreakpoints", breakpoints);
     assert_eq!(answer["breakpoints"][0]["verified"], true);
     assert_eq!(start(&mut client)["reason"], "entry");
-    // The first step goes somewhere, although the first bundle is not about to issue yet.
+    // The first step has an effect, although the first bundle is not yet about to issue.
     assert_eq!(go(&mut client, "next", json!({ "threadId": 1 })), ("step".to_owned(), 4));
     assert_eq!(go(&mut client, "continue", json!({ "threadId": 1 })), ("breakpoint".to_owned(), 12));
     assert_eq!(value(&mut client, "i"), "1");
@@ -188,11 +188,11 @@ fn it_goes_forward_and_back() {
     assert_eq!(value(&mut client, "cycle"), (cycle + 3).to_string());
     assert_eq!(go(&mut client, "takt/gotoCycle", json!({ "cycle": 0 })).0, "goto");
 
-    // Bundles, data memory, registers by bank, the debugger's own commands.
+    // Bundles, data memory, registers by bank, and debugger commands.
     let body = ok(&mut client, "disassemble", json!({ "memoryReference": "0x0", "instructionCount": 2 }));
     assert!(body["instructions"][0]["instruction"].as_str().unwrap().contains("li"), "{body}");
     let body = ok(&mut client, "readMemory", json!({ "memoryReference": "0", "count": 4 }));
-    // 0.5 is 00 00 00 3f.
+    // 0.5 is 00 00 00 3f in little-endian bytes.
     assert_eq!(body["data"], "AAAAPw==");
     let body = ok(&mut client, "evaluate", json!({ "expression": "table[2]", "context": "hover" }));
     assert_eq!(body["result"], "-1.75");
@@ -205,9 +205,9 @@ fn it_goes_forward_and_back() {
     end(client);
 }
 
-/// A program that never ends is stopped by `pause`, and one whose client goes ends with it.
+/// An endless program is stopped by `pause`, and ends with its client.
 #[test]
-fn what_runs_can_be_paused() {
+fn a_running_program_can_be_paused() {
     let folder = Folder::new();
     folder.write("loop.s", ".reg n:int\n li n, 0\nagain: iadd n, n, 1\n jmp again\n");
     let mut client = launched(&folder, json!({ "program": "loop.s" }));
@@ -249,12 +249,12 @@ turn:   isub    n, n, 1
         met.push(info["exceptionId"].as_str().unwrap().to_owned());
     }
     assert_eq!(met, ["invalid", "nan", "overflow"]);
-    // Then it halts; there is still a way back.
+    // At a halt, steps back are still possible.
     assert_eq!(go(&mut client, "continue", json!({ "threadId": 1 })).0, "pause");
     go(&mut client, "stepBack", json!({ "threadId": 1 }));
     end(client);
 
-    // A fault is an exception that nobody has to ask for.
+    // A fault always stops, without a filter.
     folder.write("read.s", ".reg _a i:int\n li i, 5000\n ld _a, [i]\n halt\n");
     let mut client = launched(&folder, json!({ "program": "read.s" }));
     start(&mut client);
@@ -263,9 +263,9 @@ turn:   isub    n, n, 1
     end(client);
 }
 
-/// Running without debugging, as editors call it: nothing stops it, and its end ends the session.
+/// A run without debugging: stops are ignored, and its end ends the session.
 #[test]
-fn it_runs_without_debugging() {
+fn runs_without_debugging() {
     let folder = Folder::new();
     folder.write("sum.s", SUM);
     folder.write("read.s", ".reg _a i:int\n li i, 5000\n ld _a, [i]\n halt\n");
@@ -298,9 +298,9 @@ fn a_missed_deadline_stops() {
     end(client);
 }
 
-/// The closed loop: it begins where the tracking error is largest.
+/// The closed loop starts at the largest tracking error.
 #[test]
-fn it_attaches_to_the_closed_loop() {
+fn attaches_to_the_closed_loop() {
     let folder = Folder::new();
     let mut client = launched(&folder, json!({ "track": true, "periods": 40 }));
     let note = client.event("output");
@@ -316,14 +316,14 @@ fn it_attaches_to_the_closed_loop() {
 }
 
 #[test]
-fn it_listens_on_a_socket() {
+fn listens_on_a_socket() {
     use std::io::{BufRead, BufReader, Read, Write};
     let folder = Folder::new();
     let mut child = folder.command(&["dap", "--listen", "127.0.0.1:0"]).spawn().unwrap();
     let mut line = String::new();
     BufReader::new(child.stderr.take().unwrap()).read_line(&mut line).unwrap();
     let address = line.trim().strip_prefix("listening on ").unwrap().to_owned();
-    // One client after the other.
+    // Clients are served one after the other.
     for _ in 0..2 {
         let mut stream = std::net::TcpStream::connect(&address).unwrap();
         let text =
@@ -341,9 +341,9 @@ fn it_listens_on_a_socket() {
     assert_eq!(folder.line("dap --listen nowhere").status, Some(1));
 }
 
-/// Emacs's client, dap-mode, with the configuration that comes with the repository.
+/// Emacs's dap-mode, with the repository's configuration.
 #[test]
-fn emacs_works_with_it() {
+fn emacs_debugs_a_program() {
     let folder = Folder::new();
     folder.write("sum.s", SUM);
     folder.write("wrong.s", "fad a, b\n");
@@ -368,7 +368,7 @@ fn emacs_works_with_it() {
     refused(1, "wrong.s:1:1: error[unknown-instruction]: there is no instruction or macro `fad`");
     refused(2, "broken.toml:3");
     assert_eq!(found["mode"], "takt-mode");
-    // The file that the editor shows, the line of the frame, that of the cursor, the thread.
+    // File in the editor, line of the frame, line of the cursor, thread.
     assert_eq!(found["entry"], json!(["sum.s", 3, 3, 1]));
     assert_eq!(found["breakpoint"], json!(["sum.s", 12, 12, 1]));
     assert_eq!(found["i"], "0");
@@ -382,9 +382,9 @@ fn emacs_works_with_it() {
     assert_eq!(found["n"], "0");
 }
 
-/// Microsoft's test client, which VS Code's own debuggers are tested with.
+/// Microsoft's test client, which also tests VS Code's debuggers.
 #[test]
-fn a_client_that_is_not_ours_works_with_it() {
+fn an_independent_client_debugs_a_program() {
     let folder = Folder::new();
     folder.write("sum.s", SUM);
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/clients/dap/client.js");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! `takt debug` as users run it.
+//! The command `takt debug` as users run it.
 
 use crate::common::{Folder, SUM, source};
 
@@ -19,12 +19,12 @@ fn a_script() {
         folder.fed("debug sum.s -m f3", &script).ok(),
         folder.fed("debug sum.s -m f3 --script -", &script).ok()
     );
-    // An image has all that its source has.
+    // An image contains everything that its source has.
     folder.line("asm sum.s -m f3 -o sum.takt").ok();
     assert_eq!(folder.line("debug sum.takt --script good.txt").ok(), said);
 }
 
-/// An image carries its source: it is what was assembled, whatever has become of the file, unless it is stripped.
+/// An image carries the assembled source, independent of later changes to the file, unless it is stripped.
 #[test]
 fn the_source_of_an_image() {
     let folder = Folder::new();
@@ -49,7 +49,7 @@ fn the_source_of_an_image() {
     assert_eq!((stale.status, &stale.stdout), (Some(0), &fresh.stdout));
     assert_eq!(
         stale.stderr,
-        "warning: sum.s has changed since sum.takt was made; shown is what it was then\n"
+        "warning: sum.s has changed since sum.takt was made; the listing shows its text of that time\n"
     );
     std::fs::remove_file(folder.path().join("sum.s")).unwrap();
     let moved = listed("sum.takt");
@@ -83,7 +83,7 @@ fn mistakes() {
         assert_eq!(done.stdout, "", "{line}");
         text.push_str(&format!("$ takt {line}\n[{}]\n{}\n", done.status.unwrap(), done.stderr));
     }
-    // A wrong command leaves the session alive; the status tells of it.
+    // A wrong command does not end the session; the exit status reports it.
     for command in [
         "step sideways",
         "break nowhere",
@@ -116,7 +116,7 @@ fn mistakes() {
 fn in_the_closed_loop() {
     let folder = Folder::new();
     let text = folder.fed("debug --track --periods 300", b"print F1, x\nback period\nstep period\n").ok();
-    // The scheduling of the program is not this test's affair.
+    // The schedule of the program is not under test here.
     let worst = "programs/hybrid/tracking.s along agh.ngc, 300 periods: the largest tracking error is 5.53";
     assert!(text.starts_with(worst) && text.contains("in period 115 (not cutting)"), "{text}");
     let places: Vec<&str> = text.lines().filter(|line| line.starts_with("cycle ")).collect();

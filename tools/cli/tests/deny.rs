@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! `--deny`: what a run must be free of.
+//! The option `--deny` and its events.
 
 use crate::common::Folder;
 use serde_json::{Value, json};
 
-/// Divides by its input, then clears the flags: what was raised counts all the same.
+/// Divides by its input, then clears the flags: raised flags count nevertheless.
 const LAW: &str = "\
 .input x, y
 .output q, p
@@ -17,11 +17,11 @@ period: fdiv    q, 1.0, x
         wait    period
 ";
 
-/// Period 1 divides by zero, 2 overflows, 4 does both.
+/// Period 1 divides by zero, period 2 overflows, period 4 does both.
 const ROWS: &str = "x,y\n1,1\n0,1\n1,3e38\n1,1\n0,3e38\n";
 
 #[test]
-fn what_when_first_and_how_often() {
+fn reports_event_first_place_and_count() {
     let folder = Folder::new();
     folder.write("law.s", LAW);
     folder.write("in.csv", ROWS);
@@ -30,7 +30,7 @@ fn what_when_first_and_how_often() {
         let json: Value = serde_json::from_str(&done.stdout).unwrap();
         (done.status, json["denied"].clone(), done.stderr)
     };
-    // The trace says who raised what when.
+    // Reference: the trace shows which operation raised a flag, and when.
     folder.line("run law.s --inputs in.csv --trace all.jsonl").ok();
     let events = folder.read_text("all.jsonl");
     let events: Vec<Value> = events.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
@@ -55,12 +55,12 @@ fn what_when_first_and_how_often() {
     assert_eq!(deny("overflow,nan"), (Some(3), json!([overflow]), overflow_text.clone()));
     assert_eq!(deny("all"), (Some(3), json!([by_zero, overflow]), format!("{by_zero_text}{overflow_text}")));
     assert_eq!(deny("missed,invalid,nan"), (Some(0), json!([]), String::new()));
-    // A trace changes nothing, whatever part of the run it shows.
+    // A trace of any part of the run changes nothing.
     for options in ["", "--trace-cycles 60..70"] {
         let done = folder.line(&format!("run law.s --inputs in.csv --deny all --trace t.jsonl {options}"));
         assert_eq!((done.status, done.stderr), (Some(3), format!("{by_zero_text}{overflow_text}")));
     }
-    // The results are there, and what is denied is no matter of theirs.
+    // Results are complete and independent of --deny.
     let with = folder.line("run law.s --inputs in.csv --outputs with.csv --deny all");
     assert_eq!(with.stdout, folder.line("run law.s --inputs in.csv --outputs without.csv").ok());
     assert_eq!(folder.read_text("with.csv"), folder.read_text("without.csv"));
@@ -73,7 +73,7 @@ fn deadlines() {
     folder.write("in.csv", "x,y\n1,1\n1,1\n1,1\n");
     let run =
         |tick: u64| folder.line(&format!("run law.s --inputs in.csv --json --deny missed --tick {tick}"));
-    // Late ticks, and ticks right behind the `wait`.
+    // Late ticks, and ticks just after the `wait`.
     run(1000).ok();
     let bounds: Value = serde_json::from_str(&folder.line("bound law.s --json").ok()).unwrap();
     let worst = |key: &str| bounds["sections"][1][key]["worst"].as_u64().unwrap();
@@ -87,7 +87,7 @@ fn deadlines() {
     );
     let text = done.stderr.split_once("times, first in period 0, cycle ");
     assert!(text.is_some_and(|(what, _)| what.starts_with("error: denied: deadline missed ")));
-    // Ticks that are lost are missed too.
+    // Lost ticks count as missed.
     let done = run(4);
     let json: Value = serde_json::from_str(&done.stdout).unwrap();
     assert!(json["denied"][0]["count"].as_u64() > Some(3), "{json}");
@@ -110,7 +110,7 @@ fn without_periods_and_after_the_last() {
             format!("error: denied: NaN written to an output port once, cycle {cycle}, to F {place}"),
         ]
     );
-    // It issues with the last `wait` and is written when the run is over.
+    // This operation issues with the last `wait`, and is written after the end of the run.
     let late = ".input x\n.output F\n.once\n wait p\n.period\np: wait p || fmul F, x, inf\n";
     folder.write("late.s", late);
     let done = folder.line("run late.s --periods 1 --deny all");
@@ -136,13 +136,13 @@ fn names() {
     let folder = Folder::new();
     folder.write("law.s", LAW);
     for (what, reason) in
-        [("mised", "did you mean `missed`?"), ("fault", "(there are: missed, "), ("", "(there are: ")]
+        [("mised", "did you mean `missed`?"), ("fault", "(events: missed, "), ("", "(events: ")]
     {
         let done = folder.takt(&["run", "law.s", "--periods", "1", "--deny", what]);
         assert_eq!(done.status, Some(2), "{what}");
         assert!(done.stderr.contains(reason), "{}", done.stderr);
     }
-    // A fault is an error as ever.
+    // A fault is still an error.
     folder.write("falls.s", ".output F\n fadd F, zero, zero\n");
     assert_eq!(folder.line("run falls.s --deny all").status, Some(1));
 }

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Commands in documents print what the documents show: every block ```` ```console ```` behind a line `<!-- output -->`.
+//! Console listings of documents equal the commands' output: all blocks ```` ```console ```` after a line `<!-- output -->`.
 //!
-//! `TAKT_BLESS=1` writes what the commands print today. A line `…` stands for lines that are left out; behind it each line is the
-//! next of the output that is the same, or else has the same first word, and what follows the last `…` goes on to the output's
-//! end. Of a command with nothing below it nothing is shown. Lines `(takt) …` are typed. Commands run in a folder with the project's programs
-//! and the document's named listings (`<!-- listing: NAME -->`), as NAME.s.
+//! `TAKT_BLESS=1` writes the present output. A line `…` stands for omitted lines; after it, each line matches the next equal line of the
+//! output, or else the next with the same first word, and the part after the last `…` extends to the output's end. A command without lines
+//! below shows nothing. Lines `(takt) …` are typed. Commands run in a folder with the project's programs and the document's named listings
+//! (`<!-- listing: NAME -->`), as NAME.s.
 
 use crate::common::Folder;
 use std::path::{Path, PathBuf};
@@ -14,18 +14,20 @@ use takt_programs::listings::listings;
 const MARK: &str = "<!-- output -->";
 const DOTS: &str = "…";
 
-/// A command of a block with the lines that stand below it.
-struct Shown {
+/// A command of a block, with the output shown below it.
+struct DocumentedCommand {
     command: String,
     lines: Vec<String>,
 }
 
-/// The commands of a block. A command whose quotes are open goes on in the next line.
-fn commands(block: &[&str]) -> Vec<Shown> {
-    let mut all: Vec<Shown> = Vec::new();
+/// Commands of a block. A command with an open quote continues on the next line.
+fn commands(block: &[&str]) -> Vec<DocumentedCommand> {
+    let mut all: Vec<DocumentedCommand> = Vec::new();
     for line in block {
         match (line.strip_prefix("$ "), all.last_mut()) {
-            (Some(command), _) => all.push(Shown { command: command.to_owned(), lines: Vec::new() }),
+            (Some(command), _) => {
+                all.push(DocumentedCommand { command: command.to_owned(), lines: Vec::new() })
+            }
             (None, Some(last)) if last.command.matches('"').count() % 2 == 1 => {
                 last.command += &format!("\n{line}");
             }
@@ -36,8 +38,8 @@ fn commands(block: &[&str]) -> Vec<Shown> {
     all
 }
 
-/// The output of a command, standard error included.
-fn printed(folder: &Folder, shown: &Shown) -> Vec<String> {
+/// Output of a command, with standard error.
+fn printed(folder: &Folder, shown: &DocumentedCommand) -> Vec<String> {
     let takt = Path::new(env!("CARGO_BIN_EXE_takt")).parent().unwrap().display();
     let path = format!("{takt}:{}", std::env::var("PATH").unwrap());
     let typed: String = shown
@@ -54,14 +56,14 @@ fn printed(folder: &Folder, shown: &Shown) -> Vec<String> {
     String::from_utf8(output.stdout).unwrap().lines().map(|line| line.trim_end().to_owned()).collect()
 }
 
-/// The lines below a command as they should be; none if none are shown.
-fn renewed(document: &Path, shown: &Shown, printed: Vec<String>) -> Vec<String> {
+/// Updated output lines of a command; empty if none are shown.
+fn renewed(document: &Path, shown: &DocumentedCommand, printed: Vec<String>) -> Vec<String> {
     if shown.lines.is_empty() {
         return Vec::new();
     }
     let first = |line: &str| line.split_whitespace().next().map(str::to_owned);
     let mut rest = &printed[..];
-    // The next of the output that is the same, or else has the same first word.
+    // The next equal line of the output, or else the next with the same first word.
     let find = |rest: &mut &[String], line: &String| {
         let same = rest.iter().position(|one| one == line);
         let found = same.or_else(|| rest.iter().position(|one| first(one) == first(line)));
@@ -80,7 +82,7 @@ fn renewed(document: &Path, shown: &Shown, printed: Vec<String>) -> Vec<String> 
             lines.extend(begins.map(|line| find(&mut rest, line)));
         }
         match pieces.peek() {
-            // The last part goes on to the output's end.
+            // The last part extends to the output's end.
             None if number == 0 || begins.is_some() => lines.extend_from_slice(rest),
             None => {}
             Some(_) => {
@@ -92,7 +94,7 @@ fn renewed(document: &Path, shown: &Shown, printed: Vec<String>) -> Vec<String> 
     lines
 }
 
-/// A document with every marked block renewed.
+/// Document text with every marked block updated.
 fn document(path: &Path, text: &str) -> String {
     let folder = Folder::new();
     copy(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../programs")), &folder.path().join("programs"));

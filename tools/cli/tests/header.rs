@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! `takt asm --header`: what it writes, read by the compilers and tools of each language.
+//! The option `takt asm --header`: headers, read by the compilers and tools of each language.
 
 use crate::common::Folder;
 use std::process::Command;
 
-/// Names that other languages have uses for, or cannot tell apart.
+/// Port names that are keywords in other languages, or indistinguishable there.
 const PROGRAM: &str = "
 .ports  latched
 .input  x, n:int @ 7, type, X:bits, self
@@ -35,7 +35,7 @@ fn write(language: &str, file: &str) -> Folder {
     folder.write("2-pd*.s", PROGRAM);
     let done = folder.line(&format!("asm 2-pd*.s --header {language} --header-file {file}"));
     assert!(done.ok().contains("assembled"));
-    // To standard output, the same, and no image on the way.
+    // To standard output: the same text, without an image.
     assert_eq!(folder.line(&format!("asm 2-pd*.s --header {language}")).ok(), folder.read_text(file));
     assert!(!folder.path().join("2-pd*.takt").exists());
     folder
@@ -105,7 +105,7 @@ const _: () = {
 }
 
 #[test]
-fn json_says_what_the_loader_writes() {
+fn json_equals_the_loaders_words() {
     let folder = write("json", "pd.json");
     let json: serde_json::Value = serde_json::from_str(&folder.read_text("pd.json")).expect("JSON");
     assert_eq!(
@@ -119,7 +119,7 @@ fn json_says_what_the_loader_writes() {
     };
     assert_eq!(port("inputs", 1), ("n".into(), 7.into(), 0x1007.into(), "int".into()));
     assert_eq!(port("outputs", 4), ("p_q".into(), 31.into(), 0x201f.into(), "bits".into()));
-    // The words of the circuit's own memory image that are not zero.
+    // Nonzero words of the circuit's own memory image.
     folder.line("rtl -o out --program 2-pd*.s").ok();
     let hex = folder.read_text("out/program.hex");
     let image = hex.lines().filter(|line| !line.starts_with("//")).map(|line| {
@@ -132,7 +132,7 @@ fn json_says_what_the_loader_writes() {
     };
     let records = json["load"]["records"].as_array().expect("a list");
     assert_eq!(records.iter().map(record).collect::<Vec<_>>(), image);
-    // The bounds are those of `takt bound`.
+    // Bounds equal `takt bound`'s.
     let bound: serde_json::Value =
         serde_json::from_str(&folder.line("bound 2-pd*.s --json").ok()).expect("JSON");
     assert_eq!(json["cycles"][1]["cycles"], bound["sections"][1]["in_time"]);
@@ -140,7 +140,7 @@ fn json_says_what_the_loader_writes() {
 }
 
 #[test]
-fn svd_is_what_its_parser_takes() {
+fn svd_is_accepted_by_its_parser() {
     let folder = write("svd", "pd.svd");
     let config = svd_parser::Config::default().validate_level(svd_parser::ValidateLevel::Strict);
     let device = svd_parser::parse_with_config(&folder.read_text("pd.svd"), &config);
@@ -152,7 +152,7 @@ fn svd_is_what_its_parser_takes() {
     };
     assert_eq!(register("in_n").address_offset, 4 * 0x1007);
     assert_eq!(register("out_p_q_2").address_offset, 4 * 0x201f);
-    // SVD knows no case.
+    // Names in SVD are case-insensitive.
     assert_eq!(register("out_f_2").address_offset, 4 * 0x2001);
     let status = register("status").fields.as_ref().expect("fields");
     assert!(

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! LinuxCNC's component, `tools/linuxcnc/hal_takt.c`, without LinuxCNC: compiled with a program that calls it as the servo thread does, at an
-//! emulated board with the hybrid robot. With LinuxCNC: `cargo xtask linuxcnc`.
+//! LinuxCNC's component `tools/linuxcnc/hal_takt.c`, compiled without LinuxCNC into a program that calls it like the servo thread, on an
+//! emulated board with the hybrid robot. With LinuxCNC: `cargo evidence linuxcnc`.
 #![cfg(unix)]
 
 use crate::common::{Folder, SimulatedBoard, source};
 use std::process::Command;
 use std::time::{Duration, Instant};
 
-/// The component in a program of its own.
+/// Compiles the component into a test program.
 fn harness(folder: &Folder) {
     let sources = format!("{}/tests/clients/linuxcnc", env!("CARGO_MANIFEST_DIR"));
     let done = Command::new("cc")
@@ -24,10 +24,16 @@ fn board(more: &str) -> String {
     format!("board sim --robot --serve --wiring {wiring} --program {system} {more}")
 }
 
-/// What the component says, on both of its outputs.
+/// Runs the component; returns its messages from both outputs.
 fn drive(folder: &Folder, port: &str, timeout: u32) -> (String, String) {
+    drive_with(folder, port, timeout, &[])
+}
+
+/// The same with parameters, as `loadrt` gives them.
+fn drive_with(folder: &Folder, port: &str, timeout: u32, parameters: &[&str]) -> (String, String) {
     let mut harness = Command::new(folder.path().join("harness"));
-    let done = harness.args([port, "3000000", &timeout.to_string()]).output().expect("it is compiled");
+    let harness = harness.args([port, "3000000", &timeout.to_string()]).args(parameters);
+    let done = harness.output().expect("it is compiled");
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
     (text(&done.stdout), text(&done.stderr))
 }
@@ -37,12 +43,12 @@ fn number(said: &str, name: &str) -> f64 {
     words.nth(1).and_then(|word| word.parse().ok()).unwrap_or_else(|| panic!("no {name}: {said}"))
 }
 
-/// Periods that a board records after the drive has ended; then it writes the file.
+/// Number of periods that a board records after the drive; then it writes the file.
 const AFTER: usize = 100;
-/// The time that it may take for this, after its host has ended.
+/// Time limit for the recording after the host has ended.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// Rows of what the board has recorded: whether it drove, and whether a motor's pin was 1.
+/// Recorded rows: whether the outputs drove, and whether a motor's pin was 1.
 fn recorded(folder: &Folder) -> Vec<(bool, bool)> {
     let begin = Instant::now();
     loop {
@@ -73,15 +79,95 @@ fn the_component_drives_the_robot() {
     for name in ["code", "starved", "skipped", "misses"] {
         assert_eq!(number(&said, name), 0.0, "{said}");
     }
-    // 5 mm in 0.2 s, with the errors of a robot that accelerates.
+    // 5 mm in 0.2 s, with the errors of an accelerating robot.
     assert!((number(&said, "moved") - 5.0).abs() < 1e-3, "{said}");
     let error = number(&said, "error");
     assert!(error > 1e-4 && error < 0.02, "{said}");
     assert_eq!(number(&said, "knots"), 220.0);
-    // A second time, from where it stands.
+    // A second drive, from the present position.
     let (said, errors) = drive(&folder, &board.port, 30_000);
     assert_eq!((errors.as_str(), number(&said, "code")), ("", 0.0), "{said}");
     assert!((number(&said, "moved") - 5.0).abs() < 1e-3, "{said}");
+}
+
+const HYBRID: &str = "--joints LLLRR --geometry hybrid \
+    --counts 2.5e-7,2.5e-7,2.5e-7,2.3968449810713143e-5,2.3968449810713143e-5";
+
+#[test]
+fn the_robots_hal_file_is_written_by_a_command() {
+    let (wiring, system) = (source("followed_board.toml"), source("followed.toml"));
+    let line = format!("board hal --wiring {wiring} --program {system} {HYBRID}");
+    let file = format!("{}/../linuxcnc/takt.hal", env!("CARGO_MANIFEST_DIR"));
+    let written = Folder::new().line(&line).ok();
+    assert_eq!(
+        std::fs::read_to_string(file).unwrap(),
+        written,
+        "tools/linuxcnc/takt.hal is stale: takt {line}"
+    );
+}
+
+/// A system whose ends at the host lie elsewhere is driven by the same component, with the parameters that `takt board hal` writes.
+#[test]
+fn another_system_needs_no_c() {
+    let folder = Folder::new();
+    harness(&folder);
+    let text = std::fs::read_to_string(source("followed.toml")).unwrap();
+    let program = |name: &str| format!("program = \"{}\"", source(name));
+    let text = text.replace("program = \"interpolation.s\"", &program("interpolation.s"));
+    let text = text.replace("program = \"tracking.s\"", &program("tracking.s"));
+    let first = "[[wire]]\nfrom = \"host.n1\"\nto = \"interpolation.n1\"";
+    assert!(text.contains(first));
+    // One more value that the host sees, ahead of the snapshot.
+    let more = "[[wire]]\nfrom = \"interpolation.pop\"\nto = \"host.taken\"\n\n";
+    folder.write("other.toml", text.replace(first, &format!("{more}{first}")));
+    let wiring = source("followed_board.toml");
+    let hal = folder.line(&format!("board hal --wiring {wiring} --program other.toml {HYBRID}")).ok();
+    let load = hal.lines().find(|line| line.starts_with("loadrt hal_takt")).expect("it loads the component");
+    let parameters: Vec<&str> = load.split(' ').skip(2).filter(|word| !word.contains("=[TAKT]")).collect();
+    assert!(parameters.contains(&"measured=0x3406"), "{load}");
+    let line = format!("board sim --robot --serve --emulated --wiring {wiring} --program other.toml");
+    let board = SimulatedBoard::start(&line, folder.path());
+    let (said, errors) = drive_with(&folder, &board.port, 30_000, &parameters);
+    assert_eq!((errors.as_str(), number(&said, "code")), ("", 0.0), "{said}");
+    assert!((number(&said, "moved") - 5.0).abs() < 1e-3, "{said}");
+    // Encoders as they are: arms of 893 mm, and two angles.
+    let direct = ["joints=LLLRR", "geometry=direct", "counts=2.5e-7:2.5e-7:2.5e-7:1e-5:1e-5"];
+    let (said, errors) = drive_with(&folder, &board.port, 30_000, &direct);
+    assert_eq!(errors, "");
+    assert_eq!(number(&said, "starts").round(), 893.0, "{said}");
+}
+
+#[test]
+fn parameters_that_do_not_fit_are_refused() {
+    let folder = Folder::new();
+    harness(&folder);
+    for (parameter, says) in [
+        ("joints=LLX", "takt: `joints` has 1 to 7 letters, L or R\n"),
+        ("counts=1:2", "takt: `counts` has a number for each joint, with colons between them\n"),
+        ("every=0", "takt: `every` is 1 to 4095 periods, `servo` us\n"),
+        ("geometry=delta", "takt: `geometry` is `direct` or `hybrid`\n"),
+        ("joints=RLLRR", "takt: the geometry `hybrid` has joints LLL, and others behind them\n"),
+    ] {
+        let said = drive_with(&folder, "/dev/null", 100, &[parameter]);
+        assert_eq!(said, (String::new(), says.to_owned()), "{parameter}");
+    }
+    let (wiring, system) = (source("followed_board.toml"), source("followed.toml"));
+    for (arguments, says) in [
+        ("--joints LLX --counts 1,1,1", "L for a linear joint and R for a rotary one"),
+        ("--joints LL --counts 1", "--counts has 1 sizes, and --joints 2 letters"),
+        ("--joints LL --counts 1,0", "0 is no size of a count"),
+        ("--joints LR --counts 1,1 --geometry hybrid", "the first three joints are linear"),
+        ("--joints LLLR --counts 1,1,1,1", "the value behind `measured.m4` is not the next one at the host"),
+        ("--joints LLLRRR --counts 1,1,1,1,1,1", "the system has no value `n6` at the host"),
+        (
+            "--joints LLLRR --counts 1,1,1,1,1 --servo 950",
+            "is 1 to 4095 periods of the board, and one of these takes 100 µs",
+        ),
+    ] {
+        let line = format!("board hal --wiring {wiring} --program {system} {arguments}");
+        let done = folder.line(&line);
+        assert!(done.stderr.contains(says), "{arguments}: {}", done.stderr);
+    }
 }
 
 #[test]
@@ -100,7 +186,7 @@ fn faults_end_in_safe_outputs_and_a_message() {
         let rows = recorded(&folder);
         assert!(rows.len() > 1000, "{option}: {}", rows.len());
         let last = rows.iter().rposition(|(drives, _)| *drives).expect("it drove");
-        // At once, or after the 300 periods for which the wiring waits for the host, less those since its last request.
+        // The outputs become safe at once, or after the wiring's timeout of 300 periods, less those since the host's last request.
         let after = last + 1 - rows.iter().position(|(drives, _)| *drives).expect("it drove");
         let expected = if code == 1.0 { 1250..=1300 } else { 999..=1000 };
         assert!(expected.contains(&after), "{option}: it drove for {after} periods");
@@ -110,7 +196,7 @@ fn faults_end_in_safe_outputs_and_a_message() {
 }
 
 #[test]
-fn what_cannot_be_served_is_refused() {
+fn rejects_unsupported_configurations() {
     let folder = Folder::new();
     harness(&folder);
     for (port, says) in [

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! `takt lsp` as clients meet it: over standard input and output, and with Neovim's own client.
+//! The command `takt lsp` with clients: on standard input and output, and with Neovim.
 
 use crate::common::protocol::Client;
 use crate::common::{Folder, source};
@@ -48,7 +48,7 @@ impl Session {
         self.told(name)
     }
 
-    /// Replaces a text that occurs once.
+    /// Replaces a text that occurs exactly once.
     fn edit(&mut self, name: &str, text: &str, from: &str, to: &str) -> String {
         assert_eq!(text.matches(from).count(), 1, "{from}");
         let (start, end) = (position(text, from, 0), position(text, from, from.len()));
@@ -63,7 +63,7 @@ impl Session {
         text.replace(from, to)
     }
 
-    /// The next diagnostics of a document.
+    /// The next published diagnostics of a document.
     fn told(&mut self, name: &str) -> Vec<Value> {
         let uri = self.uri(name);
         let message = self.client.wait(|message| {
@@ -88,7 +88,7 @@ impl Session {
         self.client.ask("textDocument/rename", params)
     }
 
-    /// The texts after a workspace edit.
+    /// Texts after a workspace edit.
     fn applied(&self, answer: &Value, files: &[(&str, &str)]) -> Vec<String> {
         assert!(answer.get("error").is_none(), "{answer}");
         let changes = answer["result"]["changes"].as_object().unwrap();
@@ -109,7 +109,7 @@ impl Session {
                 for edit in edits {
                     let (line, from) = start(&edit);
                     let to = edit["range"]["end"]["character"].as_u64().unwrap();
-                    // These texts are ASCII.
+                    // All texts are ASCII, so columns are bytes.
                     lines[line as usize]
                         .replace_range(from as usize..to as usize, edit["newText"].as_str().unwrap());
                 }
@@ -126,14 +126,14 @@ impl Session {
     }
 }
 
-/// The first place of a text, and so many bytes behind.
+/// Position `more` bytes after the first occurrence of a text.
 fn position(text: &str, of: &str, more: usize) -> Value {
     let at = text.find(of).unwrap_or_else(|| panic!("{of}")) + more;
     let start = text[..at].rfind('\n').map_or(0, |at| at + 1);
     json!({ "line": text[..at].matches('\n').count(), "character": text[start..at].encode_utf16().count() })
 }
 
-/// The diagnostics of `takt asm` for a file: code, message and first place of each.
+/// Diagnostics of `takt asm` for a file: code, message and first place of each.
 fn told_by_asm(folder: &Folder, file: &str) -> Vec<(String, String, u64, u64)> {
     let done = folder.line(&format!("asm {file} --check --json"));
     let json: Value = serde_json::from_str(&done.stdout).unwrap();
@@ -146,7 +146,7 @@ fn told_by_asm(folder: &Folder, file: &str) -> Vec<(String, String, u64, u64)> {
     messages.iter().map(one).collect()
 }
 
-/// The diagnostics of the server for a text, as [`told_by_asm`] has them.
+/// Diagnostics of the server, in the form of [`told_by_asm`].
 fn shown(told: &[Value], text: &str) -> Vec<(String, String, u64, u64)> {
     let one = |told: &Value| {
         let start = &told["range"]["start"];
@@ -164,7 +164,7 @@ fn shown(told: &[Value], text: &str) -> Vec<(String, String, u64, u64)> {
     list
 }
 
-/// Every mistake of the assembler's own tests, as the server and as `takt asm` tell it.
+/// All mistakes of the assembler's tests: server and `takt asm` report the same.
 #[test]
 fn diagnostics_are_those_of_the_assembler() {
     let mistakes = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../asm/tests/mistakes");
@@ -173,7 +173,7 @@ fn diagnostics_are_those_of_the_assembler() {
     for entry in std::fs::read_dir(mistakes).unwrap() {
         let path = entry.unwrap().path();
         let Ok(text) = std::fs::read_to_string(&path) else { continue };
-        // Those for another machine are assembled for this one: the mistakes are others, as the server's.
+        // Sources for another machine are assembled for this one, with other mistakes, as in the server.
         let name = format!("{compared}/main.s");
         std::fs::create_dir(session.folder.path().join(compared.to_string())).unwrap();
         session.folder.write(&name, &text);
@@ -184,7 +184,7 @@ fn diagnostics_are_those_of_the_assembler() {
         }
         let mut told = shown(&session.open(&name, &text), &text);
         if told != expected {
-            // The assembler's diagnostics come first; the scheduler's come when it is done.
+            // Diagnostics of the assembler come first; the scheduler's follow when it is done.
             assert!(
                 told.iter().all(|one| expected.contains(one)),
                 "{}: {told:?} {expected:?}",
@@ -247,16 +247,16 @@ fn names_are_followed_through_macros_repetitions_and_includes() {
     let references = session.ask("textDocument/references", params);
     assert_eq!(references.as_array().unwrap().len(), 2, "{references}");
 
-    // The constant: in both files, and in the macro that nothing uses.
+    // A constant: renamed in both files, and in the unused macro.
     let answer = session.rename("main.s", MAIN, "K\n", "gain");
     let texts = session.applied(&answer, &files);
     assert_eq!(texts, [MAIN.replace('K', "gain"), PART.replace('K', "gain")]);
-    // A family of registers, from the use of one.
+    // A family of registers, renamed from the use of one member.
     let answer = session.rename("main.s", MAIN, "p{i}, x", "pos{i}");
     let texts = session.applied(&answer, &files);
     assert_eq!(texts[0], MAIN.replace("p{i}", "pos{i}").replace("p1, p2", "pos1, pos2"));
     assert_eq!(texts[1], PART);
-    // A parameter and a local, in the macro only; the macro, in both.
+    // A parameter and a local, only in the macro; the macro itself, in both files.
     for (of, to) in [("to, by", "target"), ("tmp, to", "t"), ("scale", "times")] {
         let old = of.split(',').next().unwrap();
         let answer = session.rename("part.s", PART, of, to);
@@ -264,7 +264,7 @@ fn names_are_followed_through_macros_repetitions_and_includes() {
         let (again, main) = (PART.replace(old, to), MAIN.replace(old, to));
         assert_eq!(texts, [if old == "scale" { main } else { MAIN.to_owned() }, again], "{of}");
     }
-    // A change of the program's meaning is refused, with the reason.
+    // A rename that changes the program's meaning is refused with the reason.
     for (of, to, why) in [
         ("K\n", "x", "would not stay the same"),
         ("p{i}, x", "x{i}x", "must end in `{i}`"),
@@ -319,7 +319,7 @@ fn names_of_equations_and_arrays_are_followed() {
         };
         assert_eq!(texts, [expected], "{of}");
     }
-    // As `takt fmt` leaves it.
+    // Formatted exactly as by `takt fmt`.
     assert_eq!(session.folder.line("fmt --check main.s").status, Some(0));
     session.end();
 }
@@ -329,7 +329,7 @@ fn an_included_file_is_read_as_it_is_open() {
     let mut session = Session::new(&[("main.s", MAIN), ("part.s", PART)]);
     session.open("main.s", MAIN);
     session.open("part.s", PART);
-    // Unsaved: the file on the disk is as it was.
+    // Unsaved edit: the file on disk stays unchanged.
     let edited = session.edit("part.s", PART, ".const  K", ".const  L");
     let told = session.told("main.s");
     assert!(
@@ -343,7 +343,7 @@ fn an_included_file_is_read_as_it_is_open() {
 }
 
 #[test]
-fn a_misspelt_name_is_mended_as_advised() {
+fn suggested_spelling_fixes_the_name() {
     let mut session = Session::new(&[("main.s", MAIN), ("part.s", PART)]);
     session.open("main.s", MAIN);
     let edited = session.edit("main.s", MAIN, "fadd ", "fadf ");
@@ -358,11 +358,11 @@ fn a_misspelt_name_is_mended_as_advised() {
     session.end();
 }
 
-/// The advice of the assembler's help is offered as a fix, and mends it.
+/// The assembler's suggestions are offered as quick fixes, and repair the source.
 #[test]
-fn what_is_advised_is_a_fix() {
+fn each_suggestion_is_a_code_action() {
     let cases = [
-        (".input n:int\n.output y\n.period\np: y = n*2.0\n wait p\n", "n*", "write `itof(n)`"),
+        (".input n:int\n.output y\n.period\np: y = n*2.5\n wait p\n", "n*", "write `itof(n)`"),
         (
             ".include \"math.s\"\n.output y\n.period\np: mov y, zero\n wait p\n",
             ".inc",
@@ -388,7 +388,7 @@ fn what_is_advised_is_a_fix() {
     session.end();
 }
 
-/// Cycles beside the lines and above the section, and where they go when lines are added.
+/// Cycles beside the lines and above the section, and their places after added lines.
 #[test]
 fn cycles_stand_beside_the_lines() {
     let mut session = Session::new(&[("main.s", MAIN), ("part.s", PART)]);
@@ -420,7 +420,7 @@ fn cycles_stand_beside_the_lines() {
     assert!(title.starts_with(&format!("period: {} cycles, bound ", cycles["worst"])), "{title}");
     assert_eq!(lenses[0]["range"]["start"]["line"], 5);
 
-    // Two lines more, above; what is counted moves with its line until it is counted again.
+    // Two lines inserted above; old hints move with their lines until the new count arrives.
     session.edit("main.s", MAIN, ".schedule on\n", "\n\n.schedule on\n");
     let after = lines(&session.ask("textDocument/inlayHint", params));
     let moved: Vec<_> = before.iter().map(|(line, text)| (line + 2, text.clone())).collect();
@@ -428,10 +428,10 @@ fn cycles_stand_beside_the_lines() {
     session.end();
 }
 
-/// A program that another one includes is one all the same: its own cycles stand above its section. A mistake while it is
-/// written changes nothing of that; without its section it is a part of the other.
+/// A program included by another one shows its own cycles above its section. A temporary mistake does not change that; without its section
+/// it becomes a part of the other.
 #[test]
-fn a_program_that_another_includes_has_its_own_cycles() {
+fn included_programs_have_their_own_cycles() {
     let inner = ".input  x\n.output y\n.period\nperiod: fadd    y, x, x\n.if macro.longer\n        longer  y\n\
                  .endif\n        wait    period\n";
     let outer =
@@ -461,7 +461,7 @@ fn a_program_that_another_includes_has_its_own_cycles() {
     session.end();
 }
 
-/// The view of the pipeline: the cycles of the inlay hints, and lines that follow what is written.
+/// Pipeline view: cycles equal the inlay hints, and lines follow edits.
 #[test]
 fn the_picture_has_each_operation_at_its_line() {
     let mut session = Session::new(&[("main.s", MAIN), ("part.s", PART)]);
@@ -474,7 +474,7 @@ fn the_picture_has_each_operation_at_its_line() {
     let trace: Value = serde_json::from_str(&trace).unwrap();
     let of_period = |bundle: &&Value| bundle["from"] == "period";
     let bundles = picture["bundles"].as_array().unwrap();
-    // Operations of the same straight line issue as they did in the run, from its first bundle on.
+    // Operations of a straight-line block issue as in the run, relative to its first bundle.
     let ran = trace["bundles"].as_array().unwrap();
     let first = ran[0]["cycle"].as_u64().unwrap();
     let mut compared = 0;
@@ -512,7 +512,7 @@ fn the_picture_has_each_operation_at_its_line() {
     session.end();
 }
 
-/// A picture of an older text is known for one, also where the change is in an included file.
+/// A pipeline view of older text is marked as such, even if the change is in an included file.
 #[test]
 fn the_picture_is_old_while_an_included_file_is_wrong() {
     let mut session = Session::new(&[("main.s", MAIN), ("part.s", PART)]);
@@ -533,7 +533,7 @@ fn the_picture_is_old_while_an_included_file_is_wrong() {
     session.end();
 }
 
-/// A mistake right after a change without one: what is known of the text before stays.
+/// A mistake just after a correct change: results of the previous text remain.
 #[test]
 fn a_mistake_soon_after_a_change_loses_no_cycles() {
     let mut session = Session::new(&[("main.s", MAIN), ("part.s", PART), ("other.s", MAIN)]);
@@ -544,7 +544,7 @@ fn a_mistake_soon_after_a_change_loses_no_cycles() {
     session.ask("takt/pipeline", params.clone());
     session.edit("main.s", &changed, "fadd    F", "fad     F");
     assert_eq!(session.ask("takt/pipeline", params.clone())["current"], false);
-    // Programs that wait to be scheduled are so together.
+    // Several programs wait to be scheduled together.
     session.open("other.s", MAIN);
     let other = session.uri("other.s");
     session.client.wait(|message| message["method"] == "takt/counted" && message["params"]["uri"] == *other);
@@ -553,7 +553,7 @@ fn a_mistake_soon_after_a_change_loses_no_cycles() {
 }
 
 #[test]
-fn completion_knows_what_an_operand_can_be() {
+fn completion_offers_valid_operands() {
     let mut session = Session::new(&[("main.s", MAIN), ("part.s", PART)]);
     session.open("main.s", MAIN);
     let mut labels = |from: &str, to: &str| -> Vec<String> {
@@ -618,9 +618,9 @@ fn a_document_is_laid_out_as_by_fmt() {
     session.end();
 }
 
-/// Bad messages, unknown methods, missing documents: each gets an error, and the session goes on.
+/// Malformed messages, unknown methods, missing documents: each yields an error, and the session continues.
 #[test]
-fn nonsense_is_told_and_survived() {
+fn survives_and_reports_invalid_messages() {
     let folder = Folder::new();
     let mut client = Client::start(&folder, "lsp");
     let code = |answer: &Value| answer["error"]["code"].as_i64().unwrap_or_else(|| panic!("{answer}"));
@@ -646,7 +646,7 @@ fn nonsense_is_told_and_survived() {
     client.notify("textDocument/didOpen", json!("what?"));
     client.wait(|message| message["method"] == "window/logMessage");
 
-    // A document that lies nowhere, and one that is on no disk.
+    // A document without a file, and one whose file does not exist.
     for uri in ["untitled:Untitled-1", "file:///nowhere/new.s"] {
         let document =
             json!({ "uri": uri, "languageId": "takt", "version": 1, "text": ".period\np: wait q\n" });
@@ -654,13 +654,13 @@ fn nonsense_is_told_and_survived() {
         let told = client.wait(|message| message["params"]["uri"] == uri);
         assert_eq!(told["params"]["diagnostics"][0]["code"], "unknown-name", "{told}");
     }
-    // Positions beyond the text, in every request that has one.
+    // Positions beyond the text, in every request with a position.
     for method in ["hover", "completion", "definition", "documentHighlight", "prepareRename"] {
         let params = json!({ "textDocument": { "uri": "untitled:Untitled-1" }, "position": { "line": 4_000_000, "character": 4_000_000 } });
         let answer = client.ask(&format!("textDocument/{method}"), params);
         assert!(answer.get("result").is_some() || code(&answer) == -32803, "{answer}");
     }
-    // Larger than the assembler reads: 65 MiB.
+    // Larger than the assembler's limit: 65 MiB.
     let huge = "; \n".repeat((65 << 20) / 3);
     let document = json!({ "uri": "untitled:huge", "languageId": "takt", "version": 1, "text": huge });
     client.notify("textDocument/didOpen", json!({ "textDocument": document }));
@@ -673,7 +673,7 @@ fn nonsense_is_told_and_survived() {
     client.notify("exit", Value::Null);
     assert_eq!(client.end(), (Some(0), String::new()));
 
-    // A stream that is none, and one that ends: no success, and no panic.
+    // A malformed stream, and a truncated one: failure without a panic.
     let mut client = Client::start(&folder, "lsp");
     client.raw(b"GET / HTTP/1.1\n");
     let (status, stderr) = client.end();
@@ -681,7 +681,7 @@ fn nonsense_is_told_and_survived() {
     assert!(stderr.contains("begins with `Content-Length: …`") || stderr.contains("header"), "{stderr}");
 }
 
-/// A request that is cancelled before it is answered.
+/// A request cancelled before its answer.
 #[test]
 fn cancelled_requests_are_not_answered() {
     let mut session = Session::new(&[("main.s", MAIN), ("part.s", PART)]);
@@ -691,21 +691,21 @@ fn cancelled_requests_are_not_answered() {
     };
     let cancel =
         json!({ "jsonrpc": "2.0", "method": "$/cancelRequest", "params": { "id": 900 } }).to_string();
-    // In one write, so that both are there when the first is looked at, behind one that takes its time.
+    // All messages in one write, behind a slow request, so that the cancellation arrives before its request is handled.
     let frames: String = [hover(899), hover(900), cancel]
         .iter()
         .map(|text| format!("Content-Length: {}\r\n\r\n{text}", text.len()))
         .collect();
     session.client.raw(frames.as_bytes());
     let answer = session.client.wait(|message| message["id"] == 900);
-    // It may be answered before the second frame is read; otherwise it is cancelled.
+    // The request may be answered before the second frame is read; otherwise it is cancelled.
     assert!(answer["error"]["code"] == -32800 || answer.get("result").is_some(), "{answer}");
     session.end();
 }
 
 /// Neovim's own client, from the first keystroke to the end.
 #[test]
-fn neovim_works_with_it() {
+fn neovim_uses_the_language_server() {
     let folder = Folder::new();
     for name in ["tracking.s", "robot.s"] {
         folder.write(name, std::fs::read(source(name)).unwrap());
@@ -744,7 +744,7 @@ fn neovim_works_with_it() {
     assert!(text("refused").contains("is declared already"), "{found}");
     assert_eq!(text("formatted"), "        fmul    zz, z, z");
     assert_eq!(found["stopped"], true);
-    // Its result assembles to the same program.
+    // The edited source assembles to the same program.
     let code = |file: &str| -> Vec<String> {
         let done = folder.line(&format!("asm {file} --strip --readmemh memory -l -"));
         assert_eq!(done.status, Some(0), "{}", done.stderr);

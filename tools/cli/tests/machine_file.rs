@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A machine of a file, wherever a machine's name stands; `asm/tests/machine_files.rs` has every mistake in such a file.
+//! Machine files in every place of a machine's name; `asm/tests/machine_files.rs` tests all mistakes in such files.
 
 use crate::common::{Folder, source};
 
-/// A folder with t3's file, one with a second adder, and the controller.
+/// A folder with t3's file, a copy with a second adder, and the controller.
 fn workshop() -> Folder {
     let folder = Folder::new();
     let t3 = folder.takt(&["machines", "t3", "--toml"]).ok();
@@ -16,7 +16,7 @@ fn workshop() -> Folder {
     folder
 }
 
-/// A printed row is the machine: its image has the same bytes.
+/// A printed row denotes the same machine: images are equal byte for byte.
 #[test]
 fn a_round_trip() {
     let folder = workshop();
@@ -28,7 +28,7 @@ fn a_round_trip() {
     assert_eq!(folder.read("a.elf"), folder.read("c.elf"));
 }
 
-/// The image is all that is needed, and what is disassembled of it assembles again.
+/// An image suffices without its machine file, and its disassembly assembles again.
 #[test]
 fn an_image_needs_no_file() {
     let folder = workshop();
@@ -45,7 +45,7 @@ fn an_image_needs_no_file() {
     assert_eq!(again, folder.takt(&["disasm", "stripped.elf"]).ok());
 }
 
-/// A system names it relative to its own folder.
+/// A system refers to a machine file relative to its own folder.
 #[test]
 fn a_system_of_it() {
     let folder = workshop();
@@ -62,7 +62,7 @@ fn a_system_of_it() {
     assert!(told.stderr.contains("sub/system.toml:5:11") && told.stderr.contains("none.toml"), "{told:?}");
 }
 
-/// Mistakes that only the generator of circuits finds have their place in the file, too.
+/// Mistakes found only by the circuit generator are reported at their places in the file, too.
 #[test]
 fn rows_without_a_circuit() {
     let folder = workshop();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Tests of the crate from outside, one program: a module for each subject.
+//! Integration tests in one binary: one module for each subject.
 
 mod batch;
 mod board;
@@ -16,11 +16,11 @@ mod documents;
 mod explore;
 mod header;
 mod linuxcnc;
+mod live;
 mod lsp;
 mod machine_file;
 mod mistakes;
 mod model;
-mod outside;
 mod page;
 mod plant;
 mod robot;
@@ -28,3 +28,5 @@ mod sources;
 mod system;
 mod terminal;
 mod traces;
+mod untrusted_text;
+mod workers;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Wrong inputs: each gives exactly one clear error on standard error, a non-zero status, nothing on standard output,
-//! and leaves the files alone. The texts are in `snapshots/`.
+//! Wrong inputs: each yields exactly one clear error on standard error, a nonzero status, nothing on standard output, and leaves all files
+//! unchanged. The texts are in `snapshots/`.
 
-use crate::common::{Done, Folder, source};
+use crate::common::{Folder, RunOutput, source};
 
 const PD: &str = "\
 .input a, n:int
@@ -15,7 +15,7 @@ period: fadd F, a, a
         wait period
 ";
 
-/// A folder with sources and tables, good and bad.
+/// A folder with good and bad sources and tables.
 fn workshop() -> Folder {
     let folder = Folder::new();
     let files: [(&str, &[u8]); 36] = [
@@ -72,17 +72,17 @@ fn workshop() -> Folder {
     folder
 }
 
-impl Done {
+impl RunOutput {
     #[track_caller]
     fn ok_with(self, beginning: &str) {
         let text = self.ok();
         assert!(text.starts_with(beginning), "{text}");
     }
 
-    /// The error, as the snapshots have it, after a check of what every mistake has in common.
+    /// Error text for the snapshots, after checks common to all mistakes.
     #[track_caller]
     fn mistake(&self, line: &str) -> String {
-        let Done { status, stdout, stderr } = self;
+        let RunOutput { status, stdout, stderr } = self;
         assert!(matches!(status, Some(1 | 2)), "{line}: {self:?}");
         assert_eq!(stdout, "", "{line}");
         let is_usage = stderr.contains("Usage: takt") || stderr.contains("try '--help'");
@@ -92,12 +92,12 @@ impl Done {
     }
 }
 
-/// Lines that begin an error.
+/// Number of lines that begin an error.
 fn errors(stderr: &str) -> usize {
     stderr.lines().filter(|line| line.starts_with("error")).count()
 }
 
-/// Runs the lines and snapshots what they say; each must say one error.
+/// Runs command lines and snapshots their messages; each must report one error.
 fn check(snapshot: &str, lines: &[&str]) {
     let folder = workshop();
     let before = folder.list();
@@ -112,7 +112,7 @@ fn check(snapshot: &str, lines: &[&str]) {
 }
 
 #[test]
-fn files_that_are_no_program() {
+fn rejects_files_that_are_not_programs() {
     check(
         "programs",
         &[
@@ -199,7 +199,7 @@ fn programs_that_cannot_be_bounded() {
     );
 }
 
-/// Programs with the ports of a tracking program that are none; the robot's file is warned of, as nothing is used.
+/// Programs with the ports of a tracking program that do not work; the unused robot file gives warnings.
 #[test]
 fn controllers_that_go_wrong() {
     let folder = Folder::new();
@@ -229,7 +229,7 @@ fn controllers_that_go_wrong() {
     let fault = &done.stderr[done.stderr.find("error").unwrap()..];
     insta::assert_snapshot!("controller", fault);
     assert_eq!(folder.list(), ["bad.s", "robot.s"]);
-    // A force that is no number: every output is written, once.
+    // A force that is NaN: every output is written once.
     let outputs = "F1 F2 F3 tau4 tau5 l1d l2d l3d v1d v2d v3d a1d a2d a3d th4d th5d om4d om5d ep4d ep5d";
     let writes: String = outputs.split(' ').map(|port| format!(" fdiv {port}, zero, zero\n")).collect();
     folder.write("bad.s", format!(".include \"robot.s\"\n.once\n wait p\n.period\np:\n{writes} wait p\n"));
@@ -264,7 +264,7 @@ fn tables_of_inputs() {
     let lines: Vec<String> = tables.iter().map(|table| format!("run pd.s --inputs {table}.csv")).collect();
     let mut lines: Vec<&str> = lines.iter().map(String::as_str).collect();
     lines.push("run pd.s --inputs folder");
-    // Whoever reads it.
+    // Further commands report mistakes in tables alike.
     lines.extend([
         "analyse pd.s --inputs semicolon.csv",
         "debug pd.s --inputs header.csv",
@@ -347,7 +347,7 @@ fn command_lines() {
 }
 
 #[test]
-fn outputs_that_cannot_be_written() {
+fn reports_unwritable_outputs() {
     check(
         "outputs",
         &[
@@ -397,7 +397,7 @@ fn operands_of_eval() {
     assert_eq!(done.status, Some(1));
 }
 
-/// Every error of a source at once, and only they: no file, no result.
+/// All errors of a source at once, and nothing else: no file, no result.
 #[test]
 fn all_errors_of_a_source() {
     let folder = workshop();
@@ -413,7 +413,7 @@ fn all_errors_of_a_source() {
     assert_eq!(folder.list(), before);
 }
 
-/// Without an end in sight, from standard input.
+/// Endless lines from standard input.
 #[test]
 fn lines_of_a_hundred_megabytes() {
     let folder = workshop();
@@ -427,7 +427,7 @@ fn lines_of_a_hundred_megabytes() {
         ("track --gcode -", ""),
         ("eval fadd", ""),
     ] {
-        // With an open quote, line ends do not end the row.
+        // Inside an open quote, line breaks do not end the row.
         let megabyte =
             if head.ends_with('"') { "1234567\n".repeat(1 << 17) } else { "12345678".repeat(1 << 17) };
         let done = folder.fed_by(line, |stdin| {
@@ -440,7 +440,7 @@ fn lines_of_a_hundred_megabytes() {
     insta::assert_snapshot!("endless", text);
 }
 
-/// An image that is cut anywhere, or has any byte changed, either runs or is refused; nothing worse.
+/// An image truncated anywhere, or with any byte changed, either runs or is refused, without a crash.
 #[test]
 fn damaged_images() {
     let folder = workshop();
@@ -464,7 +464,7 @@ fn damaged_images() {
     }
 }
 
-/// A file stays as it was until all is well, and nothing is left beside it.
+/// A file keeps its contents until the command succeeds, and no temporary file remains.
 #[test]
 fn outputs_are_never_half_written() {
     let folder = workshop();
@@ -489,12 +489,12 @@ fn outputs_are_never_half_written() {
 }
 
 #[test]
-fn messages_that_nobody_can_read() {
+fn survives_closed_standard_error() {
     let folder = workshop();
     for line in ["asm typos.s", "run nowhere", "run --foo", "run pd.s"] {
         let full = std::fs::File::options().write(true).open("/dev/full").unwrap();
         let mut command = folder.command(&line.split(' ').collect::<Vec<_>>());
-        let done = Done::of({
+        let done = RunOutput::of({
             command.stderr(full);
             command
         });

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! `takt model`.
+//! The command `takt model`.
 
 use crate::common::Folder;
 
-const UR5: &str = include_str!("../../../programs/model/tests/data/ur5.urdf");
+const UR5: &str = include_str!("../../../asm/front/tests/data/ur5.urdf");
 
 fn folder() -> Folder {
     let folder = Folder::new();
@@ -21,10 +21,10 @@ fn a_robot_becomes_a_program_that_runs() {
         text.contains("\noperations: 21 (sums 5, products 10, divisions and roots 0, trigonometric 6"),
         "{text}"
     );
-    assert!(text.contains(" cycles on t3, bound "), "{text}");
+    assert!(text.contains(" cycles on t3 (") && text.contains(" or later), bound "), "{text}");
     let source = folder.read_text("gravity.s");
     assert!(source.contains("\n.output tau_elbow ; force of elbow_joint, N m\n"), "{source}");
-    // The arm straight up but for the wrist, and at an angle: what Pinocchio says, to what binary32 has.
+    // The arm vertical except the wrist, and at an angle: Pinocchio's values within binary32.
     folder.write("q.csv", "q_shoulder_lift,q_elbow,q_wrist_1,q_wrist_2\n-1.5707964,0,0,0\n0,0.5,-0.25,1\n");
     let rows = folder.line("run gravity.s --inputs q.csv --outputs -").ok();
     let rows: Vec<Vec<&str>> = rows.lines().map(|line| line.split(',').collect()).collect();
@@ -37,7 +37,7 @@ fn a_robot_becomes_a_program_that_runs() {
 const TAU: [f64; 2] = [-0.174_463_92, -57.207_66];
 
 #[test]
-fn output_goes_where_it_is_told() {
+fn output_goes_to_the_named_file() {
     let folder = folder();
     let source = folder.line("model ur5.urdf -f inverse-dynamics -o -").ok();
     assert!(
@@ -67,14 +67,14 @@ fn rewrites_can_be_switched_off() {
         assert!(operations(&format!("--no-{option}")) >= all, "{option}");
     }
     assert!(operations("--exact") > all && operations("--no-scale") > all);
-    for (name, _) in takt_model::graph::Rewrites::NAMES {
+    for (name, _) in takt_front::graph::Rewrites::NAMES {
         folder.line(&format!("model ur5.urdf -f gravity --no-{name}")).ok();
     }
 }
 
-/// The command in the head of `programs/examples/panda/law.s` makes the body beside it again, and the law assembles without a warning.
+/// The command in the head of `programs/examples/panda/law.s` regenerates the body beside it, and the law assembles without warnings.
 #[test]
-fn a_body_is_what_its_command_makes() {
+fn stored_body_equals_the_commands_output() {
     let panda = concat!(env!("CARGO_MANIFEST_DIR"), "/../../programs/examples/panda");
     let read = |name: &str| std::fs::read_to_string(format!("{panda}/{name}")).expect("the file");
     let law = read("law.s");
@@ -84,10 +84,10 @@ fn a_body_is_what_its_command_makes() {
         folder.write(name, read(name));
     }
     let text = folder.line(command).ok();
-    assert!(text.contains(" cycles on t3 by itself, bound "), "{text}");
-    // `cargo xtask spdx` states the licence behind it.
+    assert!(text.contains(" cycles on t3 (") && text.contains(" or later) by itself, bound "), "{text}");
+    // `cargo xtask lint --fix` appends the licence line.
     let made = folder.read_text("dynamics.s") + "; SPDX-License-Identifier: MIT OR Apache-2.0\n";
-    assert_eq!(made, read("dynamics.s"), "takt {command} in {panda}, and cargo xtask spdx");
+    assert_eq!(made, read("dynamics.s"), "takt {command} in {panda}, and cargo xtask lint --fix");
     folder.line("asm law.s -W error").ok();
     let json: serde_json::Value =
         serde_json::from_str(&folder.line("model panda.urdf -f jacobian --body --json").ok()).expect("JSON");
@@ -121,7 +121,7 @@ fn expressions_become_programs() {
     folder.write("f.json", list.replace("OP", "atan2"));
     assert!(folder.line("model f.json -o f.s").ok().contains("operations: 1 ("));
     assert!(folder.read_text("f.s").contains("        y = atan2(x_1, x_2)\n"));
-    // A function that is no instruction comes from the library.
+    // A function without an instruction comes from the library.
     folder.write("e.json", list.replace("OP", "exp").replace("\"of\": [0, 1]", "\"of\": [0]"));
     assert!(folder.line("model e.json -o e.s").ok().contains("operations: 1 ("));
     assert!(folder.read_text("e.s").contains(".include <math.s>\n"));
@@ -137,11 +137,11 @@ fn expressions_become_programs() {
     for (y, x) in values.into_iter().zip([1_f64, -2.5]) {
         assert!((y / x.exp() - 1.0).abs() < 1e-7, "{y}");
     }
-    folder.write("f.json", list.replace("OP", "erf"));
+    folder.write("f.json", list.replace("OP", "lgamma"));
     let done = folder.line("model f.json");
     assert_eq!(done.status, Some(1));
     assert!(
-        done.stderr.contains("f.json:6: operation `erf` has no meaning here; in `erf(x_1, x_2)`"),
+        done.stderr.contains("f.json:6: operation `lgamma` has no meaning here; in `lgamma(x_1, x_2)`"),
         "{}",
         done.stderr
     );
@@ -151,7 +151,7 @@ fn expressions_become_programs() {
 fn a_policy_becomes_a_program_that_runs() {
     let folder = Folder::new();
     let policies =
-        std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../programs/model/tests/data/policies");
+        std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../asm/front/tests/data/policies");
     for name in ["relu", "bad_conv"] {
         let bytes = std::fs::read(policies.join(format!("{name}.onnx"))).expect("the file");
         folder.write(format!("{name}.onnx"), bytes);
@@ -164,17 +164,28 @@ fn a_policy_becomes_a_program_that_runs() {
     assert_eq!(json["weights"], 1856);
     assert_eq!(json["inputs"][19]["name"], "obs[20]");
     let cycles = json["cycles"].as_u64().expect("a number");
-    assert!(text.contains(&format!("\n{cycles} cycles on t3,data=4096, ")), "{text}");
+    let waiting = json["cycles_waiting"].as_u64().expect("a number");
+    let both = format!(
+        "\n{cycles} cycles on t3,data=4096 ({waiting} if the tick comes 6 cycles after the wait or later), "
+    );
+    assert!(text.contains(&both), "{text}");
+    // The two figures equal the bound.
     let bound = folder.line("bound relu.s").ok();
-    assert!(bound.contains(&format!(" {cycles} ")), "{bound}");
-    // The bounds hold for arrays that a period writes before it reads them.
+    assert!(bound.contains(&format!("  period          {waiting} ")), "{bound}");
+    assert!(
+        bound.contains(&format!(
+            "period: {waiting} to {cycles} if the tick comes less than 6 cycles after the wait"
+        )),
+        "{bound}"
+    );
+    // Bounds hold for arrays that a period writes before it reads.
     let accuracy = folder.line("accuracy relu.s").ok();
     assert!(accuracy.contains("\nno NaN, no overflow, no division by zero"), "{accuracy}");
     for (line, status, expected) in [
         (
             "model bad_conv.onnx",
             1,
-            "bad_conv.onnx: node `/Conv_1` (Conv): this operator is not read; Gemm, MatMul,",
+            "bad_conv.onnx: node `/Conv_1` (Conv): this operator is not supported: convolutions and pooling are not read;",
         ),
         (
             "model relu.onnx -f gravity",
@@ -200,7 +211,7 @@ fn a_model_of_mujoco_is_read() {
     folder.write("leg.xml", PENDULUM);
     let text = folder.line("model leg.xml -f inverse-dynamics -o leg.s").ok();
     assert!(text.starts_with("inverse-dynamics of leg: joint forces"), "{text}");
-    // 2 kg at 0.5 m, a rotor, friction of both kinds.
+    // A mass of 2 kg at 0.5 m, a rotor, and both kinds of friction.
     folder.write("in.csv", "q_hip,qd_hip,qdd_hip\n0,2,3\n");
     let result = folder.line("run leg.s --inputs in.csv --outputs -").ok();
     let row = result.lines().nth(1).and_then(|row| row.split(',').next()).map(str::parse::<f64>);
@@ -212,6 +223,72 @@ fn a_model_of_mujoco_is_read() {
 /// A leg in MJCF.
 const PENDULUM: &str = r#"<mujoco model="leg"><worldbody><body name="leg"><joint name="hip" axis="0 1 0" armature="0.1" damping="0.2" frictionloss="0.05"/>
 <inertial mass="2" pos="0 0 -0.5" diaginertia="0.01 0.01 0.01"/></body></worldbody></mujoco>"#;
+
+/// Files in common variants: floating base, included file, encodings, spreadsheet export.
+#[test]
+fn reads_descriptions_of_every_origin() {
+    let folder = folder();
+    folder.write("floating.urdf", UR5.replacen("type=\"revolute\"", "type=\"floating\"", 1));
+    let text = folder.line("model floating.urdf -f gravity").ok();
+    let held = "  the base is held, though it floats: `shoulder_pan_joint` (`--floating error` refuses)\n";
+    assert!(text.contains(held), "{text}");
+    folder.write("leg.xml", PENDULUM.replace("<worldbody>", "<include file=\"look.xml\"/><worldbody>"));
+    folder.write("look.xml", "<mujocoinclude><option gravity=\"0 0 -1\"/></mujocoinclude>");
+    assert!(folder.line("model leg.xml -f gravity").ok().contains("  gravity is 0 0 -1 m/s²\n"));
+    folder.write("look.xml", "<mujocoinclude>\n<option gravity=\"0\"/></mujocoinclude>");
+    let done = folder.line("model leg.xml -f gravity");
+    assert!(
+        done.stderr.contains("look.xml:2: `gravity` is `0`: it has 1 numbers, and 3 are needed"),
+        "{}",
+        done.stderr
+    );
+    let latin: Vec<u8> =
+        UR5.replace("The arm", "Der Arm für").chars().map(|c| u8::try_from(c).unwrap_or(b'?')).collect();
+    folder.write("latin.urdf", latin);
+    let text = folder.line("model latin.urdf -f gravity").ok();
+    assert!(
+        text.contains("  line 2 is not UTF-8: the file was taken for Latin-1 (Windows-1252)\n"),
+        "{text}"
+    );
+    let wide: Vec<u8> = [0xfeff].into_iter().chain(UR5.encode_utf16()).flat_map(u16::to_le_bytes).collect();
+    folder.write("wide.urdf", wide);
+    folder.line("model wide.urdf -f gravity").ok();
+    folder.write(
+        "t.csv",
+        "\u{feff}# convention: modified;;;;;\r\njoint;kind;a;alpha_deg;d;theta\r\nj;revolute;0.1;90;0;0\r\n",
+    );
+    folder.line("model t.csv -f forward-kinematics").ok();
+    folder.write("empty.urdf", b"\0\0\0");
+    let done = folder.line("model empty.urdf -f gravity");
+    assert!(done.stderr.contains("empty.urdf: it has zero bytes: it is not text"), "{}", done.stderr);
+}
+
+/// The chosen penalty, advice on an unsuitable penalty, and Python's number syntax.
+#[test]
+fn reports_an_unusable_penalty() {
+    let folder = Folder::new();
+    let problem = "{\"format\": \"takt-mpc 1\", \"A\": [[1, 0.1], [0, 1]], \"B\": [[0.005], [0.1]], \"Q\": 1, \"R\": [1e-6],\n\
+                   \"u_max\": Infinity, \"u_min\": -1, \"horizon\": 3, \"iterations\": 4}";
+    folder.write("p.json", problem);
+    let text = folder.line("model p.json").ok();
+    let rho =
+        text.lines().next().and_then(|line| line.split_once("4 iterations, rho ")).expect("the penalty").1;
+    assert!(!text.contains("does not suit") && rho.parse::<f64>().is_ok_and(|rho| rho > 0.005), "{text}");
+    folder.write("p.json", problem.replace("\"iterations\"", "\"rho\": 1000, \"iterations\""));
+    let text = folder.line("model p.json").ok();
+    let advice = format!(
+        "\n`rho` 1000 does not suit the weights `R`: iterations hardly move; `rho` {rho} would, by 0."
+    );
+    assert!(text.contains(&advice), "{text}");
+    for (from, to, expected) in [
+        ("[1e-6]", "[NaN]", "p.json:1: `R`: NaN: a finite number is needed"),
+        ("4}", "4,}", "p.json:2: this is no control problem: trailing comma"),
+    ] {
+        folder.write("p.json", problem.replace(from, to));
+        let done = folder.line("model p.json");
+        assert!(done.stderr.contains(expected), "{}", done.stderr);
+    }
+}
 
 #[test]
 fn mistakes_have_one_message() {
@@ -231,9 +308,13 @@ fn mistakes_have_one_message() {
         (
             "model ball.xml -f gravity",
             1,
-            "ball.xml:1: `hip`: a ball joint: only hinges and slides are known; take the part of the robot behind it with --base leg",
+            "ball.xml:1: `hip`: a ball joint: only hinges and slides are known; take the part of the robot behind it with `--base leg`",
         ),
-        ("model floating.urdf -f gravity", 1, "floating.urdf:12: `shoulder_pan_joint`: a floating joint:"),
+        (
+            "model floating.urdf -f gravity --floating error",
+            1,
+            "floating.urdf:12: `shoulder_pan_joint`: a floating joint:",
+        ),
         (
             "model robot.txt -f gravity",
             1,
@@ -255,9 +336,9 @@ fn mistakes_have_one_message() {
     }
 }
 
-/// Parsers that call themselves for what is within something else stop at a depth, in every format that others write.
+/// Recursive parsers stop at a maximal depth, for every format of other tools.
 #[test]
-fn what_is_nested_without_end_has_one_message() {
+fn excessive_nesting_has_one_message() {
     const DEEP: usize = 200_000;
     let folder = folder();
     let nested =

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A plant of one's own: `takt run` as the controller at the other end of two pipes.
+//! A user's plant, with `takt run` as the controller at the other end of two pipes.
 
-use crate::common::{Done, Folder};
+use crate::common::{Folder, RunOutput};
 use std::f64::consts::TAU;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::num::NonZeroU64;
@@ -17,7 +17,7 @@ fn example() -> PathBuf {
     PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../programs/examples/plant"))
 }
 
-/// The motor of `plant.py`.
+/// The motor model of `plant.py`.
 #[derive(Default)]
 struct Motor {
     angle: f64,
@@ -39,7 +39,7 @@ impl Motor {
     }
 }
 
-/// The controller in this process: encoder to current.
+/// Controller in this process: encoder to current.
 fn controller() -> impl FnMut(i32) -> f64 {
     let options = Options::default();
     let assembled = takt_asm::assemble("servo.s", &FileLoader::new(example()), &options).unwrap();
@@ -50,20 +50,20 @@ fn controller() -> impl FnMut(i32) -> f64 {
         let report = emulator.run_period(&inputs).unwrap();
         assert!(!report.missed);
         let Some(Number::Float(current)) = emulator.output("current").unwrap() else { panic!("no current") };
-        // Through text, as it goes through the pipe: the shortest decimal of a binary32 is not that binary32 in binary64.
+        // Convert through text, as in the pipe: the shortest decimal of a binary32, read as binary64, is another number.
         format!("{current:?}").parse().unwrap()
     }
 }
 
 #[test]
 fn the_example_converges_and_equals_a_loop_without_pipes() {
-    // Without an answer both sides wait for ever.
+    // A deadlock of both sides must end.
     let mut command = Command::new("timeout");
     command
         .args([&PATIENCE.as_secs().to_string(), "python3"])
         .arg(example().join("plant.py"))
         .arg(env!("CARGO_BIN_EXE_takt"));
-    let text = Done::of(command).ok();
+    let text = RunOutput::of(command).ok();
     let mut lines = text.lines();
     assert_eq!(lines.next(), Some("time,angle,current"));
     let rows: Vec<Vec<f64>> =
@@ -94,36 +94,36 @@ period: fdiv F, 1.0, a
         wait period
 ";
 
-/// After which what hangs is taken to hang.
+/// Time after which a process counts as hung.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// A running `takt run`.
-struct Running {
+/// A running `takt run` process.
+struct RunningProcess {
     child: Child,
     stdin: Option<ChildStdin>,
     stdout: Option<BufReader<ChildStdout>>,
 }
 
-impl Running {
-    fn new(folder: &Folder, options: &str) -> Running {
+impl RunningProcess {
+    fn new(folder: &Folder, options: &str) -> RunningProcess {
         folder.write("echo.s", ECHO);
-        Running::of(folder, "echo.s", &format!("-m f3 {options}"))
+        RunningProcess::of(folder, "echo.s", &format!("-m f3 {options}"))
     }
 
-    /// Of a program or a system.
-    fn of(folder: &Folder, file: &str, options: &str) -> Running {
+    /// Starts a program or a system.
+    fn of(folder: &Folder, file: &str, options: &str) -> RunningProcess {
         let line = format!("run {file} --inputs - --outputs - {options}");
         let mut command = folder.command(&line.split_whitespace().collect::<Vec<_>>());
         let mut child = command.stdin(Stdio::piped()).spawn().unwrap();
         let (stdin, stdout) = (child.stdin.take(), child.stdout.take().map(BufReader::new));
-        Running { child, stdin, stdout }
+        RunningProcess { child, stdin, stdout }
     }
 
     fn send(&mut self, text: &str) {
         self.stdin.as_mut().unwrap().write_all(text.as_bytes()).unwrap();
     }
 
-    /// The next line, which must not need more input to come.
+    /// The next line, which must arrive without further input.
     fn line(&mut self) -> String {
         let mut stdout = self.stdout.take().unwrap();
         let (sender, answer) = mpsc::channel();
@@ -140,29 +140,29 @@ impl Running {
         line
     }
 
-    /// Status, what is still to come on standard output, standard error.
+    /// Exit status, remaining standard output, standard error.
     fn end(mut self) -> (Option<i32>, String, String) {
         drop(self.stdin.take());
         let mut rest = String::new();
         self.stdout.take().map(|mut stdout| stdout.read_to_string(&mut rest));
-        let done = Done::from(self.child.wait_with_output().unwrap());
+        let done = RunOutput::from(self.child.wait_with_output().unwrap());
         (done.status, rest, done.stderr)
     }
 }
 
 #[test]
-fn each_row_is_answered_as_it_comes() {
+fn answers_each_row_at_once() {
     let folder = Folder::new();
     for end in ["\n", "\r\n"] {
-        let mut running = Running::new(&folder, "");
-        // Before anything was sent; columns in any order, and more than there are ports.
+        let mut running = RunningProcess::new(&folder, "");
+        // Titles before any input; columns in any order, with additional ones.
         assert_eq!(running.line(), "F,k,cycles\n");
         running.send(&format!("n,time,a{end}"));
         for n in 0..5 {
             running.send(&format!("{n},now,4{end}"));
             assert_eq!(running.line(), format!("0.25,{},12\n", n + 1));
         }
-        // In pieces, and several at once.
+        // Rows in pieces, and several at once.
         running.send("5,no");
         running.send(&format!("w,4{end}6,now,4{end}7,now,4{end}"));
         for n in 5..8 {
@@ -172,13 +172,13 @@ fn each_row_is_answered_as_it_comes() {
     }
 }
 
-/// As with a program: whoever waits for the titles first is not kept waiting.
+/// A system behaves like a program: a reader that waits for the titles first is not blocked.
 #[test]
 fn a_system_answers_a_plant_too() {
     let folder = Folder::new();
     let system = concat!(env!("CARGO_MANIFEST_DIR"), "/../../programs/systems/speed");
-    let mut running = Running::of(&folder, &format!("{system}.toml"), "");
-    // Before anything was sent.
+    let mut running = RunningProcess::of(&folder, &format!("{system}.toml"), "");
+    // Titles before any input.
     let mut answers = running.line();
     assert_eq!(answers, "u,seen.peak,seen.values\n");
     let rows = std::fs::read_to_string(format!("{system}.csv")).unwrap();
@@ -194,15 +194,15 @@ fn a_system_answers_a_plant_too() {
 }
 
 #[test]
-fn a_row_that_is_wrong_ends_the_run() {
+fn a_wrong_row_ends_the_run() {
     let folder = Folder::new();
-    let mut running = Running::new(&folder, "");
+    let mut running = RunningProcess::new(&folder, "");
     running.send("a,n\n4,1\n4,x\n4,2\n");
     assert_eq!((running.line(), running.line()), ("F,k,cycles\n".to_owned(), "0.25,2,12\n".to_owned()));
     let error = "error: standard input:3: column n: `x` is no integer between -2147483648 and 2147483647\n";
     assert_eq!(running.end(), (Some(1), String::new(), error.to_owned()));
-    // A plant that says nothing at all.
-    let running = Running::new(&folder, "");
+    // A plant that sends nothing at all.
+    let running = RunningProcess::new(&folder, "");
     let error = "error: standard input is empty: it needs a header with a column for each input port\n";
     assert_eq!(running.end(), (Some(1), "F,k,cycles\n".to_owned(), error.to_owned()));
 }
@@ -211,11 +211,11 @@ fn a_row_that_is_wrong_ends_the_run() {
 fn a_plant_that_stops_reading_ends_the_run() {
     let folder = Folder::new();
     for (options, status) in [("", 0), ("--tick 10 --deny missed", 3), ("--tick 100 --deny missed", 0)] {
-        let mut running = Running::new(&folder, options);
+        let mut running = RunningProcess::new(&folder, options);
         running.send("a,n\n4,1\n");
         assert_eq!((running.line(), running.line().is_empty()), ("F,k,cycles\n".to_owned(), false));
         drop(running.stdout.take());
-        // It finds out when it answers.
+        // The closed pipe is noticed at the next answer.
         running.send("4,2\n");
         let (ended, _, stderr) = running.end();
         assert_eq!(
@@ -226,7 +226,7 @@ fn a_plant_that_stops_reading_ends_the_run() {
     }
 }
 
-/// Warnings and statistics go elsewhere.
+/// Warnings and statistics do not go to standard output.
 #[test]
 fn standard_output_has_rows_only() {
     let folder = Folder::new();

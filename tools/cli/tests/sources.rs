@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Places from which every command that assembles takes its sources: `-I`, the library that the binary carries; and `-W`.
+//! Search of sources in all assembling commands: `-I`, and the built-in library; also `-W`.
 
 use crate::common::Folder;
 
@@ -19,7 +19,7 @@ period: twice   t, x
 
 const TWICE: &str = ".macro twice y, x\n        fadd    y, x, x\n.endm\n";
 
-/// A controller that needs a folder beside its own, and inputs for it.
+/// A controller that needs a folder beside its own, with inputs.
 fn project() -> Folder {
     let folder = Folder::new();
     for name in ["app", "lib", "other"] {
@@ -33,7 +33,7 @@ fn project() -> Folder {
 }
 
 #[test]
-fn folders_and_the_library_are_asked_by_every_command_that_assembles() {
+fn every_assembling_command_searches_folders_and_library() {
     let folder = project();
     let run = |line: &str| folder.line(line).ok();
     assert!(run("run app/main.s -I lib --inputs in.csv --outputs -").contains("\n0.5,"));
@@ -44,7 +44,7 @@ fn folders_and_the_library_are_asked_by_every_command_that_assembles() {
         assert!(run(&format!("{line} app/main.s -I lib")).contains("period"));
     }
     run("rtl -o rtl --machine t1 --program app/main.s -I lib");
-    // The first folder that has the file.
+    // The first folder with the file is used.
     assert!(run("run app/main.s -I other -I lib --inputs in.csv --outputs -").contains("\n1.0,"));
     let track = folder.line("track --program app/main.s -I lib");
     assert!(track.stderr.contains("port"), "it assembles, and has not the robot's ports: {}", track.stderr);
@@ -69,7 +69,7 @@ fn the_debugger_shows_the_text_of_library_and_folder() {
 }
 
 #[test]
-fn what_is_not_found_is_told_what_there_is() {
+fn missing_file_lists_the_existing_ones() {
     let folder = project();
     let fails = |line: &str, status: i32| {
         let done = folder.line(line);
@@ -91,7 +91,7 @@ fn what_is_not_found_is_told_what_there_is() {
 }
 
 #[test]
-fn warnings_are_errors_if_asked_for() {
+fn warnings_can_be_errors() {
     let folder = Folder::new();
     folder.write("a.s", ".input x, n:int\n.output F\n.once\n wait p\n.period\np: fadd F, x, n\n wait p\n");
     let done = folder.line("asm a.s");
@@ -117,9 +117,9 @@ fn warnings_are_errors_if_asked_for() {
     assert!(done.stderr.contains("there is no warning `type`; did you mean `types`?"), "{}", done.stderr);
 }
 
-/// More values at a time than a bank has registers: every command that shows what a program costs says what becomes of them.
+/// More live values than registers in a bank: every command that shows a program's cost reports the spills.
 #[test]
-fn values_without_a_register_are_told() {
+fn reports_spilled_values() {
     let folder = Folder::new();
     let count = 236;
     let mut text = ".schedule on\n.input a, b\n.output y\n".to_owned();

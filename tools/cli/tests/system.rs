@@ -5,7 +5,7 @@ use crate::common;
 use crate::common::Folder;
 use serde_json::Value;
 
-/// The system that comes with the repository.
+/// Path of a file of the repository's example system.
 fn speed(name: &str) -> String {
     format!("{}/../../programs/systems/{name}", env!("CARGO_MANIFEST_DIR"))
 }
@@ -42,12 +42,12 @@ fn bound_follows_a_command_through_the_cores() {
         let way = ways.iter().find(|way| way["inputs"][0] == "moves.target" && way["outputs"][0] == end);
         way.unwrap()["worst"].as_u64().unwrap()
     };
-    // A command that comes just too late for a tick waits for the next one.
+    // A command just too late for a tick waits for the next one.
     assert!(worst("u") > 125_000 && worst("u") < 2 * 125_000, "{}", worst("u"));
     let late = folder.line(&format!("bound {toml} --deadline {} --empty-fifos", worst("u") - 1));
     assert_eq!(late.status, Some(1));
     folder.line(&format!("bound {toml} --deadline {} --empty-fifos", worst("seen.peak"))).ok();
-    // Queued entries come first.
+    // Queued entries are served first.
     let queued = folder.line(&format!("bound {toml} --deadline {}", worst("seen.peak")));
     assert_eq!(queued.status, Some(1));
     assert!(queued.stdout.contains("if nothing is queued in moves: not certain to be kept\n"), "{queued:?}");
@@ -75,7 +75,7 @@ fn bound_counts_the_periods_of_states() {
     folder.write("delayed.toml", system("direct delayed"));
     folder.write("ring.toml", system("ring"));
     folder.write("same.toml", system("same"));
-    // The response of the delay line comes after three periods; without it, within one.
+    // The delay line responds after three periods; without it, the response comes within one.
     assert!(
         folder
             .line("bound direct.toml --deadline 250")
@@ -91,7 +91,7 @@ fn bound_counts_the_periods_of_states() {
     let worst = way["worst"].as_u64().unwrap();
     folder.line(&format!("bound delayed.toml --deadline {worst}")).ok();
     assert_eq!(folder.line(&format!("bound delayed.toml --deadline {}", worst - 1)).status, Some(1));
-    // The length of a ring is in its addresses: nothing is certain, whatever the deadline.
+    // The length of a ring depends on its addresses: no deadline is certain.
     let ring = folder.line("bound ring.toml --deadline 1ms");
     assert!(
         ring.status == Some(1) && ring.stdout.contains("with the fewest states: not certain to be kept\n"),
@@ -127,7 +127,7 @@ fn a_session_sees_all_cores() {
 }
 
 #[test]
-fn analyse_tells_where_each_core_s_cycles_went() {
+fn analyse_accounts_for_each_cores_cycles() {
     let folder = Folder::new();
     let (toml, csv) = (speed("speed.toml"), speed("speed.csv"));
     let text = folder.line(&format!("analyse {toml} --inputs {csv}")).ok();
@@ -143,9 +143,9 @@ fn analyse_tells_where_each_core_s_cycles_went() {
     assert!(wrong.stderr.contains("--machine with a system"), "{}", wrong.stderr);
 }
 
-/// The core that divides by what another one sends it. Its source line, period and cycle are those that the core has by itself.
+/// A core divides by values from another core: source line, period and cycle are reported as if it ran alone.
 #[test]
-fn what_is_denied_is_denied_in_every_core() {
+fn deny_applies_to_every_core() {
     let folder = Folder::new();
     folder.write("send.s", ".input x\n.output y\n.once\n wait p\n.period\np: mov y, x\n wait p\n");
     folder.write("divide.s", ".input y\n.output q\n.once\n wait p\n.period\np: fdiv q, 1.0, y\n wait p\n");
@@ -157,7 +157,7 @@ fn what_is_denied_is_denied_in_every_core() {
     );
     folder.write("in.csv", "x\n2\n4\n0\n8\n0\n");
     let run = |what: &str| folder.line(&format!("run two.toml --inputs in.csv --json --deny {what}"));
-    // The part that runs once divides nothing.
+    // Code that runs once does not divide.
     let done = run("divide-by-zero");
     let json: Value = serde_json::from_str(&done.stdout).unwrap();
     assert_eq!(done.status, Some(3), "{done:?}");
@@ -170,7 +170,7 @@ fn what_is_denied_is_denied_in_every_core() {
     run("overflow,nan,missed").ok();
 }
 
-/// Each core by itself on the inputs that it had in the system: the errors are those of the program on the same inputs.
+/// Each core alone on its inputs from the system: the errors equal its program's on these inputs.
 #[test]
 fn accuracy_of_each_core() {
     let folder = Folder::new();
@@ -197,7 +197,7 @@ fn accuracy_of_each_core() {
         assert_eq!(alone["outputs"], within["cores"]["a"]["outputs"], "{options}");
         assert_eq!(alone["periods"], within["cores"]["a"]["periods"], "{options}");
     }
-    // Bounds: of a core that has ranges, and the reason of one that has none.
+    // Bounds of a core with ranges, and the reason for their absence in one without.
     let done = folder.line(&format!("accuracy {toml}"));
     assert_eq!(done.status, Some(1));
     assert!(done.stdout.contains("\nservo, ../examples/pi.s:\none period on t3"), "{done:?}");
@@ -217,7 +217,7 @@ fn a_trace_shows_all_cores_on_one_axis() {
         assert_eq!(text.matches(&format!("$scope module {scope} $end")).count(), 1, "{scope}");
     }
     assert_eq!(text.matches("$scope").count(), text.matches("$upscope").count());
-    // Every core sees its first tick in its own cycle of the one axis.
+    // On the common time axis, every core sees its first tick in its own cycle.
     let identifier = |scope: &str| {
         let rest = &text[text.find(&format!("$scope module {scope} ")).unwrap()..];
         let line = rest.lines().find(|line| line.ends_with(" tick $end")).unwrap();
@@ -240,7 +240,7 @@ fn a_trace_shows_all_cores_on_one_axis() {
 }
 
 #[test]
-fn what_a_system_is_not() {
+fn rejects_program_options_for_a_system() {
     let folder = Folder::new();
     folder.write("a.s", ".input x\n.output y\n.once\n wait p\n.period\np: mov y, x\n wait p\n");
     folder.write(
@@ -291,11 +291,11 @@ fn the_hybrid_robot_on_two_processors() {
     };
     let (one, both) = (json(""), json(&format!("--system {two}")));
     let number = |value: &serde_json::Value| value.as_f64().unwrap_or_else(|| panic!("{value} in {both}"));
-    // The points come from a core, past the first move of the table (period 26958): the robot follows them as it follows the host's.
+    // Points come from a core, past the first move of the table (period 26958): the robot follows them as it follows the host's.
     let overall = |run: &serde_json::Value| number(&run["tracking_error_m"]["overall"]);
     assert!((overall(&one) - overall(&both)).abs() < 1e-7, "{both} {one}");
     assert_eq!(both["missed"], 0);
-    // The point is there before the tracking core's tick, 400 cycles later.
+    // The point arrives before the tracking core's tick, 400 cycles later.
     assert!(both["cores"][0]["longest"].as_u64() < Some(400), "{both}");
     assert!(number(&both["points"][0]["largest_error"]) < 6.2e-8, "{both}");
     let text = folder.line(&format!("track -q --periods 10 --deny all --system {two}")).ok();
@@ -318,43 +318,43 @@ fn the_hybrid_robot_on_two_processors() {
     }
 }
 
-/// The record of a run's host is a table on which the system runs again; with `TAKT_FULL=1` its circuit, too.
+/// The recorded host of a run is a table on which the system repeats the run; with `TAKT_FULL=1` its circuit, too.
 #[test]
-fn what_a_host_said_is_a_table() {
+fn host_actions_are_recorded_as_a_table() {
     let folder = Folder::new();
     let two = common::source("two.toml");
     folder.line(&format!("track -q --periods 40 --system {two} --csv in.csv")).ok();
-    // A tick of its own for the block that places the robot.
+    // The block that places the robot has its own tick.
     assert_eq!(folder.read_text("in.csv").lines().count(), 1 + 41);
     let run = |line: &str| folder.line(&format!("run {two} --inputs in.csv {line}")).ok();
     let text = run("");
     assert!(text.contains("41 base ticks") && text.contains("; 0 refused when full"), "{text}");
-    // The first block's place, as the path begins: the core got it.
+    // The core received the first block: the path begins at its place.
     let json: Value = serde_json::from_str(&run("--json")).unwrap();
     assert!(json["fifos"]["blocks"]["pushed"].as_u64() > Some(8), "{json}");
     assert!(json["outputs"]["progress.block"].as_u64() > Some(1), "{json}");
     if std::env::var_os("TAKT_FULL").is_some() {
         let mut command = folder.command(&["cosim", &two, "--inputs", "in.csv"]);
         command.env("XDG_CACHE_HOME", env!("CARGO_TARGET_TMPDIR"));
-        let text = common::Done::of(command).ok();
+        let text = common::RunOutput::of(command).ok();
         assert!(text.contains("no difference"), "{text}");
     }
 }
 
-/// A FIFO's head that is read too late: told at its line, and silent for all systems of the repository.
+/// A late read of a FIFO's head is reported at its line; all systems of the repository are free of them.
 #[test]
-fn a_head_that_is_read_after_its_pop() {
+fn warns_of_a_head_read_after_its_pop() {
     let folder = Folder::new();
     for system in ["hybrid/two.toml", "three/controller.toml", "systems/speed.toml"] {
         let done = folder.line(&format!("bound {}", speed(&format!("../{system}"))));
         assert_eq!((done.status, done.stderr.as_str()), (Some(0), ""), "{system}");
     }
-    // The mistake that the generation once had: nothing kept the reads before the pop.
+    // A mistake that the generation once had: no constraint kept the reads before the pop.
     for name in ["two.toml", "generation.s", "tracking.s", "robot.s"] {
         let text = std::fs::read_to_string(speed(&format!("../hybrid/{name}"))).unwrap();
         let without = text.lines().filter(|line| !line.starts_with(".order") || !line.ends_with(", pop"));
         let text: String = without.map(|line| format!("{line}\n")).collect();
-        // On t4 the schedule puts a read behind the pop.
+        // On t4 the schedule moves a read after the pop.
         folder.write(
             name,
             text.replace("program = \"generation.s\"", "program = \"generation.s\"\nmachine = \"t4\""),

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! `takt debug` on a terminal: a pseudo-terminal on one side, a terminal's screen on the other.
+//! The command `takt debug` on a pseudo-terminal, with an emulated screen.
 
 use crate::common;
 use crate::common::{Folder, SUM};
@@ -9,13 +9,13 @@ use std::num::NonZeroU16;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
-/// Runs for as long as anybody lets it.
+/// A program without an end.
 const ENDLESS: &str = ".output n:int\n        mov n, zero\nloop:   iadd n, n, 1\n        jmp loop\n";
 
-/// The longest time that anything may take to show.
+/// Time limit for any change on the screen.
 const PATIENCE: Duration = Duration::from_secs(30);
 
-/// `takt` on a terminal.
+/// A `takt` process on a terminal.
 struct Terminal {
     master: Box<dyn MasterPty + Send>,
     keys: Box<dyn Write + Send>,
@@ -25,7 +25,7 @@ struct Terminal {
 }
 
 impl Terminal {
-    /// A shell's line on a terminal of this size, in a folder, with state in that folder.
+    /// Runs a shell command line on a terminal of this size, in a folder that also holds the state.
     fn new(folder: &Folder, line: &str, rows: u16, cols: u16) -> Terminal {
         let size = PtySize { rows, cols, ..PtySize::default() };
         let pair = native_pty_system().openpty(size).unwrap();
@@ -60,7 +60,7 @@ impl Terminal {
         self.keys.flush().unwrap();
     }
 
-    /// Waits until the screen is as wanted.
+    /// Waits until the screen has a property.
     #[track_caller]
     fn until(&mut self, what: &str, is: impl Fn(&vt100::Screen) -> bool) {
         let end = Instant::now() + PATIENCE;
@@ -68,7 +68,7 @@ impl Terminal {
             match self.output.recv_timeout(end.saturating_duration_since(Instant::now())) {
                 Ok(bytes) => {
                     self.parser.process(&bytes);
-                    // A terminal answers when it is asked where its cursor is.
+                    // Answer the query for the cursor's position, as terminals do.
                     if bytes.windows(4).any(|window| window == b"\x1b[6n") {
                         self.press("\x1b[1;1R");
                     }
@@ -91,7 +91,7 @@ impl Terminal {
         self.press(line);
     }
 
-    /// Waits for the end, which must be a success.
+    /// Waits for a successful end.
     #[track_caller]
     fn ends(&mut self) {
         let end = Instant::now() + PATIENCE;
@@ -100,7 +100,7 @@ impl Terminal {
                 self.parser.process(&bytes);
             }
             if let Some(status) = self.child.try_wait().unwrap() {
-                // Its last output may still be on its way; the end of file comes behind it.
+                // The last output may still be on its way; the end of file follows it.
                 while let Ok(bytes) = self.output.recv_timeout(PATIENCE) {
                     self.parser.process(&bytes);
                 }
@@ -114,14 +114,14 @@ impl Terminal {
         }
     }
 
-    /// Waits for the end, and gives what its last output leaves on the screen.
+    /// Waits for the end; returns the text that remains on the screen.
     #[track_caller]
     fn left(&mut self) -> String {
         self.ends();
         self.text()
     }
 
-    /// Changes the size, and waits for something to be drawn.
+    /// Resizes the terminal, and waits for output.
     fn resize(&mut self, rows: u16, cols: u16) {
         self.master.resize(PtySize { rows, cols, ..PtySize::default() }).unwrap();
         let [height, width] = [rows, cols].map(|size| NonZeroU16::new(size).unwrap());
@@ -131,8 +131,8 @@ impl Terminal {
     }
 }
 
-/// At every width lines are broken between words and not by the terminal, numbers stand under their titles, and one figure is bold. In a
-/// pipe lines stay whole.
+/// At every width lines are broken between words by takt, not by the terminal; numbers stay under their titles, and one figure is bold. In
+/// a pipe lines are not folded.
 #[test]
 fn results_fit_the_terminal() {
     let folder = Folder::new();
@@ -155,7 +155,7 @@ fn results_fit_the_terminal() {
             terminal.shows("all printed");
             let text = terminal.text();
             if !line.contains("plot") {
-                // A word that the terminal had broken would be none of these.
+                // Word fragments broken by the terminal would not be in the text.
                 let broken = words(&text)
                     .into_iter()
                     .find(|word| !known.contains(word) && !ADDED.contains(&word.as_str()));
@@ -169,7 +169,7 @@ fn results_fit_the_terminal() {
             assert_eq!((0..200).any(is_bold), wanted, "{line}");
         }
     }
-    // Columns are left out whole: the paper's PC and DSP have no room in 80 columns, its FPGA has.
+    // Columns are left out whole: in 80 columns the paper's PC and DSP are dropped, its FPGA stays.
     let mut terminal = Terminal::new(&folder, "takt track -q --periods 20; echo all printed", 200, 80);
     terminal.shows("all printed");
     let text = terminal.text();
@@ -179,7 +179,7 @@ fn results_fit_the_terminal() {
     );
 }
 
-/// Comments beside an example of the help go on under their own beginning.
+/// Comments beside the help's examples continue under their own beginning.
 #[test]
 fn examples_of_the_help_fit_the_terminal() {
     let folder = Folder::new();
@@ -194,7 +194,7 @@ fn examples_of_the_help_fit_the_terminal() {
     }
 }
 
-/// Words that only a narrow terminal sees.
+/// Words that appear only on narrow terminals.
 const ADDED: [&str; 21] = [
     "all",
     "printed",
@@ -229,7 +229,7 @@ fn full_screen() {
     terminal.shows("cycle 0, period 0");
     terminal.press("s");
     terminal.shows("(takt) step");
-    // A command line, completed: history and completion are the prompt's.
+    // The command line has the prompt's history and completion.
     terminal.press(":break ad\t if i == 1\r");
     terminal.shows("stop 1 at bundle");
     terminal.press("c");
@@ -251,7 +251,7 @@ fn full_screen() {
     terminal.shows("cycle 46, period 0");
     terminal.press("q");
     terminal.ends();
-    // The screen, the cursor, and the terminal's way with keys are as they were.
+    // Screen, cursor and keyboard mode are restored.
     let screen = terminal.parser.screen();
     assert!(!screen.alternate_screen() && !screen.hide_cursor());
     let text = terminal.text();
@@ -259,7 +259,7 @@ fn full_screen() {
     assert!(text.contains("isig icanon iexten echo "), "{text}");
 }
 
-/// The panes are those of one core of a system, which a key chooses; a line shows all cores.
+/// The panes show one core of a system, selected by a key; one line shows all cores.
 #[test]
 fn full_screen_of_a_system() {
     let folder = Folder::new();
@@ -338,7 +338,7 @@ fn the_prompt() {
     terminal.line("\x04");
     terminal.ends();
 
-    // The next session has the commands of this one.
+    // The next session has this session's commands in its history.
     let mut terminal = Terminal::new(&folder, "takt debug sum.s", 40, 100);
     terminal.line("\x1b[A\r");
     terminal.shows("\nstill here");
@@ -365,7 +365,7 @@ fn a_long_run_is_interrupted() {
     terminal.ends();
 }
 
-/// A board that runs freely is held by Ctrl-C, and an endless search ended by it; the board is left as it was found.
+/// Ctrl-C holds a free-running board, and ends an endless search; the board is left as found.
 #[cfg(unix)]
 #[test]
 fn a_board_at_the_prompt() {
@@ -394,9 +394,9 @@ fn a_board_at_the_prompt() {
     assert!(terminal.text().ends_with("the program runs; outputs drive"), "{}", terminal.text());
 }
 
-/// Long work shows its time to go, and long assembling that it goes on; in a pipe nothing of it is written.
+/// Long work shows its remaining time, and slow assembly that it goes on; nothing of it is written to a pipe.
 #[test]
-fn progress_of_what_takes_long() {
+fn long_commands_show_progress() {
     const SLOW: &str = ".input x\n.output y\n.reg n:int\n.once\n wait p\n.period\np: li n, 100000\nturn: isub n, n, 1\n bnz n, turn\n mov y, x\n wait p\n";
     let folder = Folder::new();
     folder.write("slow.s", SLOW);
@@ -419,7 +419,7 @@ fn progress_of_what_takes_long() {
     assert_eq!((done.status, done.stderr.as_str()), (Some(0), ""));
 }
 
-/// Ctrl-C takes a bar away, and ends the command as the signal does.
+/// Ctrl-C clears a progress bar, and ends the command by the signal.
 #[test]
 fn ctrl_c_leaves_no_bar_behind() {
     let folder = Folder::new();

@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! `accuracy`: how far registers are from binary64, as text.
+//! The `accuracy` command: errors of registers against binary64, as text.
 
-use crate::session::{Place, Session};
+use crate::session::{Place, Session, noted};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use takt_analysis::accuracy::{ErrorShare, Shadow, ulp};
 use takt_isa::{Program, Register, Type};
 
-/// Lines that are named of those an error comes from.
+/// Maximal number of source lines named as origins of an error.
 const LISTED: usize = 3;
 
-/// The register of a name, or the outputs that carry binary32, each with its name.
+/// Register of a name, or without a name every output that carries binary32, each with its name.
 ///
 /// # Errors
-/// If the name is no register's.
+/// If the name is not a register.
 pub(crate) fn registers(session: &Session, name: &str) -> Result<Vec<(String, Register)>, String> {
     if name.is_empty() {
         let ports = session.program().outputs.iter().filter(|port| port.ty == Type::F);
@@ -27,12 +27,12 @@ pub(crate) fn registers(session: &Session, name: &str) -> Result<Vec<(String, Re
     }
 }
 
-/// The errors of registers at this position, up to which `shadow` has followed the run from reset.
+/// Errors of registers at this position, which `shadow` has reached from reset.
 pub(crate) fn report(session: &Session, shadow: &Shadow, registers: &[(String, Register)]) -> String {
     let mut text = String::new();
     let width = registers.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
     for (name, register) in registers {
-        let flies = if session.arrives(*register).is_some() { "  (a new value is in flight)" } else { "" };
+        let flies = noted(session.stale(*register).map(|stale| stale.text(session.program())));
         let _ = match shadow.value(session.emulator(), *register) {
             None => writeln!(text, "{name:<width$}  no finite number{flies}"),
             Some((_, _, parts)) if parts.is_empty() => writeln!(text, "{name:<width$}  exact{flies}"),
@@ -46,7 +46,7 @@ pub(crate) fn report(session: &Session, shadow: &Shadow, registers: &[(String, R
     text
 }
 
-/// The lines that an error comes from, those that add most first.
+/// Error per source line, largest share first, as a text for the console.
 fn lines(program: &Program, parts: &[ErrorShare]) -> String {
     let mut lines: BTreeMap<String, f64> = BTreeMap::new();
     for part in parts {

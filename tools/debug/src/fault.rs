@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The diagnostic of a fault: as of a mistake in the source, with its line if the source is at hand.
+//! Fault diagnostics: the fault at its source line, in the form of a compiler error.
 
 use std::sync::Arc;
 use takt_asm::diag::{Diagnostic, Diagnostics};
@@ -8,8 +8,8 @@ use takt_emu::{Fault, FaultKind};
 use takt_isa::Program;
 use takt_isa::program::Location;
 
-/// The diagnostic of a fault: its cause and its place, at the line of the operation. `sources` are texts, by the names
-/// that the program has for them; without the one that it is in, the place is in the message, as `FILE:LINE`.
+/// Diagnostic of a fault: cause and source line. `sources` has the source texts under the program's names; without the text, the message
+/// gives the place as `FILE:LINE`.
 pub fn diagnose(fault: &Fault, program: &Program, sources: &[(String, String)]) -> Diagnostics {
     const CODE: &str = "fault";
     let shown = fault.show(program);
@@ -24,7 +24,7 @@ pub fn diagnose(fault: &Fault, program: &Program, sources: &[(String, String)]) 
     Diagnostics { sources: Arc::new(sources), list: vec![diagnostic], ..Diagnostics::default() }
 }
 
-/// The mend, where one is known.
+/// Suggested fix, if one is known.
 fn mend(kind: &FaultKind, program: &Program) -> Option<String> {
     Some(match kind {
         FaultKind::ProgramCounter { .. } => {
@@ -42,7 +42,7 @@ fn mend(kind: &FaultKind, program: &Program) -> Option<String> {
     })
 }
 
-/// The statement of a source line, without its comment; `texts` are sources, by the names that the program has for them.
+/// Statement of a source line, without its comment. `texts` has the source texts under the program's names.
 pub fn line(program: &Program, location: Location, texts: &[(String, String)]) -> Option<(Sources, Span)> {
     let name = program.files.get(location.file as usize)?;
     let (_, text) = texts.iter().find(|(known, _)| known == name)?;

@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! `info`: what a name stands for and where its values live, as text.
+//! The `info` command: meaning of a name, and the lifetimes of its values, as text.
 
-use crate::session::{Life, Session, Where};
+use crate::session::{BreakpointLocation, LiveRange, Session};
 use std::fmt::Write as _;
 use takt_asm::expr::Value;
 use takt_isa::{BundleAddress, Program, Register};
 
-/// Bundles that are listed of those that write or read a register.
+/// Maximal number of bundles listed among the writers or readers of a register.
 const LISTED: usize = 6;
 
-/// The meaning of a name: its registers, the bundles that write and read them, which of them is the current line's.
+/// Describes a name: its registers, the bundles that write and read them, and the register at the current line.
 ///
 /// # Errors
-/// If nothing is named so.
+/// If the name is unknown.
 pub(crate) fn info(session: &Session, name: &str) -> Result<String, String> {
     let live = session.parse(name)?;
     let program = session.program();
@@ -49,7 +49,7 @@ pub(crate) fn info(session: &Session, name: &str) -> Result<String, String> {
     Ok(text)
 }
 
-fn place(program: &Program, life: &Life) -> String {
+fn place(program: &Program, life: &LiveRange) -> String {
     program.machine.register_name(life.register).unwrap_or_default()
 }
 
@@ -62,8 +62,8 @@ fn kind(program: &Program, register: Register) -> &'static str {
     }
 }
 
-/// The places where a value is written and read, each bundle with the line of the operation that does so.
-fn lifetime(program: &Program, life: &Life) -> String {
+/// Bundles that write and read a value, with the source line of each operation.
+fn lifetime(program: &Program, life: &LiveRange) -> String {
     let (mut written, mut read) = (Vec::new(), Vec::new());
     let end = BundleAddress::new(program.bundles());
     let (first, last) = life.bundles.unwrap_or((BundleAddress::RESET, end.previous()));
@@ -75,12 +75,12 @@ fn lifetime(program: &Program, life: &Life) -> String {
                 let line = line.map_or(String::new(), |line| format!(" ({line})"));
                 format!("bundle {address}{line}")
             };
-            // If registers are shared, the bundle of a value's last use may write the next one.
+            // With shared registers, the bundle of a value's last use may write the next value.
             let next = life.bundles.is_some() && address == last && address != first;
             if instruction.writes(slot) == Some(life.register) && !next {
                 written.push(place());
             }
-            // And that of its first write may read the one before.
+            // The bundle of a value's first write may read the previous value.
             let before = life.bundles.is_some() && address == first;
             if instruction.reads().contains(&life.register) && !before {
                 read.push(place());
@@ -90,20 +90,20 @@ fn lifetime(program: &Program, life: &Life) -> String {
     format!("written in {}; read in {}", listed(written), listed(read))
 }
 
-/// The places where a breakpoint stops: `bundle 12 (a.s:4)`, or `3 places: …`.
-pub(crate) fn places(program: &Program, at: &Where) -> String {
+/// Places of a breakpoint: `bundle 12 (a.s:4)`, or `3 places: …`.
+pub(crate) fn places(program: &Program, at: &BreakpointLocation) -> String {
     match at {
-        Where::Bundle(address) => program.bundle_text(*address),
-        Where::Line(line, bundles) => {
+        BreakpointLocation::Bundle(address) => program.bundle_text(*address),
+        BreakpointLocation::Line(line, bundles) => {
             let line = program.place_text(*line);
             listed(bundles.iter().map(|address| format!("bundle {address} ({line})")).collect())
         }
-        Where::Cycle(cycle) => format!("cycle {cycle}"),
-        Where::Period(period) => format!("period {period}"),
+        BreakpointLocation::Cycle(cycle) => format!("cycle {cycle}"),
+        BreakpointLocation::Period(period) => format!("period {period}"),
     }
 }
 
-/// The first of some places, and how many there are.
+/// The first [`LISTED`] places, and their number if there are more.
 fn listed(mut places: Vec<String>) -> String {
     places.dedup();
     let shown = || places.iter().take(LISTED).map(String::as_str).collect::<Vec<_>>().join(", ");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Input ports from a table (CSV): one named column for each port, one row for each period.
+//! Input ports from a CSV table: a named column for each port, a row for each period.
 
 use std::io::{self, Read};
 use takt_asm::nearest;
@@ -7,10 +7,10 @@ use takt_emu::{Row, Rows};
 use takt_isa::Type;
 use takt_isa::program::Port;
 
-/// Every row of a table's text, at most `most`.
+/// Parses a table's text into rows; more than `most` is an error.
 ///
 /// # Errors
-/// If something is wrong with it; the message has the table's name, line and column.
+/// If the table is malformed; the message has the table's name, line and column.
 pub fn rows(name: &str, text: &[u8], ports: &[Port], most: usize) -> Result<Rows, String> {
     let source = io::Cursor::new(text.to_vec());
     let mut table = Table::new(name.to_owned(), Box::new(source), ports)?;
@@ -24,37 +24,39 @@ pub fn rows(name: &str, text: &[u8], ports: &[Port], most: usize) -> Result<Rows
     Ok(rows)
 }
 
-/// The bits of a CSV field.
+/// Parses a CSV field into bits.
 ///
 /// # Errors
-/// If it is no value of the type.
+/// If the text is not a value of the type.
 pub fn parse(ty: Type, text: &str) -> Result<u32, String> {
     match ty {
         Type::F => {
-            let value: f32 = text.parse().map_err(|_| format!("`{}` is no number", shown(text)))?;
+            let value: f32 = text.parse().map_err(|_| format!("`{}` is no number", field_start(text)))?;
             if value.is_nan() {
                 return Err("NaN is no input for a controller".to_owned());
             }
             if value.is_infinite() {
                 let largest = f32::MAX;
-                return Err(format!("`{}` does not fit binary32, whose largest is {largest:e}", shown(text)));
+                return Err(format!(
+                    "`{}` does not fit binary32, whose largest is {largest:e}",
+                    field_start(text)
+                ));
             }
             Ok(value.to_bits())
         }
-        Type::I => text
-            .parse()
-            .map(i32::cast_unsigned)
-            .map_err(|_| format!("`{}` is no integer between {} and {}", shown(text), i32::MIN, i32::MAX)),
+        Type::I => text.parse().map(i32::cast_unsigned).map_err(|_| {
+            format!("`{}` is no integer between {} and {}", field_start(text), i32::MIN, i32::MAX)
+        }),
         Type::B => text
             .strip_prefix("0x")
             .and_then(|digits| u32::from_str_radix(digits, 16).ok())
             .or_else(|| text.parse().ok())
-            .ok_or_else(|| format!("`{}` is no 32-bit number (0x… or decimal)", shown(text))),
+            .ok_or_else(|| format!("`{}` is no 32-bit number (0x… or decimal)", field_start(text))),
     }
 }
 
-/// The beginning of a field that may be long.
-fn shown(text: &str) -> String {
+/// Beginning of a possibly long field, for messages.
+fn field_start(text: &str) -> String {
     let mut start: String = text.chars().take(40).collect();
     if start.len() < text.len() {
         start.push('…');
@@ -62,32 +64,32 @@ fn shown(text: &str) -> String {
     start
 }
 
-/// Rows of input values from a CSV with one named column for each input port; further columns are left alone.
+/// Rows of input values from a CSV with a named column for each input port; other columns are ignored.
 pub struct Table {
     name: String,
-    reader: csv::Reader<Rationed>,
+    reader: csv::Reader<BudgetReader>,
     record: csv::StringRecord,
-    /// Number of columns.
+    /// Number of columns in the header row.
     width: usize,
-    /// The ports, each with its column.
+    /// Ports with the index of their column.
     ports: Vec<(Port, usize)>,
     row: Row,
-    /// True before the first row.
+    /// No row has been read yet.
     begins: bool,
 }
 
-/// Bytes of one row; more is an error, so that a file without line ends, or with an open quote, cannot fill the memory.
+/// Maximal size of a row in bytes, so that a file without line ends, or with an open quote, cannot fill the memory.
 pub const ROW_LIMIT: usize = 1 << 20;
 
 impl Table {
-    /// Reads the header of a table; errors call it `name`.
+    /// Reads the header of a table. `name` is the table's name in messages.
     ///
     /// # Errors
-    /// If it has not one column for each port.
+    /// If the header does not have exactly one column for each port.
     pub fn new(name: String, source: Box<dyn Read>, ports: &[Port]) -> Result<Table, String> {
-        let Begun { reader, header, found, missing } = Begun::of(&name, source, ports)?;
+        let OpenTable { reader, header, found, missing } = OpenTable::of(&name, source, ports)?;
         if let [first, ..] = missing[..] {
-            // A column that is a port's is not another's misspelt.
+            // A title that equals a port's name is no misspelling of another.
             let near =
                 suggest(first, header.iter().filter(|title| ports.iter().all(|port| port.name != **title)));
             let ports = if missing.len() == 1 { "input port" } else { "input ports" };
@@ -104,17 +106,17 @@ impl Table {
         Ok(Table::with(name, reader, &header, found))
     }
 
-    /// Reads the header of a table that has columns for some of the ports, and no others; errors call it `name`.
+    /// Reads the header of a table with columns for some of the ports and no others; errors call it `name`.
     ///
     /// # Errors
-    /// If a column is no port's, or there is none.
+    /// If a column belongs to no port, or the header is empty.
     pub fn of_some(name: String, source: Box<dyn Read>, ports: &[Port]) -> Result<Table, String> {
-        let Begun { reader, header, found, .. } = Begun::of(&name, source, ports)?;
+        let OpenTable { reader, header, found, .. } = OpenTable::of(&name, source, ports)?;
         if let Some(other) = header.iter().find(|title| ports.iter().all(|port| port.name != **title)) {
             let names = ports.iter().map(|port| port.name.as_str());
             let (near, separator) = (suggest(other, names.clone()), separator(&header));
             let names = names.collect::<Vec<_>>().join(", ");
-            let other = shown(other);
+            let other = field_start(other);
             return Err(format!("{name}: a column `{other}`{near}; there can be {names}{separator}"));
         }
         Ok(Table::with(name, reader, &header, found))
@@ -122,7 +124,7 @@ impl Table {
 
     fn with(
         name: String,
-        reader: csv::Reader<Rationed>,
+        reader: csv::Reader<BudgetReader>,
         header: &csv::StringRecord,
         ports: Vec<(Port, usize)>,
     ) -> Table {
@@ -130,32 +132,32 @@ impl Table {
         Table { name, reader, record, width: header.len(), ports, row, begins: true }
     }
 
-    /// The name that errors have for it.
+    /// Name of the table in messages.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// The titles of its columns.
+    /// Titles of the columns, from the header.
     pub fn titles(&mut self) -> Vec<String> {
-        // It was read before.
+        // The constructor has read the header row already.
         let titles = self.reader.headers().map(|header| header.iter().map(str::to_owned).collect());
         titles.unwrap_or_default()
     }
 
-    /// The place of the last row: the table's name and the line.
+    /// Place of the last row in messages: `NAME:LINE`.
     pub fn place(&self) -> String {
         place(&self.name, &self.record)
     }
 
-    /// A field of the last row.
+    /// Text of a field in the last row.
     pub fn field(&self, column: usize) -> &str {
         self.record.get(column).unwrap_or_default()
     }
 
-    /// The inputs of the next period; `None` at the end of the table, which has a row at least.
+    /// Inputs of the next period; `None` at the end of the table, which must have at least one row.
     ///
     /// # Errors
-    /// If the row has another number of fields than the header, or one that is no value of its port.
+    /// If the row's number of fields differs from the header's, or a field is not a value of its port's type.
     #[allow(clippy::should_implement_trait, reason = "what it gives is borrowed")]
     pub fn next(&mut self) -> Result<Option<&Row>, String> {
         self.reader.get_mut().left = ROW_LIMIT;
@@ -186,25 +188,25 @@ impl Table {
     }
 }
 
-/// The line of a row.
+/// Place of a row in messages: `NAME:LINE`.
 fn place(name: &str, record: &csv::StringRecord) -> String {
     format!("{name}:{}", record.position().map_or(0, csv::Position::line))
 }
 
-/// A table whose header was read.
-struct Begun<'a> {
-    reader: csv::Reader<Rationed>,
+/// A table after its header.
+struct OpenTable<'a> {
+    reader: csv::Reader<BudgetReader>,
     header: csv::StringRecord,
-    /// Ports with their columns.
+    /// Ports found in the header, with their columns.
     found: Vec<(Port, usize)>,
-    /// Names of ports without one.
+    /// Ports without a column.
     missing: Vec<&'a str>,
 }
 
-impl<'a> Begun<'a> {
-    fn of(name: &str, source: Box<dyn Read>, ports: &'a [Port]) -> Result<Begun<'a>, String> {
-        let source = Rationed { source, left: ROW_LIMIT };
-        // Rows of another length are found later, with a better message.
+impl<'a> OpenTable<'a> {
+    fn of(name: &str, source: Box<dyn Read>, ports: &'a [Port]) -> Result<OpenTable<'a>, String> {
+        let source = BudgetReader { source, left: ROW_LIMIT };
+        // Accept rows of any length here; `next` reports a wrong length with a better message.
         let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).flexible(true).from_reader(source);
         let header = reader.headers().map_err(|error| explain(name, error))?.clone();
         if header.is_empty() {
@@ -221,11 +223,11 @@ impl<'a> Begun<'a> {
                 _ => return Err(format!("{name}: two columns are named `{}`", port.name)),
             }
         }
-        Ok(Begun { reader, header, found, missing })
+        Ok(OpenTable { reader, header, found, missing })
     }
 }
 
-/// A hint for a row that seems to be separated by something else than commas.
+/// Hint for a row whose separator seems to be another character than the comma.
 fn separator(record: &csv::StringRecord) -> String {
     let others = [(';', "`;`"), ('\t', "a tab"), ('|', "`|`")];
     let found = others.iter().find(|(other, _)| record.iter().any(|field| field.contains(*other)));
@@ -234,7 +236,7 @@ fn separator(record: &csv::StringRecord) -> String {
     })
 }
 
-/// `; did you mean …?` if one of the names is near.
+/// Suffix `; did you mean …?` if a similar name exists.
 fn suggest<'a>(name: &str, names: impl IntoIterator<Item = &'a str>) -> String {
     nearest(name, names).map_or(String::new(), |near| format!("; did you mean `{near}`?"))
 }
@@ -243,7 +245,7 @@ fn fields(count: usize) -> String {
     format!("{count} field{}", if count == 1 { "" } else { "s" })
 }
 
-/// An error of the CSV reader in the form of ours.
+/// Converts an error of the CSV reader to a message with place and expectation.
 fn explain(name: &str, error: csv::Error) -> String {
     match error.kind() {
         csv::ErrorKind::Utf8 { pos, err } => {
@@ -255,13 +257,13 @@ fn explain(name: &str, error: csv::Error) -> String {
     }
 }
 
-/// A reader that gives so many bytes and then an error, unless it is granted more.
-struct Rationed {
+/// Reader with a byte budget: returns an error after `left` bytes unless the budget is raised.
+struct BudgetReader {
     source: Box<dyn Read>,
     left: usize,
 }
 
-impl Read for Rationed {
+impl Read for BudgetReader {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         if self.left == 0 {
             return Err(io::Error::other(format!("a row is longer than {} MiB", ROW_LIMIT >> 20)));

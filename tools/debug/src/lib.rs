@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Traces of running programs, and debug sessions on them. Plain data in and out; nothing here prints.
+//! Traces of running programs, and debug sessions on them, as plain data; the crate prints nothing.
 
 mod accuracy;
-mod along;
 pub mod console;
 pub mod fault;
 mod info;
 pub mod inputs;
 pub mod panes;
 pub mod remote;
+mod samples;
 pub mod session;
 pub mod stale_reads;
 pub mod system;
@@ -18,11 +18,11 @@ pub mod value;
 #[cfg(feature = "tui")]
 pub mod view;
 
-/// True if a name matches a pattern, in which `*` stands for any characters.
+/// Matches a name with a pattern in which `*` stands for any number of characters.
 fn matches(pattern: &str, name: &str) -> bool {
     let Some((head, rest)) = pattern.split_once('*') else { return pattern == name };
     let Some(mut name) = name.strip_prefix(head) else { return false };
-    // Each part where it first fits leaves most for those behind it; the last must fit the end.
+    // The leftmost match of each part leaves most for the parts after it; the last part must match at the end.
     let mut parts = rest.split('*').peekable();
     while let Some(part) = parts.next() {
         if parts.peek().is_none() {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The state at a position, as rows of plain data: the console prints them, the view draws them.
+//! State at a position as rows of plain data, which the console prints and the view draws.
 
-use crate::session::{Session, Shown, Stop, Where};
+use crate::session::{BreakpointLocation, Session, Stop, ValueNotations, noted};
 use crate::target::Target;
 use std::collections::BTreeSet;
 use std::ops::RangeInclusive;
@@ -9,125 +9,131 @@ use takt_emu::Status;
 use takt_isa::timing::{Cause, Cycle};
 use takt_isa::{Register, Type};
 
-/// Source lines before and after the next one that are at hand.
+/// Number of source lines shown before and after the next one.
 const LINES: u32 = 1000;
-/// Stalled bundles that are listed, those with most cycles first.
+/// Maximal number of bundles in the list of stalls, longest first.
 const STALLS: usize = 10;
 
-/// The kind of a named register.
+/// Kind of a named register.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Kind {
-    /// An input port.
+    /// Input port, written by the host.
     Input,
-    /// An output port.
+    /// Output port, read by the host.
     Output,
-    /// A register of the source.
+    /// Register declared in the source, or assigned to a name of it.
     Register,
 }
 
-/// A register that has a name.
+/// A named register with its value.
 #[derive(Clone, Debug)]
-pub struct Named {
-    /// Its name in the source.
+pub struct NamedRegister {
+    /// Name in the source.
     pub name: String,
-    /// Its place in the machine.
+    /// Slot and register in the machine, as text.
     pub place: String,
-    /// The type as which its bits are read.
+    /// Type in which the bits are interpreted.
     pub ty: Type,
-    /// Its bits; `None` if it was never written.
+    /// Raw bits; `None` before the first write.
     pub bits: Option<u32>,
-    /// True if the last command changed it.
+    /// Explanation of a stale value; `None` if the value is current.
+    pub note: Option<String>,
+    /// The last command changed the value.
     pub changed: bool,
-    /// True if the next bundle reads or writes it.
+    /// The next bundle reads or writes the register.
     pub used: bool,
 }
 
-impl Named {
-    /// Its value as its type has it.
+impl NamedRegister {
+    /// Value in the notation of the register's type; `~` marks a stale value.
     pub fn value(&self) -> String {
-        self.bits.map_or("(never written)".to_owned(), |bits| Shown::new(self.ty, bits).text)
+        let value =
+            self.bits.map_or("(never written)".to_owned(), |bits| ValueNotations::new(self.ty, bits).text);
+        if self.note.is_some() { format!("~{value}") } else { value }
     }
 
-    /// Its value in every way.
+    /// Value in every notation, with the note.
     pub fn every_way(&self) -> String {
-        self.bits.map_or("(never written)".to_owned(), |bits| Shown::every_way(self.ty, bits))
+        let value =
+            self.bits.map_or("(never written)".to_owned(), |bits| ValueNotations::every_way(self.ty, bits));
+        format!("{value}{}", noted(self.note.clone()))
     }
 }
 
-/// An operation in flight.
+/// An operation before its writeback.
 #[derive(Clone, Debug)]
-pub struct Flying {
-    /// Cycles until its result is there.
+pub struct InFlightOperation {
+    /// Cycles to the writeback.
     pub left: Cycle,
-    /// The register that it goes to.
+    /// Destination register by name.
     pub register: String,
-    /// Its mnemonic.
+    /// Mnemonic of the operation.
     pub mnemonic: &'static str,
-    /// Its bundle.
+    /// Bundle that issued the operation, as text with its source line.
     pub from: String,
 }
 
-/// A line of a source.
+/// A line of a source file.
 #[derive(Clone, Debug)]
 pub struct Line {
-    /// Its number, from 1.
+    /// Line number, from 1.
     pub number: u32,
-    /// Its text.
+    /// Source text without the line break.
     pub text: String,
-    /// True if the bundle that issues next is of this line.
+    /// The next bundle belongs to this line.
     pub next: bool,
-    /// True if an operation of that bundle comes from it.
+    /// An operation of the next bundle stems from this line.
     pub part: bool,
-    /// True if a breakpoint is in it.
+    /// A breakpoint is set on this line.
     pub stop: bool,
 }
 
-/// A core of a system.
+/// A core of a system, in the list of cores.
 #[derive(Clone, Debug)]
 pub struct CoreLine {
-    /// Its name.
+    /// Name of the core in the system's description.
     pub name: String,
-    /// Its state in the cycle to come.
+    /// State of the core in the cycle to come, in words.
     pub state: String,
-    /// True if commands and the other panes are about it.
+    /// Commands and the other panes refer to this core.
     pub selected: bool,
 }
 
-/// All that there is to see at a position.
+/// Contents of all panes at one position.
 #[derive(Clone, Debug)]
 pub struct Panes {
-    /// The kind of run.
+    /// Kind of the run.
     pub target: Target,
-    /// The cores of a system.
+    /// Cores of the system; empty for a program.
     pub cores: Vec<CoreLine>,
-    /// The position in one line.
+    /// Position in one line.
     pub head: String,
-    /// The source's name.
+    /// Name of the source file on display.
     pub file: String,
-    /// Its lines, as far as they are near.
+    /// Source lines around the current one.
     pub lines: Vec<Line>,
-    /// The next bundle: for each slot its name and its operation.
+    /// Next bundle: name and operation of each slot.
     pub bundle: Vec<(&'static str, Option<String>)>,
-    /// The source places of its operations, slot by slot: the line, with its file where that is another than `file`.
+    /// Source places of the bundle's operations, by slot: the line, preceded by the file if it differs from `file`.
     pub places: Vec<Option<String>>,
-    /// Registers of the source: those that have changed, then those that the bundle uses, then the rest.
-    pub registers: Vec<Named>,
-    /// Input ports.
-    pub inputs: Vec<Named>,
-    /// Output ports.
-    pub outputs: Vec<Named>,
-    /// Operations in flight.
-    pub flight: Vec<Flying>,
-    /// The reason why nothing issues in the cycle to come.
+    /// Registers of the source: first the changed ones, then those used by the next bundle, then all others.
+    pub registers: Vec<NamedRegister>,
+    /// Input ports with their present values.
+    pub inputs: Vec<NamedRegister>,
+    /// Output ports with their present values.
+    pub outputs: Vec<NamedRegister>,
+    /// Operations in flight, with the cycles left to their writeback.
+    pub flight: Vec<InFlightOperation>,
+    /// Stall cause of the cycle to come; `None` if a bundle issues.
     pub cause: Option<String>,
-    /// The account of the cycles since reset.
+    /// Cycles since reset by cause, with their texts.
     pub stalls: Vec<(u64, String)>,
     /// Expressions on display, with their values.
     pub displays: Vec<(String, String)>,
 }
 
 impl Panes {
-    /// The contents of the panes; `before` is what named registers held ([`values`]) before the last command.
+    /// Contents of all panes; `before` has the values of named registers ([`values`]) before the last command.
     pub(crate) fn new(
         session: &mut Session,
         before: &[Option<u32>],
@@ -139,7 +145,7 @@ impl Panes {
         let location = session.location();
         let (file, line) = location.map_or((0, 1), |location| (location.file, location.line));
         let used = used(session);
-        let mut rows: Vec<(Kind, Named)> = [Kind::Input, Kind::Output, Kind::Register]
+        let mut rows: Vec<(Kind, NamedRegister)> = [Kind::Input, Kind::Output, Kind::Register]
             .into_iter()
             .flat_map(|kind| named(session, kind).map(move |row| (kind, row)))
             .collect();
@@ -172,7 +178,7 @@ impl Panes {
     }
 }
 
-/// The position in one line.
+/// Position in one line.
 pub(crate) fn head(session: &mut Session) -> String {
     let (cycle, times) = (session.cycle(), session.times());
     let stall = session.stall();
@@ -206,7 +212,7 @@ pub(crate) fn head(session: &mut Session) -> String {
     format!("{times}: {what}")
 }
 
-/// The state of a core in the cycle to come, in a few words.
+/// State of a core in the cycle to come, in a few words.
 pub(crate) fn core_state(session: &mut Session) -> String {
     let stall = session.stall();
     let program = session.program();
@@ -220,13 +226,13 @@ pub(crate) fn core_state(session: &mut Session) -> String {
     }
 }
 
-/// The next bundle's slots with their operations.
+/// Slots of the next bundle with their operations.
 pub(crate) fn bundle(session: &Session) -> Vec<(&'static str, Option<String>)> {
     let slots = session.program().machine.slots.iter().map(|slot| slot.name);
     slots.zip(session.bundle(session.emulator().next_address())).collect()
 }
 
-/// The source places of the next bundle's operations, slot by slot, in words; those in `file` by their lines alone.
+/// Source places of the next bundle's operations, by slot; lines of `file` without the file's name.
 fn places(session: &Session, file: u32) -> Vec<Option<String>> {
     let program = session.program();
     let place = |location: &Option<takt_isa::program::Location>| {
@@ -235,13 +241,13 @@ fn places(session: &Session, file: u32) -> Vec<Option<String>> {
     program.locations(session.emulator().next_address()).iter().map(place).collect()
 }
 
-/// The bundles that called, the last one first.
+/// Bundles of the active calls, innermost first.
 pub(crate) fn calls(session: &Session) -> impl Iterator<Item = String> {
     let calls = session.emulator().stack().iter().rev();
     calls.map(|address| session.program().bundle_text(address.previous()))
 }
 
-/// The counted loops that are under way, the innermost first.
+/// Active counted loops, innermost first.
 pub(crate) fn loops(session: &Session) -> impl Iterator<Item = String> {
     session.emulator().loops().rev().map(|(first, last, left)| {
         let iterations = if left == 1 { "iteration" } else { "iterations" };
@@ -252,32 +258,33 @@ pub(crate) fn loops(session: &Session) -> impl Iterator<Item = String> {
     })
 }
 
-/// Ports or registers of the source, in the order of their declaration.
-pub(crate) fn named(session: &Session, kind: Kind) -> impl Iterator<Item = Named> {
+/// Ports or registers of the source, in declaration order.
+pub(crate) fn named(session: &Session, kind: Kind) -> impl Iterator<Item = NamedRegister> {
     let program = session.program();
     let ports = match kind {
         Kind::Input => &program.inputs,
         Kind::Output => &program.outputs,
         Kind::Register => &program.registers,
     };
-    ports.iter().map(|port| Named {
+    ports.iter().map(|port| NamedRegister {
         name: port.name.clone(),
         place: program.machine.register_name(port.register).unwrap_or_default(),
         ty: port.ty,
         bits: session.register(port.register),
+        note: session.stale(port.register).map(|stale| stale.text(program)),
         changed: false,
         used: false,
     })
 }
 
-/// The values of all named registers: input ports, output ports, registers of the source.
+/// Values of all named registers: input ports, output ports, registers of the source.
 pub(crate) fn values(session: &Session) -> Vec<Option<u32>> {
     let program = session.program();
     let all = program.inputs.iter().chain(&program.outputs).chain(&program.registers);
     all.map(|port| session.register(port.register)).collect()
 }
 
-/// The registers that the next bundle reads or writes.
+/// Registers that the next bundle reads or writes.
 fn used(session: &Session) -> BTreeSet<Register> {
     let program = session.program();
     let Some(Ok(instructions)) = program.bundle(session.emulator().next_address()) else {
@@ -292,10 +299,10 @@ fn used(session: &Session) -> BTreeSet<Register> {
     used
 }
 
-/// Operations in flight.
-pub fn flight(session: &Session) -> Vec<Flying> {
+/// Operations in flight, with the cycles left to their writeback.
+pub fn flight(session: &Session) -> Vec<InFlightOperation> {
     let program = session.program();
-    let flying = session.in_flight().into_iter().map(|(retire, left)| Flying {
+    let flying = session.in_flight().into_iter().map(|(retire, left)| InFlightOperation {
         left,
         register: retire.register.map_or(String::new(), |register| program.register_text(register)),
         mnemonic: retire.op.row().mnemonic,
@@ -304,7 +311,7 @@ pub fn flight(session: &Session) -> Vec<Flying> {
     flying.collect()
 }
 
-/// The account of the cycles since reset: bundles that issued, stalls by kind, and the bundles that stalled longest.
+/// Cycles since reset: issued bundles, stalls by kind, and the bundles with the longest stalls.
 pub fn stalls(session: &Session) -> Vec<(u64, String)> {
     let statistics = session.emulator().statistics();
     let program = session.program();
@@ -320,21 +327,21 @@ pub fn stalls(session: &Session) -> Vec<(u64, String)> {
     rows
 }
 
-/// Lines of a source; `None` if it is not at hand.
+/// Lines of a source; `None` if its text is not available.
 pub(crate) fn lines(session: &Session, file: u32, range: RangeInclusive<u32>) -> Option<Vec<Line>> {
     let program = session.program();
     let here = session.location().filter(|here| here.file == file);
     let of_file = |line: u32| {
         move |location: &takt_isa::program::Location| location.file == file && location.line == line
     };
-    // The source places of the next bundle's operations.
+    // Source places of the next bundle's operations.
     let part = program.locations(session.emulator().next_address());
     let stops: Vec<_> = session
         .stops()
         .iter()
         .filter_map(|(_, stop)| match stop {
-            Stop::Break { at: Where::Bundle(address), .. } => program.location(*address),
-            Stop::Break { at: Where::Line(line, _), .. } => Some(*line),
+            Stop::Break { at: BreakpointLocation::Bundle(address), .. } => program.location(*address),
+            Stop::Break { at: BreakpointLocation::Line(line, _), .. } => Some(*line),
             _ => None,
         })
         .collect();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The warning of a stale FIFO read: a field that is read after the pop of its entry, with the mend.
+//! Warning of a stale FIFO read: a field read after its entry was popped, with a suggested fix.
 
 use crate::fault::line;
 use std::sync::Arc;
@@ -7,10 +7,10 @@ use takt_asm::diag::{Diagnostic, Diagnostics, Severity};
 use takt_asm::levels::{Level, Levels};
 use takt_asm::source::Sources;
 use takt_system::Description;
-use takt_system::stale::{Doubt, StaleRead};
+use takt_system::stale_reads::{Doubt, StaleRead};
 
-/// The diagnostic of a read: at its source line, if `sources` (of its core's program: texts, by the names that the
-/// program has for them) have it. `None` if `levels` allow it.
+/// Diagnostic of a stale read, at its source line if `sources` (texts under the names in the core's program) has it. `None` if `levels`
+/// allow it.
 pub fn diagnose(
     read: &StaleRead,
     description: &Description,

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The kinds of run that a debugger moves.
+//! Kinds of runs under the debugger.
 
-/// The kind of run that a console moves.
+/// Kind of the run that a console moves.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Target {
     /// A program on one core.
     Program,
-    /// The cores of a system.
+    /// A system of several cores.
     System,
-    /// A program on a machine that runs elsewhere, and stops only between two periods.
+    /// A program on a machine that runs elsewhere and stops only between two periods.
     Board,
 }

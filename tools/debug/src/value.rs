@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A register's bits as text and as JSON, by their type.
+//! Register bits as text and as JSON, in the notation of their type.
 
 use serde_json::{Number, Value};
 use takt_isa::Type;
 
-/// As their type has them: the shortest decimal that reads back as the same binary32, an integer, or hexadecimal.
+/// Bits in the notation of their type: the shortest decimal that reads back as the same binary32, an integer, or hexadecimal.
 pub fn text(ty: Type, bits: u32) -> String {
     match ty {
         Type::F => format!("{:?}", f32::from_bits(bits)),
@@ -13,7 +13,7 @@ pub fn text(ty: Type, bits: u32) -> String {
     }
 }
 
-/// A number, or, for what JSON has no number for (NaN, infinities, hexadecimal), the [`text`].
+/// JSON number, or the [`text`] of values without one (NaN, infinities, hexadecimal).
 pub fn json(ty: Type, bits: u32) -> Value {
     let text = text(ty, bits);
     serde_json::from_str::<Number>(&text).map_or_else(|_| Value::from(text), Value::from)

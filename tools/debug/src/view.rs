@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The full-screen view: draws plain data into cells. It decides nothing and knows neither session nor terminal.
+//! Full-screen view: draws plain data into cells. It makes no decisions and knows neither session nor terminal.
 
 use crate::console::{commands, keys};
-use crate::panes::{self, CoreLine, Named, Panes};
+use crate::panes::{self, CoreLine, NamedRegister, Panes};
 use crate::target::Target;
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect, Spacing};
@@ -10,28 +10,28 @@ use ratatui::style::{Color, Modifier, Style};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Block, Borders, Clear, Paragraph, Wrap};
 
-/// From this width on there are three columns.
+/// Minimal width for three columns.
 const WIDE: u16 = 110;
-/// Lines of output that are kept.
+/// Maximal number of lines in the log.
 const LOG: usize = 2000;
-/// Columns to the next tab stop.
+/// Distance between tab stops in columns.
 const TAB: usize = 8;
-/// Columns of a name at most, where something stands beside it.
+/// Maximal width of a name with text beside it.
 const NAME: usize = 20;
-/// Columns of a slot's name and the blank behind it.
+/// Width of a slot's name with the blank after it.
 const SLOT: usize = 5;
-/// Columns of a value.
+/// Width of a value.
 const VALUE: usize = 15;
 
 const CHANGED: Style = Style::new().fg(Color::Yellow).add_modifier(Modifier::BOLD);
 const NEXT: Style = Style::new().fg(Color::Black).bg(Color::Green);
-/// Of the other lines whose operations are in the next bundle.
+/// Style of the other lines whose operations are in the next bundle.
 const PART: Style = Style::new().fg(Color::Green);
 const STOP: Style = Style::new().fg(Color::Red).add_modifier(Modifier::BOLD);
 const DIM: Style = Style::new().fg(Color::DarkGray);
 const TITLE: Style = Style::new().fg(Color::Cyan);
 
-/// A part of the view.
+/// A pane of the view.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[allow(missing_docs, reason = "they are named for what they show")]
 pub enum Pane {
@@ -46,7 +46,7 @@ pub enum Pane {
 }
 
 impl Pane {
-    /// All, in the order in which a key goes through them.
+    /// All panes, in the order of the focus key.
     pub const ALL: [Pane; 8] = [
         Pane::Source,
         Pane::Bundle,
@@ -59,39 +59,39 @@ impl Pane {
     ];
 }
 
-/// The kind of a line of the output.
+/// Kind of a line in the log.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Said {
-    /// A command, as it was given.
+pub enum LogLineKind {
+    /// A command, as entered.
     Command,
-    /// An answer.
+    /// An answer to a command.
     Answer,
-    /// An error.
+    /// An error that a command reported.
     Error,
 }
 
-/// All that is drawn.
+/// Contents of the screen, including scroll positions and focus.
 pub struct Screen {
-    /// The machine.
+    /// Contents of the panes at the present position.
     pub panes: Panes,
-    /// Commands and their answers, by line.
-    log: Vec<(Said, String)>,
-    /// The line of the log with the last command.
+    /// Lines of the log: commands with their answers.
+    log: Vec<(LogLineKind, String)>,
+    /// Index in the log of the last command.
     latest: usize,
-    /// The command that is being typed, and the column of the cursor in it.
+    /// Command line: its text and the cursor's column.
     pub typed: Option<(String, usize)>,
-    /// The text for a command that runs.
+    /// Progress text of a running command.
     pub running: Option<String>,
-    /// The line of the help that is on top, while help is shown.
+    /// Top line of the help; `None` while help is hidden.
     pub help: Option<usize>,
-    /// The pane that keys scroll.
+    /// Pane with the focus, which keys scroll.
     pub focus: Pane,
-    /// Lines by which each pane is scrolled.
+    /// Scroll offset of each pane, in lines.
     scroll: [isize; Pane::ALL.len()],
 }
 
 impl Screen {
-    /// A machine, and nothing said yet.
+    /// A screen with these panes and an empty log.
     pub fn new(panes: Panes) -> Screen {
         Screen {
             panes,
@@ -105,21 +105,21 @@ impl Screen {
         }
     }
 
-    /// Adds a command and its answer to the output, and shows the machine as it is now.
-    pub fn said(&mut self, command: &str, answer: &Result<String, String>, panes: Panes) {
+    /// Adds a command and its answer to the log, and takes over the new panes.
+    pub fn log_command(&mut self, command: &str, answer: &Result<String, String>, panes: Panes) {
         self.log.drain(..self.log.len().saturating_sub(LOG));
         self.latest = self.log.len();
-        self.log.push((Said::Command, command.to_owned()));
+        self.log.push((LogLineKind::Command, command.to_owned()));
         let (said, text) = match answer {
-            Ok(text) => (Said::Answer, text),
-            Err(text) => (Said::Error, text),
+            Ok(text) => (LogLineKind::Answer, text),
+            Err(text) => (LogLineKind::Error, text),
         };
         self.log.extend(text.lines().map(|line| (said, line.to_owned())));
         self.panes = panes;
         self.scroll = [0; Pane::ALL.len()];
     }
 
-    /// Scrolls the help, or the pane that has the focus.
+    /// Scrolls the help if shown, otherwise the pane with the focus.
     pub fn scroll(&mut self, lines: isize) {
         match &mut self.help {
             Some(top) => *top = top.saturating_add_signed(lines),
@@ -127,14 +127,14 @@ impl Screen {
         }
     }
 
-    /// Gives the focus to a pane further on, or back.
+    /// Moves the focus by a number of panes; negative is back.
     pub fn turn(&mut self, panes: isize) {
         let at = (self.focus as isize + panes).rem_euclid(Pane::ALL.len() as isize);
         self.focus = Pane::ALL[at as usize];
     }
 }
 
-/// Draws everything.
+/// Draws all panes, the log and the command line.
 pub fn draw(frame: &mut Frame<'_>, screen: &mut Screen) {
     let cores = u16::from(!screen.panes.cores.is_empty());
     let rows = [1, cores].map(Constraint::Length);
@@ -151,7 +151,7 @@ pub fn draw(frame: &mut Frame<'_>, screen: &mut Screen) {
     }
 }
 
-/// The cores of a system in one line, each with what it does.
+/// The cores of a system in one line, each with its state.
 fn core_line(panes: &Panes) -> Line<'static> {
     let core = |core: &CoreLine| {
         let style = if core.selected { TITLE.reversed() } else { TITLE };
@@ -166,7 +166,7 @@ fn core_line(panes: &Panes) -> Line<'static> {
     Line::from(spans)
 }
 
-/// The area of each pane.
+/// Screen areas of the visible panes.
 fn areas(body: Rect, panes: &Panes) -> Vec<(Pane, Rect)> {
     let rows = |lines: usize| lines as u16 + 1;
     let bundle = Constraint::Length(rows(panes.bundle.len().max(1)));
@@ -202,7 +202,7 @@ fn areas(body: Rect, panes: &Panes) -> Vec<(Pane, Rect)> {
 fn draw_pane(frame: &mut Frame<'_>, screen: &mut Screen, pane: Pane, area: Rect) {
     let height = usize::from(area.height.saturating_sub(1));
     let panes = &screen.panes;
-    // The pane's lines, and the line that is on top if nobody scrolls.
+    // Lines of the pane, and the top line while it is not scrolled.
     let (title, lines, top) = match pane {
         Pane::Source => (plain(&panes.file), source(panes), source_top(panes, height)),
         Pane::Bundle => ("bundle".to_owned(), bundle(panes, area.width), 0),
@@ -261,7 +261,7 @@ fn source(panes: &Panes) -> Vec<Line<'static>> {
     panes.lines.iter().map(row).collect()
 }
 
-/// The source's line on top, if nobody scrolls: all lines of the bundle are in view where they fit, else the next line is.
+/// Top line of the source while it is not scrolled: shows all lines of the bundle if they fit, otherwise the next line.
 fn source_top(panes: &Panes, height: usize) -> usize {
     let marked = |line: &panes::Line| line.next || line.part;
     let next = panes.lines.iter().position(|line| line.next).unwrap_or(0);
@@ -269,13 +269,13 @@ fn source_top(panes: &Panes, height: usize) -> usize {
     let last = panes.lines.iter().rposition(marked).unwrap_or(next);
     let usual = next.saturating_sub(height / 3);
     match last - first < height {
-        // As far from the usual place as is needed.
+        // Move no farther from the usual position than the first and last line need.
         true => usual.clamp((last + 1).saturating_sub(height), first),
         false => usual,
     }
 }
 
-/// The numbers of the lines of the bundle that are not among those in view.
+/// Numbers of the bundle's lines outside the visible part.
 fn hidden(panes: &Panes, top: usize, height: usize) -> String {
     let outside = |index: usize| !(top..top + height).contains(&index);
     let lines = panes.lines.iter().enumerate();
@@ -283,7 +283,7 @@ fn hidden(panes: &Panes, top: usize, height: usize) -> String {
     lines.map(|(_, line)| line.number.to_string()).collect::<Vec<_>>().join(", ")
 }
 
-/// The operations of the bundle, at the right end the line of each.
+/// Operations of the bundle, with their source lines right-aligned.
 fn bundle(panes: &Panes, room: u16) -> Vec<Line<'static>> {
     let row = |(index, (slot, operation)): (usize, &(&str, Option<String>))| {
         let slot = Span::styled(format!("{slot:<5}"), TITLE);
@@ -296,7 +296,7 @@ fn bundle(panes: &Panes, room: u16) -> Vec<Line<'static>> {
     panes.bundle.iter().enumerate().map(row).collect()
 }
 
-/// A text in at most so many columns, with an ellipsis where it was longer.
+/// Truncates a text to `room` columns; a truncated text ends in an ellipsis.
 fn shortened(text: &str, room: usize) -> String {
     if text.chars().count() <= room {
         return text.to_owned();
@@ -304,17 +304,17 @@ fn shortened(text: &str, room: usize) -> String {
     text.chars().take(room.saturating_sub(1)).chain(['…']).collect()
 }
 
-/// The output, its long lines broken, and the line at which the last command is.
-fn log(log: &[(Said, String)], latest: usize, room: u16) -> (Vec<Line<'static>>, usize) {
+/// Lines of the log, with long ones broken, and the index of the last command's line.
+fn log(log: &[(LogLineKind, String)], latest: usize, room: u16) -> (Vec<Line<'static>>, usize) {
     let (mut lines, mut top) = (Vec::new(), 0);
     for (i, (said, text)) in log.iter().enumerate() {
         if i == latest {
             top = lines.len();
         }
         let (prompt, style) = match said {
-            Said::Command => ("(takt) ", Style::new().bold()),
-            Said::Answer => ("", Style::new()),
-            Said::Error => ("", STOP),
+            LogLineKind::Command => ("(takt) ", Style::new().bold()),
+            LogLineKind::Answer => ("", Style::new()),
+            LogLineKind::Error => ("", STOP),
         };
         let text = prompt.to_owned() + &plain(text);
         lines.extend(
@@ -324,7 +324,7 @@ fn log(log: &[(Said, String)], latest: usize, room: u16) -> (Vec<Line<'static>>,
     (lines, top)
 }
 
-/// A line in parts of at most so many columns: broken at blanks, and within a word only where that is longer than a line.
+/// Breaks a line into parts of at most `room` columns: at blanks, and inside words that are longer than a line.
 fn broken(text: &str, room: usize) -> Vec<String> {
     let mut rest: Vec<char> = text.chars().collect();
     let mut parts = Vec::new();
@@ -339,12 +339,12 @@ fn broken(text: &str, room: usize) -> Vec<String> {
     parts
 }
 
-/// Names and values, those that have changed marked; bits too, where `room` columns hold them whole.
-fn values(rows: &[Named], prefix: &'static str, room: u16) -> Vec<Line<'static>> {
+/// Rows of names and values, with changed ones marked; the bits follow where `room` columns hold them whole.
+fn values(rows: &[NamedRegister], prefix: &'static str, room: u16) -> Vec<Line<'static>> {
     let width = rows.iter().map(|row| row.name.len()).max().unwrap_or(0).min(NAME);
     let left = usize::from(room).saturating_sub(prefix.len() + 1 + width + 1);
     let has_room = left >= VALUE + 1 + 8;
-    let row = |row: &Named| {
+    let row = |row: &NamedRegister| {
         let style = if row.changed {
             CHANGED
         } else if row.used {
@@ -353,7 +353,7 @@ fn values(rows: &[Named], prefix: &'static str, room: u16) -> Vec<Line<'static>>
             Style::new()
         };
         let (mark, mut value) = (if row.changed { '*' } else { ' ' }, row.value());
-        // Brackets are the first to go.
+        // On a narrow pane, drop the parentheses first.
         if value.len() > left && row.bits.is_none() {
             value = value.trim_matches(['(', ')']).to_owned();
         }
@@ -368,7 +368,7 @@ fn values(rows: &[Named], prefix: &'static str, room: u16) -> Vec<Line<'static>>
 }
 
 fn ports(panes: &Panes, room: u16) -> Vec<Line<'static>> {
-    // Outputs come first: they change.
+    // Outputs before inputs, since outputs change more often.
     let mut lines = values(&panes.outputs, "out ", room);
     lines.extend(values(&panes.inputs, "in  ", room));
     lines
@@ -380,7 +380,7 @@ fn displays(panes: &Panes) -> Vec<Line<'static>> {
 
 fn flight(panes: &Panes, room: u16) -> Vec<Line<'static>> {
     let width = panes.flight.iter().map(|row| row.register.len()).max().unwrap_or(0).min(NAME);
-    let row = |row: &panes::Flying| {
+    let row = |row: &panes::InFlightOperation| {
         let left = format!("{:>3} ", row.left);
         let what = format!("{:<width$} {:<7} ", row.register, row.mnemonic);
         let from = origin(&row.from, usize::from(room).saturating_sub(left.len() + what.chars().count()));
@@ -389,7 +389,7 @@ fn flight(panes: &Panes, room: u16) -> Vec<Line<'static>> {
     panes.flight.iter().map(row).collect()
 }
 
-/// `bundle 24 (pi.s:55)` in at most so many columns; where there is no room for all of it, one of its parts.
+/// `bundle 24 (pi.s:55)` in at most `room` columns; if too long, only the place or only the bundle.
 fn origin(from: &str, room: usize) -> String {
     if from.chars().count() <= room {
         return from.to_owned();
@@ -407,7 +407,7 @@ fn stalls(panes: &Panes) -> Vec<Line<'static>> {
     now.chain(rows).collect()
 }
 
-/// The command line; while nothing is typed, what keys do.
+/// Draws the command line; without input, the hints on keys.
 fn draw_command(frame: &mut Frame<'_>, screen: &Screen, area: Rect) {
     if let Some(text) = &screen.running {
         frame.render_widget(Line::styled(plain(text), CHANGED), area);
@@ -418,7 +418,7 @@ fn draw_command(frame: &mut Frame<'_>, screen: &Screen, area: Rect) {
         frame.render_widget(hints(screen.panes.target, area.width), area);
         return;
     };
-    // As far to the right as keeps the cursor in sight.
+    // Scroll to the right as far as keeps the cursor in sight.
     let room = usize::from(area.width).saturating_sub(PROMPT.len() + 1);
     let skipped = cursor.saturating_sub(room);
     let shown: String = text.chars().skip(skipped).collect();
@@ -429,10 +429,10 @@ fn draw_command(frame: &mut Frame<'_>, screen: &Screen, area: Rect) {
     }
 }
 
-/// Keys in the order in which the last line has room for them: the way out and the way back come first.
+/// Priority of keys in the hints: to quit, and to step back, come first.
 const HINTS: &str = "qscplbwgnuidok";
 
-/// The keys and what they do, as many as have room whole; a key and its capital, which goes back, are one.
+/// Keys with their commands, as many as fit whole; a key and its capital, which goes back, share one hint.
 fn hints(target: Target, room: u16) -> Line<'static> {
     let known: Vec<(char, &str)> = keys(target).collect();
     let line_of =
@@ -442,7 +442,7 @@ fn hints(target: Target, room: u16) -> Line<'static> {
         let (Some(forth), back) = (line_of(key), line_of(key.to_ascii_uppercase())) else { continue };
         hints.push(match back {
             Some(back) => {
-                // "step line" and "back line" have their object in common.
+                // "step line" and "back line" share their object.
                 let object = forth.split_once(' ').map_or("", |(_, object)| object);
                 let verbs = [forth, back].map(|line| line.split(' ').next().unwrap_or(line));
                 let text = format!("{}/{} {object}", verbs[0], verbs[1]);
@@ -481,7 +481,7 @@ fn draw_help(frame: &mut Frame<'_>, target: Target, top: &mut usize, body: Rect)
         lines.push(Line::from(vec![Span::styled(usage, TITLE), Span::styled(keys, CHANGED)]));
         lines.push(Line::raw(format!("    {text}")));
     }
-    // At the least as many rows as lines.
+    // Without line breaks there are as many rows as lines, the minimum.
     *top = (*top).min(lines.len().saturating_sub(1));
     let block = Block::bordered().border_style(DIM).title(Span::styled(" help (Esc leaves) ", TITLE));
     let text = Paragraph::new(lines).wrap(Wrap { trim: false }).scroll((*top as u16, 0)).block(block);
@@ -489,7 +489,7 @@ fn draw_help(frame: &mut Frame<'_>, target: Target, top: &mut usize, body: Rect)
     frame.render_widget(text, body);
 }
 
-/// A text without tabs and other control characters.
+/// Expands tabs, and replaces other control characters by `·`.
 fn plain(text: &str) -> String {
     let mut plain = String::with_capacity(text.len());
     let mut column = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A fault is told at its source line, or without the source by file, line and bundle.
+//! Fault messages: at the source line, or without the source by file, line and bundle.
 
 use takt_asm::{MemoryLoader, Options as AsmOptions, assemble};
 use takt_debug::console::Console;
@@ -8,7 +8,7 @@ use takt_debug::session::{Options, Session};
 use takt_emu::Emulator;
 use takt_isa::{F3, Program};
 
-/// A program that has a macro, a bundle of two operations, a tab and comments, and the texts that it is made of.
+/// A program with a macro, a bundle of two operations, a tab and comments, and its source texts.
 fn assembled(body: &str) -> (Program, Vec<(String, String)>) {
     let files = [
         ("a.s", &*format!(".include \"word.s\"\n.reg r:int\n.state s:int\n.once\n{body}")),
@@ -38,7 +38,7 @@ fn faults_at_their_lines() {
         let without = diagnose(&fault, &program, &[]);
         text += &format!("{}\n{}\n", with.render(false), without.render(false));
         assert!(with.has_errors() && without.has_errors());
-        // A text that is not the program's, as short as can be, has no such line.
+        // A wrong, shorter text does not have the line.
         let other: Vec<_> = sources.iter().map(|(name, _)| (name.clone(), String::new())).collect();
         let shown = diagnose(&fault, &program, &other).render(false);
         assert!(shown == without.render(false) || shown == with.render(false), "{shown}");

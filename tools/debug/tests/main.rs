@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Tests of the crate from outside, one program: a module for each subject.
+//! Integration tests in one binary: one module for each subject.
 
 mod faults;
 mod names;
 mod positions;
 mod remote;
 mod session;
+mod stale;
 mod system;
 mod traces;
 #[cfg(feature = "tui")]

@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The meaning of names at a position: what the source line at hand reads there, as the machine's words have it.
+//! Meaning of names at a position: the value that the line at hand reads, checked against the program words.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::sync::Arc;
 use takt_asm::names::DebugInfo;
-use takt_asm::{Assembled, MemoryLoader, Options as AsmOptions, assemble, image};
+use takt_asm::{AssembledProgram, MemoryLoader, Options as AsmOptions, assemble, image};
 use takt_debug::console::Console;
-use takt_debug::session::{Options, Place, Session, Unit, Why};
+use takt_debug::session::{Options, Place, Session, StopReason, Unit};
 use takt_emu::testing::Random;
 use takt_isa::{F3, MACHINES, Machine, Register};
 
-fn assembled(source: &str, machine: &'static Machine) -> Assembled {
+fn assembled(source: &str, machine: &'static Machine) -> AssembledProgram {
     let files = [("a.s", source)];
     let options = AsmOptions { machine, effort: 1, ..AsmOptions::default() };
     match assemble("a.s", &MemoryLoader::new(&files), &options) {
@@ -20,8 +20,8 @@ fn assembled(source: &str, machine: &'static Machine) -> Assembled {
     }
 }
 
-/// A session on an image, with its inputs at 1, 2, …, for some periods.
-fn session(assembled: &Assembled, periods: usize) -> Session {
+/// A session on an image after some periods, with its inputs at 1, 2, ….
+fn session(assembled: &AssembledProgram, periods: usize) -> Session {
     let bytes =
         image::write_with(&assembled.program, Some(&assembled.debug_info())).expect("an image holds it");
     let (program, debug) = image::read_with(&bytes).unwrap();
@@ -42,8 +42,7 @@ const MACRO: &str = "\
 .endm
 ";
 
-/// A straight line that writes few names over and over, in macros and out of them. Values are alive for long, so that many
-/// of them share few registers.
+/// A straight line that writes few names repeatedly, in macros and outside. Values live long, so that many of them share few registers.
 fn random_source(seed: u64, lines: usize) -> String {
     let mut random = Random::new(seed);
     let names: Vec<String> = (0..12).map(|i| format!("v{i}")).collect();
@@ -62,7 +61,7 @@ fn random_source(seed: u64, lines: usize) -> String {
     text
 }
 
-/// The names that a line reads.
+/// Names that a line reads.
 fn read_names(line: &str) -> Vec<&str> {
     let words: Vec<&str> = line.split([' ', ',']).filter(|word| !word.is_empty()).collect();
     match words[..] {
@@ -72,13 +71,13 @@ fn read_names(line: &str) -> Vec<&str> {
 }
 
 #[test]
-fn a_name_is_what_the_line_at_hand_reads() {
+fn name_means_the_value_read_at_the_line() {
     let (mut looked, mut renamed, mut inside) = (0, BTreeSet::new(), 0);
     for (seed, machine) in (0..6).zip(MACHINES.iter().cycle()) {
         let assembled = assembled(&random_source(seed, 120), machine);
         let mut session = session(&assembled, 2);
         let program = session.program().clone();
-        while session.step(Unit::Bundle) == Why::Done {
+        while session.step(Unit::Bundle) == StopReason::Done {
             let address = session.emulator().next_address();
             let Some(location) = session.location() else { continue };
             let line = session.source_line(location).unwrap().to_owned();
@@ -105,9 +104,9 @@ fn a_name_is_what_the_line_at_hand_reads() {
     assert!(looked > 1000 && renamed.len() > 100 && inside > 300, "{looked} {} {inside}", renamed.len());
 }
 
-/// With more values than registers, values share them: a value that is not there is no value.
+/// With more values than registers, values share registers: a value that is gone cannot be read.
 #[test]
-fn a_value_that_is_gone_has_no_value() {
+fn overwritten_values_are_unavailable() {
     let assembled = assembled(&random_source(7, 700), MACHINES[MACHINES.len() - 1]);
     let shared = assembled.names.values.iter().filter(|value| {
         assembled.names.values.iter().filter(|other| other.register == value.register).count() > 1
@@ -119,7 +118,7 @@ fn a_value_that_is_gone_has_no_value() {
     let labels: Vec<_> = labels.iter().map(|label| (label, session.parse(label).unwrap())).collect();
     let reasons = ["is not computed yet: bundle", "is gone: its register", "is in flight: it arrives in"];
     let (mut there, mut not) = (0, BTreeSet::<&str>::new());
-    while session.step(Unit::Bundle) == Why::Done {
+    while session.step(Unit::Bundle) == StopReason::Done {
         if !session.cycle().is_multiple_of(37) {
             continue;
         }
@@ -166,7 +165,7 @@ fn console() -> Console {
 }
 
 #[test]
-fn what_the_console_says_of_names() {
+fn info_describes_names() {
     let mut console = console();
     let mut text = String::new();
     for line in [
@@ -210,14 +209,14 @@ fn what_the_console_says_of_names() {
     insta::assert_snapshot!(text);
 }
 
-/// A line in a macro or a repetition stops in each of its places, a watched name at each of its values.
+/// A breakpoint on a line of a macro or repetition stops in each use, a watched name at each of its values.
 #[test]
 fn every_place_and_every_value() {
     let mut console = console();
     assert!(console.execute("break :7").unwrap().starts_with("stop 1 at 3 places: bundle "));
     let mut stops = 0;
     while console.execute("continue").unwrap().starts_with("stop 1") {
-        // Whatever else is in the bundle, the line at hand is that of the breakpoint.
+        // The line at hand is the breakpoint's, independent of the bundle's other operations.
         let place = console.execute("where").unwrap();
         assert!(
             place.contains("(a.s:7)") && place.contains("\n    7          fadd    own, own, by\n"),
@@ -229,7 +228,7 @@ fn every_place_and_every_value() {
     }
     assert_eq!(stops, 9, "three in each of two periods, and before the first tick");
     console.execute("goto start").unwrap();
-    // So it is for its condition.
+    // The condition, too, reads names at the breakpoint's line.
     console.execute("delete").unwrap();
     console.execute("break :7 if own == 4.0").unwrap();
     let mut uses = vec![];
@@ -249,7 +248,7 @@ fn every_place_and_every_value() {
         };
         seen.push(stop.to_owned());
     }
-    // The second period computes the same.
+    // The second period computes the same values.
     assert_eq!(seen, ["(t.1): (no value) -> 3.0", "(t.2): (no value) -> 9.0", "(t): (no value) -> 10.0"]);
 }
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The positions where a session stops, against a recording of the emulator's events that shares nothing with the session's search.
+//! Stop positions of a session, against a recording of the emulator's events that shares no code with the session's search.
 
 use std::num::NonZeroU64;
 use std::ops::RangeInclusive;
 use std::sync::Arc;
-use takt_debug::session::{Options, Session, Stop, Test, Unit, Why};
+use takt_debug::session::{Options, Session, Stop, StopReason, Test, Unit};
 use takt_emu::Rows;
 use takt_emu::testing::{Options as ProgramOptions, Random, input_ports, random_program};
 use takt_emu::{Emulator, Event, PeriodError};
@@ -12,13 +12,13 @@ use takt_isa::program::Location;
 use takt_isa::timing::Cycle;
 use takt_isa::{BundleAddress, Effect, Instruction, MACHINES, Program, Register};
 
-/// Periods of a run.
+/// Number of periods in a run.
 const PERIODS: u64 = 4;
-/// Positions that `until` is followed through.
+/// Maximal number of positions checked for `until`.
 const HELD: usize = 150;
 
-/// A random program whose bundles have source lines. With `bare`, nothing issues together with a `wait`, so that nothing is
-/// in flight while the program waits.
+/// A random program whose bundles have source lines. `bare`: nothing issues together with a `wait`, so nothing is in flight during the
+/// wait.
 fn program(seed: u64, bare: bool) -> Program {
     let machine = MACHINES[seed as usize % MACHINES.len()];
     let mut program = random_program(seed, machine, ProgramOptions::TAME);
@@ -42,16 +42,16 @@ fn program(seed: u64, bare: bool) -> Program {
     program
 }
 
-/// The events of a run.
+/// Recorded events of a run.
 struct Recording {
     program: Program,
-    /// Bundles that issued, by cycle.
+    /// Issued bundles, by cycle.
     issues: Vec<(Cycle, BundleAddress)>,
-    /// Values that registers took, by the first position that shows them.
+    /// Writes to registers, by the first position that shows them.
     writes: Vec<(Cycle, Register, u32)>,
-    /// Values that data words took, likewise.
+    /// Writes to data words, by the first position that shows them.
     stores: Vec<(Cycle, u32, u32)>,
-    /// Cycles that passed.
+    /// Length of the run in cycles.
     end: Cycle,
 }
 
@@ -90,7 +90,7 @@ impl Recording {
             }
         }
         recording.end = emulator.now();
-        // Results in flight at the end arrive after it; those that `halt` leaves in flight are written at once.
+        // Results in flight at the end arrive after it; `halt` writes its results in flight at once.
         let halted = matches!(emulator.status(), takt_emu::Status::Halted { .. });
         for write in &mut recording.writes {
             write.0 = write.0.min(if halted { recording.end } else { Cycle::MAX });
@@ -99,7 +99,7 @@ impl Recording {
         recording
     }
 
-    /// The value of a place at each position, by a list of changes.
+    /// Value at each position, from a list of changes.
     fn history<K: PartialEq + Copy>(
         &self,
         changes: &[(Cycle, K, u32)],
@@ -125,7 +125,7 @@ impl Recording {
         self.history(&self.stores, word, self.program.data.get(word as usize).copied())
     }
 
-    /// The bundle that issues next, at each position up to the last issue.
+    /// Next bundle at each position up to the last issue.
     fn address(&self) -> Vec<Option<u32>> {
         let mut issues = self.issues.iter().peekable();
         let last = self.issues.last().unwrap().0;
@@ -136,7 +136,7 @@ impl Recording {
         (0..=last).map(at).collect()
     }
 
-    /// Entries of the return stack, at each position.
+    /// Depth of the return stack at each position.
     fn depth(&self) -> Vec<Option<u32>> {
         let (mut issues, mut depth) = (self.issues.iter().peekable(), 0);
         let at = |position| {
@@ -154,7 +154,7 @@ impl Recording {
         (0..=self.end).map(at).collect()
     }
 
-    /// Positions at which a bundle of another line than the last one's is about to issue.
+    /// Positions just before the issue of a bundle from another line than the previous bundle's.
     fn lines(&self) -> Vec<Cycle> {
         let line = |address| self.program.location(address);
         let begins = |i: &usize| {
@@ -166,8 +166,8 @@ impl Recording {
     }
 }
 
-/// The runs that are tried: of each program with nothing and with results in flight while it waits; with the tick when the
-/// program is ready, one that comes too early at times, and one that lets it wait.
+/// Runs under test: each program without and with results in flight during its waits, with a tick on demand, a tick that is sometimes
+/// early, and a late tick.
 fn runs(seeds: RangeInclusive<u64>) -> impl Iterator<Item = (String, Session, Recording)> {
     let cases = seeds.flat_map(|seed| [true, false].map(|bare| (seed, bare)));
     let cases = cases.flat_map(|(seed, bare)| [0, 211, 3001].map(|tick| (seed, bare, tick)));
@@ -186,10 +186,10 @@ fn runs(seeds: RangeInclusive<u64>) -> impl Iterator<Item = (String, Session, Re
     })
 }
 
-/// Positions at which a command stops that is given again and again, up to the end of the run or the start.
-fn all(session: &mut Session, mut command: impl FnMut(&mut Session) -> Why) -> Vec<Cycle> {
+/// Stop positions of a command repeated up to the end or the start of the run.
+fn all(session: &mut Session, mut command: impl FnMut(&mut Session) -> StopReason) -> Vec<Cycle> {
     let mut positions = vec![];
-    while matches!(command(session), Why::Done | Why::Stop { .. } | Why::Holds) {
+    while matches!(command(session), StopReason::Done | StopReason::Stop { .. } | StopReason::Holds) {
         positions.push(session.cycle());
     }
     positions
@@ -203,7 +203,7 @@ fn steps_are_all_issues() {
             session.go_to(0);
             let forward = all(&mut session, |session| session.step(unit));
             assert_eq!(forward, expected, "{run}, {unit:?}");
-            assert_eq!(session.go_to(recording.end), Why::Done, "{run}");
+            assert_eq!(session.go_to(recording.end), StopReason::Done, "{run}");
             let mut back = all(&mut session, |session| session.step_back(unit));
             back.reverse();
             assert_eq!(back, expected, "{run}, {unit:?}, back");
@@ -224,17 +224,17 @@ fn calls_are_passed_over() {
             let here = depth(from);
             let over = issues().find(|cycle| *cycle > from && depth(*cycle) <= here);
             session.go_to(from);
-            let stopped = session.step(Unit::Call) == Why::Done;
+            let stopped = session.step(Unit::Call) == StopReason::Done;
             assert_eq!(over, stopped.then(|| session.cycle()), "{run}, call from {from}");
             session.go_to(from);
             let before = issues().rfind(|cycle| *cycle < from && depth(*cycle) <= here);
-            let stopped = session.step_back(Unit::Call) == Why::Done;
+            let stopped = session.step_back(Unit::Call) == StopReason::Done;
             assert_eq!(before, stopped.then(|| session.cycle()), "{run}, back call from {from}");
             if here > 0 {
                 inside += 1;
                 let out = issues().find(|cycle| *cycle > from && depth(*cycle) < here);
                 session.go_to(from);
-                let stopped = session.step(Unit::Out) == Why::Done;
+                let stopped = session.step(Unit::Out) == StopReason::Done;
                 assert_eq!(out, stopped.then(|| session.cycle()), "{run}, out from {from}");
             }
         }
@@ -242,7 +242,7 @@ fn calls_are_passed_over() {
     assert!(inside > 10, "{inside}");
 }
 
-/// A watched expression, its value at each position, and a value that it has.
+/// Watched expressions with their values at each position.
 fn watched(recording: &Recording, random: &mut Random) -> Vec<(String, Vec<Option<u32>>)> {
     let machine = recording.program.machine;
     let name = |register| format!("@{}:bits", machine.register_name(register).unwrap());
@@ -290,7 +290,7 @@ fn watch_and_until_see_every_change() {
             session.go_to(0);
             let found: Vec<Cycle> = holds
                 .iter()
-                .map_while(|_| (session.run_until(&live) == Why::Holds).then(|| session.cycle()))
+                .map_while(|_| (session.run_until(&live) == StopReason::Holds).then(|| session.cycle()))
                 .collect();
             assert_eq!(found, holds, "{run}, until {text} == {value}");
         }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Sessions on a machine that runs elsewhere: here it is another emulator, in which differences can be planted.
+//! Sessions on a machine that runs elsewhere: here a second emulator with planted differences.
 
 use std::sync::{Arc, Mutex};
 use takt_asm::{MemoryLoader, Options as AsmOptions, assemble};
@@ -10,7 +10,7 @@ use takt_emu::{Emulator, PeriodError, Status};
 use takt_isa::fp::Flags;
 use takt_isa::{BundleAddress, F3, Program, Register};
 
-/// Sums its input, keeps the last eight sums in a ring, and stops where it is told to.
+/// Sums its input, keeps the last eight sums in a ring, and stops on command.
 const SOURCE: &str = "\
 .input  n, mode:int
 .output sum, count:int
@@ -45,34 +45,34 @@ table:  .float  0.5, 0.25
 
 ";
 
-/// A planted fault.
+/// Faults planted in the emulated board; by default none.
 #[derive(Clone, Copy, Default, Debug)]
-struct Planted {
-    /// From this period on, these bits of this register are wrong.
+struct PlantedFaults {
+    /// Bits of a register that are wrong from a period on.
     register: Option<(u64, Register, u32)>,
-    /// The same of a data word.
+    /// Bits of a data word that are wrong from a period on.
     word: Option<(u64, u32, u32)>,
-    /// From this period on nobody answers.
+    /// The board stops answering from this period on.
     gone: Option<u64>,
-    /// From this period on it does not come to its `wait`.
+    /// The program does not reach its `wait` from this period on.
     busy: Option<u64>,
 }
 
-/// A board's circuit, which is an emulator.
+/// Circuit of a board, simulated by an emulator.
 struct Circuit {
     emulator: Emulator,
     program: Program,
     periods: u64,
     runs: bool,
     drives: bool,
-    planted: Planted,
-    /// The requests to it, but for values.
+    planted: PlantedFaults,
+    /// Log of the requests, without reads of values.
     asked: Vec<&'static str>,
     control: Arc<Control>,
 }
 
 impl Circuit {
-    fn new(program: &Program, planted: Planted, control: &Arc<Control>) -> Circuit {
+    fn new(program: &Program, planted: PlantedFaults, control: &Arc<Control>) -> Circuit {
         let mut emulator = Emulator::new(program).unwrap();
         for port in &program.inputs {
             emulator.set_input_bits(port.register, 0).unwrap();
@@ -105,7 +105,7 @@ impl Circuit {
     }
 }
 
-/// A board, of which the test sees the inside.
+/// A board whose internal circuit the test can read.
 #[derive(Clone)]
 struct Board(Arc<Mutex<Circuit>>);
 
@@ -207,7 +207,7 @@ impl Remote for Board {
                 Some((from, planted, bits)) if planted == register && circuit.periods >= from => bits,
                 _ => 0,
             };
-            // A register that was never written holds anything.
+            // Registers without a write hold arbitrary bits.
             let bits =
                 |register| circuit.emulator.register(register).unwrap_or(0xdead_beef) ^ wrong(register);
             registers.iter().map(|register| bits(*register)).collect()
@@ -231,8 +231,8 @@ fn program() -> Program {
     assemble("ring.s", &MemoryLoader::new(&[("ring.s", SOURCE)]), &options).unwrap().program
 }
 
-/// A console on a board after so many periods, what it said, and the board.
-fn begin(periods: u64, planted: Planted, restart: bool, interactive: bool) -> (Console, String, Board) {
+/// A console on a board after `periods` periods, its first message, and the board.
+fn begin(periods: u64, planted: PlantedFaults, restart: bool, interactive: bool) -> (Console, String, Board) {
     let options = AsmOptions { machine: &F3, ..AsmOptions::default() };
     let assembled = assemble("ring.s", &MemoryLoader::new(&[("ring.s", SOURCE)]), &options).unwrap();
     let debug = assembled.debug_info();
@@ -256,7 +256,7 @@ fn begin(periods: u64, planted: Planted, restart: bool, interactive: bool) -> (C
     (console, said, board)
 }
 
-/// Commands with what they say.
+/// Transcript: the commands, each with its answer.
 fn talk(console: &mut Console, commands: &[&str]) -> String {
     let mut text = String::new();
     for command in commands {
@@ -270,8 +270,8 @@ fn talk(console: &mut Console, commands: &[&str]) -> String {
 }
 
 #[test]
-fn what_the_console_says() {
-    let (mut console, mut text, _) = begin(3, Planted::default(), false, false);
+fn console_transcript_of_a_remote_session() {
+    let (mut console, mut text, _) = begin(3, PlantedFaults::default(), false, false);
     text += &talk(
         &mut console,
         &[
@@ -311,8 +311,8 @@ fn what_the_console_says() {
 }
 
 #[test]
-fn what_is_refused_says_why() {
-    let (mut console, _, board) = begin(2, Planted::default(), false, false);
+fn refused_commands_state_the_reason() {
+    let (mut console, _, board) = begin(2, PlantedFaults::default(), false, false);
     let mut text = String::new();
     for command in [
         "back",
@@ -357,7 +357,7 @@ fn what_is_refused_says_why() {
 #[test]
 fn a_script_leaves_the_board_as_it_found_it() {
     let ends = |runs: bool, restart: bool, commands: &[&str]| {
-        let (mut console, _, board) = begin(2, Planted::default(), restart, false);
+        let (mut console, _, board) = begin(2, PlantedFaults::default(), restart, false);
         if !runs {
             drop(console);
             board.circuit(|circuit| circuit.runs = false);
@@ -377,26 +377,28 @@ fn a_script_leaves_the_board_as_it_found_it() {
     assert_eq!(ends(true, true, &["step"]), (held.to_owned(), false));
     assert_eq!(ends(true, true, &["step", "go"]), (runs.to_owned(), true));
     assert_eq!(ends(false, false, &["go"]), (runs.to_owned(), true));
-    // However it ends.
-    let (console, _, board) = begin(2, Planted::default(), false, false);
+    // The board is released after any end of the console.
+    let (console, _, board) = begin(2, PlantedFaults::default(), false, false);
     assert!(!board.circuit(|circuit| circuit.runs));
     drop(console);
     assert!(board.circuit(|circuit| circuit.runs));
 }
 
 #[test]
-fn differences_are_told_once_and_by_name() {
+fn reports_each_difference_once_by_name() {
     let register = |name: &str| {
         let program = program();
         let mut named = program.outputs.iter().chain(&program.registers);
         named.find(|port| port.name == name).unwrap().register
     };
-    let one = |planted: Planted, restart: bool, commands: &[&str]| {
+    let one = |planted: PlantedFaults, restart: bool, commands: &[&str]| {
         let (mut console, _, _) = begin(2, planted, restart, false);
         talk(&mut console, commands)
     };
-    let planted =
-        |from, name| Planted { register: Some((from, register(name), 0x40_0000)), ..Planted::default() };
+    let planted = |from, name| PlantedFaults {
+        register: Some((from, register(name), 0x40_0000)),
+        ..PlantedFaults::default()
+    };
     for restart in [false, true] {
         let text = one(planted(4, "sum"), restart, &["set n = 1", "step 9", "print sum"]);
         let says = "error: period 4: output port `sum` is ";
@@ -404,15 +406,15 @@ fn differences_are_told_once_and_by_name() {
             text.contains(says) && text.contains("; inputs: n = 1.0, mode = 0\nperiod 4: waits"),
             "{text}"
         );
-        // A register that no output tells of, at the end of the command.
+        // A difference in a register that affects no output is found at the end of the command.
         let text = one(planted(4, "at"), restart, &["step 5", "print at", "step"]);
         let period = if restart { 5 } else { 7 };
         assert!(text.contains(&format!("error: after period {period}: `at` (register ")), "{text}");
-        // The board's value is shown, and the shadow has gone on from it: the circuit, of which only what is read is wrong, then differs
-        // again, as a shadow that goes its own way would.
+        // The console shows the board's value, and the shadow has continued from it. Only the read values of this circuit are wrong, so it
+        // then differs again, as a shadow on its own course would.
         let at = (if restart { 5 } else { 7 }) | 0x40_0000;
         assert!(text.contains(&format!("at = {at} ")), "{text}");
-        let word = Planted { word: Some((4, 3, 1)), ..Planted::default() };
+        let word = PlantedFaults { word: Some((4, 3, 1)), ..PlantedFaults::default() };
         let text = one(word, restart, &["step 8"]);
         let says = match restart {
             true => "after period 8: data word 3 (`ring+3`) is 1e-45 on the board, 0.0 in the emulator",
@@ -420,20 +422,24 @@ fn differences_are_told_once_and_by_name() {
         };
         assert!(text.contains(says), "{text}");
     }
-    // Values that nobody writes are compared where the session begins.
+    // Constants are compared at the start of the session.
     let (constant, bits) = program().constants[0];
-    let (_, said, _) =
-        begin(2, Planted { register: Some((0, constant, 1)), ..Planted::default() }, false, false);
+    let (_, said, _) = begin(
+        2,
+        PlantedFaults { register: Some((0, constant, 1)), ..PlantedFaults::default() },
+        false,
+        false,
+    );
     assert_eq!(bits, 0.5_f32.to_bits());
     let says =
         " is 0.50000006 on the board, 0.5 in the emulator, and the program does not write it\nperiod 2: ";
     assert!(said.starts_with("register ") && said.contains(says), "{said}");
-    let (_, said, _) = begin(2, Planted::default(), false, false);
+    let (_, said, _) = begin(2, PlantedFaults::default(), false, false);
     assert!(said.starts_with("period 2: waits for the tick, since bundle "), "{said}");
-    // Nothing is said where nothing differs, whatever was never written.
+    // Without a difference the console reports none, even for registers never written.
     for restart in [false, true] {
         let text = one(
-            Planted::default(),
+            PlantedFaults::default(),
             restart,
             &["set n = 0.1", "step 20", "set mode = 1", "step", "set mode = 0", "step 5"],
         );
@@ -443,7 +449,7 @@ fn differences_are_told_once_and_by_name() {
 
 #[test]
 fn a_program_that_stops() {
-    let (mut console, _, board) = begin(2, Planted::default(), false, false);
+    let (mut console, _, board) = begin(2, PlantedFaults::default(), false, false);
     let text =
         talk(&mut console, &["set mode = 2", "step 4", "print count", "step", "go", "goto start", "step"]);
     assert!(text.contains("the program has halted\nperiod 2: halted at bundle "), "{text}");
@@ -455,7 +461,7 @@ fn a_program_that_stops() {
     );
     assert_eq!(board.circuit(|circuit| circuit.asked.clone()), ["restart", "step"]);
 
-    let (mut console, _, _) = begin(2, Planted::default(), false, false);
+    let (mut console, _, _) = begin(2, PlantedFaults::default(), false, false);
     let text = talk(&mut console, &["set mode = 3", "step 4", "step", "print m"]);
     let says = "reads data word 100000, but the data memory has words 0 to 1023";
     assert!(text.contains(says) && text.contains("ld      x, ring[m]"), "{text}");
@@ -469,8 +475,8 @@ fn a_program_that_stops() {
 }
 
 #[test]
-fn a_board_that_does_not_wait_or_answer() {
-    let busy = |from| Planted { busy: Some(from), ..Planted::default() };
+fn reports_a_board_that_does_not_answer() {
+    let busy = |from| PlantedFaults { busy: Some(from), ..PlantedFaults::default() };
     let (mut console, said, board) = begin(2, busy(2), false, false);
     assert!(
         said.starts_with("the program does not come to its `wait`") && said.contains(" issued last; "),
@@ -488,23 +494,23 @@ fn a_board_that_does_not_wait_or_answer() {
         "{text}"
     );
 
-    let gone = Planted { gone: Some(4), ..Planted::default() };
+    let gone = PlantedFaults { gone: Some(4), ..PlantedFaults::default() };
     let (mut console, _, _) = begin(2, gone, false, false);
     let text =
         talk(&mut console, &["step 5", "print sum", "step", "hold", "where", "stops", "set n = 1", "go"]);
     assert!(text.contains("(takt) step 5\nerror: the line is gone\n"), "{text}");
-    assert!(text.contains("error: what the program does is not known: `hold` asks again"), "{text}");
+    assert!(text.contains("error: the program's state is unknown: `hold` asks again"), "{text}");
     assert_eq!(console.leave().unwrap_err(), "the line is gone");
 }
 
 #[test]
-fn it_runs_freely_until_somebody_interrupts() {
-    let (mut console, _, board) = begin(2, Planted::default(), false, true);
+fn runs_freely_until_interrupted() {
+    let (mut console, _, board) = begin(2, PlantedFaults::default(), false, true);
     let text = talk(&mut console, &["set n = 0.5", "continue"]);
     let periods = board.circuit(|circuit| circuit.periods);
     assert!(text.contains(&format!("interrupted\nperiod {periods}: waits")) && periods > 20, "{text}");
     assert!(!board.circuit(|circuit| circuit.runs));
-    // An endless search ends so too.
+    // An interrupt also ends an endless search.
     board.circuit(|circuit| circuit.control.interrupt());
     assert!(console.execute("until sum < 0").unwrap().starts_with("interrupted\n"));
     let text = talk(&mut console, &["set mode = 2", "continue"]);
@@ -514,7 +520,7 @@ fn it_runs_freely_until_somebody_interrupts() {
 
 #[test]
 fn completions() {
-    let (console, _, _) = begin(1, Planted::default(), false, false);
+    let (console, _, _) = begin(1, PlantedFaults::default(), false, false);
     let complete = |line: &str| {
         let (at, found) = console.complete(line);
         format!("{}|{}", &line[..at], found.join(" "))

@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Sessions against the run that they are of: wherever one goes, forward or back, everything is as it was there.
+//! Sessions against their run: every position shows the same state, reached forward or back.
 
 use std::sync::Arc;
 use takt_asm::{MemoryLoader, Options as AsmOptions, assemble};
 use takt_debug::console::Console;
-use takt_debug::session::{CHECKPOINTS, Options, Place, Session, Stop, Test, Unit, Where, Why};
+use takt_debug::session::{
+    BreakpointLocation, CHECKPOINTS, Options, Place, Session, Stop, StopReason, Test, Unit,
+};
 use takt_emu::testing::{Options as ProgramOptions, Random, input_ports, random_program};
 use takt_isa::{BundleAddress, F3, MACHINES, Program, Register};
 
-/// A random program with inputs for some periods; with `subroutines` it has calls.
+/// A random program with inputs for some periods; `subroutines`: with calls.
 fn random_session(seed: u64, index: usize, periods: u64) -> Session {
     let machine = MACHINES[index % MACHINES.len()];
     session(&random_program(seed, machine, ProgramOptions::TAME), seed, periods)
@@ -22,7 +24,7 @@ fn session(program: &Program, seed: u64, periods: u64) -> Session {
     Session::new(program, Options { inputs: Some(Arc::new(rows)), ..Options::default() }).unwrap()
 }
 
-/// All that can be seen at a position.
+/// Complete visible state at a position.
 fn fingerprint(session: &mut Session) -> String {
     let registers: Vec<Option<u32>> = Register::all().map(|register| session.register(register)).collect();
     let (next, stall, flight) = (session.next_issue(), session.stall(), session.in_flight());
@@ -38,11 +40,11 @@ fn fingerprint(session: &mut Session) -> String {
     ) + &format!("{:?} {:?}", emulator.loops().collect::<Vec<_>>(), emulator.memory())
 }
 
-/// Every position of a run, by stepping through it.
+/// Fingerprints of every position of a run, from single steps.
 fn all(session: &mut Session) -> Vec<String> {
     session.go_to(0);
     let mut positions = vec![fingerprint(session)];
-    while session.step(Unit::Cycle) == Why::Done {
+    while session.step(Unit::Cycle) == StopReason::Done {
         positions.push(fingerprint(session));
     }
     positions
@@ -57,14 +59,14 @@ fn anywhere() {
         let mut random = Random::new(seed);
         for _ in 0..60 {
             let cycle = u64::from(random.below(end as u32 + 1));
-            assert_eq!(session.go_to(cycle), Why::Done);
+            assert_eq!(session.go_to(cycle), StopReason::Done);
             assert!(fingerprint(&mut session) == positions[cycle as usize], "seed {seed}, cycle {cycle}");
             if random.once_in(3) && cycle > 0 {
-                assert_eq!(session.step_back(Unit::Cycle), Why::Done);
+                assert_eq!(session.step_back(Unit::Cycle), StopReason::Done);
                 assert!(fingerprint(&mut session) == positions[cycle as usize - 1]);
             }
         }
-        // The session's run is the emulator's.
+        // The session's run equals the emulator's.
         session.go_to(end);
         let mut emulator = takt_emu::Emulator::new(session.program()).unwrap();
         let mut random = Random::new(seed);
@@ -81,18 +83,18 @@ fn anywhere() {
     }
 }
 
-/// Positions at which stepping forward by a unit stops, from the beginning to the end.
+/// Positions at which forward steps of a unit stop, from the beginning to the end.
 fn forward(session: &mut Session, unit: Unit) -> Vec<u64> {
     session.go_to(0);
     let mut positions = vec![0];
-    while session.step(unit) == Why::Done {
+    while session.step(unit) == StopReason::Done {
         positions.push(session.cycle());
     }
     positions
 }
 
 #[test]
-fn back_is_forth_reversed() {
+fn backward_steps_reverse_forward_steps() {
     for seed in 0..16 {
         let mut session = random_session(seed, seed as usize, 3);
         for unit in [Unit::Bundle, Unit::Line, Unit::Period] {
@@ -102,13 +104,13 @@ fn back_is_forth_reversed() {
                 let why = session.step_back(unit);
                 back.push(session.cycle());
                 if session.cycle() == 0 {
-                    assert!(why == Why::Start || unit == Unit::Period);
+                    assert!(why == StopReason::Start || unit == Unit::Period);
                     break;
                 }
-                assert_eq!(why, Why::Done);
+                assert_eq!(why, StopReason::Done);
             }
             back.reverse();
-            // The end of the run may itself be such a position.
+            // The end of the run may itself be a stop position.
             let end = if forward.len() > back.len() { back.len() } else { forward.len() };
             assert_eq!(back[..end], forward[..end], "seed {seed} {unit:?}");
             assert!(forward.len() - end <= 1);
@@ -116,7 +118,7 @@ fn back_is_forth_reversed() {
     }
 }
 
-/// A program with a subroutine and a loop.
+/// Source with a subroutine and a loop.
 const SOURCE: &str = "\
 .output sum, count:int
 .reg    i:int n:int x q
@@ -152,7 +154,7 @@ fn value(console: &Console, text: &str) -> f64 {
     console.session().evaluate(&console.session().parse(text).unwrap()).unwrap().real()
 }
 
-/// The fixture counts no loops; the source names a machine that does.
+/// The fixture has no counted loops; this source names a machine with them.
 #[test]
 fn loops_show_the_iterations_left() {
     let mut console = console(
@@ -210,11 +212,11 @@ fn stops_forth_and_back() {
         let kind = stop.split(' ').next().unwrap();
         console.execute(stop).unwrap();
         let mut forward = vec![];
-        while matches!(console.session_mut().resume(), Why::Stop { id: 1, .. }) {
+        while matches!(console.session_mut().resume(), StopReason::Stop { id: 1, .. }) {
             forward.push((console.session().cycle(), fingerprint(console.session_mut())));
         }
         let mut back = vec![];
-        while matches!(console.session_mut().resume_back(), Why::Stop { id: 1, .. }) {
+        while matches!(console.session_mut().resume_back(), StopReason::Stop { id: 1, .. }) {
             back.push((console.session().cycle(), fingerprint(console.session_mut())));
         }
         back.reverse();
@@ -227,7 +229,7 @@ fn stops_forth_and_back() {
     }
 }
 
-/// The position behind the last cycle is one like any other: what issues with `halt` is seen there.
+/// The position after the last cycle is a full position: operations that issue with `halt` are visible there.
 #[test]
 fn the_last_position_counts() {
     let source = ".output y\n nop\n fadd y, 3.5, 3.5 || halt\n";
@@ -246,7 +248,7 @@ fn the_last_position_counts() {
     }
 }
 
-/// `until` goes to the next position at which its expression holds, also if it holds already.
+/// `until` goes to the next position at which its expression holds, even if it holds already.
 #[test]
 fn until_is_the_next_position() {
     let mut console = console(SOURCE);
@@ -256,7 +258,7 @@ fn until_is_the_next_position() {
     }
 }
 
-/// In random runs a breakpoint stops before each issue of its bundle, and a watchpoint at each change, and nowhere else.
+/// In random runs a breakpoint stops before each issue of its bundle and a watchpoint at each change, and nowhere else.
 #[test]
 fn stops_are_complete() {
     let mut stopped = 0;
@@ -271,7 +273,7 @@ fn stops_are_complete() {
         for cycle in 1..=end {
             let before = session.go_to(cycle - 1);
             let old = session.register(register);
-            assert_eq!((before, session.go_to(cycle)), (Why::Done, Why::Done));
+            assert_eq!((before, session.go_to(cycle)), (StopReason::Done, StopReason::Done));
             if session.next_issue() == (address, Some(cycle)) {
                 issues.push(cycle);
             }
@@ -282,13 +284,16 @@ fn stops_are_complete() {
         let name = format!("@{}", program.machine.register_name(register).unwrap());
         let what = session.parse(&name).unwrap();
         for (stop, expected) in [
-            (Stop::Break { at: Where::Bundle(address), condition: None, text: String::new() }, issues),
+            (
+                Stop::Break { at: BreakpointLocation::Bundle(address), condition: None, text: String::new() },
+                issues,
+            ),
             (Stop::Watch { what: Box::new(what), test: Test::Changed, text: String::new() }, changes),
         ] {
             session.go_to(0);
             let id = session.add_stop(stop);
             let mut found = vec![];
-            while matches!(session.resume(), Why::Stop { .. }) {
+            while matches!(session.resume(), StopReason::Stop { .. }) {
                 found.push(session.cycle());
             }
             assert_eq!(found, expected, "seed {seed}");
@@ -300,7 +305,7 @@ fn stops_are_complete() {
 }
 
 #[test]
-fn what_is_set_belongs_to_the_run() {
+fn edits_belong_to_the_run() {
     let mut console = console(SOURCE);
     console.execute("break add if i == 1").unwrap();
     console.execute("continue").unwrap();
@@ -311,13 +316,13 @@ fn what_is_set_belongs_to_the_run() {
     console.execute("goto cycle 100000").unwrap_or_default();
     assert_eq!(value(&console, "sum"), 0.5 + 100.0 - 1.75);
     let end = fingerprint(console.session_mut());
-    // Before it was set it was not; again beyond, it is.
+    // Before the edit the value is the old one; beyond it, the new one again.
     console.execute("back cycle 100").unwrap();
     assert!(console.session().cycle() < at);
     assert_eq!(value(&console, "table[1]"), 0.25);
     console.execute("goto cycle 100000").unwrap_or_default();
     assert!(fingerprint(console.session_mut()) == end);
-    // Another value there, and the old one is forgotten.
+    // An edit at the same place replaces the old one.
     console.execute(&format!("goto cycle {at}")).unwrap();
     console.execute("set table[1] = 1").unwrap();
     console.execute("goto cycle 100000").unwrap_or_default();
@@ -375,7 +380,7 @@ fn expressions() {
     insta::assert_snapshot!(errors);
 }
 
-/// 10⁸ cycles, cheap ones: checkpoints stay few, and near enough that going back anywhere is a short run.
+/// 10⁸ cheap cycles: checkpoints stay few, and dense enough for a short run to any earlier position.
 #[test]
 fn a_long_run() {
     let loader = MemoryLoader::new(takt_programs::SOURCES);
@@ -385,35 +390,39 @@ fn a_long_run() {
     let rows = Some(Arc::new(vec![zeros; 10_000]));
     let options = Options { inputs: rows, tick: std::num::NonZeroU64::new(12_500), ..Options::default() };
     let mut session = Session::new(&program, options).unwrap();
-    assert_eq!(session.go_to(100_000_000), Why::Done);
+    assert_eq!(session.go_to(100_000_000), StopReason::Done);
     let cycles = session.checkpoints();
     assert!(cycles.len() <= CHECKPOINTS);
     assert!(cycles.windows(2).all(|pair| pair[1] - pair[0] <= 1 << 19) && cycles.last() > Some(&99_000_000));
     let at_end = fingerprint(&mut session);
     for cycle in [99_999_999, 50_000_001, 3] {
-        assert_eq!(session.go_to(cycle), Why::Done);
+        assert_eq!(session.go_to(cycle), StopReason::Done);
         assert_eq!(session.cycle(), cycle);
     }
-    assert_eq!(session.go_to(100_000_000), Why::Done);
+    assert_eq!(session.go_to(100_000_000), StopReason::Done);
     assert!(fingerprint(&mut session) == at_end);
-    // Through all of it for what is not there, and for what is.
+    // A search through the whole run: for a value that never occurs.
     let [what, never] = ["F1", "1e9"].map(|text| Box::new(session.parse(text).unwrap()));
     let rare = Stop::Watch { what, test: Test::Above(never), text: String::new() };
     let id = session.add_stop(rare);
-    assert_eq!(session.resume_back(), Why::Start);
+    assert_eq!(session.resume_back(), StopReason::Start);
     session.remove_stop(id);
-    assert_eq!(session.go_to(100_000_000), Why::Done);
-    session.add_stop(Stop::Break { at: Where::Period(7), condition: None, text: String::new() });
-    assert!(matches!(session.resume_back(), Why::Stop { .. }) && session.period() == 7);
-    // In a cycle in which the program waits and nothing happens, too.
+    assert_eq!(session.go_to(100_000_000), StopReason::Done);
+    session.add_stop(Stop::Break { at: BreakpointLocation::Period(7), condition: None, text: String::new() });
+    assert!(matches!(session.resume_back(), StopReason::Stop { .. }) && session.period() == 7);
+    // A stop in a cycle of a wait without events is found too.
     session.go_to(0);
-    session.add_stop(Stop::Break { at: Where::Cycle(59_000), condition: None, text: String::new() });
-    assert!(matches!(session.resume(), Why::Stop { .. }) && session.cycle() == 59_000);
+    session.add_stop(Stop::Break {
+        at: BreakpointLocation::Cycle(59_000),
+        condition: None,
+        text: String::new(),
+    });
+    assert!(matches!(session.resume(), StopReason::Stop { .. }) && session.cycle() == 59_000);
     let clock = session.parse("cycle == 71999").unwrap();
-    assert!(session.run_until(&clock) == Why::Holds && session.cycle() == 71_999);
+    assert!(session.run_until(&clock) == StopReason::Holds && session.cycle() == 71_999);
 }
 
-/// Most programs have a label `period`: its address is not what a condition on the period asks for.
+/// Most programs have a label `period`: in a condition `period` is the counter, not the address.
 #[test]
 fn counters_come_before_labels() {
     let mut console = console(
@@ -423,7 +432,7 @@ fn counters_come_before_labels() {
     assert_eq!(value(&console, "period"), 3.0);
 }
 
-/// Arrays of registers have their elements' names, and what computes a part of an equation the part's columns.
+/// Elements of register arrays have names, and operations of an equation have the columns of their parts.
 #[test]
 fn equations_and_arrays() {
     let source = ".input x\n.output y\n.state P[2,2]\n.once\n P[1,1], P[1,2], P[2,1], P[2,2] = 1, 2, 3, 4\n wait p\n\

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Sessions on systems of several cores, against the emulator that goes forward only.
+//! Sessions on systems of several cores, against the forward-only emulator.
 
 use std::collections::BTreeMap;
 use takt_debug::console::{Console, Target, commands, first_mistake};
 use takt_debug::session::{Options, Session, Unit};
-use takt_debug::system::{SystemOptions, SystemSession, SystemStop, SystemWhy};
+use takt_debug::system::{SystemOptions, SystemSession, SystemStop, SystemStopReason};
 use takt_emu::Event;
 use takt_emu::testing::Random;
 use takt_isa::{F1, MACHINES, Register};
@@ -17,7 +17,7 @@ fn session(description: &Description) -> SystemSession {
     SystemSession::new(description, SystemOptions::default()).expect("a random system loads")
 }
 
-/// All that can be seen of a system: registers and memory of each core, and the entries of each FIFO.
+/// Visible state of a system: registers and memory of each core, and the entries of each FIFO.
 type State = (Vec<Vec<Option<u32>>>, Vec<Vec<u32>>, Vec<Vec<Vec<u32>>>);
 
 fn state(system: &System) -> State {
@@ -29,7 +29,7 @@ fn state(system: &System) -> State {
     (registers.collect(), memories.collect(), fifos.collect())
 }
 
-/// Systems that run without a fault for as long as the tests look at them.
+/// Systems without faults within the tested length of time.
 fn systems() -> impl Iterator<Item = (u64, Description)> {
     let all = (0..16).map(|seed| (seed, random_description(seed, MACHINES)));
     let runs = |(_, description): &(u64, Description)| {
@@ -40,13 +40,13 @@ fn systems() -> impl Iterator<Item = (u64, Description)> {
 }
 
 #[test]
-fn every_position_is_what_a_run_from_reset_gives() {
+fn every_position_equals_a_run_from_reset() {
     for (seed, description) in systems() {
         let mut session = session(&description);
         let mut random = Random::new(seed);
         for _ in 0..12 {
             let cycle = u64::from(random.below(CYCLES as u32));
-            assert_eq!(session.go_to(cycle), SystemWhy::Done, "seed {seed}");
+            assert_eq!(session.go_to(cycle), SystemStopReason::Done, "seed {seed}");
             let mut fresh = System::new(&description).expect("it loads");
             fresh.run_until(cycle).expect("no fault");
             assert_eq!(session.cycle(), cycle);
@@ -63,7 +63,7 @@ fn stops_at_every_event_forward_and_back() {
         system.keep_events();
         system.run_until(CYCLES).expect("no fault");
         let events = system.take_events();
-        // The rarest kind of event that there is a handful of.
+        // The rarest kind of event with more than three occurrences.
         let mut counts: BTreeMap<(usize, &str), Vec<u64>> = BTreeMap::new();
         for event in events.iter().filter(|event| event.cycle + 1100 < CYCLES) {
             counts.entry((event.link, event.kind.name())).or_default().push(event.cycle + 1);
@@ -80,18 +80,18 @@ fn stops_at_every_event_forward_and_back() {
         let mut session = session(&description);
         let id = session.add_stop(SystemStop { link, kind: Some(kind) }, String::new());
         for &cycle in &cycles {
-            assert_eq!(session.resume(&mut []), SystemWhy::Stop(id), "seed {seed}: {name} at {cycle}");
+            assert_eq!(session.resume(&mut []), SystemStopReason::Stop(id), "seed {seed}: {name} at {cycle}");
             assert_eq!(session.cycle(), cycle, "seed {seed}: {name} of link {link}");
         }
         for &cycle in cycles.iter().rev().skip(1) {
             assert_eq!(
                 session.resume_back(&mut []),
-                SystemWhy::Stop(id),
+                SystemStopReason::Stop(id),
                 "seed {seed}: back to {name} at {cycle}"
             );
             assert_eq!(session.cycle(), cycle, "seed {seed}: back to {name} of link {link}");
         }
-        assert_eq!(session.resume_back(&mut []), SystemWhy::Start);
+        assert_eq!(session.resume_back(&mut []), SystemStopReason::Start);
     }
     assert!(!kinds.is_empty(), "no system has an event that comes often enough");
 }
@@ -117,7 +117,7 @@ fn bundles_and_periods_of_each_core() {
         for cycle in issues.take(30) {
             assert_eq!(
                 (session.step(&mut [], core, Unit::Bundle), session.cycle()),
-                (SystemWhy::Done, cycle)
+                (SystemStopReason::Done, cycle)
             );
         }
         session.go_to(0);
@@ -125,20 +125,20 @@ fn bundles_and_periods_of_each_core() {
         for &cycle in &waits {
             assert_eq!(
                 (session.step(&mut [], core, Unit::Period), session.cycle()),
-                (SystemWhy::Done, cycle)
+                (SystemStopReason::Done, cycle)
             );
         }
         for &cycle in waits.iter().rev().skip(1) {
             assert_eq!(
                 (session.step_back(&mut [], core, Unit::Period), session.cycle()),
-                (SystemWhy::Done, cycle)
+                (SystemStopReason::Done, cycle)
             );
         }
     }
 }
 
 #[test]
-fn mistakes_are_told() {
+fn reports_mistakes() {
     let (_, description) = systems().next().expect("a system");
     let views = description
         .cores
@@ -173,8 +173,8 @@ fn mistakes_are_told() {
     assert!(console.execute("check cycle == 400").is_ok(), "every core is in the same cycle");
 }
 
-/// A watchpoint on a register of core 1 stops at each position where its value changes, forward and back; and stops
-/// with conditions are those of the positions at which they hold.
+/// A watchpoint on a register of core 1 stops at each change of its value, forward and back; conditional stops stop at the positions at
+/// which the condition holds.
 #[test]
 fn watchpoints_and_conditions_see_every_position() {
     const END: u64 = 1500;
@@ -191,12 +191,12 @@ fn watchpoints_and_conditions_see_every_position() {
             console.execute(&format!("core {}", names[1])).expect("it is there");
             console
         };
-        // An output port, an input port, and a register of the machine.
+        // Subjects: an output port, an input port, and a register of the machine.
         let program = &description.cores[1].program;
         let ports = program.outputs.iter().take(1).chain(program.inputs.iter().take(2));
         let watched: Vec<String> = ports.map(|port| format!("{}:int", port.name)).collect();
         for what in &watched {
-            // Position by position.
+            // Reference: the stops found position by position.
             let mut one = console();
             let value = |console: &mut Console| console.execute(&format!("print {what}")).expect("a value");
             let mut before = value(&mut one);
@@ -231,7 +231,7 @@ fn watchpoints_and_conditions_see_every_position() {
             back.reverse();
             assert_eq!(back, expected, "seed {seed}: {what}, back");
         }
-        // A condition: of all bundles that issue, those in even cycles.
+        // A condition that selects issues in even cycles.
         let mut stepping = console();
         let mut expected = Vec::new();
         let (mut bundle, mut cycle) = (None, 0);
@@ -240,7 +240,7 @@ fn watchpoints_and_conditions_see_every_position() {
             let here = stepping.system().expect("a system").system().core(1).next_address();
             let before = std::mem::replace(&mut cycle, stepping.session().cycle());
             if cycle == before {
-                // It has halted, or waits for good.
+                // The core has halted, or waits forever.
                 break;
             }
             if *bundle.get_or_insert(here) == here && cycle % 2 == 0 {
@@ -259,9 +259,9 @@ fn watchpoints_and_conditions_see_every_position() {
     assert!(changes > 20, "{changes} changes are too few to tell");
 }
 
-/// A value that is set is there when a session comes back to it, and gone before.
+/// An edit is visible when the session returns to it, and not before it.
 #[test]
-fn what_is_set_stays() {
+fn edits_persist() {
     let (_, description) = systems().next().expect("a system");
     let views = description.cores.iter();
     let views = views.map(|core| Session::new(&core.program, Options::default()).expect("it loads"));
@@ -283,8 +283,8 @@ fn what_is_set_stays() {
     assert_eq!(run("stops"), "");
 }
 
-/// A program that calls and then halts, and one that goes on for ever.
-fn calling() -> (Description, [takt_asm::Assembled; 2]) {
+/// A program with calls that halts, and an endless one.
+fn calling() -> (Description, [takt_asm::AssembledProgram; 2]) {
     const CALLING: &str = ".reg n:int m:int
         li      n, 3
 turn:   call    twice
@@ -323,11 +323,11 @@ machine = \"f1\"
     (description, programs)
 }
 
-/// Steps of a core are those of its program alone, forward and back.
+/// Steps of a core in a system equal the steps of its program alone, forward and back.
 #[test]
-fn steps_of_a_core_are_those_of_a_single_one() {
+fn steps_of_a_core_equal_a_single_programs() {
     let (description, programs) = calling();
-    let view = |program: &takt_asm::Assembled| Session::new(&program.program, Options::default());
+    let view = |program: &takt_asm::AssembledProgram| Session::new(&program.program, Options::default());
     let [mut calling, mut forever] =
         [&programs[0], &programs[1]].map(|program| view(program).expect("it loads"));
     for unit in [Unit::Bundle, Unit::Line, Unit::Call, Unit::Out] {
@@ -340,11 +340,11 @@ fn steps_of_a_core_are_those_of_a_single_one() {
             let mut steps = 0;
             loop {
                 let (expected, why) = (alone.step(unit), system.step(&mut views, 0, unit));
-                if expected == takt_debug::session::Why::Halted {
-                    assert_eq!(why, SystemWhy::Core(0, expected), "{unit:?} from {begin}");
+                if expected == takt_debug::session::StopReason::Halted {
+                    assert_eq!(why, SystemStopReason::Core(0, expected), "{unit:?} from {begin}");
                     break;
                 }
-                assert_eq!(why, SystemWhy::Done, "{unit:?} from {begin}");
+                assert_eq!(why, SystemStopReason::Done, "{unit:?} from {begin}");
                 assert_eq!(system.cycle(), alone.cycle(), "{unit:?} from {begin}");
                 steps += 1;
             }
@@ -357,18 +357,21 @@ fn steps_of_a_core_are_those_of_a_single_one() {
             }
         }
     }
-    // It has halted; the other one goes on, and so does time.
+    // The first core has halted; the second runs on, and so does time.
     let mut system = session(&description);
     let mut views = [&mut calling, &mut forever];
     system.go_to(5000);
-    assert_eq!(system.step(&mut views, 0, Unit::Line), SystemWhy::Core(0, takt_debug::session::Why::Halted));
+    assert_eq!(
+        system.step(&mut views, 0, Unit::Line),
+        SystemStopReason::Core(0, takt_debug::session::StopReason::Halted)
+    );
     assert_eq!(system.cycle(), 5000);
-    assert_eq!(system.step(&mut views, 1, Unit::Line), SystemWhy::Done);
+    assert_eq!(system.step(&mut views, 1, Unit::Line), SystemStopReason::Done);
 }
 
-/// A search goes in stretches; what is about to issue where one ends is found like any other.
+/// A search proceeds in stretches, and also finds a bundle about to issue at a stretch's end.
 #[test]
-fn stops_are_found_wherever_a_search_begins() {
+fn finds_stops_from_every_start() {
     let (description, programs) = calling();
     let mut system = System::new(&description).expect("it loads");
     system.keep_core_events();
@@ -395,13 +398,13 @@ fn stops_are_found_wherever_a_search_begins() {
     }
 }
 
-/// Periods are counted from reset, for each core, whichever way the session comes to them.
+/// Periods count from reset for each core, in both directions of travel.
 #[test]
 fn goes_to_a_period_of_a_core() {
     let (_, description) = systems().next().expect("a system");
     let mut session = session(&description);
     for period in [3, 1, 2, 0] {
-        assert_eq!(session.go_to_period(0, period), SystemWhy::Done);
+        assert_eq!(session.go_to_period(0, period), SystemStopReason::Done);
         assert_eq!(session.system().periods(0).count, period);
         let here = session.cycle();
         if period > 0 {
@@ -415,9 +418,9 @@ fn goes_to_a_period_of_a_core() {
     }
 }
 
-/// The error of a core's values is that of its operations since reset, of a system's core as of a program's.
+/// The reported error of a core covers its operations since reset, in a system as in a single program.
 #[test]
-fn accuracy_of_a_core_is_that_of_its_program() {
+fn accuracy_of_a_core_equals_its_programs() {
     const THIRD: &str = ".reg n:int x y
         li      n, 5
         fdiv    x, 1.0, 3.0
@@ -455,9 +458,9 @@ end:    jmp     end
     }
 }
 
-/// Every command that a program has is there for a system; what one of them lacks says why.
+/// Every console command works on a system or explains its refusal.
 #[test]
-fn each_command_is_there_or_says_why() {
+fn each_command_is_available_or_states_the_reason() {
     let names = |target| commands(target).map(|(usage, ..)| usage.split(' ').next().map(str::to_owned));
     let [program, system, board] =
         [Target::Program, Target::System, Target::Board].map(|target| names(target).collect::<Vec<_>>());
@@ -473,7 +476,7 @@ fn each_command_is_there_or_says_why() {
     }
 }
 
-/// Another core's values are named with the core before them; what is selected stays selected.
+/// Values of another core are named with the core as prefix; the selection stays.
 #[test]
 fn names_of_another_core() {
     let (description, programs) = calling();
@@ -502,7 +505,7 @@ fn names_of_another_core() {
     assert!(run("check forever.n == 20").is_ok());
     assert!(run("continue").expect("it stops").contains("stop 2"));
     assert!(run("continue").expect("it stops").contains("stop 1"));
-    // A mistake in it is told as for one's own.
+    // An error in another core's expression is reported as in one's own.
     let error = run("print forever.m, calling.n").expect_err("two cores");
     assert!(error.contains("one command is about one core"), "{error}");
     run("core calling").expect("it is there");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Traces, read back by readers that share no code with their writers, against the run that they are of.
+//! Traces against their run, read back by readers that share no code with the writers.
 
 use std::cell::RefCell;
 use std::collections::{BTreeMap, HashMap};
@@ -13,7 +13,7 @@ use takt_emu::{Emulator, Event, Retire, Step};
 use takt_isa::timing::Cycle;
 use takt_isa::{F1, F3, MACHINES, Program, Type};
 
-/// Somewhere to write that can be looked at afterwards, and that is full after so many bytes.
+/// A shared in-memory file with a size limit in bytes, after which writing fails.
 #[derive(Clone)]
 struct Disk(Rc<RefCell<Vec<u8>>>, usize);
 
@@ -43,7 +43,7 @@ fn tracking(machine: &'static takt_isa::Machine) -> Program {
     assemble("hybrid/tracking.s", &loader, &options).unwrap().program
 }
 
-/// A machine whose inputs are set, small numbers all.
+/// A machine with small random inputs.
 fn loaded(program: &Program, seed: u64) -> Emulator {
     let mut emulator = Emulator::new(program).unwrap();
     let mut random = Random::new(seed);
@@ -80,14 +80,14 @@ fn traced(program: &Program, options: Options) -> (Vec<u8>, Summary) {
     (bytes, summary)
 }
 
-/// The values of a waveform in each cycle, signal by signal: found without the tracer.
+/// Expected waveform values in each cycle, signal by signal, computed without the tracer.
 fn expected(program: &Program) -> Vec<BTreeMap<String, String>> {
     let mut whole = loaded(program, 1);
     for _ in 0..PERIODS {
         whole.run_period(&[]).unwrap();
     }
     let (end, mut emulator, mut cycles) = (whole.now(), loaded(program, 1), Vec::new());
-    // The ticks come when they came.
+    // Ticks replay the recorded run.
     while emulator.now() < end {
         if let takt_emu::Status::Waiting { since, .. } = *emulator.status() {
             emulator.tick_at(emulator.now().max(since + u64::from(program.machine.refill)));
@@ -122,7 +122,7 @@ fn expected(program: &Program) -> Vec<BTreeMap<String, String>> {
     cycles
 }
 
-/// The values that wellen reads from a waveform, in each cycle of the range.
+/// Values in each cycle of the range, as wellen reads them from a waveform.
 fn read_wave(bytes: Vec<u8>, cycles: Range<Cycle>) -> Vec<BTreeMap<String, String>> {
     let mut wave = wellen::simple::read_from_reader(Cursor::new(bytes)).unwrap();
     let vars: Vec<_> = wave
@@ -208,7 +208,7 @@ fn size_is_bounded() {
         let (bytes, summary) = traced(&program, Options { limit, ..options(format) });
         assert!(summary.cut && bytes.len() < whole.len(), "{format:?}: {}", bytes.len());
         if matches!(format, Format::Vcd | Format::Fst) {
-            // The part that is there is complete.
+            // The truncated trace is a complete file.
             read_wave(bytes, summary.cycles);
         }
     }
@@ -221,14 +221,14 @@ fn a_full_disk() {
         let mut emulator = loaded(&program, 1);
         let disk = Disk(Rc::default(), 1000);
         let mut tracer = Tracer::new(&emulator, Box::new(disk), options(format)).unwrap();
-        // The run is not disturbed.
+        // A failed write does not disturb the run.
         let report = tracer.run_period(&mut emulator, None).unwrap();
         assert_eq!(report, loaded(&program, 1).run_period(&[]).unwrap());
         assert_eq!(tracer.finish(&emulator).unwrap_err().kind(), io::ErrorKind::StorageFull);
     }
 }
 
-/// The names that the documentation gives are names that can be selected: alone, with their group, with the whole path.
+/// Every documented form of a signal name selects: alone, with its group, with its whole path.
 #[test]
 fn signals_by_the_names_of_the_document() {
     let text = include_str!("../../../docs/traces.md");
@@ -259,12 +259,12 @@ fn signals_by_the_names_of_the_document() {
     let causes = table.split("charged to: `").nth(1).unwrap().split('`').next().unwrap();
     let stalls: Vec<String> = causes.split(' ').map(|cause| format!("takt.stall.{cause}")).collect();
     assert_eq!(selected("takt.stall.*"), stalls);
-    // A group is not what a name's beginning happens to match.
+    // A pattern of a name does not match groups by their prefix.
     assert!(!selected("i*").iter().any(|path| path.starts_with("takt.inputs.") && !path.contains(".i")));
     assert_eq!(selected("*.F1"), ["takt.outputs.F1"]);
 }
 
-/// The paths of a VCD's signals, in its order.
+/// Paths of a VCD's signals, in file order.
 fn read_names(bytes: Vec<u8>) -> Vec<String> {
     let text = String::from_utf8(bytes).unwrap();
     let mut scopes = Vec::new();
@@ -324,17 +324,17 @@ fn retire_log() {
     }
 }
 
-/// An instruction as a reader of Kanata logs knows it.
+/// An instruction of a Kanata log, as read back.
 #[derive(Default, Debug)]
 struct Row {
     text: String,
-    /// Stage, first cycle, cycle after the last.
+    /// Stages: name, first cycle, cycle after the last.
     stages: Vec<(String, u64, Option<u64>)>,
     retired: Option<(u64, bool)>,
     producers: Vec<u64>,
 }
 
-/// Reads a log by the format's specification (shioyadan/Konata, docs/kanata-log-format.md), strictly.
+/// Strict reader of the log format as specified (shioyadan/Konata, docs/kanata-log-format.md).
 fn read_kanata(text: &str) -> BTreeMap<u64, Row> {
     let mut lines = text.lines();
     assert_eq!(lines.next(), Some("Kanata\t0004"));
@@ -408,12 +408,12 @@ fn konata() {
                 *waits.entry(name.clone()).or_insert(0) += to.unwrap() - from;
             }
             for producer in &row.producers {
-                // A result is taken when it is there.
+                // A consumer issues at or after the producer's writeback.
                 assert!(stage(&rows[producer], "Wb").unwrap().0 <= issued);
                 arrows += 1;
             }
         }
-        // Operations in flight at the end are in the log to their end.
+        // Operations in flight at the end of the trace are logged to their end.
         shown.retain(|(done, ..)| *done < summary.cycles.end);
         shown.sort_unstable();
         let mut real: Vec<_> = retires(&program)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The full-screen view as cells: what stands where, at every size, and the picture of the documents.
+//! Full-screen view in cells: layout at every size, and the picture in the documents.
 
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
@@ -49,12 +49,12 @@ fn console(source: &str) -> Console {
     Console::new(Session::new(&assembled.program, options).unwrap())
 }
 
-/// The screen after these commands.
+/// Screen after these commands.
 fn screen(console: &mut Console, commands: &[&str]) -> Screen {
     let mut screen = Screen::new(console.panes());
     for command in commands {
         let answer = console.execute(command);
-        screen.said(command, &answer, console.panes());
+        screen.log_command(command, &answer, console.panes());
     }
     screen
 }
@@ -66,7 +66,7 @@ fn drawn(screen: &mut Screen, width: u16, height: u16) -> TestBackend {
 }
 
 #[test]
-fn what_was_never_written_says_so_whole() {
+fn unwritten_values_show_their_whole_note() {
     let mut console = console(&SOURCE.replace("count", "number_of_entries"));
     let mut screen = screen(&mut console, &[]);
     for width in 90..=160 {
@@ -78,7 +78,7 @@ fn what_was_never_written_says_so_whole() {
 }
 
 #[test]
-fn what_stands_where() {
+fn layout_of_the_panes() {
     let mut console = console(SOURCE);
     let commands = ["break add if i == 1", "display sum", "continue", "step 4", "print smu"];
     let mut screen = screen(&mut console, &commands);
@@ -93,7 +93,7 @@ fn what_stands_where() {
     insta::assert_snapshot!("help", drawn(&mut screen, 100, 40));
 }
 
-/// The rows of the screen as texts.
+/// Rows of the screen as strings.
 fn rows(backend: &TestBackend) -> Vec<String> {
     let buffer = backend.buffer();
     let width = usize::from(buffer.area.width);
@@ -101,7 +101,7 @@ fn rows(backend: &TestBackend) -> Vec<String> {
     buffer.content.chunks(width).map(row).collect()
 }
 
-/// The way out and the way back come first in the last line, and none of its words is cut.
+/// In the last line the keys to quit and to step back precede all others; no hint is cut.
 #[test]
 fn the_last_line_has_whole_words() {
     let mut console = console(SOURCE);
@@ -120,8 +120,7 @@ fn the_last_line_has_whole_words() {
     }
 }
 
-/// All lines of a bundle are marked: in view where they fit, by their numbers in the source's title where they do not, and beside
-/// the operations.
+/// All lines of a bundle are marked: in view where they fit, otherwise by their numbers in the source's title, and beside the operations.
 #[test]
 fn every_line_of_a_bundle_is_shown() {
     let source = |between: usize| {
@@ -141,7 +140,7 @@ fn every_line_of_a_bundle_is_shown() {
     }
 }
 
-/// The panes are those of the selected core of a system; a line shows all cores.
+/// The panes show the selected core of a system; one line shows all cores.
 #[test]
 fn the_cores_of_a_system() {
     let machine = MACHINES.iter().find(|machine| machine.name == "t1").expect("there is one");
@@ -170,7 +169,7 @@ fn scrolling_stays_within() {
     let natural = drawn(&mut screen, 80, 24).buffer().clone();
     for pane in Pane::ALL {
         assert_eq!(screen.focus, pane);
-        // However far one scrolls beyond the end, one step back shows.
+        // After any scroll beyond the end, one line back is visible at once.
         screen.scroll(1_000_000);
         let end = drawn(&mut screen, 80, 24).buffer().clone();
         screen.scroll(1_000_000);
@@ -179,9 +178,9 @@ fn scrolling_stays_within() {
         drawn(&mut screen, 80, 24);
         screen.turn(1);
     }
-    // A command shows everything from where it naturally begins.
-    screen.said("", &Ok(String::new()), console.panes());
-    screen.said("continue", &console.execute("continue"), console.panes());
+    // A command resets the scroll positions.
+    screen.log_command("", &Ok(String::new()), console.panes());
+    screen.log_command("continue", &console.execute("continue"), console.panes());
     assert_eq!(drawn(&mut screen, 80, 24).buffer().area, natural.area);
     screen.help = Some(usize::MAX);
     drawn(&mut screen, 80, 24);
@@ -191,7 +190,7 @@ fn scrolling_stays_within() {
 
 #[test]
 fn any_size_and_any_text() {
-    // Names as long as the assembler takes them, a source with what terminals take for commands, words that are none.
+    // Names of maximal length, a source with terminal escape sequences, and illegal program words.
     let long = "n".repeat(200);
     let source = format!(
         ".output {long}\n.reg a{long}\n; \x1b[2J\u{7}\t世界 {long}\n{long}x: mov {long}, zero\nfadd a{long}, zero, zero\nhalt\n"
@@ -232,7 +231,7 @@ fn keys_stand_for_commands() {
     assert_eq!(keys.len(), KEYS.len());
 }
 
-/// The tracking program in the closed loop, as `takt debug --track --tui` has it.
+/// The tracking program in its closed loop, as in `takt debug --track --tui`.
 fn tracking(periods: usize) -> Console {
     let mut loader = MemoryLoader::default();
     for (path, text) in SOURCES {
@@ -259,7 +258,7 @@ fn tracking(periods: usize) -> Console {
     Console::new(Session::new(&program, options).unwrap())
 }
 
-/// docs/pictures/debug.svg is drawn by this test: with TAKT_PICTURES=1 it writes the file, otherwise it compares.
+/// This test owns docs/pictures/debug.svg: with TAKT_PICTURES=1 it writes the file, otherwise it compares.
 #[test]
 fn the_picture_of_the_documents() {
     let mut console = tracking(700);
@@ -285,7 +284,7 @@ fn the_picture_of_the_documents() {
     );
 }
 
-/// Cells as a picture: runs of one style, each as wide as its cells.
+/// Cells as an SVG picture, in runs of one style.
 fn svg(buffer: &Buffer) -> String {
     const WIDTH: f32 = 8.4;
     const HEIGHT: u16 = 18;

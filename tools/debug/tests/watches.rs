@@ -1,23 +1,22 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Watchpoints stop at the same places wherever a search for them begins, and in both directions: against a walk through all
-//! positions that knows nothing of searches.
+//! Watchpoints stop at the same positions for every start of a search and in both directions: compared with a walk through all positions
+//! that uses no search.
 
 use std::fmt::Write as _;
 use std::sync::Arc;
 use takt_asm::names::{NamedValue, Names};
-use takt_asm::{Assembled, MemoryLoader, Options as AsmOptions, assemble};
+use takt_asm::{AssembledProgram, MemoryLoader, Options as AsmOptions, assemble};
 use takt_debug::console::{Console, End};
-use takt_debug::session::{Live, Move, Options, Place, Session, Stop, Test, Why};
+use takt_debug::session::{Move, Options, Place, Session, Stop, StopReason, Test, WatchExpression};
 use takt_debug::system::{SystemOptions, SystemSession};
 use takt_emu::testing::Random;
 use takt_isa::{MACHINES, Machine, Program, Register};
 use takt_system::Description;
 use takt_system::testing::random_description;
 
-/// Names that are written over and over.
+/// Number of names that the source writes repeatedly.
 const NAMES: u32 = 40;
-/// Straight lines that write few names over and over, one after the other, in loops, passed over at times, and in a
-/// subroutine; most of what they compute is the same as before.
+/// Source that writes few names repeatedly: in straight lines, in loops, in skipped code and in a subroutine. Most results repeat.
 fn source(seed: u64, inputs: bool) -> String {
     let mut random = Random::new(seed);
     let names: Vec<String> = (0..NAMES).map(|i| format!("v{i}")).collect();
@@ -66,7 +65,7 @@ fn source(seed: u64, inputs: bool) -> String {
     text
 }
 
-fn assembled(seed: u64, inputs: bool, machine: &'static Machine) -> Assembled {
+fn assembled(seed: u64, inputs: bool, machine: &'static Machine) -> AssembledProgram {
     let text = source(seed, inputs);
     let options = AsmOptions { machine, effort: 1, ..AsmOptions::default() };
     match assemble("a.s", &MemoryLoader::new(&[("a.s", text.as_str())]), &options) {
@@ -75,14 +74,14 @@ fn assembled(seed: u64, inputs: bool, machine: &'static Machine) -> Assembled {
     }
 }
 
-/// Rows of inputs, of few values, so that much is computed as it was before.
+/// Rows of inputs with few distinct values, so that most results repeat.
 fn rows(program: &Program, seed: u64, periods: usize) -> Vec<Vec<(Register, u32)>> {
     let mut random = Random::new(seed);
     let mut value = || [0.5f32, 0.5, 2.0][random.below(3) as usize].to_bits();
     (0..periods).map(|_| program.inputs.iter().map(|port| (port.register, value())).collect()).collect()
 }
 
-/// A watched name and its test.
+/// Watched names with their tests.
 const WATCHES: [(&str, Kind); 5] = [
     ("v0", Kind::Changed),
     ("v3", Kind::Changed),
@@ -94,7 +93,7 @@ const WATCHES: [(&str, Kind); 5] = [
 #[derive(Clone, Copy, Debug)]
 enum Kind {
     Changed,
-    /// Above another.
+    /// The value is above another expression.
     Above(&'static str),
 }
 
@@ -107,17 +106,17 @@ fn stop(session: &Session, (what, kind): (&str, Kind)) -> Stop {
     Stop::Watch { what: parse(what), test, text: what.to_owned() }
 }
 
-/// One value of a name, as the assembler tells of it.
-struct Held {
+/// Value of a name, from the assembler's debug information.
+struct NameValue {
     register: Register,
-    /// The addresses between which the next bundle must be: above the first, up to the second.
+    /// Address range of the next bundle in which the register holds the value: above the first, up to the second.
     range: Option<(u32, u32)>,
-    /// True if its register has other values, too.
+    /// The register has further values.
     shares: bool,
 }
 
-impl Held {
-    fn each(names: &Names, name: &str) -> Vec<Held> {
+impl NameValue {
+    fn each(names: &Names, name: &str) -> Vec<NameValue> {
         let held = |value: &NamedValue| {
             let first = |value: &NamedValue| value.bundles.map(|(first, _)| first.get());
             let others =
@@ -127,12 +126,12 @@ impl Held {
             let range = first(value).filter(|_| shares || value.orders.is_some()).map(|first| {
                 (first, rivals.into_iter().filter(|rival| *rival > first).min().unwrap_or(u32::MAX))
             });
-            Held { register: value.register, range, shares }
+            NameValue { register: value.register, range, shares }
         };
         names.values.iter().filter(|value| value.name == name).map(held).collect()
     }
 
-    /// The bits, if it is there.
+    /// Bits of the value, if it is in its register.
     fn bits(&self, session: &Session) -> Option<Option<u32>> {
         let next = session.emulator().next_address().get();
         if self.range.is_some_and(|(after, through)| next <= after || next > through)
@@ -145,12 +144,12 @@ impl Held {
     }
 }
 
-/// The visible values of a watched name, each in its register, position by position.
+/// Reference: the visible values of a watched name, position by position.
 struct Walk {
-    values: Vec<Held>,
-    other: Option<Live>,
+    values: Vec<NameValue>,
+    other: Option<WatchExpression>,
     kind: Kind,
-    /// Of each value: what was there last, and whether it was above the other.
+    /// Per value: the bits last seen there, and whether they were above the other expression.
     last: Vec<Option<(Option<u32>, bool)>>,
     stops: Vec<u64>,
 }
@@ -158,7 +157,7 @@ struct Walk {
 impl Walk {
     fn new(session: &Session, names: &Names, (what, kind): (&str, Kind)) -> Walk {
         let (name, _) = what.split_once(' ').unwrap_or((what, ""));
-        let values = Held::each(names, name);
+        let values = NameValue::each(names, name);
         let other = match kind {
             Kind::Changed => None,
             Kind::Above(other) => Some(session.parse(other).expect("it is a name")),
@@ -166,9 +165,9 @@ impl Walk {
         Walk { last: values.iter().map(|_| None).collect(), values, other, kind, stops: Vec::new() }
     }
 
-    /// At position 0 there is nothing to compare with.
+    /// Position 0 has no previous value to compare with.
     fn visit(&mut self, session: &Session, position: u64) {
-        let there = |live: &Live| Some(session.place(live).ok()??.2);
+        let there = |live: &WatchExpression| Some(session.place(live).ok()??.2);
         let real = |bits: Option<u32>| bits.map(f32::from_bits);
         let other = self.other.as_ref().map(there);
         let mut hit = false;
@@ -191,29 +190,29 @@ impl Walk {
     }
 }
 
-/// Stops that are looked at from each beginning, each way.
+/// Maximal number of stops checked from each beginning, in each direction.
 const MOST: usize = 8;
 
-/// Positions at which a command stops that is given again and again.
-fn all(session: &mut Session, command: impl Fn(&mut Session) -> Why) -> Vec<u64> {
+/// Stop positions of a repeated command.
+fn all(session: &mut Session, command: impl Fn(&mut Session) -> StopReason) -> Vec<u64> {
     let mut positions = Vec::new();
-    while positions.len() < MOST && matches!(command(session), Why::Stop { .. }) {
+    while positions.len() < MOST && matches!(command(session), StopReason::Stop { .. }) {
         positions.push(session.cycle());
     }
     positions
 }
 
-/// The stops behind and before a position.
+/// Stops before and after a position.
 fn split(stops: &[u64], begin: u64) -> (Vec<u64>, Vec<u64>) {
     let back = stops.iter().rev().copied().filter(|stop| *stop < begin);
     (stops.iter().copied().filter(|stop| *stop > begin).take(MOST).collect(), back.take(MOST).collect())
 }
 
 #[test]
-fn stops_are_the_same_wherever_a_search_begins() {
+fn stops_are_independent_of_the_start() {
     let mut seen = 0;
     for (seed, machine) in (0..2).zip(MACHINES) {
-        let Assembled { program, names, .. } = assembled(seed, true, machine);
+        let AssembledProgram { program, names, .. } = assembled(seed, true, machine);
         let inputs = Some(Arc::new(rows(&program, seed, 9)));
         let options = Options { inputs, names: names.clone(), ..Options::default() };
         let fresh = || Session::new(&program, options.clone()).expect("it loads");
@@ -222,7 +221,7 @@ fn stops_are_the_same_wherever_a_search_begins() {
             let mut session = fresh();
             let mut walk = Walk::new(&session, &names, watch);
             assert!(walk.values.len() > 3 && walk.values.len() < 60, "{watch:?}: {}", walk.values.len());
-            // In half of the runs something is set by hand on the way.
+            // Half of the runs contain an edit.
             let edit = random.once_in(2).then(|| u64::from(3000 + random.below(1000)));
             let edited = |session: &mut Session| {
                 if let Some(edit) = edit {
@@ -234,7 +233,7 @@ fn stops_are_the_same_wherever_a_search_begins() {
             edited(&mut session);
             session.go_to(0);
             walk.visit(&session, 0);
-            while session.go_to(session.cycle() + 1) == Why::Done {
+            while session.go_to(session.cycle() + 1) == StopReason::Done {
                 walk.visit(&session, session.cycle());
             }
             let (end, stops) = (session.cycle(), &walk.stops);
@@ -247,12 +246,12 @@ fn stops_are_the_same_wherever_a_search_begins() {
                 edited(&mut new);
                 new.add_stop(stop(&new, watch));
                 let (forward, back) = split(stops, begin);
-                // In one that has searched before, and in one that has not.
+                // A session with earlier searches, and a new one.
                 for session in [&mut kept, &mut new] {
                     let told = format!("seed {seed}, {watch:?}, edit {edit:?}, from {begin}");
-                    assert_eq!(session.go_to(begin), Why::Done);
+                    assert_eq!(session.go_to(begin), StopReason::Done);
                     assert_eq!(all(session, Session::resume), forward, "{told}");
-                    assert_eq!(session.go_to(begin), Why::Done);
+                    assert_eq!(session.go_to(begin), StopReason::Done);
                     assert_eq!(all(session, Session::resume_back), back, "{told}, back");
                 }
             }
@@ -261,9 +260,9 @@ fn stops_are_the_same_wherever_a_search_begins() {
     assert!(seen > 100, "{seen}");
 }
 
-/// Two cores with such programs.
-fn description() -> (Description, Vec<Assembled>) {
-    let programs: Vec<Assembled> =
+/// A system of two cores with such programs.
+fn description() -> (Description, Vec<AssembledProgram>) {
+    let programs: Vec<AssembledProgram> =
         (10..).zip(MACHINES).take(2).map(|(seed, machine)| assembled(seed, false, machine)).collect();
     let core = |number: usize| {
         let machine = MACHINES[number].name;
@@ -278,12 +277,12 @@ fn description() -> (Description, Vec<Assembled>) {
 }
 
 fn is_stop(end: Result<End, String>) -> bool {
-    matches!(end, Ok(End { why: Why::Stop { .. }, .. }))
+    matches!(end, Ok(End { why: StopReason::Stop { .. }, .. }))
 }
 
-/// Of a core of a system as of a single one.
+/// Watches on a core of a system stop where those on a single core do.
 #[test]
-fn of_a_core_of_a_system_too() {
+fn stops_of_a_systems_core_are_independent_of_the_start() {
     const END: u64 = 20_000;
     let (description, programs) = description();
     let fresh = || {
@@ -340,7 +339,7 @@ fn of_a_core_of_a_system_too() {
     assert!(seen > 50, "{seen}");
 }
 
-/// An event at the end of a searched stretch matters a few positions later: an input port of a random system.
+/// An event at the end of a searched stretch takes effect a few positions later: an input port of a random system.
 #[test]
 fn an_input_is_seen_over_the_end_of_a_stretch() {
     const END: u64 = 9000;
@@ -361,7 +360,7 @@ fn an_input_is_seen_over_the_end_of_a_stretch() {
         let mut stops = Vec::new();
         let mut before = value(&mut walking);
         for position in 1..END {
-            if walking.go(0, &Move::Cycle(position)).expect("it moves").why != Why::Done {
+            if walking.go(0, &Move::Cycle(position)).expect("it moves").why != StopReason::Done {
                 break;
             }
             let now = value(&mut walking);
@@ -370,7 +369,7 @@ fn an_input_is_seen_over_the_end_of_a_stretch() {
             }
         }
         seen += stops.len();
-        // Stretches that end just before a change, with it, and behind it.
+        // Stretches that end just before a change, at it, and after it.
         for stop in stops.iter().filter(|stop| **stop > 4200).take(3) {
             for begin in stop - 4096 - 4..=stop - 4096 + 4 {
                 let mut watching = console();
@@ -380,7 +379,7 @@ fn an_input_is_seen_over_the_end_of_a_stretch() {
                 watching.add_stop(1, stop);
                 watching.go(0, &Move::Cycle(begin)).expect("it moves");
                 let mut found = Vec::new();
-                while watching.go(0, &Move::Resume).expect("it moves").why != Why::Done
+                while watching.go(0, &Move::Resume).expect("it moves").why != StopReason::Done
                     && watching.session().cycle() < 4300 + begin
                 {
                     found.push(watching.session().cycle());

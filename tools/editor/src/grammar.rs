@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The TextMate grammar, written from the tables: an editor colours by it before the server has answered, or without one.
+//! TextMate grammar, generated from the tables: syntax colours before the server answers, or without a server.
 
 use serde_json::{Value, json};
 use takt_asm::Directive;
 use takt_asm::expr::{BUILTINS, Function};
 use takt_isa::ROWS;
 
-/// Words as an alternative of a regular expression, the longest first.
+/// Alternation of words in a regular expression, longest first.
 fn any_of<'w>(words: impl IntoIterator<Item = &'w str>) -> String {
     let mut words: Vec<&str> = words.into_iter().collect();
     words.sort_by_key(|word| (std::cmp::Reverse(word.len()), *word));
     words.join("|")
 }
 
-/// The grammar, as an editor reads it.
+/// The TextMate grammar as JSON.
 pub fn textmate() -> Value {
     let directives = any_of(Directive::ALL.iter().map(|directive| &directive.name()[1..]));
     let mnemonics = any_of(ROWS.iter().map(|row| row.mnemonic));
@@ -45,8 +45,8 @@ pub fn textmate() -> Value {
     })
 }
 
-/// The grammar's file.
+/// Text of the grammar's file.
 pub fn textmate_text() -> String {
-    // A value made of literals and strings is always written.
+    // Cannot fail: the value consists of literals and strings.
     serde_json::to_string_pretty(&textmate()).unwrap_or_default() + "\n"
 }

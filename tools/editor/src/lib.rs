@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The language server, the debug adapter, and the grammars for editors.
+//! Language server, debug adapter, and grammars for editors.
 //!
-//! [`lsp`] is the language server: everything it says of the language it asks of `takt_asm` and of the tables in `takt_isa`.
-//! [`dap`] is the debug adapter. [`grammar`] and [`tree_sitter`] are what an editor colours and folds by without it. Nothing here prints: a connection is a pair of channels.
+//! [`lsp`] is the language server; its knowledge of the language comes from `takt_asm` and the tables of `takt_isa`. [`dap`] is the debug
+//! adapter. [`grammar`] and [`tree_sitter`] serve editors for colours and folds without the server. The crate does not print: a connection
+//! is a pair of channels.
 
 pub mod dap;
 pub mod grammar;

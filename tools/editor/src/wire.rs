@@ -1,25 +1,24 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Messages on a stream, as the language server protocol and the debug adapter protocol frame them: a header with the length,
-//! and JSON.
+//! Framing of the language server and debug adapter protocols: a header with the length, then JSON.
 //!
-//! `lsp_server` has this too, but ends at the first message that is no JSON, and takes any length at its word. An editor's
-//! session should outlive one message.
+//! `lsp_server` has the same, but ends at the first malformed message and accepts any length. An editor's session should outlive one bad
+//! message.
 
 use serde_json::Value;
 use std::io::{self, BufRead, Read, Write};
 
-/// Bytes of a message at most: above those of the largest source.
+/// Maximal size of a message in bytes; the largest source fits.
 pub const MESSAGE_BYTES: usize = 256 << 20;
-/// Bytes of a header line at most.
+/// Maximal size of a header line in bytes.
 const HEADER_BYTES: u64 = 4096;
 
-/// The reason why no message could be read.
+/// Errors of reading a message.
 #[derive(Debug, thiserror::Error)]
 pub enum WireError {
-    /// The stream is broken, or what stands there is no header: where the next message begins is not known.
+    /// The stream is broken, or the header is malformed: the start of the next message is unknown.
     #[error("{0}")]
     Lost(String),
-    /// One message makes no sense; the next one can be read.
+    /// A single message is malformed; the next one can be read.
     #[error("{0}")]
     Message(String),
 }
@@ -33,7 +32,7 @@ impl From<io::Error> for WireError {
 /// Reads a message; `None` at the end of the stream.
 ///
 /// # Errors
-/// See [`WireError`].
+/// If the stream or the message is malformed: see [`WireError`].
 pub fn read(stream: &mut impl BufRead) -> Result<Option<Value>, WireError> {
     let mut length = None;
     let mut first = true;
@@ -67,7 +66,7 @@ pub fn read(stream: &mut impl BufRead) -> Result<Option<Value>, WireError> {
     let length: usize =
         length.ok_or_else(|| WireError::Lost("a header without `Content-Length`".to_owned()))?;
     if length > MESSAGE_BYTES {
-        // The announced bytes are passed over, so that the next message can be read.
+        // Skip the announced bytes, so that the next message can be read.
         io::copy(&mut stream.take(length as u64), &mut io::sink())?;
         let most = MESSAGE_BYTES >> 20;
         return Err(WireError::Message(format!("a message of {length} bytes: more than {most} MiB")));
@@ -82,10 +81,10 @@ pub fn read(stream: &mut impl BufRead) -> Result<Option<Value>, WireError> {
         .map_err(|error| WireError::Message(format!("a message is no JSON: {error}")))
 }
 
-/// Writes a message.
+/// Writes a message with its header.
 ///
 /// # Errors
-/// If the stream does.
+/// If writing to the stream fails.
 pub fn write(stream: &mut impl Write, message: &impl serde::Serialize) -> io::Result<()> {
     let text = serde_json::to_string(message)?;
     write!(stream, "Content-Length: {}\r\n\r\n{text}", text.len())?;
@@ -117,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_header_is_told() {
+    fn reports_invalid_headers() {
         for (text, told) in [
             ("{}\r\n\r\n", "a message begins with `Content-Length: …`, not with `{}`"),
             ("Content-Length: x\r\n\r\n", "`x` is no length of a message"),
@@ -132,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_is_read() {
+    fn written_data_is_read_back() {
         let mut bytes = Vec::new();
         let message = serde_json::json!({ "method": "µ" });
         write(&mut bytes, &message).expect("a vector takes all");

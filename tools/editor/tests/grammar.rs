@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The grammars that editors read are the ones that the tables give.
+//! Editor grammars in the repository equal the generated ones.
 
 use std::path::Path;
 use takt_editor::{grammar, tree_sitter};
@@ -21,4 +21,16 @@ fn the_grammars_are_as_generated() {
     is_as_generated("tree-sitter-takt/queries/highlights.scm", &tree_sitter::highlights());
     is_as_generated("helix/queries/takt/highlights.scm", &tree_sitter::helix_highlights());
     is_as_generated("tree-sitter-takt/queries/folds.scm", &tree_sitter::folds());
+}
+
+/// The path that Helix's configuration names below the user's copy of Takt.
+#[test]
+fn helix_builds_the_grammar_from_a_folder_that_is_there() {
+    let editors = Path::new(env!("CARGO_MANIFEST_DIR")).join("../editors");
+    let text =
+        std::fs::read_to_string(editors.join("helix/languages.toml")).expect("Helix has a configuration");
+    let (_, path) = text.split_once("path = \"/path/to/takt/").expect("it names the grammar's folder");
+    let path = path.split('"').next().unwrap_or_default();
+    let folder = editors.join("../..").join(path);
+    assert!(folder.join("src/grammar.json").is_file(), "there is no grammar in {path}");
 }

@@ -1,24 +1,38 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! tree-sitter's parser reads without a mistake exactly what the assembler's does: every shipped source, every listing of the
-//! documents, random sources, and thousands of each with a mistake in them. The tree-sitter is Neovim's.
+//! tree-sitter's parser accepts exactly the texts that the assembler's does: all shipped sources, all listings of the documents, random
+//! sources, and thousands of mutations of each. The tree-sitter runtime is Neovim's.
 
 use crate::sources;
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::sync::Once;
 use takt_asm::diag::Severity;
 
 const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../editors/tree-sitter-takt");
 
-/// Compiles the parser.
+/// Generates the parser, which git does not keep, from the grammar, by a program in a workspace of its own.
+fn generate() {
+    static GENERATED: Once = Once::new();
+    GENERATED.call_once(|| {
+        let mut generate = Command::new(env!("CARGO"));
+        generate.args(["run", "--quiet", "--release", "--locked", "--manifest-path"]);
+        generate.arg(format!("{FOLDER}/generate/Cargo.toml")).arg("--target-dir");
+        generate.arg(Path::new(env!("CARGO_TARGET_TMPDIR")).with_file_name("tree-sitter"));
+        assert!(generate.status().expect("cargo runs the tests").success());
+    });
+}
+
+/// Compiles the generated parser to a shared library.
 fn compile(library: &Path) {
+    generate();
     let mut compile = Command::new("cc");
     compile.args(["-shared", "-fPIC", "-O1", "-I"]).arg(format!("{FOLDER}/src"));
     compile.arg(format!("{FOLDER}/src/parser.c")).arg("-o").arg(library);
     assert!(compile.status().expect("cc is there: `cargo xtask test` installs it").success());
 }
 
-/// Neovim with the parser.
+/// A Neovim process with the parser.
 struct Client {
     process: Child,
     requests: ChildStdin,
@@ -26,7 +40,7 @@ struct Client {
 }
 
 impl Client {
-    /// Compiles the parser and loads it. `name` tells the libraries of tests that run at once apart.
+    /// Compiles the parser and loads it. `name` separates the libraries of concurrent tests.
     fn new(name: &str) -> Client {
         let library = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("takt_{name}.so"));
         compile(&library);
@@ -58,15 +72,14 @@ impl Client {
         String::from_utf8(answer).expect("it is text")
     }
 
-    /// Holds tree-sitter's verdict against the assembler's; whether both accept the text, or `None` where the assembler
-    /// stops at one of its limits.
+    /// Compares the verdicts of tree-sitter and the assembler; returns whether both accept, or `None` if the assembler stops at a limit.
     fn compare(&mut self, name: &str, text: &str) -> Option<bool> {
         if text.is_empty() {
             return Some(true);
         }
         let report = takt_asm::read(name, text);
         let errors = report.list.iter().filter(|diagnostic| diagnostic.severity == Severity::Error);
-        // Sizes are no matter of a grammar.
+        // Limits on sizes are not part of the grammar.
         let limit = |code: &str, message: &str| {
             code == "limit"
                 || message.contains("does not fit a 64-bit integer")
@@ -91,13 +104,13 @@ impl Client {
 
 impl Drop for Client {
     fn drop(&mut self) {
-        // Each request is answered; a failed test does not wait.
+        // All requests are answered at this point; a failed test does not wait.
         let _ = self.process.kill();
         let _ = self.process.wait();
     }
 }
 
-/// Every source below the project's folder, and every listing of its documents.
+/// All sources below the project's folder, and all listings of its documents.
 fn shipped() -> Vec<(String, String)> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let mut found = Vec::new();
@@ -113,7 +126,7 @@ fn shipped() -> Vec<(String, String)> {
                 continue;
             }
             let shown = path.strip_prefix(&root).expect("it lies in it").to_string_lossy().into_owned();
-            // Some sources of tests are no text.
+            // Some test sources are not UTF-8.
             let Ok(text) = std::fs::read_to_string(&path) else { continue };
             if name.ends_with(".s") {
                 found.push((shown, text));
@@ -130,7 +143,7 @@ fn shipped() -> Vec<(String, String)> {
 }
 
 #[test]
-fn it_parses_what_the_assembler_parses() {
+fn grammar_accepts_the_assemblers_sources() {
     let mut client = Client::new("parses");
     let random = &mut sources::Random::new(0x7a6b_7401);
     let shipped = shipped();
@@ -145,7 +158,7 @@ fn it_parses_what_the_assembler_parses() {
         compare(name, text);
         let lines: Vec<&str> = text.lines().collect();
         for _ in 0..20 {
-            // A part is enough to hold a mistake.
+            // A few lines suffice to hold a mistake.
             let first = random.below(lines.len() as u64) as usize;
             let part = lines[first..lines.len().min(first + 12)].join("\n");
             compare(name, &sources::mutated(random, &part));
@@ -164,7 +177,7 @@ fn it_parses_what_the_assembler_parses() {
 }
 
 #[test]
-fn random_sources_that_should_be_read_are() {
+fn grammar_accepts_valid_random_sources() {
     let random = &mut sources::Random::new(1);
     for _ in 0..2000 {
         let text = sources::valid(random);
@@ -173,7 +186,7 @@ fn random_sources_that_should_be_read_are() {
     }
 }
 
-/// The captures of Neovim's own queries in a source with something of everything.
+/// Captures of Neovim's own queries in a source with every kind of item.
 #[test]
 fn colours_and_folds() {
     let mut client = Client::new("colours");
@@ -201,7 +214,7 @@ loop: y = -x^2 < 3 ? p[0,1] : 1_000
     insta::assert_snapshot!(answer);
 }
 
-/// Set up as docs/editors.md says, Neovim colours a file that it opens.
+/// With the setup from docs/editors.md, Neovim colours a file that it opens.
 #[test]
 fn neovim_colours_a_file() {
     let home = Path::new(env!("CARGO_TARGET_TMPDIR")).join("neovim");
@@ -224,7 +237,7 @@ fn neovim_colours_a_file() {
         .arg(&source)
         .args(["-c", &format!("lua io.write(tostring({active}))"), "-c", "qall!"])
         .env("XDG_CONFIG_HOME", &home)
-        // The language server is another test's matter.
+        // The language server is disabled: another test covers it.
         .args(["--cmd", "lua vim.lsp.start = function() end"])
         .stdin(Stdio::null())
         .output()

@@ -138,10 +138,8 @@ def picture(result: Swings, file: str) -> None:
 
 
 def plot(results: dict[str, Swings], file: str) -> None:
-    import matplotlib
-
-    matplotlib.use("svg")
     import matplotlib.pyplot as plt
+    import pictures
 
     figure, axes = plt.subplots(2, 1, figsize=(8, 4.8), layout="constrained", sharex=True)
     for name, result in results.items():
@@ -155,8 +153,7 @@ def plot(results: dict[str, Swings], file: str) -> None:
     axes[0].legend(fontsize=8)
     for axis in axes:
         axis.grid(alpha=0.3)
-    matplotlib.rcParams["svg.hashsalt"] = "takt"
-    figure.savefig(file, metadata={"Date": None})
+    pictures.save(figure, file)
 
 
 def main(arguments: list[str] | None = None) -> dict[str, Swings]:

@@ -170,10 +170,8 @@ def picture(model: Any, path: Joints, file: str) -> None:
 
 
 def plot(results: dict[str, Lap], file: str) -> None:
-    import matplotlib
-
-    matplotlib.use("svg")
     import matplotlib.pyplot as plt
+    import pictures
 
     figure, axes = plt.subplots(figsize=(8, 4.2), layout="constrained")
     for name, result in results.items():
@@ -183,8 +181,7 @@ def plot(results: dict[str, Lap], file: str) -> None:
     axes.set(xlabel="time, s", ylabel="distance of the tip from its path, µm", ylim=(1e-1, None))
     axes.legend(fontsize=7, loc="upper left", bbox_to_anchor=(1, 1))
     axes.grid(alpha=0.3)
-    matplotlib.rcParams["svg.hashsalt"] = "takt"
-    figure.savefig(file, metadata={"Date": None})
+    pictures.save(figure, file)
 
 
 def main(arguments: list[str] | None = None) -> dict[str, Lap]:
@@ -194,7 +191,7 @@ def main(arguments: list[str] | None = None) -> dict[str, Lap]:
     parser.add_argument("--picture", metavar="FILE", help="draw the robot")
     options = parser.parse_args(arguments)
     spec = panda()
-    model, law = spec.compile(), takt.mujoco.program(spec, "computed-torque", kp=10_000, kd=200)
+    model, law = spec.compile(), takt.mujoco.program(spec, "computed-torque", kp=10_000, kd=200, effort=20)
     path = Joints(model)
     names = list(CASES) if options.table or options.plot else ["10 kHz, exact to the cycle"]
     results = {}

@@ -111,10 +111,8 @@ def picture(result: Swing, file: str) -> None:
 
 
 def plot(results: dict[str, Swing], file: str) -> None:
-    import matplotlib
-
-    matplotlib.use("svg")
     import matplotlib.pyplot as plt
+    import pictures
 
     figure, axes = plt.subplots(2, 1, figsize=(8, 4.8), layout="constrained", sharex=True)
     for name, result in results.items():
@@ -126,8 +124,7 @@ def plot(results: dict[str, Swing], file: str) -> None:
     axes[0].legend(fontsize=8)
     for axis in axes:
         axis.grid(alpha=0.3)
-    matplotlib.rcParams["svg.hashsalt"] = "takt"
-    figure.savefig(file, metadata={"Date": None})
+    pictures.save(figure, file)
 
 
 def main(arguments: list[str] | None = None) -> dict[str, Swing]:

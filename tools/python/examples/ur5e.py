@@ -177,10 +177,8 @@ def picture(model: Any, file: str) -> None:
 
 
 def plot(result: Round, file: str) -> None:
-    import matplotlib
-
-    matplotlib.use("svg")
     import matplotlib.pyplot as plt
+    import pictures
 
     figure, axes = plt.subplots(3, 1, figsize=(8, 6.5), layout="constrained", sharex=True)
     times = PERIOD * np.arange(1, len(result.distance) + 1)
@@ -192,8 +190,7 @@ def plot(result: Round, file: str) -> None:
     axes[1].axhline(-FASTEST, color="0.4", linestyle="--", linewidth=0.8)
     axes[0].legend([f"joint {i}" for i in range(1, 7)], fontsize=7, ncols=6, loc="lower right")
     axes[2].set_xlabel("time, s")
-    matplotlib.rcParams["svg.hashsalt"] = "takt"
-    figure.savefig(file, metadata={"Date": None})
+    pictures.save(figure, file)
 
 
 def main(arguments: list[str] | None = None) -> dict[str, Round]:
@@ -203,8 +200,8 @@ def main(arguments: list[str] | None = None) -> dict[str, Round]:
     parser.add_argument("--picture", metavar="FILE", help="draw the robot")
     options = parser.parse_args(arguments)
     spec = ur5e()
-    model, dynamics = spec.compile(), takt.mujoco.program(spec, "inverse-dynamics")
-    controller = takt.mpc.program(plan())
+    model, dynamics = spec.compile(), takt.mujoco.program(spec, "inverse-dynamics", effort=20)
+    controller = takt.mpc.program(plan(), effort=20)
     results = {}
     for name in list(CASES) if options.table else ["exact to the cycle"]:
         results[name] = result = drive(model, controller, dynamics, **CASES[name])

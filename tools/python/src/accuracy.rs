@@ -9,31 +9,33 @@ use numpy::{PyReadonlyArray, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use std::num::NonZeroU64;
-use takt_analysis::accuracy::{ErrorShare, Interval, Moment, OutputAccuracy, Shadow, Worst};
+use takt_analysis::accuracy::{ErrorShare, Interval, LargestError, Moment, OutputAccuracy, Shadow};
 use takt_emu::{Emulator, Fault};
 
 /// An error, the period from 0, what the output was, and what it is in binary64.
-type Largest = (f64, u64, f64, f64);
+type LargestErrorOf = (f64, u64, f64, f64);
 
 /// The measured accuracy of an output.
 #[derive(IntoPyObject)]
-pub(crate) struct Measured {
+pub(crate) struct MeasuredOutput {
     name: String,
     periods: u64,
-    absolute: Option<Largest>,
-    ulp: Option<Largest>,
-    relative: Option<Largest>,
+    absolute: Option<LargestErrorOf>,
+    ulp: Option<LargestErrorOf>,
+    relative: Option<LargestErrorOf>,
     /// Place of an operation, and its share of the largest absolute error.
     operations: Vec<(String, f64)>,
 }
 
-impl Measured {
-    fn of(output: &OutputAccuracy, program: &takt_isa::Program) -> Measured {
-        let largest = |worst: Option<Worst>| {
-            worst.map(|Worst { error, period, value, exact }| (error, period.saturating_sub(1), value, exact))
+impl MeasuredOutput {
+    fn of(output: &OutputAccuracy, program: &takt_isa::Program) -> MeasuredOutput {
+        let largest = |worst: Option<LargestError>| {
+            worst.map(|LargestError { error, period, value, exact }| {
+                (error, period.saturating_sub(1), value, exact)
+            })
         };
         let place = |part: &ErrorShare| (program.word_text(part.word as usize), part.error);
-        Measured {
+        MeasuredOutput {
             name: output.name.clone(),
             periods: output.periods,
             absolute: largest(output.absolute),
@@ -45,9 +47,9 @@ impl Measured {
 }
 
 /// The ends of an interval.
-type Ends = (f64, f64);
+type IntervalEnds = (f64, f64);
 
-fn ends(interval: Interval) -> Ends {
+fn ends(interval: Interval) -> IntervalEnds {
     (interval.low, interval.high)
 }
 
@@ -55,7 +57,7 @@ fn ends(interval: Interval) -> Ends {
 #[derive(IntoPyObject)]
 pub(crate) struct OutputBound {
     name: String,
-    range: Option<Ends>,
+    range: Option<IntervalEnds>,
     error: Option<f64>,
     ulp: Option<f64>,
     /// Place of an operation, and what its rounding adds at most.
@@ -63,17 +65,17 @@ pub(crate) struct OutputBound {
 }
 
 /// A warning at a place, with the names and ranges of the values that the operation reads.
-type Hazard = (String, String, Vec<(String, Option<Ends>)>);
+type Hazard = (String, String, Vec<(String, Option<IntervalEnds>)>);
 
 /// A state's name, its range, whether the first period begins or any later one ends, and where the state may be then.
-type Assumed = (String, Ends, bool, Option<Ends>);
+type StateAssumption = (String, IntervalEnds, bool, Option<IntervalEnds>);
 
 /// Encloses what every period computes.
 #[pyfunction]
 pub(crate) fn enclose(
     py: Python<'_>,
     program: &Program,
-) -> PyResult<(Vec<OutputBound>, Vec<Hazard>, Vec<Assumed>)> {
+) -> PyResult<(Vec<OutputBound>, Vec<Hazard>, Vec<StateAssumption>)> {
     let program = &program.program;
     let found = py
         .detach(|| takt_analysis::accuracy::enclose(program))
@@ -94,7 +96,7 @@ pub(crate) fn enclose(
         let operands = operands.map(|(register, range)| (program.register_text(*register), range.map(ends)));
         (program.word_text(hazard.word as usize), hazard.problem.to_string(), operands.collect())
     };
-    let assumed = |state: &takt_analysis::accuracy::Assumed| {
+    let assumed = |state: &takt_analysis::accuracy::UnprovedRange| {
         let first = state.moment == Moment::First;
         (program.register_text(state.range.register), state.range.ends(), first, state.found.map(ends))
     };
@@ -113,7 +115,7 @@ pub(crate) fn accuracy(
     inputs: PyReadonlyArray<'_, u32, numpy::Ix2>,
     each_period: bool,
     max_cycles: NonZeroU64,
-) -> PyResult<(Vec<Measured>, Option<Failure>)> {
+) -> PyResult<(Vec<MeasuredOutput>, Option<Failure>)> {
     let ports = &program.program.inputs;
     if inputs.shape().get(1) != Some(&ports.len()) {
         let text = format!("inputs of shape {:?}; the program has {}", inputs.shape(), ports.len());
@@ -122,7 +124,7 @@ pub(crate) fn accuracy(
     let words = inputs.as_slice().map_err(|_| PyValueError::new_err("inputs is not contiguous"))?;
     let periods = inputs.shape().first().copied().unwrap_or(0);
     let row = |period: usize| &words[period * ports.len()..][..ports.len()];
-    let measured = || -> PyResult<Result<Vec<Measured>, (Fault, usize)>> {
+    let measured = || -> PyResult<Result<Vec<MeasuredOutput>, (Fault, usize)>> {
         let mut emulator = loaded(Emulator::new(&program.program))?;
         let shadow = Shadow::new(&program.program);
         let mut shadow = if each_period { shadow.each_period_afresh() } else { shadow };
@@ -142,7 +144,7 @@ pub(crate) fn accuracy(
                 }
             }
         }
-        Ok(Ok(shadow.outputs().iter().map(|output| Measured::of(output, &program.program)).collect()))
+        Ok(Ok(shadow.outputs().iter().map(|output| MeasuredOutput::of(output, &program.program)).collect()))
     };
     Ok(match py.detach(measured)? {
         Ok(outputs) => (outputs, None),

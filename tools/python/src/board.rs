@@ -48,7 +48,9 @@ impl Board {
         baud: u32,
     ) -> PyResult<Board> {
         let application = match (program, system) {
-            (Some(program), _) => Application::from(&*program.program).into_owned(),
+            (Some(program), _) => {
+                Application::from(&*program.program).with_arrays(vec![program.arrays()]).into_owned()
+            }
             (None, Some(file)) => Application::from(&py.detach(|| system::read(&file))?).into_owned(),
             (None, None) => return Err(wrong("a program, or a system's file".to_owned())),
         };
@@ -165,6 +167,11 @@ impl Board {
         py.detach(|| host.set("step", 1)).map_err(failed)
     }
 
+    /// The names of an array's elements; the name itself if it is no array's.
+    fn elements(&self, name: &str) -> Vec<String> {
+        self.application.elements(name).unwrap_or_else(|| vec![name.to_owned()])
+    }
+
     /// Type and bits of each name's value.
     fn read(&mut self, py: Python<'_>, names: Vec<String>) -> PyResult<Vec<(&'static str, u32)>> {
         let application = &self.application;
@@ -172,11 +179,9 @@ impl Board {
         let places = places.map_err(wrong)?;
         let host = &mut self.host;
         py.detach(|| {
-            let mut values = Vec::with_capacity(places.len());
-            for place in places {
-                values.push((place.ty.name(), host.read(place.read, 1)?.first().copied().unwrap_or(0)));
-            }
-            Ok(values)
+            let addresses: Vec<u16> = places.iter().map(|place| place.read).collect();
+            let words = host.read_each(&addresses)?;
+            Ok(places.iter().map(|place| place.ty.name()).zip(words).collect())
         })
         .map_err(failed)
     }

@@ -2,7 +2,7 @@
 //! Many closed loops at once: a batch, stepped from Python over arrays.
 
 use crate::failure::{self, Failure};
-use crate::run::{UNWRITTEN, loaded, misses, port_error, shaped, shown, writable};
+use crate::run::{UNWRITTEN, loaded, misses, output_state, port_error, shaped, writable};
 use numpy::{PyReadonlyArray, PyReadwriteArray};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -92,7 +92,7 @@ impl Lanes {
         for (port, series) in self.program.outputs.iter().zip(outputs.chunks_exact_mut(runs)) {
             for (run, value) in series.iter_mut().enumerate() {
                 let bits = (!self.failed[run]).then(|| self.batch.output_bits(run, port.register));
-                *value = shown(port, bits.flatten());
+                *value = output_state(port, bits.flatten());
             }
         }
         let behind = &mut outputs[self.program.outputs.len() * runs..];

@@ -18,6 +18,7 @@ mod report;
 mod run;
 mod sim;
 mod system;
+mod units;
 
 use pyo3::prelude::*;
 
@@ -35,12 +36,12 @@ mod _takt {
     #[pymodule_export]
     use crate::model::{expressions, robot, robot_functions};
     #[pymodule_export]
-    use crate::mpc::{predictive, predictive_worst};
+    use crate::mpc::{predictive, predictive_weight, predictive_worst};
     #[pymodule_export]
     use crate::policy::perceptron;
     #[pymodule_export]
     use crate::program::{
-        Program, assemble, flag_names, load, longest_tick, machines, nearest_name, restored_program,
+        Program, assemble, flag_names, load, longest_tick, machines, nearest_name, restored_program, version,
     };
     #[pymodule_export]
     use crate::report::analyse;
@@ -50,4 +51,6 @@ mod _takt {
     use crate::sim::Sim;
     #[pymodule_export]
     use crate::system::SystemSim;
+    #[pymodule_export]
+    use crate::units::run_units;
 }

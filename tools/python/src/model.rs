@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Sources from robots' descriptions and from other tools' expressions: `takt_model`, for `takt.urdf`, `takt.casadi`, ….
+//! Sources from robots' descriptions and from other tools' expressions: `takt_front`, for `takt.urdf`, `takt.casadi`, ….
 
 use crate::program::{machine, suggest};
 use pyo3::exceptions::PyValueError;
 use pyo3::import_exception;
 use pyo3::prelude::*;
-use takt_model::functions::{Array, Function, Options, Port, What, derive};
-use takt_model::graph::{Delays, Rewrites};
-use takt_model::robot::{Tree, dh, read as described, urdf};
-use takt_model::write::{self, Layout};
-use takt_model::{Error, instructions};
+use std::path::{Path, PathBuf};
+use takt_front::graph::{Array, Delays, Function, Port, Rewrites};
+use takt_front::robot::functions::{Options, RobotFunction, derive};
+use takt_front::robot::{Tree, dh, read as described, urdf};
+use takt_front::sink::{self, Layout};
+use takt_front::{DecodedText, Error, decode, no_files};
 
 import_exception!(takt._errors, ModelError);
 
@@ -25,7 +26,7 @@ pub(crate) enum Element {
 }
 
 /// Name, dimensions and elements, the last index fastest.
-pub(crate) type Shaped = (String, Vec<usize>, Vec<Element>);
+pub(crate) type ShapedArray = (String, Vec<usize>, Vec<Element>);
 
 /// A source, and what its ports are.
 #[derive(IntoPyObject)]
@@ -36,8 +37,8 @@ pub(crate) struct Model {
     pub(crate) operations: usize,
     /// The meaning of each port, and its unit.
     pub(crate) texts: Vec<(String, String)>,
-    pub(crate) inputs: Vec<Shaped>,
-    pub(crate) outputs: Vec<Shaped>,
+    pub(crate) inputs: Vec<ShapedArray>,
+    pub(crate) outputs: Vec<ShapedArray>,
     /// Of the outputs that lie in data memory: name, array, and the word's number there.
     pub(crate) data: Vec<(String, String, usize)>,
     pub(crate) joints: Vec<String>,
@@ -45,7 +46,7 @@ pub(crate) struct Model {
 
 impl Model {
     fn of(function: &Function, layout: &Layout, joints: Vec<String>) -> Model {
-        let read = write::inputs_read(function);
+        let read = sink::inputs_read(function);
         let input = |index: Option<usize>| match index.filter(|index| read[*index]) {
             Some(index) => Element::Port(function.inputs[index].name.clone()),
             None => Element::None(None),
@@ -71,7 +72,7 @@ impl Model {
         let ports = function.inputs.iter().chain(function.outputs.iter().map(|(port, _)| port));
         let text = |port: &Port| (port.name.clone(), port.text.clone());
         Model {
-            source: write::source(function, layout),
+            source: sink::source(function, layout),
             title: function.title.clone(),
             notes: function.notes.clone(),
             operations: function.count().total(),
@@ -85,11 +86,8 @@ impl Model {
 }
 
 /// An error with its place; `name` is what was read.
-pub(crate) fn told(name: &str, error: Error) -> PyErr {
-    let text = match error.line {
-        Some(line) => format!("{name}:{line}: {error}"),
-        None => format!("{name}: {error}"),
-    };
+pub(crate) fn located_error(name: &str, error: Error) -> PyErr {
+    let text = error.located_text(name);
     ModelError::new_err((text, error.line))
 }
 
@@ -110,28 +108,37 @@ fn rewrites(exact: bool, without: &[String]) -> PyResult<Rewrites> {
 /// The functions of a robot: name and description.
 #[pyfunction]
 pub(crate) fn robot_functions() -> Vec<(&'static str, &'static str)> {
-    What::ALL.iter().map(|(_, name, text)| (*name, *text)).collect()
+    RobotFunction::ALL.iter().map(|(_, name, text)| (*name, *text)).collect()
 }
 
-/// A function of a robot that is described in URDF, or by a table of Denavit-Hartenberg parameters.
+/// The text of a file that a description includes.
+fn text_of(path: &Path) -> Result<String, String> {
+    let bytes = std::fs::read(path).map_err(|error| format!("cannot read {}: {error}", path.display()))?;
+    decode(bytes).map(|decoded| decoded.text).map_err(|why| format!("{}: {why}", path.display()))
+}
+
+/// A function of a robot that is described in URDF or MJCF, with the files of `folder` that it includes, or by a table of
+/// Denavit-Hartenberg parameters.
 #[pyfunction]
 #[allow(clippy::too_many_arguments)]
 pub(crate) fn robot(
     py: Python<'_>,
-    text: &str,
+    bytes: &[u8],
     name: &str,
+    folder: Option<PathBuf>,
     table: bool,
     function: &str,
     base: Option<&str>,
     tip: Option<&str>,
+    held: bool,
     gains: (f64, f64),
     snap: f64,
     exact: bool,
     without: Vec<String>,
     machine: &str,
 ) -> PyResult<Model> {
-    let what = What::from_name(function).ok_or_else(|| {
-        let names = What::ALL.map(|(_, name, _)| name);
+    let what = RobotFunction::from_name(function).ok_or_else(|| {
+        let names = RobotFunction::ALL.map(|(_, name, _)| name);
         let near = suggest(function, names);
         let text =
             format!("there is no function `{function}` of a robot{near} (functions: {})", names.join(", "));
@@ -152,15 +159,25 @@ pub(crate) fn robot(
     let delays = Delays::of(machine);
     let rewrites = rewrites(exact, &without)?;
     let made = || {
-        let tree: Tree = if table { dh::read(text, name, snap)? } else { described(text, snap)? };
-        let robot = tree.robot(base, tip).map_err(|error| error.located(text))?;
+        let DecodedText { text, note } = decode(bytes.to_vec()).map_err(Error::from)?;
+        let file = |name: &str| match &folder {
+            Some(folder) => text_of(&folder.join(name)),
+            None => no_files(name),
+        };
+        let mut tree: Tree =
+            if table { dh::read(&text, name, snap)? } else { described(&text, snap, &file)? };
+        tree.notes.extend(note);
+        if held {
+            tree = tree.held();
+        }
+        let robot = tree.robot(base, tip).map_err(|error| error.located(&text))?;
         let options = Options { rewrites, delays, tip, kp: gains.0, kd: gains.1 };
         let function = derive(&robot, what, &options)?;
         let layout = Layout::program(&function, machine)?;
         let joints = robot.joints.iter().map(|joint| joint.name.clone()).collect();
         Ok(Model::of(&function, &layout, joints))
     };
-    py.detach(made).map_err(|error| told(name, error))
+    py.detach(made).map_err(|error| located_error(name, error))
 }
 
 /// A list of instructions, as `takt_expressions` makes it.
@@ -177,9 +194,9 @@ pub(crate) fn expressions(
     let delays = Delays::of(machine);
     let rewrites = rewrites(exact, &without)?;
     let made = || {
-        let function = instructions::read(text, rewrites)?.optimised(&delays);
+        let function = takt_front::expressions::read(text, rewrites)?.optimised(&delays);
         let layout = Layout::program(&function, machine)?;
         Ok(Model::of(&function, &layout, Vec::new()))
     };
-    py.detach(made).map_err(|error| told(name, error))
+    py.detach(made).map_err(|error| located_error(name, error))
 }

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Sources from control problems: `takt_model::mpc`, for `takt.mpc`.
+//! Sources from control problems: `takt_front::mpc`, for `takt.mpc`.
 
-use crate::model::{Element, Model, Shaped, told};
+use crate::model::{Element, Model, ShapedArray, located_error};
 use crate::program::machine;
 use pyo3::prelude::*;
-use takt_model::Error;
-use takt_model::mpc::{self, Controller, MAX_RESTARTS, Search};
+use takt_front::mpc::{self, Controller, MAX_RESTARTS, Search};
+use takt_front::{Error, no_files};
 
 /// Bundles of program memory: room for pipelined loops.
 const BUNDLES: usize = 4096;
@@ -13,12 +13,12 @@ const BUNDLES: usize = 4096;
 type Ports = [(&'static str, Vec<usize>, &'static str)];
 
 fn controller(text: &str) -> Result<Controller, Error> {
-    mpc::read(text, "mpc", &mpc::no_files).and_then(Controller::new).map_err(|error| error.located(text))
+    mpc::read(text, "mpc", &no_files).and_then(Controller::new).map_err(|error| error.located(text))
 }
 
 /// Arrays of ports, whose elements are numbered from 1, the last index fastest.
-fn shaped(ports: &Ports) -> Vec<Shaped> {
-    let array = |(name, dims, _): &(&'static str, Vec<usize>, &'static str)| -> Shaped {
+fn shaped(ports: &Ports) -> Vec<ShapedArray> {
+    let array = |(name, dims, _): &(&'static str, Vec<usize>, &'static str)| -> ShapedArray {
         let mut indices = vec![Vec::new()];
         for size in dims {
             indices = indices
@@ -73,7 +73,15 @@ pub(crate) fn predictive(py: Python<'_>, text: &str, machine: &str) -> PyResult<
             source: source.text,
         })
     };
-    py.detach(made).map_err(|error| told("mpc", error))
+    py.detach(made).map_err(|error| located_error("mpc", error))
+}
+
+/// The weight of the plan's last state, row by row: the cost-to-go of the infinite horizon.
+#[pyfunction]
+pub(crate) fn predictive_weight(py: Python<'_>, text: &str) -> PyResult<Vec<Vec<f64>>> {
+    let controller = py.detach(|| controller(text)).map_err(|error| located_error("mpc", error))?;
+    let weight = &controller.factors.p;
+    Ok(weight.row_iter().map(|row| row.iter().copied().collect()).collect())
 }
 
 /// The worst residuals and violation found over the problem's range: name, value and state.
@@ -90,5 +98,5 @@ pub(crate) fn predictive_worst(
         let worst = mpc::search(&controller(text)?, search)?;
         Ok(worst.into_iter().map(|worst| (worst.name, worst.value, worst.state)).collect())
     };
-    py.detach(found).map_err(|error| told("mpc", error))
+    py.detach(found).map_err(|error| located_error("mpc", error))
 }

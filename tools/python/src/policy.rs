@@ -1,16 +1,18 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Sources from learned policies: `takt_model::policy`, for `takt.onnx`.
+//! Sources from learned policies: `takt_front::policy`, for `takt.onnx`.
 
-use crate::model::{Element, Model, Shaped, told};
+use crate::model::{Element, Model, ShapedArray, located_error};
 use crate::program::machine;
 use pyo3::prelude::*;
-use takt_model::policy::{self, Vector};
+use std::path::PathBuf;
+use takt_front::policy::{self, Vector};
 
 /// Bundles of program memory: room for pipelined loops.
 const BUNDLES: usize = 4096;
 
 /// A multi-layer perceptron from the bytes of a file in ONNX.
 #[pyfunction]
+#[allow(clippy::too_many_arguments)]
 pub(crate) fn perceptron(
     py: Python<'_>,
     bytes: &[u8],
@@ -18,10 +20,18 @@ pub(crate) fn perceptron(
     exact: bool,
     range: Option<(f64, f64)>,
     machine: &str,
+    result: Option<&str>,
+    folder: Option<PathBuf>,
 ) -> PyResult<Model> {
     let machine = self::machine(machine)?;
     let made = || {
-        let network = policy::read(bytes, name)?.merged(exact);
+        let files = |name: &str, offset, length| match &folder {
+            Some(folder) => policy::external_data(folder, name, offset, length),
+            None => Err(format!(
+                "its numbers lie in `{name}`; a model that is given as bytes has all of them in itself"
+            )),
+        };
+        let network = policy::read(bytes, name, result, &files)?.merged(exact);
         let source = policy::source(&network, machine, range, BUNDLES)?;
         let ports = |vector: &Vector, name: &str| -> Vec<String> {
             (1..=vector.length).map(|i| format!("{name}[{i}]")).collect()
@@ -31,7 +41,7 @@ pub(crate) fn perceptron(
             let text = |(index, port): (usize, String)| (port, format!("{}[{index}]", vector.name));
             ports(vector, name).into_iter().enumerate().map(text)
         });
-        let shaped = |(vector, name): (&Vector, &String)| -> Shaped {
+        let shaped = |(vector, name): (&Vector, &String)| -> ShapedArray {
             let elements = ports(vector, name).into_iter().map(Element::Port).collect();
             (vector.name.clone(), vec![vector.length], elements)
         };
@@ -47,5 +57,5 @@ pub(crate) fn perceptron(
             source: source.text,
         })
     };
-    py.detach(made).map_err(|error| told(name, error))
+    py.detach(made).map_err(|error| located_error(name, error))
 }

@@ -9,12 +9,17 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use std::num::NonZeroU64;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
+use std::time::{Duration, Instant};
 use takt_asm::diag::Diagnostics;
-use takt_asm::levels::Wish;
+use takt_asm::levels::LevelSetting;
 use takt_asm::limits::IMAGE_BYTES;
-use takt_asm::names::DebugInfo;
-use takt_asm::{Assembled, Contract, FileLoader, Options, Schedule, Search, disasm, image, listing, nearest};
+use takt_asm::names::{DebugInfo, NamedArray};
+use takt_asm::{
+    AssembledProgram, Contract, FileLoader, Options, Schedule, Search, disasm, image, listing, nearest,
+};
+use takt_board::Array;
+use takt_cache::CacheLocation;
 use takt_isa::fp::Flags;
 use takt_isa::program::{Port, Space, Symbol};
 use takt_isa::{MACHINES, Machine};
@@ -29,18 +34,36 @@ pub(crate) struct Program {
     /// Texts, by the names that the program has for them.
     pub(crate) sources: Arc<Vec<(String, String)>>,
     /// The assembler's result, of one that was assembled here.
-    pub(crate) assembled: Option<Assembled>,
+    pub(crate) assembled: Option<AssembledProgram>,
     /// The same of one that was pickled.
-    kept: Option<Kept>,
+    kept: Option<PickledMessages>,
     /// The way it was assembled.
     recipe: Option<Recipe>,
     /// And of one from an image.
     debug: Option<DebugInfo>,
 }
 
+/// The scheduler's effort, unless given: about a second for a policy of a thousand operations, a quarter of what `takt asm` takes.
+const EFFORT: u32 = 5;
+/// Programs that are assembled faster are not kept.
+const SLOW: Duration = Duration::from_millis(100);
+/// Programs that are kept, the newest.
+const MOST: usize = 400;
+
+/// This build of the package, of which another one may assemble otherwise; `None` if it is not known.
+static BUILD: OnceLock<Option<String>> = OnceLock::new();
+
+/// The package's version. `file` is that of the extension module.
+#[pyfunction]
+pub(crate) fn version(file: PathBuf) -> &'static str {
+    let version = env!("CARGO_PKG_VERSION");
+    BUILD.get_or_init(|| Some(format!("{version} {}", takt_cache::build(&file)?)));
+    version
+}
+
 /// The assembler's messages of a program, for one that comes from a pickle: there it is not assembled again.
 #[derive(Clone, FromPyObject, IntoPyObject)]
-pub(crate) struct Kept(String, Option<(String, String)>, Vec<(Option<String>, u32, u32)>);
+pub(crate) struct PickledMessages(String, Option<(String, String)>, Vec<(Option<String>, u32, u32)>);
 
 /// A source and the options that make a program of it.
 #[derive(Clone)]
@@ -49,28 +72,28 @@ struct Recipe {
     name: String,
     folder: PathBuf,
     include: Vec<PathBuf>,
-    wishes: Wishes,
+    wishes: OptionTexts,
     options: Options,
 }
 
 /// The options in words: `schedule`, `contract`, `effort`, `warnings`.
 #[derive(Clone, FromPyObject, IntoPyObject)]
-pub(crate) struct Wishes(String, String, Option<u32>, Vec<String>);
+pub(crate) struct OptionTexts(String, String, Option<u32>, Vec<String>);
 
 /// A recipe in words, for a pickle: text, name, folder, folders of includes, wishes.
-pub(crate) type Words = (Vec<u8>, String, PathBuf, Vec<PathBuf>, Wishes);
+pub(crate) type Words = (Vec<u8>, String, PathBuf, Vec<PathBuf>, OptionTexts);
 
-impl Default for Wishes {
-    fn default() -> Wishes {
-        Wishes("source".to_owned(), "source".to_owned(), None, Vec::new())
+impl Default for OptionTexts {
+    fn default() -> OptionTexts {
+        OptionTexts("source".to_owned(), "source".to_owned(), None, Vec::new())
     }
 }
 
-impl Wishes {
+impl OptionTexts {
     fn options(&self, machine: &'static Machine) -> PyResult<Options> {
-        let Wishes(schedule, contract, effort, warnings) = self;
+        let OptionTexts(schedule, contract, effort, warnings) = self;
         let wishes = warnings.iter().map(|wish| {
-            wish.parse::<Wish>()
+            wish.parse::<LevelSetting>()
                 .map_err(|reason| PyValueError::new_err(format!("warnings: `{wish}`: {reason}")))
         });
         Ok(Options {
@@ -85,7 +108,7 @@ impl Wishes {
                 contract,
                 &[("source", Contract::AsWritten), ("on", Contract::All), ("off", Contract::None)],
             )?,
-            effort: effort.unwrap_or(Options::default().effort),
+            effort: effort.unwrap_or(EFFORT),
             levels: wishes.collect::<PyResult<Vec<_>>>()?.into_iter().collect(),
         })
     }
@@ -102,10 +125,36 @@ impl Recipe {
         (text, name, folder, include, wishes)
     }
 
-    fn assemble(&self) -> Result<Assembled, Diagnostics> {
+    fn search(&self) -> Search<FileLoader> {
         let search = Search::new(FileLoader::new(&self.folder));
-        let search = self.include.iter().fold(search, Search::folder).library(takt_programs::LIBRARY);
-        takt_asm::assemble_bytes(&self.name, self.text.clone(), &search, &self.options)
+        self.include.iter().fold(search, Search::folder).library(takt_programs::LIBRARY)
+    }
+
+    fn assemble(&self) -> Result<AssembledProgram, Diagnostics> {
+        takt_asm::assemble_bytes(&self.name, self.text.clone(), &self.search(), &self.options)
+    }
+
+    /// The program, from the user's cache if it was assembled before. Programs that took long are kept, without warnings: those are
+    /// shown each time.
+    fn make(self) -> Result<PyResult<Program>, Diagnostics> {
+        let checked = takt_asm::check_bytes(&self.name, self.text.clone(), &self.search(), &self.options);
+        let key = BUILD.get().and_then(Option::as_ref).map(|build| checked.key(build, &self.options));
+        let place = key.and_then(|key| CacheLocation::of("python", key));
+        if let Some(place) = &place
+            && checked.diagnostics().is_empty()
+            && let Some(program) = Program::read(place, checked.machine(), &self)
+        {
+            return Ok(Ok(program));
+        }
+        let begin = Instant::now();
+        let program = Program::assembled(checked.finish()?, self);
+        if let (Some(place), Ok(program)) = (place, &program)
+            && begin.elapsed() >= SLOW
+            && program.warnings().is_none()
+        {
+            program.keep(&place);
+        }
+        Ok(program)
     }
 }
 
@@ -170,20 +219,24 @@ pub(crate) fn assemble(
     warnings: Vec<String>,
 ) -> PyResult<Program> {
     let machine = self::machine(machine)?;
-    let wishes = Wishes(schedule.to_owned(), contract.to_owned(), effort, warnings);
+    let wishes = OptionTexts(schedule.to_owned(), contract.to_owned(), effort, warnings);
     let recipe = Recipe::of((text, name.to_owned(), folder, include, wishes), machine)?;
     if let Some(none) = recipe.include.iter().find(|folder| !folder.is_dir()) {
         return Err(PyValueError::new_err(format!("include: there is no folder {}", none.display())));
     }
-    match py.detach(|| recipe.assemble()) {
-        Ok(assembled) => Program::assembled(assembled, recipe),
+    match py.detach(|| recipe.make()) {
+        Ok(program) => program,
         Err(diagnostics) => Err(AssemblyError::new_err((diagnostics.render(false), diagnostics.to_json()))),
     }
 }
 
 /// A program that was pickled, from its image, how it was assembled, and what is said of it.
 #[pyfunction]
-pub(crate) fn restored_program(image: &[u8], recipe: Option<Words>, kept: Option<Kept>) -> PyResult<Program> {
+pub(crate) fn restored_program(
+    image: &[u8],
+    recipe: Option<Words>,
+    kept: Option<PickledMessages>,
+) -> PyResult<Program> {
     let program = Program::from_image(image, Path::new("a pickled program"))?;
     let machine = program.program.machine;
     let recipe = recipe.map(|words| Recipe::of(words, machine)).transpose()?;
@@ -194,7 +247,7 @@ pub(crate) fn restored_program(image: &[u8], recipe: Option<Words>, kept: Option
 pub(crate) fn read_program(
     path: &Path,
     machine: Option<&'static Machine>,
-    wishes: Wishes,
+    wishes: OptionTexts,
 ) -> PyResult<takt_isa::Program> {
     let text = std::fs::read(path).map_err(|error| named(path, error))?;
     if image::is_image(&text) {
@@ -205,11 +258,11 @@ pub(crate) fn read_program(
     let folder = path.parent().map_or_else(PathBuf::new, Path::to_owned);
     let words = (text, name, folder, Vec::new(), wishes);
     let recipe = Recipe::of(words, machine.unwrap_or(MACHINES[0]))?;
-    let assembled = recipe.assemble();
-    let program = assembled
-        .map_err(|diagnostics| AssemblyError::new_err((diagnostics.render(false), diagnostics.to_json())))?
-        .program;
-    of_machine(path, program, machine)
+    let made = recipe.make();
+    let made = made.map_err(|diagnostics| {
+        AssemblyError::new_err((diagnostics.render(false), diagnostics.to_json()))
+    })??;
+    of_machine(path, Arc::unwrap_or_clone(made.program), machine)
 }
 
 /// A program that was read, if it is for the machine that was asked for.
@@ -255,7 +308,7 @@ fn ports(ports: &[Port]) -> Vec<(String, &'static str)> {
 }
 
 impl Program {
-    fn assembled(assembled: Assembled, recipe: Recipe) -> PyResult<Program> {
+    fn assembled(assembled: AssembledProgram, recipe: Recipe) -> PyResult<Program> {
         if assembled.program.bundles() == 0 {
             return Err(PyValueError::new_err("the program has no instruction"));
         }
@@ -272,9 +325,41 @@ impl Program {
     }
 
     /// The same source assembled for another machine; `None` of an image, and if it does not fit.
-    pub(crate) fn again(&self, machine: &'static Machine) -> Option<Assembled> {
+    pub(crate) fn again(&self, machine: &'static Machine) -> Option<AssembledProgram> {
         let recipe = self.recipe.as_ref()?;
         Recipe { options: Options { machine, ..recipe.options }, ..recipe.clone() }.assemble().ok()
+    }
+
+    /// The program that is kept at a place, and what the assembler said of it.
+    fn read(place: &CacheLocation, machine: &'static Machine, recipe: &Recipe) -> Option<Program> {
+        let parts = place.read()?;
+        let [known, image] = &parts[..] else { return None };
+        let (listing, blocks) = serde_json::from_slice(known).ok()?;
+        let program = Program::from_image(image, Path::new("a kept program")).ok()?;
+        if *program.program.machine != *machine {
+            return None;
+        }
+        Some(Program {
+            kept: Some(PickledMessages(listing, None, blocks)),
+            recipe: Some(recipe.clone()),
+            ..program
+        })
+    }
+
+    fn keep(&self, place: &CacheLocation) {
+        if let (Ok(known), Ok(image)) = (serde_json::to_vec(&(self.listing(), self.blocks())), self.image()) {
+            place.keep(&[&known, &image], MOST);
+        }
+    }
+
+    /// The arrays of its source in data memory.
+    pub(crate) fn arrays(&self) -> Vec<Array> {
+        let debug = self.assembled.as_ref().map(AssembledProgram::debug_info).or_else(|| self.debug.clone());
+        let arrays = debug.map_or(Vec::new(), |debug| debug.names.arrays);
+        arrays
+            .into_iter()
+            .map(|NamedArray { name, base, sizes, ty }| Array { name, base, sizes, ty })
+            .collect()
     }
 
     fn from_image(bytes: &[u8], path: &Path) -> PyResult<Program> {
@@ -341,7 +426,7 @@ impl Program {
     /// The assembler's warnings: rendered, and as JSON.
     #[getter]
     fn warnings(&self) -> Option<(String, String)> {
-        if let Some(Kept(_, warnings, _)) = &self.kept {
+        if let Some(PickledMessages(_, warnings, _)) = &self.kept {
             return warnings.clone();
         }
         let warnings = &self.assembled.as_ref()?.warnings;
@@ -352,21 +437,21 @@ impl Program {
     fn listing(&self) -> String {
         match (&self.assembled, &self.kept) {
             (Some(assembled), _) => listing::listing(assembled),
-            (None, Some(Kept(listing, ..))) => listing.clone(),
+            (None, Some(PickledMessages(listing, ..))) => listing.clone(),
             (None, None) => disasm::disassemble(&self.program),
         }
     }
 
     /// The image, as `takt asm` writes it.
     pub(crate) fn image(&self) -> PyResult<Vec<u8>> {
-        let debug = self.assembled.as_ref().map(Assembled::debug_info).or_else(|| self.debug.clone());
+        let debug = self.assembled.as_ref().map(AssembledProgram::debug_info).or_else(|| self.debug.clone());
         let image = image::write_with(&self.program, debug.as_ref());
         image.map_err(|error| PyValueError::new_err(format!("no image: {error}")))
     }
 
     /// Of each block that the scheduler packed: label, cycles, and what no schedule can beat.
     fn blocks(&self) -> Vec<(Option<String>, u32, u32)> {
-        if let Some(Kept(_, _, blocks)) = &self.kept {
+        if let Some(PickledMessages(_, _, blocks)) = &self.kept {
             return blocks.clone();
         }
         let blocks = self.assembled.iter().flat_map(|assembled| &assembled.blocks);
@@ -399,8 +484,8 @@ impl Program {
     fn __reduce__<'py>(
         &self,
         py: Python<'py>,
-    ) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>, Option<Words>, Option<Kept>))> {
-        let made = || Kept(self.listing(), self.warnings(), self.blocks());
+    ) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>, Option<Words>, Option<PickledMessages>))> {
+        let made = || PickledMessages(self.listing(), self.warnings(), self.blocks());
         let kept = (self.assembled.is_some() || self.kept.is_some()).then(made);
         let image = PyBytes::new(py, &self.image()?);
         let recipe = self.recipe.as_ref().map(Recipe::words);

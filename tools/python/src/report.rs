@@ -15,7 +15,7 @@ use takt_isa::timing::Cycle;
 use takt_isa::{Machine, Register};
 
 /// Text, JSON and page; or what ended the run before.
-type Analysed = (Option<(String, String, String)>, Option<Failure>);
+type AnalysisResult = (Option<(String, String, String)>, Option<Failure>);
 
 /// Runs the program with these words on its input ports, a row for each period, and looks at period `wanted`, or else the last. With `reassemble` the program is
 /// assembled for each faster machine, too.
@@ -27,14 +27,14 @@ pub(crate) fn analyse(
     rows: Vec<Vec<u32>>,
     wanted: Option<u64>,
     reassemble: bool,
-) -> PyResult<Analysed> {
+) -> PyResult<AnalysisResult> {
     let ports = &program.program.inputs;
     if let Some(row) = rows.iter().find(|row| row.len() != ports.len()) {
         let text = format!("{} inputs; the program has {}", row.len(), ports.len());
         return Err(PyValueError::new_err(text));
     }
     if let Some(many) = wanted.into_iter().chain([rows.len() as u64]).find(|many| *many > MOST_PERIODS) {
-        let text = format!("{many} periods: at most {MOST_PERIODS} are run on the way to the one to look at");
+        let text = format!("{many} periods: at most {MOST_PERIODS} are run to reach the selected period");
         return Err(PyValueError::new_err(text));
     }
     let registers: Vec<Register> = ports.iter().map(|port| port.register).collect();

@@ -21,7 +21,7 @@ pub(crate) const UNWRITTEN: u32 = 0x7fc0_0000;
 
 /// The results of a run beside outputs and cycles.
 #[derive(IntoPyObject)]
-pub(crate) struct Ran {
+pub(crate) struct RunResults {
     /// Of each run the periods that came to their end.
     completed: Vec<usize>,
     /// Of each run its sticky exception flags, as bits.
@@ -39,11 +39,11 @@ struct Arrays<'a> {
     ports: usize,
     periods: usize,
     runs: usize,
-    /// By input port, period and run.
+    /// Input words in the order of ports, periods, runs.
     inputs: &'a [u32],
-    /// By output port and then word, period and run.
+    /// Output words in the order of ports and words, periods, runs.
     outputs: &'a mut [u32],
-    /// By period and run.
+    /// Cycles in the order of periods, then runs.
     cycles: &'a mut [u64],
     missed: &'a mut [u64],
 }
@@ -95,7 +95,7 @@ pub(crate) fn run(
     mut missed: PyReadwriteArray<'_, u64, numpy::Ix2>,
     tick: Option<NonZeroU64>,
     max_cycles: NonZeroU64,
-) -> PyResult<Ran> {
+) -> PyResult<RunResults> {
     let &[ports, periods, runs] = inputs.shape() else {
         return Err(PyValueError::new_err("inputs: by port, period and run"));
     };
@@ -204,7 +204,7 @@ pub(crate) fn misses(report: &PeriodReport) -> u64 {
 }
 
 /// The state of an output: its value, and true if it was ever written.
-pub(crate) fn shown(port: &Port, bits: Option<u32>) -> u32 {
+pub(crate) fn output_state(port: &Port, bits: Option<u32>) -> u32 {
     bits.unwrap_or(if port.ty == Type::F { UNWRITTEN } else { 0 })
 }
 
@@ -216,13 +216,13 @@ pub(crate) fn port_error(error: takt_emu::PortError) -> PyErr {
     PyValueError::new_err(error.to_string())
 }
 
-fn alone(settings: &Settings<'_>, arrays: Arrays<'_>) -> PyResult<Ran> {
+fn alone(settings: &Settings<'_>, arrays: Arrays<'_>) -> PyResult<RunResults> {
     let Settings { program, words, sources, tick, max_cycles } = *settings;
     let Arrays { periods, inputs, outputs, cycles, missed, .. } = arrays;
     let mut emulator = loaded(Emulator::new(program))?;
     emulator.set_tick_period(tick);
     let mut interrupt = Interrupt::new();
-    let mut ran = Ran::new(1, program);
+    let mut ran = RunResults::new(1, program);
     fill(program, outputs, periods);
     for number in 0..periods {
         for (port, series) in program.inputs.iter().zip(inputs.chunks_exact(periods)) {
@@ -243,7 +243,7 @@ fn alone(settings: &Settings<'_>, arrays: Arrays<'_>) -> PyResult<Ran> {
         for ((port, series), unwritten) in ports {
             let bits = emulator.output_bits(port.register);
             *unwritten += u64::from(bits.is_none());
-            series[number] = shown(port, bits);
+            series[number] = output_state(port, bits);
         }
         let behind = outputs.chunks_exact_mut(periods).skip(program.outputs.len());
         for (address, series) in words.iter().zip(behind) {
@@ -261,15 +261,15 @@ fn fill(program: &takt_isa::Program, outputs: &mut [u32], each: usize) {
         // Behind the ports are words.
         outputs.fill(UNWRITTEN);
         let ports = program.outputs.iter().zip(outputs.chunks_exact_mut(each));
-        ports.for_each(|(port, series)| series.fill(shown(port, None)));
+        ports.for_each(|(port, series)| series.fill(output_state(port, None)));
     }
 }
 
-fn together(settings: &Settings<'_>, arrays: Arrays<'_>) -> PyResult<Ran> {
+fn together(settings: &Settings<'_>, arrays: Arrays<'_>) -> PyResult<RunResults> {
     let Settings { program, words, sources, tick, max_cycles } = *settings;
     let Arrays { ports, periods, runs, inputs, outputs, cycles, missed } = arrays;
     let mut interrupt = Interrupt::new();
-    let mut ran = Ran::new(runs, program);
+    let mut ran = RunResults::new(runs, program);
     fill(program, outputs, periods * runs);
     let at_once = (WORDS / program.machine.data_depth as usize).clamp(Batch::WIDTH, LANES);
     for first in (0..runs).step_by(at_once) {
@@ -305,7 +305,7 @@ fn together(settings: &Settings<'_>, arrays: Arrays<'_>) -> PyResult<Ran> {
                 for (index, port) in program.outputs.iter().enumerate() {
                     let bits = batch.output_bits(lane, port.register);
                     ran.unwritten[index] += u64::from(bits.is_none());
-                    outputs[(index * periods + number) * runs + run] = shown(port, bits);
+                    outputs[(index * periods + number) * runs + run] = output_state(port, bits);
                 }
                 let memory = if words.is_empty() { Vec::new() } else { batch.memory(lane) };
                 for (index, address) in words.iter().enumerate() {
@@ -324,9 +324,9 @@ fn together(settings: &Settings<'_>, arrays: Arrays<'_>) -> PyResult<Ran> {
     Ok(ran)
 }
 
-impl Ran {
-    fn new(runs: usize, program: &takt_isa::Program) -> Ran {
-        Ran {
+impl RunResults {
+    fn new(runs: usize, program: &takt_isa::Program) -> RunResults {
+        RunResults {
             completed: vec![0; runs],
             flags: vec![0; runs],
             failures: Vec::new(),

@@ -95,8 +95,9 @@ impl Sim {
     }
 
     /// The value that Python gave, as the port's bits.
-    fn bits(port: &Port, value: &Bound<'_, PyAny>) -> PyResult<u32> {
-        let wrong = |text: String| PyValueError::new_err(format!("input `{}`: {text}", port.name));
+    fn bits(port: &Port, value: &Bound<'_, PyAny>, period: usize) -> PyResult<u32> {
+        let wrong =
+            |text: String| PyValueError::new_err(format!("input `{}` of period {period}: {text}", port.name));
         let typed = |error: PyErr| {
             let text = format!("input `{}` takes {}: {error}", port.name, port.ty.name());
             PyTypeError::new_err(text)
@@ -136,7 +137,7 @@ impl Sim {
                 let near = suggest(&name, ports.iter().map(|port| port.name.as_str()));
                 return Err(PyValueError::new_err(format!("the program has no input `{name}`{near}")));
             };
-            let bits = Self::bits(&ports[index], &value)?;
+            let bits = Self::bits(&ports[index], &value, self.periods)?;
             self.next.push((ports[index].register, bits));
             given.push((index, bits));
         }

@@ -3,7 +3,7 @@
 
 use crate::failure::{self, Failure};
 use crate::interrupt::{Interrupt, SLICE};
-use crate::program::{AssemblyError, Wishes, read_program};
+use crate::program::{AssemblyError, OptionTexts, read_program};
 use crate::run::loaded;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -28,7 +28,7 @@ pub(crate) fn read(path: &Path) -> PyResult<Description> {
                 let help = Some("programs are looked for beside the system's file".to_owned());
                 return Err(ProgramError::Missing { message, help });
             }
-            read_program(&file, request.machine, Wishes::default()).map_err(ProgramError::Invalid)
+            read_program(&file, request.machine, OptionTexts::default()).map_err(ProgramError::Invalid)
         });
     read.map_err(|error| match error {
         ReadError::Mistakes(mistakes) => AssemblyError::new_err((mistakes.render(false), mistakes.to_json())),

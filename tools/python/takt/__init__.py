@@ -17,8 +17,10 @@ The arithmetic is the machine's, bit for bit, and so are the cycles. `takt.urdf`
 programs from robots' descriptions, from expressions and from learned policies; `takt.mujoco` runs them against MuJoCo.
 """
 
+from takt import _takt
 from takt._batch import Batch, Loops
 from takt._board import Board, BoardStatus
+from takt._distribute import distribute
 from takt._errors import (
     AssemblyError,
     AssemblyWarning,
@@ -32,6 +34,7 @@ from takt._errors import (
 )
 from takt._ports import Array, Port
 from takt._program import DEFAULT_MACHINE, Program, assemble, load, machines
+from takt._progress import set_progress
 from takt._results import (
     Accuracy,
     Analysis,
@@ -49,6 +52,9 @@ from takt._results import (
 from takt._sim import Sim
 from takt._system import CorePeriods, System
 from takt._takt import Fault
+
+#: The package's version.
+__version__ = _takt.version(_takt.__file__)
 
 __all__ = [
     "DEFAULT_MACHINE",
@@ -85,6 +91,8 @@ __all__ = [
     "System",
     "TaktError",
     "assemble",
+    "distribute",
     "load",
     "machines",
+    "set_progress",
 ]

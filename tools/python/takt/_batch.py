@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from takt import _takt
 from takt._errors import FaultError
-from takt._ports import Port, count_of, mapping_of, near, numbers, words_of
+from takt._exclusive import exclusive
+from takt._ports import KEPT, Port, count_of, mapping_of, near, numbers, words_of
 from takt._results import flags_of
 
 if TYPE_CHECKING:
@@ -33,6 +34,7 @@ class Loops:
     cycles: NDArray[np.int64]
 
 
+@exclusive("`program.batch(runs)` makes machines for each thread")
 class Batch:
     """Closed loops of many runs, in one call or period by period:
 
@@ -75,21 +77,21 @@ class Batch:
 
     def _set(self, inputs: Mapping[str, ArrayLike]) -> None:
         """Takes inputs, all of them or, with an error, none."""
-        words = self._inputs.copy()
+        words, when = self._inputs.copy(), f" of period {self._core.periods}"
         floats, seen = words.view(np.float32), list[int]()
         for name, value in inputs.items():
             wanted = self._wanted.get(name)
             if wanted is None:
                 raise ValueError(f"the program has no input `{name}`{near(name, list(self._wanted))}")
             shape, places, rows, port = wanted
-            values = numbers(f"`{name}`", value)
+            values = numbers(f"`{name}`", value, when)
             if values.shape != shape and values.shape != (self.runs, *shape):
                 raise ValueError(f"`{name}` has shape {values.shape}, not {(self.runs, *shape)} nor {shape}")
             if port is None:
                 continue
             into: NDArray[Any] = floats
             if port.type != "float":
-                into, values = words, words_of(f"`{name}`", port, values)
+                into, values = words, words_of(f"`{name}`", port, values, when)
             if shape:
                 flat = values.reshape(*values.shape[: values.ndim - len(shape)], -1)
                 flat = flat if len(places) == flat.shape[-1] else flat[..., places]
@@ -102,7 +104,7 @@ class Batch:
             for name, value in inputs.items():
                 port = self._wanted[name][3]
                 if port is not None:
-                    words_of(f"`{name}`", port, numbers(f"`{name}`", value))
+                    words_of(f"`{name}`", port, numbers(f"`{name}`", value, when), when)
         if len(seen) != len(set(seen)):
             raise ValueError("an input is given twice: by itself and in an array")
         if not self._complete:
@@ -114,7 +116,7 @@ class Batch:
             self._complete = True
         self._inputs = words
 
-    def step(self, inputs: Mapping[str, ArrayLike] | None = None) -> dict[str, NDArray[Any]]:
+    def step(self, inputs: Mapping[str, ArrayLike] = KEPT) -> dict[str, NDArray[Any]]:
         """Sets inputs, lets the tick come and runs every machine to its `wait`.
 
         Args:
@@ -148,6 +150,7 @@ class Batch:
             What was recorded, and the cycles.
 
         Raises:
+            TypeError: the plant returned None.
             FaultError: a machine has stopped; `Loops` of a run up to there comes from stepping it.
         """
         count = count_of("periods", periods, least=0) or 0
@@ -165,6 +168,8 @@ class Batch:
             for name, values in kept.items():
                 values.append(outputs[name] if name in outputs else self._input(name))
             inputs = plant(outputs, period)
+            if inputs is None:
+                raise TypeError(f"the plant returned None after period {period}: it lacks a `return` of the inputs of the next (an empty dict keeps them)")
         whole = {name: np.stack(values, axis=1) if values else np.zeros((self.runs, 0)) for name, values in kept.items()}
         return Loops(
             {name: values for name, values in whole.items() if name in self._names},

@@ -12,7 +12,8 @@ from numpy.typing import ArrayLike
 
 from takt import _takt
 from takt._errors import BoardError
-from takt._ports import AnyPath, Port, count_of, mapping_of, near, path_of, value_of, word_of
+from takt._exclusive import exclusive
+from takt._ports import KEPT, AnyPath, Port, count_of, mapping_of, near, path_of, value_of, word_of
 from takt._program import Program
 
 #: Periods from one frame of a stream to the next, at most.
@@ -45,6 +46,7 @@ class BoardStatus:
     lost: int
 
 
+@exclusive("a lock around its calls lets threads take turns")
 class Board:
     """A board that carries a circuit from `takt board build` (docs/board.md):
 
@@ -153,7 +155,7 @@ class Board:
         """Lets the program run on after `hold`."""
         self._core.control("go")
 
-    def step(self, inputs: Mapping[str, ArrayLike] | None = None) -> dict[str, float | int]:
+    def step(self, inputs: Mapping[str, ArrayLike] = KEPT) -> dict[str, float | int]:
         """Sets inputs and runs one period, while the program is held.
 
         Returns:
@@ -167,13 +169,15 @@ class Board:
         return self.read(*self.outputs)
 
     def read(self, *names: str) -> dict[str, float | int]:
-        """Values by name, read between two periods or when the program has stopped; without names, those of all ports.
+        """Values by name, read between two periods or when the program has stopped; without names, those of all ports. Elements of
+        arrays have the indices of the source (`M[2,3]`); the name of an array stands for all of them.
 
         Raises:
             BoardError: the program does not wait for its tick.
             ValueError: there is no such name.
         """
-        wanted = list(names) or [*self.inputs, *self.outputs]
+        each = [element for name in names for element in self._core.elements(name)]
+        wanted = each or [*self.inputs, *self.outputs]
         return {name: value_of(*value) for name, value in zip(wanted, self._core.read(wanted))}
 
     def set(self, values: Mapping[str, ArrayLike]) -> None:

@@ -6,6 +6,8 @@ import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from takt._words import in_python
+
 if TYPE_CHECKING:
     from takt._takt import Fault
 
@@ -61,7 +63,10 @@ def diagnostics(text: str) -> list[Diagnostic]:
 
     def one(message: dict[str, Any]) -> Diagnostic:
         places = tuple(Place(**place) for place in message.pop("places"))
-        return Diagnostic(places=places, notes=tuple(message.pop("notes")), **message)
+        notes = tuple(in_python(note) for note in message.pop("notes"))
+        for key in ("message", "help"):
+            message[key] = None if message[key] is None else in_python(message[key])
+        return Diagnostic(places=places, notes=notes, **message)
 
     return [one(message) for message in json.loads(text)]
 
@@ -78,7 +83,7 @@ class AssemblyError(TaktError, ValueError):
 
     def __init__(self, rendered: str, messages: str) -> None:
         super().__init__(rendered, messages)
-        self.rendered = rendered.rstrip("\n")
+        self.rendered = in_python(rendered.rstrip("\n"))
         self.diagnostics = diagnostics(messages)
 
     def __str__(self) -> str:
@@ -92,6 +97,9 @@ class AssemblyWarning(UserWarning):
 class NoBoundError(TaktError, ValueError):
     """The cycles of a program cannot be bounded, and why."""
 
+    def __str__(self) -> str:
+        return in_python(super().__str__())
+
 
 class ModelError(TaktError, ValueError):
     """A robot's description or an expression that cannot become a program, and why."""
@@ -100,7 +108,7 @@ class ModelError(TaktError, ValueError):
     line: int | None
 
     def __init__(self, text: str, line: int | None = None) -> None:
-        super().__init__(text)
+        super().__init__(in_python(text))
         self.line = line
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -109,6 +117,9 @@ class ModelError(TaktError, ValueError):
 
 class BoardError(TaktError, OSError):
     """A board does not answer, cannot do what is asked, or is no board."""
+
+    def __str__(self) -> str:
+        return in_python(super().__str__())
 
 
 class FaultError(TaktError, RuntimeError):

@@ -7,6 +7,7 @@ import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -73,10 +74,14 @@ def first(wrong: NDArray[np.bool_]) -> str:
     return "" if not place else "[" + ", ".join(str(int(i)) for i in place) + "]"
 
 
-def mapping_of(what: str, values: Mapping[str, ArrayLike] | None) -> Mapping[str, ArrayLike]:
-    """Values by name; None is none."""
+#: No values: every input keeps its own.
+KEPT: Mapping[str, ArrayLike] = MappingProxyType({})
+
+
+def mapping_of(what: str, values: Mapping[str, ArrayLike]) -> Mapping[str, ArrayLike]:
+    """Values by name."""
     if values is None:
-        return {}
+        raise TypeError(f"{what} are None: does the function that makes them lack a `return`? Without the argument, every input keeps its value")
     # What has names and values will do, as a table of pandas does.
     if not (hasattr(values, "keys") and hasattr(values, "items")):
         raise TypeError(f"{what} are values by the name of their port, as {{'x': 0.5}}, and not a {type(values).__name__}")
@@ -91,49 +96,50 @@ def path_of(what: str, value: AnyPath) -> Path:
         raise TypeError(f"{what} is a path: a str, bytes or os.PathLike, not a {type(value).__name__}") from None
 
 
-def numbers(what: str, value: ArrayLike) -> NDArray[Any]:
+def numbers(what: str, value: ArrayLike, when: str = "") -> NDArray[Any]:
+    """Numbers as an array; `when` is the time in messages, as ` of period 3`."""
     if isinstance(value, np.ma.MaskedArray):
         masked = np.ma.getmaskarray(value)
         if masked.any():
-            raise ValueError(f"{what}{first(masked)} is masked: there is no value to run with; .filled(…) gives masked elements one")
+            raise ValueError(f"{what}{first(masked)}{when} is masked: there is no value to run with; .filled(…) gives masked elements one")
     try:
         array = np.asarray(value)
     except ValueError as error:
-        raise ValueError(f"{what}: no array of numbers: {error}") from None
+        raise ValueError(f"{what}{when}: no array of numbers: {error}") from None
     if array.dtype.kind not in "fiub":
-        raise ValueError(f"{what}: an array of {array.dtype} is none of numbers")
+        raise ValueError(f"{what}{when}: an array of {array.dtype} is none of numbers")
     return array
 
 
-def words_of(what: str, port: Port, array: NDArray[Any]) -> NDArray[np.uint32]:
+def words_of(what: str, port: Port, array: NDArray[Any], when: str = "") -> NDArray[np.uint32]:
     """The bits of values for a port; numbers are rounded to binary32 once."""
     if port.type == "float":
         nan = np.isnan(array)
         if nan.any():
-            raise ValueError(f"{what}{first(nan)}: NaN is no input for a controller")
+            raise ValueError(f"{what}{first(nan)}{when}: NaN is no input for a controller")
         with np.errstate(over="ignore"):
             rounded = array.astype(np.float32)
         infinite = np.isinf(rounded)
         if infinite.any():
             number = array[infinite].flat[0]
-            raise ValueError(f"{what}{first(infinite)}: {number} does not fit binary32, whose largest is 3.4028235e38")
+            raise ValueError(f"{what}{first(infinite)}{when}: {number} does not fit binary32, whose largest is 3.4028235e38")
         return rounded.view(np.uint32)
     if array.dtype.kind == "f":
-        raise ValueError(f"{what}: the port carries integers, the array {array.dtype}; round it and use .astype(np.{port.dtype})")
+        raise ValueError(f"{what}{when}: the port carries integers, the array {array.dtype}; round it and use .astype(np.{port.dtype})")
     limits = np.iinfo(port.dtype)
     outside = (array < limits.min) | (array > limits.max) if array.dtype.itemsize >= 4 or limits.min == 0 else np.zeros(array.shape, bool)
     if outside.any():
         number = array[outside].flat[0]
-        raise ValueError(f"{what}{first(outside)}: {number} is not between {limits.min} and {limits.max}")
+        raise ValueError(f"{what}{first(outside)}{when}: {number} is not between {limits.min} and {limits.max}")
     return array.astype(port.dtype).view(np.uint32)
 
 
-def word_of(name: str, value: ArrayLike, port: Port) -> int:
-    """The bits of one value for a port."""
-    array = numbers(f"`{name}`", value)
+def word_of(name: str, value: ArrayLike, port: Port, when: str = "") -> int:
+    """The bits of one value for a port; `when` is the time in messages, as ` of tick 3`."""
+    array = numbers(f"`{name}`", value, when)
     if array.shape != ():
-        raise ValueError(f"`{name}` is one number, not an array of shape {array.shape}")
-    return int(words_of(f"`{name}`", port, np.asarray(array)))
+        raise ValueError(f"`{name}`{when} is one number, not an array of shape {array.shape}")
+    return int(words_of(f"`{name}`", port, np.asarray(array), when))
 
 
 def value_of(kind: str, bits: int) -> float | int:

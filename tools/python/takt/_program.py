@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import os
 import warnings as python_warnings
 from collections.abc import Mapping, Sequence
@@ -15,8 +16,10 @@ from takt import _takt
 from takt._batch import Batch
 from takt._errors import AssemblyWarning, Diagnostic, FaultError, diagnostics
 from takt._ports import AnyPath, Array, Port, count_of, limits_of, mapping_of, near, numbers, path_of, words_of
-from takt._results import Accuracy, Analysis, Bound, Enclosure, Largest, Model, Run, Section, Span
+from takt._progress import progress
+from takt._results import Accuracy, Analysis, Bound, Enclosure, Largest, Model, Run, Section, Span, ports_table
 from takt._sim import Sim
+from takt._words import in_python
 
 #: Cycles in which a period ends, or nobody expects it to any more.
 MAX_CYCLES = 1_000_000_000
@@ -121,7 +124,7 @@ class Program:
             FaultError: the program came to a fault before.
             ValueError: there is no such period.
         """
-        given = self._by_port(mapping_of("inputs", inputs))
+        given = self._by_port(mapping_of("inputs", {} if inputs is None else inputs))
         lead = self._lead({what: shape for what, shape, _ in given.values()})
         if len(lead) > 1:
             raise ValueError(f"an analysis is of one run, and the inputs have {lead[0]}")
@@ -154,7 +157,7 @@ class Program:
         Raises:
             FaultError: the program came to a fault.
         """
-        given = self._by_port(mapping_of("inputs", inputs))
+        given = self._by_port(mapping_of("inputs", {} if inputs is None else inputs))
         self._all_given(given)
         lead = self._lead({what: shape for what, shape, _ in given.values()})
         if len(lead) > 1:
@@ -220,7 +223,7 @@ class Program:
             ValueError: a name, shape or value that does not fit, with the name nearest to it.
         """
         tick, max_cycles = limits_of(tick, max_cycles, MAX_CYCLES)
-        given = self._by_port(mapping_of("inputs", inputs))
+        given = self._by_port(mapping_of("inputs", {} if inputs is None else inputs))
         self._all_given(given)
         lead = self._lead({what: shape for what, shape, _ in given.values()})
         if periods is not None:
@@ -332,6 +335,12 @@ class Program:
             text = ", ".join(f"{what} {shape}" for what, shape in shapes.items() if shape)
             raise ValueError(f"inputs of different lengths: {text}") from None
 
+    def _repr_html_(self) -> str:
+        ports = [("input", port.name, port.type) for port in self.inputs.values()]
+        ports += [("output", port.name, port.type) for port in self.outputs.values()]
+        listing = f"<details><summary>listing</summary><pre>{html.escape(self.listing())}</pre></details>"
+        return ports_table(ports, repr(self)[1:-1]) + listing
+
     def __repr__(self) -> str:
         def names(ports: Mapping[str, Port], arrays: Sequence[Array]) -> str:
             listed = [f"{array.name}{list(array.shape) if array.shape else ''}" for array in arrays] or list(ports)
@@ -376,9 +385,11 @@ def assemble(
         raise TypeError(f"a source is a str, not {type(text).__name__}; takt.load reads files")
     if "\n" not in text and text.endswith((".s", ".takt")) and Path(text).is_file():
         raise ValueError(f"{text!r} is a file's name, not a source: takt.load({text!r}) reads it")
-    core = _takt.assemble(
-        text.encode(), name, path_of("folder", folder), _folders(include), machine or DEFAULT_MACHINE, schedule, contract, count_of("effort", effort, 0), list(warnings)
-    )
+    where, included = path_of("folder", folder), _folders(include)
+    with progress(f"building {name}"):
+        core = _takt.assemble(
+            text.encode(), name, where, included, machine or DEFAULT_MACHINE, schedule, contract, count_of("effort", effort, 0), list(warnings)
+        )
     _check_machine(core, machine, name)
     return _warned(Program(core))
 
@@ -412,9 +423,10 @@ def load(
     path = path_of("path", path)
     core, text = _takt.load(path)
     if core is None:
-        core = _takt.assemble(
-            text, path.name, path.parent, _folders(include), machine or DEFAULT_MACHINE, schedule, contract, count_of("effort", effort, 0), list(warnings)
-        )
+        with progress(f"building {path.name}"):
+            core = _takt.assemble(
+                text, path.name, path.parent, _folders(include), machine or DEFAULT_MACHINE, schedule, contract, count_of("effort", effort, 0), list(warnings)
+            )
     _check_machine(core, machine, path)
     return _warned(Program(core))
 
@@ -429,7 +441,7 @@ def _folders(include: Sequence[AnyPath]) -> list[str | os.PathLike[str]]:
 def _warned(program: Program) -> Program:
     found = program._core.warnings
     if found is not None:
-        python_warnings.warn("\n" + found[0].rstrip("\n"), AssemblyWarning, stacklevel=3)
+        python_warnings.warn("\n" + in_python(found[0].rstrip("\n")), AssemblyWarning, stacklevel=3)
     return program
 
 
@@ -439,11 +451,12 @@ def modelled(model: _takt.Model, name: str, machine: str, effort: int | None) ->
     def arrays(shaped: list[tuple[str, list[int], list[str | float | None]]]) -> list[Array]:
         return [Array(name, tuple(shape), tuple(elements)) for name, shape, elements in shaped]
 
-    core = _takt.assemble(
-        model["source"].encode(), name, ".", [], machine, "source", "source", count_of("effort", effort, 0), []
-    )
+    with progress(f"building {name}"):
+        core = _takt.assemble(
+            model["source"].encode(), name, ".", [], machine, "source", "source", count_of("effort", effort, 0), []
+        )
     about = Model(
-        model["title"], tuple(model["notes"]), model["operations"], tuple(model["joints"]), dict(model["texts"])
+        model["title"], tuple(in_python(note) for note in model["notes"]), model["operations"], tuple(model["joints"]), dict(model["texts"])
     )
     data = {name: (core.data_address(array) or 0) + word for name, array, word in model["data"]}
     return _warned(Program(core, arrays(model["inputs"]), arrays(model["outputs"]), about, data))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import json
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,6 +16,8 @@ from takt._errors import FaultError
 from takt._ports import Array
 
 _FLAGS = _takt.flag_names()
+#: Faults that a notebook shows.
+_SHOWN = 3
 
 
 def flags_of(bits: int) -> frozenset[str]:
@@ -164,6 +167,32 @@ class Bound:
     #: The longest period, in cycles, with every tick in time; None if there is no period.
     worst_period: int | None
 
+    def _repr_html_(self) -> str:
+        def span(of: Span) -> str:
+            return str(of.best) if of.best == of.worst else f"{of.best} to {of.worst}"
+
+        rows = [
+            (one.name, one.place or "", span(one.cycles), "" if one.once else span(one.in_time), "" if one.once else span(one.missed))
+            for one in self.sections
+        ]
+        worst = "no period" if self.worst_period is None else f"a period takes {self.worst_period} cycles at most"
+        return _table(("section", "place", "cycles", "tick in time", "after a missed deadline"), rows, worst)
+
+
+def _table(head: Sequence[str], rows: Iterable[Sequence[object]], caption: str) -> str:
+    """A table for a notebook."""
+
+    def row(cells: Sequence[object], tag: str) -> str:
+        return "<tr>" + "".join(f"<{tag}>{html.escape(str(cell))}</{tag}>" for cell in cells) + "</tr>"
+
+    body = "".join(row(cells, "td") for cells in rows)
+    return f"<table><caption>{html.escape(caption)}</caption><thead>{row(head, 'th')}</thead><tbody>{body}</tbody></table>"
+
+
+def ports_table(ports: Iterable[tuple[str, str, str]], caption: str) -> str:
+    """A program's ports for a notebook: direction, name and type of each."""
+    return _table(("port", "name", "type"), ports, caption)
+
 
 class Analysis:
     """Where the cycles of a period went. In a notebook it shows the pipeline as a picture; as text it is the report that
@@ -254,6 +283,16 @@ class Run:
         if self.faults:
             raise FaultError(self.faults[0])
         return self
+
+    def _repr_html_(self) -> str:
+        rows = []
+        for name, values in self.outputs.items():
+            numbers = values[np.isfinite(values)]
+            least, most = (numbers.min(), numbers.max()) if numbers.size else ("", "")
+            last = values[..., -1] if self.cycles.shape and values.ndim == 1 and values.size else values if values.ndim == 0 else ""
+            rows.append((name, values.dtype, values.shape, least, most, last))
+        faults = "".join(f"<pre>{html.escape(fault.text)}</pre>" for fault in self.faults[:_SHOWN])
+        return _table(("output", "type", "shape", "least", "most", "last"), rows, repr(self)[1:-1]) + faults
 
     def __repr__(self) -> str:
         shape, cycles = self.cycles.shape, self.cycles

@@ -11,13 +11,15 @@ from numpy.typing import ArrayLike
 
 from takt import _takt
 from takt._errors import FaultError
-from takt._ports import mapping_of, near, numbers
+from takt._exclusive import exclusive
+from takt._ports import KEPT, mapping_of, near, numbers
 from takt._results import flags_of
 
 if TYPE_CHECKING:
     from takt._program import Program
 
 
+@exclusive("`copy.copy(sim)` or `program.sim()` makes a machine for each thread")
 class Sim:
     """A closed loop, period by period:
 
@@ -31,7 +33,7 @@ class Sim:
         self.program = program
         self._core = core
 
-    def step(self, inputs: Mapping[str, ArrayLike] | None = None) -> dict[str, Any]:
+    def step(self, inputs: Mapping[str, ArrayLike] = KEPT) -> dict[str, Any]:
         """Sets inputs, lets the tick come and runs the program to its `wait`.
 
         Args:
@@ -67,7 +69,7 @@ class Sim:
             if array is None or array.shape == ():
                 pairs = [(name if array is None else array.elements[0], value)]
             else:
-                values = numbers(f"`{name}`", value)
+                values = numbers(f"`{name}`", value, f" of period {self.periods}")
                 if values.shape != array.shape:
                     raise ValueError(f"`{name}` has shape {values.shape}, not {array.shape}")
                 pairs = list(zip(array.elements, values.ravel().tolist()))

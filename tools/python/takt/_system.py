@@ -10,7 +10,9 @@ from numpy.typing import ArrayLike
 
 from takt import _takt
 from takt._errors import FaultError
-from takt._ports import AnyPath, Port, mapping_of, near, path_of, value_of, word_of
+from takt._exclusive import exclusive
+from takt._ports import KEPT, AnyPath, Port, mapping_of, near, path_of, value_of, word_of
+from takt._progress import progress
 
 
 @dataclass(frozen=True)
@@ -26,6 +28,7 @@ class CorePeriods:
     skipped: int
 
 
+@exclusive("`takt.System(path)` makes a system for each thread")
 class System:
     """Cores and links as a system's file describes them (docs/system.md), with Python as the host:
 
@@ -54,7 +57,9 @@ class System:
     pops: dict[str, dict[str, Port]]
 
     def __init__(self, path: AnyPath) -> None:
-        self._core = _takt.SystemSim(path_of("path", path))
+        file = path_of("path", path)
+        with progress(f"building {file.name}"):
+            self._core = _takt.SystemSim(file)
         ins, outs = self._core.ports()
         self.inputs = {name: Port(name, kind) for name, kind in ins}
         self.outputs = {name: Port(name, kind) for name, kind in outs}
@@ -62,7 +67,7 @@ class System:
         self.pushes = {fifo: {name: Port(name, kind) for name, kind in self._core.fields(fifo, False)} for fifo in pushes}
         self.pops = {fifo: {name: Port(name, kind) for name, kind in self._core.fields(fifo, True)} for fifo in pops}
 
-    def step(self, inputs: Mapping[str, ArrayLike] | None = None) -> dict[str, float | int]:
+    def step(self, inputs: Mapping[str, ArrayLike] = KEPT) -> dict[str, float | int]:
         """Writes inputs and runs a base tick.
 
         Args:
@@ -81,7 +86,7 @@ class System:
             port = self.inputs.get(name)
             if port is None:
                 raise ValueError(f"the system has no input `{name}`{near(name, list(self.inputs))}")
-            words.append((name, word_of(name, value, port)))
+            words.append((name, word_of(name, value, port, f" of tick {self.ticks}")))
         found = self._core.step(words)
         return self._shown(self._checked(found))
 

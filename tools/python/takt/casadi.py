@@ -14,6 +14,7 @@ from typing import Any
 
 import takt_expressions
 from takt import _takt
+from takt._errors import ModelError
 from takt._program import DEFAULT_MACHINE, Program, modelled
 
 
@@ -41,6 +42,10 @@ def program(
     """
     if not hasattr(function, "n_instructions"):
         raise TypeError(f"a casadi.Function is needed, not {type(function).__name__}")
-    text, name = takt_expressions.casadi_text(function), str(function.name())
+    name = str(function.name())
+    try:
+        text = takt_expressions.casadi_text(function)
+    except ValueError as error:
+        raise ModelError(f"{name}: {error}") from None
     model = _takt.expressions(text, name, exact, list(without), machine)
     return modelled(model, f"{name}.s", machine, effort)

@@ -40,7 +40,7 @@ def problem(
     x_max: ArrayLike | None = None,
     u_min: ArrayLike | None = None,
     u_max: ArrayLike | None = None,
-    rho: float = 1.0,
+    rho: float | None = None,
     iterations: int = 10,
     references: str = "none",
     warm_start: bool = True,
@@ -52,10 +52,10 @@ def problem(
 
     Args:
         A, B: x' = A x + B u in discrete time.
-        Q, R: Weights of ½ xᵀQx + ½ uᵀRu: a number, a diagonal or a symmetric matrix. The last state's weight is the cost-to-go.
+        Q, R: Weights of ½ xᵀQx + ½ uᵀRu: a number, a diagonal or a symmetric matrix. The last state's weight is the cost-to-go (`terminal_weight`).
         horizon: States of the plan, the given one among them.
         x_min, x_max, u_min, u_max: Limits, one or one for each; an infinite one is none.
-        rho: The penalty of ADMM.
+        rho: The penalty of ADMM; without, one that suits `R`.
         iterations: Iterations in each period.
         references: "none", "constant" (inputs `xr` and `ur`) or "horizon" (a row for each step).
         warm_start: Begins where the period before ended.
@@ -80,8 +80,10 @@ def problem(
             found[key] = [None if np.isinf(x) else float(x) for x in array] if array.ndim else float(array)
             if array.ndim == 0 and np.isinf(array):
                 del found[key]
-    found |= {"horizon": int(horizon), "rho": float(rho), "iterations": int(iterations)}
-    _checked("rho", np.asarray(rho), np.isfinite(rho))
+    found |= {"horizon": int(horizon), "iterations": int(iterations)}
+    if rho is not None:
+        _checked("rho", np.asarray(rho), np.isfinite(rho))
+        found["rho"] = float(rho)
     return found | {"references": references, "warm_start": bool(warm_start), "relinearise": int(relinearise)}
 
 
@@ -105,6 +107,19 @@ def program(problem: Mapping[str, Any], machine: str = DEFAULT_MACHINE, *, effor
         AssemblyError: the program does not fit the machine.
     """
     return modelled(_takt.predictive(_text(problem), machine), "mpc.s", machine, effort)
+
+
+def terminal_weight(problem: Mapping[str, Any]) -> NDArray[np.float64]:
+    """The weight of the plan's last state, of shape (n, n): the cost-to-go of the infinite horizon, with `rho` added to the diagonals of
+    Q and R. Another solver that is to agree with the controller takes it for its last state.
+
+    Args:
+        problem: As `program` takes it.
+
+    Raises:
+        ModelError: parts of the problem do not fit, or it has no such weight: an unstable mode has no weight or is reached by no input.
+    """
+    return np.array(_takt.predictive_weight(_text(problem)))
 
 
 def worst(problem: Mapping[str, Any], starts: int = 100, *, seed: int = 0, periods: int = 1) -> dict[str, Worst]:

@@ -10,11 +10,14 @@ docs/model.md says how descriptions are read and what the functions compute.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
+from typing import Literal
 
 from takt import _takt
 from takt._ports import AnyPath, path_of
 from takt._program import DEFAULT_MACHINE, Program, modelled
+from takt._words import in_python
 
 #: Angles this close to a multiple of a quarter turn are rounded to it, rad.
 SNAP = 1e-6
@@ -32,6 +35,7 @@ def program(
     *,
     base: str | None = None,
     tip: str | None = None,
+    floating: Literal["held", "error"] = "held",
     kp: float = 100.0,
     kd: float = 20.0,
     snap: float = SNAP,
@@ -51,6 +55,7 @@ def program(
         machine: The machine's name.
         base: The link that stays where it is; without, the root.
         tip: Only the joints from the base to this link, whose pose and Jacobian are computed.
+        floating: A base that a joint lets move freely is held where it is, with a warning, or an error.
         kp: For computed torque: gain of the position error, 1/s².
         kd: And of the velocity error, 1/s.
         snap: Angles this close to a multiple of a quarter turn are rounded to it, rad.
@@ -62,16 +67,18 @@ def program(
         ModelError: the description cannot be read, has what the equations cannot express, or does not fit the machine.
         AssemblyError: the program does not fit the machine.
     """
+    if floating not in ("held", "error"):
+        raise ValueError(f"floating is {floating!r}: it is 'held' or 'error'")
     if isinstance(robot, str) and robot.lstrip("\ufeff \t\r\n").startswith("<"):
-        text, name, table = robot, "robot", False
+        data, name, table, folder = robot.encode(), "robot", False, None
     else:
         path = path_of("robot", robot)
-        try:
-            text = path.read_text("utf-8")
-        except UnicodeDecodeError:
-            raise ValueError(f"{path} is not UTF-8 text") from None
-        name, table = path.name, path.suffix.lower() == ".csv"
+        data, name, table, folder = path.read_bytes(), path.name, path.suffix.lower() == ".csv", str(path.parent)
     model = _takt.robot(
-        text, name, table, function, base, tip, (float(kp), float(kd)), float(snap), exact, list(without), machine
+        data, name, folder, table, function, base, tip, floating == "held",
+        (float(kp), float(kd)), float(snap), exact, list(without), machine,
     )
+    for note in model["notes"]:
+        if note.startswith("the base is held"):
+            warnings.warn(in_python(note), stacklevel=2)
     return modelled(model, f"{function}.s", machine, effort)

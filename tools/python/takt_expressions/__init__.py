@@ -20,9 +20,11 @@ def _write(path, text):
         file.write(text)
 
 
-def _text(name, source, inputs, outputs, code):
+def _text(name, source, inputs, outputs, code, notes=()):
     """One instruction a line, so that a message can say where."""
     head = {"format": FORMAT, "name": name, "source": source, "inputs": inputs, "outputs": outputs}
+    if notes:
+        head["notes"] = list(notes)
     lines = ",\n".join("  " + json.dumps(step, allow_nan=False) for step in code)
     return json.dumps(head)[:-1] + ', "code": [\n' + lines + "\n]}\n"
 
@@ -39,11 +41,31 @@ def casadi(function, path):
     _write(path, casadi_text(function))
 
 
+def _expanded(function):
+    try:
+        return function.expand()
+    except RuntimeError as error:
+        # CasADi's own message begins with the place in its sources.
+        reason = str(error).splitlines()[-1].rsplit(": ", 1)[-1]
+        raise ValueError(f"`{function.name()}` cannot be expanded to scalar operations: {reason}") from None
+
+
+def _called(function):
+    """The functions that are called as a whole, and how each becomes an expression."""
+    names = [f"`{called.name()}`" for called in function.find_functions()]
+    are = "is a whole that CasADi cannot look into" if len(names) == 1 else "are wholes that CasADi cannot look into"
+    return (
+        f"`{function.name()}` calls {' and '.join(names) or 'a function'}, which {are}: an integrator of fixed steps becomes an expression "
+        "with the option {'simplify': True}, a function of one's own without {'never_inline': True}; an interpolant (a lookup table), a "
+        "rootfinder and an external function have none"
+    )
+
+
 def casadi_text(function):
     """The same as text."""
     import casadi as ca
 
-    f = function if function.is_a("SXFunction") else function.expand()
+    f = function if function.is_a("SXFunction") else _expanded(function)
     opcodes = {value: name[3:].lower() for name, value in vars(ca).items() if name.startswith("OP_")}
 
     def argument(name, sparsity):
@@ -56,6 +78,8 @@ def casadi_text(function):
     code = []
     for k in range(f.n_instructions()):
         op = opcodes.get(f.instruction_id(k), str(f.instruction_id(k)))
+        if op == "call":
+            raise ValueError(_called(f))
         of, to = f.instruction_input(k), f.instruction_output(k)
         if op == "input":
             code.append({"op": op, "to": to[0], "port": of})
@@ -68,14 +92,43 @@ def casadi_text(function):
     return _text(f.name(), "CasADi " + ca.__version__, inputs, outputs, code)
 
 
+def _inputs(sp, arguments):
+    """The symbol of each input in a list, all different, and a real one in its place."""
+    real, owner = {}, {}
+    for name, symbols in arguments:
+        for symbol in symbols:
+            if isinstance(symbol, sp.Expr) and symbol.is_number or not isinstance(symbol, sp.Basic):
+                raise ValueError(f"the input `{name}` has {symbol}, which is no symbol")
+            if symbol in owner:
+                raise ValueError(f"the symbol {symbol} is an input twice, in `{owner[symbol]}` and in `{name}`")
+            if symbol.is_real is False:
+                raise ValueError(f"the symbol {symbol} of the input `{name}` is declared not to be real")
+            owner[symbol] = name
+            real[symbol] = symbol if symbol.is_real else sp.Dummy(str(symbol), real=True)
+    return real
+
+
+def _of_reals(sp, e, real, taken):
+    """An expression of real inputs, whose derivatives are carried out; `taken` has what depends on symbols that were not declared real."""
+    e = sp.sympify(e)
+    for derivative in e.atoms(sp.Derivative):
+        functions = derivative.expr.atoms(sp.core.function.AppliedUndef) & real.keys()
+        if functions and derivative not in real:
+            raise ValueError(f"{derivative} is no input, and {functions.pop()} is one: its derivative needs an input of its own")
+    for part in e.atoms(sp.Abs, sp.re, sp.im, sp.conjugate, sp.arg):
+        for symbol in real:
+            if real[symbol] is not symbol and part.has(symbol):
+                taken.setdefault(symbol, set()).add(type(part).__name__)
+    e = e.xreplace(real)
+    return e.doit() if e.has(sp.Derivative, sp.Subs) else e
+
+
 class _Sympy:
     """Expressions to instructions, in places that are written once."""
 
-    FUNCTIONS = {
-        "sin": "sin", "cos": "cos", "tan": "tan", "asin": "asin", "acos": "acos", "atan": "atan", "atan2": "atan2",
-        "exp": "exp", "log": "log", "tanh": "tanh", "floor": "floor", "ceiling": "ceil", "Abs": "fabs", "sign": "sign",
-    }
-    FOLDED = {"Add": "add", "Mul": "mul", "Min": "fmin", "Max": "fmax", "And": "and", "Or": "or"}
+    # What is not here keeps its name: `takt model` knows it, or says with the expression that it has no meaning.
+    FUNCTIONS = {"ceiling": "ceil", "Abs": "fabs", "ITE": "if_else"}
+    FOLDED = {"Add": "add", "Mul": "mul", "Min": "fmin", "Max": "fmax", "And": "and", "Or": "or", "Xor": "xor"}
     RELATIONS = {
         "StrictLessThan": ("lt", False), "LessThan": ("le", False), "StrictGreaterThan": ("lt", True),
         "GreaterThan": ("le", True), "Equality": ("eq", False), "Unequality": ("ne", False),
@@ -138,7 +191,8 @@ class _Sympy:
             for a in e.args[1:]:
                 value = self.step(self.FOLDED[name], [value, self.place(a)])
             return value
-        # What has no meaning keeps its name: `takt model` says so, with the expression.
+        if not isinstance(e, (self.sympy.Expr, self.sympy.logic.boolalg.Boolean)):
+            raise ValueError(f"{e} ({name}) is no number")
         return self.step(self.FUNCTIONS.get(name, name), [self.place(a) for a in e.args])
 
 
@@ -153,15 +207,21 @@ def sympy_text(name, inputs, outputs):
     import sympy as sp
 
     def shaped(name, value):
-        matrix = value if isinstance(value, sp.MatrixBase) else sp.Matrix(value if isinstance(value, (list, tuple)) else [value])
+        # A list is none of SymPy's matrices, which have no truth values.
+        flat = list(value) if isinstance(value, (list, tuple)) else [value]
+        if not isinstance(value, sp.MatrixBase) and not any(isinstance(e, (list, tuple, sp.MatrixBase)) for e in flat):
+            return {"name": name, "rows": len(flat), "columns": 1}, flat
+        matrix = value if isinstance(value, sp.MatrixBase) else sp.Matrix(value)
         rows, columns = matrix.shape
         return {"name": name, "rows": rows, "columns": columns}, [matrix[i, j] for j in range(columns) for i in range(rows)]
 
-    walk = _Sympy(sp)
+    walk, taken = _Sympy(sp), {}
     ins, outs = [shaped(*item) for item in inputs.items()], [shaped(*item) for item in outputs.items()]
+    real = _inputs(sp, [(name["name"], symbols) for name, symbols in ins])
     for i, (_, symbols) in enumerate(ins):
         for k, symbol in enumerate(symbols):
-            walk.known[symbol] = walk.step("input", port=[i, k])
+            walk.known[real[symbol]] = walk.step("input", port=[i, k])
+    outs = [(shape, [_of_reals(sp, e, real, taken) for e in values]) for shape, values in outs]
     shared, reduced = sp.cse([e for _, values in outs for e in values])
     for symbol, e in shared:
         walk.known[symbol] = walk.place(sp.sympify(e))
@@ -172,4 +232,6 @@ def sympy_text(name, inputs, outputs):
     for step in walk.code:
         if step["op"] == "output":
             del step["to"]
-    return _text(name, "SymPy " + sp.__version__, [i for i, _ in ins], [o for o, _ in outs], walk.code)
+    said = "was taken to be real; a symbol with real=True says so to SymPy"
+    notes = [f"`{symbol}` in {', '.join(sorted(taken[symbol]))} {said}" for symbol in real if symbol in taken]
+    return _text(name, "SymPy " + sp.__version__, [i for i, _ in ins], [o for o, _ in outs], walk.code, notes)

@@ -99,9 +99,9 @@ def test_what_does_not_fit_is_said():
         batch.step({**given, "kq": 1})
     with pytest.raises(ValueError, match=r"`q` has shape \(3,\), not \(4,\) nor \(\)"):
         batch.step({**given, "q": [1, 2, 3]})
-    with pytest.raises(ValueError, match=r"`q`\[2\]: NaN is no input for a controller"):
+    with pytest.raises(ValueError, match=r"`q`\[2\] of period 0: NaN is no input for a controller"):
         batch.step({**given, "q": [0, 0, np.nan, 0]})
-    with pytest.raises(ValueError, match="`q`: 1e\\+39 does not fit binary32"):
+    with pytest.raises(ValueError, match="`q` of period 0: 1e\\+39 does not fit binary32"):
         batch.step({**given, "q": 1e39})
     # What was refused has not been taken.
     with pytest.raises(ValueError, match="no value for `q`, `qr`, `kp`, `kd`"):
@@ -132,7 +132,7 @@ def test_a_fault_stops_one_and_ends_the_call():
 
 
 def test_arrays_of_ports_keep_their_elements():
-    program = takt.urdf.program(Path(__file__).parents[3] / "programs/model/tests/data/ur5.urdf", "gravity")
+    program = takt.urdf.program(Path(__file__).parents[3] / "asm/front/tests/data/ur5.urdf", "gravity")
     q = np.random.default_rng(4).uniform(-3, 3, (20, 6))
     outputs = program.batch(20).step({"q": q})["tau"]
     # As in runs from arrays; the first joint's torque is constant, and its angle has no port.

@@ -3,12 +3,17 @@
 import os
 import re
 import runpy
+import sys
+import xml.etree.ElementTree as ET
 from pathlib import Path
 
+import pytest
 import takt.mpc
 import takt.mujoco
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
+# A script's own folder, from which it imports; `runpy` does not add it.
+sys.path.insert(0, str(EXAMPLES))
 
 
 def test_the_acrobot_follows_its_reference(capsys):
@@ -45,8 +50,8 @@ def test_the_ur5e_keeps_its_limits_as_the_document_says(capsys):
     rows = {line.split("|")[1].strip(): line for line in table.splitlines()[2:]}
     assert set(rows) == set(names["CASES"])
     spec = names["ur5e"]()
-    model, dynamics = spec.compile(), takt.mujoco.program(spec, "inverse-dynamics")
-    controller = takt.mpc.program(names["plan"]())
+    model, dynamics = spec.compile(), takt.mujoco.program(spec, "inverse-dynamics", effort=20)
+    controller = takt.mpc.program(names["plan"](), effort=20)
     for name, options in names["CASES"].items():
         if not full and name != "exact to the cycle":
             continue
@@ -127,3 +132,19 @@ def test_the_plant_is_the_one_of_the_urdf():
     run = takt.urdf.program(names["URDF"], "forward-dynamics").run({"q": q, "qd": qd, "tau": tau})
     expected = np.array([names["acceleration"](*state) for state in zip(q, qd, tau)])
     np.testing.assert_allclose(run.outputs["qdd"], expected, rtol=1e-4, atol=1e-3)
+
+
+def test_pictures_are_small_and_the_same_in_every_run(tmp_path):
+    plt = pytest.importorskip("matplotlib.pyplot")
+    names = runpy.run_path(str(EXAMPLES / "pictures.py"))
+    figure, axes = plt.subplots()
+    axes.plot([0, 1, 1, 2], [0, 0.5, 0.5, 1])
+    files = [tmp_path / "a.svg", tmp_path / "b.svg"]
+    for file in files:
+        names["save"](figure, file)
+    text = files[0].read_text()
+    assert files[1].read_text() == text and text.count("\n") < 100
+    assert ET.fromstring(text).tag.endswith("svg")
+    # Two equal points are one, and coordinates have one digit after the point.
+    [line] = re.findall(r'<g id="line2d_\d+"><path d="(M[^"]*)" clip-path', text)
+    assert re.fullmatch(r"M[\d.]+ [\d.]+( [\d.]+ [\d.]+){2}", line) and all(len(part.partition(".")[2]) < 2 for part in line[1:].split())

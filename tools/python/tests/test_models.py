@@ -14,7 +14,7 @@ import takt.casadi
 import takt.sympy
 import takt.urdf
 
-UR5 = Path(__file__).parents[3] / "programs/model/tests/data/ur5.urdf"
+UR5 = Path(__file__).parents[3] / "asm/front/tests/data/ur5.urdf"
 PANDA = Path(__file__).parents[3] / "programs/examples/panda/panda.urdf"
 # Relative to the largest output of a state; docs/models.md has the errors that were measured.
 CLOSE = 1e-5
@@ -57,8 +57,8 @@ def test_mx_and_the_errors_of_expressions():
     program = takt.casadi.program(ca.Function("f", [x], [ca.sumsqr(x)], ["x"], ["y"]), "t1")
     assert program.machine == "t1" and program.run({"x": [[3.0, 4.0]]}).outputs["y"].tolist() == [25.0]
     x = ca.SX.sym("x")
-    with pytest.raises(takt.ModelError, match=r"f:\d+: operation `erf` has no meaning here") as raised:
-        takt.casadi.program(ca.Function("f", [x], [ca.erf(x)], ["x"], ["y"]))
+    with pytest.raises(takt.ModelError, match=r"f:\d+: operation `erfinv` has no meaning here") as raised:
+        takt.casadi.program(ca.Function("f", [x], [ca.erfinv(x)], ["x"], ["y"]))
     assert raised.value.line is not None
     single = [x * k for k in range(2, 42)]
     with pytest.raises(takt.ModelError, match="it does not fit: it has 40 outputs that are numbers, t3 has 32 output ports"):
@@ -193,8 +193,10 @@ def test_errors_of_robots(tmp_path):
         takt.urdf.program(UR5, "gravity", tip="wrist")
     with pytest.raises(takt.ModelError, match="ur5.urdf:12: `shoulder_pan_joint`: a floating joint") as raised:
         (tmp_path / "ur5.urdf").write_text(UR5.read_text().replace('type="revolute"', 'type="floating"', 1))
-        takt.urdf.program(tmp_path / "ur5.urdf", "gravity")
+        takt.urdf.program(tmp_path / "ur5.urdf", "gravity", floating="error")
     assert raised.value.line == 12
+    with pytest.warns(UserWarning, match="the base is held, though it floats: `shoulder_pan_joint` .`floating=\"error\"`"):
+        takt.urdf.program(tmp_path / "ur5.urdf", "gravity")
     with pytest.raises(ValueError, match="kp is -1: a gain is finite and not negative"):
         takt.urdf.program(UR5, "computed-torque", kp=-1)
     with pytest.raises(ValueError, match=r"`q` has shape \(4, 5\); an array of shape \(6,\) is needed"):

@@ -13,12 +13,12 @@ import takt
 import takt.mpc
 
 ROOT = Path(__file__).parents[3]
-RECORDED = ROOT / "programs/model/tests/data/mpc"
+RECORDED = ROOT / "asm/front/tests/data/mpc"
 A, B = np.array([[1, 0.1], [0, 0.99]]), np.array([[0.005], [0.1]])
 
 
 def test_the_optimum_of_osqp_is_reached():
-    """Recorded by programs/model/tests/mpc.py: with references in each step, warm start in the same state."""
+    """Recorded by asm/front/tests/mpc.py: with references in each step, warm start in the same state."""
     problem = json.loads((RECORDED / "mass.json").read_text())
     program = takt.mpc.program(problem)
     assert program.model.title == "mass: model-predictive control, 2 states, 1 inputs, a horizon of 8, 20 iterations"

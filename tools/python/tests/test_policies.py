@@ -14,8 +14,8 @@ import takt.onnx
 
 ROOT = Path(__file__).parents[3]
 EXAMPLES = ROOT / "tools/python/examples"
-sys.path.insert(0, str(ROOT / "programs/model/tests"))
-import policies  # noqa: E402 (the models of takt-model's own tests)
+sys.path.insert(0, str(ROOT / "asm/front/tests"))
+import policies  # noqa: E402 (the models of takt-front's own tests)
 
 # Relative to the largest output, or to 1.
 CLOSE = 1e-6
@@ -53,7 +53,7 @@ def test_the_large_policy_takes_less_than_1_15_cycles_a_weight():
 
 def test_what_is_refused(tmp_path):
     bad = dict(policies.bad())
-    with pytest.raises(takt.ModelError, match=r"policy: node `/Conv_1` \(Conv\): this operator is not read"):
+    with pytest.raises(takt.ModelError, match=r"policy: node `/Conv_1` \(Conv\): this operator is not supported: convolutions"):
         takt.onnx.program(bad["conv"])
     (tmp_path / "wide.onnx").write_bytes(bad["wide"].SerializeToString())
     with pytest.raises(takt.ModelError, match="wide: it does not fit: `action` has 40 numbers, t3 has 32 output ports"):

@@ -26,7 +26,7 @@ if (total >= LIMIT) {
   process.exit(1);
 }
 
-/** WebAssembly without its custom sections (number 0), which hold names for debuggers. */
+/** Removes custom sections (number 0) from WebAssembly: they contain names for debuggers. */
 function bare(bytes) {
   const parts = [bytes.subarray(0, 8)];
   for (let at = 8; at < bytes.length; ) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Programs to start from.
+//! Example programs of the playground.
 
 use crate::{CYCLES, PERIODS, SOURCE_BYTES};
 use serde::Deserialize;
@@ -8,15 +8,15 @@ use std::sync::OnceLock;
 use takt_isa::MACHINES;
 use takt_programs::{EXAMPLES, SOURCES};
 
-/// Those of `programs/examples` that come first, in this order; the others follow as they are.
+/// Examples of `programs/examples` at the top of the list, in this order; all others follow.
 const FIRST: [&str; 3] = ["pi.s", "foc.s", "blink.s"];
-/// Periods without inputs in which an example shows what it does.
+/// Number of periods that shows an example without inputs at work.
 const PERIODS_OF: [(&str, usize); 1] = [("blink.s", 2000)];
-/// The controller that drives the robot.
+/// Controller program of the robot.
 pub(crate) const TRACKING: &str = "hybrid/tracking.s";
 
-/// Sources that a program can include by name: the parts of those that come with Takt.
-pub(crate) fn beside() -> &'static [(&'static str, &'static str)] {
+/// Sources that a program can include by name: parts of the shipped programs.
+pub(crate) fn includable_sources() -> &'static [(&'static str, &'static str)] {
     static BESIDE: OnceLock<Vec<(&str, &str)>> = OnceLock::new();
     BESIDE.get_or_init(|| SOURCES.iter().map(|(path, text)| (file_name(path), *text)).collect())
 }
@@ -25,27 +25,27 @@ fn file_name(path: &'static str) -> &'static str {
     path.rsplit_once('/').map_or(path, |(_, name)| name)
 }
 
-/// Which file is to be read.
+/// Request for a file's text.
 #[derive(Deserialize)]
 pub(crate) struct Source {
     name: String,
 }
 
-/// The text of a file that a program can include: one that comes with Takt, or of the library, `<math.s>`.
+/// Text of a shipped file or of a library file (`<math.s>`).
 pub(crate) fn source(wanted: Source) -> Result<Value, String> {
     let Source { name } = wanted;
     let bare = name.trim_start_matches('<').trim_end_matches('>');
-    let known = if bare == name { beside() } else { takt_programs::LIBRARY };
+    let known = if bare == name { includable_sources() } else { takt_programs::LIBRARY };
     let text = known.iter().find(|(known, _)| *known == bare).map(|(_, text)| Value::from(*text));
     text.ok_or_else(|| format!("there is no file `{name}` to be shown"))
 }
 
-/// The description of an example: the words of its first comment.
+/// Description of an example: its first comment.
 fn title(source: &str) -> &str {
     source.lines().find_map(|line| line.strip_prefix(';')).map_or("", str::trim)
 }
 
-/// The data that the page gets first.
+/// Initial data of the page.
 pub(crate) fn about() -> Value {
     let text = |name: &str| EXAMPLES.iter().find(|(known, _)| *known == name).map(|(_, text)| *text);
     let rest =

@@ -1,23 +1,23 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Files to download: image, circuit, header.
+//! Downloads: image, circuit, header.
 
-use crate::program::Loaded;
+use crate::program::LoadedProgram;
 use serde::Deserialize;
 use serde_json::{Value, json};
 use takt_rtl::header::{Header, Language};
 use takt_rtl::{Library, bench, export};
 
-/// Rows of recorded inputs that the test bench gets.
+/// Maximal number of input rows in the test bench.
 const BENCH_PERIODS: usize = 100;
 
-pub(crate) fn image(loaded: &Loaded) -> Result<Vec<u8>, String> {
+pub(crate) fn image(loaded: &LoadedProgram) -> Result<Vec<u8>, String> {
     let assembled = &loaded.assembled;
     takt_asm::image::write_with(&assembled.program, Some(&assembled.debug_info()))
         .map_err(|error| error.to_string())
 }
 
-/// The circuit with its test bench, which runs the program: names and texts of files.
-pub(crate) fn verilog(loaded: &Loaded) -> Result<Value, String> {
+/// Verilog of the machine with a test bench that runs the program: file names and texts.
+pub(crate) fn verilog(loaded: &LoadedProgram) -> Result<Value, String> {
     let program = &loaded.assembled.program;
     let design = export(program.machine, &Library::builtin()).map_err(|error| error.to_string())?;
     let design = design.latching(program.latched_inputs()).map_err(|error| error.to_string())?;
@@ -29,13 +29,13 @@ pub(crate) fn verilog(loaded: &Loaded) -> Result<Value, String> {
 }
 
 #[derive(Deserialize)]
-struct Wanted {
+struct ExportRequest {
     language: String,
 }
 
-/// The facts about the program that a host must know.
-pub(crate) fn header(loaded: &Loaded, params: Value) -> Result<Value, String> {
-    let Wanted { language } = crate::parameters("header", params)?;
+/// Header for the host: ports and addresses of the program.
+pub(crate) fn header(loaded: &LoadedProgram, params: Value) -> Result<Value, String> {
+    let ExportRequest { language } = crate::parameters("header", params)?;
     let language = match language.as_str() {
         "c" => Language::C,
         "rust" => Language::Rust,

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The playground as WebAssembly exports it: bytes in, bytes out, so that the JavaScript beside it is a dozen lines.
+//! WebAssembly exports of the playground: bytes in, bytes out, with a dozen lines of JavaScript on the other side.
 //!
-//! The page asks for room with [`takt_input`], writes a method, a line feed and its parameters there, and calls [`takt_call`] or
-//! [`takt_image`]; the answer has as many bytes as they return, at [`takt_output`]. An answer is `{"ok": …}` or `{"error": "…"}`.
-//! Nothing here is unsafe but that names are exported.
+//! The page requests a buffer with [`takt_input`], writes a method, a line feed and JSON parameters, and calls [`takt_call`] or
+//! [`takt_image`]. The result is the answer's length in bytes; the answer is at [`takt_output`], as `{"ok": …}` or `{"error": "…"}`. The
+//! only unsafe part is the export of names.
 #![allow(
     unsafe_code,
     unreachable_pub,
@@ -25,7 +25,7 @@ thread_local! {
     static EXCHANGE: RefCell<Exchange> = RefCell::default();
 }
 
-/// Room for a request of so many bytes.
+/// Allocates a request buffer of `length` bytes.
 #[unsafe(no_mangle)]
 pub extern "C" fn takt_input(length: usize) -> *mut u8 {
     EXCHANGE.with_borrow_mut(|exchange| {
@@ -34,7 +34,7 @@ pub extern "C" fn takt_input(length: usize) -> *mut u8 {
     })
 }
 
-/// Answers the request; the number of bytes of the answer.
+/// Answers the request; returns the answer's length in bytes.
 #[unsafe(no_mangle)]
 pub extern "C" fn takt_call() -> usize {
     EXCHANGE.with_borrow_mut(|exchange| {
@@ -50,7 +50,7 @@ pub extern "C" fn takt_call() -> usize {
     })
 }
 
-/// The image of the program; the number of its bytes, 0 if there is none.
+/// Writes the program's image; returns its length in bytes, 0 without a program.
 #[unsafe(no_mangle)]
 pub extern "C" fn takt_image() -> usize {
     EXCHANGE.with_borrow_mut(|exchange| {
@@ -59,7 +59,7 @@ pub extern "C" fn takt_image() -> usize {
     })
 }
 
-/// The address of the last answer.
+/// Address of the last answer.
 #[unsafe(no_mangle)]
 pub extern "C" fn takt_output() -> *const u8 {
     EXCHANGE.with_borrow(|exchange| exchange.output.as_ptr())

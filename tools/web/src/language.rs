@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The language server, its messages as JSON.
+//! Language server of the playground, with JSON messages.
 
 use crate::examples;
 use lsp_server::Message;
@@ -11,7 +11,7 @@ pub(crate) fn server(machine: &'static Machine) -> Inline {
     Inline::new(Settings {
         machine,
         library: takt_programs::LIBRARY,
-        beside: examples::beside(),
+        beside: examples::includable_sources(),
         library_by_name: true,
         ..Settings::default()
     })

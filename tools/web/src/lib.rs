@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The playground: what a page in a browser asks of Takt.
+//! Playground: Takt's services for a web page.
 //!
-//! [`Playground::call`] takes a method and its parameters as JSON and answers in JSON, so that everything here is tested
-//! without a browser. In one, `exports` hands the texts across. The page itself is in `page/`; nothing of the language is in it:
-//! colours, diagnostics and completion come from [`takt_editor::lsp`], the pipeline's picture from [`takt_analysis::picture`].
+//! [`Playground::call`] takes a method with JSON parameters and answers in JSON, so that all of it is testable without a browser. In a
+//! browser, `exports` passes the texts. The page in `page/` knows nothing of the language: colours, diagnostics and completion come from
+//! [`takt_editor::lsp`], the pipeline diagram from [`takt_analysis::picture`].
 //!
 //! | method | what it does |
 //! |---|---|
@@ -17,7 +17,7 @@
 //! | `picture` | the pipeline's picture as data |
 //! | `listing`, `header`, `verilog`, `image` | what can be taken away |
 //!
-//! Nothing here knows the time or waits: whoever calls divides what is long.
+//! The crate has no clock and never waits: the caller divides long work into calls.
 
 mod examples;
 mod export;
@@ -30,7 +30,7 @@ mod run;
 mod track;
 mod view;
 
-use program::Loaded;
+use program::LoadedProgram;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
@@ -39,17 +39,17 @@ use takt_editor::lsp::Inline;
 use takt_isa::Machine;
 use takt_isa::timing::Cycle;
 
-/// Cycles that a period, or a command of the debugger, may take: about a second in a browser.
+/// Maximal number of cycles of a period or of a debugger command: about a second in a browser.
 pub const CYCLES: Cycle = 20_000_000;
-/// Rows of recorded inputs, and periods of a run.
+/// Maximal number of input rows, and of periods in a run.
 pub const PERIODS: usize = 100_000;
-/// Bytes of a source.
+/// Maximal size of a source in bytes.
 pub const SOURCE_BYTES: usize = 4 << 20;
 
-/// The results for the page's program so far.
+/// State of the page: language server, loaded program, debug session, and runs.
 pub struct Playground {
     language: Inline,
-    loaded: Option<Loaded>,
+    loaded: Option<LoadedProgram>,
     console: Option<Console>,
     run: Option<run::Run>,
     track: Option<track::Track>,
@@ -61,7 +61,7 @@ impl Default for Playground {
     }
 }
 
-/// Parameters of a method.
+/// Deserialises the parameters of a method.
 fn parameters<P: DeserializeOwned>(method: &str, params: Value) -> Result<P, String> {
     serde_json::from_value(params).map_err(|error| format!("the parameters of `{method}`: {error}"))
 }
@@ -73,19 +73,19 @@ impl Playground {
         Playground { language, loaded: None, console: None, run: None, track: None }
     }
 
-    /// Answers a request of the page.
+    /// Answers a request from the page.
     ///
     /// # Errors
-    /// Its mistakes, for the user to read.
+    /// A message for the user on an invalid request.
     pub fn call(&mut self, method: &str, params: Value) -> Result<Value, String> {
         #[derive(Deserialize)]
-        struct OfMachine {
+        struct MachineParameters {
             machine: String,
         }
         match method {
             "about" => Ok(examples::about()),
             "lsp.start" => {
-                let OfMachine { machine: name } = parameters(method, params)?;
+                let MachineParameters { machine: name } = parameters(method, params)?;
                 self.language = language::server(program::machine(&name)?);
                 Ok(Value::Null)
             }
@@ -105,15 +105,15 @@ impl Playground {
         }
     }
 
-    /// The image of the program, with what a debugger needs.
+    /// Image of the loaded program, with debug information.
     ///
     /// # Errors
-    /// If there is no program, or it does not fit an image.
+    /// If no program is loaded, or the image format cannot hold it.
     pub fn image(&self) -> Result<Vec<u8>, String> {
         export::image(self.loaded()?)
     }
 
-    fn loaded(&self) -> Result<&Loaded, String> {
+    fn loaded(&self) -> Result<&LoadedProgram, String> {
         self.loaded.as_ref().ok_or_else(|| "no program is assembled yet".to_owned())
     }
 }

@@ -1,16 +1,15 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Units and limits of ports, for the axes of their plots. The language has no units: by convention, a declaration's comment
-//! begins with them, as in `.output u ; V`.
+//! Units and limits of ports, for the axes of plots. The language has no units; by convention a declaration's comment begins with them, as
+//! in `.output u ; V`.
 
 use takt_isa::{BundleAddress, Instruction, Program, Register, SlotIndex};
 
-/// Characters of a unit at most.
+/// Maximal length of a unit in characters.
 const UNIT: usize = 12;
-/// Copies on the way from a limiting operation to a port.
+/// Maximal number of copies followed between a limiting operation and a port.
 const COPIES: usize = 8;
 
-/// The unit that the comment behind a port's declaration begins with; `None` if it begins with other words. `directive` is
-/// `.input` or `.output`.
+/// Unit at the beginning of a port declaration's comment; `None` if the comment begins otherwise. `directive` is `.input` or `.output`.
 pub(crate) fn unit(sources: &[(String, String)], directive: &str, port: &str) -> Option<String> {
     let lines = sources.iter().flat_map(|(_, text)| text.lines());
     let declared = lines.filter_map(|line| line.trim_start().strip_prefix(directive));
@@ -18,7 +17,7 @@ pub(crate) fn unit(sources: &[(String, String)], directive: &str, port: &str) ->
         let at = names.split(',').map(|name| name.trim()).position(|name| names_it(name, port))?;
         let comment = comment.trim();
         let units: Vec<&str> = comment.split([':', ';']).next()?.split(',').map(str::trim).collect();
-        // As many units as names: each has its own. Else the first word is the unit of all.
+        // Equally many units and names correspond one to one; otherwise the first unit applies to all names.
         let own = units.len() > 1
             && units.len() == names.split(',').count()
             && units.iter().all(|one| is_unit(one));
@@ -27,7 +26,7 @@ pub(crate) fn unit(sources: &[(String, String)], directive: &str, port: &str) ->
     })
 }
 
-/// True if a declared name, `x:int`, `y[3]` or `x{i}`, declares the port.
+/// A declared name, such as `x:int`, `y[3]` or `x{i}`, declares the port.
 fn names_it(declared: &str, port: &str) -> bool {
     let name = declared.split([':', ' ', '[', '{']).next().unwrap_or_default();
     let whole = declared.split([':', ' ']).next() == Some(name);
@@ -40,7 +39,7 @@ fn names_it(declared: &str, port: &str) -> bool {
     })
 }
 
-/// True for what looks like a unit: one short word of letters, with powers, products and quotients, and no word of prose.
+/// Product or quotient of powers of known unit symbols, at most [`UNIT`] characters long.
 fn is_unit(word: &str) -> bool {
     const BASE: [&str; 22] = [
         "m", "mm", "um", "µm", "s", "ms", "µs", "g", "kg", "A", "mA", "V", "mV", "W", "N", "J", "Hz", "rad",
@@ -55,15 +54,14 @@ fn is_unit(word: &str) -> bool {
         })
 }
 
-/// The limit that `fsat` keeps an output port within, ±, if the operation that writes the port is one, perhaps with copies in
-/// between, and its limit is a constant.
+/// Limit ± of an output port: the constant limit of the `fsat` that writes it, directly or through copies.
 pub(crate) fn limit(program: &Program, port: Register) -> Option<f32> {
-    // Where two operations write the port, as in `.once` and in the period, the one that limits says how far.
+    // If several operations write the port, for example one in `.once`, take the limit of the first that limits.
     let writers = writers(program, port);
     writers.iter().find_map(|(address, instruction)| saturated(program, *address, instruction, COPIES))
 }
 
-/// The operations that write a register, with their bundles, in the order of the code.
+/// Operations that write a register, with their bundles, in code order.
 fn writers(program: &Program, register: Register) -> Vec<(BundleAddress, Instruction)> {
     let all = program.addresses().flat_map(|address| {
         let bundle = program.bundle(address).and_then(Result::ok).unwrap_or_default();
@@ -88,7 +86,7 @@ fn saturated(
         }
         "mov" if copies > 0 => {
             let source = *instruction.reads().first()?;
-            // The nearest write before it in the order of the code.
+            // Follow the nearest preceding write in code order.
             let (before, writer) = writers(program, source).into_iter().rfind(|(at, _)| *at < address)?;
             saturated(program, before, &writer, copies - 1)
         }

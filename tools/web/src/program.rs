@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Assembling what the page holds.
+//! Assembly of the page's program.
 
 use crate::{CYCLES, PERIODS, Playground, SOURCE_BYTES, examples, ports, view};
 use serde::Deserialize;
@@ -9,7 +9,7 @@ use std::num::NonZeroU64;
 use std::sync::Arc;
 use takt_analysis::SectionBounds;
 use takt_asm::schedule::BlockReport;
-use takt_asm::{Assembled, MemoryLoader, Options, Search};
+use takt_asm::{AssembledProgram, MemoryLoader, Options, Search};
 use takt_debug::console::Console;
 use takt_debug::inputs::{self, Table};
 use takt_debug::session::{self, Session};
@@ -18,30 +18,30 @@ use takt_isa::Machine;
 use takt_isa::program::Port;
 use takt_isa::timing::Span;
 
-/// A program, and what it is run on.
-pub(crate) struct Loaded {
+/// The loaded program with its inputs.
+pub(crate) struct LoadedProgram {
     pub(crate) name: String,
-    pub(crate) assembled: Assembled,
-    /// Recorded inputs; `None`: the ports are 0.
+    pub(crate) assembled: AssembledProgram,
+    /// Recorded inputs; `None`: all ports are 0.
     pub(crate) rows: Option<Arc<Rows>>,
     pub(crate) tick: Option<NonZeroU64>,
 }
 
-/// A source to assemble.
+/// Request to assemble a source.
 #[derive(Deserialize)]
-pub(crate) struct Assemble {
+pub(crate) struct AssembleRequest {
     name: String,
     source: String,
     machine: String,
-    /// A table (CSV) with a column for each input port; blank, or for other ports: the ports are 0.
+    /// Input table (CSV) with a column for each input port. If it is blank or belongs to other ports, all ports are 0.
     #[serde(default)]
     inputs: String,
-    /// Cycles between ticks; 0: the tick comes when the program is ready.
+    /// Cycles between ticks; 0: a tick comes as soon as the program waits.
     #[serde(default)]
     tick: u64,
 }
 
-/// The machine that the page asks for: by its name, or by the text of its file, which has several lines.
+/// Machine by name, or by the text of a machine file, which has several lines.
 pub(crate) fn machine(wanted: &str) -> Result<&'static Machine, String> {
     match wanted.contains('\n') {
         true => takt_asm::machine::read("machine.toml", wanted).map_err(|mistakes| mistakes.render(false)),
@@ -49,19 +49,20 @@ pub(crate) fn machine(wanted: &str) -> Result<&'static Machine, String> {
     }
 }
 
-/// The name by which errors call the inputs.
+/// Name of the input table in messages.
 const INPUTS: &str = "inputs";
 
 impl Playground {
-    /// Assembles, bounds the cycles, opens a session at the beginning.
-    pub(crate) fn assemble(&mut self, wanted: Assemble) -> Result<Value, String> {
+    /// Assembles a source, bounds its cycles, and opens a debug session.
+    pub(crate) fn assemble(&mut self, wanted: AssembleRequest) -> Result<Value, String> {
         let machine = machine(&wanted.machine)?;
         (self.loaded, self.console, self.run, self.track) = (None, None, None, None);
         if wanted.source.len() > SOURCE_BYTES {
             return Err(format!("the source has more than {} MiB", SOURCE_BYTES >> 20));
         }
         let name = if wanted.name.is_empty() { "main.s".to_owned() } else { wanted.name };
-        let loader = Search::new(MemoryLoader::new(examples::beside())).library(takt_programs::LIBRARY);
+        let loader =
+            Search::new(MemoryLoader::new(examples::includable_sources())).library(takt_programs::LIBRARY);
         let options = Options { machine, ..Options::default() };
         let assembled = match takt_asm::assemble_bytes(&name, wanted.source.into_bytes(), &loader, &options) {
             Ok(assembled) => assembled,
@@ -75,7 +76,7 @@ impl Playground {
         let empty = program.bundles() == 0;
         let table = wanted.inputs.as_bytes();
         let is_blank = wanted.inputs.trim().is_empty();
-        // A table for other ports is one of the text before: it says nothing of this program.
+        // A table with other ports belongs to a previous program: ignore it.
         let others =
             Table::new(INPUTS.to_owned(), Box::new(Cursor::new(table.to_vec())), &program.inputs).err();
         let others = others.filter(|_| !is_blank);
@@ -89,8 +90,8 @@ impl Playground {
             Ok(rows) => (rows, None),
             Err(error) => (None, Some(error)),
         };
-        let loaded = Loaded { name, assembled, rows, tick: NonZeroU64::new(wanted.tick) };
-        let mut told = told(&loaded);
+        let loaded = LoadedProgram { name, assembled, rows, tick: NonZeroU64::new(wanted.tick) };
+        let mut told = facts(&loaded);
         told["inputs_error"] = json!(inputs_error);
         told["inputs_of_others"] = json!(others);
         if !empty && inputs_error.is_none() {
@@ -104,8 +105,8 @@ impl Playground {
     }
 }
 
-impl Loaded {
-    /// A debug session at the beginning.
+impl LoadedProgram {
+    /// Debug session at the beginning of the program.
     fn session(&self) -> Result<Session, String> {
         let info = self.assembled.debug_info();
         let options = session::Options {
@@ -123,9 +124,9 @@ impl Loaded {
     }
 }
 
-/// The facts about a program that assembles.
-fn told(loaded: &Loaded) -> Value {
-    let Loaded { assembled, name, .. } = loaded;
+/// Facts about the assembled program, for the page.
+fn facts(loaded: &LoadedProgram) -> Value {
+    let LoadedProgram { assembled, name, .. } = loaded;
     let program = &assembled.program;
     let sources = assembled.debug_info().sources;
     let port = |port: &Port, what: &str| {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Periods on the emulator, with what the ports carried in each; and one of them as a picture.
+//! Runs of periods on the emulator with the values of all ports, and the pipeline diagram of a period.
 
-use crate::program::Loaded;
+use crate::program::LoadedProgram;
 use crate::{CYCLES, PERIODS, Playground};
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
@@ -12,40 +12,40 @@ use takt_emu::{Emulator, PeriodError, Status};
 use takt_isa::program::Port;
 use takt_isa::{Program, Register, Type};
 
-/// Periods without recorded inputs.
+/// Default number of periods without recorded inputs.
 const ZERO_PERIODS: usize = 20;
-/// Cycles after which a call gives back what it has.
+/// Maximal number of cycles in a call.
 const SLICE: u64 = 1_000_000;
-/// Periods after which it does.
+/// Maximal number of periods in a call.
 const SLICE_PERIODS: u64 = 2000;
 
-/// A run that is under way.
+/// A run in progress.
 pub(crate) struct Run {
     emulator: Emulator,
-    /// Periods that are over, and those that there will be.
+    /// Periods done, and periods in total.
     done: u64,
     all: u64,
 }
 
-/// A request for a run.
+/// Request to run periods.
 #[derive(Deserialize)]
-pub(crate) struct Wanted {
-    /// From the beginning; else further.
+pub(crate) struct RunRequest {
+    /// Restart from the beginning instead of continuing.
     #[serde(default)]
     begin: bool,
-    /// Periods without recorded inputs.
+    /// Number of periods without recorded inputs.
     #[serde(default)]
     periods: Option<usize>,
 }
 
-impl Loaded {
+impl LoadedProgram {
     fn emulator(&self) -> Result<Emulator, String> {
         let mut emulator = Emulator::new(&self.assembled.program).map_err(|error| error.to_string())?;
         emulator.set_tick_period(self.tick);
         Ok(emulator)
     }
 
-    /// A fault, or what else ends a period, at its source line.
+    /// Message of a fault or another end of a period, at its source line.
     pub(crate) fn fault(&self, error: &PeriodError) -> String {
         match error {
             PeriodError::Fault(fault) => {
@@ -56,7 +56,7 @@ impl Loaded {
     }
 }
 
-/// Sets the inputs of a period, from 0, and lets it take [`CYCLES`].
+/// Sets a period's inputs (periods count from 0) and its limit of [`CYCLES`].
 fn prepare(emulator: &mut Emulator, rows: Option<&Rows>, period: u64) -> Result<(), String> {
     let zeros: Vec<(Register, u32)>;
     let row = match rows {
@@ -73,8 +73,7 @@ fn prepare(emulator: &mut Emulator, rows: Option<&Rows>, period: u64) -> Result<
     Ok(())
 }
 
-/// A port's value as a number to plot; nothing where there is none. JSON has no words for what is not finite: `"NaN"`, `"inf"`,
-/// `"-inf"`.
+/// Value of a port as a JSON number; null without a value, and `"NaN"`, `"inf"`, `"-inf"` for values that JSON lacks.
 fn number(ty: Type, bits: Option<u32>) -> Value {
     match (ty, bits) {
         (_, None) => Value::Null,
@@ -92,8 +91,8 @@ fn has_periods(program: &Program) -> bool {
 }
 
 impl Playground {
-    /// Runs on, for a slice; what the ports carried in each of its periods.
-    pub(crate) fn run(&mut self, wanted: Wanted) -> Result<Value, String> {
+    /// Runs a slice of periods; returns the port values of each period.
+    pub(crate) fn run(&mut self, wanted: RunRequest) -> Result<Value, String> {
         if wanted.begin {
             let loaded = self.loaded()?;
             let recorded = loaded.rows.as_ref().map(|rows| rows.len());
@@ -166,16 +165,16 @@ impl Playground {
     }
 }
 
-/// Which period is to be drawn.
+/// Request for the diagram of a period.
 #[derive(Deserialize)]
-pub(crate) struct Which {
-    /// From 1; 0 is what runs once.
+pub(crate) struct PeriodRequest {
+    /// Period from 1; 0 is the code from reset to the first `wait`.
     period: u64,
 }
 
 impl Playground {
-    /// The picture of a period's pipeline, as data.
-    pub(crate) fn picture(&self, wanted: Which) -> Result<Value, String> {
+    /// Pipeline diagram of a period, as data.
+    pub(crate) fn picture(&self, wanted: PeriodRequest) -> Result<Value, String> {
         let loaded = self.loaded()?;
         let program = &loaded.assembled.program;
         let mut emulator = loaded.emulator()?;

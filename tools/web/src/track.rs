@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The robot: a tracking program in the closed loop along the AGH path.
+//! Closed loop of a tracking program and the robot along the AGH path.
 
-use crate::program::Loaded;
+use crate::program::LoadedProgram;
 use crate::{CYCLES, Playground};
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -9,15 +9,15 @@ use std::sync::OnceLock;
 use takt_emu::{Emulator, PeriodError};
 use takt_programs::hybrid::closed_loop::{ClosedLoop, Inputs, TrackingController, TrackingError};
 use takt_programs::hybrid::params;
-use takt_programs::hybrid::{Binding, LoopError, Outputs, Unwritten};
+use takt_programs::hybrid::{Binding, LoopError, Outputs, UnwrittenOutput};
 use takt_programs::trajectory::Trajectory;
 
-/// Periods that a call drives at most.
+/// Maximal number of periods in a call.
 const SLICE: u64 = 20_000;
-/// Every so many periods the pose is kept for drawing.
+/// Distance in periods between two poses kept for drawing.
 const EVERY: u64 = 100;
 
-/// The AGH path, planned once.
+/// Plan of the AGH path, computed once.
 fn trajectory() -> Result<&'static Trajectory, String> {
     static TRAJECTORY: OnceLock<Result<Trajectory, String>> = OnceLock::new();
     let plan = || {
@@ -28,58 +28,58 @@ fn trajectory() -> Result<&'static Trajectory, String> {
     TRAJECTORY.get_or_init(plan).as_ref().map_err(Clone::clone)
 }
 
-/// The reason for which the loop ends early.
-pub(crate) enum Lost {
+/// Errors that end the loop early.
+pub(crate) enum LoopFailure {
     Period(PeriodError),
-    Unwritten(Unwritten),
+    Unwritten(UnwrittenOutput),
 }
 
-/// The program as the controller.
-struct OnEmulator {
+/// The program on the emulator, as the loop's controller.
+struct EmulatorController {
     emulator: Emulator,
     binding: Binding,
     cycles: u64,
 }
 
-impl TrackingController for OnEmulator {
-    type Error = Lost;
+impl TrackingController for EmulatorController {
+    type Error = LoopFailure;
 
-    fn step(&mut self, inputs: &Inputs) -> Result<Outputs<f64>, Lost> {
+    fn step(&mut self, inputs: &Inputs) -> Result<Outputs<f64>, LoopFailure> {
         let Self { emulator, binding, cycles } = self;
         for (register, bits) in binding.inputs.iter().zip(inputs.to_words()) {
-            emulator.set_input_bits(*register, bits).map_err(|error| Lost::Period(error.into()))?;
+            emulator.set_input_bits(*register, bits).map_err(|error| LoopFailure::Period(error.into()))?;
         }
         emulator.set_cycle_limit(emulator.now() + CYCLES);
-        *cycles = emulator.run_period(&[]).map_err(Lost::Period)?.cycles;
-        binding.outputs(|register| emulator.output_bits(register)).map_err(Lost::Unwritten)
+        *cycles = emulator.run_period(&[]).map_err(LoopFailure::Period)?.cycles;
+        binding.outputs(|register| emulator.output_bits(register)).map_err(LoopFailure::Unwritten)
     }
 }
 
-/// A drive along the path.
+/// A drive along the path in progress.
 pub(crate) struct Track {
-    closed_loop: ClosedLoop<'static, OnEmulator>,
+    closed_loop: ClosedLoop<'static, EmulatorController>,
     errors: TrackingError,
-    /// Periods that are over.
+    /// Number of completed periods.
     done: u64,
     longest: u64,
 }
 
-/// The length of the drive.
+/// Request to drive on.
 #[derive(Deserialize)]
-pub(crate) struct Wanted {
-    /// From the beginning; else further.
+pub(crate) struct DriveRequest {
+    /// Restart from the beginning instead of continuing.
     #[serde(default)]
     begin: bool,
     periods: u64,
 }
 
-impl Loaded {
-    fn lost(&self, error: &LoopError<Lost>) -> String {
+impl LoadedProgram {
+    fn lost(&self, error: &LoopError<LoopFailure>) -> String {
         match error {
-            LoopError::Controller { period, source: Lost::Period(error) } => {
+            LoopError::Controller { period, source: LoopFailure::Period(error) } => {
                 format!("period {}: {}", period + 1, self.fault(error))
             }
-            LoopError::Controller { period, source: Lost::Unwritten(error) } => {
+            LoopError::Controller { period, source: LoopFailure::Unwritten(error) } => {
                 format!("period {}: {error}", period + 1)
             }
             LoopError::NotFinite { period, port } => format!("period {}: {port} is not finite", period + 1),
@@ -91,15 +91,16 @@ impl Loaded {
 }
 
 impl Playground {
-    /// Drives on; the poses on the way.
-    pub(crate) fn track(&mut self, wanted: Wanted) -> Result<Value, String> {
+    /// Continues the drive; returns the poses on the way.
+    pub(crate) fn track(&mut self, wanted: DriveRequest) -> Result<Value, String> {
         let trajectory = trajectory()?;
         if wanted.begin {
             let loaded = self.loaded()?;
             let program = &loaded.assembled.program;
             let binding = Binding::new(program).map_err(|error| error.to_string())?;
             let emulator = Emulator::new(program).map_err(|error| error.to_string())?;
-            let closed_loop = ClosedLoop::new(trajectory, OnEmulator { emulator, binding, cycles: 0 });
+            let closed_loop =
+                ClosedLoop::new(trajectory, EmulatorController { emulator, binding, cycles: 0 });
             self.track = Some(Track { closed_loop, errors: TrackingError::default(), done: 0, longest: 0 });
         }
         let mut track = self.track.take().ok_or("no drive has begun")?;

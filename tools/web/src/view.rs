@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The debug session as the page shows it.
+//! JSON view of the debug session for the page.
 
 use crate::Playground;
 use serde::Deserialize;
 use serde_json::{Value, json};
 use takt_debug::console::Console;
-use takt_debug::panes::Named;
-use takt_debug::session::{Stop, Where};
+use takt_debug::panes::NamedRegister;
+use takt_debug::session::{BreakpointLocation, Stop};
 
-/// A line for the debugger's console.
+/// Request to execute a console command.
 #[derive(Deserialize)]
 pub(crate) struct Execute {
     line: String,
@@ -22,14 +22,14 @@ impl Playground {
     }
 }
 
-fn named(row: &Named) -> Value {
+fn named(row: &NamedRegister) -> Value {
     json!({
         "name": row.name, "place": row.place, "type": row.ty.name(), "value": row.value(),
-        "every_way": row.every_way(), "changed": row.changed, "used": row.used,
+        "every_way": row.every_way(), "note": row.note, "changed": row.changed, "used": row.used,
     })
 }
 
-/// Everything that there is to see at this position.
+/// Contents of all panes at this position.
 pub(crate) fn view(console: &mut Console) -> Value {
     let panes = console.panes();
     let session = console.session();
@@ -38,13 +38,13 @@ pub(crate) fn view(console: &mut Console) -> Value {
     let program = session.program();
     let breaks = session.stops().iter().filter_map(|(id, stop)| {
         let at = match stop {
-            Stop::Break { at: Where::Line(at, _), .. } => *at,
-            Stop::Break { at: Where::Bundle(bundle), .. } => program.location(*bundle)?,
+            Stop::Break { at: BreakpointLocation::Line(at, _), .. } => *at,
+            Stop::Break { at: BreakpointLocation::Bundle(bundle), .. } => program.location(*bundle)?,
             _ => return None,
         };
         Some(json!({ "id": id, "file": program.files.get(at.file as usize), "line": at.line }))
     });
-    let rows = |rows: &[Named]| rows.iter().map(named).collect::<Vec<_>>();
+    let rows = |rows: &[NamedRegister]| rows.iter().map(named).collect::<Vec<_>>();
     let flight = panes.flight.iter().map(|one| {
         json!({ "left": one.left, "register": one.register, "mnemonic": one.mnemonic, "from": one.from })
     });

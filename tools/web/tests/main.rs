@@ -1,4 +1,4 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Tests of the crate from outside, one program: a module for each subject.
+//! Integration tests in one binary: one module for each subject.
 
 mod playground;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The playground as the page calls it, without a browser.
+//! Playground methods as the page calls them, without a browser.
 
 use serde_json::{Value, json};
 use takt_web::{CYCLES, Playground};
@@ -43,7 +43,7 @@ fn every_example_assembles_and_runs() {
             let all = numbers.iter().all(Value::is_number);
             assert!(all && !numbers.is_empty(), "{}: {port} is {values}", example["name"]);
         }
-        // An example without inputs does something in the periods that it asks for.
+        // An example without inputs must change its lamp within its number of periods.
         if !has_inputs {
             let mut lit = Vec::new();
             for begin in [true, false] {
@@ -68,7 +68,7 @@ fn every_example_assembles_and_runs() {
 }
 
 #[test]
-fn a_run_gives_what_the_ports_carried() {
+fn run_returns_the_values_of_the_ports() {
     let mut playground = Playground::default();
     assemble(&mut playground, DOUBLE, "x,other\n1,5\n-2.5,6\n");
     let ran = call(&mut playground, "run", json!({ "begin": true }));
@@ -81,7 +81,7 @@ fn a_run_gives_what_the_ports_carried() {
 }
 
 #[test]
-fn values_that_are_no_numbers_are_named() {
+fn reports_values_that_are_not_numbers() {
     let mut playground = Playground::default();
     let source = ".input x\n.output y, z\n.period\nstart:\n    fdiv y, x, x\n    fdiv z, one, x\n.const one = 1\n    wait start\n";
     assemble(&mut playground, source, "x\n0\n2\n");
@@ -135,7 +135,7 @@ fn long_runs_come_in_slices() {
 }
 
 #[test]
-fn mistakes_are_told() {
+fn reports_mistakes() {
     let mut playground = Playground::default();
     let told = assemble(&mut playground, "    fmull y, x, x\n", "");
     assert_eq!(told["assembled"], false);
@@ -144,7 +144,7 @@ fn mistakes_are_told() {
     assert_eq!(error, "no program is assembled yet");
     let told = assemble(&mut playground, DOUBLE, "x\n1\ntwo\n");
     assert_eq!(told["inputs_error"], "inputs:3: column x: `two` is no number");
-    // A table for other ports is one of another text: the program runs, with zeros.
+    // A table for other ports belongs to another program: the program runs with zeros.
     let told = assemble(&mut playground, DOUBLE, "a,b\n1,2\n");
     assert_eq!((&told["inputs_error"], &told["rows"]), (&Value::Null, &Value::Null));
     assert_eq!(told["inputs_of_others"], "inputs: no column for the input port x");
@@ -154,7 +154,7 @@ fn mistakes_are_told() {
     );
     assert_eq!(assemble(&mut playground, DOUBLE, " \n")["inputs_of_others"], Value::Null);
     assert_eq!(assemble(&mut playground, DOUBLE, "x\n1\n")["inputs_of_others"], Value::Null);
-    // A page has no command line.
+    // Messages must not suggest command-line options: a page has none.
     let told = assemble(&mut playground, ".include \"no.s\"\n", "");
     let text = told["text"].as_str().unwrap_or_default();
     assert!(text.contains("robot.s") && !text.contains("-I"), "{text}");
@@ -173,7 +173,7 @@ fn mistakes_are_told() {
     assert!(playground.call("nothing", Value::Null).is_err());
     let params = json!({ "name": "", "source": "x".repeat(takt_web::SOURCE_BYTES + 1), "machine": "t3" });
     assert_eq!(playground.call("assemble", params), Err("the source has more than 4 MiB".to_owned()));
-    // An empty source is no program, and nothing that is asked of it fails otherwise than in words.
+    // An empty source is not a program: every method fails with a message.
     assemble(&mut playground, "", "");
     for method in ["run", "track", "picture", "execute", "listing", "header", "verilog"] {
         let params = json!({ "begin": true, "periods": 1, "period": 1, "line": "step", "language": "c" });
@@ -216,7 +216,7 @@ fn steps_forward_and_back() {
 }
 
 #[test]
-fn breakpoints_are_told_with_their_lines() {
+fn breakpoints_are_reported_with_their_lines() {
     let mut playground = Playground::default();
     assemble(&mut playground, DOUBLE, "x\n1\n3\n");
     let told = call(&mut playground, "execute", json!({ "line": "break a.s:6" }));
@@ -231,7 +231,7 @@ fn breakpoints_are_told_with_their_lines() {
 }
 
 #[test]
-fn files_that_programs_include_can_be_read() {
+fn included_files_can_be_read() {
     let mut playground = Playground::default();
     for (name, word) in [("robot.s", ".const"), ("<math.s>", ".macro")] {
         let text = call(&mut playground, "source", json!({ "name": name }));
@@ -251,7 +251,7 @@ fn the_robot_follows_the_path() {
     let params = json!({ "name": "tracking.s", "source": source, "machine": "f3" });
     call(&mut playground, "assemble", params);
     let first = call(&mut playground, "track", json!({ "begin": true, "periods": 150 }));
-    // The first period takes what the controller does only once besides.
+    // The first period includes work that the controller does only once.
     assert_eq!((&first["done"], &first["cycles"]), (&json!(150), &json!(112)));
     assert!(first["longest"].as_u64() >= first["cycles"].as_u64(), "{}", first["longest"]);
     assert_eq!(first["poses"].as_array().map(Vec::len), Some(2));
@@ -269,7 +269,7 @@ fn the_robot_follows_the_path() {
 }
 
 #[test]
-fn what_is_taken_away_is_what_the_command_line_writes() {
+fn downloads_equal_the_command_lines_output() {
     let mut playground = Playground::default();
     assemble(&mut playground, DOUBLE, "x\n1\n");
     let image = playground.image().expect("it fits");

@@ -1,89 +1,160 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A HyperQueue server and workers on this computer, each a process of its own.
+//! HyperQueue server and workers on this computer, each in its own process.
 
-use crate::{WorkError, at};
+use crate::program::Server;
+use crate::{Client, WorkError, at};
+use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
-/// The Python package with server, workers and client. A server that somebody else has started must be of the same version.
-pub const HYPERQUEUE: &str = "hyperqueue==0.27.0";
-
-/// The script that does what the package is needed for.
+/// Python script that drives the package.
 pub(crate) const fn script() -> &'static str {
     include_str!("takt_hq.py")
 }
 
-/// A server and its workers, which end when this is dropped.
+/// Keeps a program running: starts it, with its process number on standard output, and again when it has ended. The end of standard
+/// input, which comes when whoever started this is gone, ends it all.
+const KEEPER: &str = r#"
+trap '' PIPE
+(while :; do "$@" </dev/null >&2 & echo $!; wait $!; sleep 0.5; done) &
+read -r _
+trap '' TERM
+kill 0
+sleep 0.3
+kill -9 0
+"#;
+
+/// A server with its workers; dropping it ends them.
 pub struct Cluster {
-    process: Child,
+    /// The script, or the keepers of server and workers.
+    keepers: Vec<Child>,
     server: PathBuf,
     processes: Processes,
 }
 
-/// The processes of a cluster, by their numbers.
+/// Process numbers of a cluster.
 #[derive(Clone, Debug, Default, serde::Deserialize)]
 pub struct Processes {
-    /// The server.
+    /// Process number of the server.
     pub server: u32,
-    /// The workers.
+    /// Process numbers of the workers.
     pub workers: Vec<u32>,
 }
 
 impl Cluster {
-    /// Starts a server in a folder, and workers of one core each. If one of these processes ends, it is started again.
+    /// Starts a server in a folder, and single-core workers. A process that ends is restarted.
     ///
     /// # Errors
     /// If the server does not start.
-    pub fn start(python: &Path, server: &Path, workers: usize) -> Result<Cluster, WorkError> {
+    pub fn start(client: &Client, server: &Path, workers: usize) -> Result<Cluster, WorkError> {
         std::fs::create_dir_all(server).map_err(at(server))?;
         let server = std::path::absolute(server).map_err(at(server))?;
-        let mut command = Command::new(python);
-        command.args(["-c", script(), "cluster"]).arg(&server).arg(workers.max(1).to_string());
         let log = server.join("cluster.log");
-        let messages = std::fs::File::create(&log).map_err(at(&log))?;
-        command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(messages);
-        let process = command.spawn().map_err(at(python))?;
-        let mut cluster = Cluster { process, server, processes: Processes::default() };
-        let mut line = String::new();
-        let output = cluster.process.stdout.take();
-        let read = output.map(|output| BufReader::new(output).read_line(&mut line));
-        if !matches!(read, Some(Ok(1..))) {
-            let errors = std::fs::read_to_string(&log).unwrap_or_default();
-            return Err(WorkError::Queue(format!(
-                "no server in {}: {}",
-                cluster.server.display(),
-                errors.trim()
-            )));
+        let messages = File::create(&log).map_err(at(&log))?;
+        let mut cluster = Cluster { keepers: Vec::new(), server, processes: Processes::default() };
+        let started = match client {
+            Client::Program(program) => cluster.keep(program, workers.max(1), &messages),
+            Client::Python(python) => cluster.run_script(python, workers.max(1), &messages),
+        };
+        match started {
+            Ok(()) => Ok(cluster),
+            Err(WorkError::Queue(text)) if text.is_empty() => {
+                let errors = std::fs::read_to_string(&log).unwrap_or_default();
+                let server = cluster.server.display();
+                Err(WorkError::Queue(format!("no server in {server}: {}", errors.trim())))
+            }
+            Err(error) => Err(error),
         }
-        cluster.processes =
-            serde_json::from_str(&line).map_err(|error| WorkError::Queue(error.to_string()))?;
-        Ok(cluster)
     }
 
-    /// The processes with which it began.
+    fn run_script(&mut self, python: &Path, workers: usize, messages: &File) -> Result<(), WorkError> {
+        let mut command = Command::new(python);
+        command.args(["-c", script(), "cluster"]).arg(&self.server).arg(workers.to_string());
+        command.stdin(Stdio::null());
+        let line = self.spawn(command, messages)?;
+        self.processes = serde_json::from_str(&line).map_err(|error| WorkError::Queue(error.to_string()))?;
+        Ok(())
+    }
+
+    fn keep(&mut self, program: &Path, workers: usize, messages: &File) -> Result<(), WorkError> {
+        self.processes.server = self.keeper(program, &["server", "start"], messages)?;
+        Server { program, folder: &self.server }.connect(true)?;
+        for _ in 0..workers {
+            let worker = self.keeper(
+                program,
+                &["worker", "start", "--cpus", "1", "--on-server-lost", "stop"],
+                messages,
+            )?;
+            self.processes.workers.push(worker);
+        }
+        Ok(())
+    }
+
+    /// Keeps `hq` running; the number of its process.
+    fn keeper(&mut self, program: &Path, arguments: &[&str], messages: &File) -> Result<u32, WorkError> {
+        let mut command = Command::new("sh");
+        command
+            .args(["-c", KEEPER, "takt"])
+            .arg(program)
+            .arg("--server-dir")
+            .arg(&self.server)
+            .args(arguments);
+        // A group of its own: the keeper ends all of it, and Ctrl-C ends this program first.
+        #[cfg(unix)]
+        std::os::unix::process::CommandExt::process_group(&mut command, 0);
+        command.stdin(Stdio::piped());
+        let line = self.spawn(command, messages)?;
+        line.trim().parse().map_err(|_| WorkError::Queue(String::new()))
+    }
+
+    /// Starts a process; its first line.
+    fn spawn(&mut self, mut command: Command, messages: &File) -> Result<String, WorkError> {
+        let program = PathBuf::from(command.get_program());
+        let messages = messages.try_clone().map_err(at(&self.server))?;
+        let process = command.stdout(Stdio::piped()).stderr(messages).spawn().map_err(at(&program))?;
+        self.keepers.push(process);
+        let output = self.keepers.last_mut().and_then(|process| process.stdout.take());
+        let mut line = String::new();
+        let read = output.map(|output| BufReader::new(output).read_line(&mut line));
+        if matches!(read, Some(Ok(1..))) { Ok(line) } else { Err(WorkError::Queue(String::new())) }
+    }
+
+    /// Process numbers at the start.
     pub fn processes(&self) -> &Processes {
         &self.processes
     }
 
-    /// The server's folder.
+    /// Folder of the server.
     pub fn server(&self) -> &Path {
         &self.server
     }
 
-    /// Waits until it ends, which it does if it is interrupted.
+    /// Waits for the end of the cluster, by an interrupt.
     ///
     /// # Errors
     /// If the process is lost.
     pub fn wait(&mut self) -> Result<(), WorkError> {
-        self.process.wait().map(drop).map_err(at(&self.server))
+        for keeper in &mut self.keepers {
+            // `wait` would close its input.
+            let input = keeper.stdin.take();
+            keeper.wait().map_err(at(&self.server))?;
+            drop(input);
+        }
+        Ok(())
     }
 }
 
 impl Drop for Cluster {
     fn drop(&mut self) {
-        // Server and workers see that their parent is gone, and end.
-        let _ = self.process.kill();
-        let _ = self.process.wait();
+        for keeper in &mut self.keepers {
+            // A keeper ends with its input; without the script, server and workers see that their parent is gone.
+            if keeper.stdin.take().is_none() {
+                let _ = keeper.kill();
+            }
+        }
+        for keeper in &mut self.keepers {
+            let _ = keeper.wait();
+        }
     }
 }

@@ -1,47 +1,57 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Units of work: commands that each write one file, run on this computer or by HyperQueue on others.
+//! Units of work: commands that each write one file, run on this computer or through HyperQueue on others.
 //!
-//! A unit is done when its file is there, so that a run that was interrupted goes on where it was, a unit that was lost is run again, and
-//! two runs of one unit do no harm. A command writes its file under another name and renames it ([`write`]). Files carry everything:
-//! on several computers the folder of the results lies on a file system that all of them share.
+//! A unit is done when its file exists. An interrupted run can thus be resumed, a lost unit is repeated, and concurrent runs of a unit are
+//! harmless. A command writes its file under another name and renames it ([`write`]). Files carry all data: across computers, the folder of
+//! the results is on a shared file system.
 
+mod client;
 mod cluster;
 mod local;
+mod program;
 mod queue;
 
-pub use cluster::{Cluster, HYPERQUEUE, Processes};
+pub use client::{Client, HYPERQUEUE, has_package};
+pub use cluster::{Cluster, Processes};
 
 use serde::{Deserialize, Serialize};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
+use std::time::Duration;
 use thiserror::Error;
 
-/// Times that a unit is started before it counts as failed.
+/// Number of attempts at a unit before it counts as failed.
 pub const ATTEMPTS: u32 = 3;
-/// Bytes of a failed unit's messages that are kept, from their end.
+/// Bytes kept from the end of a failed unit's messages.
 const KEPT: usize = 8192;
+/// Environment variable that keeps a unit to its CPUs.
+const THREADS: &str = "RAYON_NUM_THREADS";
 
-/// A unit of work.
+/// A unit of work: a command that writes one file.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Unit {
-    /// The name, for messages.
+    /// Name of the unit in messages.
     pub name: String,
-    /// The program and its arguments. It ends with status 0 once it has written `result`; what it says goes to standard error.
+    /// Program and arguments. Exits with status 0 after writing `result`; messages go to standard error.
     pub command: Vec<String>,
-    /// The folder in which it runs.
+    /// Working directory of the command.
     pub folder: PathBuf,
-    /// The file that it writes.
+    /// Path of the file that the command writes.
     pub result: PathBuf,
+    /// Number of CPUs that the command keeps busy.
+    pub cpus: u32,
+    /// Upper bound of the run time: workers whose allocation ends earlier do not get the unit.
+    pub time: Duration,
 }
 
 impl Unit {
-    /// True if its file is there.
+    /// The result file exists.
     pub fn is_done(&self) -> bool {
         self.result.is_file()
     }
 
-    /// The file with its messages, which is there while it runs and after it failed.
+    /// Path of the message log, which exists during the run and after a failure.
     pub fn log(&self) -> PathBuf {
         let mut name = self.result.clone().into_os_string();
         name.push(".log");
@@ -49,53 +59,74 @@ impl Unit {
     }
 }
 
-/// The place where units run.
+/// Place where units run.
 #[derive(Clone, Debug)]
 pub enum Place {
-    /// This computer, so many at a time.
+    /// This computer, on so many CPUs.
     Here(usize),
     /// The workers of a HyperQueue server.
     Queue {
-        /// Python with the package [`HYPERQUEUE`].
-        python: PathBuf,
-        /// The server's folder.
+        /// HyperQueue on this computer.
+        client: Client,
+        /// Folder of the server.
         server: PathBuf,
     },
 }
 
-/// An event of a run, for whoever watches.
+impl Place {
+    /// The workers of a HyperQueue server: of the server that runs with the folder `server`, or else of a cluster started with the folder
+    /// `fresh`, whose workers end when the cluster is dropped.
+    ///
+    /// # Errors
+    /// If the cluster does not start.
+    pub fn queue(
+        client: Client,
+        server: Option<&Path>,
+        fresh: &Path,
+        workers: usize,
+    ) -> Result<(Place, Option<Cluster>), WorkError> {
+        if let Some(server) = server {
+            let server = std::path::absolute(server).map_err(at(server))?;
+            return Ok((Place::Queue { client, server }, None));
+        }
+        let cluster = Cluster::start(&client, fresh, workers)?;
+        Ok((Place::Queue { client, server: cluster.server().to_owned() }, Some(cluster)))
+    }
+}
+
+/// Progress event of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event<'a> {
-    /// So many of the units that [`run`] was given are done.
+    /// Number of units done so far, out of those given to [`run`].
     Done(u64),
-    /// Something else that is worth a line.
+    /// Another message, as one line.
     Note(&'a str),
 }
 
-/// A unit that failed every time.
+/// A unit that failed in all attempts.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Failure {
-    /// Its name.
+    /// Name of the unit.
     pub name: String,
-    /// The way in which it ended, and the end of its messages.
+    /// Exit status in words, and the end of the messages.
     pub reason: String,
 }
 
-/// The reason for which units could not be run at all.
+/// Errors that prevent the whole run.
 #[derive(Debug, Error)]
 pub enum WorkError {
-    /// A file cannot be written, or a program not be started.
+    /// File error, or failure to start a program.
     #[error("{0}: {1}")]
     File(String, io::Error),
-    /// HyperQueue's client ended.
+    /// HyperQueue's client ended with this message.
     #[error("HyperQueue: {0}")]
     Queue(String),
 }
 
-/// Runs the units that are not done. Returns those that failed [`ATTEMPTS`] times; after `stop` was set, nothing new is begun.
+/// Runs all unfinished units. Returns the units that failed [`ATTEMPTS`] times. Once `stop` is set, no new unit begins.
 ///
 /// # Errors
-/// If nothing can be run. What was done before stays done.
+/// If no unit can be run. Finished units stay done.
 pub fn run(
     units: &[Unit],
     place: &Place,
@@ -111,16 +142,16 @@ pub fn run(
     }
     let mut failures = match place {
         Place::Here(jobs) => local::run(&left, *jobs, stop, observe),
-        Place::Queue { python, server } => queue::run(&left, python, server, stop, observe)?,
+        Place::Queue { client, server } => queue::run(&left, client, server, stop, observe)?,
     };
     failures.sort_by(|one, other| one.name.cmp(&other.name));
     Ok(failures)
 }
 
-/// Writes a unit's file: complete, or not at all.
+/// Writes a unit's file atomically.
 ///
 /// # Errors
-/// If it cannot be written.
+/// If the file cannot be written.
 pub fn write(result: &Path, bytes: &[u8]) -> Result<(), WorkError> {
     let mut partial = result.to_owned().into_os_string();
     partial.push(format!(".{}.partial", std::process::id()));
@@ -132,7 +163,7 @@ fn at(path: &Path) -> impl Fn(io::Error) -> WorkError + '_ {
     move |error| WorkError::File(path.display().to_string(), error)
 }
 
-/// The end of a unit's messages.
+/// End of a unit's messages.
 fn messages(unit: &Unit) -> String {
     let bytes = std::fs::read(unit.log()).unwrap_or_default();
     String::from_utf8_lossy(&bytes[bytes.len().saturating_sub(KEPT)..]).trim_end().to_owned()

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Units on this computer, several at a time.
+//! Execution of units on this computer, several at a time.
 
-use crate::{ATTEMPTS, Event, Failure, Unit, messages};
+use crate::{ATTEMPTS, Event, Failure, THREADS, Unit, messages};
 use std::fs::File;
 use std::io;
 use std::process::{Command, Stdio};
@@ -15,13 +15,15 @@ pub(crate) fn run(
     observe: &mut dyn FnMut(Event<'_>),
 ) -> Vec<Failure> {
     let (next, (sender, ended)) = (AtomicUsize::new(0), channel());
+    let widest = units.iter().map(|unit| unit.cpus.max(1)).max().unwrap_or(1);
+    let jobs = jobs / usize::try_from(widest).unwrap_or(1);
     std::thread::scope(|scope| {
         for _ in 0..jobs.clamp(1, units.len().max(1)) {
             let (next, sender) = (&next, sender.clone());
             scope.spawn(move || {
                 while !stop.load(Ordering::Relaxed) {
                     let Some(unit) = units.get(next.fetch_add(1, Ordering::Relaxed)) else { break };
-                    // Nobody waits for it any more if that fails.
+                    // A send error means that the run is abandoned.
                     let _ = sender.send(attempts(unit, stop));
                 }
             });
@@ -31,7 +33,7 @@ pub(crate) fn run(
         for outcome in ended {
             match outcome {
                 Ok(()) => done += 1,
-                // What ended because all of it was to end has not failed.
+                // Units ended by `stop` have not failed.
                 Err(_) if stop.load(Ordering::Relaxed) => {}
                 Err(failure) => failures.push(failure),
             }
@@ -41,7 +43,7 @@ pub(crate) fn run(
     })
 }
 
-/// Runs a unit until it is done, a few times at most.
+/// Runs a unit up to [`ATTEMPTS`] times, until it is done.
 fn attempts(unit: &Unit, stop: &AtomicBool) -> Result<(), Failure> {
     let mut reason = String::new();
     for _ in 0..ATTEMPTS {
@@ -61,7 +63,8 @@ fn once(unit: &Unit) -> Result<(), String> {
     let log = File::create(unit.log()).map_err(|error| format!("{}: {error}", unit.log().display()))?;
     let (program, arguments) = unit.command.split_first().ok_or("it has no command")?;
     let mut command = Command::new(program);
-    command.args(arguments).current_dir(&unit.folder).stdin(Stdio::null()).stdout(Stdio::null()).stderr(log);
+    command.args(arguments).current_dir(&unit.folder).env(THREADS, unit.cpus.max(1).to_string());
+    command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(log);
     let status = command.status().map_err(failed)?;
     if status.success() && unit.is_done() {
         let _ = std::fs::remove_file(unit.log());

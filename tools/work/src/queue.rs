@@ -1,25 +1,40 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Units on the workers of a HyperQueue server, by its Python package: the script `takt_hq.py` submits them and says how far they are.
+//! Units on the workers of a HyperQueue server, submitted as one job; what failed or was lost is submitted again.
 
 use crate::cluster::script;
-use crate::{Event, Failure, Unit, WorkError, at, messages};
+use crate::program::Server;
+use crate::{ATTEMPTS, Client, Event, Failure, Unit, WorkError, at, messages};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
 
-/// A line that the script writes.
+/// The time without a server, and until a result that was written elsewhere is seen: a shared file system shows it late.
+pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
+
+/// The end of a job.
+#[derive(Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum JobEnd {
+    /// Every unit has ended; of those that failed, by their places in the list, the reason.
+    Whole(BTreeMap<usize, String>),
+    /// The server is gone, for a reason.
+    Lost(String),
+}
+
+/// A line of the script's output.
 #[derive(Deserialize)]
 #[serde(rename_all = "snake_case")]
 enum Line {
     Done(u64),
-    Note(String),
-    Failed(BTreeMap<String, String>),
+    Ended(JobEnd),
 }
 
-/// Ends the script if whoever started it gives up.
+/// Ends the script if its caller gives up.
 struct Guard(Child);
 
 impl Drop for Guard {
@@ -29,34 +44,106 @@ impl Drop for Guard {
     }
 }
 
+pub(crate) fn no_server(folder: &Path) -> WorkError {
+    let folder = folder.display();
+    WorkError::Queue(format!("no server has its files in {folder}; start one, or leave out --hq-server"))
+}
+
 pub(crate) fn run(
     units: &[&Unit],
-    python: &Path,
+    client: &Client,
     server: &Path,
     stop: &AtomicBool,
     observe: &mut dyn FnMut(Event<'_>),
 ) -> Result<Vec<Failure>, WorkError> {
     let folder = units[0].result.parent().unwrap_or(Path::new("."));
-    let list = folder.join(format!(".units.{}.json", std::process::id()));
-    let tasks: Vec<_> = units
-        .iter()
-        .map(|unit| (&unit.name, &unit.command, &unit.folder, &unit.result, unit.log()))
-        .collect();
-    let text = serde_json::to_vec(&tasks).map_err(|error| WorkError::Queue(error.to_string()))?;
-    std::fs::write(&list, text).map_err(at(&list))?;
-    let result = submit(units, python, server, &list, stop, observe);
+    let list = folder.join(format!(".units.{}", std::process::id()));
+    let result = rounds(units, stop, observe, &mut |todo, done| match client {
+        Client::Program(program) => Server { program, folder: server }.submit(todo, &list, stop, done),
+        Client::Python(python) => script_submits(todo, python, server, &list, stop, done),
+    });
     let _ = std::fs::remove_file(list);
     result
 }
 
-fn submit(
+/// Submits units, and reports how many are done while it waits.
+type Submit<'s> = dyn FnMut(&[&Unit], &mut dyn FnMut(u64)) -> Result<JobEnd, WorkError> + 's;
+
+/// Submits units, as a job or several, until each is done or has failed a few times.
+fn rounds(
+    units: &[&Unit],
+    stop: &AtomicBool,
+    observe: &mut dyn FnMut(Event<'_>),
+    submit: &mut Submit<'_>,
+) -> Result<Vec<Failure>, WorkError> {
+    let (mut attempts, mut failures) = (BTreeMap::<&str, u32>::new(), Vec::new());
+    let mut todo = units.to_vec();
+    while !todo.is_empty() {
+        let before = (units.len() - todo.len() - failures.len()) as u64;
+        let ended = submit(&todo, &mut |done| observe(Event::Done(before + done)))?;
+        if stop.load(Ordering::Relaxed) {
+            return Ok(failures);
+        }
+        let failed = match ended {
+            JobEnd::Whole(failed) => failed,
+            JobEnd::Lost(reason) => {
+                let note = format!("the server is lost ({reason}); what is not done is submitted again");
+                observe(Event::Note(&note));
+                todo.retain(|unit| !unit.is_done());
+                continue;
+            }
+        };
+        let mut again = Vec::new();
+        for (index, unit) in todo.into_iter().enumerate() {
+            let reason = match failed.get(&index) {
+                Some(reason) => reason,
+                None if is_seen(unit) => {
+                    let _ = std::fs::remove_file(unit.log());
+                    continue;
+                }
+                None => "it wrote no result",
+            };
+            let count = attempts.entry(unit.name.as_str()).or_default();
+            *count += 1;
+            if *count < ATTEMPTS {
+                again.push(unit);
+            } else {
+                let reason = format!("{reason}\n{}", messages(unit)).trim_end().to_owned();
+                failures.push(Failure { name: unit.name.clone(), reason });
+            }
+        }
+        todo = again;
+    }
+    Ok(failures)
+}
+
+/// True once a unit's file is there, for which it waits.
+fn is_seen(unit: &Unit) -> bool {
+    let begin = Instant::now();
+    while !unit.is_done() {
+        if begin.elapsed() > PATIENCE {
+            return false;
+        }
+        sleep(Duration::from_millis(200));
+    }
+    true
+}
+
+/// Submits units with the Python package.
+fn script_submits(
     units: &[&Unit],
     python: &Path,
     server: &Path,
     list: &Path,
     stop: &AtomicBool,
-    observe: &mut dyn FnMut(Event<'_>),
-) -> Result<Vec<Failure>, WorkError> {
+    done: &mut dyn FnMut(u64),
+) -> Result<JobEnd, WorkError> {
+    let task = |unit: &&Unit| {
+        (unit.command.clone(), unit.folder.clone(), unit.log(), unit.cpus.max(1), unit.time.as_secs())
+    };
+    let tasks: Vec<_> = units.iter().map(task).collect();
+    let text = serde_json::to_vec(&tasks).map_err(|error| WorkError::Queue(error.to_string()))?;
+    std::fs::write(list, text).map_err(at(list))?;
     let mut command = Command::new(python);
     command.args(["-c", script(), "submit"]).arg(server).arg(list).stdin(Stdio::null());
     let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
@@ -67,32 +154,23 @@ fn submit(
         let _ = errors.map(|mut errors| errors.read_to_string(&mut text));
         text
     });
-    let mut failures = None;
+    let mut end = None;
     for line in output.into_iter().flat_map(|output| BufReader::new(output).lines()).map_while(Result::ok) {
         match serde_json::from_str(&line) {
-            Ok(Line::Done(count)) => observe(Event::Done(count)),
-            Ok(Line::Note(note)) => observe(Event::Note(&note)),
-            Ok(Line::Failed(failed)) => failures = Some(failed),
-            Err(_) => observe(Event::Note(&line)),
+            Ok(Line::Done(count)) => done(count),
+            Ok(Line::Ended(ended)) => end = Some(ended),
+            Err(_) => {}
         }
         if stop.load(Ordering::Relaxed) {
-            return Ok(Vec::new());
+            return Ok(JobEnd::Whole(BTreeMap::new()));
         }
     }
     let status = child.0.wait().map_err(at(python))?;
     let errors = errors.join().unwrap_or_default();
-    let Some(failed) = failures.filter(|_| status.success()) else {
-        return Err(WorkError::Queue(reason(&errors)));
-    };
-    let with_messages = |(name, error): (String, String)| {
-        let messages =
-            units.iter().find(|unit| unit.name == name).map(|unit| messages(unit)).unwrap_or_default();
-        Failure { name, reason: format!("{error}\n{messages}").trim_end().to_owned() }
-    };
-    Ok(failed.into_iter().map(with_messages).collect())
+    end.filter(|_| status.success()).ok_or_else(|| WorkError::Queue(reason(&errors)))
 }
 
-/// The last line that says something: HyperQueue's errors are followed by a stack.
+/// Last informative line of the script's errors: HyperQueue's own are followed by a stack trace.
 fn reason(errors: &str) -> String {
     let ours = errors.lines().rev().find_map(|line| line.strip_prefix("takt: "));
     ours.or_else(|| errors.lines().rev().find(|line| !line.trim().is_empty()))

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""HyperQueue for takt-work: a server with workers, each a process of its own, and a client that submits units.
+"""HyperQueue for takt-work: a server with workers, each in its own process, and a client that submits units.
 
     cluster DIR N     a server in DIR and N workers of one core, each started again if it ends
     server DIR        the server alone
     worker DIR        a worker of the server in DIR; it looks for the next one if that ends
-    submit DIR UNITS  runs the units of a file, until each is done or has failed a few times
+    submit DIR UNITS  runs the units of a file as one job, until each has ended or the server is lost
 
 The package starts a server and workers in threads of one process. A worker in a process of its own is a server without work whose link
 to the server's files, `hq-current`, is set to those of the server that it is to serve.
@@ -18,13 +18,15 @@ import subprocess
 import sys
 import tempfile
 import time
+from datetime import timedelta
 
 from hyperqueue import Client, Job
 from hyperqueue.ffi.cluster import Cluster
+from hyperqueue.ffi.protocol import ResourceRequest
 from hyperqueue.output import StdioDef
 
-ATTEMPTS = 3  # times that a unit is started, as in lib.rs
-PATIENCE = 60  # seconds without a server, or until a result that was written elsewhere is seen
+PATIENCE = 60  # seconds without a server, as in queue.rs
+THREADS = "RAYON_NUM_THREADS"  # as in lib.rs
 CURRENT = "hq-current"
 
 
@@ -38,12 +40,12 @@ def give_up(text):
 
 
 def reason(error):
-    """The error's own words, without the stack that follows them."""
+    """Message of the error, without the stack trace."""
     return str(error).split("\n\nStack backtrace")[0].strip().replace("\n", " ")
 
 
 def while_parent_lives():
-    """Returns when whoever started this process is gone."""
+    """Ends when the parent process is gone."""
     parent = os.getppid()
     while os.getppid() == parent:
         yield
@@ -78,7 +80,7 @@ def serve(folder, own, cores=1):
         try:
             idle.add_worker(cores)
             serves = current
-        except Exception as error:  # the server is on its way, or gone
+        except Exception as error:  # the server is starting, or gone
             sys.stderr.write(f"worker: {reason(error)}\n")
 
 
@@ -119,7 +121,7 @@ def wait_for_server(folder, process):
 
 
 def connect(folder):
-    """A client of the server, for which it waits if there was one before."""
+    """Client of the server; waits if a server existed before."""
     end = time.monotonic() + PATIENCE
     while True:
         try:
@@ -137,58 +139,28 @@ def connect(folder):
 def submit(folder, path):
     with open(path, encoding="utf-8") as file:
         units = json.load(file)
-    attempts, failed = {}, {}
-    total = len(units)
-    todo = units
-    while todo:
-        client = connect(folder)
-        job = Job(max_fails=None, name="takt")
-        for name, command, cwd, _result, log in todo:
-            job.program(command, cwd=cwd, name=name, stdout=None, stderr=StdioDef.remove_if_finished(log))
-        base = total - len(todo) - len(failed)
-        try:
-            submitted = client.submit(job)
-
-            def progress(jobs):
-                say(done=base + sum(status["finished"] for status in jobs.values()))
-
-            lost = client.connection.wait_for_jobs([submitted.id], progress)
-            errors = client.get_failed_tasks(submitted) if lost else {}
-            client.forget(submitted)
-        except Exception as error:
-            say(note=f"the server is lost ({reason(error)}); what is not done is submitted again")
-            todo = [unit for unit in todo if not os.path.exists(unit[3])]
-            continue
-        again = []
-        for task, unit in enumerate(todo):
-            name = unit[0]
-            if task in errors:
-                attempts[name] = attempts.get(name, 0) + 1
-                why = errors[task].error.strip()
-            elif not seen(unit[3]):
-                attempts[name] = attempts.get(name, 0) + 1
-                why = "it wrote no result"
-            else:
-                continue
-            if attempts[name] < ATTEMPTS:
-                again.append(unit)
-            else:
-                failed[name] = why
-        todo = again
-    say(failed=failed)
-
-
-def seen(path):
-    """True if a file is there, or comes: a shared file system shows it late."""
-    for _ in range(PATIENCE):
-        if os.path.exists(path):
-            return True
-        time.sleep(1)
-    return False
+    client = connect(folder)
+    job = Job(max_fails=None, name="takt")
+    for command, cwd, log, cpus, seconds in units:
+        job.program(
+            command, cwd=cwd, stdout=None, stderr=StdioDef.from_path(log), env={THREADS: str(cpus)},
+            resources=ResourceRequest(cpus=cpus, min_time=timedelta(seconds=seconds)),
+        )
+    try:
+        submitted = client.submit(job)
+        lost = client.connection.wait_for_jobs(
+            [submitted.id], lambda jobs: say(done=sum(status["finished"] for status in jobs.values()))
+        )
+        errors = client.get_failed_tasks(submitted) if lost else {}
+        client.forget(submitted)
+    except Exception as error:
+        say(ended={"lost": reason(error)})
+    else:
+        say(ended={"whole": {str(task): errors[task].error.strip() for task in errors}})
 
 
 if __name__ == "__main__":
-    # `python -c SOURCE …` keeps its source for the processes that it starts.
+    # `python -c SOURCE …`: keep the source for child processes.
     SOURCE = sys.orig_argv[sys.orig_argv.index("-c") + 1]
     command, *rest = sys.argv[1:]
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The tests of `takt-work`: one program, a module for each topic.
+//! Tests of `takt-work` in one binary: one module for each topic.
 
-mod here;
+mod local;
+mod program;
 mod queue;
 mod units;

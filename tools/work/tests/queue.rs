@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Units on a HyperQueue server and two workers, of which one worker and then the server are ended in mid-run: the same results as here.
+//! Units on a HyperQueue server with two workers, with a worker and then the server killed in mid-run: results equal a local run's.
 //!
-//! HyperQueue is in the Python environment that `cargo xtask test` makes (`TAKT_VENV`, or `.venv`).
+//! HyperQueue is in the Python environment made by `cargo xtask test` (`TAKT_VENV`, or `.venv`).
 
 #![allow(clippy::print_stdout)]
 
@@ -9,20 +9,17 @@ use crate::units::{folder, unit};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::atomic::AtomicBool;
-use takt_work::{Cluster, Event, Place, Unit, WorkError, run};
+use takt_work::{Client, Cluster, Event, Place, Unit, WorkError, has_package, run};
 
 static NEVER: AtomicBool = AtomicBool::new(false);
 
-fn python() -> PathBuf {
+fn client() -> Client {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let venv = std::env::var_os("TAKT_VENV").map_or_else(|| root.join(".venv"), PathBuf::from);
     let python = venv.join("bin/python3");
-    let has = Command::new(&python)
-        .args(["-c", "import hyperqueue"])
-        .output()
-        .is_ok_and(|said| said.status.success());
+    let has = has_package(&python);
     assert!(has, "{} has no {}; `cargo xtask test` installs it", python.display(), takt_work::HYPERQUEUE);
-    python
+    Client::Python(python)
 }
 
 fn end(process: u32) {
@@ -33,12 +30,12 @@ fn end(process: u32) {
 #[test]
 fn worker_and_server_may_end() {
     let folder = folder("queue");
-    let python = python();
-    let cluster = Cluster::start(&python, &folder.join("server"), 2).expect("a server starts");
+    let client = client();
+    let cluster = Cluster::start(&client, &folder.join("server"), 2).expect("a server starts");
     let script = "echo x >> $R.count; sleep 0.4; basename $R > $R.partial; mv $R.partial $R";
     let mut units: Vec<Unit> = (0..30).map(|index| unit(&folder, &format!("{index:02}"), script)).collect();
     units.push(unit(&folder, "wrong", "echo 'as it was told' >&2; exit 7"));
-    let place = Place::Queue { python, server: cluster.server().to_owned() };
+    let place = Place::Queue { client, server: cluster.server().to_owned() };
     let (mut ended, mut notes) = (0, Vec::new());
     let failures = run(&units, &place, &NEVER, &mut |event| match event {
         Event::Done(4..) if ended == 0 => {
@@ -64,22 +61,22 @@ fn worker_and_server_may_end() {
 }
 
 #[test]
-fn a_folder_without_a_server_is_told() {
+fn reports_a_folder_without_a_server() {
     let folder = folder("nobody");
-    let place = Place::Queue { python: python(), server: folder.join("server") };
+    let place = Place::Queue { client: client(), server: folder.join("server") };
     let error = run(&[unit(&folder, "one", "touch $R")], &place, &NEVER, &mut |_| {});
     let Err(WorkError::Queue(text)) = error else { panic!("{error:?}") };
     assert!(text.contains("no server has its files in") && text.contains("--hq-server"), "{text}");
 }
 
-/// The CPU time that a process itself has taken, in s (`proc_pid_stat(5)`: fields 14 and 15, in hundredths of a second).
+/// CPU time of a process without its children, in s (`proc_pid_stat(5)`: fields 14 and 15, in hundredths of a second).
 fn taken(process: u32) -> f64 {
     let text = std::fs::read_to_string(format!("/proc/{process}/stat")).expect("it runs");
     let fields = text.rsplit_once(')').expect("its name is in parentheses").1.split_whitespace();
     fields.skip(11).take(2).map(|ticks| ticks.parse::<f64>().expect("a number") / 100.0).sum()
 }
 
-/// The figure of docs/campaigns.md: what the scheduler itself takes for 10,000 units.
+/// Figure of docs/campaigns.md: the scheduler's own time for 10,000 units.
 ///
 /// ```text
 /// cargo test --release -p takt-work --test suite -- --ignored --nocapture queue::ten_thousand_units
@@ -88,10 +85,10 @@ fn taken(process: u32) -> f64 {
 #[ignore = "takes minutes"]
 fn ten_thousand_units() {
     let folder = folder("many");
-    let python = python();
-    let cluster = Cluster::start(&python, &folder.join("server"), 2).expect("a server starts");
+    let client = client();
+    let cluster = Cluster::start(&client, &folder.join("server"), 2).expect("a server starts");
     let units: Vec<Unit> = (0..10_000).map(|index| unit(&folder, &format!("{index:05}"), ": > $R")).collect();
-    let place = Place::Queue { python, server: cluster.server().to_owned() };
+    let place = Place::Queue { client, server: cluster.server().to_owned() };
     let begin = std::time::Instant::now();
     let failures = run(&units, &place, &NEVER, &mut |_| {}).expect("the server answers");
     assert_eq!((failures.len(), units.iter().filter(|unit| unit.is_done()).count()), (0, units.len()));

@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The documentation as one searchable site: `docs/` in mdbook, the crates' documentation, and the playground, in which every
-//! listing opens.
+//! Documentation site: `docs/` in mdbook, the crates' documentation, and the playground, in which every listing opens.
 
 mod colour;
 
-use crate::passed::Inputs;
-use crate::{cargo, root, run, web};
-use anyhow::{Context, Result, bail};
+use crate::web;
+use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 use miniz_oxide::deflate::compress_to_vec_zlib;
 use serde_json::json;
@@ -14,6 +12,8 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::{Component, Path, PathBuf};
 use std::process::Command;
+use takt_automation::check_cache::Inputs;
+use takt_automation::command::{cargo, root, run};
 use takt_programs::listings::listings;
 
 /// The parts of the site.
@@ -34,52 +34,39 @@ pub(crate) struct Arguments {
 }
 
 impl Arguments {
-    /// The whole site, untested.
+    /// The whole site, without browser tests.
     pub(crate) const WHOLE: Arguments =
         Arguments { no_rustdoc: false, no_web: false, no_playground: false, test: false };
-    /// The documents alone, with their links.
+    /// Documents alone, with a check of their links.
     pub(crate) const DOCUMENTS: Arguments =
         Arguments { no_rustdoc: true, no_web: false, no_playground: true, test: false };
 }
 
-/// The version of mdbook that the site is written for.
+/// mdbook version that the site is written for.
 const MDBOOK: &str = "0.5.4";
-/// The folder into which it is installed.
+/// Installation folder of mdbook.
 const TOOLS: &str = "target/tools";
-/// The folders of mdbook's input and output.
+/// Input and output folders of mdbook.
 const SOURCE: &str = "target/book/source";
 pub(crate) const SITE: &str = "target/book/site";
 
-/// The order of the documents, by part. Those that are in none come last.
+/// Documents in the order of a reader, by part; every document has its place.
 const PARTS: &[(&str, &[&str])] = &[
-    ("Start", &["first-controller", "tour", "what-fits", "figures"]),
+    ("Start", &["first-controller", "tour", "what-fits", "examples", "figures"]),
+    ("Writing programs", &["language", "library", "fast-code", "scheduling", "editors", "playground"]),
+    ("Programs from models", &["model", "models", "readers", "c"]),
+    ("Time and accuracy", &["analysis", "accuracy", "timing", "verify"]),
+    ("Running programs", &["debugging", "traces", "batch", "plant", "mujoco", "python", "system"]),
+    ("Controllers", &["motor", "robot", "friction", "generation", "arm", "controller", "robot-commands"]),
     (
-        "Writing programs",
-        &[
-            "language",
-            "examples",
-            "library",
-            "fast-code",
-            "scheduling",
-            "analysis",
-            "accuracy",
-            "verify",
-            "editors",
-            "playground",
-        ],
+        "Boards and circuits",
+        &["board", "power-stage", "linuxcnc", "hardware", "headers", "protocol", "synthesis"],
     ),
-    ("Running them", &["debugging", "traces", "batch", "plant", "python", "system"]),
-    ("The processor", &["isa", "timing", "trig", "image", "machine-choice"]),
-    ("The circuit", &["hardware", "headers", "board", "protocol", "synthesis", "verification"]),
-    (
-        "Robots",
-        &["robot", "friction", "generation", "arm", "controller", "robot-commands", "model", "models"],
-    ),
-    ("Reference", &["glossary", "speed", "reach"]),
+    ("The processor", &["isa", "machines", "machine-choice", "trig", "image"]),
+    ("Evidence", &["verification", "campaigns", "speed"]),
+    ("Reference", &["glossary", "reach"]),
 ];
-/// The part of the others.
-const FURTHER: &str = "Further";
-/// What the tables of contents call the page that leads to the playground and the crates' documentation.
+/// Title of the page with links to the playground and the crates' documentation.
 const BESIDE: &str = "Playground and API";
 
 pub(crate) fn book(arguments: &Arguments) -> Result<()> {
@@ -100,7 +87,7 @@ pub(crate) fn book(arguments: &Arguments) -> Result<()> {
         copy(&root().join(web::PAGE), &site.join("playground"))?;
     }
     if !arguments.no_rustdoc {
-        // The libraries; what only works on the project has no reader.
+        // Document the libraries; packages for work on the project itself have no readers.
         let excluded = ["xtask", "unify", "takt-benches", "takt"];
         let excluded = excluded.iter().flat_map(|package| ["--exclude", package]);
         run(cargo().args(["doc", "--workspace", "--no-deps", "--lib", "--release"]).args(excluded))?;
@@ -113,13 +100,13 @@ pub(crate) fn book(arguments: &Arguments) -> Result<()> {
     if arguments.test { web::in_browser("test/book.test.mjs", &[("TAKT_BOOK", &site)]) } else { Ok(()) }
 }
 
-/// What the documents' check depends on.
+/// Inputs of the documents' check.
 pub(crate) fn inputs() -> Result<Inputs> {
     let files = ["docs", "tools/xtask/src/book.rs", "tools/xtask/src/book/colour.rs"];
     files.iter().try_fold(Inputs::default().and(MDBOOK), |inputs, path| inputs.files(path))
 }
 
-/// mdbook in the version that is written down: the one installed, or else one made here.
+/// mdbook in the pinned version: the installed program, or a local build.
 fn mdbook() -> Result<PathBuf> {
     let is_it = |program: &Path| {
         let output = Command::new(program).arg("--version").output();
@@ -134,13 +121,13 @@ fn mdbook() -> Result<PathBuf> {
         }
     }
     eprintln!("mdbook {MDBOOK} is missing: installing it into {TOOLS}");
-    // It runs for a second: what it takes to compile counts.
+    // A debug build: mdbook runs for a second, so compile time dominates.
     let install = ["install", "mdbook", "--version", MDBOOK, "--locked", "--debug", "--root", TOOLS];
     run(cargo().args(install).args(["--no-default-features", "--features", "search"]))?;
     Ok(own)
 }
 
-/// Writes mdbook's input: the documents with their links and listings made the site's.
+/// Writes mdbook's input: documents with links and listings adapted to the site.
 fn write_source(docs: &Path, folder: &Path) -> Result<()> {
     let chapters = folder.join("src");
     std::fs::create_dir_all(&chapters)?;
@@ -148,7 +135,7 @@ fn write_source(docs: &Path, folder: &Path) -> Result<()> {
     for entry in std::fs::read_dir(docs).context("cannot read docs/")? {
         let path = entry?.path();
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        // The index of the folder: the book has its own.
+        // The folder's index is left out: the book has its own.
         let Some(stem) = name.strip_suffix(".md").filter(|stem| *stem != "README") else { continue };
         let text = std::fs::read_to_string(&path).with_context(|| format!("cannot read docs/{name}"))?;
         let title = text.lines().find_map(|line| line.strip_prefix("# ")).unwrap_or(stem).to_owned();
@@ -159,7 +146,7 @@ fn write_source(docs: &Path, folder: &Path) -> Result<()> {
         std::fs::write(chapters.join(&name), titled(&chapter(&name, &text, &chapters)?, &titles))?;
     }
     copy(&docs.join("pictures"), &chapters.join("pictures"))?;
-    // The site opens with the first chapter: that is the one for a reader who comes to it first.
+    // The site opens with the first chapter, which is for new readers.
     let mut summary = "# Summary\n".to_owned();
     let mut contents = String::new();
     let mut put = |part: &str, chapters: Vec<(String, String)>| {
@@ -173,7 +160,7 @@ fn write_source(docs: &Path, folder: &Path) -> Result<()> {
     for (part, names) in PARTS {
         put(part, names.iter().filter_map(|name| titles.remove_entry(*name)).collect());
     }
-    put(FURTHER, titles.into_iter().collect());
+    ensure!(titles.is_empty(), "name these documents in `PARTS` of {}: {titles:?}", file!());
     let _ = write!(summary, "\n---\n\n[{BESIDE}](beside.md)\n");
     let front = format!(
         "# {BESIDE}\n\n\
@@ -212,7 +199,7 @@ html:is(.navy, .coal, .ayu) { --links: #82b6f5; --sidebar-active: #82b6f5; }
 @media (max-width: 500px) { .to-playground span { display: none; } .menu-title { font-size: 1.5rem; } .content main table :is(td, th) { padding: 3px 8px; } }
 ";
 
-/// Puts the playground's name among the buttons at the top of each page.
+/// Script that adds a link to the playground to the buttons of each page.
 const SCRIPT: &str = "\
 const buttons = document.querySelector('.right-buttons');
 const link = Object.assign(document.createElement('a'), {
@@ -223,7 +210,7 @@ link.append('Playground', Object.assign(document.createElement('span'), { textCo
 buttons?.prepend(link);
 ";
 
-/// A document as a chapter: a link to the playground below each listing; files outside `docs/` beside the book.
+/// Converts a document to a chapter: adds a playground link below each listing, and links files outside `docs/` to copies beside the book.
 fn chapter(name: &str, text: &str, folder: &Path) -> Result<String> {
     let mut out = String::with_capacity(text.len());
     let mut rest = text;
@@ -231,7 +218,7 @@ fn chapter(name: &str, text: &str, folder: &Path) -> Result<String> {
         let at = listing.text.as_ptr() as usize - rest.as_ptr() as usize;
         let end = at + listing.text.len();
         let fence = rest[end..].find('\n').map_or(rest.len(), |offset| end + offset + 1);
-        // Up to the line that opens the block; in place of the block, the same in colour.
+        // Copy up to the line that opens the block, and replace the block by its coloured version.
         let opening = rest[..at].trim_end_matches('\n').rfind('\n').map_or(0, |offset| offset + 1);
         out.push_str(&rest[..opening]);
         out.push_str(&colour::html(listing.text, &listing.program));
@@ -248,7 +235,7 @@ fn chapter(name: &str, text: &str, folder: &Path) -> Result<String> {
     outside(name, &out, folder)
 }
 
-/// Links that show a document's file name, `[glossary.md](glossary.md)`, show its title: a book has no files.
+/// Replaces file names in link texts, as in `[glossary.md](glossary.md)`, by titles.
 fn titled(text: &str, titles: &BTreeMap<String, String>) -> String {
     let link = |text: String, (stem, title): (&String, &String)| {
         let shown = format!("[{stem}.md]({stem}.md");
@@ -257,7 +244,7 @@ fn titled(text: &str, titles: &BTreeMap<String, String>) -> String {
     titles.iter().fold(text.to_owned(), link)
 }
 
-/// The part of an address behind `#` that the playground unpacks (`tools/web/page/src/link.js`).
+/// URL fragment with the program, as unpacked by `tools/web/page/src/link.js`.
 fn fragment(program: &str) -> String {
     const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_";
     let mut text = "p1=".to_owned();
@@ -271,7 +258,7 @@ fn fragment(program: &str) -> String {
     text
 }
 
-/// Links to files outside `docs/`: the files are put beside the book. Folders and what is not there keep their text only.
+/// Redirects links to files outside `docs/` to copies beside the book. Links to folders and missing files become plain text.
 fn outside(name: &str, text: &str, folder: &Path) -> Result<String> {
     let mut out = String::with_capacity(text.len());
     let mut rest = text;
@@ -288,7 +275,7 @@ fn outside(name: &str, text: &str, folder: &Path) -> Result<String> {
             std::fs::copy(&file, as_text(&copied))?;
             let _ = write!(out, "files/{}", as_text(&inner));
         } else if file.is_dir() {
-            // `[text](` becomes `text (folder`.
+            // `[text](folder)` becomes `text (folder)`.
             let open = before.rfind('[').with_context(|| format!("docs/{name}: a link does not begin"))?;
             let _ = write!(out, "{}{} (`{}`", &before[..open], &before[open + 1..at], inner.display());
         } else {
@@ -300,13 +287,13 @@ fn outside(name: &str, text: &str, folder: &Path) -> Result<String> {
     Ok(out)
 }
 
-/// A file's name as a text, which a browser shows. mdbook takes every `.md` in a link for a chapter.
+/// File name with an extension that browsers display; mdbook would take a linked `.md` for a chapter.
 fn as_text(path: &Path) -> String {
     let path = path.display().to_string();
     format!("{}.txt", path.strip_suffix(".md").unwrap_or(&path))
 }
 
-/// A path without `..`.
+/// Path with `..` resolved.
 fn normal(path: &Path) -> PathBuf {
     let mut out = PathBuf::new();
     for part in path.components() {
@@ -333,13 +320,13 @@ fn copy(from: &Path, to: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Values of an attribute in a page.
+/// Values of an attribute in an HTML page.
 fn attributes<'p>(page: &'p str, name: &str) -> Vec<&'p str> {
     let pattern = format!(" {name}=\"");
     page.split(pattern.as_str()).skip(1).filter_map(|rest| rest.split('"').next()).collect()
 }
 
-/// Follows every link of the book's own pages: the file is there, and the place in it. How many pages and links there are.
+/// Checks every link of the book's own pages, including the anchor. Returns the numbers of pages and links.
 fn check_links(site: &Path) -> Result<(usize, usize)> {
     let mut pages = BTreeMap::new();
     for entry in std::fs::read_dir(site)? {
@@ -395,7 +382,7 @@ mod tests {
         assert!(link.ends_with("\">Open in the playground</a>\n\nend\n"), "{link}");
     }
 
-    /// Links lead to chapters, to places in them, and to files that are put beside the book; mdbook is not needed to see that.
+    /// Links of the documents resolve to chapters, anchors, or files beside the book; checked without mdbook.
     #[test]
     fn every_link_of_the_documents_leads_somewhere() {
         let folder = std::env::temp_dir().join(format!("takt-book-{}", std::process::id()));
@@ -409,7 +396,7 @@ mod tests {
         for entry in std::fs::read_dir(&chapters).expect("there are some") {
             let path = entry.expect("it can be read").path();
             let Ok(text) = std::fs::read_to_string(&path) else { continue };
-            // Examples in code are no links.
+            // Text in code blocks contains no links.
             let prose: Vec<&str> = text.split("```").step_by(2).collect();
             for link in prose.iter().flat_map(|part| part.split("](").skip(1)) {
                 let target = link.split([')', '#', ' ']).next().unwrap_or_default();
@@ -418,7 +405,7 @@ mod tests {
                 }
                 count += 1;
                 let is_chapter = target.ends_with(".md");
-                // mdbook makes a chapter of every `.md`, and an index of every `README.md`.
+                // mdbook turns every `.md` into a chapter, and every `README.md` into an index.
                 if !chapters.join(target).is_file() || is_chapter && target.contains('/') {
                     broken.push(format!("{}: {target}", path.display()));
                 }

@@ -1,53 +1,29 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Archives for hardware engineers, who need no Rust: for each machine its Verilog, a FuseSoC core, headers and data sheet.
+//! Archives for hardware engineers without Rust: Verilog, FuseSoC core, headers and data sheet of each machine.
 
-use crate::spdx::LINE;
-use crate::{root, run, venv::Venv};
-use anyhow::{Context, Result, anyhow, ensure};
+use anyhow::{Context, Result, ensure};
 use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use takt_asm::{FileLoader, Options, assemble};
-use takt_isa::{MACHINES, Machine, Program, Register};
-use takt_programs::hybrid::closed_loop::Inputs;
+use takt_automation::SPDX;
+use takt_automation::command::{root, run};
+use takt_automation::tracking::{PROGRAM, periods, program};
+use takt_automation::venv::Venv;
+use takt_isa::{MACHINES, Machine, Register};
 use takt_programs::hybrid::ports::{INPUTS, OUTPUTS};
-use takt_programs::hybrid::{Controller, Outputs, Plant};
-use takt_programs::trajectory::Trajectory;
-use takt_programs::{AGH, gcode};
 use takt_rtl::bench;
 use takt_rtl::header::{Header, Language};
 use takt_rtl::{Library, axi, export, wishbone};
 
-/// The tools of the data sheet: pandoc as a wheel, and typst.
+/// Tools for the data sheet: pandoc as a wheel, and typst.
 const DATA_SHEET: [&str; 2] = ["pypandoc-binary==1.17", "typst==0.15.2"];
-/// The reader of the core's description.
+/// Tools that read the core description.
 const FUSESOC: [&str; 2] = ["edalize==0.6.8", "fusesoc==2.4.7"];
 
-const PROGRAM: &str = "programs/hybrid/tracking.s";
-const PERIODS: usize = 3;
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
-/// The archives to write.
-#[derive(clap::Args)]
-pub(crate) struct Arguments {
-    /// One machine only.
-    #[arg(long)]
-    machine: Option<String>,
-    /// Archive nothing; run the smallest machine's FuseSoC targets and compare what its test bench computes (a share of `test`).
-    #[arg(long, conflicts_with = "machine")]
-    test: bool,
-}
-
-/// `cargo xtask dist`.
-pub(crate) fn dist(arguments: &Arguments) -> Result<()> {
-    if arguments.test {
-        return test();
-    }
-    archives(&root().join("target/dist"), arguments.machine.as_deref())
-}
-
-/// Writes the archive of a machine, or of each, into a folder.
+/// Writes the archive of one machine, or of each, into a folder.
 pub(crate) fn archives(out: &Path, machine: Option<&str>) -> Result<()> {
     let is_wanted = |candidate: &&&Machine| machine.is_none_or(|name| name == candidate.name);
     let machines: Vec<&Machine> = MACHINES.iter().filter(is_wanted).copied().collect();
@@ -64,7 +40,7 @@ pub(crate) fn archives(out: &Path, machine: Option<&str>) -> Result<()> {
     Ok(())
 }
 
-/// Archives a folder: the same archive from the same files.
+/// Archives a folder reproducibly: equal files yield equal archives.
 pub(crate) fn archive(folder: &Path, archive: &Path) -> Result<()> {
     let parent = folder.parent().context("a folder of a folder")?;
     let name = folder.file_name().context("it has a name")?;
@@ -85,28 +61,7 @@ fn data_sheet(folder: &Path) -> Result<PathBuf> {
     Ok(sheet)
 }
 
-/// The tracking program.
-pub(crate) fn program(machine: &'static Machine) -> Result<Program> {
-    let options = Options { machine, ..Options::default() };
-    let (loader, name) =
-        FileLoader::of_file(root().join(PROGRAM)).map_err(|error| anyhow!("{PROGRAM}: {error}"))?;
-    Ok(assemble(&name, &loader, &options).map_err(|error| anyhow!("{PROGRAM}: {error:?}"))?.program)
-}
-
-/// The inputs of the first periods of the letters' path, the robot standing where it begins, and what binary64 computes of them.
-pub(crate) fn periods() -> Result<Vec<(Inputs, Outputs<f64>)>> {
-    let path = gcode::read(AGH).map_err(|error| anyhow!("the path: {error:?}"))?;
-    let trajectory = Trajectory::plan(&path).map_err(|error| anyhow!("the path: {error}"))?;
-    let counts = Plant::at_rest(&trajectory.start()).counts().context("it begins within reach")?;
-    let mut controller = Controller::<f64>::new();
-    let inputs = trajectory.samples().take(PERIODS).map(|sample| {
-        let inputs = Inputs { counts, reference: sample.reference.convert() };
-        (inputs, controller.step(inputs.counts, &inputs.reference.convert()))
-    });
-    Ok(inputs.collect())
-}
-
-/// Writes the folder of a machine.
+/// Writes the folder of one machine.
 fn package(machine: &'static Machine, folder: &Path, sheet: &Path) -> Result<PathBuf> {
     let package = folder.join(format!("takt-{}-{VERSION}", machine.name));
     if package.exists() {
@@ -129,8 +84,8 @@ fn package(machine: &'static Machine, folder: &Path, sheet: &Path) -> Result<Pat
         .map(|(inputs, _)| registers.iter().copied().zip(inputs.to_words()).collect())
         .collect();
     for file in bench::folder(&design, Some(&program), &periods) {
-        let is_bare = file.name.ends_with(".v") && !file.text.contains(LINE);
-        let line = if is_bare { format!("// {LINE}\n") } else { String::new() };
+        let is_bare = file.name.ends_with(".v") && !file.text.contains(SPDX);
+        let line = if is_bare { format!("// {SPDX}\n") } else { String::new() };
         write(&file.name, &(line + &file.text))?;
     }
     let list = fs::read_to_string(package.join(format!("{}.f", design.top)))?;
@@ -150,7 +105,7 @@ fn package(machine: &'static Machine, folder: &Path, sheet: &Path) -> Result<Pat
     Ok(package)
 }
 
-/// The machine for FuseSoC, in its CAPI2.
+/// FuseSoC core description (CAPI2) of a machine.
 fn core<'a>(machine: &Machine, top: &str, files: impl Iterator<Item = &'a str>, slaves: &[String]) -> String {
     let list = |files: &mut dyn Iterator<Item = String>| -> String {
         files.fold(String::new(), |mut text, file| {
@@ -204,7 +159,7 @@ targets:
     )
 }
 
-/// Makes the smallest machine's folder, runs its targets with FuseSoC, and compares its forces with binary64's.
+/// Writes the smallest machine's folder, runs its targets with FuseSoC, and compares its forces with binary64.
 pub(crate) fn test() -> Result<()> {
     let machine = MACHINES.iter().copied().min_by_key(|machine| machine.slots.len()).context("a machine")?;
     let folder = root().join("target/dist/test");
@@ -231,7 +186,7 @@ pub(crate) fn test() -> Result<()> {
         let port = program.outputs.iter().find(|output| output.name == port)?;
         machine.output_number(port.register)
     };
-    // Of the last period: a line `cycle output number bits` for each write.
+    // Writes of the last period, from lines `cycle output number bits`.
     let written = |number: u16| {
         let of = |line: &str| {
             let [_, "output", port, bits] = line.split_whitespace().collect::<Vec<_>>()[..] else {
@@ -247,7 +202,7 @@ pub(crate) fn test() -> Result<()> {
     for (port, expected) in OUTPUTS.iter().zip(expected.to_array()).take(3) {
         let force =
             number(port.name).and_then(written).with_context(|| format!("no {} in\n{sim}", port.name))?;
-        // Lengths in binary32 are off by up to 8e-8 m, of which the gain makes 0.7 N.
+        // Lengths in binary32 are off by up to 8e-8 m, which the gain amplifies to 0.7 N.
         ensure!((force - expected).abs() < 1.0, "{}: {force} N, binary64 {expected} N", port.name);
     }
     let pages = fs::metadata(package.join("takt.pdf"))?.len();

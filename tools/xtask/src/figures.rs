@@ -1,25 +1,26 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Figures of the machines in documents, each named by the comment behind it: `112<!-- =tracking.t3.cycles -->`.
+//! Measured figures in documents, each named by the comment after it: `112<!-- =tracking.t3.cycles -->`.
 //!
-//! Rendered, the comment is invisible. The names' values are measured here: cycles, bounds and latencies by assembler, analysis
-//! and tables, in this process; clocks and sizes come from the record of place and route. `cargo xtask docs` writes the figures,
-//! and with `--check` fails if one is wrong.
+//! The comment is invisible when rendered. Values are measured here: cycles, bounds and latencies by assembler, analysis and tables in this
+//! process; clocks and sizes are from the record of place and route. `cargo xtask docs` writes the figures; `--check` fails if one is
+//! wrong.
 
 use anyhow::{Context, Result, bail, ensure};
 use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
 use takt_asm::schedule::DemandKind;
-use takt_asm::{Assembled, Contract, FileLoader, Options, Search};
+use takt_asm::{AssembledProgram, Contract, FileLoader, Options, Search};
+use takt_family::MEASURED;
 use takt_isa::{Machine, Op};
 use takt_rtl::synthesis;
 
 const OPEN: &str = "<!-- =";
 const CLOSE: &str = " -->";
 
-/// The clock at which times are given, MHz: that of the founding paper's processor.
+/// Clock for times in documents, MHz, equal to the clock of the founding paper's processor.
 const CLOCK: f64 = 125.0;
 
-/// The programs of which figures tell: name, and path from the project's folder.
+/// Programs with figures: name, and path from the project's folder.
 const PROGRAMS: [(&str, &str); 12] = [
     ("tracking", "programs/hybrid/tracking.s"),
     ("contracted", "programs/hybrid/tracking.s"),
@@ -35,10 +36,10 @@ const PROGRAMS: [(&str, &str); 12] = [
     ("equations", "programs/hybrid/tracking_equations.s"),
 ];
 
-/// The program with its products fused into sums.
+/// Prefix of the program variant with contracted products and sums.
 const CONTRACTED: &str = "contracted";
 
-/// The documents with figures: path, and text as it should be. Some were generated before.
+/// Documents with figures: path, and updated text. Some were generated before.
 pub(crate) fn documents(
     root: &Path,
     generated: &BTreeMap<PathBuf, String>,
@@ -67,19 +68,19 @@ pub(crate) fn documents(
     Ok(documents)
 }
 
-/// A program on a machine, measured.
-struct Measured {
-    assembled: Assembled,
+/// Measurements of a program on a machine.
+struct ProgramMeasurement {
+    assembled: AssembledProgram,
     bounds: takt_analysis::Bounds,
 }
 
 struct Figures<'r> {
     root: &'r Path,
-    measured: HashMap<(String, String), Measured>,
+    measured: HashMap<(String, String), ProgramMeasurement>,
 }
 
 impl Figures<'_> {
-    /// The document with every figure as it is measured.
+    /// Document text with all figures updated.
     fn fill(&mut self, text: &str) -> Result<String> {
         let mut filled = String::new();
         let mut rest = text;
@@ -95,7 +96,7 @@ impl Figures<'_> {
         Ok(filled + rest)
     }
 
-    /// The figure of a name: `PROGRAM.MACHINE.QUANTITY`, `MNEMONIC.MACHINE.latency`, `circuit.DESIGN.QUANTITY`.
+    /// Value of a figure: `PROGRAM.MACHINE.QUANTITY`, `MNEMONIC.MACHINE.latency`, or `circuit.DESIGN.QUANTITY`.
     fn value(&mut self, name: &str) -> Result<String> {
         let mut parts = name.splitn(3, '.');
         let [Some(what), Some(of), Some(quantity)] = [parts.next(), parts.next(), parts.next()] else {
@@ -111,7 +112,7 @@ impl Figures<'_> {
         }
     }
 
-    fn program(&mut self, name: &str, machine: &'static Machine) -> Result<&Measured> {
+    fn program(&mut self, name: &str, machine: &'static Machine) -> Result<&ProgramMeasurement> {
         let key = (name.to_owned(), machine.name.to_owned());
         if !self.measured.contains_key(&key) {
             let known: BTreeMap<&str, &str> = PROGRAMS.into_iter().collect();
@@ -126,7 +127,12 @@ impl Figures<'_> {
 }
 
 /// Assembles a program as `takt asm` does, and bounds it as `takt bound` does.
-fn measure(root: &Path, path: &str, contracted: bool, machine: &'static Machine) -> Result<Measured> {
+fn measure(
+    root: &Path,
+    path: &str,
+    contracted: bool,
+    machine: &'static Machine,
+) -> Result<ProgramMeasurement> {
     let (folder, file) = path.rsplit_once('/').context("a program lies in a folder")?;
     let loader = Search::new(FileLoader::new(root.join(folder))).library(takt_programs::LIBRARY);
     let contract = if contracted { Contract::All } else { Contract::AsWritten };
@@ -134,15 +140,15 @@ fn measure(root: &Path, path: &str, contracted: bool, machine: &'static Machine)
     let assembled = takt_asm::assemble(file, &loader, &options)
         .map_err(|errors| anyhow::anyhow!("{}", errors.render(false)))?;
     let bounds = takt_analysis::bound(&assembled.program)?;
-    Ok(Measured { assembled, bounds })
+    Ok(ProgramMeasurement { assembled, bounds })
 }
 
-fn quantity_of(measured: &Measured, quantity: &str) -> Result<String> {
-    let Measured { assembled, bounds } = measured;
+fn quantity_of(measured: &ProgramMeasurement, quantity: &str) -> Result<String> {
+    let ProgramMeasurement { assembled, bounds } = measured;
     let section = bounds.sections.iter().find(|section| section.name == "period");
     let cycles = match section {
         Some(section) => section.cycles.worst,
-        // A program that halts.
+        // A program that halts, without periods.
         None => bounds.sections.iter().map(|section| section.cycles.worst).max().context("no section")?,
     };
     let late = || {
@@ -152,7 +158,7 @@ fn quantity_of(measured: &Measured, quantity: &str) -> Result<String> {
     Ok(match quantity {
         "cycles" => grouped(cycles),
         "us" => format!("{:.2}", cycles as f64 / CLOCK),
-        // A tick may come within the refill of the `wait`, too.
+        // Includes the refill after the `wait`, during which a tick may come.
         "in_time" => grouped(section.context("it has no period")?.in_time.worst),
         "worst" => grouped(bounds.worst_period().context("it has no period")?),
         "once" => {
@@ -160,7 +166,7 @@ fn quantity_of(measured: &Measured, quantity: &str) -> Result<String> {
             grouped(once.context("it has no code that runs once")?.cycles.worst)
         }
         "best" => grouped(section.context("it has no period")?.cycles.best),
-        // The bound of the scheduled block, and what the section takes beyond it.
+        // Bound of the scheduled block, plus the section's cycles outside it.
         "bound" => {
             let blocks = assembled.blocks.iter();
             let block = blocks.max_by_key(|block| block.cycles).context("no block is scheduled")?;
@@ -168,7 +174,7 @@ fn quantity_of(measured: &Measured, quantity: &str) -> Result<String> {
         }
         "late" => grouped(late()?.window.context("no output follows")?.0.into()),
         "late_bound" => grouped(late()?.window.context("no output follows")?.1.into()),
-        // From the input that is read last.
+        // Cycles from the latest read of an input.
         "last" => {
             let report = late()?;
             let first = report.ports.iter().map(|port| port.1);
@@ -179,7 +185,7 @@ fn quantity_of(measured: &Measured, quantity: &str) -> Result<String> {
     })
 }
 
-/// Latency and interval of the unit that executes an instruction.
+/// Latency and initiation interval of the unit that executes an instruction.
 fn unit(machine: &Machine, op: Op, quantity: &str) -> Result<String> {
     let (_, unit) = machine.host(op.row().function).context("the machine has no unit for it")?;
     match quantity {
@@ -189,11 +195,11 @@ fn unit(machine: &Machine, op: Op, quantity: &str) -> Result<String> {
     }
 }
 
-/// A figure of the placed and routed circuit.
+/// Figure of a placed and routed circuit.
 fn circuit(design: &str, quantity: &str) -> Result<String> {
     let rows = synthesis::committed().into_iter();
     let name = if design == "three" { "programs/three/controller.toml" } else { design };
-    let placed = rows.filter(|row| row.design == name && row.device == "LFE5U-85F");
+    let placed = rows.filter(|row| row.design == name && row.device == MEASURED.part);
     let row = placed.max_by_key(|row| row.grade).context("it has not been placed and routed")?;
     let clock = |mhz: Option<f64>| mhz.map(|mhz| format!("{mhz:.1}")).context("no clock is recorded");
     match quantity {
@@ -210,7 +216,7 @@ fn circuit(design: &str, quantity: &str) -> Result<String> {
     }
 }
 
-/// A number with commas between thousands.
+/// Decimal number with commas between thousands.
 fn grouped(number: u64) -> String {
     let digits = number.to_string();
     let mut text = String::new();
@@ -227,7 +233,7 @@ fn grouped(number: u64) -> String {
 mod tests {
     use super::*;
 
-    /// A figure is replaced, and nothing else; one that is not there, or of an unknown name, is an error.
+    /// A figure is replaced and all other text stays; a missing figure or an unknown name is an error.
     #[test]
     fn figures_are_filled_in() {
         let mut figures = Figures { root: Path::new("."), measured: HashMap::new() };

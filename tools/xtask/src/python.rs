@@ -1,24 +1,24 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The Python package: its wheel, and its tests, which use it as it is installed.
+//! Python package: builds the wheel, and runs the package's tests on the installed wheel.
 
-use crate::suite::{Report, output};
-use crate::venv::{MODELS, Venv};
-use crate::{root, run};
 use anyhow::{Context, Result, bail};
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use takt_automation::command::{Report, output};
+use takt_automation::command::{root, run};
+use takt_automation::venv::{MODELS, Venv};
 
-/// Builds wheels. (In the environment, `pip install .` would ask for one of its own.)
+/// Wheel builder. (In the environment, `pip install .` would fetch another one.)
 pub(crate) const MATURIN: &str = "maturin==1.16.0";
-/// The packages that the tests need beside [`MODELS`].
-const TESTS: [&str; 6] = [
+/// Packages of the tests in addition to [`MODELS`].
+const TESTS: [&str; 5] = [
     "numpy==2.4.6",
     "pytest==9.2.0",
     "mypy==2.4.1",
-    "onnx==1.23.2",
-    "onnxruntime==1.32.0",
-    // The examples draw with it.
+    // Used by the examples for plots.
     "matplotlib==3.11.2",
+    // Its motor, bridge and carrier close the loop of `programs/servo`.
+    "motulator==0.5.0",
 ];
 
 #[derive(clap::Args)]
@@ -28,17 +28,17 @@ pub(crate) struct Arguments {
     out: PathBuf,
 }
 
-/// Builds the wheel, in the profile of takt and the tests, so that what they have in common is compiled once.
+/// Builds the wheel in the profile of takt and the tests, so that common crates are compiled once.
 pub(crate) fn wheel(arguments: &Arguments) -> Result<()> {
     let wheel = build(&Venv::with(&[MATURIN])?, &root().join(&arguments.out), &[])?;
     println!("{}", wheel.display());
     Ok(())
 }
 
-/// Builds the wheel with further arguments for maturin.
+/// Builds the wheel with additional maturin arguments.
 pub(crate) fn build(venv: &Venv, out: &Path, arguments: &[&str]) -> Result<PathBuf> {
     std::fs::create_dir_all(out).with_context(|| format!("cannot make the folder {}", out.display()))?;
-    // A folder of its own: there is one wheel in it.
+    // A new folder, so that it contains exactly one wheel.
     let fresh = out.join(format!(".{}", std::process::id()));
     let mut command = venv.command("maturin")?;
     command.args(["build", "--release", "--interpreter"]).arg(venv.tool("python3")).args(arguments);
@@ -49,7 +49,7 @@ pub(crate) fn build(venv: &Venv, out: &Path, arguments: &[&str]) -> Result<PathB
         std::fs::rename(wheel.path(), &place)?;
         Ok(place)
     });
-    // If it stays, it is in nobody's way.
+    // A leftover folder is harmless.
     let _ = std::fs::remove_dir_all(&fresh);
     built
 }

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Targets other than x86-64 Linux: the tests of the core crates on aarch64 Linux, in qemu, and compilation for the rest.
+//! Targets other than x86-64 Linux: tests of the core crates on aarch64 Linux in qemu, and compilation for all others.
 
-use crate::{apt_install, cargo, run, works};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use takt_automation::command::{apt_install, cargo, run, works};
 
 /// Which of it.
 #[derive(Args)]
@@ -18,15 +18,15 @@ pub(crate) struct Arguments {
     packages: Vec<String>,
 }
 
-/// A target, and what is compiled for it.
+/// A target with the packages that are compiled for it.
 struct Target {
     triple: &'static str,
     packages: &'static [&'static str],
 }
 
-/// The command and with it everything it is made of.
+/// The command with all its dependencies.
 const WHOLE: &[&str] = &["takt"];
-/// The packages that need no operating system.
+/// Packages that need no operating system.
 const LIBRARIES: &[&str] = &[
     "takt-isa",
     "takt-asm",
@@ -34,6 +34,7 @@ const LIBRARIES: &[&str] = &[
     "takt-analysis",
     "takt-debug",
     "takt-programs",
+    "takt-family",
     "takt-rtl",
     "takt-editor",
     "takt-web",
@@ -46,19 +47,19 @@ const TARGETS: [Target; 4] = [
     Target { triple: AARCH64, packages: WHOLE },
 ];
 
-/// The target of browsers.
+/// Target triple for browsers.
 pub(crate) const WASM: &str = "wasm32-unknown-unknown";
 const AARCH64: &str = "aarch64-unknown-linux-gnu";
-/// The crates whose results must be the same bits on every host.
+/// Crates whose results must be bit-identical on every host.
 const TESTED: [&str; 4] = ["takt-isa", "takt-syntax", "takt-asm", "takt-emu"];
-/// Of the random operands of a release test run; qemu takes about fifty times as long for each.
+/// Share of the random operands of a release test; qemu takes about fifty times as long for each.
 const SCALE: &str = "0.002";
 
-/// The source of the targets' standard libraries.
+/// Origin of the targets' standard libraries.
 pub(crate) enum Toolchain {
-    /// rustup has them, compiled.
+    /// Precompiled libraries from rustup.
     Rustup,
-    /// Debian's compiler builds them from its source.
+    /// Library source of Debian, built with its compiler.
     Debian,
 }
 
@@ -66,7 +67,7 @@ const DEBIAN_RUSTC: &str = "/usr/bin/rustc";
 const DEBIAN_SOURCE: &str = "/usr/lib/rustlib/src/rust/library/std";
 
 impl Toolchain {
-    /// The toolchain that compiles for these targets.
+    /// Selects the toolchain for these targets.
     pub(crate) fn find(triples: &[&str]) -> Result<Toolchain> {
         let mut rustup = Command::new("rustup");
         rustup.args(["target", "add"]).args(triples);
@@ -83,16 +84,15 @@ impl Toolchain {
         Ok(Toolchain::Debian)
     }
 
-    /// Cargo with a subcommand for a target; what it makes goes to a folder of its own, because the compiler may differ from the
-    /// project's.
+    /// Cargo for a target. Output goes to a separate folder, since the compiler may differ from the project's.
     pub(crate) fn cargo(&self, subcommand: &str, triple: &str, folder: &str) -> Command {
         let mut command = cargo();
         command.args([subcommand, "--target", triple, "--target-dir", folder]);
         if let Toolchain::Debian = self {
-            // Building the standard library is unstable; the second variable admits it on the stable compiler.
+            // `-Zbuild-std` is unstable; RUSTC_BOOTSTRAP enables it on the stable compiler.
             command.env("RUSTC", DEBIAN_RUSTC).env("RUSTC_BOOTSTRAP", "1");
             command.arg("-Zbuild-std=std,panic_abort");
-            // Debian's compiler looks for a linker that Debian has not; rustup's own has it.
+            // Debian's compiler expects a linker that Debian lacks; use rustup's.
             if triple == WASM
                 && let Some(linker) = rust_lld()
             {
@@ -103,15 +103,14 @@ impl Toolchain {
     }
 }
 
-/// The linker that comes with the project's compiler.
+/// Linker shipped with the project's compiler.
 fn rust_lld() -> Option<PathBuf> {
     let output = Command::new("rustc").args(["--print", "target-libdir"]).output().ok()?;
     let folder = PathBuf::from(String::from_utf8(output.stdout).ok()?.trim());
     Some(folder.parent()?.join("bin/rust-lld")).filter(|path| path.exists())
 }
 
-/// For the targets of this command, without optimisation: what is only checked need not be fast; the standard library is compiled
-/// all the same.
+/// Unoptimised compilation for a target: checks need no speed, and the standard library is compiled in any case.
 fn plain(toolchain: &Toolchain, subcommand: &str, triple: &str) -> Command {
     let mut command = toolchain.cargo(subcommand, triple, "target/reach");
     command.env("CARGO_PROFILE_DEV_OPT_LEVEL", "0").env("CARGO_PROFILE_DEV_DEBUG", "0");
@@ -125,7 +124,7 @@ pub(crate) fn reach(arguments: &Arguments) -> Result<()> {
         let packages = packages.iter().flat_map(|package| ["-p", package]);
         let mut check = plain(&toolchain, "check", triple);
         if triple == AARCH64 && !arguments.check {
-            // The tests' profile: one standard library for both.
+            // The tests' profile: shares the standard library.
             check.args(["--profile", "test"]);
         }
         run(check.args(packages)).with_context(|| triple.to_owned())?;

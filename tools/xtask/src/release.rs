@@ -1,23 +1,24 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A release: everything that a user downloads, in one folder with checksums.
+//! Release: all downloads in one folder, with checksums.
 
 use crate::book::{self, SITE};
 use crate::python;
-use crate::venv::Venv;
-use crate::{EVERYTHING, apt_install, cargo, dist, extension, root, run, web, works};
+use crate::{changes, dist, extension, web};
 use anyhow::{Context, Result, ensure};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use takt_automation::command::{EVERYTHING, apt_install, cargo, root, run, works};
+use takt_automation::venv::Venv;
 
-/// Compiles and links for other systems, with a C compiler and libraries for each; reads a wheel as the package index does.
+/// Python packages: cross-compilation with Zig, and a check of the wheel by the package index's rules.
 const TOOLS: [&str; 4] = ["cargo-zigbuild==0.24.1", "ziglang==0.17.1", python::MATURIN, "twine==7.0.0"];
-/// A wheel for glibc 2.17 and later, the oldest that Rust supports; Zig has its symbols.
+/// maturin options for a wheel on glibc 2.17 and later, the oldest that Rust supports; Zig has its symbols.
 const MANYLINUX: [&str; 5] =
     ["--zig", "--compatibility", "manylinux2014", "--target", "x86_64-unknown-linux-gnu"];
-/// The targets of `takt` whose C library is linked statically, so that it runs on any Linux.
+/// Targets of `takt` with a static C library, for any Linux.
 const TARGETS: [&str; 2] = ["x86_64-unknown-linux-musl", "aarch64-unknown-linux-musl"];
-/// The folder of what is compiled for them.
+/// Build folder of the static targets.
 const STATIC: &str = "target/static";
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
@@ -27,25 +28,41 @@ pub(crate) struct Arguments {
     /// The folder.
     #[arg(long, default_value = "target/release-files")]
     out: PathBuf,
-    /// Leave out parts: binaries, wheel, extension, book, circuit, crates.
+    /// Leave out parts: binaries, wheel, extension, editors, book, circuit, crates.
     #[arg(long, value_delimiter = ',')]
     without: Vec<String>,
+    /// Move the fragments of docs/changes into CHANGELOG.md as the section of this version, and build nothing.
+    #[arg(long, value_name = "VERSION", conflicts_with_all = ["out", "without"])]
+    changelog: Option<String>,
+    /// Only write the archives of Verilog, target/dist/takt-*.tar.gz: a machine's Verilog, a FuseSoC core, headers, the data sheet as PDF.
+    #[arg(long, conflicts_with_all = ["out", "without", "changelog"])]
+    archives: bool,
+    /// The archive of one machine only.
+    #[arg(long, requires = "archives")]
+    machine: Option<String>,
 }
 
-/// A part of a release: its name, and the function that writes its files into a folder.
+/// Part of a release: its name, and the function that writes its files into a folder.
 type Artefact = (&'static str, fn(&Venv, &Path) -> Result<()>);
 
-const PARTS: [Artefact; 6] = [
+const PARTS: [Artefact; 7] = [
     ("binaries", binaries),
     ("wheel", wheel),
     ("extension", vsix),
+    ("editors", editors),
     ("book", pages),
     ("circuit", circuit),
     ("crates", crates),
 ];
 
-/// `cargo xtask release`.
+/// Entry of `cargo xtask release`.
 pub(crate) fn release(arguments: &Arguments) -> Result<()> {
+    if let Some(version) = &arguments.changelog {
+        return changes::release(version);
+    }
+    if arguments.archives {
+        return dist::archives(&root().join("target/dist"), arguments.machine.as_deref());
+    }
     for name in &arguments.without {
         ensure!(PARTS.iter().any(|(part, _)| part == name), "a release has no part `{name}`");
     }
@@ -63,7 +80,7 @@ pub(crate) fn release(arguments: &Arguments) -> Result<()> {
     sums(&out)
 }
 
-/// `takt` for each target whose standard library rustup has.
+/// Builds `takt` for each target whose standard library rustup has.
 fn binaries(venv: &Venv, out: &Path) -> Result<()> {
     for target in TARGETS {
         if run(Command::new("rustup").args(["target", "add", target])).is_err() {
@@ -94,38 +111,59 @@ fn binaries(venv: &Venv, out: &Path) -> Result<()> {
     Ok(())
 }
 
-/// The wheel, and its description as the package index reads it.
+/// Builds the wheel, and checks its description as the package index does.
 fn wheel(venv: &Venv, out: &Path) -> Result<()> {
     let wheel = python::build(venv, out, &MANYLINUX)?;
     run(Command::new(venv.tool("python3")).args(["-I", "-m", "twine", "check", "--strict"]).arg(wheel))
 }
 
-/// The extension of VS Code.
+/// Builds the VS Code extension.
 fn vsix(_: &Venv, out: &Path) -> Result<()> {
     extension()?;
     fs::copy(root().join("tools/editors/vscode/dist/takt.vsix"), out.join(format!("takt-{VERSION}.vsix")))?;
     Ok(())
 }
 
-/// The documents as a site, and the playground alone.
+/// Archives the configurations of other editors, with tree-sitter's parser, which it generates.
+fn editors(_: &Venv, out: &Path) -> Result<()> {
+    let from = root().join("tools/editors");
+    let mut generate = cargo();
+    generate.args(["run", "--quiet", "--release", "--locked", "--target-dir", "target/tree-sitter"]);
+    run(generate.arg("--manifest-path").arg(from.join("tree-sitter-takt/generate/Cargo.toml")))?;
+    let folder = root().join(format!("target/dist/takt-{VERSION}-editors"));
+    if folder.exists() {
+        fs::remove_dir_all(&folder)?;
+    }
+    fs::create_dir_all(&folder)?;
+    for editor in ["emacs", "helix", "neovim", "tree-sitter-takt"] {
+        run(Command::new("cp").arg("-r").arg(from.join(editor)).arg(&folder))?;
+    }
+    fs::remove_dir_all(folder.join("tree-sitter-takt/generate"))?;
+    for licence in ["LICENSE-APACHE", "LICENSE-MIT"] {
+        fs::copy(root().join(licence), folder.join(licence))?;
+    }
+    dist::archive(&folder, &out.join(format!("takt-{VERSION}-editors.tar.gz")))
+}
+
+/// Builds the documentation site, and the playground by itself.
 fn pages(_: &Venv, out: &Path) -> Result<()> {
     book::book(&book::Arguments::WHOLE)?;
     dist::archive(&root().join(SITE), &out.join(format!("takt-{VERSION}-book.tar.gz")))?;
     dist::archive(&root().join(web::PAGE), &out.join(format!("takt-{VERSION}-playground.tar.gz")))
 }
 
-/// The archive of Verilog for each machine.
+/// Writes the Verilog archive of each machine.
 fn circuit(_: &Venv, out: &Path) -> Result<()> {
     dist::archives(out, None)
 }
 
-/// The libraries as crates.io would get them; nothing is uploaded. They are not compiled from their packages: Berkeley SoftFloat
-/// would then be compiled by CMake, which `isa/c99` spares the workspace.
+/// Packages the libraries as for crates.io, without upload. Without compilation, too: Berkeley SoftFloat would then be built by CMake,
+/// which `isa/c99` avoids in the workspace.
 fn crates(_: &Venv, _: &Path) -> Result<()> {
     run(cargo().args(["publish", "--workspace", "--dry-run", "--no-verify"]))
 }
 
-/// Writes the checksums.
+/// Writes the SHA-256 checksums.
 fn sums(out: &Path) -> Result<()> {
     if !works("sha256sum", "--version") {
         apt_install(&["coreutils"])?;

@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Checks that the tests find every crate that takt with all features, xtask and the wheel compiled: `tools/unify`'s purpose.
+//! Checks `tools/unify`: the tests must find every crate compiled by takt with all features, by xtask, evidence and the wheel.
 //!
-//! cargo-hakari, which writes such crates, leaves out the workspace's own crates, whose features differ too, and takes minutes to
-//! install; cargo's own plan shows both kinds in a second.
+//! cargo-hakari generates such crates, but leaves out the workspace's own, whose features differ too, and takes minutes to install; cargo's
+//! build plan shows both kinds in a second.
 
-use crate::cargo;
 use anyhow::{Context, Result, bail};
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
+use takt_automation::command::{EVERYTHING, cargo};
 
-/// The units that cargo would compile: package, target and mode, and the features of each.
+/// Units of cargo's build plan, by package, target and mode, with their features.
 fn units(arguments: &[&str]) -> Result<BTreeMap<String, BTreeSet<String>>> {
     let mut command = cargo();
     command.args(arguments).args(["--release", "--unit-graph", "-Zunstable-options"]);
-    // Cargo's plan is unstable; the variable admits it on the stable compiler.
+    // The build plan is unstable; RUSTC_BOOTSTRAP enables it on the stable compiler.
     let output = command.env("RUSTC_BOOTSTRAP", "1").output().context("cannot start cargo")?;
     if !output.status.success() {
         bail!("cargo gave no plan: {}", String::from_utf8_lossy(&output.stderr));
@@ -28,14 +28,15 @@ fn units(arguments: &[&str]) -> Result<BTreeMap<String, BTreeSet<String>>> {
 }
 
 /// # Errors
-/// If the tests would compile a crate again, with other features. A crate with other features makes all that depend on it compile
-/// twice.
+/// If the tests would compile a crate again with other features: all its dependents would then be compiled twice.
 pub(crate) fn check() -> Result<()> {
-    let tests = units(&["test", "--workspace", "--features", crate::EVERYTHING])?;
+    let tests = units(&["test", "--workspace", "--features", EVERYTHING])?;
     let mut again = Vec::new();
-    for (package, features) in [("takt", &["--features", "full"][..]), ("xtask", &[]), ("takt-python", &[])] {
+    for (package, features) in
+        [("takt", &["--features", "full"][..]), ("xtask", &[]), ("evidence", &[]), ("takt-python", &[])]
+    {
         for (unit, features) in units(&[&["build", "--package", package], features].concat())? {
-            // The wheel has no screen.
+            // Intended difference: the wheel has no full-screen view.
             let is_meant =
                 package == "takt-python" && ["takt-debug", "unify"].iter().any(|name| unit.contains(name));
             let with = tests.get(&unit);

@@ -1,17 +1,16 @@
-//! The line of SPDX that states the licence, in every source file.
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! SPDX line that states the licence, in every source file.
 
-use crate::{cargo, root};
 use anyhow::{Context, Result, ensure};
 use std::fs;
 use std::process::Command;
+use takt_automation::SPDX;
+use takt_automation::command::{cargo, root};
 
-/// The line, without the characters that begin a comment.
-pub(crate) const LINE: &str = "SPDX-License-Identifier: MIT OR Apache-2.0";
-
-/// The files that have it. The assembler's own tests read texts that are no programs.
+/// Files that must have the line. Test inputs of the assembler are exempt.
 const FILES: [&str; 5] = ["*.rs", "*.v", "*.vh", "*.sv", "programs/*.s"];
 
-/// The files that lack it.
+/// Files without the line.
 fn lacking() -> Result<Vec<String>> {
     let mut git = Command::new("git");
     git.current_dir(root()).args(["ls-files", "-z", "--"]).args(FILES);
@@ -25,20 +24,20 @@ fn lacking() -> Result<Vec<String>> {
     let mut lacking = Vec::new();
     for path in listed.split_terminator('\0') {
         let text = fs::read_to_string(root().join(path)).with_context(|| format!("cannot read {path}"))?;
-        if !text.contains(LINE) {
+        if !text.contains(SPDX) {
             lacking.push(path.to_owned());
         }
     }
     Ok(lacking)
 }
 
-/// A file's text with the line: the first, or the last of a program, whose lines then keep the numbers that documents and listings quote.
+/// Inserts the line into a text: as the first, or in a program as the last, so that quoted line numbers stay valid.
 fn with_line(path: &str, text: &str) -> String {
     if !path.ends_with(".s") {
-        return format!("// {LINE}\n{text}");
+        return format!("// {SPDX}\n{text}");
     }
     let gap = if text.is_empty() || text.ends_with('\n') { "" } else { "\n" };
-    format!("{text}{gap}; {LINE}\n")
+    format!("{text}{gap}; {SPDX}\n")
 }
 
 /// # Errors
@@ -47,13 +46,13 @@ pub(crate) fn check() -> Result<()> {
     let lacking = lacking()?;
     ensure!(
         lacking.is_empty(),
-        "these files state no licence; `cargo xtask spdx` writes the line:\n{}",
+        "these files state no licence; `cargo xtask lint --fix` writes the line:\n{}",
         lacking.join("\n")
     );
     Ok(())
 }
 
-/// Writes the line into each file that lacks it.
+/// Adds the line to all files without it.
 pub(crate) fn fix() -> Result<()> {
     for path in lacking()? {
         let file = root().join(&path);
@@ -61,7 +60,7 @@ pub(crate) fn fix() -> Result<()> {
         fs::write(&file, with_line(&path, &text)).with_context(|| format!("cannot write {path}"))?;
         println!("wrote {path}");
     }
-    crate::run(cargo().args(["fmt", "--all"]))
+    takt_automation::command::run(cargo().args(["fmt", "--all"]))
 }
 
 #[cfg(test)]
@@ -70,7 +69,7 @@ mod tests {
 
     #[test]
     fn programs_keep_their_line_numbers() {
-        assert_eq!(with_line("isa/src/lib.rs", "//! Text\n"), format!("// {LINE}\n//! Text\n"));
-        assert_eq!(with_line("programs/a.s", ".period"), format!(".period\n; {LINE}\n"));
+        assert_eq!(with_line("isa/src/lib.rs", "//! Text\n"), format!("// {SPDX}\n//! Text\n"));
+        assert_eq!(with_line("programs/a.s", ".period"), format!(".period\n; {SPDX}\n"));
     }
 }

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The playground: compiled for browsers, bundled, and tested in one.
+//! Playground: compilation to WebAssembly, bundling, and tests in a browser.
 
 use crate::reach::{Toolchain, WASM};
-use crate::{apt_install, root, run, works};
 use anyhow::{Context, Result};
 use clap::Args;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use takt_automation::command::{apt_install, root, run, works};
 
 /// The steps beyond building the page.
 #[derive(Args)]
@@ -22,12 +22,12 @@ pub(crate) struct Arguments {
     screenshots: Option<PathBuf>,
 }
 
-/// The folder of the page; any file server can serve it.
+/// Folder of the finished page; any file server can serve it.
 pub(crate) const PAGE: &str = "target/playground";
-/// The folder of what is compiled on the way.
+/// Build folder of the page.
 const TARGET: &str = "target/web";
 
-/// What makes the page small: a level for size, and one optimisation of the whole.
+/// Cargo settings for a small page: optimisation for size, and link-time optimisation.
 const SMALL: [&str; 9] = [
     "profile.release.opt-level=\"s\"",
     "profile.release.lto=\"fat\"",
@@ -48,11 +48,11 @@ pub(crate) fn web(arguments: &Arguments) -> Result<()> {
     Ok(())
 }
 
-/// Builds the page.
+/// Builds the playground's page.
 pub(crate) fn build() -> Result<()> {
     let mut compile = Toolchain::find(&[WASM])?.cargo("build", WASM, TARGET);
     compile.args(["--release", "-p", "takt-web"]);
-    // The project's profile is for compiling quickly; a page is loaded. What runs often keeps its level there.
+    // The project's profile favours compile time; a page favours size. Hot crates keep their optimisation level.
     for small in SMALL {
         compile.args(["--config", small]);
     }
@@ -67,7 +67,7 @@ pub(crate) fn build() -> Result<()> {
     Ok(())
 }
 
-/// The page's folder, with what it needs from npm in the versions that are written down.
+/// Folder of the page, with its npm packages in pinned versions.
 fn packages() -> Result<PathBuf> {
     if !works("node", "--version") || !works("npm", "--version") {
         apt_install(&["nodejs", "npm"])?;
@@ -95,7 +95,7 @@ fn test(arguments: &Arguments) -> Result<()> {
     in_browser("test/page.test.mjs", &environment)
 }
 
-/// Runs a test of the page's folder that uses a headless browser.
+/// Runs a test of the page's folder in a headless browser.
 pub(crate) fn in_browser(test: &str, environment: &[(&str, &Path)]) -> Result<()> {
     if !works("chromium", "--version") {
         apt_install(&["chromium"])?;

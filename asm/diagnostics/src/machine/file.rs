@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A machine's row as a file (TOML), each mistake at its place. The checks are those of the table's rows
-//! ([`Machine::error`]); the file's own are that names, keys and numbers can be read at all.
+//! A machine's row as a file (TOML), each mistake at its place. [`Machine::error`] checks the row like the table's rows;
+//! this module checks that names, keys and numbers can be read at all.
 
 use super::too_long;
 use crate::diag::{Diagnostic, Diagnostics};
@@ -14,12 +14,12 @@ use std::fmt;
 use std::ops::Range;
 use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 use takt_isa::spec::row::{BankOwned, RowError, RowOwned, RowPlace, SlotOwned, UnitOwned};
-use takt_isa::{Machine, MachineReason, UNITS};
+use takt_isa::{Function, Machine, MachineReason, UNITS};
 use toml::Spanned;
 
 /// The longest file of a machine.
 pub const FILE_BYTES: usize = 1 << 16;
-/// The longest name in it: names become parts of names in assembly and Verilog.
+/// The longest name in a file, in bytes: names become parts of names in assembly and Verilog.
 const NAME_BYTES: usize = 40;
 /// The most units of a slot.
 const UNITS_OF_SLOT: usize = 32;
@@ -78,9 +78,9 @@ struct UnitTable {
 
 impl<'de> Deserialize<'de> for Entry {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Entry, D::Error> {
-        struct Either;
+        struct EntryVisitor;
 
-        impl<'de> Visitor<'de> for Either {
+        impl<'de> Visitor<'de> for EntryVisitor {
             type Value = Entry;
 
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -97,14 +97,14 @@ impl<'de> Deserialize<'de> for Entry {
             }
         }
 
-        deserializer.deserialize_any(Either)
+        deserializer.deserialize_any(EntryVisitor)
     }
 }
 
 /// Name and text of files, by the names of their machines.
 type Files = HashMap<&'static str, [Arc<str>; 2]>;
 
-/// The files of the machines that were read: for messages about what a later stage finds.
+/// The files of the machines that were read, for messages of later stages.
 static FILES: LazyLock<Mutex<Files>> = LazyLock::new(Mutex::default);
 
 fn span(range: Range<usize>) -> Span {
@@ -117,7 +117,7 @@ fn diagnostics(name: &str, text: &str, list: Vec<Diagnostic>) -> Diagnostics {
     Diagnostics { sources: Arc::new(sources), list, ..Diagnostics::default() }
 }
 
-/// Reads a machine's row. One that was read before is the same machine.
+/// Reads a machine's row. A row that was read before gives the same machine.
 ///
 /// # Errors
 /// The mistakes in the file, all that can be told at once.
@@ -141,7 +141,8 @@ pub fn read(name: &str, text: &str) -> Result<&'static Machine, Diagnostics> {
     }
 }
 
-/// A message about a part of a machine that was read from a file, options left out, at its place there; `None` of other machines.
+/// A message about a part of a machine that was read from a file, options left out, at its place there; `None` for other
+/// machines.
 pub fn about(machine: &str, place: RowPlace<'_>, message: &str, help: &str) -> Option<Diagnostics> {
     let [name, text] = {
         let files = FILES.lock().unwrap_or_else(PoisonError::into_inner);
@@ -203,7 +204,7 @@ fn mistake(file: &File, error: &RowError) -> Diagnostic {
     }
 }
 
-/// The place of a part of the row; of several of one name the last.
+/// The place of a part of the row; among several of one name, the last.
 fn find(file: &File, place: RowPlace<'_>) -> Range<usize> {
     let top = || file.name.span();
     let slot = |name: &str| file.slot.iter().rev().find(|slot| slot.name.get_ref() == name);
@@ -247,7 +248,9 @@ impl Reader {
                 let message = format!("{} units; a slot has {UNITS_OF_SLOT} at most", units.len());
                 self.mistakes.push(Diagnostic::error("limit", span(table.units.span()), message));
             }
-            let units = units.iter().take(UNITS_OF_SLOT).filter_map(|entry| self.unit(entry)).collect();
+            let counts = *file.loop_depth.get_ref() != 0;
+            let units =
+                units.iter().take(UNITS_OF_SLOT).filter_map(|entry| self.unit(entry, counts)).collect();
             let bank = self.bank(&table.bank, &table.base, &table.depth);
             slots.push(SlotOwned { name: self.name(&table.name), bank, units });
         }
@@ -274,7 +277,7 @@ impl Reader {
         name.get_ref().clone()
     }
 
-    /// A number of the type that the row has; its own checks come later.
+    /// A number in the type of the row's field; the row's own checks come later.
     fn number<T: TryFrom<i64> + Default>(&mut self, what: &str, number: &Spanned<i64>) -> T {
         T::try_from(*number.get_ref()).unwrap_or_else(|_| {
             let message = format!("{what} is {}; it is no number of that size", number.get_ref());
@@ -289,7 +292,9 @@ impl Reader {
         BankOwned { name, base: self.number("base", base), depth: self.number("depth", depth) }
     }
 
-    fn unit(&mut self, entry: &Spanned<Entry>) -> Option<UnitOwned> {
+    /// A unit as the machine has it. On a machine that counts no loops (`counts` is false), a unit lacks [`Function::Loop`]
+    /// unless the entry lists its functions.
+    fn unit(&mut self, entry: &Spanned<Entry>, counts: bool) -> Option<UnitOwned> {
         let UnitTable { unit: name, functions, latency, interval } = &entry.get_ref().0;
         let Some(mut unit) = UnitOwned::of(name) else {
             let known = UNITS.iter().map(|unit| unit.name);
@@ -316,6 +321,8 @@ impl Reader {
                     }
                 }
             }
+        } else if !counts {
+            unit.functions.retain(|function| *function != Function::Loop);
         }
         if let Some(latency) = latency {
             unit.latency = self.number("latency", latency);

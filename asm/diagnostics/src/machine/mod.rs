@@ -9,16 +9,16 @@ pub use file::{FILE_BYTES, about, read};
 use std::path::Path;
 use takt_isa::{Machine, MachineNameError};
 
-/// The reason why there is no such machine.
+/// The reason that a machine is unknown, unread or wrong.
 #[derive(Clone, Debug)]
 pub enum MachineMistake {
     /// No machine of the table, or no option, has this name.
     Name(MachineNameError),
     /// The file cannot be read.
     Unread {
-        /// Its name.
+        /// Path of the file, as given.
         file: String,
-        /// The reason.
+        /// Reason, in the loader's words.
         reason: String,
     },
     /// The file has mistakes.
@@ -36,7 +36,7 @@ pub fn machine_file(name: &str) -> Option<(&str, &str)> {
     Some((file.trim_start(), options.trim_start().trim_start_matches(',')))
 }
 
-/// The machine of a name or of a file, which `load` gives.
+/// The machine of a name, or of a file whose bytes `load` gives.
 ///
 /// # Errors
 /// If there is none, or the file has mistakes.
@@ -53,7 +53,7 @@ pub fn machine_from(
         Ok(text) => text,
         Err(error) => {
             let at = error.utf8_error().valid_up_to();
-            return Err(unread(format!("it is no text: byte {at} is not UTF-8")));
+            return Err(unread(format!("it is not text: byte {at} is not UTF-8")));
         }
     };
     let machine = read(file, &text).map_err(MachineMistake::File)?;
@@ -66,7 +66,7 @@ pub fn machine_from(
 /// The machine of a name or of a file on this disk, with options if it has any: `t3,data=32768`, `my.toml`.
 ///
 /// # Errors
-/// The mistake in words, with the name that was perhaps meant and those that there are.
+/// The mistake in words, with the nearest known name and a list of all.
 pub fn machine(name: &str) -> Result<&'static Machine, String> {
     machine_from(name, |file| load(Path::new(file))).map_err(|mistake| mistake.to_string())
 }
@@ -112,7 +112,8 @@ impl std::fmt::Display for MachineMistake {
 }
 
 impl MachineMistake {
-    /// As an error at the place of another file that names the machine; mistakes in the machine's own file become notes.
+    /// This mistake as an error at the place where another file names the machine; mistakes in the machine's own file become
+    /// notes.
     pub fn diagnose(&self, span: crate::Span) -> Diagnostic {
         match self {
             MachineMistake::Name(error) => {

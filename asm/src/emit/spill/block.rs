@@ -1,23 +1,23 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Spill code in one scheduled block, whose bundles stay in their order.
 //!
-//! From the first bundle to the last: where a bank has too many live values, the one whose next use is farthest is spilled (Belady,
-//! 1966). It is stored once, after its computation, and reloaded as late as its next use allows, in free slots if there are any.
-//! A reloaded value has a live range of its own, and may be spilled again.
+//! Bundles are visited from first to last: where a bank has too many live values, the value whose next use is farthest is spilled
+//! (Belady, 1966). It is stored once, after its computation, and reloaded as late as its next use allows, in free slots if there
+//! are any. A reloaded value has a live range of its own, and may be spilled again.
 
 use super::super::allocate::Pressure;
-use super::Spilled;
+use super::SpilledValue;
 use crate::ir::runs::Run;
 use crate::ir::{Bundle, Constant, Ir, Operation, RegisterId, VirtualRegister};
 use crate::schedule;
 use smallvec::smallvec;
 use takt_isa::{Effect, Op, ROWS, SlotIndex};
 
-/// The shortage.
-pub(super) enum Short {
-    /// Data words: so many are needed at least.
+/// Reason that spilling fails.
+pub(super) enum SpillError {
+    /// Too few data words: at least this many are needed.
     Words(usize),
-    /// Values that may be kept elsewhere.
+    /// Too few values that may be spilled.
     Values,
 }
 
@@ -25,13 +25,13 @@ pub(super) enum Short {
 struct Value {
     id: RegisterId,
     slot: SlotIndex,
-    /// The bundle that writes it, counted from the block's first.
+    /// Bundle that writes it, counted from the block's first.
     first: usize,
-    /// The bundles that read it, ascending.
+    /// Bundles that read it, ascending.
     uses: Vec<usize>,
-    /// True if it may be spilled.
+    /// The value may be spilled.
     spillable: bool,
-    /// Which of the spilled values it is, once it is in data memory.
+    /// Index among the spilled values, once it is in data memory.
     stored: Option<usize>,
 }
 
@@ -41,13 +41,13 @@ impl Value {
         self.uses.last().copied().unwrap_or(0).max(self.first + usize::from(self.uses.is_empty()))
     }
 
-    /// True if it is live between a bundle and the next.
+    /// The value is live between bundle `gap` and the next.
     fn spans(&self, gap: usize) -> bool {
         self.first <= gap && gap < self.end()
     }
 }
 
-/// The place of an added operation: in a bundle, or in one of its own after it.
+/// The place of an added operation: in a bundle, or in a bundle of its own after it.
 #[derive(Clone, Copy)]
 enum InsertionPoint {
     In(usize),
@@ -67,27 +67,30 @@ struct Block<'a> {
     bundles: Vec<Bundle>,
     /// Operations in bundles of their own, by the bundle that they follow.
     behind: Vec<Vec<Operation>>,
-    /// When the bundles issue, before any is added to.
+    /// Issue cycles of the bundles, before operations are added.
     start: Vec<u32>,
     values: Vec<Value>,
-    spilled: Vec<Spilled>,
-    /// The operation that computes each of these.
+    spilled: Vec<SpilledValue>,
+    /// The operation that computes each spilled value.
     computed: Vec<Operation>,
     load: Op,
     store: Op,
     slot: SlotIndex,
 }
 
-/// Spills values of a run until the others have registers. Returns the new bundles and the spilled values, which are kept in `words`.
+/// Spills values of a run until the others have registers. Returns the new bundles and the spilled values, which are kept in
+/// `words`.
 pub(super) fn spill(
     ir: &mut Ir,
     run: Run,
     pressure: &Pressure,
     words: &mut impl Iterator<Item = u32>,
-) -> Result<(Vec<Bundle>, Vec<Spilled>), Short> {
+) -> Result<(Vec<Bundle>, Vec<SpilledValue>), SpillError> {
     let of = |effect: Effect| ROWS.iter().find(|row| row.effect == effect);
-    let (Some(load), Some(store)) = (of(Effect::Load), of(Effect::Store)) else { return Err(Short::Values) };
-    let Some((slot, _)) = ir.machine.host(store.function) else { return Err(Short::Values) };
+    let (Some(load), Some(store)) = (of(Effect::Load), of(Effect::Store)) else {
+        return Err(SpillError::Values);
+    };
+    let Some((slot, _)) = ir.machine.host(store.function) else { return Err(SpillError::Values) };
     let bundles = ir.bundles[run.start..run.end].to_vec();
     let start = schedule::as_written(ir, &bundles);
     let values = values(&bundles, run, pressure);
@@ -111,7 +114,7 @@ pub(super) fn spill(
     Ok(block.finish())
 }
 
-/// The values of a run that one operation writes and only the run uses.
+/// Values of a run that one operation writes and only the run uses.
 fn values(bundles: &[Bundle], run: Run, pressure: &Pressure) -> Vec<Value> {
     let mut values: Vec<Value> = Vec::new();
     let mut index = std::collections::HashMap::new();
@@ -123,7 +126,7 @@ fn values(bundles: &[Bundle], run: Run, pressure: &Pressure) -> Vec<Value> {
                     if value.uses.last() != Some(&at) {
                         value.uses.push(at);
                     }
-                    // It is known by its register where it is copied, and where the source packs the bundle.
+                    // Copies, and bundles that the source packs, name the value by its register: it must stay there.
                     value.spillable &= !operation.made && !bundle.explicit;
                 }
             }
@@ -150,21 +153,21 @@ fn values(bundles: &[Bundle], run: Run, pressure: &Pressure) -> Vec<Value> {
 }
 
 impl Block<'_> {
-    /// Takes one of the values that a bank holds between a bundle and the next out of it: that which is used again latest.
+    /// Spills one of the values that a bank holds between bundle `gap` and the next: the value with the farthest next use.
     fn make_room(
         &mut self,
         held: &[usize],
         gap: usize,
         words: &mut impl Iterator<Item = u32>,
-    ) -> Result<(), Short> {
+    ) -> Result<(), SpillError> {
         let next = |value: &Value| value.uses.iter().copied().find(|at| *at > gap);
-        // There must be a bundle between, to load in; and one before, to store in.
+        // Reloading needs a bundle between; storing needs an earlier one.
         let candidates = held.iter().filter_map(|&value| {
             let of = &self.values[value];
             let next = next(of).filter(|next| of.spillable && *next > gap + 1)?;
             (of.first < gap).then_some((next, of.stored.is_some(), value))
         });
-        let (next, _, value) = candidates.max().ok_or(Short::Values)?;
+        let (next, _, value) = candidates.max().ok_or(SpillError::Values)?;
         let stored = match self.values[value].stored {
             Some(stored) => stored,
             None => self.store(value, gap, words)?,
@@ -173,7 +176,7 @@ impl Block<'_> {
         Ok(())
     }
 
-    /// True if an operation can be added to a bundle.
+    /// An operation on the memory's slot can be added to a bundle.
     fn has_room(&self, at: usize) -> bool {
         let Bundle { operations, explicit, .. } = &self.bundles[at];
         let taken = |operation: &Operation| operation.slot.is_none_or(|slot| slot == self.slot);
@@ -189,18 +192,18 @@ impl Block<'_> {
         }
     }
 
-    /// Stores a value behind its computation, so that its register is free before a gap or after its last use until then.
+    /// Stores a value after its computation, so that its register is free from the gap on, or until the store reads it.
     fn store(
         &mut self,
         value: usize,
         gap: usize,
         words: &mut impl Iterator<Item = u32>,
-    ) -> Result<usize, Short> {
+    ) -> Result<usize, SpillError> {
         let Value { id, first, .. } = self.values[value];
         let computing = self.bundles[first].operations.iter().find(|operation| operation.dest == Some(id));
-        let computing = *computing.ok_or(Short::Values)?;
+        let computing = *computing.ok_or(SpillError::Values)?;
         let ready = self.start[first] + schedule::latency(self.ir.machine, &computing);
-        let word = words.next().ok_or(Short::Words(self.spilled.len() + 1))?;
+        let word = words.next().ok_or(SpillError::Words(self.spilled.len() + 1))?;
         let free = (first + 1..=gap).find(|&at| self.start[at] >= ready && self.has_room(at));
         let behind = || (first..gap).find(|&at| self.start[at + 1] >= ready).unwrap_or(gap - 1);
         let place = free.map_or_else(|| InsertionPoint::Behind(behind()), InsertionPoint::In);
@@ -212,14 +215,14 @@ impl Block<'_> {
         let uses = &mut self.values[value].uses;
         let at = match place {
             InsertionPoint::In(bundle) => bundle,
-            // It needs its register to the bundle behind.
+            // The store reads the register in the bundle after.
             InsertionPoint::Behind(bundle) => bundle + 1,
         };
         if let Err(place) = uses.binary_search(&at) {
             uses.insert(place, at);
         }
         let register = self.ir.register(id);
-        self.spilled.push(Spilled {
+        self.spilled.push(SpilledValue {
             name: register.name.clone(),
             bank: self.ir.machine.slot(self.values[value].slot).bank.name,
             location: self.ir.location(&computing),
@@ -230,7 +233,7 @@ impl Block<'_> {
         Ok(self.spilled.len() - 1)
     }
 
-    /// Loads a value for its `next` use, behind a gap; all further uses read what is loaded.
+    /// Loads a value for its `next` use, after the gap; all further uses read the loaded value.
     fn reload(&mut self, value: usize, stored: usize, gap: usize, next: usize) {
         let computing = self.computed[stored];
         let old = self.values[value].id;
@@ -269,7 +272,7 @@ impl Block<'_> {
         });
     }
 
-    /// A load or store of a word, for what an operation computes.
+    /// A load or store of a word, attributed to the operation that computes the value.
     fn operation(&self, computing: &Operation, op: Op, word: u32) -> Operation {
         Operation {
             op,
@@ -284,7 +287,7 @@ impl Block<'_> {
         }
     }
 
-    fn finish(self) -> (Vec<Bundle>, Vec<Spilled>) {
+    fn finish(self) -> (Vec<Bundle>, Vec<SpilledValue>) {
         let mut bundles = Vec::with_capacity(self.bundles.len());
         for (mut bundle, behind) in self.bundles.into_iter().zip(self.behind) {
             bundle.operations.sort_by_key(|operation| operation.slot);

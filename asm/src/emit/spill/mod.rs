@@ -1,50 +1,50 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Reduction of register pressure: other schedules, and spilling to data memory.
 //!
-//! If a block of equations has more live values than a bank has registers, schedules nearer to the source's order are tried, which
-//! have lower pressure ([`Order`]), and spilling: values whose next use is farthest are stored in words that nothing else
-//! touches, and reloaded before that use ([`block`]). The shorter program is taken. Registers written by hand-written operations
-//! are never spilled.
+//! If a block of equations has more live values than a bank has registers, two remedies are tried: schedules nearer to the
+//! source's order, which have lower pressure ([`Order`]), and spilling: values whose next use is farthest are stored in words that
+//! nothing else touches, and reloaded before that use ([`block`]). The shorter program is taken. Registers written by hand-written
+//! operations are never spilled.
 
 mod block;
 
 use super::allocate::{self, Pressure};
+use crate::capacity;
 use crate::ir::runs::{self, Run};
 use crate::ir::{Bundle, Ir};
-use crate::report::diag::Sink;
-use crate::room;
-use crate::schedule::{self, BlockReport, Order, PlainLoop, Report};
+use crate::schedule::{self, BlockReport, Budget, Order, PlainLoop, Report};
+use takt_diagnostics::diag::Sink;
 use takt_isa::BundleAddress;
 use takt_isa::program::Location;
 
-/// A spilled value.
+/// A value of a block that is kept in data memory.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Spilled {
-    /// Its name; empty if it is a part of an equation.
+pub struct SpilledValue {
+    /// Name of the value; empty for a part of an equation.
     pub name: String,
-    /// The bank that had no room for it.
+    /// Bank that had no room for the value.
     pub bank: &'static str,
-    /// The line that computes it.
+    /// Source line that computes the value.
     pub location: Option<Location>,
-    /// The data word that keeps it.
+    /// Data word that keeps the value.
     pub word: u32,
-    /// The number of reloads.
+    /// Number of loads from the word.
     pub loads: u32,
 }
 
 /// The cost of high register pressure in a block.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Spills {
-    /// The block: an index into the assembled program's blocks.
+    /// Index of the block among the assembled program's blocks.
     pub block: usize,
-    /// The values; none if another order was enough.
-    pub values: Vec<Spilled>,
-    /// Cycles more than the block would take with as many registers as it needs.
+    /// Spilled values; empty if another order was enough.
+    pub values: Vec<SpilledValue>,
+    /// Additional cycles, compared with the block's schedule for unlimited registers.
     pub cycles: u32,
 }
 
 impl Spills {
-    /// Loads and stores added.
+    /// Number of loads and stores added.
     pub fn operations(&self) -> u32 {
         self.values.iter().map(|value| 1 + value.loads).sum()
     }
@@ -61,27 +61,27 @@ impl std::fmt::Display for Spills {
     }
 }
 
-impl std::fmt::Display for Spilled {
+impl std::fmt::Display for SpilledValue {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Spilled { name, bank, word, loads, .. } = self;
+        let SpilledValue { name, bank, word, loads, .. } = self;
         let name = if name.is_empty() { "a part of the equation" } else { name };
         let times = if *loads == 1 { "once".to_owned() } else { format!("{loads} times") };
         write!(f, "{name}: from bank {bank} to word {word}, loaded {times}")
     }
 }
 
-/// The number of schedules that are tried, each twice as near to the source's order: within a half of the block's operations, a
-/// quarter …; so many if not even the source's own order is known to suffice.
+/// Number of schedules to try. Each halves the window in which operations may leave source order, beginning at half of the
+/// block's operations. Used if not even source order is known to suffice.
 const REACHES: u32 = 5;
 
 /// A program in which all live values have a register.
-struct Reduced {
+struct AllocatableProgram {
     ir: Ir,
     report: Report,
     spills: Vec<Spills>,
 }
 
-impl Reduced {
+impl AllocatableProgram {
     fn cycles(&self) -> u64 {
         self.report.blocks.iter().map(|block| u64::from(block.cycles)).sum()
     }
@@ -91,12 +91,12 @@ impl Reduced {
     }
 }
 
-/// Programs with fewer and fewer pipelined loops that are tried, before none is.
+/// Programs to try with one pipelined loop less each, before all loops are left as written.
 const LOOPS_LESS: usize = 5;
 
-/// Leaves pipelined loops as they are written, first the one that saves the fewest cycles for each of its bundles, until the program
-/// fits the program memory and all values have a register, or there is none left.
-pub(crate) fn reduce_loops(ir: &mut Ir, report: &mut Report, source: Option<&Ir>, effort: u32) {
+/// Leaves pipelined loops as they are written, beginning with the loop that saves the fewest cycles per bundle, until the program
+/// fits the program memory and all values have a register, or no pipelined loop is left.
+pub(crate) fn reduce_loops(ir: &mut Ir, report: &mut Report, source: Option<&Ir>, budget: &mut Budget) {
     let Some(source) = source else { return };
     let (mut without, mut plain) = (Vec::new(), Vec::new());
     while let Some(last) = report.loops.iter().reduce(|a, b| if b.is_of_less_use(a) { b } else { a }) {
@@ -105,7 +105,7 @@ pub(crate) fn reduce_loops(ir: &mut Ir, report: &mut Report, source: Option<&Ir>
         let reason = match ir.bundles.len() > most as usize {
             true => {
                 let bundles = ir.bundles.len();
-                let room = room::for_bundles(ir.machine, bundles);
+                let room = capacity::for_bundles(ir.machine, bundles);
                 format!("the program would take {bundles} bundles of {most}; {room}")
             }
             false if pressure.has_all() => break,
@@ -117,20 +117,21 @@ pub(crate) fn reduce_loops(ir: &mut Ir, report: &mut Report, source: Option<&Ir>
             plain.push(PlainLoop { location: one.location, reason: reason.clone() });
         }
         *ir = source.clone();
-        *report = schedule::schedule_without(ir, effort, Order::Free, &without, &mut Sink::default());
+        *report = schedule::schedule_without(ir, budget, Order::Free, &without, &mut Sink::default());
     }
     report.plain_loops.extend(plain);
 }
 
-/// Reduces the register pressure of a scheduled program to the registers that there are. `source` is the program before scheduling.
+/// Reduces the register pressure of a scheduled program to the available registers. `source` is the program before scheduling.
 ///
 /// # Errors
-/// The reason if it cannot be done; the program is then in its order or in that of the source, whichever lacks fewer registers.
+/// If some values get no register, with the reason. The program is then in its present order or in source order, whichever lacks
+/// fewer registers.
 pub(crate) fn reduce_pressure(
     ir: &mut Ir,
     report: &mut Report,
     source: Option<&Ir>,
-    effort: u32,
+    budget: &mut Budget,
 ) -> Result<Vec<Spills>, Option<String>> {
     let runs = runs::runs(ir);
     let pressure = allocate::pressure(ir, &runs, &mut Sink::default());
@@ -139,7 +140,7 @@ pub(crate) fn reduce_pressure(
         return Ok(Vec::new());
     }
     // With the source's order as the last resort, no program that fits without the scheduler fails to fit with it.
-    let as_written = source.map(|source| by_order(source, report, effort, Order::Written));
+    let as_written = source.map(|source| by_order(source, report, budget, Order::Written));
     let (written, unfit) = match as_written {
         Some(Ok(written)) => (Some(written), None),
         Some(Err(unfit)) => (None, unfit),
@@ -148,12 +149,12 @@ pub(crate) fn reduce_pressure(
     let (mut spilled, mut why, mut near) = (None, None, None);
     if pressure.is_short() || written.is_some() {
         let longest = report.blocks.iter().map(|block| block.operations).max().unwrap_or(1);
-        // Ever nearer, as long as something fits in the end.
+        // Reduce the reach step by step, as long as some order fits.
         let last = if written.is_some() { longest.ilog2() } else { REACHES };
         near = source.and_then(|source| {
             (1..=last).find_map(|shift| {
                 let reach = (longest >> shift).max(1) as usize;
-                by_order(source, report, effort, Order::Near(reach)).ok()
+                by_order(source, report, budget, Order::Near(reach)).ok()
             })
         });
     }
@@ -163,7 +164,7 @@ pub(crate) fn reduce_pressure(
             Err(reason) => why = Some(reason),
         }
     }
-    let best = near.into_iter().chain(spilled).chain(written).min_by_key(Reduced::cycles);
+    let best = near.into_iter().chain(spilled).chain(written).min_by_key(AllocatableProgram::cycles);
     let Some(best) = best else {
         // The error is about the order that lacks the fewest registers.
         if let Some(unfit) = unfit.filter(|unfit| unfit.missing < pressure.shortage()) {
@@ -176,29 +177,34 @@ pub(crate) fn reduce_pressure(
     Ok(best.spills)
 }
 
-/// A program in an order in which not all values have room.
-struct Unfit {
+/// A program in an order in which some values lack registers.
+struct UnallocatableProgram {
     program: Box<Ir>,
-    /// Registers that it lacks.
+    /// Number of missing registers.
     missing: usize,
 }
 
-/// By an order near to that of the source.
+/// Reduces the pressure by an order near to the source's.
 ///
 /// # Errors
-/// If not all values have room in it: the program, and how many registers it lacks; none if it breaks a demand.
-fn by_order(source: &Ir, before: &Report, effort: u32, order: Order) -> Result<Reduced, Option<Unfit>> {
+/// If some values lack registers in this order: the program, and the number of missing registers. `None` if the order breaks a demand.
+fn by_order(
+    source: &Ir,
+    before: &Report,
+    budget: &mut Budget,
+    order: Order,
+) -> Result<AllocatableProgram, Option<UnallocatableProgram>> {
     let mut ir = source.clone();
     let mut sink = Sink::default();
-    let mut report = schedule::schedule(&mut ir, effort, order, &mut sink);
+    let mut report = schedule::schedule(&mut ir, budget, order, &mut sink);
     let pressure = allocate::pressure(&ir, &runs::runs(&ir), &mut Sink::default());
     if sink.errors > 0 || ir.bundles.len() > ir.machine.most_bundles() as usize {
         return Err(None);
     }
     if !pressure.has_all() {
-        return Err(Some(Unfit { missing: pressure.shortage(), program: Box::new(ir) }));
+        return Err(Some(UnallocatableProgram { missing: pressure.shortage(), program: Box::new(ir) }));
     }
-    // Loops that were pipelined are not in this order: then the blocks are others.
+    // This order pipelines no loops, so its blocks may differ.
     let same = |after: &BlockReport| {
         let same = |free: &&BlockReport| (free.location, &free.label) == (after.location, &after.label);
         before.blocks.iter().find(same)
@@ -211,17 +217,22 @@ fn by_order(source: &Ir, before: &Report, effort: u32, order: Order) -> Result<R
             spills.push(Spills { block, values: Vec::new(), cycles: after.cycles - free.cycles });
         }
     }
-    Ok(Reduced { ir, report, spills })
+    Ok(AllocatableProgram { ir, report, spills })
 }
 
-/// By loads and stores.
-fn by_memory(ir: &Ir, runs: &[Run], pressure: &Pressure, before: &Report) -> Result<Reduced, String> {
+/// Reduces the pressure by spilling to data memory.
+fn by_memory(
+    ir: &Ir,
+    runs: &[Run],
+    pressure: &Pressure,
+    before: &Report,
+) -> Result<AllocatableProgram, String> {
     let name = ir.machine.name;
     let touched = schedule::touched(ir)
         .ok_or("values are not kept in data memory: a load or store may touch any word of it")?;
     let declared = ir.data.len() as u32;
     let mut words = (declared..ir.machine.data_depth).filter(|word| !touched.contains(word));
-    let mut reduced = Reduced { ir: ir.clone(), report: before.clone(), spills: Vec::new() };
+    let mut reduced = AllocatableProgram { ir: ir.clone(), report: before.clone(), spills: Vec::new() };
     let mut bundles: Vec<Bundle> = Vec::with_capacity(ir.bundles.len());
     let mut moved = std::collections::BTreeMap::new();
     for run in runs {
@@ -234,14 +245,14 @@ fn by_memory(ir: &Ir, runs: &[Run], pressure: &Pressure, before: &Report) -> Res
         };
         let spilled = block::spill(&mut reduced.ir, *run, pressure, &mut words);
         let (new, values) = spilled.map_err(|short| match short {
-            block::Short::Words(needed) => {
+            block::SpillError::Words(needed) => {
                 let free = ir.machine.data_depth - declared.min(ir.machine.data_depth);
-                // More than there are: some of those beyond the declared ones are in use, too.
+                // More than the memory has: some words beyond the declared ones are in use, too.
                 let words = u64::from(declared.max(ir.machine.data_depth)) + needed as u64;
-                let mend = room::for_words(ir.machine, words);
+                let mend = capacity::for_words(ir.machine, words);
                 format!("{needed} data words are needed for values that find no register, and {free} of {name} are free ({mend})")
             }
-            block::Short::Values => {
+            block::SpillError::Values => {
                 "values are not kept in data memory: too few of those that find no register are computed by equations"
                     .to_owned()
             }
@@ -266,7 +277,7 @@ fn by_memory(ir: &Ir, runs: &[Run], pressure: &Pressure, before: &Report) -> Res
         return Err(format!(
             "with loads and stores of values that find no register there are {bundles} bundles, and {name}'s program memory \
              holds {depth} ({})",
-            room::for_bundles(ir.machine, bundles)
+            capacity::for_bundles(ir.machine, bundles)
         ));
     }
     // The demands on ports must be met with the spill code, too.
@@ -274,7 +285,8 @@ fn by_memory(ir: &Ir, runs: &[Run], pressure: &Pressure, before: &Report) -> Res
         let mut stands = reduced.ir.clone();
         stands.bundles.iter_mut().for_each(|bundle| bundle.scheduled = false);
         let mut sink = Sink::default();
-        reduced.report.timing = schedule::schedule(&mut stands, 0, Order::Free, &mut sink).timing;
+        reduced.report.timing =
+            schedule::schedule(&mut stands, &mut Budget::new(0), Order::Free, &mut sink).timing;
         if sink.errors > 0 {
             return Err("with values kept in data memory, the demands on ports are not met".to_owned());
         }

@@ -6,11 +6,11 @@ use super::meta::MetaType;
 use super::validate::{FILE_NAME, is_spelled, wrong_port};
 use crate::limits::ARRAY_INDICES;
 use crate::output::names::{DebugInfo, NamedArray, NamedValue, Names, Position, Scope};
-use crate::report::source::line_feeds;
-use crate::syntax::expr::Value;
 use serde::{Deserialize, Serialize};
 use std::collections::HashSet;
+use takt_diagnostics::source::line_feeds;
 use takt_isa::{BundleAddress, Program, Register};
+use takt_syntax::expr::Value;
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -19,14 +19,14 @@ struct Debug {
     constants: Vec<Constant>,
     positions: Vec<Option<(u32, u32)>>,
     scopes: Vec<Use>,
-    values: Vec<Named>,
+    values: Vec<NameRecord>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    arrays: Vec<Sized>,
+    arrays: Vec<ArrayRecord>,
 }
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Sized {
+struct ArrayRecord {
     name: String,
     base: u32,
     sizes: Vec<u32>,
@@ -48,7 +48,7 @@ struct Constant {
     value: Number,
 }
 
-/// A real number as text: JSON has neither infinities nor NaN.
+/// A number of the source. Reals are text: JSON has neither infinities nor NaN.
 #[derive(Serialize, Deserialize)]
 #[serde(untagged)]
 enum Number {
@@ -65,7 +65,7 @@ struct Use {
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Named {
+struct NameRecord {
     name: String,
     label: String,
     register: u16,
@@ -76,7 +76,7 @@ struct Named {
 }
 
 /// The reason that a value's register is refused.
-const MISPLACED: &str = "it does not lie where such registers lie";
+const MISPLACED: &str = "it lies outside the registers of its kind";
 
 pub(super) fn to_json(info: &DebugInfo) -> serde_json::Result<Vec<u8>> {
     let DebugInfo { sources, constants, names } = info;
@@ -89,7 +89,7 @@ pub(super) fn to_json(info: &DebugInfo) -> serde_json::Result<Vec<u8>> {
         },
     };
     let scope = |scope: &Scope| Use { name: scope.name.clone(), parameters: scope.parameters.clone() };
-    let value = |value: &NamedValue| Named {
+    let value = |value: &NamedValue| NameRecord {
         name: value.name.clone(),
         label: value.label.clone(),
         register: value.register.get(),
@@ -97,7 +97,7 @@ pub(super) fn to_json(info: &DebugInfo) -> serde_json::Result<Vec<u8>> {
         orders: value.orders,
         bundles: value.bundles,
     };
-    let array = |NamedArray { name, base, sizes, ty }: &NamedArray| Sized {
+    let array = |NamedArray { name, base, sizes, ty }: &NamedArray| ArrayRecord {
         name: name.clone(),
         base: *base,
         sizes: sizes.clone(),
@@ -116,18 +116,6 @@ pub(super) fn to_json(info: &DebugInfo) -> serde_json::Result<Vec<u8>> {
 
 pub(super) fn from_json(bytes: &[u8], program: &Program) -> Result<DebugInfo, ImageError> {
     let debug: Debug = serde_json::from_slice(bytes).map_err(|error| ImageError::Debug(error.to_string()))?;
-    let name = |name: String| {
-        if is_spelled(&name, FILE_NAME) { Ok(name) } else { Err(ImageError::Name(name)) }
-    };
-    let mut seen = HashSet::new();
-    for Source { name, .. } in &debug.sources {
-        if name.is_empty() || name.len() > FILE_NAME {
-            return Err(ImageError::Name(name.chars().take(80).collect()));
-        }
-        if !seen.insert(name.as_str()) {
-            return Err(ImageError::RepeatedName(name.clone()));
-        }
-    }
     let constant = |constant: Constant| {
         let value = match constant.value {
             Number::Int(value) => Value::Int(value),
@@ -136,7 +124,7 @@ pub(super) fn from_json(bytes: &[u8], program: &Program) -> Result<DebugInfo, Im
                 Value::Real(text.parse().map_err(|_| wrong())?)
             }
         };
-        Ok((name(constant.name)?, value))
+        Ok((constant.name, value))
     };
     let names = Names {
         positions: debug
@@ -148,7 +136,7 @@ pub(super) fn from_json(bytes: &[u8], program: &Program) -> Result<DebugInfo, Im
         values: debug
             .values
             .into_iter()
-            .map(|Named { name, label, register, ty, orders, bundles }| {
+            .map(|NameRecord { name, label, register, ty, orders, bundles }| {
                 let known = Register::new(register.into());
                 let register = known.ok_or_else(|| wrong_port("value", &label, register, MISPLACED))?;
                 Ok(NamedValue { name, label, register, ty: ty.into(), orders, bundles })
@@ -157,18 +145,39 @@ pub(super) fn from_json(bytes: &[u8], program: &Program) -> Result<DebugInfo, Im
         arrays: debug
             .arrays
             .into_iter()
-            .map(|Sized { name, base, sizes, ty }| NamedArray { name, base, sizes, ty: ty.into() })
+            .map(|ArrayRecord { name, base, sizes, ty }| NamedArray { name, base, sizes, ty: ty.into() })
             .collect(),
     };
-    check(&names, program)?;
-    Ok(DebugInfo {
+    let info = DebugInfo {
         sources: debug.sources.into_iter().map(|of| (of.name, line_feeds(&of.text).into_owned())).collect(),
-        constants: debug.constants.into_iter().map(constant).collect::<Result<_, _>>()?,
+        constants: debug.constants.into_iter().map(constant).collect::<Result<_, ImageError>>()?,
         names,
-    })
+    };
+    check(&info, program)?;
+    Ok(info)
 }
 
-fn check(names: &Names, program: &Program) -> Result<(), ImageError> {
+/// Checks that the information fits the program, whether it was read or is to be written.
+pub(super) fn check(info: &DebugInfo, program: &Program) -> Result<(), ImageError> {
+    let DebugInfo { sources, constants, names } = info;
+    let mut seen = HashSet::new();
+    for (name, _) in sources {
+        if name.is_empty() || name.len() > FILE_NAME {
+            return Err(ImageError::Name(name.chars().take(80).collect()));
+        }
+        if !seen.insert(name.as_str()) {
+            return Err(ImageError::RepeatedName(name.clone()));
+        }
+    }
+    for (name, _) in constants {
+        if !is_spelled(name, FILE_NAME) {
+            return Err(ImageError::Name(name.clone()));
+        }
+    }
+    check_names(names, program)
+}
+
+fn check_names(names: &Names, program: &Program) -> Result<(), ImageError> {
     let wrong = |message: String| Err(ImageError::Debug(message));
     let spelled = |name: &str| match is_spelled(name, FILE_NAME) {
         true => Ok(()),

@@ -3,9 +3,9 @@
 
 use super::validate::{NO_BANK, wrong_port};
 use super::{ImageError, VERSION};
-use crate::report::diag::Diagnostics;
-use crate::report::machine;
 use serde::{Deserialize, Serialize};
+use takt_diagnostics::diag::Diagnostics;
+use takt_diagnostics::machine;
 use takt_isa::program::{Columns, Location, Port, Range, Section, Symbol};
 use takt_isa::{BundleAddress, Machine, Program, Register, Type};
 
@@ -14,7 +14,7 @@ use takt_isa::{BundleAddress, Machine, Program, Register, Type};
 pub(super) struct Meta {
     pub(super) version: u32,
     pub(super) machine: String,
-    /// The machine's row, without options, as its file has it; of a machine of the table left out.
+    /// The machine's row, without options, as its file has it; left out for built-in machines.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     row: Option<String>,
     inputs: Vec<MetaPort>,
@@ -28,16 +28,16 @@ pub(super) struct Meta {
     ranges: Vec<MetaRange>,
     sections: Vec<MetaSection>,
     files: Vec<String>,
-    /// For each word of code its file and line.
+    /// File and line of each word of code.
     lines: Vec<Option<(u32, u32)>>,
-    /// For words that compute a part of an equation, the word's index and the part's first and last column. Left out if empty.
+    /// Parts of equations: index of the word that computes it, first and last column. Left out if empty.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     parts: Vec<(u32, u32, u32)>,
 }
 
-/// Read first: of a metadata of another version nothing else may be assumed.
+/// Version, read first: metadata of another version may differ in everything else.
 #[derive(Deserialize)]
-struct Head {
+struct VersionHeader {
     version: u32,
 }
 
@@ -77,7 +77,7 @@ struct MetaSection {
     end: BundleAddress,
 }
 
-/// Mistakes of a row in a line.
+/// Mistakes of a row, in one line.
 fn words(mistakes: &Diagnostics) -> String {
     mistakes.list.iter().map(|mistake| mistake.message.as_str()).collect::<Vec<_>>().join("; ")
 }
@@ -149,7 +149,7 @@ impl Meta {
 
     pub(super) fn from_json(bytes: &[u8]) -> Result<Meta, ImageError> {
         let wrong = |error: serde_json::Error| ImageError::Meta(error.to_string());
-        let Head { version } = serde_json::from_slice(bytes).map_err(wrong)?;
+        let VersionHeader { version } = serde_json::from_slice(bytes).map_err(wrong)?;
         if version != VERSION {
             return Err(ImageError::Version { found: version });
         }

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! A program as a file, and back: an ELF container that `readelf` and debuggers' readers know their way in.
 //!
-//! `docs/image.md` describes the format for who writes another reader. Writing is deterministic: equal programs give equal
-//! bytes. Reading trusts nothing: each defect is an [`ImageError`] of its own, nothing panics, and what is allocated is
-//! bounded by the size of the file. A program that was read is one that the assembler could have made, but that any word
-//! may stand in its code: the machine faults on those that are no instructions.
+//! `docs/image.md` describes the format for authors of other readers. Writing is deterministic: equal programs give equal
+//! bytes. Reading trusts nothing: each defect is an [`ImageError`] of its own, nothing panics, and allocation is bounded by
+//! the size of the file. A program that was read is one that the assembler could have made, except that any word may stand
+//! in its code: the machine faults on words that are no instructions.
 
 mod debug;
 mod meta;
@@ -17,7 +17,6 @@ use object::elf;
 use object::read::elf::{FileHeader as _, SectionHeader as _, Sym as _};
 use object::write::elf as write;
 use object::{Endianness, LittleEndian as LE};
-use takt_isa::encode::WORD_MASK;
 use takt_isa::program::{LoopBound, Space, Symbol};
 use takt_isa::{BundleAddress, MachineNameError, Program};
 
@@ -32,34 +31,34 @@ const CODE: &str = ".takt.code";
 const DATA: &str = ".takt.data";
 const CONSTANTS: &str = ".takt.constants";
 const META: &str = ".takt.meta";
-/// There only if a loop has a bound.
+/// Section of loop bounds; absent if no loop has a bound.
 const LOOPS: &str = ".takt.loops";
 const TOTALS: &str = ".takt.totals";
-/// There unless the image is stripped: what only a debugger reads.
+/// Section for debuggers; absent if the image is stripped.
 const DEBUG: &str = ".takt.debug";
 
-/// The reason that a file is not an image that can be loaded.
+/// Reason that a file cannot be loaded as an image.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum ImageError {
-    /// It does not begin like an ELF file.
+    /// The file does not begin like an ELF file.
     #[error("this is not an image: it does not begin like an ELF file")]
     NotElf,
-    /// It is larger than [`LIMIT`].
+    /// The file is larger than [`LIMIT`].
     #[error("an image of {bytes} bytes: the largest has {LIMIT}")]
     TooLarge {
-        /// Its size.
+        /// Size of the file.
         bytes: usize,
     },
-    /// It is cut short, or its structure points outside of itself.
+    /// The file is cut short, or its structure points outside of it.
     #[error("the image is truncated or damaged: {0}")]
     Damaged(String),
-    /// It is an ELF file of another kind.
+    /// The ELF file is of another kind.
     #[error("this ELF file is for another machine: it is no Takt image")]
     NotTakt,
     /// The container or the metadata is of another version.
     #[error("the image has format version {found}, and this program reads version {VERSION}")]
     Version {
-        /// Its version.
+        /// Version of the image.
         found: u32,
     },
     /// A section is missing.
@@ -71,60 +70,60 @@ pub enum ImageError {
     /// A section's size is not a whole number of its elements.
     #[error("section `{section}` has {bytes} bytes: not a multiple of {element}")]
     SectionSize {
-        /// The section.
+        /// Name of the section.
         section: &'static str,
-        /// Its size.
+        /// Size of the section.
         bytes: usize,
-        /// The size of one element.
+        /// Size of one element.
         element: usize,
     },
-    /// The metadata is not what it should be.
+    /// The metadata cannot be parsed.
     #[error("the image's metadata cannot be read: {0}")]
     Meta(String),
     /// No machine has the name.
     #[error("the image is for a machine that is not known here: {0}")]
     UnknownMachine(MachineNameError),
-    /// The machine's row, which the image carries, is none.
+    /// The machine's row, which the image carries, is invalid.
     #[error("the row of its machine: {0}")]
     Row(String),
     /// The code is not a whole number of bundles.
     #[error("{words} words of code: not a multiple of the {slots} slots of {machine}")]
     WordCount {
-        /// Its words.
+        /// Words of code in the image.
         words: usize,
-        /// The machine's slots.
+        /// Slots of the machine, and words of a bundle.
         slots: usize,
-        /// The machine.
+        /// Name of the machine.
         machine: &'static str,
     },
     /// A word has more than 48 bits.
     #[error("word {index} of the code, 0x{word:x}, has more than 48 bits")]
     WordBits {
-        /// Its index.
+        /// Index of the word.
         index: usize,
-        /// The word.
+        /// Value of the word.
         word: u64,
     },
-    /// A memory is too small for it.
+    /// A memory of the machine is too small for the program.
     #[error("{found} {what}, and {machine} holds {limit}")]
     MemorySize {
-        /// The thing that there is too much of.
+        /// Unit of the amounts: bundles or words of data.
         what: &'static str,
-        /// The amount.
+        /// Amount in the image.
         found: usize,
-        /// The limit.
+        /// The most that the machine holds.
         limit: u32,
-        /// The machine.
+        /// Name of the machine.
         machine: &'static str,
     },
-    /// A register address is in no bank, or in one where this register cannot be.
+    /// A register address is in no bank, or in a bank where this register cannot be.
     #[error("{what} at register address {address}: {reason}")]
     Register {
-        /// The thing that lies there.
+        /// Kind and name of the register.
         what: String,
-        /// The address.
+        /// Register address in the image.
         address: u32,
-        /// The reason that it cannot.
+        /// Reason against the address.
         reason: &'static str,
     },
     /// A name is not one that a source could have.
@@ -136,11 +135,11 @@ pub enum ImageError {
     /// A label points outside of its memory, or labels are not in order.
     #[error("label `{name}` at {address}: {reason}")]
     Label {
-        /// Its name.
+        /// Name of the label.
         name: String,
-        /// Its target.
+        /// Bundle or data word that it points to.
         address: u32,
-        /// The mistake.
+        /// Reason against the label.
         reason: &'static str,
     },
     /// The sections of the program are not `once` and then `period`, over all bundles.
@@ -152,20 +151,20 @@ pub enum ImageError {
     /// A bound of a loop is of no bundle, is 0, or is out of order.
     #[error("the bound of the loop at bundle {address}: {reason}")]
     Loop {
-        /// The bundle.
+        /// Bundle that heads the loop.
         address: BundleAddress,
-        /// The mistake.
+        /// Reason against the bound.
         reason: &'static str,
     },
     /// A range is of no register, is empty, or is out of order.
     #[error("the range of register {register}: {reason}")]
     Range {
-        /// The register's address.
+        /// Address of the register.
         register: u16,
-        /// The mistake.
+        /// Reason against the range.
         reason: &'static str,
     },
-    /// The format cannot hold it.
+    /// The format cannot hold the program.
     #[error("an image cannot hold this program: {0}")]
     Unwritable(String),
     /// The debugging information does not fit the program.
@@ -176,14 +175,9 @@ pub enum ImageError {
     Lines(String),
 }
 
-/// True if a file begins like an image (or another ELF file) rather than like a source.
+/// A file begins like an image (or another ELF file) rather than like a source.
 pub fn is_image(bytes: &[u8]) -> bool {
     bytes.starts_with(&elf::ELFMAG)
-}
-
-/// A text as ELF's string tables can hold it.
-fn clean(name: &str) -> String {
-    name.replace('\0', "")
 }
 
 /// The image of a program, without what only a debugger reads.
@@ -194,22 +188,25 @@ pub fn write(program: &Program) -> Result<Vec<u8>, ImageError> {
     write_with(program, None)
 }
 
-/// The image of a program with what a debugger knows of it beyond the program.
+/// The image of a program with debugging information beyond the program.
 ///
 /// # Errors
-/// If an image cannot hold it: its sizes go beyond 32 bits, or beyond what [`read`] takes.
+/// If [`read`] would refuse the image, with the same error; or if its sizes go beyond 32 bits.
 pub fn write_with(program: &Program, debug: Option<&DebugInfo>) -> Result<Vec<u8>, ImageError> {
     within(program, debug, LIMIT)
 }
 
-/// The image of a program, if it has at most so many bytes.
+/// The image of a program, if it has at most `most` bytes.
 fn within(program: &Program, debug: Option<&DebugInfo>, most: usize) -> Result<Vec<u8>, ImageError> {
+    validate::words(&program.code)?;
+    validate::constants(&constants(program), program.machine)?;
+    validate::program(program)?;
+    debug.map_or(Ok(()), |debug| debug::check(debug, program))?;
     let unwritable = |error: String| ImageError::Unwritable(error);
     let meta = Meta::of(program).to_json().map_err(|error| unwritable(error.to_string()))?;
     let debug = debug.map(debug::to_json).transpose().map_err(|error| unwritable(error.to_string()))?;
     let mut bytes = Vec::new();
-    let names: Vec<String> = program.symbols.iter().map(|symbol| clean(&symbol.name)).collect();
-    write_elf(program, (&meta, debug.as_deref()), &names, &mut bytes)
+    write_elf(program, (&meta, debug.as_deref()), &mut bytes)
         .map_err(|error| unwritable(error.to_string()))?;
     if bytes.len() > most {
         return Err(ImageError::TooLarge { bytes: bytes.len() });
@@ -217,10 +214,14 @@ fn within(program: &Program, debug: Option<&DebugInfo>, most: usize) -> Result<V
     Ok(bytes)
 }
 
+/// The words of the constants' section: register addresses and bits.
+fn constants(program: &Program) -> Vec<u32> {
+    program.constants.iter().flat_map(|&(register, bits)| [register.get().into(), bits]).collect()
+}
+
 fn write_elf(
     program: &Program,
     (meta, debug): (&[u8], Option<&[u8]>),
-    names: &[String],
     bytes: &mut Vec<u8>,
 ) -> Result<(), object::write::Error> {
     let code: Vec<u8> = program.code.iter().flat_map(|word| word.to_le_bytes()).collect();
@@ -230,13 +231,12 @@ fn write_elf(
         let [e, f, g, h] = second.to_le_bytes();
         [a, b, c, d, e, f, g, h]
     };
-    let constants = program.constants.iter().map(|&(register, bits)| (register.get().into(), bits));
-    let constants: Vec<u8> = constants.flat_map(pair).collect();
+    let constants: Vec<u8> = constants(program).into_iter().flat_map(u32::to_le_bytes).collect();
     let loops = program.loop_bounds.iter().map(|bound| (bound.address.get(), bound.most));
     let loops: Vec<u8> = loops.flat_map(pair).collect();
     let totals = program.loop_bounds.iter().filter_map(|bound| Some((bound.address.get(), bound.total?)));
     let totals: Vec<u8> = totals.flat_map(pair).collect();
-    // First everything is given its place, then everything is written there, in the same order.
+    // First reserve the place of everything, then write it there, in the same order.
     let mut writer = write::Writer::new(Endianness::Little, false, bytes);
     writer.reserve_file_header();
     let mut contents = vec![
@@ -264,11 +264,12 @@ fn write_elf(
     };
     let sections: Vec<_> = contents.into_iter().map(&mut place).collect();
     writer.reserve_null_symbol_index();
-    let labels: Vec<_> = names
+    let labels: Vec<_> = program
+        .symbols
         .iter()
-        .map(|name| {
+        .map(|symbol| {
             writer.reserve_symbol_index(None);
-            writer.add_string(name.as_bytes())
+            writer.add_string(symbol.name.as_bytes())
         })
         .collect();
     writer.reserve_symtab_section_index();
@@ -292,22 +293,7 @@ fn write_elf(
         writer.write(content);
     }
     writer.write_null_symbol();
-    for (symbol, name) in program.symbols.iter().zip(labels) {
-        let (section, kind) = match symbol.space {
-            Space::Code => (sections[0].0, elf::STT_FUNC),
-            Space::Data => (sections[1].0, elf::STT_OBJECT),
-        };
-        let symbol = write::Sym {
-            st_name: writer.string_offset(Some(name)),
-            section: Some(section.0),
-            st_info: elf::SymbolInfo::new(elf::STB_GLOBAL, kind),
-            st_other: elf::SymbolOther::default(),
-            st_shndx: elf::SHN_UNDEF,
-            st_value: symbol.address.into(),
-            st_size: 0,
-        };
-        writer.write_symbol(&symbol);
-    }
+    write_symbols(&mut writer, program, &labels, [sections[0].0, sections[1].0]);
     writer.write_strtab();
     writer.write_shstrtab();
     writer.write_null_section_header();
@@ -323,11 +309,36 @@ fn write_elf(
             ..Default::default()
         });
     }
-    // All symbols are global but the first, the null symbol.
+    // The null symbol is the only local one.
     writer.write_symtab_section_header(1);
     writer.write_strtab_section_header();
     writer.write_shstrtab_section_header();
     Ok(())
+}
+
+/// Writes the symbols, which lie in the sections of code and data.
+fn write_symbols(
+    writer: &mut write::Writer<'_>,
+    program: &Program,
+    labels: &[object::write::StringId],
+    [code, data]: [write::SectionIndex; 2],
+) {
+    for (symbol, name) in program.symbols.iter().zip(labels) {
+        let (section, kind) = match symbol.space {
+            Space::Code => (code, elf::STT_FUNC),
+            Space::Data => (data, elf::STT_OBJECT),
+        };
+        let symbol = write::Sym {
+            st_name: writer.string_offset(Some(*name)),
+            section: Some(section.0),
+            st_info: elf::SymbolInfo::new(elf::STB_GLOBAL, kind),
+            st_other: elf::SymbolOther::default(),
+            st_shndx: elf::SHN_UNDEF,
+            st_value: symbol.address.into(),
+            st_size: 0,
+        };
+        writer.write_symbol(&symbol);
+    }
 }
 
 /// The program of an image.
@@ -338,7 +349,7 @@ pub fn read(bytes: &[u8]) -> Result<Program, ImageError> {
     Ok(read_with(bytes)?.0)
 }
 
-/// The program of an image, and what it has for a debugger unless it is stripped.
+/// The program of an image, and its debugging information unless it is stripped.
 ///
 /// # Errors
 /// The first defect that is found.
@@ -400,9 +411,7 @@ pub fn read_with(bytes: &[u8]) -> Result<(Program, Option<DebugInfo>), ImageErro
         content.as_chunks::<4>().0.iter().map(|bytes| u32::from_le_bytes(*bytes)).collect()
     };
     let code: Vec<u64> = code.as_chunks::<8>().0.iter().map(|bytes| u64::from_le_bytes(*bytes)).collect();
-    if let Some((index, word)) = code.iter().enumerate().find(|(_, word)| **word > WORD_MASK) {
-        return Err(ImageError::WordBits { index, word: *word });
-    }
+    validate::words(&code)?;
     let constants = validate::constants(&words(constants), machine)?;
     let symbols = {
         let table = sections.symbols(LE, bytes, elf::SHT_SYMTAB).map_err(damaged)?;

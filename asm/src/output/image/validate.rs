@@ -1,14 +1,22 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Validation of a program that is read from a file: invariants on which the loader, the debugger and the disassembler rely.
+//! Validation of a program that is read from a file or written to one: invariants on which the loader, the debugger and the
+//! disassembler rely.
 
 use super::ImageError;
 use crate::limits;
 use std::collections::HashSet;
+use takt_isa::encode::WORD_MASK;
 use takt_isa::program::{LoopBound, Port, Space};
 use takt_isa::{BundleAddress, Machine, Program, Register};
 
 /// The longest name of a source file.
 pub(super) const FILE_NAME: usize = 4096;
+
+/// Checks that no word has more than 48 bits.
+pub(super) fn words(code: &[u64]) -> Result<(), ImageError> {
+    let wrong = code.iter().enumerate().find(|(_, word)| **word > WORD_MASK);
+    wrong.map_or(Ok(()), |(index, &word)| Err(ImageError::WordBits { index, word }))
+}
 
 /// Register addresses and bits, from the words of their section.
 pub(super) fn constants(words: &[u32], machine: &Machine) -> Result<Vec<(Register, u32)>, ImageError> {
@@ -40,8 +48,8 @@ pub(super) fn wrong_port(kind: &str, name: &str, address: u16, reason: &'static 
     ImageError::Register { what: format!("{kind} `{name}`"), address: address.into(), reason }
 }
 
-/// True if a name is spelled like `P` or, for an array's element, `P[2,3]`, with at most `limit` letters. (Those that a macro's use
-/// gives may be longer than a source's.)
+/// A name is spelled like `P` or, for an array's element, `P[2,3]`, in at most `limit` letters. (Names from a macro's use may be
+/// longer than a source's.)
 pub(super) fn is_spelled(name: &str, limit: usize) -> bool {
     let first = |c: char| c.is_ascii_alphabetic() || c == '_';
     let other = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '.';
@@ -56,7 +64,7 @@ pub(super) fn is_spelled(name: &str, limit: usize) -> bool {
         && name.len() <= limit
 }
 
-/// True if a source could declare the name.
+/// A source could declare the name.
 pub(crate) fn is_name(name: &str) -> bool {
     is_spelled(name, limits::NAME_BYTES) && name != "zero"
 }
@@ -127,7 +135,7 @@ fn ports(program: &Program) -> Result<(), ImageError> {
             return wrong(NO_BANK);
         }
         if !fits {
-            return wrong("it does not lie where such registers lie");
+            return wrong("it lies outside the registers of its kind");
         }
         if !seen.insert(port.register) {
             return wrong("two names share the register");
@@ -220,10 +228,14 @@ fn lines(program: &Program) -> Result<(), ImageError> {
     }
     for location in program.lines.iter().flatten() {
         if location.file as usize >= program.files.len() {
-            return wrong(format!("one is in file {}, and there are {}", location.file, program.files.len()));
+            return wrong(format!(
+                "a location is in file {}, and there are {}",
+                location.file,
+                program.files.len()
+            ));
         }
         if location.line == 0 {
-            return wrong("one is line 0, and lines count from 1".to_owned());
+            return wrong("a location has line 0, and lines count from 1".to_owned());
         }
     }
     let mut next = 0;

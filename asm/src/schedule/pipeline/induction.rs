@@ -7,16 +7,16 @@ use std::collections::HashMap;
 use takt_isa::Effect;
 use takt_isa::shape::Field;
 
-/// Advances of an induction register that an access may be ahead of, or behind.
+/// The most advances of an induction register that an access may be ahead or behind.
 const AHEAD: i64 = 8;
 
 /// A load or store whose address is an induction register and an offset.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Induction {
-    /// The task of the access, and that which advances the register.
+    /// The task of the access, and the task that advances the register.
     pub(super) access: usize,
     pub(super) advance: usize,
-    /// The offset that the source has, and what is added to the register.
+    /// Offset in the source, and the constant that each advance adds to the register.
     offset: i64,
     step: i64,
     /// Advances of its own iteration that the access sees in the source: 1 if it follows, else 0.
@@ -24,12 +24,12 @@ pub(super) struct Induction {
 }
 
 impl Induction {
-    /// The offset of an access that sees so many advances more than iterations have begun before its own.
+    /// Offset of the access if the advances that it sees exceed the iterations begun before its own by `advances`.
     pub(super) fn offset(&self, advances: i64) -> i64 {
         self.offset + self.step * (self.seen - advances)
     }
 
-    /// The least and the most advances that it can see, that is, for which there is an offset.
+    /// The least and the most advances that the access can see, limited by the offset's field and [`AHEAD`].
     pub(super) fn advances(&self) -> (i64, i64) {
         let fits =
             |advances: &i64| (0..=i64::from(Field::Offset.bits().max())).contains(&self.offset(*advances));
@@ -39,7 +39,8 @@ impl Induction {
     }
 }
 
-/// The accesses of a body whose address is a register that one of its operations advances by a constant, and nothing else writes.
+/// The accesses of a body whose address is a register that one operation of the body advances by a constant, and nothing else
+/// writes.
 pub(super) fn inductions(
     ir: &Ir,
     fixed: &[Option<u32>],

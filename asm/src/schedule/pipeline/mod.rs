@@ -1,23 +1,24 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Software pipelining of counted loops: a loop whose body is one block begins an iteration before the one before has ended.
+//! Software pipelining of counted loops: if the body is one block, an iteration begins before the previous one has ended.
 //!
 //! [`modulo`](super::modulo) finds the cycles of an iteration's operations. The kernel, one interval long, then holds operations of
-//! several iterations at once. What precedes its first run, the prologue, goes before `loop`; what follows its last, the
-//! epilogue, behind the body's end. There both are parts of the blocks around the loop and are scheduled with them.
+//! several iterations at once. The prologue goes before `loop`, the epilogue after the body's end; both become parts of the blocks
+//! around the loop and are scheduled with them.
 //!
-//! Values that do not outlive their iteration get registers of their own first ([`rename::rename`]). The next iteration writes a register after
-//! this one has read it, which is one more precedence: no value lives longer than an interval.
+//! Values that do not outlive their iteration get registers of their own first ([`rename::rename`]). The next iteration writes a register
+//! after this iteration has read it, which is one more precedence: no value lives longer than an interval.
 //!
-//! A count that is known at run time only may be below the number of iterations that overlap. The loop is then there twice: a branch
-//! before the prologue leads such a count to the loop as it is written.
+//! A count that is known only at run time may be below the number of iterations that overlap. The program then holds the loop twice:
+//! a branch before the prologue leads such a count to the loop as it is written.
 
 mod induction;
 mod parts;
 mod rename;
 mod rewrite;
 
+use super::budget::{Budget, Steps};
 use super::domains::Domains;
-use super::modulo::{Advanced, IntervalBound, LoopEdge, LoopProblem};
+use super::modulo::{AdvancedAccess, IntervalBound, LoopEdge, LoopProblem};
 use super::problem::Edge;
 use super::{Block, latency, memory, solve};
 use crate::ir::arrays::{ArrayAccess, LoopId};
@@ -25,55 +26,55 @@ use crate::ir::runs::{self, Run};
 use crate::ir::{Bundle, Ir, Operation, RegisterId};
 use crate::loops::LoopCount;
 use induction::{Induction, inductions};
-use parts::{Parts, Turn};
-use rewrite::TwoWays;
+use parts::{Parts, PeeledIteration};
+use rewrite::LoopChoice;
 use std::collections::HashMap;
 use std::ops::Range;
 use takt_isa::program::{Location, Space};
 use takt_isa::{BundleAddress, Effect, SlotIndex, Slots};
 
-/// Beyond the bound, so many intervals are tried: an eighth of it and a few.
+/// Intervals that are tried beyond the bound: an eighth of it, and four.
 const SPARE: (u32, u32) = (8, 4);
 
 /// Report of a pipelined loop.
 #[derive(Clone, Debug)]
 pub struct LoopReport {
-    /// Its number among the loops that may be pipelined.
+    /// Index among the loops that may be pipelined.
     pub number: usize,
-    /// Operations of its body.
+    /// Number of operations in the body.
     pub operations: u32,
     /// The source line of the body's first operation.
     pub location: Option<Location>,
     /// The address of the kernel.
     pub address: BundleAddress,
-    /// Its iterations, each time that it is entered.
+    /// Iterations each time that the loop is entered.
     pub iterations: LoopCount,
-    /// Iterations that are under way at a time.
+    /// Iterations that overlap in the kernel.
     pub stages: u32,
-    /// Cycles from the beginning of one iteration to that of the next.
+    /// Initiation interval, in cycles.
     pub interval: u32,
     /// The lower bounds of the interval.
     pub bound: IntervalBound,
-    /// The cycles that it saves each time that the loops around have run, with all their iterations.
+    /// Cycles saved by all entries of the loop while the loops around it run once.
     pub(crate) saved: u64,
-    /// The bundles that it takes, roughly.
+    /// Approximate number of bundles that the pipelined loop takes.
     pub(crate) bundles: u64,
 }
 
 impl LoopReport {
-    /// True if it saves less for each bundle than another one does.
+    /// Saves fewer cycles per bundle than another loop.
     pub(crate) fn is_of_less_use(&self, other: &LoopReport) -> bool {
         let product = |saved: u64, bundles: u64| u128::from(saved) * u128::from(bundles);
         product(self.saved, other.bundles) < product(other.saved, self.bundles)
     }
 }
 
-/// A counted loop around no other whose iterations are executed one after the other, as they are written.
+/// An innermost counted loop whose iterations are executed one after the other, as they are written.
 #[derive(Clone, Debug)]
 pub struct PlainLoop {
     /// The source line of the body's first operation.
     pub location: Option<Location>,
-    /// The reason, a clause.
+    /// Reason, a clause for the report.
     pub reason: String,
 }
 
@@ -81,8 +82,8 @@ pub struct PlainLoop {
 #[derive(Clone, Copy)]
 enum Count {
     Exactly(u32),
-    /// One to so many; and what chooses between the pipelined loop and that of the source.
-    AtMost(u32, TwoWays),
+    /// From one to this many, with the operations that choose between the pipelined loop and the source's.
+    AtMost(u32, LoopChoice),
 }
 
 impl Count {
@@ -100,7 +101,7 @@ struct Candidate {
     entry: usize,
     body: Run,
     count: Count,
-    /// The loop that the source has there.
+    /// The source's `.for` loop, if it is one.
     of: Option<LoopId>,
 }
 
@@ -113,8 +114,12 @@ struct Pipelined {
     report: LoopReport,
 }
 
-/// Pipelines every loop for which it pays. The kernels are not scheduled again; the blocks around them are.
-pub(super) fn pipeline(ir: &mut Ir, without: &[usize]) -> (Vec<LoopReport>, Vec<PlainLoop>) {
+/// Pipelines every loop that becomes shorter. The kernels are not scheduled again; the blocks around them are.
+pub(super) fn pipeline(
+    ir: &mut Ir,
+    without: &[usize],
+    budget: &mut Budget,
+) -> (Vec<LoopReport>, Vec<PlainLoop>) {
     if !ir.operations().any(|operation| operation.row().effect == Effect::Loop) {
         return (Vec::new(), Vec::new());
     }
@@ -125,14 +130,24 @@ pub(super) fn pipeline(ir: &mut Ir, without: &[usize]) -> (Vec<LoopReport>, Vec<
     let fixed = memory::fixed(ir);
     let mut accesses = ir.accesses.clone();
     let mut pipelined: Vec<Pipelined> = Vec::new();
+    let loops = candidates.len();
     for (number, candidate) in candidates.into_iter().enumerate() {
         if without.contains(&number) {
             continue;
         }
         let domains = Domains::new(ir, &runs, false);
         let location = location(ir, candidate.body);
-        let Some(one) = one(ir, &fixed, &domains, (number, candidate), &mut accesses) else {
-            let reason = "no schedule with overlapping iterations is shorter".to_owned();
+        let mut steps = budget.of_loop(loops - number);
+        let found = one(ir, &fixed, &domains, (number, candidate), &mut accesses, &mut steps);
+        budget.take_for_loop(steps.taken());
+        let Some(one) = found else {
+            let reason = match steps.are_spent() {
+                true => {
+                    "no schedule with overlapping iterations was found in the steps of its search; `--effort` gives it more"
+                }
+                false => "no schedule with overlapping iterations is shorter",
+            };
+            let reason = reason.to_owned();
             plain.push(PlainLoop { location, reason });
             continue;
         };
@@ -152,12 +167,12 @@ fn location(ir: &Ir, body: Run) -> Option<Location> {
     operations.into_iter().find_map(|operation| ir.location(operation))
 }
 
-/// The loops with a constant count, or a largest one, whose body is one block that the scheduler may move, and in which no port has a
-/// demand; and the others around no loop.
+/// Candidates for pipelining: loops with a constant or bounded count, whose body is one block that the scheduler may move, and in
+/// which no port has a demand. Also the other innermost loops, each with the reason.
 fn candidates(ir: &Ir, runs: &[Run], fixed: &[Option<u32>]) -> (Vec<Candidate>, Vec<PlainLoop>) {
     let demanded =
         |id: &RegisterId| ir.demands.iter().flat_map(|demand| &demand.ports).any(|(port, _)| port == id);
-    let ways = TwoWays::of(ir.machine);
+    let ways = LoopChoice::of(ir.machine);
     let bounds: HashMap<u32, u32> = ir.loop_bounds.iter().map(|bound| (bound.position, bound.most)).collect();
     let labels: Vec<u32> =
         ir.labels.iter().filter(|label| label.space == Space::Code).map(|label| label.position).collect();
@@ -193,6 +208,10 @@ fn candidates(ir: &Ir, runs: &[Run], fixed: &[Option<u32>]) -> (Vec<Candidate>, 
                 labels.contains(&head) || constant.is_some() && bounds.contains_key(&head),
                 "a label or a bound stands at its start",
             ),
+            (
+                ir.loop_bounds.iter().any(|bound| bound.position == head && bound.total.is_some()),
+                "its `.loop_bound` has a total, which two loops cannot share",
+            ),
             (own.iter().any(Bundle::is_opaque), "a raw word is in its body"),
             (
                 operations().any(|operation| operation.row().effect.drains()),
@@ -222,7 +241,7 @@ fn candidates(ir: &Ir, runs: &[Run], fixed: &[Option<u32>]) -> (Vec<Candidate>, 
     (candidates, plain)
 }
 
-/// One iteration as a problem.
+/// A loop iteration as a modulo scheduling problem.
 struct Iteration {
     problem: LoopProblem,
     /// The bundle of each task.
@@ -230,7 +249,7 @@ struct Iteration {
     inductions: Vec<Induction>,
 }
 
-/// One iteration as a problem: the edges between two iterations, one after the other, tell those within one and those to the next.
+/// Builds the problem of an iteration from two iterations one after the other: edges within the first, and edges to the second.
 fn problem(
     ir: &Ir,
     fixed: &[Option<u32>],
@@ -269,25 +288,26 @@ fn problem(
         edges.push(LoopEdge { edge: edge(access, advance, 0), iterations: most as u32 });
         edges.push(LoopEdge { edge: edge(advance, access, 1), iterations: (1 - least) as u32 });
         let latency = latency(ir.machine, &own[origins[advance]].operations[0]);
-        advanced.push(Advanced { access, advance, latency });
+        advanced.push(AdvancedAccess { access, advance, latency });
     }
     Iteration { problem: LoopProblem { tasks, edges, advanced }, origins, inductions }
 }
 
-/// The times that a loop is entered while the loops around it run, at most.
+/// The most times that a loop is entered while the loops around it run once.
 fn entries(ir: &Ir, of: Option<LoopId>) -> u64 {
     let parent = |of: LoopId| ir.loops[of.0 as usize].parent;
     let around = std::iter::successors(of.and_then(parent), |of| parent(*of));
     around.map(|of| u64::from(ir.loops[of.0 as usize].iterations.most())).fold(1, u64::saturating_mul)
 }
 
-/// Pipelines a loop, if that makes it shorter. `accesses` are the program's, to which those before and after the kernel are added.
+/// Pipelines a loop, if that makes it shorter. `accesses` are the program's; those before and after the kernel are appended.
 fn one(
     ir: &Ir,
     fixed: &[Option<u32>],
     domains: &Domains,
     (number, candidate): (usize, Candidate),
     accesses: &mut Vec<ArrayAccess>,
+    steps: &mut Steps,
 ) -> Option<Pipelined> {
     let own = &ir.bundles[candidate.body.start..candidate.body.end];
     let Iteration { problem, origins, inductions } = problem(ir, fixed, domains, own, candidate.of);
@@ -296,19 +316,21 @@ fn one(
     }
     let machine = ir.machine;
     let units = machine.slots.iter().map(|slot| slot.units.len()).sum();
-    let bound = problem.bound(machine.slots.len(), units);
+    let bound = problem.bound(machine.slots.len(), units, steps);
     let least = bound.cycles();
     let (count, most) = (candidate.count.iterations(), candidate.count.iterations().most());
-    let schedule = problem.schedule(least..=least + least / SPARE.0 + SPARE.1, most)?;
+    let schedule = problem.schedule(least..=least + least / SPARE.0 + SPARE.1, most, steps)?;
     let stages = schedule.stages();
-    // One after the other, iterations take at least as long as each would by itself.
-    let alone = solve::solve(&Block::new(ir, fixed, own, Some(domains)).problem, 0).length;
+    // Without pipelining, each iteration takes at least the length of the body scheduled alone.
+    let alone = solve::solve(&Block::new(ir, fixed, own, Some(domains)).problem, 0);
+    steps.add(alone.steps);
+    let alone = alone.length;
     let entry = match candidate.count {
         Count::Exactly(_) => 0,
-        Count::AtMost(..) => TwoWays::cycles(machine),
+        Count::AtMost(..) => LoopChoice::cycles(machine),
     };
     let pays = |count: u32| schedule.cycles(count) + u64::from(entry) < u64::from(count) * u64::from(alone);
-    // A count that varies must gain at half of its largest value, too.
+    // A variable count must also gain halfway between its largest value and the number of stages.
     if stages < 2 || !pays(most) || entry > 0 && !pays(most.midpoint(stages)) {
         return None;
     }
@@ -316,9 +338,13 @@ fn one(
     let (origins, inductions) = (&origins, &inductions);
     let mut parts = Parts { own, origins, inductions, problem: &problem, schedule: &schedule, of, accesses };
     // The iteration of a stage in a block: the first blocks begin iterations, the last ones end them.
-    let begun = |block: u32| move |stage: u32| block.checked_sub(stage).map(i64::from).map(Turn::FromFirst);
+    let begun = |block: u32| {
+        move |stage: u32| block.checked_sub(stage).map(i64::from).map(PeeledIteration::FromFirst)
+    };
     let ended = |block: u32| {
-        move |stage: u32| (stage >= block).then(|| Turn::FromEnd(1 + i64::from(stage) - i64::from(block)))
+        move |stage: u32| {
+            (stage >= block).then(|| PeeledIteration::FromEnd(1 + i64::from(stage) - i64::from(block)))
+        }
     };
     let mut blocks = |mut blocks: Range<u32>, ended_not_begun: bool| {
         blocks.try_fold(Vec::new(), |mut bundles, block| {
@@ -349,7 +375,7 @@ fn one(
     Some(Pipelined { candidate, prologue, kernel, epilogue, report })
 }
 
-/// Lets all that writes a register do so from the slot that a kernel writes it from.
+/// Moves every write of a kernel's register to the slot from which the kernel writes it.
 fn settle_slots(ir: &mut Ir, kernel: &[Bundle]) {
     let operations = kernel.iter().flat_map(|bundle| &bundle.operations);
     let slots: HashMap<RegisterId, (Slots, Option<SlotIndex>)> = operations

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The parts of a pipelined loop: the operations of one iteration, in the kernel and before and behind it.
+//! The parts of a pipelined loop: operations of an iteration in the kernel, the prologue and the epilogue.
 
 use super::super::modulo::{LoopProblem, ModuloSchedule};
 use super::induction::Induction;
@@ -11,12 +11,12 @@ use std::collections::BTreeMap;
 use takt_isa::Slots;
 use takt_isa::shape::Field;
 
-/// An iteration before the kernel or behind it.
+/// An iteration of the prologue or the epilogue.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Turn {
-    /// So many iterations precede it.
+pub(super) enum PeeledIteration {
+    /// Number of iterations before it.
     FromFirst(i64),
-    /// It is the last but so many; the last is 1.
+    /// Number from the end; the last iteration is 1.
     FromEnd(i64),
 }
 
@@ -27,9 +27,9 @@ pub(super) struct Parts<'a> {
     pub(super) inductions: &'a [Induction],
     pub(super) problem: &'a LoopProblem,
     pub(super) schedule: &'a ModuloSchedule,
-    /// The loop that the source has there.
+    /// The source's `.for` loop, if it is one.
     pub(super) of: Option<LoopId>,
-    /// The program's accesses, to which those of certain iterations are added.
+    /// The program's accesses; accesses of certain iterations are appended.
     pub(super) accesses: &'a mut Vec<ArrayAccess>,
 }
 
@@ -39,28 +39,28 @@ impl Parts<'_> {
         self.schedule.start[task] / self.schedule.interval
     }
 
-    /// The offset of a task's access to memory by an induction register, in the kernel or in an iteration before or behind it, when not
-    /// all advances have begun or some have ended; `None` if the task is no such access.
-    fn offset(&self, task: usize, turn: Option<Turn>) -> Option<i64> {
+    /// The offset of a task's access by an induction register, in the kernel (`turn` is `None`), or in an iteration before or after it,
+    /// when not all advances have begun or some have ended; `None` if the task is no such access.
+    fn offset(&self, task: usize, turn: Option<PeeledIteration>) -> Option<i64> {
         let induction = self.inductions.iter().find(|induction| induction.access == task)?;
         let start = |task: usize| i64::from(self.schedule.start[task]);
         let since = start(task) - start(induction.advance) - 1;
         let advances = since.div_euclid(i64::from(self.schedule.interval)) + 1;
-        // A loop has at least as many iterations as there are stages: an iteration before the kernel sees its first advance at the
-        // earliest, one behind it its last at the latest, and neither reaches the other end.
+        // A loop has at least as many iterations as there are stages: an iteration of the prologue sees its first advance at the
+        // earliest, one of the epilogue its last at the latest, and neither reaches the other end.
         Some(induction.offset(match turn {
             None => advances,
-            Some(Turn::FromFirst(before)) => advances.max(-before),
-            Some(Turn::FromEnd(left)) => advances.min(left),
+            Some(PeeledIteration::FromFirst(before)) => advances.max(-before),
+            Some(PeeledIteration::FromEnd(left)) => advances.min(left),
         }))
     }
 
-    /// Makes a task's operations those of one certain iteration of the loop. `None` if there is no such offset.
+    /// Fixes a task's operations to one certain iteration of the loop. `None` if the offset does not fit its field.
     fn settle(
         &mut self,
         task: usize,
         operations: &mut [Operation],
-        turn: Turn,
+        turn: PeeledIteration,
         count: LoopCount,
     ) -> Option<()> {
         if let Some(offset) = self.offset(task, Some(turn)) {
@@ -72,10 +72,12 @@ impl Parts<'_> {
             let Some(AccessId(access)) = operation.access else { continue };
             let access = &self.accesses[access as usize];
             let word = access.word.as_ref().and_then(|word| match (turn, count) {
-                (Turn::FromFirst(iteration), _) => word.at(of, iteration),
-                (Turn::FromEnd(left), LoopCount::Exactly(count)) => word.at(of, i64::from(count) - left),
-                // Behind the kernel, the loop's iteration number stands for the count.
-                (Turn::FromEnd(left), LoopCount::AtMost(_)) => word.later(of, -left),
+                (PeeledIteration::FromFirst(iteration), _) => word.at(of, iteration),
+                (PeeledIteration::FromEnd(left), LoopCount::Exactly(count)) => {
+                    word.at(of, i64::from(count) - left)
+                }
+                // After the kernel, the loop's iteration number stands for the count.
+                (PeeledIteration::FromEnd(left), LoopCount::AtMost(_)) => word.later(of, -left),
             });
             let access = ArrayAccess { word, ..access.clone() };
             operation.access = Some(AccessId(self.accesses.len() as u32));
@@ -96,8 +98,8 @@ impl Parts<'_> {
         placed.collect()
     }
 
-    /// The tasks in the order of the kernel, with their cycles in it. Of those in one cycle, what reads a register comes before what
-    /// writes it, for all of them read before any writes.
+    /// The tasks in the order of the kernel, with their cycles in it. Within a cycle, readers of a register come before its writers,
+    /// for all of them read before any writes.
     fn order(&self) -> Vec<(u32, usize)> {
         let interval = self.schedule.interval;
         let cycle = |task: usize| self.schedule.start[task] % interval;
@@ -113,7 +115,7 @@ impl Parts<'_> {
         for group in tasks.chunk_by(|a, b| cycle(*a) == cycle(*b)) {
             let mut left = group.to_vec();
             while !left.is_empty() {
-                // The first that writes nothing that another of them still has to read; any, in a ring of them.
+                // The first task that writes nothing that another still has to read; in a ring of such reads, any task.
                 let free =
                     |&at: &usize| left.iter().all(|other| *other == left[at] || !reads(*other, left[at]));
                 let at = (0..left.len()).find(free).unwrap_or(0);
@@ -123,14 +125,14 @@ impl Parts<'_> {
         order
     }
 
-    /// Operations of one interval before or after the kernel: those of the stages that are in an iteration there, its `turn`, a bundle each; in a
-    /// ring of reads and writes, together.
+    /// Operations of one interval of the prologue or epilogue, a bundle each: the stages for which `turn` gives an iteration. A ring of
+    /// reads and writes becomes one bundle.
     pub(super) fn block(
         &mut self,
         count: LoopCount,
-        turn: impl Fn(u32) -> Option<Turn>,
+        turn: impl Fn(u32) -> Option<PeeledIteration>,
     ) -> Option<Vec<Bundle>> {
-        let mut by_cycle: BTreeMap<u32, Vec<(usize, Turn)>> = BTreeMap::new();
+        let mut by_cycle: BTreeMap<u32, Vec<(usize, PeeledIteration)>> = BTreeMap::new();
         for (cycle, task) in self.order() {
             if let Some(turn) = turn(self.stage(task)) {
                 by_cycle.entry(cycle).or_default().push((task, turn));

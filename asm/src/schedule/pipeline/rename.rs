@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Registers of values in a loop's body: each value gets one of its own, and those before the kernel and behind it others.
+//! Register renaming in a loop's body: one register for each value, and others in the prologue and the epilogue.
 
 use crate::ir::runs::Run;
 use crate::ir::{Bundle, Ir, RegisterId, RegisterKind, Version, VirtualRegister, numbered};
 use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 
-/// Gives each value of a body a register of its own, but for the last that is written to a name, which may be read after it. A name that
-/// is an output, has a place or shares a bundle keeps all its values.
+/// Gives each value of a body a register of its own, except the last that is written to a name, which may be read after the loop. A name
+/// that is an output, is pinned or shares a bundle keeps all its values.
 pub(super) fn rename(ir: &mut Ir, body: Run) {
     let bundles = body.start..body.end;
     let mut writes: HashMap<RegisterId, Vec<usize>> = HashMap::new();
@@ -70,7 +70,7 @@ pub(super) fn inside(ir: &Ir) -> Vec<Option<Range<usize>>> {
     uses
 }
 
-/// True if a register is read before it is written, or only read.
+/// A register is read before it is written, or never written.
 pub(super) fn read_first(bundles: &[Bundle], register: RegisterId) -> bool {
     for bundle in bundles {
         if bundle.operations.iter().any(|operation| operation.reads().contains(&register)) {
@@ -83,8 +83,8 @@ pub(super) fn read_first(bundles: &[Bundle], register: RegisterId) -> bool {
     true
 }
 
-/// Gives the values of one iteration registers of their own before the kernel and behind it, so that they take a register only as
-/// long as they live. Only a value that an iteration keeps from one run of the kernel to the next has the kernel's register there, too.
+/// Gives the values of one iteration registers of their own in the prologue and the epilogue, so that they take a register only as long
+/// as they live. Values that the kernel reads from the prologue keep the kernel's register.
 pub(super) fn localise(
     ir: &mut Ir,
     values: &HashSet<RegisterId>,
@@ -110,8 +110,8 @@ pub(super) fn localise(
     rename_values(ir, values, epilogue, &mut HashMap::new());
 }
 
-/// Gives each value that is written in straight-line bundles a register of its own. `now` has the present one of each, and the result the
-/// bundle of the last write.
+/// Gives each value that is written in straight-line bundles a register of its own. `now` maps each value to its present register; the
+/// result is the bundle of its last write.
 fn rename_values(
     ir: &mut Ir,
     values: &HashSet<RegisterId>,
@@ -128,7 +128,7 @@ fn rename_values(
         }
         for operation in &mut bundle.operations {
             let Some(dest) = operation.dest.filter(|dest| values.contains(dest)) else { continue };
-            // It has no name: the debugger shows the kernel's.
+            // Nameless: the debugger shows the kernel's register.
             let own = VirtualRegister { name: String::new(), ..ir.register(dest).clone() };
             ir.registers.push(own);
             let own = RegisterId::new(ir.registers.len() - 1);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The program with pipelined loops in place of those of the source.
+//! Replaces the source's loops by pipelined ones.
 
 use super::rename::{inside, localise, read_first};
 use super::{Candidate, Count, LoopReport, Pipelined};
@@ -8,26 +8,26 @@ use crate::ir::{
     Bundle, Constant, Ir, Label, LabelId, LoopBound, Operation, RegisterId, RegisterKind, VirtualRegister,
     with_effect, with_form,
 };
-use crate::report::source::Span;
 use smallvec::{SmallVec, smallvec};
 use std::collections::{BTreeMap, HashSet};
+use takt_diagnostics::source::Span;
 use takt_isa::program::Space;
 use takt_isa::{BundleAddress, Effect, Machine, Op, Type};
 
-/// The operations with which a loop chooses one of two ways at run time.
+/// Operations that choose between two loops at run time.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct TwoWays {
+pub(super) struct LoopChoice {
     subtract: (Op, [usize; 2]),
     less: (Op, [usize; 2]),
     branch: Op,
     jump: Op,
 }
 
-impl TwoWays {
-    /// `None` if the machine lacks one of them.
-    pub(super) fn of(machine: &Machine) -> Option<TwoWays> {
+impl LoopChoice {
+    /// `None` if the machine lacks an operation.
+    pub(super) fn of(machine: &Machine) -> Option<LoopChoice> {
         let able = |op: &Op| !machine.hosts(op.row().function).is_empty();
-        Some(TwoWays {
+        Some(LoopChoice {
             subtract: with_form(machine, "-", Type::I)?,
             less: with_form(machine, "<", Type::I)?,
             branch: with_effect(Effect::BranchNonzero).filter(able)?,
@@ -35,21 +35,21 @@ impl TwoWays {
         })
     }
 
-    /// Cycles that it takes to choose a way, and to pass over the other one.
+    /// Cycles to choose a loop, and to jump over the other.
     pub(super) fn cycles(machine: &Machine) -> u32 {
         2 * machine.refill
     }
 }
 
-/// The program that is made, and the labels and bounds that are new in it.
+/// The program under construction, with its new labels and bounds.
 struct Rewriting<'i> {
     ir: &'i mut Ir,
     bundles: Vec<Bundle>,
-    /// The new place of each bundle.
+    /// New position of each bundle.
     moved: BTreeMap<u32, u32>,
-    /// Labels, with their new places.
+    /// New labels, with their positions.
     labels: Vec<Label>,
-    /// Labels of the source at new places of their own.
+    /// Labels of the source that get positions of their own.
     placed: Vec<(LabelId, u32)>,
     /// Bounds of the iterations of loops at new places.
     bounds: Vec<LoopBound>,
@@ -128,7 +128,7 @@ impl Rewriting<'_> {
         BundleAddress::new(self.bundles.len() as u32)
     }
 
-    /// Keeps bundles as they are.
+    /// Copies a range of bundles unchanged.
     fn keep(&mut self, which: std::ops::Range<usize>) {
         for at in which {
             self.moved.entry(at as u32).or_insert(self.bundles.len() as u32);
@@ -136,7 +136,7 @@ impl Rewriting<'_> {
         }
     }
 
-    /// Puts what shares the bundle with `loop` before it. Returns `loop`.
+    /// Moves operations that share the bundle with `loop` before it. Returns `loop`.
     fn enter(&mut self, entry: usize) -> Operation {
         self.moved.entry(entry as u32).or_insert(self.bundles.len() as u32);
         let last = self.ir.bundles[entry].clone();
@@ -151,22 +151,26 @@ impl Rewriting<'_> {
     }
 
     /// Computes the kernel's count, and branches to a label if there are fewer iterations than stages.
-    fn choose(&mut self, ways: TwoWays, looped: &Operation, stages: u32) -> (RegisterId, LabelId) {
+    fn choose(&mut self, ways: LoopChoice, looped: &Operation, stages: u32) -> (RegisterId, LabelId) {
         let count = looped.sources[0];
         let (one_less, least) = (self.constant(stages - 1), self.constant(stages));
         let counter = self.integer(looped, ways.subtract, [count, one_less]);
         let is_short = self.integer(looped, ways.less, [count, least]);
         let short = self.label(looped);
         let sources = [is_short, RegisterId::ZERO, RegisterId::ZERO];
-        self.push(Operation { sources, constant: Constant::Code(short), ..self.made(looped, ways.branch) });
+        self.push(Operation {
+            sources,
+            constant: Constant::Code(short),
+            ..self.loop_operation(looped, ways.branch)
+        });
         (counter, short)
     }
 
-    /// Adds the loop as it is written, for counts below that of the stages.
+    /// Adds the loop as written, for counts below the number of stages.
     fn otherwise(&mut self, jump: Op, looped: Operation, short: LabelId, body: Run, most: u32) {
         let end = self.label(&looped);
         let (constant, sources) = (Constant::Code(end), [RegisterId::ZERO; 3]);
-        self.push(Operation { constant, sources, ..self.made(&looped, jump) });
+        self.push(Operation { constant, sources, ..self.loop_operation(&looped, jump) });
         self.place(short);
         self.push(Operation { constant: Constant::Code(end), ..looped });
         self.bounds.push(LoopBound { position: self.here().get(), most, total: None });
@@ -175,7 +179,7 @@ impl Rewriting<'_> {
     }
 
     /// An operation that the assembler makes for a loop.
-    fn made(&self, looped: &Operation, op: Op) -> Operation {
+    fn loop_operation(&self, looped: &Operation, op: Op) -> Operation {
         let slots = self.ir.machine.hosts(op.row().function);
         Operation { op, slots, slot: slots.first(), dest: None, access: None, made: true, ..*looped }
     }
@@ -184,7 +188,7 @@ impl Rewriting<'_> {
         self.bundles.push(Bundle { operations: smallvec![operation], explicit: false, scheduled: true });
     }
 
-    /// The value of an operation on integers.
+    /// Emits an operation on integers. Returns the register of its result.
     fn integer(
         &mut self,
         looped: &Operation,
@@ -197,11 +201,16 @@ impl Rewriting<'_> {
         for (source, operand) in order.into_iter().zip(operands) {
             sources[source] = operand;
         }
-        self.push(Operation { dest: Some(dest), sources, constant: Constant::None, ..self.made(looped, op) });
+        self.push(Operation {
+            dest: Some(dest),
+            sources,
+            constant: Constant::None,
+            ..self.loop_operation(looped, op)
+        });
         dest
     }
 
-    /// A new label. It is to be placed.
+    /// A new label, still without a position.
     fn label(&mut self, looped: &Operation) -> LabelId {
         let id = LabelId((self.ir.labels.len() + self.labels.len()) as u32);
         let (name, space, span) = (String::new(), Space::Code, looped.span);
@@ -209,7 +218,7 @@ impl Rewriting<'_> {
         id
     }
 
-    /// The label for a kernel's end: that of the loop, if it `may` be that and nothing else leads to it. A label behind the epilogue would
+    /// The label for a kernel's end: the loop's own, if it `may` be reused and nothing else leads to it. A label after the epilogue would
     /// end a block.
     fn kernel_end(&mut self, looped: &Operation, may: bool) -> LabelId {
         let own = looped.target().and_then(Result::ok).filter(|_| may);
@@ -219,7 +228,7 @@ impl Rewriting<'_> {
         own.filter(leads).unwrap_or_else(|| self.label(looped))
     }
 
-    /// Places a label before the next bundle: a new one, or that of a loop.
+    /// Places a label, new or a loop's, before the next bundle.
     fn place(&mut self, label: LabelId) {
         let here = self.here().get();
         match (label.0 as usize).checked_sub(self.ir.labels.len()) {
@@ -248,7 +257,7 @@ impl Rewriting<'_> {
             ir.labels[label.0 as usize].position = position;
         }
         ir.labels.extend(labels);
-        // The bound of a loop that is there twice is that of neither.
+        // Two new bounds replace the bound of a loop that is there twice.
         ir.loop_bounds.retain(|known| bounds.iter().all(|bound| bound.position != known.position));
         ir.loop_bounds.extend(bounds);
         ir.loop_bounds.sort_by_key(|bound| bound.position);

@@ -5,9 +5,9 @@ use super::Tokens;
 use crate::ast::*;
 use crate::lex::Token;
 use crate::name::{NameId, NameRef};
-use crate::report::source::Span;
 use chumsky::input::{Checkpoint, Cursor};
 use chumsky::inspector::Inspector;
+use takt_diagnostics::source::Span;
 
 /// Builder of the syntax tree, to which the grammar's rules write.
 pub(crate) struct Builder<'a> {
@@ -72,7 +72,7 @@ impl Builder<'_> {
         ExprId { first, count: self.ast.nodes.len() as u32 - first }
     }
 
-    /// An operand that is an expression; one that is a name alone is kept as that.
+    /// An operand for an expression; a name alone becomes a name operand.
     pub(super) fn expression_operand(&mut self, first: u32, span: Span) -> Operand {
         let kind = match self.ast.nodes[first as usize..] {
             [Node { kind: NodeKind::Name(name), .. }] => {
@@ -98,7 +98,7 @@ impl Builder<'_> {
         NameRef::template(self.ast.templates.len() as u32 - 1)
     }
 
-    /// Closes an element whose indices' nodes begin at `starts`: they move out of the list, as those of a template do.
+    /// Closes an element whose indices' nodes begin at `starts`: they move out of the list, like the nodes of a template.
     pub(super) fn element(&mut self, name: Name, starts: Vec<u32>) -> u32 {
         let first = starts.first().copied().unwrap_or(self.ast.nodes.len() as u32);
         let mut nodes = self.ast.nodes.split_off(first as usize);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The grammar of directives.
 
-use super::expected::What;
+use super::expected::ExpectedItem;
 use super::{Body, Builder, Rule, indices, rule};
 use crate::ast::*;
 use crate::lex::Token;
@@ -13,9 +13,9 @@ pub(super) fn directive<'t, 'a: 't>(
     expr: Rule<'t, 'a, Expr>,
     expression: Rule<'t, 'a, ()>,
 ) -> Rule<'t, 'a, Body> {
-    let comma = || just(Token::Comma).labelled(What::Comma);
+    let comma = || just(Token::Comma).labelled(ExpectedItem::Comma);
     let is = |directive| just(Token::Directive(directive));
-    let text = rule(select! { Token::Text => () }.labelled(What::Text).map_with(|(), e| {
+    let text = rule(select! { Token::Text => () }.labelled(ExpectedItem::Text).map_with(|(), e| {
         let span = e.span();
         (e.state() as &mut Builder<'a>).quoted(span)
     }));
@@ -30,10 +30,10 @@ pub(super) fn directive<'t, 'a: 't>(
         Token::Directive(Directive::Else) => DirectiveKind::Else(0),
     };
     let declares = select! {
-        Token::Directive(Directive::Reg) => Declares::Register,
-        Token::Directive(Directive::State) => Declares::State,
-        Token::Directive(Directive::Input) => Declares::Input,
-        Token::Directive(Directive::Output) => Declares::Output,
+        Token::Directive(Directive::Reg) => DeclarationKind::Register,
+        Token::Directive(Directive::State) => DeclarationKind::State,
+        Token::Directive(Directive::Input) => DeclarationKind::Input,
+        Token::Directive(Directive::Output) => DeclarationKind::Output,
     };
     let sizes = expr
         .clone()
@@ -41,8 +41,8 @@ pub(super) fn directive<'t, 'a: 't>(
         .at_least(1)
         .collect::<Vec<_>>()
         .delimited_by(
-            just(Token::BracketOpen).labelled(What::BracketOpen),
-            just(Token::BracketClose).labelled(What::BracketClose),
+            just(Token::BracketOpen).labelled(ExpectedItem::BracketOpen),
+            just(Token::BracketClose).labelled(ExpectedItem::BracketClose),
         )
         .or_not()
         .map_with(|sizes, e| {
@@ -55,9 +55,17 @@ pub(super) fn directive<'t, 'a: 't>(
         .clone()
         .then(rule(sizes))
         .then(
-            just(Token::Colon).labelled(What::Colon).ignore_then(name.clone().labelled(What::Type)).or_not(),
+            just(Token::Colon)
+                .labelled(ExpectedItem::Colon)
+                .ignore_then(name.clone().labelled(ExpectedItem::Type))
+                .or_not(),
         )
-        .then(just(Token::At).labelled(What::At).ignore_then(expr.clone().labelled(What::Place)).or_not())
+        .then(
+            just(Token::At)
+                .labelled(ExpectedItem::At)
+                .ignore_then(expr.clone().labelled(ExpectedItem::Place))
+                .or_not(),
+        )
         .map(|(((name, sizes), ty), place)| Declaration { name, sizes, ty, place });
     let declaration = rule(declaration);
     // Separated by blanks or commas.
@@ -72,13 +80,20 @@ pub(super) fn directive<'t, 'a: 't>(
     let declare =
         declares.then(declarations.clone()).map(|(what, names)| DirectiveKind::Declare(what, names));
     let values = rule(expr.clone().separated_by(comma()).at_least(1).collect::<Vec<_>>());
+    let listed = text
+        .clone()
+        .map_with(|path, e| ArrayValues::File(path, e.span()))
+        .or(values.clone().map(ArrayValues::Listed));
     let array = is(Directive::Array)
         .ignore_then(declarations)
-        .then(just(Token::Assign).labelled(What::Assign).ignore_then(values.clone()).or_not())
-        .map(|(arrays, values)| DirectiveKind::Array(arrays, values.unwrap_or_default()));
+        .then(just(Token::Assign).labelled(ExpectedItem::Assign).ignore_then(listed).or_not())
+        .map(|(arrays, values)| {
+            DirectiveKind::Array(arrays, values.unwrap_or(ArrayValues::Listed(Vec::new())))
+        });
     let float = is(Directive::Float).ignore_then(values.clone()).map(DirectiveKind::Float);
     let word = is(Directive::Word).ignore_then(values.clone()).map(DirectiveKind::Word);
-    let assigned = name.clone().then_ignore(just(Token::Assign).labelled(What::Assign)).then(expr.clone());
+    let assigned =
+        name.clone().then_ignore(just(Token::Assign).labelled(ExpectedItem::Assign)).then(expr.clone());
     let assigned = rule(assigned);
     // A register by its name, or an element of an array.
     let register = name.clone().then(indices(expression, 1).or_not()).map_with(|(name, starts), e| {
@@ -92,7 +107,7 @@ pub(super) fn directive<'t, 'a: 't>(
     });
     let register = rule(register);
     let options = rule(comma().or_not().ignore_then(assigned.clone()).repeated().collect::<Vec<_>>());
-    let row = name.clone().labelled(What::Machine).map(MachineName::Row);
+    let row = name.clone().labelled(ExpectedItem::Machine).map(MachineName::Row);
     let machine = row.or(text.clone().map_with(|path, e| MachineName::File(path, e.span())));
     let machine = is(Directive::Machine)
         .ignore_then(machine)
@@ -103,8 +118,8 @@ pub(super) fn directive<'t, 'a: 't>(
         .map(|(name, value)| DirectiveKind::Const(name, value));
     let preset = is(Directive::Preset)
         .ignore_then(just(Token::At).or_not())
-        .then(register.clone().labelled(What::Register))
-        .then_ignore(just(Token::Assign).labelled(What::Assign))
+        .then(register.clone().labelled(ExpectedItem::Register))
+        .then_ignore(just(Token::Assign).labelled(ExpectedItem::Assign))
         .then(expr.clone())
         .map(|((at, register), value)| DirectiveKind::Preset { register, placed: at.is_some(), value });
     let space = is(Directive::Space).ignore_then(expr.clone()).map(DirectiveKind::Space);
@@ -118,7 +133,7 @@ pub(super) fn directive<'t, 'a: 't>(
         .then_ignore(comma())
         .then(expr.clone())
         .map(|((variable, first), last)| DirectiveKind::Rep { variable, first, last, end: 0 });
-    let option = name.clone().labelled(What::LoopOption).then(expr.clone());
+    let option = name.clone().labelled(ExpectedItem::LoopOption).then(expr.clone());
     let for_ = is(Directive::For)
         .ignore_then(name.clone())
         .then_ignore(comma())
@@ -134,11 +149,21 @@ pub(super) fn directive<'t, 'a: 't>(
             end: 0,
         });
     let more = rule(comma().or_not().ignore_then(name.clone()).repeated().collect::<Vec<_>>());
+    let parameter = name
+        .clone()
+        .then(
+            just(Token::Colon)
+                .labelled(ExpectedItem::Colon)
+                .ignore_then(name.clone().labelled(ExpectedItem::Type))
+                .or_not(),
+        )
+        .map(|(name, ty)| Parameter { name, ty });
+    let parameters = rule(comma().or_not().ignore_then(parameter).repeated().collect::<Vec<_>>());
     let macro_ = is(Directive::Macro)
         .ignore_then(name.clone())
-        .then(more.clone())
+        .then(parameters)
         .map(|(name, parameters)| DirectiveKind::Macro { name, parameters, end: 0 });
-    // Whatever tokens a library file's name is made of: its text counts.
+    // A library file's name may consist of any tokens: only its text counts.
     let library = select! {
         token if !matches!(token, Token::Newline | Token::Operator(Operator::Gt)) => (),
     }
@@ -150,39 +175,39 @@ pub(super) fn directive<'t, 'a: 't>(
         (e.state() as &mut Builder<'a>).text_of(span).to_owned()
     })
     .delimited_by(
-        just(Token::Operator(Operator::Lt)).labelled(What::LibraryFile),
-        just(Token::Operator(Operator::Gt)).labelled(What::Greater),
+        just(Token::Operator(Operator::Lt)).labelled(ExpectedItem::LibraryFile),
+        just(Token::Operator(Operator::Gt)).labelled(ExpectedItem::Greater),
     );
     let include = is(Directive::Include)
         .ignore_then(text.clone().map(|name| (name, false)).or(library.map(|name| (name, true))))
         .map(|(name, library)| DirectiveKind::Include(name, library));
     let schedule = is(Directive::Schedule)
-        .ignore_then(name.clone().labelled(What::OnOrOff))
+        .ignore_then(name.clone().labelled(ExpectedItem::OnOrOff))
         .map(DirectiveKind::Schedule);
-    let fast = is(Directive::Fast).ignore_then(name.clone().labelled(What::Allowed).then(more.clone())).map(
-        |(first, mut more)| {
+    let fast = is(Directive::Fast)
+        .ignore_then(name.clone().labelled(ExpectedItem::Allowed).then(more.clone()))
+        .map(|(first, mut more)| {
             more.insert(0, first);
             DirectiveKind::Fast(more)
-        },
-    );
+        });
     let contract = is(Directive::Contract)
-        .ignore_then(name.clone().labelled(What::OnOrOff))
+        .ignore_then(name.clone().labelled(ExpectedItem::OnOrOff))
         .map(DirectiveKind::Contract);
     let latched = is(Directive::Ports)
-        .ignore_then(name.clone().labelled(What::LatchedOrDirect))
+        .ignore_then(name.clone().labelled(ExpectedItem::LatchedOrDirect))
         .map(DirectiveKind::Ports);
-    let total = name.clone().labelled(What::LoopTotal).then(expr.clone());
+    let total = name.clone().labelled(ExpectedItem::LoopTotal).then(expr.clone());
     let loop_bound = is(Directive::LoopBound)
         .ignore_then(expr.clone())
         .then(total.or_not())
         .map(|(most, total)| DirectiveKind::LoopBound(most, total));
-    let ports = rule(name.clone().labelled(What::Port).then(more).map(|(first, mut more)| {
+    let ports = rule(name.clone().labelled(ExpectedItem::Port).then(more).map(|(first, mut more)| {
         more.insert(0, first);
         more
     }));
     let registers = register
         .clone()
-        .labelled(What::Register)
+        .labelled(ExpectedItem::Register)
         .then(comma().or_not().ignore_then(register).repeated().collect::<Vec<_>>())
         .map(|(first, mut more)| {
             more.insert(0, first);
@@ -191,10 +216,10 @@ pub(super) fn directive<'t, 'a: 't>(
     let range = is(Directive::Range)
         .ignore_then(just(Token::At).or_not())
         .then(registers)
-        .then_ignore(just(Token::Assign).labelled(What::Assign))
-        .then(expr.clone().labelled(What::Least))
+        .then_ignore(just(Token::Assign).labelled(ExpectedItem::Assign))
+        .then(expr.clone().labelled(ExpectedItem::Least))
         .then_ignore(comma())
-        .then(expr.clone().labelled(What::Largest))
+        .then(expr.clone().labelled(ExpectedItem::Largest))
         .map(|(((at, registers), low), high)| DirectiveKind::Range {
             registers,
             placed: at.is_some(),
@@ -203,16 +228,16 @@ pub(super) fn directive<'t, 'a: 't>(
         });
     let deadline = is(Directive::Deadline)
         .ignore_then(ports.clone())
-        .then_ignore(just(Token::Assign).labelled(What::Assign))
-        .then(expr.clone().labelled(What::Cycle))
+        .then_ignore(just(Token::Assign).labelled(ExpectedItem::Assign))
+        .then(expr.clone().labelled(ExpectedItem::Cycle))
         .map(|(ports, cycle)| DirectiveKind::Deadline(ports, cycle));
     let order = is(Directive::Order).ignore_then(ports.clone()).map(DirectiveKind::Order);
     let late = is(Directive::Late)
         .ignore_then(ports.clone())
         .then(
             just(Token::Assign)
-                .labelled(What::Assign)
-                .ignore_then(expr.clone().labelled(What::Cycles))
+                .labelled(ExpectedItem::Assign)
+                .ignore_then(expr.clone().labelled(ExpectedItem::Cycles))
                 .or_not(),
         )
         .map(|(ports, cost)| DirectiveKind::Late(ports, cost));
@@ -222,18 +247,20 @@ pub(super) fn directive<'t, 'a: 't>(
         .then_ignore(comma())
         .then(expr.clone())
         .delimited_by(
-            just(Token::BracketOpen).labelled(What::BracketOpen),
-            just(Token::BracketClose).labelled(What::BracketClose),
+            just(Token::BracketOpen).labelled(ExpectedItem::BracketOpen),
+            just(Token::BracketClose).labelled(ExpectedItem::BracketClose),
         )
         .or_not();
     let at = text
         .clone()
-        .then(expr.clone().labelled(What::LineNumber))
+        .then(expr.clone().labelled(ExpectedItem::LineNumber))
         .then(columns)
         .map(|((file, line), columns)| Loc::At(file, line, columns))
         .or(name.map(Loc::None));
     let loc = is(Directive::Loc)
-        .ignore_then(at.separated_by(just(Token::Bars).labelled(What::Bars)).at_least(1).collect::<Vec<_>>())
+        .ignore_then(
+            at.separated_by(just(Token::Bars).labelled(ExpectedItem::Bars)).at_least(1).collect::<Vec<_>>(),
+        )
         .map(DirectiveKind::Loc);
     let kind = choice([
         rule(bare),

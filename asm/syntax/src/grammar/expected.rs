@@ -1,29 +1,29 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Errors of the grammar: a place and the set of tokens expected there. An error costs no allocation, so that a line is parsed once
-//! whether or not it has one.
+//! Errors of the grammar: a place and the set of tokens expected there. An error costs no allocation, so that each line is parsed
+//! once, correct or not.
 
 use super::Tokens;
 use crate::ast::Directive;
 use crate::lex::Token;
-use crate::report::source::Span;
 use chumsky::DefaultExpected;
 use chumsky::error::{Error, LabelError};
 use chumsky::util::MaybeRef;
+use takt_diagnostics::source::Span;
 
 macro_rules! whats {
     ($($variant:ident $text:literal;)*) => {
-        /// Something that may stand at a place of a line.
+        /// A token or a construct that may stand at a place of a line.
         #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-        pub(crate) enum What {
+        pub(crate) enum ExpectedItem {
             $($variant,)*
         }
 
-        impl What {
-            const ALL: &[What] = &[$(What::$variant),*];
+        impl ExpectedItem {
+            const ALL: &[ExpectedItem] = &[$(ExpectedItem::$variant),*];
 
-            /// Its name in messages.
+            /// Name of the token or construct in messages.
             pub(crate) const fn text(self) -> &'static str {
-                match self { $(What::$variant => $text,)* }
+                match self { $(ExpectedItem::$variant => $text,)* }
             }
         }
     };
@@ -73,17 +73,17 @@ whats! {
 }
 
 // Every kind and every directive has a bit of its own.
-const _: () = assert!(What::ALL.len() + Directive::ALL.len() <= 128);
+const _: () = assert!(ExpectedItem::ALL.len() + Directive::ALL.len() <= 128);
 
-/// The furthest place that a parser of a line came to, and what would have been taken there.
+/// The furthest place that a parser of a line came to, and the tokens that it would have taken there.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Expected {
+pub(crate) struct ExpectedItems {
     span: Span,
     set: u128,
 }
 
-impl Expected {
-    /// The place.
+impl ExpectedItems {
+    /// The furthest place that the parser came to.
     pub(crate) fn span(&self) -> Span {
         self.span
     }
@@ -91,8 +91,8 @@ impl Expected {
     /// The names of the expected tokens, in alphabetical order.
     pub(crate) fn texts(&self) -> Vec<String> {
         let is_in = |bit: usize| self.set >> bit & 1 != 0;
-        let whats = What::ALL.iter().enumerate().filter(|(bit, _)| is_in(*bit));
-        let directives = (What::ALL.len()..).zip(Directive::ALL).filter(|(bit, _)| is_in(*bit));
+        let whats = ExpectedItem::ALL.iter().enumerate().filter(|(bit, _)| is_in(*bit));
+        let directives = (ExpectedItem::ALL.len()..).zip(Directive::ALL).filter(|(bit, _)| is_in(*bit));
         let mut texts: Vec<String> = whats.map(|(_, what)| what.text().to_owned()).collect();
         texts.extend(directives.map(|(_, directive)| format!("`{}`", directive.name())));
         texts.sort();
@@ -105,7 +105,7 @@ trait Bit {
     fn bit(self) -> u128;
 }
 
-impl Bit for What {
+impl Bit for ExpectedItem {
     fn bit(self) -> u128 {
         1 << self as u32
     }
@@ -115,43 +115,43 @@ impl Bit for DefaultExpected<'_, Token> {
     fn bit(self) -> u128 {
         let what = match self {
             DefaultExpected::NothingElse => return 0,
-            DefaultExpected::EndOfInput => What::EndOfLine,
+            DefaultExpected::EndOfInput => ExpectedItem::EndOfLine,
             DefaultExpected::Token(token) => match *token {
-                Token::Directive(directive) => return 1 << (What::ALL.len() + directive as usize),
-                Token::Comma => What::Comma,
-                Token::Colon => What::Colon,
-                Token::At => What::At,
-                Token::Assign => What::Assign,
-                Token::Question => What::Question,
-                Token::Bars => What::Bars,
-                Token::Open => What::Open,
-                Token::Close => What::Close,
-                Token::BracketOpen => What::BracketOpen,
-                Token::BracketClose => What::BracketClose,
-                Token::Newline => What::EndOfLine,
-                _ => What::SomethingElse,
+                Token::Directive(directive) => return 1 << (ExpectedItem::ALL.len() + directive as usize),
+                Token::Comma => ExpectedItem::Comma,
+                Token::Colon => ExpectedItem::Colon,
+                Token::At => ExpectedItem::At,
+                Token::Assign => ExpectedItem::Assign,
+                Token::Question => ExpectedItem::Question,
+                Token::Bars => ExpectedItem::Bars,
+                Token::Open => ExpectedItem::Open,
+                Token::Close => ExpectedItem::Close,
+                Token::BracketOpen => ExpectedItem::BracketOpen,
+                Token::BracketClose => ExpectedItem::BracketClose,
+                Token::Newline => ExpectedItem::EndOfLine,
+                _ => ExpectedItem::SomethingElse,
             },
-            _ => What::SomethingElse,
+            _ => ExpectedItem::SomethingElse,
         };
         what.bit()
     }
 }
 
-impl<'t> Error<'t, Tokens<'t>> for Expected {
+impl<'t> Error<'t, Tokens<'t>> for ExpectedItems {
     #[inline]
-    fn merge(self, other: Expected) -> Expected {
-        Expected { span: self.span, set: self.set | other.set }
+    fn merge(self, other: ExpectedItems) -> ExpectedItems {
+        ExpectedItems { span: self.span, set: self.set | other.set }
     }
 }
 
-impl<'t, L: Bit> LabelError<'t, Tokens<'t>, L> for Expected {
+impl<'t, L: Bit> LabelError<'t, Tokens<'t>, L> for ExpectedItems {
     #[inline]
     fn expected_found<I: IntoIterator<Item = L>>(
         expected: I,
         _: Option<MaybeRef<'t, Token>>,
         span: Span,
-    ) -> Expected {
-        Expected { span, set: expected.into_iter().fold(0, |set, expected| set | expected.bit()) }
+    ) -> ExpectedItems {
+        ExpectedItems { span, set: expected.into_iter().fold(0, |set, expected| set | expected.bit()) }
     }
 
     #[inline]

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The grammar of expressions.
 
-use super::expected::What;
+use super::expected::ExpectedItem;
 use super::{Builder, Extra, Rule, Tokens, name_ref, rule, slices};
 use crate::ast::*;
 use crate::lex::Token;
@@ -10,8 +10,8 @@ use chumsky::input::MapExtra;
 use chumsky::pratt::{infix, left, prefix, right};
 use chumsky::prelude::*;
 
-/// The parser of an expression, with or without elements of arrays: elsewhere than in equations a bracket after a name is
-/// that of a memory operand. It knows itself weakly: one that owned itself would never be freed.
+/// The parser of an expression, with or without elements of arrays: elsewhere than in equations, a bracket after a name
+/// belongs to a memory operand. The parser refers to itself weakly: a parser that owned itself would never be freed.
 pub(super) fn expression<'t, 'a: 't>(elements: bool) -> Rule<'t, 'a, ()> {
     fn fold<'t, 'a, 'b>(_: (), operator: Operator, _: (), e: &mut MapExtra<'t, 'b, Tokens<'t>, Extra<'a>>) {
         let span = e.span();
@@ -35,7 +35,7 @@ pub(super) fn expression<'t, 'a: 't>(elements: bool) -> Rule<'t, 'a, ()> {
             .clone()
             .separated_by(just(Token::Comma))
             .collect::<Vec<()>>()
-            .delimited_by(just(Token::Open), just(Token::Close).labelled(What::Close));
+            .delimited_by(just(Token::Open), just(Token::Close).labelled(ExpectedItem::Close));
         let call_or_name =
             rule(name_ref.clone().then(arguments.or_not()).try_map_with(|(name, arguments), e| {
                 let span = e.span();
@@ -43,8 +43,8 @@ pub(super) fn expression<'t, 'a: 't>(elements: bool) -> Rule<'t, 'a, ()> {
                     (_, None) => NodeKind::Name(name),
                     (Ok(name), Some(count)) => NodeKind::Call(name, count.len() as u32),
                     (Err(_), Some(_)) => {
-                        return Err(LabelError::<Tokens<'t>, What>::expected_found(
-                            [What::Function],
+                        return Err(LabelError::<Tokens<'t>, ExpectedItem>::expected_found(
+                            [ExpectedItem::Function],
                             None,
                             span,
                         ));
@@ -63,24 +63,26 @@ pub(super) fn expression<'t, 'a: 't>(elements: bool) -> Rule<'t, 'a, ()> {
             let builder: &mut Builder<'a> = e.state();
             builder.node(kind, span);
         });
-        let parenthesised =
-            expression.clone().delimited_by(just(Token::Open), just(Token::Close).labelled(What::Close));
+        let parenthesised = expression
+            .clone()
+            .delimited_by(just(Token::Open), just(Token::Close).labelled(ExpectedItem::Close));
         // Without elements, the tokens after a name are not examined.
         let element = match elements {
             true => rule(element),
             false => call_or_name.clone(),
         };
-        let atom = rule(choice((literal, element, call_or_name, parenthesised)).labelled(What::Operand));
+        let atom =
+            rule(choice((literal, element, call_or_name, parenthesised)).labelled(ExpectedItem::Operand));
 
         let operator = |level: u16| {
             select! { Token::Operator(operator) if operator.precedence() == level => operator }
-                .labelled(What::Operator)
+                .labelled(ExpectedItem::Operator)
         };
         let computed = atom.pratt((
             prefix(
                 Operator::PREFIX,
                 select! { Token::Operator(operator) if operator.is_prefix() => operator }
-                    .labelled(What::Operand),
+                    .labelled(ExpectedItem::Operand),
                 |operator, (), e| {
                     let span = e.span();
                     let builder: &mut Builder<'a> = e.state();
@@ -96,9 +98,9 @@ pub(super) fn expression<'t, 'a: 't>(elements: bool) -> Rule<'t, 'a, ()> {
             infix(left(1), operator(1), fold),
         ));
         let choices = just(Token::Question)
-            .labelled(What::Operator)
+            .labelled(ExpectedItem::Operator)
             .ignore_then(expression.clone())
-            .then(just(Token::Colon).labelled(What::Colon).ignore_then(expression))
+            .then(just(Token::Colon).labelled(ExpectedItem::Colon).ignore_then(expression))
             .or_not();
         rule(computed.then(choices).map_with(|(_, choices): ((), Option<((), ())>), e| {
             let span = e.span();

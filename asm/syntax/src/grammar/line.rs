@@ -2,9 +2,9 @@
 //! The grammar of lines: bundles and equations.
 
 use super::directive::directive;
-use super::expected::What;
+use super::expected::ExpectedItem;
 use super::expression::expression;
-use super::{Body, Builder, Extra, ParsedLine, Rule, Tokens, here, indices, name_ref, rule, slices};
+use super::{Body, Builder, Extra, ParsedLine, Rule, Tokens, indices, name_ref, next_node, rule, slices};
 use crate::ast::*;
 use crate::lex::Token;
 use crate::name::{NameId, NameRef};
@@ -21,12 +21,15 @@ pub(crate) fn line<'t, 'a: 't>() -> Rule<'t, 'a, ParsedLine> {
             .ignore_then(name.clone())
             .map_with(|name, e| Operand { kind: OperandKind::Place(name.name), span: e.span() }),
     );
-    let base = place.clone().or(here().then(expression.clone()).map_with(|(first, ()), e| {
+    let base = place.clone().or(next_node().then(expression.clone()).map_with(|(first, ()), e| {
         let span = e.span();
         let builder: &mut Builder<'a> = e.state();
         builder.expression_operand(first, span)
     }));
-    let ty = just(Token::Colon).labelled(What::Colon).ignore_then(name.clone().labelled(What::Type)).or_not();
+    let ty = just(Token::Colon)
+        .labelled(ExpectedItem::Colon)
+        .ignore_then(name.clone().labelled(ExpectedItem::Type))
+        .or_not();
     let ty = rule(ty);
     let cast = |(operand, ty): (Operand, Option<Name>), e: &mut MapExtra<'t, '_, Tokens<'t>, Extra<'a>>| {
         let Some(ty) = ty else { return operand };
@@ -35,13 +38,11 @@ pub(crate) fn line<'t, 'a: 't>() -> Rule<'t, 'a, ParsedLine> {
         casts.push(Cast { operand, ty });
         Operand { kind: OperandKind::Cast(casts.len() as u32 - 1), span }
     };
-    let brackets = rule(
-        base.then(ty.clone())
-            .map_with(cast)
-            .labelled(What::Register)
-            .delimited_by(just(Token::BracketOpen), just(Token::BracketClose).labelled(What::BracketClose)),
-    );
-    let offset = here().then(expression.clone()).map_with(|(first, ()), e| (first, e.span()));
+    let brackets = rule(base.then(ty.clone()).map_with(cast).labelled(ExpectedItem::Register).delimited_by(
+        just(Token::BracketOpen),
+        just(Token::BracketClose).labelled(ExpectedItem::BracketClose),
+    ));
+    let offset = next_node().then(expression.clone()).map_with(|(first, ()), e| (first, e.span()));
     let memory_or_expression = offset.then(brackets.clone().or_not()).map_with(|((first, span), base), e| {
         let whole = e.span();
         let builder: &mut Builder<'a> = e.state();
@@ -65,7 +66,7 @@ pub(crate) fn line<'t, 'a: 't>() -> Rule<'t, 'a, ParsedLine> {
         builder.ast.memories.push(Memory { offset: None, base });
         Operand { kind: OperandKind::Memory(builder.ast.memories.len() as u32 - 1), span }
     });
-    // With one index it may be a place in memory: what the name means decides.
+    // With one index the operand may be a place in memory: the name's meaning decides.
     let element = name.clone().then(indices(expression.clone(), 2)).map_with(|(name, starts), e| {
         let span = e.span();
         let builder: &mut Builder<'a> = e.state();
@@ -75,18 +76,19 @@ pub(crate) fn line<'t, 'a: 't>() -> Rule<'t, 'a, ParsedLine> {
         .then(ty)
         .map_with(cast)
         .map_with(|operand, e| (e.state() as &mut Builder<'a>).ast.operands.push(operand))
-        .labelled(What::Operand);
-    let operands = rule(operand).separated_by(just(Token::Comma).labelled(What::Comma)).collect::<Vec<()>>();
+        .labelled(ExpectedItem::Operand);
+    let operands =
+        rule(operand).separated_by(just(Token::Comma).labelled(ExpectedItem::Comma)).collect::<Vec<()>>();
 
     let operation =
-        name.clone().labelled(What::Instruction).then(operands).map_with(|(mnemonic, count), e| {
+        name.clone().labelled(ExpectedItem::Instruction).then(operands).map_with(|(mnemonic, count), e| {
             let span = e.span();
             (e.state() as &mut Builder<'a>).push_operation(mnemonic, count.len(), span);
         });
     let raw = just(Token::Directive(Directive::Raw))
-        .labelled(What::Instruction)
+        .labelled(ExpectedItem::Instruction)
         .map_with(|_, e| e.span())
-        .then(name.clone().labelled(What::Slot))
+        .then(name.clone().labelled(ExpectedItem::Slot))
         .then(expr.clone())
         .map_with(|((raw, slot), word), e| {
             let span = e.span();
@@ -98,19 +100,20 @@ pub(crate) fn line<'t, 'a: 't>() -> Rule<'t, 'a, ParsedLine> {
         });
     let bundle = rule(operation)
         .or(rule(raw))
-        .separated_by(just(Token::Bars).labelled(What::Bars))
+        .separated_by(just(Token::Bars).labelled(ExpectedItem::Bars))
         .at_least(1)
         .collect::<Vec<()>>()
         .map(|count| Body::Bundle(count.len() as u32));
 
     let directive = directive(name.clone(), expr, expression.clone());
-    let body = rule(bundle).or(directive).labelled(What::InstructionOrDirective).or(empty().to(Body::Empty));
+    let body =
+        rule(bundle).or(directive).labelled(ExpectedItem::InstructionOrDirective).or(empty().to(Body::Empty));
     // A plain label takes one look ahead; only a template is read twice.
     let label = name.then_ignore(just(Token::Colon)).or_not();
     rule(
         label
             .then(body)
-            .then_ignore(just(Token::Newline).labelled(What::EndOfLine))
+            .then_ignore(just(Token::Newline).labelled(ExpectedItem::EndOfLine))
             .map(|(label, body)| ParsedLine { label, body }),
     )
 }
@@ -122,15 +125,15 @@ fn name<'t, 'a: 't>(name_ref: Rule<'t, 'a, NameRef>) -> Rule<'t, 'a, Name> {
 
 /// An expression and its place.
 fn expr<'t, 'a: 't>(expression: Rule<'t, 'a, ()>) -> Rule<'t, 'a, Expr> {
-    let expr = here().then(expression).map_with(|(first, ()), e| {
+    let expr = next_node().then(expression).map_with(|(first, ()), e| {
         let span = e.span();
         let builder: &mut Builder<'a> = e.state();
         Expr { id: builder.expr(first), span }
     });
-    rule(expr.labelled(What::Expression))
+    rule(expr.labelled(ExpectedItem::Expression))
 }
 
-/// The parser of a line that holds an equation: an optional label, what is written, `=`, and what is computed.
+/// The parser of a line that holds an equation: an optional label, the targets, `=`, and the values.
 pub(crate) fn equation<'t, 'a: 't>() -> Rule<'t, 'a, ParsedLine> {
     let expression = expression(true);
     let name = name(name_ref(expression.clone()));
@@ -143,14 +146,14 @@ pub(crate) fn equation<'t, 'a: 't>() -> Rule<'t, 'a, ParsedLine> {
         Operand { kind: OperandKind::Element(builder.element(name, starts)), span }
     });
     let plain = name.clone().map(|name| Operand { kind: OperandKind::Name(name.name), span: name.span });
-    let target = rule(choice((place, element, plain)).labelled(What::RegisterToWrite));
+    let target = rule(choice((place, element, plain)).labelled(ExpectedItem::RegisterToWrite));
     let value = expr(expression);
-    let comma = || just(Token::Comma).labelled(What::Comma);
+    let comma = || just(Token::Comma).labelled(ExpectedItem::Comma);
     let body = target
         .separated_by(comma())
         .at_least(1)
         .collect::<Vec<_>>()
-        .then_ignore(just(Token::Assign).labelled(What::Assign))
+        .then_ignore(just(Token::Assign).labelled(ExpectedItem::Assign))
         .then(value.separated_by(comma()).at_least(1).collect::<Vec<_>>())
         .map_with(|(targets, values), e| {
             let span = e.span();
@@ -161,7 +164,7 @@ pub(crate) fn equation<'t, 'a: 't>() -> Rule<'t, 'a, ParsedLine> {
     rule(
         label
             .then(body)
-            .then_ignore(just(Token::Newline).labelled(What::EndOfLine))
+            .then_ignore(just(Token::Newline).labelled(ExpectedItem::EndOfLine))
             .map(|(label, ())| ParsedLine { label, body: Body::Equation }),
     )
 }

@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Recursive-descent parser for common lines, in front of the grammar. It accepts a subset of the grammar, with the same tree.
+//! Recursive-descent parser for common lines, in front of the grammar. The parser accepts a subset of the grammar, with the same
+//! tree.
 //!
-//! It stays because the assembler would otherwise be slower than GNU `as`: called in a process on 10,000 lines, it reads 3.1
-//! million lines a second of processor time with this parser and 0.47 million without; GNU `as` reads 2.3 million
+//! The shortcut stays because the assembler would otherwise be slower than GNU `as`: called in a process on 10,000 lines, it
+//! reads 3.1 million lines a second of processor time with this parser and 0.47 million without; GNU `as` reads 2.3 million
 //! (`cargo run --release -p takt-asm --example lines_per_second`, 2026-11-25).
 
 use super::{Body, Builder, ParsedLine};
 use crate::ast::*;
 use crate::lex::Token;
 use crate::name::NameRef;
-use crate::report::source::Span;
+use takt_diagnostics::source::Span;
 
 /// Parses a common line: an optional label, then operations whose operands are names, numbers, `offset[name]` with one of
 /// each, or expressions of names and numbers. `None` leaves any other line to the grammar, after a rewind of the builder.
@@ -36,7 +37,7 @@ pub(crate) fn common_line(tokens: &[(Token, Span)], builder: &mut Builder<'_>) -
     }
 }
 
-/// The operands of [`common_line`]: the token that ends them, `||` or the end of the line, and what follows it.
+/// The operands of [`common_line`]: the token that ends them, `||` or the end of the line, and the tokens behind it.
 #[inline(always)]
 fn common_operands<'t>(
     mut rest: &'t [(Token, Span)],
@@ -50,7 +51,7 @@ fn common_operands<'t>(
         return Some((*end, behind));
     }
     loop {
-        // A name alone is what most operands are.
+        // Most operands are a name alone.
         if let [
             (Token::Name(name), span),
             (end @ (Token::Comma | Token::Newline | Token::Bars), _),
@@ -110,8 +111,8 @@ fn common_operands<'t>(
     }
 }
 
-/// An expression of names, numbers, operators and parentheses whose operators bind at least as tightly as `least`: what
-/// follows it, and its place. Nesting is bounded before a line is parsed.
+/// An expression of names, numbers, operators and parentheses whose operators bind at least as tightly as `least`: the
+/// tokens behind it, and its place. Nesting is bounded before a line is parsed.
 fn common_expression<'t>(
     tokens: &'t [(Token, Span)],
     least: u16,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Text to tokens. One regular expression for each kind of token, none for mnemonics: those are names like any other.
+//! Text to tokens. Each kind of token has a regular expression; mnemonics are names like any other.
 
 mod range;
 #[allow(clippy::all, unused, reason = "generated")]
@@ -10,12 +10,12 @@ use crate::ast::Operator;
 use crate::intern::Interner;
 use crate::limits;
 use crate::name::NameId;
-use crate::report::diag::{Diagnostic, Severity, Sink};
-use crate::report::source::Span;
 use logos::Logos;
 pub(crate) use raw::Raw;
+use takt_diagnostics::diag::{Diagnostic, Severity, Sink};
+use takt_diagnostics::source::Span;
 
-/// A token with what it carries.
+/// A token with its name, number or directive.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) enum Token {
     /// The end of a line, at the end of every line's tokens.
@@ -44,7 +44,7 @@ pub(crate) enum Token {
     Question,
     Bars,
     Operator(Operator),
-    /// Reported already; no line that holds one is parsed.
+    /// A token that was reported; lines that hold one are not parsed.
     Bad,
 }
 
@@ -52,7 +52,7 @@ pub(crate) enum Token {
 #[derive(Default)]
 pub(crate) struct Chunk {
     pub(crate) tokens: Vec<(Token, Span)>,
-    /// For each line that has tokens: where they end in `tokens`, the line's number, and what stands against parsing it.
+    /// For each line that has tokens: the end of its tokens in `tokens`, its number, and the reasons against parsing it.
     pub(crate) lines: Vec<LineTokens>,
 }
 
@@ -62,13 +62,13 @@ pub(crate) struct LineTokens {
     pub(crate) end: u32,
     /// Line number, from 1.
     pub(crate) number: u32,
-    /// A token was reported.
+    /// A token of the line was reported.
     pub(crate) bad: bool,
     /// The line continues over line breaks.
     pub(crate) continued: bool,
-    /// It may nest deeply: many brackets, prefix operators and powers.
+    /// The line may nest deeply: many brackets, prefix operators and powers.
     pub(crate) nested: bool,
-    /// It has a comparison, and another or `&` or `|`.
+    /// The line has a comparison, and a second one, `&` or `|`.
     pub(crate) compared: bool,
 }
 
@@ -200,21 +200,21 @@ impl<'s> Lexer<'s> {
 
 /// The line being read.
 struct LineState {
-    /// Its first token.
+    /// Index of the line's first token.
     start: usize,
     number: u32,
-    /// Its start in the space of all files.
+    /// Offset of the line's start in the space of all files.
     from: u32,
     bad: bool,
     continued: bool,
-    /// Something in it was no token, and is reported.
+    /// An unknown character was met, and is reported.
     unknown: bool,
     long: bool,
     /// Tokens that may nest expressions.
     nesting: usize,
-    /// Comparisons.
+    /// Number of comparison operators so far.
     compares: usize,
-    /// `&` and `|`.
+    /// Number of `&` and `|` so far.
     joins: usize,
 }
 
@@ -232,7 +232,7 @@ impl LineState {
     }
 }
 
-/// True if a line is meant as an equation: of other lines only directives have a `=`.
+/// The line is meant as an equation: among other lines, only directives have a `=`.
 pub(crate) fn is_equation(tokens: &[(Token, Span)]) -> bool {
     let mut assigns = false;
     for (token, _) in tokens {
@@ -381,7 +381,7 @@ fn radix(digits: &str, radix: u32) -> Result<i64, TokenError> {
 }
 
 fn real(text: &str) -> f64 {
-    // The regular expression admits only what the parser takes, once separators are gone.
+    // Without separators, the regular expression admits only numbers that the parser takes.
     let parsed = if text.contains('_') { text.replace('_', "").parse() } else { text.parse() };
     parsed.unwrap_or(f64::NAN)
 }

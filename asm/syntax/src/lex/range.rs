@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Diagnostics for a range, as `1..3` of other languages, where a number is read.
 
-use crate::report::diag::Diagnostic;
-use crate::report::source::Span;
+use takt_diagnostics::diag::Diagnostic;
+use takt_diagnostics::source::Span;
 
 /// A range, as `1..3`, where a number is read: `before` are the tokens before it on its line, as names or none.
 pub(super) fn describe(before: &[Option<(&str, Span)>], text: &str, span: Span) -> Option<Diagnostic> {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The assembler beside other assemblers.
+//! Speed of the assembler compared with other assemblers.
 
 use crate::{Outcome, ROUNDS, Ratios, fastest};
 use std::fmt::Write as _;
@@ -9,29 +9,29 @@ use std::process::{Command, Stdio};
 use takt_asm::{MemoryLoader, Options};
 use takt_benches::{DEEP, source};
 
-/// The argument with which this program is an assembler and nothing else: [`assemble`].
+/// Argument that turns this program into a bare assembler: [`assemble`].
 pub(crate) const ALONE: &str = "assemble";
 
-/// Another assembler, with [`source`]'s mix of lines in its language: comments, blank lines, labels, constants, a macro's use.
-struct Other {
+/// Another assembler, with [`source`]'s mix of lines in its language: comments, blank lines, labels, constants, uses of a macro.
+struct OtherAssembler {
     command: &'static str,
-    /// The document's name for it, before its version.
+    /// Name in the document, before the version.
     name: &'static str,
-    /// The source that it assembles.
+    /// Description of the source's language.
     language: &'static str,
     arguments: &'static [&'static str],
-    /// The shortest source, with what every one needs.
+    /// Beginning of every source: definitions that the blocks use.
     head: &'static str,
-    /// The twelve lines of a block, by its number.
+    /// Twelve lines of a block, from its number.
     block: fn(usize) -> String,
     comment: &'static str,
-    /// Lines of the sources that are compared.
+    /// Lengths of the compared sources, in lines.
     lines: &'static [usize],
     is_here: bool,
 }
 
-const OTHERS: [Other; 2] = [
-    Other {
+const OTHERS: [OtherAssembler; 2] = [
+    OtherAssembler {
         command: "as",
         name: "GNU `as`",
         language: "x86-64",
@@ -50,7 +50,7 @@ const OTHERS: [Other; 2] = [
         lines: &[10_000, 100_000, 1_000_000],
         is_here: cfg!(target_arch = "x86_64"),
     },
-    Other {
+    OtherAssembler {
         command: "customasm",
         name: "customasm",
         language: "a machine with such instructions, described in its language",
@@ -71,14 +71,14 @@ const OTHERS: [Other; 2] = [
             )
         },
         comment: "; rest\n",
-        // It takes some ten microseconds a line.
+        // About ten microseconds a line rule out a longer source.
         lines: &[10_000, 100_000],
         is_here: true,
     },
 ];
 
-impl Other {
-    /// The first line of what it says of its version; none if it cannot be compared here.
+impl OtherAssembler {
+    /// First line of its `--version`; `None` if it is not installed or does not run here.
     fn version(&self) -> Option<String> {
         let output = Command::new(self.command).arg("--version").output();
         let output = output.ok().filter(|output| output.status.success() && self.is_here)?;
@@ -107,12 +107,12 @@ impl Other {
     }
 }
 
-/// For the machine with room for the longest source.
+/// Options for [`DEEP`], which has room for the longest source.
 fn options() -> Options {
     Options { machine: &DEEP, ..Options::default() }
 }
 
-/// From file to file, as `takt asm`, for [`DEEP`].
+/// Assembles a file to an image for [`DEEP`], as `takt asm` does.
 pub(crate) fn assemble(file: &Path, image: &Path) -> Outcome<()> {
     let loader = MemoryLoader::of("source.s", std::fs::read_to_string(file)?);
     let assembled = takt_asm::assemble("source.s", &loader, &options());
@@ -154,8 +154,8 @@ fn measure_in(folder: &Path, text: &mut String) -> Outcome<()> {
     Ok(())
 }
 
-fn against(other: &Other, version: &str, folder: &Path, text: &mut String) -> Outcome<()> {
-    let Other { name, language, .. } = other;
+fn against(other: &OtherAssembler, version: &str, folder: &Path, text: &mut String) -> Outcome<()> {
+    let OtherAssembler { name, language, .. } = other;
     writeln!(
         text,
         "\n{name} ({version}) assembles for {language}.\n\n\

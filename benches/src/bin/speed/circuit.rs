@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The circuit in lockstep with the emulator, beside the emulator alone.
+//! Speed of circuit and emulator in lockstep, compared with the emulator alone.
 
 use crate::tracking::{recorded, tracking};
 use crate::{Outcome, ROUNDS, Ratios};
 use std::fmt::Write as _;
 use std::process::Command;
 use std::time::Instant;
-use takt_cosim::{Lockstep, Model, cache_folder};
+use takt_cosim::{Lockstep, Model};
 use takt_emu::Emulator;
 use takt_programs::hybrid::closed_loop::Inputs;
 use takt_rtl::{Library, export};
 
-/// Periods in lockstep.
+/// Number of periods in lockstep.
 const PERIODS: usize = 300;
 
 pub(crate) fn measure(text: &mut String) -> Outcome<()> {
@@ -24,7 +24,7 @@ pub(crate) fn measure(text: &mut String) -> Outcome<()> {
     let row = |inputs: &Inputs| registers.iter().copied().zip(inputs.to_words()).collect::<Vec<_>>();
     let rows: Vec<_> = inputs[..PERIODS].iter().map(row).collect();
     let design = export(program.machine, &Library::builtin())?.latching(program.latched_inputs())?;
-    let model = Model::build(&design, &cache_folder(), false)?;
+    let model = Model::build(&design, &takt_cache::folder()?, false)?;
     let (mut ratios, mut rate) = (Ratios::default(), Ratios::default());
     for _ in 0..ROUNDS {
         let simulation = model.start(&[])?;

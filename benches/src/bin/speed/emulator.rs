@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The emulator beside the same algorithm compiled natively.
+//! Speed of the emulator compared with the same algorithm as native code.
 
+use crate::other_build::OtherBuild;
 use crate::tracking::{PERIODS, recorded, tracking};
 use crate::{Outcome, ROUNDS, Ratios, fastest};
 use std::fmt::Write as _;
@@ -8,15 +9,16 @@ use std::hint::black_box;
 use takt_emu::{Batch, Emulator};
 use takt_programs::hybrid::Controller;
 
-/// Samples of each side in a round.
+/// Number of samples of each side in a round.
 const SAMPLES: usize = 40;
-/// Periods of a sample: few, so that some sample is not interrupted.
+/// Periods in a sample: few, so that some samples are free of interruptions.
 const STRETCH: usize = 100;
 
-pub(crate) fn measure(text: &mut String) -> Outcome<()> {
+/// Measures the emulator, in turns with another build if given.
+pub(crate) fn measure(text: &mut String, mut other: Option<&mut OtherBuild>) -> Outcome<()> {
     let inputs = recorded()?;
     let (program, registers) = tracking()?;
-    // Every lane somewhere else on the path.
+    // Lanes start at different points of the path.
     let lanes = Batch::WIDTH;
     let rows: Vec<Vec<Vec<u32>>> = (0..PERIODS)
         .map(|period| {
@@ -27,12 +29,14 @@ pub(crate) fn measure(text: &mut String) -> Outcome<()> {
         .collect();
     let mut controller = Controller::<f32>::new();
     let [mut single, mut interpreted] = [Emulator::new(&program)?, Emulator::new(&program)?];
-    // The compiler's own time is not measured.
+    // Compile in advance: compilation time is not measured.
     single.set_compile_after(Some(1));
     interpreted.set_compile_after(None);
     let mut batch = Batch::new(&program, lanes)?;
-    let [mut singles, mut interpreted_singles, mut batches, mut per_operation] =
-        [(); 4].map(|()| Ratios::default());
+    let per_robot = format!("in a batch of {lanes}, per robot");
+    let names = ["one run", "one run, interpreted", &per_robot];
+    let mut all = names.map(|_| Ratios::default());
+    let mut per_operation = Ratios::default();
     let mut operations = 0;
     for _ in 0..ROUNDS {
         let stretch = |sample: usize| {
@@ -41,7 +45,7 @@ pub(crate) fn measure(text: &mut String) -> Outcome<()> {
         };
         let native = fastest(SAMPLES, |sample| {
             for inputs in &inputs[stretch(sample)] {
-                // All outputs are wanted, or the compiler leaves out what computes the others.
+                // Use all outputs; otherwise the compiler removes their computation.
                 black_box(controller.step(inputs.counts, &inputs.reference));
             }
         });
@@ -66,11 +70,23 @@ pub(crate) fn measure(text: &mut String) -> Outcome<()> {
                 batch.run_period();
             }
         }) / lanes as f64;
-        singles.0.push(emulated / native);
-        interpreted_singles.0.push(run(&mut interpreted) / native);
-        batches.0.push(batched / native);
+        let ratios = [emulated, run(&mut interpreted), batched].map(|seconds| seconds / native);
+        all.iter_mut().zip(ratios).for_each(|(all, ratio)| all.0.push(ratio));
+        if let Some(other) = &mut other {
+            let ours: Vec<(&str, f64)> = names.into_iter().zip(ratios).collect();
+            other.round(&ours)?;
+        }
         per_operation.0.push(operations as f64 * STRETCH as f64 / batched / 1e9);
     }
+    let head = match other {
+        Some(_) => "| | times native | rounds | times the last release | rounds |\n|---|---|---|---|---|",
+        None => "| | times native | rounds |\n|---|---|---|",
+    };
+    let row = |(name, ratios): (&str, &Ratios)| match &other {
+        Some(other) => format!("| {name} | {} | {} |\n", ratios.text(), other.text(name)),
+        None => format!("| {name} | {} |\n", ratios.text()),
+    };
+    let table: String = names.into_iter().zip(&all).map(row).collect();
     let apart = batch.periods_apart();
     let how = match Emulator::compiles() {
         true => {
@@ -84,13 +100,9 @@ pub(crate) fn measure(text: &mut String) -> Outcome<()> {
          The hybrid robot's tracking program (`programs/hybrid/tracking.s`, {operations} operations a period on t3), beside the \
          same algorithm in Rust's binary32, compiled natively: time for a period of one robot, on one core, the inputs set \
          each time.\n\n\
-         | | times native | rounds |\n|---|---|---|\n| one run | {} |\n| one run, interpreted | {} |\n\
-         | in a batch of {lanes}, per robot | {} |\n\n{how}\n\n\
+         {head}\n{table}\n{how}\n\n\
          In the batch a core executed {} thousand million operations a second (median, range of the rounds); {apart} \
          periods of a lane ran apart.\n",
-        singles.text(),
-        interpreted_singles.text(),
-        batches.text(),
         per_operation.text().replace(" | ", ", "),
     )?;
     Ok(())

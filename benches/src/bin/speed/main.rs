@@ -1,24 +1,27 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Speed of the tools beside things that a reader has: ratios measured in one run, as a Markdown document on standard
-//! output. `cargo xtask speed` runs it.
+//! Speed of the tools relative to reference programs: ratios measured in one run, as a Markdown document on standard output. `cargo
+//! evidence speed` runs it.
 //!
-//! The things compared take turns, round after round, so that another load on the machine, or its clock, weighs on both sides.
-//! Each round gives a ratio of the fastest samples; shown are the median round and the range of all.
+//! The sides of a comparison take turns, round after round, so that other load on the machine, or a change of its clock, affects both. Each
+//! round yields a ratio of the fastest samples; the document shows the median round and the range.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
 mod assembler;
 mod circuit;
 mod emulator;
+mod other_build;
 mod tracking;
 
 use std::time::Instant;
 
 type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
+/// A measurement that appends its part of the document.
+type Measurement<'a> = &'a mut dyn FnMut(&mut String) -> Outcome<()>;
 
-/// Rounds of each comparison.
+/// Number of rounds of each comparison.
 const ROUNDS: usize = 5;
 
-/// The fastest of some samples of `work`, in seconds; `work` is given the number of the sample.
+/// Fastest sample of `work` in seconds; `work` receives the sample's number.
 fn fastest(samples: usize, mut work: impl FnMut(usize)) -> f64 {
     let mut fastest = f64::INFINITY;
     for sample in 0..samples {
@@ -29,7 +32,7 @@ fn fastest(samples: usize, mut work: impl FnMut(usize)) -> f64 {
     fastest
 }
 
-/// Ratios of rounds.
+/// Ratios, one per round.
 #[derive(Default)]
 struct Ratios(Vec<f64>);
 
@@ -49,25 +52,33 @@ impl Ratios {
 }
 
 fn main() -> Outcome<()> {
-    // Of the parts only these; all, if none is named.
-    let wanted: Vec<String> = std::env::args().skip(1).collect();
+    // Parts to measure; all if none is named.
+    let mut wanted: Vec<String> = std::env::args().skip(1).collect();
     if let [command, file, image] = &wanted[..]
         && command == assembler::ALONE
     {
         return assembler::assemble(file.as_ref(), image.as_ref());
     }
+    let mut other = None;
+    if let Some(at) = wanted.iter().position(|argument| argument == other_build::AGAINST) {
+        let program =
+            wanted.get(at + 1).ok_or("--against needs the path of another build of this program")?;
+        other = Some(other_build::OtherBuild::new(program.as_ref()));
+        wanted.drain(at..at + 2);
+    }
     let mut text = format!(
         "# How fast the tools are\n\n\
-         Written by `cargo xtask speed`. Absolute speeds depend on the machine, so each figure is a ratio to something that a \
+         Written by `cargo evidence speed`. Absolute speeds depend on the machine, so each figure is a ratio to something that a \
          reader has, measured in the same run: both sides take turns for {ROUNDS} rounds, a round's ratio is that of the \
          fastest samples, and the table has the median round and the range of all. Larger is slower for times, faster for \
          lines a second.\n\n"
     );
-    for (name, measure) in [
-        ("emulator", emulator::measure as fn(&mut String) -> Outcome<()>),
-        ("assembler", assembler::measure),
-        ("lockstep", circuit::measure),
-    ] {
+    let parts: [(&str, Measurement<'_>); 3] = [
+        ("emulator", &mut |text| emulator::measure(text, other.as_mut())),
+        ("assembler", &mut assembler::measure),
+        ("lockstep", &mut circuit::measure),
+    ];
+    for (name, measure) in parts {
         if wanted.is_empty() || wanted.iter().any(|wanted| wanted == name) {
             eprintln!("measuring: {name}");
             measure(&mut text)?;

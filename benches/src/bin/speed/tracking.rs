@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The subject of emulator and circuit: the hybrid robot's tracking program and its inputs.
+//! Workload for emulator and circuit: the hybrid robot's tracking program with recorded inputs.
 
 use crate::Outcome;
 use takt_asm::{MemoryLoader, Options};
@@ -9,7 +9,7 @@ use takt_programs::hybrid::{Controller, ports};
 use takt_programs::trajectory::Trajectory;
 use takt_programs::{AGH, SOURCES, gcode};
 
-/// Recorded periods.
+/// Number of recorded periods.
 pub(crate) const PERIODS: usize = 4000;
 
 /// Inputs recorded in closed loop with the binary64 controller.
@@ -20,7 +20,7 @@ pub(crate) fn recorded() -> Outcome<Vec<Inputs>> {
     records.map(|record| Ok(record?.inputs)).collect()
 }
 
-/// The tracking program, and the registers of its inputs in the order of [`ports::INPUTS`].
+/// Tracking program, with its input registers in the order of [`ports::INPUTS`].
 pub(crate) fn tracking() -> Outcome<(Program, Vec<Register>)> {
     let mut loader = MemoryLoader::default();
     for (path, text) in SOURCES {

@@ -6,16 +6,17 @@
 
 use super::interval::Interval;
 use std::cmp::Ordering;
+use std::collections::BTreeMap;
 use std::rc::Rc;
 
 /// Bound on the relative error of a few binary64 operations, 2⁻⁵⁰.
 const ROUNDING: f64 = 1.0 / (1u64 << 50) as f64;
-/// An allowance for underflow in these operations.
+/// Allowance for underflow in these operations.
 const LEAST: f64 = 1e-300;
 /// Limit on the terms of a form; beyond it, the smallest are moved to the slack.
 const MAX_TERMS: usize = 1024;
 
-/// An affine form.
+/// Affine form of a real value, see the module.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Affine {
     center: f64,
@@ -33,24 +34,24 @@ impl Affine {
         self.center == 0.0 && self.slack == 0.0 && self.terms.is_empty()
     }
 
-    /// True if it is an interval without correlation: it has slack only.
+    /// Interval without correlation: slack only, no symbol, so that a symbol of its own may be worth giving.
     pub(super) fn is_free(&self) -> bool {
         self.slack > 0.0 && self.terms.is_empty()
     }
 
-    /// The form of an interval, with a new symbol.
+    /// Form of an interval, with a new symbol.
     pub(super) fn of(interval: Interval, symbol: u32) -> Affine {
         let radius = interval.radius();
         let terms = if radius == 0.0 { Rc::default() } else { Rc::from([(symbol, radius)]) };
         Affine { center: interval.middle(), terms, slack: 0.0 }
     }
 
-    /// The form of an interval without correlation: all of it is slack.
+    /// Form of an interval without correlation, whose radius is all slack.
     pub(super) fn free(interval: Interval) -> Affine {
         Affine { slack: interval.radius(), ..Affine::constant(interval.middle()) }
     }
 
-    /// The radius: the sum of the magnitudes of all coefficients, and the slack.
+    /// Radius of the form: the sum of all coefficients' magnitudes and the slack.
     pub(super) fn radius(&self) -> f64 {
         let all: f64 = self.terms.iter().map(|(_, coefficient)| coefficient.abs()).sum();
         (all + self.slack) * (1.0 + self.terms.len() as f64 * ROUNDING)
@@ -65,7 +66,7 @@ impl Affine {
         }
     }
 
-    /// The magnitudes of its terms by symbol, and the slack.
+    /// Magnitudes of the terms by symbol, then the slack with the center's magnitude.
     pub(super) fn shares(&self) -> (impl Iterator<Item = (u32, f64)> + '_, f64) {
         (
             self.terms.iter().map(|(symbol, coefficient)| (*symbol, coefficient.abs())),
@@ -78,13 +79,13 @@ impl Affine {
         Affine { center: -self.center, terms, slack: self.slack }
     }
 
-    /// `a·x + b·y`.
+    /// Linear combination `a·x + b·y`; its own rounding errors go to the slack.
     pub(super) fn combine(x: &Affine, a: f64, y: &Affine, b: f64) -> Affine {
         let mut terms = Vec::with_capacity(x.terms.len() + y.terms.len());
         let mut lost = 0.0;
         let mut mixed = |p: f64, q: f64| {
             let value = p + q;
-            // Multiplying by one rounds nothing.
+            // A factor of one adds no rounding error.
             lost += (p.abs() + q.abs()) * ROUNDING;
             value
         };
@@ -125,12 +126,12 @@ impl Affine {
         Affine::combine(self, 1.0, other, -1.0)
     }
 
-    /// The form with more slack.
+    /// Adds `by` to the slack.
     pub(super) fn widened(&self, by: f64) -> Affine {
         Affine { slack: (self.slack + by) * (1.0 + ROUNDING), ..self.clone() }
     }
 
-    /// The product with an interval.
+    /// Product with an interval.
     pub(super) fn scale(&self, by: Interval) -> Affine {
         if self.is_zero() {
             return self.clone();
@@ -157,7 +158,84 @@ impl Affine {
         Affine { center: product, ..mixed }.widened(rest * (1.0 + ROUNDING))
     }
 
-    /// The form with an additional term.
+    /// Parts of [-1, 1] in which symbols must lie so that the form is not positive, where these are narrower than what is `known`; `None` if
+    /// the form is positive everywhere.
+    pub(super) fn confines(&self, known: &dyn Fn(u32) -> Option<Interval>) -> Option<Vec<(u32, Interval)>> {
+        let of = |symbol: u32| known(symbol).unwrap_or(Interval::new(-1.0, 1.0));
+        let least = |(symbol, coefficient): &(u32, f64)| {
+            let range = of(*symbol);
+            (coefficient * range.low).min(coefficient * range.high)
+        };
+        let all: f64 = self.terms.iter().map(least).sum();
+        let rounding = (self.center.abs() + self.radius()) * (self.terms.len() + 4) as f64 * ROUNDING + LEAST;
+        let all = self.center - self.slack + all - rounding;
+        if all.is_nan() {
+            return Some(Vec::new());
+        }
+        if all > 0.0 {
+            return None;
+        }
+        let confined = self.terms.iter().filter_map(|term @ (symbol, coefficient)| {
+            let bound = (least(term) - all) / coefficient;
+            let margin = bound.abs() * ROUNDING + ROUNDING;
+            let range = of(*symbol);
+            let to = if *coefficient > 0.0 {
+                Interval::new(range.low, range.high.min(bound + margin))
+            } else {
+                Interval::new(range.low.max(bound - margin), range.high)
+            };
+            (to != range).then_some((*symbol, to))
+        });
+        Some(confined.collect())
+    }
+
+    /// Form with symbols replaced that lie in a part of [-1, 1]: each by its middle, radius and the new symbol for it. New symbols are larger
+    /// than all old ones, in the same order.
+    pub(super) fn replaced(&self, by: &BTreeMap<u32, (f64, f64, u32)>) -> Option<Affine> {
+        if !self.terms.iter().any(|(symbol, _)| by.contains_key(symbol)) {
+            return None;
+        }
+        let (mut center, mut lost) = (self.center, 0.0);
+        let (mut kept, mut new) = (Vec::new(), Vec::new());
+        for (symbol, coefficient) in self.terms.iter() {
+            match by.get(symbol) {
+                None => kept.push((*symbol, *coefficient)),
+                Some((middle, radius, symbol)) => {
+                    center += coefficient * middle;
+                    lost += coefficient.abs() + center.abs();
+                    new.push((*symbol, coefficient * radius));
+                }
+            }
+        }
+        kept.extend(new);
+        Some(Affine { center, terms: kept.into(), slack: self.slack }.widened(lost * ROUNDING + LEAST))
+    }
+
+    /// Coefficients of some symbols, and a bound on the magnitude of what the form holds beyond these and a number.
+    pub(super) fn apart(&self, symbols: &[u32], from: f64) -> (Vec<f64>, f64) {
+        let rest = self.terms.iter().filter(|(symbol, _)| !symbols.contains(symbol));
+        let rest: f64 = rest.map(|(_, coefficient)| coefficient.abs()).sum();
+        let rest = rest + self.slack + (self.center - from).abs();
+        let rounding = (rest + self.center.abs()) * (self.terms.len() + 4) as f64 * ROUNDING;
+        (symbols.iter().map(|symbol| self.coefficient(*symbol)).collect(), rest + rounding)
+    }
+
+    /// Symbols with their coefficients.
+    pub(super) fn terms(&self) -> impl Iterator<Item = (u32, f64)> + '_ {
+        self.terms.iter().copied()
+    }
+
+    /// Coefficient of a symbol.
+    pub(super) fn coefficient(&self, symbol: u32) -> f64 {
+        self.terms.binary_search_by_key(&symbol, |(symbol, _)| *symbol).map_or(0.0, |at| self.terms[at].1)
+    }
+
+    /// Symbol with the largest coefficient.
+    pub(super) fn largest(&self) -> Option<u32> {
+        self.terms.iter().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs())).map(|(symbol, _)| *symbol)
+    }
+
+    /// Adds a term to the form.
     pub(super) fn with(&self, symbol: u32, coefficient: f64) -> Affine {
         let term = Affine { center: 0.0, terms: Rc::from([(symbol, coefficient)]), slack: 0.0 };
         self.add(&term)
@@ -171,10 +249,14 @@ impl Affine {
         let mean = Affine::combine(self, 0.5, other, 0.5);
         let difference = Affine::combine(self, 0.5, other, -0.5);
         let slack = difference.range().magnitude() + self.slack.max(other.slack);
-        Affine { slack: 0.0, ..mean.clone() }.widened(slack + mean.range().magnitude() * ROUNDING + LEAST)
+        let joined = Affine { slack: 0.0, ..mean.clone() };
+        let joined = joined.widened(slack + mean.range().magnitude() * ROUNDING + LEAST);
+        // Forms that share little are narrower as an interval.
+        let hull = Affine::free(self.range().hull(other.range()));
+        if hull.radius() < 0.9 * joined.radius() { hull } else { joined }
     }
 
-    /// The form with its smallest terms moved to the slack, if there are too many.
+    /// Moves the smallest terms to the slack if there are more than [`MAX_TERMS`].
     fn short(self) -> Affine {
         if self.terms.len() <= MAX_TERMS {
             return self;
@@ -187,7 +269,7 @@ impl Affine {
         Affine { terms: terms.into(), ..self }.widened(grown)
     }
 
-    /// The values of the form for given noise.
+    /// Values of the form for given noise.
     #[cfg(test)]
     pub(super) fn at(&self, noise: &dyn Fn(u32) -> f64) -> Interval {
         let terms = self.terms.iter().map(|(symbol, coefficient)| coefficient * noise(*symbol));

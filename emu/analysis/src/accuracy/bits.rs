@@ -12,35 +12,42 @@
 use super::affine::Affine;
 use super::interval::Interval;
 use super::number::*;
+use super::operand;
 use super::value::{Offset, Value};
 use super::{FRACTION, LEAST_EXPONENT};
 use std::collections::BTreeSet;
 use std::rc::Rc;
 use takt_isa::fp::Bitwise;
 
-/// Limit on the integers of a range that are enumerated.
+/// Limit on the size of an integer range that is enumerated.
 const FEW: f64 = 64.0;
 
-/// The results that a comparison may have, 1 and 0.
+/// Abstract result of a comparison, from the possible outcomes true and false.
 pub(super) fn decided((yes, no): (bool, bool)) -> Value {
     let may = [(yes, 1), (no, 0)].into_iter().filter(|(may, _)| *may).map(|(_, bits)| bits);
     Value::patterns(may.collect())
 }
 
-/// A sum that counts as a decision, rounding to the nearest integer, because binary32 has no fraction bits at its magnitude. The run's
-/// result counts as exact. `symbol` is for the rounding.
+/// Rounds a sum with a rounding constant to the nearest integer, since binary32 has no fraction bits at its magnitude. The sum counts as a
+/// decision, so that the run's result is exact. `symbol` is for the rounding.
 pub(super) fn nearest(sum: &Number, symbol: u32) -> Number {
     let Interval { low, high } = sum.actual;
     let actual = Interval::new(f64::from(low as f32), f64::from(high as f32));
     let form = in_the_run(sum).with(symbol, super::ulp(sum.actual.magnitude()) / 2.0);
-    // From 2²³ on binary32 holds integers only.
+    // Binary32 holds only integers from 2²³ on.
     let grid = (sum.actual.abs().low >= power(EXPONENT)).then_some(0);
-    Number { actual, exact: actual.meet(form.range()), form, error: Affine::constant(0.0), grid }
+    Number {
+        actual,
+        exact: actual.meet(form.range()),
+        form,
+        error: Affine::constant(0.0),
+        grid,
+        relative: None,
+    }
 }
 
-/// The float whose bits are those of a float plus a multiple of 2²³: exactly the float times a power of two. For zeros and
-/// subnormals, which have no exponent to add to, a bound of that size: of the exact value, too, since that of a float without an error
-/// is what its bits are.
+/// Adds a multiple of 2²³ to a float's bits, which multiplies the float by a power of two exactly. A zero or subnormal operand has no
+/// exponent to add to: the result is a bound of its size, for the exact value too, since an operand without error is exact in its bits.
 fn scaled(float: &Number, by: &Number) -> Option<Number> {
     if by.grid? < EXPONENT {
         return None;
@@ -73,15 +80,16 @@ fn scaled(float: &Number, by: &Number) -> Option<Number> {
         form,
         error: widened(float.error.scale(factor)),
         grid: if tiny { None } else { float.grid.map(|grid| grid + least) },
+        relative: None,
     })
 }
 
-/// True if an integer may be a multiple of 2²³, so that adding it to a float's bits scales the float.
+/// An integer may be a multiple of 2²³: adding it to a float's bits then scales the float.
 fn may_scale(by: &Number) -> bool {
     (by.actual.high / NORMAL).floor() * NORMAL >= by.actual.low
 }
 
-/// The sum of two values as integers. If one of them is a float's bits, the result may be a float.
+/// Sum of two values as integers. If one of them is a float's bits, the result may be a float.
 pub(super) fn sum(a: &Value, b: &Value) -> Value {
     if let (Value::Broken, _) | (_, Value::Broken) = (a, b) {
         return Value::Broken;
@@ -101,7 +109,7 @@ pub(super) fn sum(a: &Value, b: &Value) -> Value {
     Value::Integer(Rc::new(added(&a.whole(), &b.whole())))
 }
 
-/// The difference of two values as integers.
+/// Difference of two values as integers.
 pub(super) fn difference(a: &Value, b: &Value) -> Value {
     if let (Value::Broken, _) | (_, Value::Broken) = (a, b) {
         return Value::Broken;
@@ -132,7 +140,7 @@ pub(super) fn difference(a: &Value, b: &Value) -> Value {
     Value::Integer(Rc::new(added(&a.whole(), &negated(&other))))
 }
 
-/// The fraction of a positive float: its exponent, relative to a base, is subtracted, so that it lies between the base and twice that.
+/// Fraction of a positive float: subtracts the exponent relative to a base, so that the result lies between the base and its double.
 fn fraction(float: &Number, offset: &Offset) -> Option<Number> {
     if float.actual.low < power(LEAST_EXPONENT) {
         return None;
@@ -148,7 +156,7 @@ fn fraction(float: &Number, offset: &Offset) -> Option<Number> {
     let actual = scaled.map_or(ends, |scaled| ends.meet(scaled));
     let error = float.error.scale(Interval::new(power(-most), power(-least)));
     let exact = if error.is_zero() { actual } else { actual - error.range() };
-    Some(Number { actual, exact, form: Affine::free(exact), error, grid: None })
+    Some(Number { actual, exact, form: Affine::free(exact), error, grid: None, relative: None })
 }
 
 fn negated(number: &Number) -> Number {
@@ -161,9 +169,9 @@ fn added(a: &Number, b: &Number) -> Number {
     integer(a.actual + b.actual, a.form.add(&b.form), grid)
 }
 
-/// The abstract operation on bits.
+/// Abstract operation on bits.
 pub(super) fn bitwise(op: Bitwise, a: &Value, b: &Value) -> Value {
-    // A few patterns are enumerated.
+    // Enumerate a few patterns.
     let alone = |value: &Value| match value {
         Value::Patterns(patterns) => Some(Rc::clone(patterns)),
         Value::Integer(number) => few(number),
@@ -211,7 +219,7 @@ pub(super) fn bitwise(op: Bitwise, a: &Value, b: &Value) -> Value {
     }
 }
 
-/// The bits of the integers of a small range; `None` if there are too many.
+/// Bit patterns of a small range of integers; `None` if there are too many.
 fn few(number: &Number) -> Option<Rc<BTreeSet<u32>>> {
     let step = power(number.grid.unwrap_or(0).min(31));
     let Interval { low, high } = number.actual;
@@ -224,13 +232,13 @@ fn joined(values: impl Iterator<Item = Value>) -> Value {
     values.reduce(|all, value| all.join(&value)).unwrap_or(Value::Any)
 }
 
-/// A range of signed integers as unsigned ones, if it has no gap there.
+/// Converts a range of signed integers to unsigned ones, if it stays a range.
 fn unsigned(range: Interval) -> Option<Interval> {
     let words = Interval::point(WORDS);
     if range.low >= 0.0 { Some(range) } else { (range.high < 0.0).then(|| range + words) }
 }
 
-/// Operands of which neither is known to the bit.
+/// Bitwise operation on two operands with unknown bits.
 fn both(op: Bitwise, a: &Value, b: &Value) -> Value {
     let sign = if op == Bitwise::And { INTEGERS.high } else { INTEGERS.low };
     let (carries, (a, b)) = ([a.carries(), b.carries()], (a.whole(), b.whole()));
@@ -240,7 +248,7 @@ fn both(op: Bitwise, a: &Value, b: &Value) -> Value {
     if a.actual.low < 0.0 || b.actual.low < 0.0 {
         return Value::Integer(Rc::new(anything()));
     }
-    // The operands have no bit position in common, so that there is no carry.
+    // Operands without a common bit position produce no carry, so that OR and XOR are sums.
     let below = |number: &Number, other: &Number| number.actual.high < power(other.grid.unwrap_or(0));
     if op != Bitwise::And && (below(&a, &b) || below(&b, &a)) {
         return Value::Integer(Rc::new(added(&a, &b)));
@@ -254,7 +262,7 @@ fn both(op: Bitwise, a: &Value, b: &Value) -> Value {
     Value::Integer(Rc::new(integer(range, Affine::free(range), grid)))
 }
 
-/// A value and a mask that is known.
+/// Bitwise operation with a constant mask.
 fn masked(op: Bitwise, value: &Value, mask: u32) -> Value {
     let leading = mask.leading_ones() + mask.trailing_zeros().min(32) == 32 && mask != 0;
     match (op, value) {
@@ -270,11 +278,11 @@ fn masked(op: Bitwise, value: &Value, mask: u32) -> Value {
             return Value::Float(Rc::new(truncated(float, mask.trailing_zeros())));
         }
         (Bitwise::Xor, Value::Float(float)) if mask == SIGN => {
-            return Value::Float(Rc::new(opposite(float)));
+            return Value::Float(Rc::new(float.negative()));
         }
         (Bitwise::Or, Value::Float(float)) if mask == SIGN => {
             return match magnitude(value, float) {
-                Value::Float(float) => Value::Float(Rc::new(opposite(&float))),
+                Value::Float(float) => Value::Float(Rc::new(float.negative())),
                 other => other,
             };
         }
@@ -293,7 +301,7 @@ fn masked(op: Bitwise, value: &Value, mask: u32) -> Value {
         };
     }
     if op == Bitwise::And && mask & mask.wrapping_add(1) == 0 {
-        // A mask below a power of two gives the remainder of the division by it.
+        // A mask below a power of two gives the remainder of a division by that power.
         let size = f64::from(mask) + 1.0;
         let (low, high) = ((actual.low / size).floor(), (actual.high / size).floor());
         if low == high {
@@ -310,49 +318,38 @@ fn masked(op: Bitwise, value: &Value, mask: u32) -> Value {
     both(op, &Value::Integer(number), &mask)
 }
 
-/// A value whose bits are taken as they are: the run's value counts as exact.
+/// Value reinterpreted as bits: the run's value counts as exact.
 fn settled(value: &Value) -> Value {
     match value {
         Value::Float(float) if value.carries() => {
             let form = in_the_run(float);
             let exact = float.actual;
             let error = Affine::constant(0.0);
-            Value::Float(Rc::new(Number { actual: exact, exact, form, error, grid: float.grid }))
+            Value::Float(Rc::new(Number {
+                actual: exact,
+                exact,
+                form,
+                error,
+                grid: float.grid,
+                relative: None,
+            }))
         }
         _ => value.clone(),
     }
 }
 
-fn opposite(float: &Number) -> Number {
-    Number {
-        actual: -float.actual,
-        exact: -float.exact,
-        form: float.form.neg(),
-        error: float.error.neg(),
-        grid: float.grid,
-    }
-}
-
-/// A float without its sign.
+/// Float without its sign.
 fn magnitude(value: &Value, float: &Rc<Number>) -> Value {
     if float.actual.low > 0.0 && float.exact.low >= 0.0 {
         value.clone()
     } else if float.actual.high < 0.0 && float.exact.high <= 0.0 {
-        Value::Float(Rc::new(opposite(float)))
+        Value::Float(Rc::new(float.negative()))
     } else {
-        let exact = float.exact.abs();
-        let error = float.error.join(&float.error.neg());
-        Value::Float(Rc::new(Number {
-            actual: float.actual.abs(),
-            exact,
-            form: Affine::free(exact),
-            error,
-            grid: float.grid,
-        }))
+        Value::Float(Rc::new(operand::magnitude(float)))
     }
 }
 
-/// A float whose sign bit is cleared. If it may be zero, the integer that it then is excludes a negative zero.
+/// Float whose sign bit is cleared. If the float may be zero, its integer excludes a negative zero.
 fn cleared(value: &Value, float: &Rc<Number>) -> Value {
     if !float.error.is_zero() || !float.actual.contains(0.0) {
         return magnitude(value, float);
@@ -362,7 +359,7 @@ fn cleared(value: &Value, float: &Rc<Number>) -> Value {
     Value::Integer(Rc::new(integer(range, Affine::free(range), 0)))
 }
 
-/// A float whose last bits are cleared, which brings it nearer to zero. The run's value counts as exact.
+/// Float whose last bits are cleared, which brings it nearer to zero. The run's value counts as exact.
 fn truncated(float: &Number, digits: u32) -> Number {
     let (low, high) = floats(float.actual);
     let of = |value: f32| f64::from(f32::from_bits(value.to_bits() >> digits << digits));
@@ -373,11 +370,18 @@ fn truncated(float: &Number, digits: u32) -> Number {
         if float.actual.low < 0.0 { cleared } else { 0.0 },
     );
     let form = in_the_run(float).add(&Affine::free(between));
-    // It may have been cleared already.
-    Number { actual, exact: actual.meet(form.range()), form, error: Affine::constant(0.0), grid: float.grid }
+    // The last bits may have been zero already, so the grid stays.
+    Number {
+        actual,
+        exact: actual.meet(form.range()),
+        form,
+        error: Affine::constant(0.0),
+        grid: float.grid,
+        relative: None,
+    }
 }
 
-/// The multiple of a power of two at or below an integer.
+/// Multiple of a power of two at or below an integer.
 fn floored(number: &Number, digits: i32) -> Number {
     let grid = number.grid.unwrap_or(0);
     if grid >= digits {
@@ -390,7 +394,7 @@ fn floored(number: &Number, digits: i32) -> Number {
     integer(range, number.form.add(&cut), digits)
 }
 
-/// An integer shifted by `by` bits.
+/// Integer shifted by `by` bits.
 fn shifted(op: Bitwise, number: &Number, by: u32) -> Number {
     let by = by as i32;
     let size = power(by);
@@ -419,7 +423,7 @@ mod tests {
     use super::*;
     use takt_emu::testing::Random;
 
-    /// True if a value contains these bits.
+    /// The abstract value contains these bits.
     fn holds(value: &Value, bits: u32) -> bool {
         let within = |number: &Number, x: f64| {
             let step = power(number.grid.unwrap_or(-200).min(31));
@@ -436,7 +440,7 @@ mod tests {
         }
     }
 
-    /// A value, and bits that it stands for.
+    /// Random abstract value, and bits that it stands for.
     fn value(random: &mut Random, symbol: u32) -> (Value, Vec<u32>) {
         let size = [0.01, 1.0, 20.0, 3e6, 1e20][random.below(5) as usize];
         let mut unit = || f64::from(random.below(1 << 20)) / f64::from(1 << 19) - 1.0;
@@ -474,9 +478,9 @@ mod tests {
         }
     }
 
-    /// Soundness: whatever bits the operands have, those of the result are in its abstract value.
+    /// Soundness: results for concrete operands lie in the abstract result.
     #[test]
-    fn results_hold_what_the_operations_give() {
+    fn results_enclose_all_outcomes() {
         let mut random = Random::new(3);
         let (mut known, mut all) = (0, 0);
         for round in 0..60_000 {
@@ -513,7 +517,7 @@ mod tests {
         assert!(2 * known > all, "{known} of {all}");
     }
 
-    /// A float's exponent taken off its bits leaves its fraction.
+    /// Subtraction of a float's exponent from its bits leaves the fraction.
     #[test]
     fn exponents_are_taken_off() {
         let mut random = Random::new(4);

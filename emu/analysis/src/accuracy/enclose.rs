@@ -1,43 +1,41 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Bounds of every output's error, over every run whose inputs and states begin a period within their `.range`.
 //!
-//! This is abstract interpretation. Every path through a section is followed, loops iteration by iteration, as in
+//! Method: abstract interpretation. Every path through a section is followed, loops iteration by iteration, as in
 //! [`bound`](crate::bound()); states of paths that meet are joined. The abstract values are [`Value`]s. The meaning in the rows of
-//! instructions gives the results, and their `ulp` the rounding error.
+//! instructions gives the results (`compute.rs`), and their `ulp` the rounding error. Conditions narrow what was computed before
+//! (`refine.rs`).
 
-use super::affine::Affine;
-use super::bits;
-use super::enclosure::{Assumed, Enclosure, Hazard, Moment, OutputBound};
+use super::converge::Linear;
+use super::enclosure::{Converging, Enclosure, Hazard, Moment, OutputBound, UnprovedRange};
+use super::fixed;
 use super::interval::Interval;
-use super::number::{Number, Problem};
-use super::operand::Operand;
-use super::value::{MAX_PATTERNS, Value};
-use super::{LARGEST_ROUNDED, ROUNDERS, fixed, is_rounder, ulp};
+use super::node::{Made, Node};
+use super::number::{Number, Problem, float_grid};
+use super::value::Value;
 use crate::error::{BoundError, Refusal, place};
 use crate::graph::{Edge, Graph};
-use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
-use takt_isa::fp::{Flags, Host};
 use takt_isa::program::{Port, Range};
-use takt_isa::{
-    BundleAddress, Effect, Flow, Instruction, Program, Register, Row, SlotIndex, Type, compute, real,
-};
+use takt_isa::{BundleAddress, Effect, Flow, Instruction, Program, Register, SlotIndex, Type};
 
 /// Limit on the bundles executed abstractly, over all sections.
 pub const MAX_BUNDLES: u64 = 1 << 18;
+/// Limit on the parts of ranges that are evaluated by themselves, in all of a program.
+const MAX_PARTS: u32 = 1 << 14;
 /// Limit on the words of data memory that a load with an unknown address may read.
 const MAX_WORDS: usize = 4096;
 
-/// Encloses the results of every period of a program; for a program without periods, those of the run to its `halt`.
+/// Encloses the results of every period of a program; without periods, the results of the run to its `halt`.
 ///
 /// # Errors
 /// If a program cannot be enclosed: a loop without bound, a state or an input without a range, more paths than [`MAX_BUNDLES`].
 pub fn enclose(program: &Program) -> Result<Enclosure, BoundError> {
     let mut stored = BTreeSet::new();
     loop {
-        // What the loader put into a word is there as long as no store goes to it, and where stores go is known at the end: a word that
-        // was taken for unchanged and is not makes another pass necessary, in which it counts as changed.
+        // Fixpoint: assume that no store modifies a preloaded word. If a pass finds a store to an assumed word, that word counts as changed
+        // in another pass.
         let mut explorer = explored(program, &stored)?;
         let changed: Vec<u32> =
             explorer.initial_words.intersection(&explorer.changed_words).copied().collect();
@@ -48,7 +46,7 @@ pub fn enclose(program: &Program) -> Result<Enclosure, BoundError> {
     }
 }
 
-/// All sections of a program followed, where these data words may not be what the loader put there.
+/// Follows all sections, given the data words that the program may change.
 fn explored<'p>(program: &'p Program, stored: &BTreeSet<u32>) -> Result<Explorer<'p>, BoundError> {
     let graph = Graph::new(program)?;
     let mut explorer = Explorer {
@@ -63,15 +61,21 @@ fn explored<'p>(program: &'p Program, stored: &BTreeSet<u32>) -> Result<Explorer
         fixed: fixed(program),
         float_outputs: float_outputs(program).map(|port| port.register).collect(),
         left: BTreeMap::new(),
+        state_symbols: BTreeMap::new(),
+        periods: 0,
+        computed: BTreeMap::new(),
         bundles: 0,
         operations: 0,
+        quiet: 0,
+        parts: MAX_PARTS,
+        nested: 0,
         stored: stored.clone(),
         initial_words: BTreeSet::new(),
         changed_words: BTreeSet::new(),
     };
     let mut seen = BTreeSet::new();
     let mut sections = vec![(true, BundleAddress::RESET)];
-    let mut once_outputs = BTreeMap::new();
+    let (mut once_outputs, mut once_computed) = (BTreeMap::new(), BTreeMap::new());
     while let Some((once, address)) = sections.pop() {
         if !seen.insert((once, address)) {
             continue;
@@ -81,63 +85,75 @@ fn explored<'p>(program: &'p Program, stored: &BTreeSet<u32>) -> Result<Explorer
         if once {
             // Outputs are compared at the ends of periods.
             once_outputs = std::mem::take(&mut explorer.outputs);
+            once_computed = std::mem::take(&mut explorer.computed);
             explorer.initial = std::mem::take(&mut explorer.left);
             explorer.first.extend(targets);
         }
     }
     if seen.len() == 1 {
-        explorer.outputs = once_outputs;
+        (explorer.outputs, explorer.computed) = (once_outputs, once_computed);
     }
     Ok(explorer)
 }
 
-/// The abstract state at a point of the program: everything that an instruction may read.
+/// Abstract state at a point of the program: everything that an instruction may read.
 #[derive(Clone)]
 struct State {
-    registers: BTreeMap<Register, Value>,
+    registers: BTreeMap<Register, Rc<Node>>,
     /// States not proved to be in their range at the first period's start, and not written since.
     unshown: BTreeSet<Register>,
     /// Data words written in this period.
-    memory: BTreeMap<u32, Value>,
+    memory: BTreeMap<u32, Rc<Node>>,
     /// Return addresses, and the iteration counts of active loops.
     calls: Vec<BundleAddress>,
     turns: BTreeMap<(usize, BundleAddress), u32>,
 }
 
-/// The point that a path has reached, ordered so that a path can only lead to later points.
+/// Progress of a path, ordered so that a path can only lead to later points.
 type Position = Vec<u32>;
 
-/// The registers that an operation reads, each with the range of its values; `None` if that is unknown.
+/// Registers that an operation reads, each with the range of its values; `None` if that is unknown.
 type Operands = Vec<(Register, Option<Interval>)>;
 
-struct Explorer<'p> {
+pub(super) struct Explorer<'p> {
     program: &'p Program,
     graph: Graph<'p>,
-    /// For each symbol, the word whose rounding error it stands for; `None` for the value of an input or state.
-    symbols: Vec<Option<u32>>,
-    hazards: BTreeMap<(u32, Problem), Operands>,
+    /// Origin of each symbol: the word whose rounding error it stands for; `None` for the value of an input or state.
+    pub(super) symbols: Vec<Option<u32>>,
+    pub(super) hazards: BTreeMap<(u32, Problem), Operands>,
     outputs: BTreeMap<Register, Value>,
-    /// The states' values when the first period begins, the bundles where that does, and the states whose value then matters.
+    /// States at the start of the first period: their values, the bundles at which it starts, and the states whose value matters then.
     initial: BTreeMap<Register, Value>,
     first: BTreeSet<BundleAddress>,
     needed: BTreeSet<Register>,
-    /// The constant registers: [`fixed`].
-    fixed: BTreeMap<Register, u32>,
-    /// The output ports that carry binary32.
+    /// Constant registers of the program: [`fixed`].
+    pub(super) fixed: BTreeMap<Register, u32>,
+    /// Output ports that carry binary32.
     float_outputs: BTreeSet<Register>,
-    /// The states' values at the end of a period.
+    /// Values of the states at the end of a period.
     left: BTreeMap<Register, Value>,
+    /// Symbols of the states when a period begins, and the periods' beginnings.
+    state_symbols: BTreeMap<Register, u32>,
+    periods: u32,
+    /// Outputs as the period computes them, before cases are distinguished: with the operations that errors come from.
+    computed: BTreeMap<Register, Value>,
     bundles: u64,
-    operations: u64,
+    pub(super) operations: u64,
+    /// Values are evaluated again: hazards have been listed before.
+    pub(super) quiet: u32,
+    /// Parts of ranges that may still be evaluated by themselves.
+    pub(super) parts: u32,
+    /// Selections whose conditions are assumed.
+    pub(super) nested: u32,
     /// Data words that the program may change.
     stored: BTreeSet<u32>,
-    /// Those that were taken to hold what the loader put there, and those that stores went to.
+    /// Words assumed to hold the loader's value, and words that stores modified.
     initial_words: BTreeSet<u32>,
     changed_words: BTreeSet<u32>,
 }
 
 impl Explorer<'_> {
-    fn symbol(&mut self, word: Option<u32>) -> u32 {
+    pub(super) fn symbol(&mut self, word: Option<u32>) -> u32 {
         self.symbols.push(word);
         (self.symbols.len() - 1) as u32
     }
@@ -146,22 +162,25 @@ impl Explorer<'_> {
         BoundError::new(self.program, address, refusal)
     }
 
-    /// The abstract state at the start of a section.
+    /// Abstract state at the start of a section.
     fn begin(&mut self, once: bool, address: BundleAddress) -> State {
         let program = self.program;
-        // Later, a register that the program writes may hold something else than its preset.
+        // After `.once`, a register that the program writes may no longer hold its preset.
         let constants = if once { program.constants.iter().copied().collect() } else { self.fixed.clone() };
-        let mut registers: BTreeMap<Register, Value> =
-            constants.into_iter().map(|(register, bits)| (register, Value::bits(bits))).collect();
-        registers.insert(Register::ZERO, Value::bits(0));
+        let constant = |bits| Node::leaf(Value::bits(bits));
+        let mut registers: BTreeMap<Register, Rc<Node>> =
+            constants.into_iter().map(|(register, bits)| (register, constant(bits))).collect();
+        registers.insert(Register::ZERO, constant(0));
         let mut unshown = BTreeSet::new();
+        self.periods += u32::from(!once);
         for range in &program.ranges {
             let input = program.machine.is_input(range.register);
             if once && !input {
                 continue;
             }
             let value = self.ranged(range);
-            registers.insert(range.register, value);
+            registers.insert(range.register, Node::leaf(value));
+            self.state_symbols.insert(range.register, (self.symbols.len() - 1) as u32);
             if !input && self.first.contains(&address) && !shown(range, self.initial.get(&range.register)) {
                 unshown.insert(range.register);
             }
@@ -172,15 +191,16 @@ impl Explorer<'_> {
     fn ranged(&mut self, range: &Range) -> Value {
         let (low, high) = range.ends();
         let symbol = self.symbol(None);
-        let grid = (range.ty == Type::I).then_some(0);
-        let number = Rc::new(Number::of(Interval::new(low, high), symbol, grid));
+        let ends = Interval::new(low, high);
+        let grid = if range.ty == Type::F { float_grid(ends) } else { Some(0) };
+        let number = Rc::new(Number::of(ends, symbol, grid));
         match range.ty {
             Type::F => Value::Float(number),
             Type::I | Type::B => Value::Integer(number),
         }
     }
 
-    /// Gives the input ports that a bundle reads new values: unless they are latched, the host may have set them since the last read.
+    /// Gives new values to the input ports that a bundle reads: unless ports are latched, the host may have set them since the last read.
     fn sample(&mut self, address: BundleAddress, state: &mut State) {
         let program = self.program;
         let Some(Ok(instructions)) = program.bundle(address).filter(|_| !program.latched) else { return };
@@ -188,7 +208,7 @@ impl Explorer<'_> {
         for range in program.ranges.iter().filter(|range| reads.contains(&range.register)) {
             if program.machine.is_input(range.register) {
                 let value = self.ranged(range);
-                state.registers.insert(range.register, value);
+                state.registers.insert(range.register, Node::leaf(value));
             }
         }
     }
@@ -225,13 +245,11 @@ impl Explorer<'_> {
                 }
                 Flow::Jump(target) => self.go(&mut ways, address, target, true, state)?,
                 Flow::Branch { zero, target, .. } => {
-                    let (may_zero, may_set) = before.map_or((true, true), |value| value.tested());
-                    let (taken, not) = if zero { (may_zero, may_set) } else { (may_set, may_zero) };
-                    if not {
-                        self.go(&mut ways, address, next, false, state.clone())?;
-                    }
-                    if taken {
-                        self.go(&mut ways, address, target, true, state)?;
+                    let Some(condition) = before else { continue };
+                    for (holds, to, jump) in [(zero, next, false), (!zero, target, true)] {
+                        if let Some(state) = self.assumed(&state, &condition, holds) {
+                            self.go(&mut ways, address, to, jump, state)?;
+                        }
                     }
                 }
                 Flow::Call(target) => {
@@ -263,7 +281,22 @@ impl Explorer<'_> {
         Ok(targets)
     }
 
-    /// Continues a path at a bundle; a back edge is one more iteration of the loop that it heads.
+    /// State on the way on which a condition holds, or does not; `None` if no run takes it.
+    fn assumed(&mut self, state: &State, condition: &Rc<Node>, holds: bool) -> Option<State> {
+        let mut state = state.clone();
+        match (condition.value.tested(), holds) {
+            ((false, _), true) | ((_, false), false) => return Some(state),
+            ((false, _), false) | ((_, false), true) => return None,
+            _ => {}
+        }
+        let mut scene = self.scene(|context| context.decide(condition, holds))?;
+        for node in state.registers.values_mut().chain(state.memory.values_mut()) {
+            *node = self.under(node, &mut scene);
+        }
+        Some(state)
+    }
+
+    /// Continues a path at a bundle; a back edge starts one more iteration of the loop whose head it reaches.
     fn go(
         &mut self,
         ways: &mut BTreeMap<Position, (BundleAddress, State)>,
@@ -273,7 +306,7 @@ impl Explorer<'_> {
         mut state: State,
     ) -> Result<(), BoundError> {
         let depth = state.calls.len();
-        // A loop that the path has left is not iterated any more.
+        // Drop the counts of loops that the path has left.
         state.turns.retain(|(level, head), _| *level < depth || self.graph.loops[head].body.contains(&to));
         if jump && to <= from {
             let Some(turned) = self.graph.loops.get(&to) else {
@@ -293,7 +326,7 @@ impl Explorer<'_> {
         self.join(ways, to, state)
     }
 
-    /// Adds a path to the worklist; its state is joined with that of a path that has reached the same position.
+    /// Adds a path to the worklist, joining its state with the state of a path at the same position.
     fn join(
         &mut self,
         ways: &mut BTreeMap<Position, (BundleAddress, State)>,
@@ -306,8 +339,9 @@ impl Explorer<'_> {
                 ways.insert(position, (address, state));
             }
             Some((_, known)) => {
-                for (register, value) in &state.registers {
-                    let joined = known.registers.get(register).unwrap_or(&Value::Unknown).join(value);
+                for (register, node) in &state.registers {
+                    let unknown = || Node::leaf(Value::Unknown);
+                    let joined = known.registers.get(register).map_or_else(unknown, |known| known.join(node));
                     known.registers.insert(*register, joined);
                 }
                 known.registers.retain(|register, _| state.registers.contains_key(register));
@@ -324,7 +358,7 @@ impl Explorer<'_> {
         Ok(())
     }
 
-    /// The position of a path: calls and iterations from the outermost to the innermost, then the bundle.
+    /// Position of a path: calls and iterations from the outermost to the innermost, then the bundle.
     fn position(&self, address: BundleAddress, state: &State) -> Position {
         let mut position = Vec::new();
         let level = |depth: usize, position: &mut Position| {
@@ -339,7 +373,7 @@ impl Explorer<'_> {
         };
         for (depth, back) in state.calls.iter().enumerate() {
             level(depth, &mut position);
-            // The call itself lies before its return address.
+            // The call's address precedes its return address.
             position.push(back.get() - 1);
         }
         level(state.calls.len(), &mut position);
@@ -347,35 +381,35 @@ impl Explorer<'_> {
         position
     }
 
-    /// The value of a register; an error if it is unknown.
+    /// Value of a register; an error if it is unknown.
     fn read(
         &mut self,
         state: &State,
         register: Register,
         address: BundleAddress,
-    ) -> Result<Value, BoundError> {
+    ) -> Result<Rc<Node>, BoundError> {
         if state.unshown.contains(&register) {
             self.needed.insert(register);
         }
-        match state.registers.get(&register) {
-            Some(Value::Unknown) | None => {
+        match state.registers.get(&register).filter(|node| node.value != Value::Unknown) {
+            None => {
                 let name = self.program.register_text(register);
                 let input = self.program.machine.is_input(register);
                 Err(self.error(address, Refusal::NoRange { name, input }))
             }
-            Some(value) => Ok(value.clone()),
+            Some(node) => Ok(Rc::clone(node)),
         }
     }
 
-    /// The value of a data word that this period has not written.
-    fn initial(&mut self, word: u32) -> Value {
-        match self.stored.contains(&word) {
+    /// Value of a data word that this period has not written.
+    fn initial(&mut self, word: u32) -> Rc<Node> {
+        Node::leaf(match self.stored.contains(&word) {
             true => Value::Unknown,
             false => {
                 self.initial_words.insert(word);
                 Value::bits(self.program.data.get(word as usize).copied().unwrap_or(0))
             }
-        }
+        })
     }
 
     fn execute(&mut self, address: BundleAddress, state: &mut State) -> Result<(), BoundError> {
@@ -383,21 +417,21 @@ impl Explorer<'_> {
         let machine = self.program.machine;
         let mut written = Vec::new();
         for ((number, slot), instruction) in machine.numbered_slots().zip(&instructions) {
-            let value = self.operation(address, number, instruction, state)?;
-            if let (Some(register), Some(value)) = (instruction.writes(slot), value) {
+            let node = self.operation(address, number, instruction, state)?;
+            if let (Some(register), Some(node)) = (instruction.writes(slot), node) {
                 if self.float_outputs.contains(&register)
-                    && value.float().is_err_and(|problem| problem != Problem::Told)
+                    && node.value.float().is_err_and(|problem| problem != Problem::Told)
                 {
                     self.hazards
                         .entry((self.word(address, number), Problem::Output))
                         .or_insert_with(|| vec![(register, None)]);
                 }
-                written.push((register, value));
+                written.push((register, node));
             }
         }
-        for (register, value) in written {
+        for (register, node) in written {
             state.unshown.remove(&register);
-            state.registers.insert(register, value);
+            state.registers.insert(register, node);
         }
         Ok(())
     }
@@ -412,52 +446,53 @@ impl Explorer<'_> {
         slot: SlotIndex,
         instruction: &Instruction,
         state: &mut State,
-    ) -> Result<Option<Value>, BoundError> {
+    ) -> Result<Option<Rc<Node>>, BoundError> {
         let word = self.word(address, slot);
-        let mut operands = [(); 3].map(|()| Value::bits(0));
+        let none = Node::leaf(Value::bits(0));
+        let mut operands = [(); 3].map(|()| Rc::clone(&none));
         for (operand, register) in operands.iter_mut().zip(instruction.reads()) {
             *operand = self.read(state, *register, address)?;
         }
         self.operations += u64::from(instruction.effect() != Effect::Nothing);
         Ok(match instruction.effect() {
-            Effect::Compute => Some(self.compute(word, instruction, &operands)),
-            Effect::Immediate => Some(Value::bits(instruction.constant)),
+            Effect::Compute => Some(self.apply(&Made { word, instruction: *instruction, operands })),
+            Effect::Immediate => Some(Node::leaf(Value::bits(instruction.constant))),
             Effect::Load => {
-                let mut loaded: Option<Value> = None;
-                for word in self.addresses(instruction, &operands[0], address)? {
-                    let value = state.memory.get(&word).cloned().unwrap_or_else(|| self.initial(word));
-                    if value == Value::Unknown {
+                let mut loaded: Option<Rc<Node>> = None;
+                for word in self.addresses(instruction, &operands[0].value, address)? {
+                    let node = state.memory.get(&word).cloned().unwrap_or_else(|| self.initial(word));
+                    if node.value == Value::Unknown {
                         let word = self.program.data_text(word);
                         return Err(self.error(address, Refusal::NoRangeOfWord { word }));
                     }
-                    loaded = Some(loaded.map_or(value.clone(), |known| known.join(&value)));
+                    loaded = Some(loaded.map_or_else(|| Rc::clone(&node), |known| known.join(&node)));
                 }
-                Some(loaded.unwrap_or(Value::Broken))
+                Some(loaded.unwrap_or_else(|| Node::leaf(Value::Broken)))
             }
             Effect::Store => {
-                let words = self.addresses(instruction, &operands[0], address)?;
+                let words = self.addresses(instruction, &operands[0].value, address)?;
                 let certain = words.len() == 1;
                 for word in words {
                     self.changed_words.insert(word);
-                    let value = if certain {
-                        operands[1].clone()
+                    let node = if certain {
+                        Rc::clone(&operands[1])
                     } else {
                         let known = state.memory.get(&word).cloned().unwrap_or_else(|| self.initial(word));
                         known.join(&operands[1])
                     };
-                    state.memory.insert(word, value);
+                    state.memory.insert(word, node);
                 }
                 None
             }
-            Effect::ReadFlags => Some(Value::Any),
-            // These write nothing.
+            Effect::ReadFlags => Some(Node::leaf(Value::Any)),
+            // Control and flag operations write no register.
             Effect::ClearFlags | Effect::Nothing | Effect::Wait | Effect::Halt => None,
             Effect::Jump | Effect::BranchZero | Effect::BranchNonzero => None,
             Effect::Call | Effect::Return | Effect::Loop => None,
         })
     }
 
-    /// The data words that a load or store may touch.
+    /// Data words that a load or store may touch.
     fn addresses(
         &self,
         instruction: &Instruction,
@@ -477,7 +512,7 @@ impl Explorer<'_> {
             }
             _ => (0..depth).collect(),
         };
-        // An address beyond the memory is a fault, after which nothing is computed.
+        // An address beyond the memory is a fault, which ends the run.
         let words: Vec<u32> = words.into_iter().filter(|word| *word < depth).collect();
         if words.len() > MAX_WORDS {
             let what = "data words that one operation may touch";
@@ -486,150 +521,84 @@ impl Explorer<'_> {
         Ok(words)
     }
 
-    fn compute(&mut self, word: u32, instruction: &Instruction, operands: &[Value; 3]) -> Value {
-        let (op, row) = (instruction.op, instruction.op.row());
-        let sources = row.shape.sources();
-        let integer = row.result_type() == Type::I;
-        if row.ulp.is_none() || integer {
-            let raises = Cell::new(false);
-            let known = patterns(operands, sources, |a, b, c| {
-                let value = compute::<Host>(op, a, b, c);
-                raises.set(raises.get() || value.flags != Flags::NONE);
-                value.bits
-            });
-            if let Some(value) = known.filter(|_| !raises.get()) {
-                return value;
-            }
-        }
-        let operand = |i: usize| Operand::of(operands[i].clone());
-        let Some(result) = real(op, operand(0), operand(1), operand(2)) else { return Value::Any };
-        let Operand { value, mut problem, terms } = result;
-        let value = match value {
-            value if problem.is_some() || row.result_type() != Type::F => value,
-            Value::Whole(_) | Value::Float(_) => {
-                let rounded =
-                    value.float().and_then(|number| self.round(word, instruction, &number, terms, operands));
-                rounded.unwrap_or_else(|overflow| {
-                    problem = Some(overflow);
-                    Value::Broken
-                })
-            }
-            value => value,
-        };
-        if let Some(problem) = problem.filter(|problem| *problem != Problem::Told) {
-            let value = |value: &Value| value.float().ok().map(|number| number.actual);
-            let reads = instruction.reads().iter().zip(operands);
-            let reads: Vec<_> = reads.map(|(register, operand)| (*register, value(operand))).collect();
-            self.hazards.entry((word, problem)).or_insert(reads);
-        }
-        self.own(value)
-    }
-
-    /// Gives an uncorrelated value a symbol of its own, so that later values can be correlated with it.
-    fn own(&mut self, value: Value) -> Value {
-        match value {
-            Value::Float(number) if number.form.is_free() => {
-                let form = Affine::of(number.exact, self.symbol(None));
-                Value::Float(Rc::new(Number { form, ..Number::clone(&number) }))
-            }
-            Value::Integer(number) if number.form.is_free() => {
-                let form = Affine::of(number.exact, self.symbol(None));
-                Value::Integer(Rc::new(Number { form, ..Number::clone(&number) }))
-            }
-            value => value,
-        }
-    }
-
-    /// Rounds a result to binary32, given the exact result for the run's operands.
-    fn round(
-        &mut self,
-        word: u32,
-        instruction: &Instruction,
-        number: &Number,
-        terms: Option<[Interval; 2]>,
-        operands: &[Value; 3],
-    ) -> Result<Value, Problem> {
-        let exact = number.exact.meet(number.form.range());
-        let actual = number.actual.meet(exact + number.error.range());
-        let number = Number { actual, exact, ..number.clone() };
-        let rounder = |register: &Register| self.fixed.get(register).is_some_and(|bits| is_rounder(*bits));
-        let terms = terms.filter(|_| instruction.reads().iter().any(rounder));
-        let (may_decide, may_round) = terms.map_or((false, true), decides);
-        let row = instruction.op.row();
-        let result = if !may_decide {
-            self.rounded(word, row, number, operands)?
-        } else {
-            let decided = bits::nearest(&number, self.symbol(None));
-            if may_round { decided.join(&self.rounded(word, row, number, operands)?) } else { decided }
-        };
-        Ok(Value::Float(Rc::new(result)))
-    }
-
-    /// Rounds a result whose rounding counts as an error.
-    fn rounded(
-        &mut self,
-        word: u32,
-        row: &Row,
-        mut number: Number,
-        operands: &[Value; 3],
-    ) -> Result<Number, Problem> {
-        let actual = number.actual;
-        let bound = row.ulp.unwrap_or(0.0);
-        let magnitude = actual.magnitude();
-        let fits = |grid: i32| grid >= -149 && magnitude <= 2f64.powi((24 + grid).min(127));
-        let largest = f64::from(f32::MAX);
-        if bound == 0.0 || number.grid.is_some_and(fits) {
-            return if magnitude <= largest { Ok(number) } else { Err(Problem::Overflow) };
-        }
-        let local = bound * ulp(magnitude);
-        // A NaN does not fit.
-        let fits = magnitude + local <= largest && number.error.range().is_finite();
-        if !fits {
-            return Err(Problem::Overflow);
-        }
-        // If all operands are known to the bit, so is the result.
-        let known = patterns(operands, row.shape.sources(), |a, b, c| compute::<Host>(row.op, a, b, c).bits);
-        if let Some(Value::Patterns(known)) = &known
-            && let (1, Some(bits)) = (known.len(), known.first())
-        {
-            let value = Interval::point(f64::from(f32::from_bits(*bits)));
-            number.error = Affine::free(value - number.exact);
-            number.actual = value;
-            return Ok(number);
-        }
-        let symbol = self.symbol(Some(word));
-        number.error = number.error.with(symbol, local);
-        number.actual = match bound == 0.5 {
-            // Rounding to nearest is monotonic.
-            true => Interval::new(f64::from(actual.low as f32), f64::from(actual.high as f32)),
-            false => actual.widened(local),
-        };
-        number.actual = number.actual.meet(number.exact + number.error.range());
-        Ok(number)
-    }
-
-    /// Ends a period: joins the values of outputs and states into those of all paths.
+    /// Ends a period: joins the values of outputs and states into the values over all paths.
     fn end(&mut self, state: &State) {
         for register in self.float_outputs.clone() {
-            if let Some(value) = state.registers.get(&register).filter(|value| **value != Value::Unknown) {
-                join_into(&mut self.outputs, register, value);
+            if let Some(node) = state.registers.get(&register).filter(|node| node.value != Value::Unknown) {
+                let value = self.by_cases(node);
+                join_into(&mut self.outputs, register, &value);
+                join_into(&mut self.computed, register, &node.value);
             }
         }
-        // Passed on to the next period, which may read it.
+        // Unread states pass to the next period, which may read them.
         self.needed.extend(&state.unshown);
         for range in &self.program.ranges {
-            if let Some(value) = state.registers.get(&range.register) {
-                join_into(&mut self.left, range.register, value);
-            }
+            let Some(node) = state.registers.get(&range.register) else { continue };
+            let kept = shown(range, Some(&node.value)) || node.value == Value::Unknown;
+            let value = if kept { node.value.clone() } else { self.by_cases(node) };
+            join_into(&mut self.left, range.register, &value);
         }
+    }
+
+    /// States that no single period keeps in their ranges, if their linear part keeps all of them there for all time.
+    fn converging(&self) -> Vec<Converging> {
+        let is_open = |range: &&Range| {
+            let left = self.left.get(&range.register);
+            !self.program.machine.is_input(range.register)
+                && left.is_some_and(|value| !shown(range, Some(value)))
+        };
+        let open: Vec<&Range> = self.program.ranges.iter().filter(is_open).collect();
+        // Periods with code of their own have states with symbols of their own.
+        if open.is_empty() || self.periods != 1 {
+            return Vec::new();
+        }
+        // A state that the others keep in its range may converge with them, or be one that does not: a limited integrator.
+        let is_float = |range: &&Range| matches!(self.left.get(&range.register), Some(Value::Float(_)));
+        let is_state = |range: &&Range| !self.program.machine.is_input(range.register);
+        let all: Vec<&Range> = self.program.ranges.iter().filter(is_state).filter(is_float).collect();
+        let is_open = |state: &Converging| open.iter().any(|range| range.register == state.range.register);
+        let kept = [&all, &open].into_iter().find_map(|states| {
+            let mut bounded = self.bounded_by_convergence(states)?;
+            bounded.retain(is_open);
+            let within = |state: &Converging| state.found.within(ends(&state.range));
+            (bounded.len() == open.len() && bounded.iter().all(within)).then_some(bounded)
+        });
+        kept.unwrap_or_default()
+    }
+
+    fn bounded_by_convergence(&self, states: &[&Range]) -> Option<Vec<Converging>> {
+        let symbols: Option<Vec<u32>> =
+            states.iter().map(|range| self.state_symbols.get(&range.register).copied()).collect();
+        let (symbols, mut linear) =
+            (symbols?, Linear { rows: Vec::new(), added: Vec::new(), first: Vec::new() });
+        for range in states {
+            let Some(Value::Float(number)) = self.left.get(&range.register) else { return None };
+            let (middle, radius) = (ends(range).middle(), Interval::point(ends(range).radius()));
+            if radius.low <= 0.0 {
+                return None;
+            }
+            let (row, rest) = number.form.apart(&symbols, middle);
+            let added = Interval::point(rest) + Interval::point(number.error_range().magnitude());
+            linear.rows.push(row.into_iter().map(|factor| Interval::point(factor) / radius).collect());
+            linear.added.push((added / radius).high);
+            let initial = self.initial.get(&range.register).filter(|value| shown(range, Some(value)));
+            let first = initial.and_then(|value| held(range, value)).unwrap_or(ends(range));
+            linear.first.push(((first - Interval::point(middle)).abs() / radius).high);
+        }
+        let found = states.iter().zip(linear.largest()?).map(|(range, most)| {
+            let most = (Interval::point(most) * Interval::point(ends(range).radius())).high;
+            Converging { range: **range, found: Interval::point(ends(range).middle()).widened(most) }
+        });
+        Some(found.collect())
     }
 
     fn finish(self) -> Enclosure {
         let output = |port: &Port| {
             let value = self.outputs.get(&port.register)?;
             let number = value.float().ok();
+            let computed = self.computed.get(&port.register).and_then(|value| value.float().ok());
             let mut shares: BTreeMap<u32, f64> = BTreeMap::new();
-            for (symbol, share) in number.iter().flat_map(|number| number.error.shares().0) {
+            for (symbol, share) in computed.iter().flat_map(|number| number.error.shares().0) {
                 if let Some(word) = self.symbols[symbol as usize] {
                     *shares.entry(word).or_default() += share;
                 }
@@ -640,24 +609,24 @@ impl Explorer<'_> {
                 name: port.name.clone(),
                 register: port.register,
                 range: number.as_ref().map(|number| number.actual),
-                error: number.as_ref().map(|number| number.error.range().magnitude()),
+                error: number.as_ref().map(|number| number.error_range().magnitude()),
                 parts,
             })
         };
+        let converging = self.converging();
         let states =
             self.program.ranges.iter().filter(|range| !self.program.machine.is_input(range.register));
         let assumed = |range: &Range| {
             let initial = self.initial.get(&range.register);
-            let first = self.needed.contains(&range.register).then(|| Assumed {
+            let first = self.needed.contains(&range.register).then(|| UnprovedRange {
                 range: *range,
                 moment: Moment::First,
                 found: initial.and_then(|value| held(range, value)),
             });
             let left = self.left.get(&range.register);
-            let later = left.filter(|value| !shown(range, Some(value))).map(|value| Assumed {
-                range: *range,
-                moment: Moment::Later,
-                found: held(range, value),
+            let converges = converging.iter().any(|state| state.range.register == range.register);
+            let later = left.filter(|value| !converges && !shown(range, Some(value))).map(|value| {
+                UnprovedRange { range: *range, moment: Moment::Later, found: held(range, value) }
             });
             first.into_iter().chain(later)
         };
@@ -671,17 +640,18 @@ impl Explorer<'_> {
             outputs: outputs.collect(),
             hazards: self.hazards.iter().map(hazard).collect(),
             assumed: states.flat_map(assumed).collect(),
+            converging: converging.clone(),
             operations: self.operations,
         }
     }
 }
 
-/// The output ports that carry binary32.
+/// Output ports that carry binary32.
 fn float_outputs(program: &Program) -> impl Iterator<Item = &Port> {
     program.outputs.iter().filter(|port| port.ty == Type::F)
 }
 
-/// A state's value in the type of its range: binary32 or integer.
+/// Values of a state in the type of its range: binary32 or integer.
 fn held(range: &Range, value: &Value) -> Option<Interval> {
     match range.ty {
         Type::F => value.float().ok().map(|number| number.actual),
@@ -689,7 +659,12 @@ fn held(range: &Range, value: &Value) -> Option<Interval> {
     }
 }
 
-/// True if a state is proved to be in its range.
+fn ends(range: &Range) -> Interval {
+    let (low, high) = range.ends();
+    Interval::new(low, high)
+}
+
+/// The state is proved to lie in its range.
 fn shown(range: &Range, value: Option<&Value>) -> bool {
     let (low, high) = range.ends();
     let found = value.and_then(|value| held(range, value));
@@ -699,39 +674,4 @@ fn shown(range: &Range, value: Option<&Value>) -> bool {
 fn join_into(values: &mut BTreeMap<Register, Value>, register: Register, value: &Value) {
     let joined = values.get(&register).map_or_else(|| value.clone(), |known| known.join(value));
     values.insert(register, joined);
-}
-
-/// Two flags: a sum of these terms may be a rounding to the nearest integer, and may be an ordinary sum. It is the former if one term is
-/// of a magnitude at which binary32 has no fraction, and the other is small. [`Shadow`](super::Shadow) decides the same by the
-/// terms of the run.
-fn decides(terms: [Interval; 2]) -> (bool, bool) {
-    let [a, b] = terms;
-    let (mut may, mut must) = (false, false);
-    for (rounder, small) in [(a, b), (b, a)] {
-        let magnitude = small.abs();
-        for value in ROUNDERS.into_iter().flat_map(|value| [value, -value]) {
-            if rounder.contains(value) && magnitude.low <= LARGEST_ROUNDED {
-                may = true;
-                must |= rounder.low == rounder.high && magnitude.high <= LARGEST_ROUNDED;
-            }
-        }
-    }
-    (may, !must)
-}
-
-/// The results of an operation on every combination of its operands' patterns, if these are known and not too many.
-fn patterns(operands: &[Value; 3], sources: usize, of: impl Fn(u32, u32, u32) -> u32) -> Option<Value> {
-    let mut lists: [Vec<u32>; 3] = [vec![0], vec![0], vec![0]];
-    for (list, operand) in lists.iter_mut().zip(operands).take(sources) {
-        match operand {
-            Value::Patterns(patterns) => *list = patterns.iter().copied().collect(),
-            _ => return None,
-        }
-    }
-    let [a, b, c] = &lists;
-    if a.len() * b.len() * c.len() > MAX_PATTERNS {
-        return None;
-    }
-    let all = a.iter().flat_map(|a| b.iter().flat_map(move |b| c.iter().map(move |c| (*a, *b, *c))));
-    Some(Value::patterns(all.map(|(a, b, c)| of(a, b, c)).collect()))
 }

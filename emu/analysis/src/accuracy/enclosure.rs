@@ -1,86 +1,97 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The statements of [`enclose()`](super::enclose()) about a program, as plain data.
+//! Statements of [`enclose()`](super::enclose()) about a program, as plain data.
 
 use super::interval::Interval;
 use super::{Problem, ulp};
 use takt_isa::Register;
 use takt_isa::program::Range;
 
-/// The bound of an output's error.
+/// Error bound of an output.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OutputBound {
-    /// Its name.
+    /// Name of the output port.
     pub name: String,
-    /// Its register.
+    /// Register of the output port.
     pub register: Register,
-    /// The values that it may have; `None` if a problem leaves that open.
+    /// Range of the output's values; `None` if a problem leaves it open.
     pub range: Option<Interval>,
-    /// The magnitude of its error at most.
+    /// Bound on the error's magnitude, in the output's unit; `None` if a problem leaves it open.
     pub error: Option<f64>,
-    /// The most that each operation's rounding adds to that, by word, the largest first.
+    /// Bound on each operation's contribution to the error, by word, largest first.
     pub parts: Vec<(u32, f64)>,
 }
 
 impl OutputBound {
-    /// The bound in ulps of the output's largest value.
+    /// Bound in ulps of the output's largest value.
     pub fn ulps(&self) -> Option<f64> {
         Some(self.error? / ulp(self.range?.magnitude()))
     }
 }
 
-/// A hazard: an operation that may go wrong.
+/// Hazard: an operation that may have no finite result, or that depends on bits without an enclosure.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Hazard {
-    /// Index into [`Program::code`].
+    /// Word of the operation, an index into [`Program::code`].
     pub word: u32,
-    /// The hazard.
+    /// Reason why the operation has no enclosure.
     pub problem: Problem,
-    /// The registers that the operation reads, and the numbers that they may hold, if known.
+    /// Registers that the operation reads, each with the range of its values if known.
     pub operands: Vec<(Register, Option<Interval>)>,
 }
 
-/// The moment at which a state must lie in its range.
+/// Point of the induction over periods at which a state must lie in its range.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Moment {
-    /// The first period begins: the base of the induction over periods.
+    /// Start of the first period: base of the induction.
     First,
-    /// A period ends that began with all states in their ranges: its step.
+    /// End of a period that began with all states in their ranges: step of the induction.
     Later,
 }
 
-/// A state that was not shown to be in its range.
+/// State that was not proved to lie in its range.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Assumed {
-    /// The state.
+pub struct UnprovedRange {
+    /// State's register and declared range.
     pub range: Range,
-    /// The moment.
+    /// Point at which the proof fails.
     pub moment: Moment,
-    /// The values that it may then have; `None` if that is not known as a number.
+    /// Values that the state may have then; `None` if they are not known as numbers.
     pub found: Option<Interval>,
 }
 
-/// The enclosure of every period that begins with inputs and states within their ranges, the states free of error.
+/// State whose range no single period keeps, but all periods together: what a period makes of the states is linear and converges.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Converging {
+    /// State's register and declared range.
+    pub range: Range,
+    /// Values that the state may have at the end of any period.
+    pub found: Interval,
+}
+
+/// Statements about every period that begins with inputs and states within their ranges, the states free of error.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Enclosure {
-    /// The outputs that carry binary32 and that a period writes.
+    /// Bounds of the outputs that carry binary32 and that a period writes.
     pub outputs: Vec<OutputBound>,
-    /// Operations that may have no number as their result, or convert a number that fits no integer; of those that depend on such an
-    /// operation, the first. If there are none: no NaN, no overflow, no division by zero, no conversion out of range.
+    /// Operations that may yield NaN or infinity, or convert out of range; only the first of each dependence chain. An empty list proves:
+    /// no NaN, no overflow, no division by zero, no conversion out of range.
     pub hazards: Vec<Hazard>,
-    /// States whose range is promised by the source and not proved, at one of the two moments of an induction over periods.
-    pub assumed: Vec<Assumed>,
-    /// Operations gone through.
+    /// States whose declared range is not proved, at one of the two points of an induction over periods.
+    pub assumed: Vec<UnprovedRange>,
+    /// States whose declared range is proved for all periods together.
+    pub converging: Vec<Converging>,
+    /// Operations executed abstractly, iterations of loops included.
     pub operations: u64,
 }
 
 impl Enclosure {
-    /// States not shown to begin the first period in their range: where there is one, the rest need not hold.
-    pub fn first(&self) -> impl Iterator<Item = &Assumed> {
+    /// States not proved to begin the first period in their range. Unless empty, the other statements need not hold.
+    pub fn first(&self) -> impl Iterator<Item = &UnprovedRange> {
         self.assumed.iter().filter(|state| state.moment == Moment::First)
     }
 
-    /// States not shown to end a period in their range.
-    pub fn later(&self) -> impl Iterator<Item = &Assumed> {
+    /// States not proved to end a period in their range.
+    pub fn later(&self) -> impl Iterator<Item = &UnprovedRange> {
         self.assumed.iter().filter(|state| state.moment == Moment::Later)
     }
 }

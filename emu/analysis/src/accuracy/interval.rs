@@ -4,19 +4,19 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-/// All reals from `low` to `high`.
+/// Closed interval of reals from `low` to `high`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interval {
-    /// The least.
+    /// Lower end, included; may be -∞.
     pub low: f64,
-    /// The largest.
+    /// Upper end, included; may be +∞.
     pub high: f64,
 }
 
 /// Products below this may have lost digits to underflow: they count as inexact.
 const TINY: f64 = 1e-280;
 
-/// The rounded sum, and the sign of its rounding error; NaN if that is not known.
+/// Rounded sum, and the sign of its rounding error (NaN if unknown).
 fn sum(a: f64, b: f64) -> (f64, f64) {
     let s = a + b;
     let back = s - a;
@@ -37,7 +37,7 @@ fn quotient(a: f64, b: f64) -> (f64, f64) {
     (q, rest * b.signum())
 }
 
-/// The nearest binary64 at or below the exact value.
+/// Nearest binary64 at or below the exact value; `rest` is the rounding error's sign.
 fn down((value, rest): (f64, f64)) -> f64 {
     if rest >= 0.0 { value } else { value.next_down() }
 }
@@ -58,30 +58,30 @@ impl Interval {
         Interval::new(value, value)
     }
 
-    /// Results of a function of `libm` at both ends, rounded outwards: its errors are below two ulps, and four are allowed for.
+    /// Hull of a `libm` function's results at both ends, rounded outwards: its errors are below two ulps, and four are allowed for.
     fn outward(low: f64, high: f64) -> Interval {
         let slack = |value: f64| value.abs() * (4.0 * f64::EPSILON);
         Interval::new((low - slack(low)).next_down(), (high + slack(high)).next_up())
     }
 
-    /// The largest magnitude.
+    /// Largest magnitude of a member.
     pub fn magnitude(self) -> f64 {
         self.low.abs().max(self.high.abs())
     }
 
-    /// A number in the middle, or near it.
+    /// Number in the middle, or near it.
     pub(super) fn middle(self) -> f64 {
         let middle = self.low / 2.0 + self.high / 2.0;
         if middle.is_finite() { middle.clamp(self.low, self.high) } else { 0.0 }
     }
 
-    /// The distance of its ends from its middle, at most.
+    /// Upper bound on the distance of the ends from the middle.
     pub(super) fn radius(self) -> f64 {
         let middle = self.middle();
         up(sum(self.high, -middle)).max(up(sum(middle, -self.low)))
     }
 
-    /// True if it contains a number.
+    /// Membership; false for NaN.
     pub fn contains(self, value: f64) -> bool {
         self.low <= value && value <= self.high
     }
@@ -94,7 +94,7 @@ impl Interval {
         Interval::new(self.low.min(other.low), self.high.max(other.high))
     }
 
-    /// Intersection. Both enclose one value, so that it is not empty; if rounding leaves nothing, either interval will do.
+    /// Intersection of two intervals that enclose the same value, so that it is not empty; if rounding leaves nothing, returns `self`.
     pub(super) fn meet(self, other: Interval) -> Interval {
         let both = Interval::new(self.low.max(other.low), self.high.min(other.high));
         if both.low <= both.high { both } else { self }
@@ -115,19 +115,35 @@ impl Interval {
         Interval::new(down(product(least, least)), up(product(most, most)))
     }
 
-    /// The square root, of an interval without negative numbers.
+    /// Interval of binary32 that holds the rounded members, each off by less than an ulp: away from zero, no rounding passes the binary32 next
+    /// to the end. Towards zero it may, below a power of two.
+    pub(super) fn outer(self, ulps: f64) -> Interval {
+        let (low, high) = (self.low as f32, self.high as f32);
+        let next_low = if f64::from(low) > self.low { low.next_down() } else { low };
+        let next_high = if f64::from(high) < self.high { high.next_up() } else { high };
+        let by = self.widened(ulps * super::ulp(self.magnitude()));
+        if ulps >= 1.0 {
+            return by;
+        }
+        Interval::new(
+            if self.low <= 0.0 { by.low.max(next_low.into()) } else { by.low },
+            if self.high >= 0.0 { by.high.min(next_high.into()) } else { by.high },
+        )
+    }
+
+    /// Square root of an interval; negative members count as zero.
     pub(super) fn sqrt(self) -> Interval {
         let root = |value: f64| {
             let root = value.max(0.0).sqrt();
             (root, (-root).mul_add(root, value.max(0.0)))
         };
-        // The last operand's rest may vanish in underflow.
+        // Underflow may make the last operand's rest vanish.
         let low = if self.low > TINY { down(root(self.low)) } else { 0.0 };
         let high = if self.high > TINY { up(root(self.high)) } else { root(self.high).0.next_up() };
         Interval::new(low, high)
     }
 
-    /// True if it may contain a number `at` + k·2π.
+    /// May contain `at + k·2π` for an integer `k`; allows 10⁻⁹ of a turn of slack.
     fn meets(self, at: f64) -> bool {
         let slack = 1e-9;
         ((self.low - at) / TAU - slack).ceil() <= ((self.high - at) / TAU + slack).floor()
@@ -155,19 +171,19 @@ impl Interval {
         Interval::new(low, high)
     }
 
-    /// The arccosine, of an interval within [-1, 1].
+    /// Arccosine of an interval within [-1, 1].
     pub(super) fn acos(self) -> Interval {
         let ends =
             Interval::outward(libm::acos(self.high.clamp(-1.0, 1.0)), libm::acos(self.low.clamp(-1.0, 1.0)));
         ends.meet(Interval::new(0.0, PI.next_up()))
     }
 
-    /// True if the box of points (`x`, self) contains the origin or crosses the cut along the negative axis.
+    /// The points (`x`, self) include the origin or cross the branch cut along the negative axis.
     pub(super) fn meets_cut(self, x: Interval) -> bool {
         self.contains(0.0) && x.low <= 0.0
     }
 
-    /// The angle of the points (`x`, self).
+    /// Angle of the points (`x`, self).
     pub(super) fn atan2(self, x: Interval) -> Interval {
         if self.meets_cut(x) {
             return Interval::new(-PI.next_up(), PI.next_up());
@@ -224,11 +240,11 @@ impl Neg for Interval {
     }
 }
 
-/// The hull of four results, each given with the sign of its rounding error.
+/// Hull of four results, each given with the sign of its rounding error.
 fn extremes(of: [(f64, f64); 4]) -> Interval {
     let low = of.into_iter().map(down).fold(f64::INFINITY, f64::min);
     let high = of.into_iter().map(up).fold(f64::NEG_INFINITY, f64::max);
-    // Infinity times zero is no product of finite numbers.
+    // The product of infinity and zero is undefined: take all reals.
     if low.is_nan() || high.is_nan() { Interval::ALL } else { Interval::new(low, high) }
 }
 
@@ -249,7 +265,7 @@ impl Mul for Interval {
 impl Div for Interval {
     type Output = Interval;
 
-    /// The quotient; all reals if the divisor may be zero.
+    /// Quotient; all reals if the divisor may be zero.
     fn div(self, other: Interval) -> Interval {
         let (a, b) = (self, other);
         if b.contains(0.0) || !a.is_finite() || !b.is_finite() {

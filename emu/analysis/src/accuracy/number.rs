@@ -4,52 +4,62 @@
 
 use super::affine::Affine;
 use super::interval::Interval;
+use super::relative::Relative;
 use super::{FRACTION, LEAST_EXPONENT};
 
-/// All integers of 32 bits.
+/// Range of the 32-bit signed integers.
 pub(super) const INTEGERS: Interval = Interval { low: -2_147_483_648.0, high: 2_147_483_647.0 };
 
-/// The position of the lowest bit of a float's exponent.
+/// Position of the lowest bit of a float's exponent.
 pub(super) const EXPONENT: i32 = FRACTION;
 pub(super) const SIGN: u32 = 1 << 31;
-/// The bits of the largest float.
+/// Bits of the largest float.
 pub(super) const LARGEST: f64 = 0x7f7f_ffff as f64;
-/// The bits of the smallest normal one.
+/// Bits of the smallest normal float.
 pub(super) const NORMAL: f64 = (1u32 << EXPONENT) as f64;
 /// Bias of the exponent.
 pub(super) const BIAS: i32 = 127;
-/// The number of all words.
+/// Number of 32-bit words, 2³².
 pub(super) const WORDS: f64 = 4_294_967_296.0;
 
-/// A number: its value in the run, its value in exact arithmetic, and their difference.
+/// Enclosure of a number: its value in the run, its value in exact arithmetic, and their difference.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Number {
-    /// The values of the run.
+    /// Range of the value in the run.
     pub(super) actual: Interval,
-    /// The values of exact arithmetic.
+    /// Range of the value in exact arithmetic.
     pub(super) exact: Interval,
-    /// The exact value as an affine form, which keeps its correlation with others.
+    /// Exact value as an affine form, which keeps its correlation with other values.
     pub(super) form: Affine,
-    /// The error: the value of the run minus that of exact arithmetic.
+    /// Error as an affine form: value in the run minus value in exact arithmetic.
     pub(super) error: Affine,
-    /// The exponent of a power of two of which the run's value is a multiple, if one is known.
+    /// Exponent `g` such that the run's value is a multiple of 2^g, if known.
     pub(super) grid: Option<i32>,
+    /// Bound of the error relative to the exact value, if known.
+    pub(super) relative: Option<Relative>,
 }
 
 impl Number {
     pub(super) fn point(value: f64) -> Number {
         let at = Interval::point(value);
         let grid = grid_of(value);
-        Number { actual: at, exact: at, form: Affine::constant(value), error: Affine::constant(0.0), grid }
+        Number {
+            actual: at,
+            exact: at,
+            form: Affine::constant(value),
+            error: Affine::constant(0.0),
+            grid,
+            relative: None,
+        }
     }
 
-    /// A number without error, in an interval.
+    /// Number without error, in an interval.
     pub(super) fn of(range: Interval, symbol: u32, grid: Option<i32>) -> Number {
         if range.low == range.high {
             return Number::point(range.low);
         }
         let error = Affine::constant(0.0);
-        Number { actual: range, exact: range, form: Affine::of(range, symbol), error, grid }
+        Number { actual: range, exact: range, form: Affine::of(range, symbol), error, grid, relative: None }
     }
 
     pub(super) fn join(&self, other: &Number) -> Number {
@@ -59,7 +69,50 @@ impl Number {
             form: self.form.join(&other.form),
             error: self.error.join(&other.error),
             grid: self.grid.zip(other.grid).map(|(a, b)| a.min(b)),
+            relative: Some(Relative::join(self, other)),
         }
+    }
+
+    /// The number with the opposite sign.
+    pub(super) fn negative(&self) -> Number {
+        Number {
+            actual: -self.actual,
+            exact: -self.exact,
+            form: self.form.neg(),
+            error: self.error.neg(),
+            grid: self.grid,
+            relative: self.relative,
+        }
+    }
+
+    /// Range of the error: no wider than the distance of the run's range from the exact one, nor than its share of the exact value.
+    pub(super) fn error_range(&self) -> Interval {
+        if self.error.is_zero() {
+            return Interval::ZERO;
+        }
+        let error = self.error.range().meet(self.actual - self.exact);
+        self.relative.map_or(error, |relative| {
+            let bound = relative.bound(self.exact);
+            if bound.is_nan() { error } else { error.meet(Interval::new(-bound, bound)) }
+        })
+    }
+
+    /// Caps each of range, exact range and error by the other two. The error's terms give way where both ranges bound it better, as behind
+    /// a clamp; `symbol` then stands for the error.
+    pub(super) fn capped(mut self, symbol: impl FnOnce(&Affine) -> u32) -> Number {
+        self.exact = self.exact.meet(self.form.range());
+        let error = self.error_range();
+        self.exact = self.exact.meet(self.actual - error);
+        self.actual = self.actual.meet(self.exact + error);
+        if self.is_loose() {
+            self.error = Affine::of(self.error_range(), symbol(&self.error));
+        }
+        self
+    }
+
+    /// Both ranges bound the error to half of what its terms do.
+    pub(super) fn is_loose(&self) -> bool {
+        !self.error.is_zero() && 2.0 * self.error_range().radius() < self.error.radius()
     }
 
     /// Hull of the values of the run and of exact arithmetic: a derivative between the two is taken over it.
@@ -68,7 +121,7 @@ impl Number {
     }
 }
 
-/// The exponent of the largest power of two of which a number is a multiple; for zero, one larger than that of any number.
+/// Exponent of the largest power of two that divides a number; 200 for zero, which every power divides.
 fn grid_of(value: f64) -> Option<i32> {
     if value == 0.0 {
         return Some(200);
@@ -82,7 +135,20 @@ fn grid_of(value: f64) -> Option<i32> {
     Some(exponent - 1075 + fraction.trailing_zeros() as i32)
 }
 
-/// Hull of finite numbers; `None` if one is not finite.
+/// Exponent of a power of two that divides every binary32 in an interval.
+pub(super) fn float_grid(range: Interval) -> Option<i32> {
+    let least = range.abs().low.max(power(LEAST_EXPONENT));
+    least.is_finite().then(|| (least.to_bits() >> 52) as i32 - 1023 - FRACTION)
+}
+
+/// Multiples of a power of two in an interval; `None` if it holds none.
+pub(super) fn on_grid(range: Interval, grid: Option<i32>) -> Option<Interval> {
+    let Some(step) = grid.filter(|grid| (-1000..100).contains(grid)).map(power) else { return Some(range) };
+    let inner = Interval::new((range.low / step).ceil() * step, (range.high / step).floor() * step);
+    (inner.low <= inner.high).then_some(inner)
+}
+
+/// Hull of finite numbers; `None` if any is not finite.
 pub(super) fn hull(values: &mut dyn Iterator<Item = f64>) -> Option<Number> {
     let mut number: Option<Number> = None;
     for value in values {
@@ -96,19 +162,19 @@ pub(super) fn hull(values: &mut dyn Iterator<Item = f64>) -> Option<Number> {
                 let range = known.actual.hull(point.actual);
                 let grid = known.grid.zip(point.grid).map(|(a, b)| a.min(b));
                 let (form, error) = (Affine::free(range), Affine::constant(0.0));
-                Number { actual: range, exact: range, form, error, grid }
+                Number { actual: range, exact: range, form, error, grid, relative: None }
             }
         });
     }
     number
 }
 
-/// Two to a power.
+/// Power of two, exact.
 pub(super) fn power(exponent: i32) -> f64 {
     2f64.powi(exponent)
 }
 
-/// The signed integer that a sum of this range becomes in 32 bits.
+/// Wraps a sum of this range to a signed 32-bit integer.
 pub(super) fn integer(range: Interval, form: Affine, grid: i32) -> Number {
     let grid = grid.min(31);
     let step = power(grid);
@@ -125,20 +191,27 @@ pub(super) fn integer(range: Interval, form: Affine, grid: i32) -> Number {
         let back = -turn * WORDS;
         (range + Interval::point(back), form.add(&Affine::constant(back)))
     };
-    Number { actual: range, exact: range, form, error: Affine::constant(0.0), grid: Some(grid) }
+    Number {
+        actual: range,
+        exact: range,
+        form,
+        error: Affine::constant(0.0),
+        grid: Some(grid),
+        relative: None,
+    }
 }
 
-/// Any signed integer.
+/// Enclosure of all signed integers.
 pub(super) fn anything() -> Number {
     integer(INTEGERS, Affine::free(INTEGERS), 0)
 }
 
-/// The run's value as an affine form: the sum of exact value and error.
+/// Affine form of the run's value: the sum of exact value and error.
 pub(super) fn in_the_run(number: &Number) -> Affine {
     number.form.add(&number.error)
 }
 
-/// The floats in an interval: the least and the largest.
+/// Least and largest float in an interval.
 pub(super) fn floats(range: Interval) -> (f32, f32) {
     let (mut low, mut high) = (range.low as f32, range.high as f32);
     if f64::from(low) < range.low {
@@ -174,7 +247,7 @@ pub(super) fn of_float(number: &Number) -> Number {
     if low > high {
         return anything();
     }
-    // Negative numbers, and zero of either sign, which has the least bits if it is negative.
+    // Negative numbers, and zero of either sign: a negative zero has the least bits.
     let range = Interval::new(INTEGERS.low, bits(high).max(0.0));
     integer(range, Affine::free(range), 0)
 }
@@ -195,14 +268,14 @@ pub(super) fn to_float(number: &Number) -> Result<Number, Problem> {
         return Err(Problem::NotFinite);
     }
     let least = if low >= 0.0 { low } else { low - INTEGERS.low };
-    // If there are only exponent bits, the float is a power of two.
+    // Exponent bits alone encode a power of two.
     let power = number.grid.is_some_and(|grid| grid >= EXPONENT) && least >= NORMAL;
     let grid = power.then(|| (least / NORMAL) as i32 - BIAS);
     let form = if range.low == range.high { Affine::constant(range.low) } else { Affine::free(range) };
-    Ok(Number { actual: range, exact: range, form, error: Affine::constant(0.0), grid })
+    Ok(Number { actual: range, exact: range, form, error: Affine::constant(0.0), grid, relative: None })
 }
 
-/// The reason why an operation has no enclosure.
+/// Hazard: reason why an operation has no enclosure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Problem {
     /// The divisor may be zero.
@@ -213,13 +286,13 @@ pub enum Problem {
     Overflow,
     /// The result may not fit a 32-bit integer, so that the conversion saturates and is invalid.
     Conversion,
-    /// An operand may be infinite or a NaN: a pattern of bits that says so.
+    /// An operand may have the bit pattern of an infinity or a NaN.
     NotFinite,
-    /// An operand has bits for which there is no enclosure as a number.
+    /// An operand has bits without an enclosure as a number.
     Bits,
     /// A word that may be infinite or a NaN, or has no enclosure as a number, is written to an output of binary32.
     Output,
-    /// An operand depends on a hazard that is listed.
+    /// An operand depends on a hazard that is already listed.
     Told,
 }
 
@@ -232,7 +305,7 @@ impl std::fmt::Display for Problem {
             Problem::Conversion => "the result may not fit a 32-bit integer",
             Problem::NotFinite => "an operand may be infinite or a NaN",
             Problem::Bits => "an operand is bits that nothing encloses as a number",
-            Problem::Output => "what is written to this output may be infinite or a NaN",
+            Problem::Output => "the value written to this output may be infinite or a NaN",
             Problem::Told => "an earlier problem",
         })
     }

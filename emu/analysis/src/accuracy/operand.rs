@@ -4,19 +4,20 @@
 use super::affine::Affine;
 use super::bits;
 use super::interval::Interval;
-use super::number::{INTEGERS, Number, Problem, integer};
+use super::number::{INTEGERS, Number, Problem, in_the_run, integer};
+use super::relative::Relative;
 use super::value::Value;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 use std::rc::Rc;
 use takt_isa::fp::{Bitwise, Real, SIN_LIMIT};
 
-/// Abstract operand or result: its abstract value, and the hazard in its computation, if there is one.
+/// Abstract operand or result: an abstract value, and the hazard in its computation, if any.
 #[derive(Clone, Debug)]
 pub(super) struct Operand {
-    /// The abstract value. If there is a hazard, it covers the result in that case, too, which may be anything for most operations.
+    /// Abstract value. With a hazard, it also covers the result in that case: any value, for most operations.
     pub(super) value: Value,
     pub(super) problem: Option<Problem>,
-    /// The ranges of the two terms in the run, if this is a sum.
+    /// Ranges of both terms in the run, for a sum.
     pub(super) terms: Option<[Interval; 2]>,
 }
 
@@ -37,7 +38,7 @@ impl Operand {
         self.problem.map_or_else(|| self.value.float(), Err)
     }
 
-    /// The operand as a result: the number, since the sign of a zero that its patterns of bits have may change.
+    /// Passes the operand on as a result: as a number, since its bit patterns may contain a zero whose sign changes.
     fn passed(self, number: Rc<Number>) -> Operand {
         match self.value {
             Value::Float(_) => self,
@@ -54,7 +55,7 @@ impl Operand {
         both.and_then(|(a, b)| of(&a, &b)).map_or_else(Operand::failed, Operand::float)
     }
 
-    /// Both, if an operation takes them as integers.
+    /// Abstract values of the operands, if an operation takes both as integers.
     fn wholes<'o>(&'o self, other: &'o Operand) -> Option<(&'o Value, &'o Value)> {
         match (&self.value, &other.value) {
             (Value::Whole(a), Value::Whole(b)) => Some((a, b)),
@@ -66,12 +67,12 @@ impl Operand {
         let both = self.value.extent().and_then(|a| Ok((a, other.value.extent()?)));
         match both {
             Ok((a, b)) => Operand::of(bits::decided(of(a, b))),
-            // Both results are possible: even with a NaN, a comparison gives 1 or 0.
+            // Even with a NaN, a comparison gives 1 or 0: both results are possible.
             Err(problem) => Operand { problem: Some(problem), ..Operand::of(bits::decided((true, true))) },
         }
     }
 
-    /// A function with this value and derivative.
+    /// Smooth function, given its value and its derivative on intervals.
     fn smooth(
         &self,
         value: impl Fn(Interval) -> Interval,
@@ -81,12 +82,12 @@ impl Operand {
             let exact = value(x.exact);
             let form = linear(&x.form, x.exact, &value, derivative(x.exact), exact);
             let error = x.error.scale(derivative(x.both()));
-            Ok(Number { actual: value(x.actual), exact, form, error, grid: None })
+            Ok(Number { actual: value(x.actual), exact, form, error, grid: None, relative: None })
         })
     }
 }
 
-/// A function of a form as a form, by the mean value theorem; its interval where that is narrower.
+/// Affine form of a function of a form by the mean value theorem, clipped to the function's interval where that is narrower.
 fn linear(
     form: &Affine,
     range: Interval,
@@ -100,13 +101,52 @@ fn linear(
     let middle = range.middle();
     let at = value(Interval::point(middle));
     let away = form.sub(&Affine::constant(middle));
-    // The form may reach beyond the range, the number does not.
+    // The form may exceed the range; the number does not.
     let spread = slope.radius() * range.widened(middle.abs() * f64::EPSILON).radius();
     let fixed = away.scale(Interval::point(slope.middle()));
     let line = fixed
         .add(&Affine::constant(at.middle()))
         .widened((spread + at.radius()) * (1.0 + 4.0 * f64::EPSILON));
     if line.radius() > 4.0 * hull.radius() { Affine::free(hull) } else { line }
+}
+
+/// Minimum of two numbers whose order is not known in exact arithmetic.
+fn least(a: &Number, b: &Number) -> Number {
+    let exact = a.exact.minimum(b.exact);
+    // The run takes `less`; exact arithmetic may take the other one, by what it lies below.
+    let taken = |less: &Number, other: &Number| {
+        let below = (less.exact - other.exact).high.max(0.0);
+        let by = Interval::new(0.0, below);
+        (less.form.add(&Affine::free(-by)), less.error.add(&Affine::free(by)))
+    };
+    let (form, error) = if a.actual.high <= b.actual.low {
+        taken(a, b)
+    } else if b.actual.high <= a.actual.low {
+        taken(b, a)
+    } else {
+        // The error of a minimum lies between both operands' errors.
+        (Affine::free(exact), a.error.join(&b.error))
+    };
+    let grid = a.grid.zip(b.grid).map(|(a, b)| a.min(b));
+    Number { actual: a.actual.minimum(b.actual), exact, form, error, grid, relative: Relative::minimum(a, b) }
+}
+
+/// Magnitude of a number whose sign is not known in exact arithmetic.
+pub(super) fn magnitude(x: &Number) -> Number {
+    let exact = x.exact.abs();
+    // With the run's sign, twice what the exact value lies on the other side of zero is missing.
+    let signed = |x: &Number| {
+        let by = Interval::new(0.0, 2.0 * (-x.exact.low).max(0.0));
+        (x.form.add(&Affine::free(by)), x.error.add(&Affine::free(-by)))
+    };
+    let (form, error) = if x.actual.low >= 0.0 {
+        signed(x)
+    } else if x.actual.high <= 0.0 {
+        signed(&x.negative())
+    } else {
+        (Affine::free(exact), x.error.join(&x.error.neg()))
+    };
+    Number { actual: x.actual.abs(), exact, form, error, grid: x.grid, relative: Some(Relative::of(x)) }
 }
 
 impl Add for Operand {
@@ -125,6 +165,7 @@ impl Add for Operand {
                 exact: (a.exact + b.exact).meet(form.range()),
                 error: a.error.add(&b.error),
                 grid: a.grid.zip(b.grid).map(|(a, b)| a.min(b)),
+                relative: Relative::sum(a, b),
                 form,
             })
         });
@@ -136,15 +177,7 @@ impl Neg for Operand {
     type Output = Operand;
 
     fn neg(self) -> Operand {
-        self.one(|a| {
-            Ok(Number {
-                actual: -a.actual,
-                exact: -a.exact,
-                form: a.form.neg(),
-                error: a.error.neg(),
-                grid: a.grid,
-            })
-        })
+        self.one(|a| Ok(a.negative()))
     }
 }
 
@@ -164,7 +197,7 @@ impl Mul for Operand {
 
     fn mul(self, other: Operand) -> Operand {
         self.two(&other, |a, b| {
-            // The same number, not one that looks alike: every result has a place of its own.
+            // Pointer identity means the same number (x·x): every result has its own allocation.
             let square = std::ptr::eq(a, b);
             let form = a.form.mul(&b.form);
             let (actual, exact) = match square {
@@ -172,7 +205,7 @@ impl Mul for Operand {
                 false => (a.actual * b.actual, a.exact * b.exact),
             };
             let crossed = a.form.mul(&b.error).add(&b.form.mul(&a.error));
-            // If the affine form is wider than the interval, the interval says more.
+            // Without correlations the product may be narrower; then take the interval.
             let plain = b.error.scale(a.exact).add(&a.error.scale(b.exact));
             let crossed = if plain.radius() < crossed.radius() { plain } else { crossed };
             Ok(Number {
@@ -180,6 +213,7 @@ impl Mul for Operand {
                 exact: exact.meet(form.range()),
                 error: crossed.add(&a.error.mul(&b.error)),
                 grid: a.grid.zip(b.grid).map(|(a, b)| a + b),
+                relative: Relative::product(a, b),
                 form,
             })
         })
@@ -199,11 +233,21 @@ impl Div for Operand {
             let slope = -(one / b.exact.square());
             let inverted = linear(&b.form, b.exact, &inverse, slope, inverse(b.exact));
             let form = a.form.mul(&inverted);
-            let exact = (a.exact / b.exact).meet(form.range());
+            let exact = (a.exact / b.exact).meet(form.range()).meet(quotient(&a.form, &b.form, b.exact));
             // (a + da)/(b + db) - a/b = (da - a/b·db)/(b + db).
             let error = a.error.sub(&b.error.scale(exact)).scale(one / b.actual);
-            Ok(Number { actual: a.actual / b.actual, exact, form, error, grid: None })
+            let actual = (a.actual / b.actual).meet(quotient(&in_the_run(a), &in_the_run(b), b.actual));
+            Ok(Number { actual, exact, form, error, grid: None, relative: Relative::quotient(a, b) })
         })
+    }
+}
+
+/// Range of a quotient whose terms grow together: a/b = r + (a - r·b)/b, where r removes the largest symbol of b.
+fn quotient(a: &Affine, b: &Affine, divisor: Interval) -> Interval {
+    let ratio = b.largest().map(|symbol| a.coefficient(symbol) / b.coefficient(symbol));
+    match ratio.filter(|ratio| ratio.is_finite() && *ratio != 0.0) {
+        Some(ratio) => Interval::point(ratio) + Affine::combine(a, 1.0, b, -ratio).range() / divisor,
+        None => Interval::ALL,
     }
 }
 
@@ -212,20 +256,23 @@ impl Real for Operand {
         let slope = |x: Interval| Interval::point(0.5) / x.sqrt();
         let steep = self.number().is_ok_and(|x| x.both().low <= 0.0);
         if !steep {
-            return self.smooth(Interval::sqrt, slope);
+            let relative = self.number().ok().and_then(|x| Relative::root(&x));
+            let root = self.smooth(Interval::sqrt, slope);
+            return root.one(|root| Ok(Number { relative, ..root.clone() }));
         }
         self.one(|x| {
             if x.actual.low < 0.0 {
                 return Err(Problem::Domain);
             }
             let actual = x.actual.sqrt();
-            // If the exact operand may be below zero, the run's result counts as exact.
+            // A negative exact operand has no root: the run's result counts as exact.
             let exact = if x.exact.low < 0.0 { x.exact.sqrt().hull(actual) } else { x.exact.sqrt() };
             // |√A - √a| ≤ √|A - a|.
             let most = Interval::point(x.error.range().magnitude()).sqrt().high;
             let error =
                 if x.error.is_zero() { Affine::constant(0.0) } else { Affine::constant(0.0).widened(most) };
-            Ok(Number { actual, exact, form: Affine::free(exact), error, grid: None })
+            let (form, relative) = (Affine::free(exact), Relative::root(x));
+            Ok(Number { actual, exact, form, error, grid: None, relative })
         })
     }
 
@@ -244,12 +291,18 @@ impl Real for Operand {
             let error = if y.error.is_zero() && x.error.is_zero() {
                 Affine::constant(0.0)
             } else if all_y.meets_cut(all_x) {
-                // The angle may be on one side of the cut in the run, and on the other exactly.
+                // The angles of run and exact arithmetic may lie on opposite sides of the branch cut.
                 Affine::free(actual - exact)
             } else {
                 let square = all_x.square() + all_y.square();
                 y.error.scale(all_x / square).add(&x.error.scale(-(all_y / square)))
             };
+            // An error of a share of both changes the angle by at most half of it, in whatever direction the point lies.
+            let whole = |number: &Number| Relative::of(number).whole(number.exact.abs().low);
+            let (of_y, of_x) = (whole(y), whole(x));
+            let turn = 0.6 * (of_y.share + of_x.share);
+            let turns = of_y.rest == 0.0 && of_x.rest == 0.0 && turn < 0.06 && turn < error.radius();
+            let error = if turns { Affine::constant(0.0).widened(turn) } else { error };
             let form = if y.exact.meets_cut(x.exact) {
                 Affine::free(exact)
             } else {
@@ -265,7 +318,7 @@ impl Real for Operand {
                 let line = line.add(&Affine::constant(at.middle())).widened(at.radius());
                 if line.radius() > 4.0 * exact.radius() { Affine::free(exact) } else { line }
             };
-            Ok(Number { actual, exact, form, error, grid: None })
+            Ok(Number { actual, exact, form, error, grid: None, relative: None })
         })
     }
 
@@ -280,11 +333,18 @@ impl Real for Operand {
                 return Err(Problem::Domain);
             }
             let exact = x.exact.acos();
-            // The arccosine is steepest at ±1: no step of this size changes it by more than the one there.
+            // The arccosine is steepest at ±1: a step of this size changes it by no more than it does there.
             let step = x.error.range().magnitude();
             let most = (one - Interval::point(step.min(2.0))).acos().high;
             let error = if step == 0.0 { Affine::constant(0.0) } else { Affine::constant(0.0).widened(most) };
-            Ok(Number { actual: x.actual.acos(), exact, form: Affine::free(exact), error, grid: None })
+            Ok(Number {
+                actual: x.actual.acos(),
+                exact,
+                form: Affine::free(exact),
+                error,
+                grid: None,
+                relative: None,
+            })
         })
     }
 
@@ -292,11 +352,7 @@ impl Real for Operand {
         match self.number() {
             Ok(x) if x.actual.low >= 0.0 && x.exact.low >= 0.0 => self.passed(x),
             Ok(x) if x.actual.high <= 0.0 && x.exact.high <= 0.0 => -self,
-            _ => self.one(|x| {
-                let exact = x.exact.abs();
-                let error = x.error.join(&x.error.neg());
-                Ok(Number { actual: x.actual.abs(), exact, form: Affine::free(exact), error, grid: x.grid })
-            }),
+            _ => self.one(|x| Ok(magnitude(x))),
         }
     }
 
@@ -307,7 +363,7 @@ impl Real for Operand {
                 true => Affine::constant(0.0),
                 false => Affine::free(actual - exact),
             };
-            Ok(Number { actual, exact, form: Affine::free(exact), error, grid: Some(0) })
+            Ok(Number { actual, exact, form: Affine::free(exact), error, grid: Some(0), relative: None })
         })
     }
 
@@ -315,17 +371,7 @@ impl Real for Operand {
         match self.number().and_then(|a| Ok((a, other.number()?))) {
             Ok((a, b)) if a.actual.high <= b.actual.low && a.exact.high <= b.exact.low => self.passed(a),
             Ok((a, b)) if b.actual.high <= a.actual.low && b.exact.high <= a.exact.low => other.passed(b),
-            _ => self.two(&other, |a, b| {
-                let exact = a.exact.minimum(b.exact);
-                Ok(Number {
-                    actual: a.actual.minimum(b.actual),
-                    exact,
-                    form: Affine::free(exact),
-                    // It lies between the errors of both.
-                    error: a.error.join(&b.error),
-                    grid: a.grid.zip(b.grid).map(|(a, b)| a.min(b)),
-                })
-            }),
+            _ => self.two(&other, |a, b| Ok(least(a, b))),
         }
     }
 
@@ -384,7 +430,7 @@ impl Real for Operand {
 }
 
 impl Operand {
-    /// An angle that the kernels of sine and cosine take.
+    /// Angle in the domain of the sine and cosine kernels; otherwise a hazard.
     fn bounded_angle(self) -> Operand {
         let limit = f64::from(f32::from_bits(SIN_LIMIT));
         let within = |x: &Number| x.actual.within(Interval::new(-limit, limit));

@@ -5,18 +5,19 @@ use super::FRACTION;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 use takt_isa::fp::{Bitwise, Real};
 
-/// An operand or a result: its value, its bits in the run, which decide comparisons and conversions, and the terms of its sum.
+/// Operand or result of an evaluation in binary64: its value, its bits in the run (which decide comparisons and conversions), and the terms
+/// of its sum.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Probe {
     pub(super) value: f64,
-    /// The bits of an operand in the run.
+    /// Bits of an operand in the run.
     pub(super) bits: u32,
-    /// The terms of the last addition in the operation.
+    /// Terms of the operation's last addition.
     pub(super) sum: Option<[f64; 2]>,
-    /// The exact value as a float of an operand that is used as an integer.
+    /// Exact value as a float, for an operand that is used as an integer.
     whole: Option<f64>,
-    /// The exact result of an operation on the bits of one float with an error, if the operation only scales the float by a power
-    /// of two or changes its sign.
+    /// Exact result of an operation on the bits of a float with an error, if the operation only scales the float by a power of two or
+    /// changes its sign.
     pub(super) carried: Option<f64>,
 }
 
@@ -25,13 +26,13 @@ impl Probe {
         Probe { value, bits, sum: None, whole: None, carried: None }
     }
 
-    /// True if its exact value as a float is not the run's.
+    /// The exact value as a float differs from the run's value.
     fn carries(self) -> bool {
         let exact = self.whole.unwrap_or(self.value);
         !exact.is_nan() && exact != f64::from(f32::from_bits(self.bits))
     }
 
-    /// The float scaled by the power of two that adding (or subtracting) an integer to its bits amounts to; `None` if the integer has
+    /// Float scaled by the power of two that adding an integer to its bits (`sign` = -1: subtracting) amounts to; `None` if the integer has
     /// digits of the fraction.
     fn scaled(self, by: Probe, sign: i32) -> Option<f64> {
         let (exact, _) = self.whole.zip(by.whole)?;
@@ -114,7 +115,7 @@ impl Real for Probe {
     }
 
     fn acos(self) -> Probe {
-        // If rounding has carried the operand past the edge of the domain, the arccosine of the edge is meant.
+        // Rounding may carry the operand past the edge of the domain: take the arccosine of the edge.
         Probe::of(libm::acos(self.value.clamp(-1.0, 1.0)))
     }
 
@@ -166,7 +167,7 @@ impl Real for Probe {
         if self.bits != 0 { yes } else { no }
     }
 
-    /// No number, as the row says; but masks of the sign carry an error on.
+    /// NaN, like the row's meaning in the reals; but masks of the sign bit carry an error on.
     fn bitwise(self, op: Bitwise, other: Probe) -> Probe {
         let masked = |float: Probe, mask: Probe| match (op, mask.bits) {
             _ if !float.carries() || mask.carries() => None,
@@ -187,15 +188,15 @@ mod tests {
     use takt_isa::fp::Host;
     use takt_isa::{ROWS, Type, compute, real};
 
-    /// Every row's two meanings agree up to the row's rounding, over words of all kinds.
+    /// Agreement of the two meanings of every row, up to the row's rounding, over words of all kinds.
     #[test]
-    fn a_row_means_the_same_in_both() {
+    fn binary64_and_abstract_meanings_of_rows_agree() {
         let mut random = Random::new(64);
         for row in ROWS {
             let Some(most) = row.ulp else { continue };
             let mut compared = 0;
             for _ in 0..20_000 {
-                // Numbers of like size, or anything.
+                // Numbers of like size, or arbitrary words.
                 let word = |random: &mut Random| match random.below(3) {
                     0 => random.word(),
                     _ => (random.below(1 << 20) as f32 / 3e5 - 1.7).to_bits(),
@@ -217,7 +218,7 @@ mod tests {
                     if !value.is_finite() || !exact.is_finite() || ulp(exact).is_infinite() {
                         continue;
                     }
-                    // A product and a sum in binary64 round themselves.
+                    // In binary64, the product and the sum round as well.
                     let error = (value - exact).abs() / ulp(exact);
                     assert!(error <= most + 1e-3, "{}({a:08x}, {b:08x}, {c:08x}): {error} ulp", row.mnemonic);
                 }

@@ -11,97 +11,97 @@ use takt_isa::fp::Host;
 use takt_isa::timing::Cycle;
 use takt_isa::{BundleAddress, Effect, Instruction, Program, Register, Type, compute, real};
 
-/// An operation's share of an error: the word of the program and what it adds, with its sign.
+/// An operation's share of an error, with its sign.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ErrorShare {
-    /// Index into [`Program::code`].
+    /// Word of the operation, an index into [`Program::code`].
     pub word: u32,
-    /// Its share, in the unit of the value.
+    /// Signed share, in the unit of the value.
     pub error: f64,
 }
 
-/// The largest error of a kind that an output has had.
+/// Largest error of a kind at an output.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Worst {
-    /// The error, in the unit asked for: that of the output, ulps of the exact value, or a part of it.
+pub struct LargestError {
+    /// Error in the requested unit: the output's unit, ulps of the exact value, or a fraction of it.
     pub error: f64,
-    /// The period, from 1; 0 is what runs once.
+    /// Period, from 1; 0 is the section that runs once.
     pub period: u64,
-    /// The output.
+    /// Output's value in the run.
     pub value: f64,
-    /// The same in binary64.
+    /// Output's value in binary64.
     pub exact: f64,
 }
 
-/// The errors of an output at the ends of the periods.
+/// Errors of an output at the ends of the periods.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OutputAccuracy {
-    /// Its name.
+    /// Name of the output port.
     pub name: String,
-    /// Its register.
+    /// Register of the output port.
     pub register: Register,
-    /// The largest in the output's own unit; `None` if it never was a finite number.
-    pub absolute: Option<Worst>,
-    /// The largest in ulps.
-    pub ulp: Option<Worst>,
-    /// The largest as a part of the exact value, which is not zero then.
-    pub relative: Option<Worst>,
-    /// The shares of the operations in the largest absolute error, to which they add up. The largest first.
+    /// Largest error in the output's unit; `None` if the output was never a finite number.
+    pub absolute: Option<LargestError>,
+    /// Largest error in ulps.
+    pub ulp: Option<LargestError>,
+    /// Largest error relative to the exact value; periods with an exact value of zero are left out.
+    pub relative: Option<LargestError>,
+    /// Shares of the operations in the largest absolute error, largest first; they add up to it.
     pub parts: Vec<ErrorShare>,
-    /// Periods at whose end it was compared.
+    /// Periods at whose end the output was compared.
     pub periods: u64,
 }
 
-/// The effect of an operation on accuracy.
+/// Effect of an operation on accuracy.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct OperationAccuracy {
-    /// Executions.
+    /// Times that the operation executed.
     pub count: u64,
-    /// Its own rounding at most, in ulps of its exact result.
+    /// Largest rounding error of the operation itself, in ulps of its exact result.
     pub rounding: f64,
-    /// Leading binary digits that were equal in the terms of its sum, at most, where a term carried an error: it grows by as many
-    /// digits in relation to the result.
+    /// Cancellation: most leading binary digits that the terms of its sum had in common while a term carried an error. The error relative
+    /// to the result grows by as many digits.
     pub cancelled: f64,
-    /// The period of that.
+    /// Period of the largest cancellation.
     pub cancelled_in: u64,
-    /// Executions in which a term of its sum that is not zero was too small to change the result.
+    /// Absorptions: executions in which a nonzero term of its sum was too small to change the result.
     pub absorbed: u64,
 }
 
-/// A decision of the run that binary64 would have made otherwise.
+/// Decision of the run that binary64 would have made otherwise.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Decision {
-    /// Occurrences.
+    /// Times that the decision differed.
     pub count: u64,
-    /// First in this period.
+    /// First period in which it differed.
     pub period: u64,
 }
 
-/// A loss of the comparison with binary64, which began anew there.
+/// A point at which the comparison with binary64 was lost and began anew.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Lost {
-    /// Occurrences.
+pub struct LostComparison {
+    /// Times that it was lost.
     pub count: u64,
-    /// First in this period.
+    /// First period in which it was lost.
     pub period: u64,
-    /// True if a value was infinite or a NaN; else a value with an error was taken as bits.
+    /// Cause: a value was infinite or a NaN. Otherwise, an operation took the bits of a value with an error.
     pub infinite: bool,
 }
 
-/// A register or data word.
+/// Shadow of a register or data word.
 #[derive(Clone)]
 struct Cell {
-    /// The bits of the run. If they are others now (an input, a value set by hand), the cell is out of date.
+    /// Bits in the run. If the machine holds other bits (an input, a value set by hand), the cell is out of date.
     bits: u32,
     real: f64,
-    /// By word, ascending.
+    /// Shares of the error, ascending by word.
     parts: Rc<[ErrorShare]>,
 }
 
-/// The same program in binary64, beside a run.
+/// Shadow execution: the program in binary64, beside a run.
 ///
-/// Loads, stores, jumps and operations on integers are those of the run: binary64 follows it. Wherever it would have decided
-/// otherwise, that is counted ([`Shadow::decisions`]).
+/// Loads, stores, jumps and integer operations follow the run. Decisions that binary64 would have made otherwise are counted
+/// ([`Shadow::decisions`]).
 #[derive(Clone)]
 pub struct Shadow {
     program: Rc<Program>,
@@ -111,17 +111,17 @@ pub struct Shadow {
     memory: BTreeMap<u32, Cell>,
     operations: BTreeMap<u32, OperationAccuracy>,
     decisions: BTreeMap<u32, Decision>,
-    lost: BTreeMap<u32, Lost>,
+    lost: BTreeMap<u32, LostComparison>,
     outputs: Vec<OutputAccuracy>,
     period: u64,
-    /// True if each period begins with exact values.
+    /// Values count as exact at the start of each period.
     afresh: bool,
 }
 
-/// The result of an operation.
+/// Result of an operation.
 struct Outcome {
     bits: u32,
-    /// The value in binary64, and the shares of the operations in the difference; `None` if it has no shadow.
+    /// Value in binary64, and the shares of the operations in the difference; `None` if the result has no shadow.
     shadow: Option<(f64, Vec<ErrorShare>)>,
 }
 
@@ -131,7 +131,7 @@ impl Outcome {
     }
 }
 
-/// An operand.
+/// Operand in the run and in binary64.
 struct Operand {
     bits: u32,
     value: f64,
@@ -146,7 +146,7 @@ impl Operand {
 }
 
 impl Shadow {
-    /// A shadow for a run from reset.
+    /// Shadow for a run from reset.
     pub fn new(program: &Program) -> Shadow {
         let ports = program.outputs.iter().filter(|port| port.ty == Type::F);
         let output = |port: &takt_isa::program::Port| OutputAccuracy {
@@ -177,15 +177,20 @@ impl Shadow {
         }
     }
 
-    /// Lets each period begin with exact values: errors are those of one period, which is what static bounds speak of.
+    /// Counts values as exact at the start of each period, so that errors are made within one period: static bounds are stated in this way.
     #[must_use]
     pub fn each_period_afresh(self) -> Shadow {
         Shadow { afresh: true, ..self }
     }
 
     /// Runs the machine to the next `wait` or `halt` and follows it. If the machine waits and no tick is scheduled, the tick
-    /// comes when the front end has refilled, as in [`Emulator::run_period`]. The outputs are compared at the end.  # Returns
-    /// False once the machine has halted.  # Errors The program's fault.
+    /// comes when the front end has refilled, as in [`Emulator::run_period`]. The outputs are compared at the end.
+    ///
+    /// # Returns
+    /// False once the machine has halted.
+    ///
+    /// # Errors
+    /// The program's fault.
     pub fn run_period(&mut self, emulator: &mut Emulator) -> Result<bool, Fault> {
         if let Status::Waiting { since, .. } = *emulator.status() {
             emulator.tick_at(emulator.now().max(since + Cycle::from(emulator.machine().refill)));
@@ -230,7 +235,7 @@ impl Shadow {
         }
     }
 
-    /// Begins a period.
+    /// Begins a period: counts it, and drops the shadows if each period begins afresh.
     pub fn begin_period(&mut self) {
         self.period += 1;
         if self.afresh {
@@ -239,7 +244,7 @@ impl Shadow {
         }
     }
 
-    /// Follows a bundle that issued in the cycle just passed. Registers must still hold the values that it read.
+    /// Follows a bundle that issued in the previous cycle. Registers must still hold the values that it read.
     pub fn issued(&mut self, emulator: &Emulator, address: BundleAddress) {
         let program = Rc::clone(&self.program);
         let Some(Ok(instructions)) = program.bundle(address) else { return };
@@ -276,9 +281,9 @@ impl Shadow {
                 None
             }
             Effect::Immediate => Some(Outcome::exact(instruction.constant)),
-            // The flags are an integer, which is exact.
+            // Flags are an integer, and so exact.
             Effect::ReadFlags => None,
-            // These write nothing.
+            // Control and flag operations write no register.
             Effect::ClearFlags | Effect::Nothing | Effect::Wait | Effect::Halt => None,
             Effect::Jump | Effect::BranchZero | Effect::BranchNonzero => None,
             Effect::Call | Effect::Return | Effect::Loop => None,
@@ -324,7 +329,7 @@ impl Shadow {
         if let Some(terms) = plain.sum {
             let rounder = instruction.reads().iter().any(|register| self.rounders.contains(register));
             if let Some(nearest) = rounds_to_integer(terms).filter(|_| rounder) {
-                // The sum is meant as a decision: rounding to the nearest integer.
+                // The sum counts as a decision: rounding to the nearest integer.
                 let shadow = evaluate(3).and_then(|shadow| rounds_to_integer(shadow.sum?));
                 if carries && shadow != Some(nearest) {
                     decide(&mut self.decisions, word, period);
@@ -342,7 +347,7 @@ impl Shadow {
             lose(&mut self.lost, word, period, true);
             return Outcome::exact(bits);
         }
-        // One operand after the other from its value in the run to that in binary64: the steps add up to the whole.
+        // Telescoping sum: replace the operands' values in the run by their values in binary64 one by one; each step is an operand's share.
         let mut parts: Vec<ErrorShare> = Vec::new();
         let mut before = plain.value;
         for (i, operand) in operands.iter().enumerate().filter(|(_, operand)| !operand.parts.is_empty()) {
@@ -359,7 +364,7 @@ impl Shadow {
         Outcome { bits, shadow: Some((exact, parts)) }
     }
 
-    /// The result of an operation on the bits of the one operand that has an error, which keeps it.
+    /// Result of an operation on the bits of the only operand with an error: it keeps that error.
     fn carried(&mut self, operands: &[Operand; 3], bits: u32, exact: f64, word: u32) -> Outcome {
         let value = f64::from(f32::from_bits(bits));
         let Some(operand) = operands.iter().find(|operand| operand.error() != 0.0) else {
@@ -373,14 +378,14 @@ impl Shadow {
         Outcome { bits, shadow: Some((exact, parts)) }
     }
 
-    /// Compares the outputs, at the end of a period.
+    /// Compares the outputs at the end of a period.
     pub fn compare(&mut self, emulator: &Emulator) {
         let mut outputs = std::mem::take(&mut self.outputs);
         for output in &mut outputs {
             let Some((value, exact, parts)) = self.value(emulator, output.register) else { continue };
             output.periods += 1;
             let error = (value - exact).abs();
-            let worst = |error| Worst { error, period: self.period, value, exact };
+            let worst = |error| LargestError { error, period: self.period, value, exact };
             if output.absolute.is_none_or(|known| error > known.error) {
                 output.absolute = Some(worst(error));
                 output.parts = parts.to_vec();
@@ -394,33 +399,33 @@ impl Shadow {
         self.outputs = outputs;
     }
 
-    /// A register that holds a finite number: its value, that in binary64, and where the difference comes from.
+    /// Value of a register that holds a finite number, its value in binary64, and the shares of the difference.
     pub fn value(&self, emulator: &Emulator, register: Register) -> Option<(f64, f64, Rc<[ErrorShare]>)> {
         let operand = Operand::of(self.registers.get(&register), emulator.register(register)?);
         operand.value.is_finite().then_some((operand.value, operand.real, operand.parts))
     }
 
-    /// The outputs that carry binary32, in the order of their declaration.
+    /// Accuracy of the outputs that carry binary32, in the order of their declaration.
     pub fn outputs(&self) -> &[OutputAccuracy] {
         &self.outputs
     }
 
-    /// The operations with a meaning in the reals that have been executed, by word.
+    /// Executed operations with a meaning in the reals, by word.
     pub fn operations(&self) -> &BTreeMap<u32, OperationAccuracy> {
         &self.operations
     }
 
-    /// Decisions that binary64 would have made otherwise, by the word that made them.
+    /// Decisions that binary64 would have made otherwise, by word.
     pub fn decisions(&self) -> &BTreeMap<u32, Decision> {
         &self.decisions
     }
 
-    /// Words behind which errors are not followed any more.
-    pub fn lost(&self) -> &BTreeMap<u32, Lost> {
+    /// Words at which the comparison was lost: errors are not followed beyond them.
+    pub fn lost(&self) -> &BTreeMap<u32, LostComparison> {
         &self.lost
     }
 
-    /// Periods that have begun.
+    /// Number of periods begun.
     pub fn periods(&self) -> u64 {
         self.period
     }
@@ -447,14 +452,14 @@ impl Operand {
 }
 
 impl OperationAccuracy {
-    /// Records cancellation and absorption in a sum, from its terms, the exact result and that of the run.
+    /// Records cancellation and absorption in a sum, given its terms, its exact result and the run's result.
     fn sum(&mut self, terms: [f64; 2], exact: f64, value: f64, carries: bool, period: u64) {
         let [large, small] = if terms[0].abs() >= terms[1].abs() { terms } else { [terms[1], terms[0]] };
         if small != 0.0 && value == large && exact != large {
             self.absorbed += 1;
         }
         if carries && large != 0.0 && large.is_finite() {
-            // Nothing is left: all digits that there are.
+            // An exact zero cancels all 24 digits.
             let digits = if exact == 0.0 { 24.0 } else { (large / exact).abs().log2() };
             if digits > self.cancelled.max(1.0) {
                 (self.cancelled, self.cancelled_in) = (digits, period);
@@ -463,7 +468,7 @@ impl OperationAccuracy {
     }
 }
 
-/// The nearest integer to one term of a sum, if the other is there to round it.
+/// Nearest integer to a term of a sum whose other term is a rounding constant ([`ROUNDERS`]).
 fn rounds_to_integer(terms: [f64; 2]) -> Option<f64> {
     let [a, b] = terms;
     let of = |rounder: f64, value: f64| {
@@ -484,7 +489,7 @@ fn put<K: Ord>(cells: &mut BTreeMap<K, Cell>, place: K, outcome: Outcome) {
     }
 }
 
-fn keep(known: &mut Option<Worst>, worst: Worst) {
+fn keep(known: &mut Option<LargestError>, worst: LargestError) {
     if known.is_none_or(|known| worst.error > known.error) {
         *known = Some(worst);
     }
@@ -494,11 +499,11 @@ fn decide(decisions: &mut BTreeMap<u32, Decision>, word: u32, period: u64) {
     decisions.entry(word).or_insert(Decision { count: 0, period }).count += 1;
 }
 
-fn lose(lost: &mut BTreeMap<u32, Lost>, word: u32, period: u64, infinite: bool) {
-    lost.entry(word).or_insert(Lost { count: 0, period, infinite }).count += 1;
+fn lose(lost: &mut BTreeMap<u32, LostComparison>, word: u32, period: u64, infinite: bool) {
+    lost.entry(word).or_insert(LostComparison { count: 0, period, infinite }).count += 1;
 }
 
-/// The sum of one list of shares and a multiple of another, both sorted by word.
+/// Sum of a list of shares and a multiple of another, both sorted by word.
 fn merge(a: &[ErrorShare], b: &[ErrorShare], factor: f64) -> Vec<ErrorShare> {
     let mut merged = Vec::with_capacity(a.len() + b.len());
     let (mut i, mut j) = (0, 0);

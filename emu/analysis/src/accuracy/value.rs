@@ -1,41 +1,41 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Abstract domain of the enclosures: the sets of values that a register may hold, over all runs. Abstract interpretation evaluates
-//! the meaning of instructions in it.
+//! Abstract domain of the enclosures: sets of values that a register may hold, over all runs. Abstract interpretation evaluates the meaning
+//! of instructions in it.
 
 use super::interval::Interval;
 use super::number::{Number, Problem, anything, hull, of_float, to_float};
 use std::collections::BTreeSet;
 use std::rc::Rc;
 
-/// Limit on the bit patterns that are listed one by one.
+/// Limit on the bit patterns listed for a value; beyond it, the value is [`Value::Any`].
 pub(super) const MAX_PATTERNS: usize = 1024;
 /// Abstract value: a set of values that a register may hold.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Value {
-    /// One of these bit patterns.
+    /// Finite set of bit patterns.
     Patterns(Rc<BTreeSet<u32>>),
-    /// A finite binary32.
+    /// Finite binary32 with its error.
     Float(Rc<Number>),
-    /// A signed integer. It has no error.
+    /// Signed integer, without error.
     Integer(Rc<Number>),
-    /// The same, made from a float that is known.
+    /// Signed integer computed from the bits of a known float.
     Offset(Rc<Offset>),
-    /// An operand whose bits an operation takes as an integer.
+    /// Operand whose bits an operation takes as an integer.
     Whole(Rc<Value>),
-    /// Any 32 bits.
+    /// Arbitrary 32 bits, without error.
     Any,
-    /// Any 32 bits, which depend on a hazard that is listed. As an operand of binary32 it is not listed again.
+    /// Arbitrary 32 bits that depend on a listed hazard. As an operand of binary32 they are not listed again.
     Broken,
-    /// A value from before this period, of which no range is given.
+    /// Value from an earlier period without a declared range.
     Unknown,
 }
 
-/// The bits of a float less a base; `floored`, the multiple of the least exponent at or below that.
+/// Bits of a float less a base. If `floored`: the multiple of the least exponent (2²³) at or below them.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Offset {
-    /// The integer.
+    /// Offset as a signed integer.
     pub(super) number: Number,
-    /// The float.
+    /// Float whose bits the offset is computed from; identity matters, not equality.
     pub(super) of: Rc<Number>,
     pub(super) base: f64,
     pub(super) floored: bool,
@@ -50,10 +50,10 @@ impl Value {
         if patterns.len() > MAX_PATTERNS { Value::Any } else { Value::Patterns(Rc::new(patterns)) }
     }
 
-    /// The join of a register's values on two paths that meet.
+    /// Joins a register's values on two paths that meet.
     pub(super) fn join(&self, other: &Value) -> Value {
         match (self, other) {
-            // Equality of pointers, not of contents: two equal affine forms may still be of different variables (see the product).
+            // Compare pointers instead of contents: two equal affine forms may still belong to different variables (see the product).
             (Value::Float(a), Value::Float(b)) if Rc::ptr_eq(a, b) => self.clone(),
             (Value::Offset(a), Value::Offset(b)) if Rc::ptr_eq(a, b) => self.clone(),
             (Value::Unknown, _) | (_, Value::Unknown) => Value::Unknown,
@@ -77,7 +77,7 @@ impl Value {
         }
     }
 
-    /// The value as a binary32 operand.
+    /// Value as a binary32 operand.
     pub(super) fn float(&self) -> Result<Rc<Number>, Problem> {
         match self {
             Value::Float(number) => Ok(Rc::clone(number)),
@@ -94,7 +94,7 @@ impl Value {
         }
     }
 
-    /// The value as a signed integer, which any 32 bits are.
+    /// Value as a signed integer; any 32 bits are a valid one.
     pub(super) fn whole(&self) -> Rc<Number> {
         match self {
             Value::Integer(number) => Rc::clone(number),
@@ -109,7 +109,7 @@ impl Value {
         }
     }
 
-    /// True if it is binary32 with an error, so that its bits are not those of the exact value.
+    /// Binary32 with an error: its bits differ from the exact value's.
     pub(super) fn carries(&self) -> bool {
         match self {
             Value::Float(number) => !number.error.is_zero(),
@@ -118,7 +118,7 @@ impl Value {
         }
     }
 
-    /// The values that a comparison may see, infinities included.
+    /// Values that a comparison may see, infinities included.
     pub(super) fn extent(&self) -> Result<Interval, Problem> {
         let Value::Patterns(patterns) = self else { return Ok(self.float()?.actual) };
         let values = patterns.iter().map(|bits| f64::from(f32::from_bits(*bits)));
@@ -128,7 +128,7 @@ impl Value {
             .unwrap_or(Err(Problem::NotFinite))
     }
 
-    /// Two flags: the bits may be all zero; one of them may be set.
+    /// Two flags: the bits may all be zero; some bit may be set.
     pub(super) fn tested(&self) -> (bool, bool) {
         match self {
             Value::Patterns(patterns) => (patterns.contains(&0), patterns.iter().any(|bits| *bits != 0)),

@@ -3,30 +3,30 @@
 
 use super::{MAX_PERIODS, Periods};
 
-/// The age that stands for no known dependence.
+/// Sentinel age: no dependence (as `least`), or no certain dependence (as `most`).
 const NEVER: u16 = u16::MAX;
 const CAP: u16 = MAX_PERIODS as u16;
 
-/// The abstract value of one storage place, in terms of one input.
+/// Abstract value of one storage place with respect to one input.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Cell {
-    /// The least age of a read on which the value may depend, over all paths and operands.
+    /// Least age of a read on which the value may depend, over all paths and operands.
     least: u16,
-    /// The age that is certain: on every path, the value depends on a read at most this old.
+    /// Certain age: on every path, the value depends on a read at most this old.
     most: u16,
-    /// True if the value may depend on a read of an earlier period.
+    /// The value may depend on a read of an earlier period.
     lasting: bool,
 }
 
 impl Cell {
     /// Independent of the input.
     pub(super) const NONE: Cell = Cell { least: NEVER, most: NEVER, lasting: false };
-    /// The input itself.
+    /// Value of the input port itself, read in this period.
     pub(super) const INPUT: Cell = Cell { least: 0, most: 0, lasting: false };
-    /// The bottom element: the value of a place that no path has reached so far. Joining it changes nothing.
+    /// Bottom element: the value of a place that no path has reached so far. Joining it changes nothing.
     pub(super) const BOTTOM: Cell = Cell { most: 0, ..Cell::NONE };
 
-    /// The value of a result, from its operands: either of two is enough for a certain dependence, hence the minimum.
+    /// Combines the operands of an operation: a certain dependence of one operand is certain for the result, hence the minimum.
     pub(super) fn with(self, operand: Cell) -> Cell {
         Cell {
             least: self.least.min(operand.least),
@@ -35,22 +35,22 @@ impl Cell {
         }
     }
 
-    /// The join of two control-flow paths: only what is certain on both stays certain, hence the maximum.
+    /// Joins two control-flow paths: a dependence is certain only if it is certain on both, hence the maximum.
     pub(super) fn or(self, other: Cell) -> Cell {
         Cell { most: self.most.max(other.most), ..self.with(other) }
     }
 
-    /// Joins a control dependence: it adds to the possible reads, and nothing to the certain ones.
+    /// Joins a control dependence: it adds possible reads, and no certain ones.
     pub(super) fn under(self, condition: Cell) -> Cell {
         Cell { most: self.most, ..self.with(condition) }
     }
 
-    /// The same value with nothing certain.
+    /// Drops the certain dependence and keeps the possible ones.
     pub(super) fn uncertain(self) -> Cell {
         Cell { most: NEVER, ..self }
     }
 
-    /// The same value one period later.
+    /// Ages the value by one period.
     pub(super) fn later(self) -> Cell {
         let least = if self.least == NEVER { NEVER } else { (self.least + 1).min(CAP) };
         let most = if self.most >= CAP { NEVER } else { self.most + 1 };

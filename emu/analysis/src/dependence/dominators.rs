@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Immediate dominators of a graph, by the iterative algorithm of Cooper, Harvey and Kennedy (2001).
 
-/// The immediate dominator of each node: the last node, other than itself, that lies on every path from `root` to it. The
-/// root and unreachable nodes have none. `to` lists each node's successors, `before` its predecessors; a caller that swaps the
-/// two and starts from the exit gets post-dominators.
+/// Immediate dominator of each node: the last node, other than itself, that lies on every path from `root` to it; `None` for the root and
+/// unreachable nodes. `to` lists each node's successors, `before` its predecessors; a caller that swaps the two and starts from the exit
+/// gets post-dominators.
 pub(super) fn dominators(to: &[Vec<usize>], before: &[Vec<usize>], root: usize) -> Vec<Option<usize>> {
     // Postorder by depth-first search: a node comes after its successors, back edges excepted.
     let (mut order, mut seen) = (Vec::new(), vec![false; to.len()]);
@@ -50,13 +50,13 @@ pub(super) fn dominators(to: &[Vec<usize>], before: &[Vec<usize>], root: usize) 
     found
 }
 
-/// The nearest common dominator of two nodes: climbs the dominator tree from each until they meet.
+/// Nearest common dominator of two nodes: climbs the dominator tree from each until they meet.
 fn common(found: &[Option<usize>], number: &[usize], mut one: usize, mut other: usize) -> usize {
     while one != other {
         let later = if number[one] < number[other] { &mut one } else { &mut other };
         match found[*later] {
             Some(before) if before != *later => *later = before,
-            // Only the root has no dominator, and its postorder number is the largest.
+            // The root alone has no dominator, and its postorder number is the largest.
             _ => return one.max(other),
         }
     }
@@ -68,8 +68,8 @@ mod tests {
     use super::dominators;
 
     #[test]
-    fn of_a_branch_in_a_loop() {
-        // 0 -> 1 -> 2 or 3 -> 4 -> 1 or 5
+    fn dominators_of_a_branch_in_a_loop() {
+        // Edges 0 -> 1 -> 2 or 3 -> 4 -> 1 or 5
         let to = [vec![1], vec![2, 3], vec![4], vec![4], vec![1, 5], vec![]];
         let mut before = vec![Vec::new(); to.len()];
         for (from, to) in to.iter().enumerate() {

@@ -11,90 +11,90 @@ use std::ops::Range;
 use takt_isa::spec::units::MAX_LATENCY;
 use takt_isa::{BundleAddress, Effect, Flow, Instruction, Program, Register, Slot};
 
-/// The number of a storage place: a register that is written or is an input, a data word, or other state such as the flags.
+/// Number of a storage place: a register that is written or is an input, a data word, or other state such as the flags.
 pub(super) type Storage = usize;
 
-/// The origin of a value.
+/// Origin of a value.
 #[derive(Clone, Debug)]
-pub(super) enum Reads {
-    /// These places.
+pub(super) enum ValueSource {
+    /// Storage places known from the instruction alone.
     Places(Vec<Storage>),
-    /// A word of the data memory at an address that is not constant, and the places that compute the address.
+    /// Word of the data memory at an address that is not constant, and the places that compute the address.
     Memory(Vec<Storage>),
 }
 
-/// The destination of a value.
+/// Destination of a value.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Writes {
-    /// A place.
+pub(super) enum ValueDestination {
+    /// Storage place that takes the new value alone.
     Place(Storage),
-    /// A place that also keeps its old value, as the sticky flags do.
+    /// Storage place that also keeps its old value, as the sticky flags do.
     Gathered(Storage),
-    /// A word of the data memory at an address that is not constant.
+    /// Word of the data memory at an address that is not constant.
     Memory,
 }
 
-/// The operations of a bundle; all read before any writes.
+/// Data flow of a bundle; all reads precede all writes.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Step {
-    pub(super) moves: Vec<(Reads, Writes)>,
-    /// The output ports that this bundle sends: the place of the port, and the place that holds its sent value.
+    pub(super) moves: Vec<(ValueSource, ValueDestination)>,
+    /// Output ports that this bundle sends: the place of the port, and the place that holds its sent value.
     pub(super) sends: Vec<(Storage, Storage)>,
 }
 
-/// The immediate post-dominator of a branch, where its paths meet again.
+/// Immediate post-dominator of a branch, where its paths meet again.
 #[derive(Clone, Debug)]
 pub(super) struct Gate {
-    /// The block with the branch.
+    /// Block with the branch.
     pub(super) branch: usize,
-    /// True if the branch dominates this place: every path to here passes it.
+    /// The branch dominates this place: every path to here passes it.
     pub(super) always: bool,
-    /// The places that are written between the branch and here.
+    /// Places written between the branch and here.
     pub(super) written: Vec<Storage>,
 }
 
-/// A basic block.
+/// Basic block of a period.
 #[derive(Debug, Default)]
 pub(super) struct Block {
     pub(super) before: Vec<usize>,
     pub(super) steps: Vec<Step>,
-    /// The place that its branch tests, if it ends in one.
+    /// Place tested by its final branch, if any.
     pub(super) tests: Option<Storage>,
-    /// Its control dependences: the blocks whose branches decide if it is executed.
+    /// Control dependences: blocks whose branches decide if this block executes.
     pub(super) under: Vec<usize>,
     pub(super) gates: Vec<Gate>,
-    /// True if its last bundle is a `wait`.
+    /// The last bundle is a `wait`.
     pub(super) waits: bool,
 }
 
-/// A period: the code from one bundle to its `wait`s.
+/// Period: the code from one bundle to its `wait`s.
 #[derive(Debug)]
 pub(super) struct Section {
-    /// Its blocks in topological order, back edges excepted; the first is the entry.
+    /// Blocks in topological order, back edges excepted; the first is the entry.
     pub(super) blocks: Vec<Block>,
-    /// The gates at its end: branches whose paths meet only there.
+    /// Gates at the end: branches whose paths meet only there.
     pub(super) gates: Vec<Gate>,
-    /// The periods that come next, by number.
+    /// Following periods, by number.
     pub(super) next: Vec<usize>,
 }
 
-/// All repeating periods.
+/// Graphs of all repeating periods, with the numbering of storage places.
 #[derive(Debug)]
-pub(super) struct Flat {
+pub(super) struct PeriodGraphs {
     pub(super) sections: Vec<Section>,
     pub(super) places: usize,
     pub(super) registers: BTreeMap<Register, Storage>,
-    /// The words of the data memory.
+    /// Places of the data memory's words.
     pub(super) memory: Range<Storage>,
-    /// The place of the value of a port that a write to another port sent last, and true if it is certain which value that was.
+    /// Place that holds the value of a port last sent by a write to another port; the flag says that the sent value is certain.
     pub(super) sent: BTreeMap<(Register, Register), (Storage, bool)>,
-    /// The place of the choice of the next period, if there are several.
+    /// Place for the choice of the next period, if there are several.
     pub(super) which: Option<Storage>,
-    /// The places that any period writes.
+    /// Places that any period writes.
     pub(super) written: Vec<Storage>,
 }
 
-/// A bundle under its call path.
+/// Bundle under its call path.
 struct Bundle<'g> {
     node: &'g Node,
     to: Vec<usize>,
@@ -102,14 +102,14 @@ struct Bundle<'g> {
     waits: Option<BundleAddress>,
 }
 
-impl Flat {
-    /// The graphs of a program; `None` if it is too large.
+impl PeriodGraphs {
+    /// Graphs of a program's periods; `None` if the program is too large.
     pub(super) fn new(
         program: &Program,
         sent_by: &BTreeSet<(Register, Register)>,
-    ) -> Result<Option<Flat>, BoundError> {
+    ) -> Result<Option<PeriodGraphs>, BoundError> {
         let graph = Graph::new(program)?;
-        // Worklist of periods: first those that the section after reset leads to, then those that they lead to.
+        // Worklist of periods: begins with those after the reset section, then follows their successors.
         let once = unfolded(&graph, BundleAddress::RESET)?;
         let (mut found, mut left, mut nodes) = (BTreeMap::new(), targets(&once), once.len());
         if nodes > MAX_NODES {
@@ -135,7 +135,7 @@ impl Flat {
             found.values().map(|bundles| section(&graph, bundles, &places, &numbers)).collect();
         let steps = sections.iter().flat_map(|section| &section.blocks).flat_map(|block| &block.steps);
         let written: BTreeSet<Storage> = steps.flat_map(|step| step.places(&places.memory)).collect();
-        Ok(Some(Flat {
+        Ok(Some(PeriodGraphs {
             sections,
             places: places.count,
             registers: places.registers,
@@ -151,11 +151,11 @@ fn targets(bundles: &[Bundle<'_>]) -> Vec<BundleAddress> {
     bundles.iter().filter_map(|bundle| bundle.waits).collect()
 }
 
-/// The bundles that are reachable from one, calls inlined: one entry for each call path. A search that goes beyond
-/// [`MAX_NODES`] is cut off: its result has more bundles than that, and must not be analysed.
+/// Bundles reachable from `start`, calls inlined: one entry for each call path. A search beyond [`MAX_NODES`] is cut off: its result has
+/// more bundles than that, and must not be analysed.
 fn unfolded<'g>(graph: &'g Graph<'_>, start: BundleAddress) -> Result<Vec<Bundle<'g>>, BoundError> {
     let error = |at, refusal| BoundError::new(graph.program, at, refusal);
-    // A call path is its parent path and the return address; the first is the empty path.
+    // A call path is its parent path and a return address; the first is the empty path.
     let mut calls: Vec<Option<(usize, BundleAddress)>> = vec![None];
     let mut call_numbers = HashMap::new();
     let mut numbers = HashMap::from([((0, start), 0)]);
@@ -222,7 +222,7 @@ fn prune(bundles: &mut [Bundle<'_>]) {
     }
 }
 
-/// Removes the periods that cannot repeat: those on no cycle.
+/// Removes periods that lie on no cycle, and so cannot repeat.
 fn keep_repeating(found: &mut BTreeMap<BundleAddress, Vec<Bundle<'_>>>) {
     let next: BTreeMap<BundleAddress, Vec<BundleAddress>> =
         found.iter().map(|(&address, bundles)| (address, targets(bundles))).collect();
@@ -237,7 +237,7 @@ fn keep_repeating(found: &mut BTreeMap<BundleAddress, Vec<Bundle<'_>>>) {
     });
 }
 
-/// The numbering of storage places.
+/// Numbering of storage places.
 struct Places {
     count: usize,
     registers: BTreeMap<Register, Storage>,
@@ -276,7 +276,7 @@ impl Places {
         places.count = places.registers.len();
         let first = places.count;
         places.words = words.into_iter().zip(first..).collect();
-        // The last one stands for all words that no constant address names.
+        // The last place stands for all words that no constant address names.
         places.count += places.words.len() + 1;
         places.memory = first..places.count;
         let reads_flags = instructions().any(|(instruction, _)| instruction.effect() == Effect::ReadFlags);
@@ -289,7 +289,7 @@ impl Places {
         self.count - 1
     }
 
-    /// The word that a load or store uses, if its address is a constant.
+    /// Word that a load or store uses, if its address is constant.
     fn word(&self, instruction: &Instruction) -> Option<i64> {
         let base = self.known.get(&instruction.sources[0])?;
         Some(i64::from(instruction.constant) + i64::from(base.cast_signed()))
@@ -299,7 +299,7 @@ impl Places {
         registers.iter().filter_map(|register| self.registers.get(register).copied()).collect()
     }
 
-    /// The data flow of a bundle.
+    /// Data flow of a bundle.
     fn step(&self, instructions: &[Instruction], slots: &[Slot]) -> Step {
         let mut step = Step::default();
         for (instruction, slot) in instructions.iter().zip(slots) {
@@ -309,24 +309,30 @@ impl Places {
             let (from, to) = match instruction.effect() {
                 Effect::Compute => {
                     if let Some(flags) = self.flags {
-                        step.moves.push((Reads::Places(reads.clone()), Writes::Gathered(flags)));
+                        step.moves
+                            .push((ValueSource::Places(reads.clone()), ValueDestination::Gathered(flags)));
                     }
-                    (Reads::Places(reads), to.map(Writes::Place))
+                    (ValueSource::Places(reads), to.map(ValueDestination::Place))
                 }
-                Effect::Immediate => (Reads::Places(Vec::new()), to.map(Writes::Place)),
+                Effect::Immediate => (ValueSource::Places(Vec::new()), to.map(ValueDestination::Place)),
                 Effect::Load => match word() {
-                    Some(word) => (Reads::Places(vec![word]), to.map(Writes::Place)),
-                    None => (Reads::Memory(reads), to.map(Writes::Place)),
+                    Some(word) => (ValueSource::Places(vec![word]), to.map(ValueDestination::Place)),
+                    None => (ValueSource::Memory(reads), to.map(ValueDestination::Place)),
                 },
                 Effect::Store => match word() {
-                    Some(word) => {
-                        (Reads::Places(self.of(&instruction.sources[1..2])), Some(Writes::Place(word)))
-                    }
-                    None => (Reads::Places(reads), Some(Writes::Memory)),
+                    Some(word) => (
+                        ValueSource::Places(self.of(&instruction.sources[1..2])),
+                        Some(ValueDestination::Place(word)),
+                    ),
+                    None => (ValueSource::Places(reads), Some(ValueDestination::Memory)),
                 },
-                Effect::ReadFlags => (Reads::Places(self.flags.into_iter().collect()), to.map(Writes::Place)),
-                Effect::ClearFlags => (Reads::Places(Vec::new()), self.flags.map(Writes::Place)),
-                // These write nothing.
+                Effect::ReadFlags => {
+                    (ValueSource::Places(self.flags.into_iter().collect()), to.map(ValueDestination::Place))
+                }
+                Effect::ClearFlags => {
+                    (ValueSource::Places(Vec::new()), self.flags.map(ValueDestination::Place))
+                }
+                // Control operations write no place.
                 Effect::Nothing | Effect::Wait | Effect::Halt => continue,
                 Effect::Jump | Effect::BranchZero | Effect::BranchNonzero => continue,
                 Effect::Call | Effect::Return | Effect::Loop => continue,
@@ -348,18 +354,18 @@ impl Places {
 }
 
 impl Step {
-    /// The places that the bundle may write.
+    /// Places that the bundle may write.
     pub(super) fn places(&self, memory: &Range<Storage>) -> impl Iterator<Item = Storage> {
         let moves = self.moves.iter().flat_map(|(_, to)| match to {
-            Writes::Place(place) | Writes::Gathered(place) => *place..place + 1,
-            Writes::Memory => memory.clone(),
+            ValueDestination::Place(place) | ValueDestination::Gathered(place) => *place..place + 1,
+            ValueDestination::Memory => memory.clone(),
         });
         moves.chain(self.sends.iter().map(|(_, place)| *place))
     }
 }
 
-/// True if a write to `by` always sends the value that the last preceding bundle, or its own, wrote to `port`. It may not, since
-/// writebacks come out of order if latencies differ by more than the distance of the bundles.
+/// A write to `by` always sends the value that the last preceding bundle, or its own, wrote to `port`. Writebacks that come out of order,
+/// since latencies differ by more than the distance of the bundles, break this.
 fn ordered(
     graph: &Graph<'_>,
     found: &BTreeMap<BundleAddress, Vec<Bundle<'_>>>,
@@ -376,7 +382,7 @@ fn ordered(
     found.values().all(|bundles| {
         (0..bundles.len()).all(|at| {
             let Some(own) = latency(&bundles[at], by) else { return true };
-            // A value written by the bundle of a `wait` arrives in the next period.
+            // Writes of the bundle with the `wait` arrive in the next period.
             if bundles[at].waits.is_some() {
                 return false;
             }
@@ -429,7 +435,7 @@ fn section(
         to.push(bundles[at].to.iter().filter_map(|next| block_of.get(next).copied()).collect());
         blocks.push(block);
     }
-    // A virtual exit node, after the last block, as the root of the post-dominators.
+    // Add a virtual exit node, after the last block, as the root of the post-dominators.
     let end = blocks.len();
     for (block, to) in blocks.iter().zip(&mut to) {
         to.extend(block.waits.then_some(end));
@@ -470,7 +476,7 @@ fn section(
     Section { blocks, gates: end_gates, next: next.into_iter().collect() }
 }
 
-/// True if `over` dominates `block`: every path to `block` passes it.
+/// Dominance: every path to `block` passes `over`.
 fn is_over(dominators: &[Option<usize>], over: usize, mut block: usize) -> bool {
     while let Some(next) = dominators[block].filter(|&next| next != block) {
         if next == over {
@@ -481,7 +487,7 @@ fn is_over(dominators: &[Option<usize>], over: usize, mut block: usize) -> bool 
     false
 }
 
-/// The leaders of the basic blocks, in topological order (back edges excepted).
+/// Leaders of the basic blocks, in topological order (back edges excepted).
 fn order(bundles: &[Bundle<'_>]) -> Vec<usize> {
     let begins = |bundle: usize| match bundles[bundle].before[..] {
         [before] if bundle > 0 => bundles[before].to.len() > 1,

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Data-flow analysis of response time: the number of periods after which an output follows an input.
 //!
-//! For one input port, the abstract value of every register and data word is the age, in periods, of the reads of that port
-//! on which it depends ([`Periods`]): the least age over all paths (no response comes earlier), and an age that is not
-//! exceeded on any path. A `wait` makes everything one period older. A value that is written under a branch depends on the
-//! branch's condition (control dependence, found by post-dominators). An address that is not a constant may be that of any
-//! word. `docs/analysis.md` has the argument.
+//! The abstract value of every register and data word, with respect to one input port, is the age, in periods, of the reads of that port on
+//! which it depends ([`Periods`]): the least age over all paths (no response comes earlier), and an age that is not exceeded on any path. A
+//! `wait` makes every value one period older. A value that is written under a branch depends on the branch's condition (control dependence,
+//! found by post-dominators). An address that is not constant may refer to any word. `docs/analysis.md` has the argument.
 //!
-//! Only the periods that repeat are analysed, since code that runs once, or only at first, responds to no later input.
+//! Periods that do not repeat are left out, since code that runs once, or only at first, responds to no later input.
 
 mod cell;
 mod dominators;
@@ -15,12 +14,12 @@ mod graph;
 mod solve;
 
 use crate::error::BoundError;
-use graph::Flat;
-use solve::Solved;
+use graph::PeriodGraphs;
+use solve::Solution;
 use std::collections::BTreeSet;
 use takt_isa::{Program, Register};
 
-/// The largest age that is told apart. A greater one counts as this one for the least, and as unbounded for the most.
+/// Largest age that is told apart. A greater age counts as this one for the least, and as unbounded for the most.
 pub const MAX_PERIODS: u32 = 1 << 12;
 /// Limit on the bundles of all periods, a subroutine's counted for each call path. In a larger program, every output may depend on
 /// every input.
@@ -28,24 +27,24 @@ pub const MAX_NODES: usize = 1 << 14;
 /// Limit on the iterations to the fixed point, for each input; one iteration covers one period.
 pub const MAX_ROUNDS: u32 = MAX_PERIODS + 16;
 
-/// The response time of an output, in periods after the one that reads the input.
+/// Response time of an output, in periods after the period that reads the input.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Periods {
-    /// The output cannot follow earlier; 0 means in the period of the read itself.
+    /// Least age: the output cannot follow earlier; 0 means in the period of the read itself.
     pub least: u32,
-    /// It follows by then, whatever the branches and addresses; `None` if these can delay it without end.
+    /// Greatest age: the output has followed by then on every path; `None` if branches or addresses can delay it without end.
     pub most: Option<u32>,
-    /// True if states carry the dependence on to later periods, as a filter's do.
+    /// States carry the dependence on to later periods, as a filter's do.
     pub lasting: bool,
 }
 
 impl Periods {
-    /// The response within the period of the read, always.
+    /// Response within the period of the read, always.
     pub const DIRECT: Periods = Periods { least: 0, most: Some(0), lasting: false };
-    /// The response of which nothing is known.
+    /// Response that excludes nothing, for programs that are not analysed.
     pub const UNKNOWN: Periods = Periods { least: 0, most: None, lasting: true };
 
-    /// The response to two inputs that change together: the sooner of two.
+    /// Response to two inputs that change together: the sooner of two.
     #[must_use]
     pub fn sooner(self, other: Periods) -> Periods {
         let most = match (self.most, other.most) {
@@ -56,25 +55,25 @@ impl Periods {
     }
 }
 
-/// The event with which the value of an output port leaves the machine.
+/// Event with which the value of an output port leaves the machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Sent {
-    /// Each write of the port.
+pub enum OutputEvent {
+    /// Each write of the port sends its value.
     Written,
-    /// The `wait`, for ports that are latched: it publishes what earlier bundles have written.
+    /// The `wait` sends, for latched ports: it publishes earlier bundles' writes.
     AtWait,
-    /// A write to this other output port.
+    /// A write to this other output port sends.
     By(Register),
 }
 
-/// The data-flow graph of a program; empty if nothing is known of it.
+/// Data-flow graph of a program; empty if the program is not analysed.
 #[derive(Debug)]
 pub struct Dependence {
-    flat: Option<Flat>,
+    flat: Option<PeriodGraphs>,
 }
 
 impl Dependence {
-    /// Analyses a program. `sent_by` has the pairs (port, other port) in which a write to the other port sends the first.
+    /// Analyses a program. `sent_by` holds pairs (port, other port): a write to the other port sends the first.
     ///
     /// # Errors
     /// Those of [`crate::bound`], if a loop or a call cannot be followed.
@@ -82,29 +81,29 @@ impl Dependence {
         program: &Program,
         sent_by: &BTreeSet<(Register, Register)>,
     ) -> Result<Dependence, BoundError> {
-        Ok(Dependence { flat: Flat::new(program, sent_by)? })
+        Ok(Dependence { flat: PeriodGraphs::new(program, sent_by)? })
     }
 
-    /// The dependence of every output on every input, for a program of which nothing is known.
+    /// Every output depends on every input: for programs that cannot be analysed.
     pub const fn unknown() -> Dependence {
         Dependence { flat: None }
     }
 
-    /// The dependences on an input port.
+    /// Dependences on an input port.
     pub fn on(&self, input: Register) -> Dependents<'_> {
-        Dependents { solved: self.flat.as_ref().map(|flat| Solved::new(flat, input)) }
+        Dependents { solved: self.flat.as_ref().map(|flat| Solution::new(flat, input)) }
     }
 }
 
-/// The dependences on an input port.
+/// Dependences on an input port, solved to a fixed point.
 #[derive(Debug)]
 pub struct Dependents<'a> {
-    solved: Option<Solved<'a>>,
+    solved: Option<Solution<'a>>,
 }
 
 impl Dependents<'_> {
-    /// The response time of an output port; `None` if it never follows the input.
-    pub fn output(&self, output: Register, sent: Sent) -> Option<Periods> {
+    /// Response time of an output port; `None` if it never follows the input.
+    pub fn output(&self, output: Register, sent: OutputEvent) -> Option<Periods> {
         match &self.solved {
             Some(solved) => solved.output(output, sent),
             None => Some(Periods::UNKNOWN),

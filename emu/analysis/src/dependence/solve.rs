@@ -2,34 +2,34 @@
 //! Fixed-point solver of the data-flow analysis for one input, one period per iteration.
 
 use super::cell::Cell;
-use super::graph::{Flat, Gate, Reads, Section, Step, Storage, Writes};
-use super::{MAX_ROUNDS, Periods, Sent};
+use super::graph::{Gate, PeriodGraphs, Section, Step, Storage, ValueDestination, ValueSource};
+use super::{MAX_ROUNDS, OutputEvent, Periods};
 use takt_isa::Register;
 
-/// The abstract value of every storage place.
+/// Abstract value of every storage place.
 type State = Vec<Cell>;
 
-/// The states at the end of a section, joined over all paths.
-struct Ends {
-    /// The states before the bundle with the `wait`, and after it.
+/// States at the end of a section, joined over all paths.
+struct SectionStates {
+    /// States before the bundle with the `wait`, and after it.
     before: State,
     after: State,
-    /// The least ages that the places have anywhere in the section: an output port may be read in mid-period.
+    /// Least ages of the places anywhere in the section: an output port may be read in mid-period.
     any: State,
 }
 
-/// The solution for one input: the states of [`Ends`], joined over all sections.
+/// Solution for one input: the states of [`SectionStates`], joined over all sections.
 #[derive(Debug)]
-pub(super) struct Solved<'a> {
-    flat: &'a Flat,
-    /// True if the iteration reached a fixed point.
+pub(super) struct Solution<'a> {
+    flat: &'a PeriodGraphs,
+    /// The iteration reached a fixed point.
     whole: bool,
     before: State,
     after: State,
     any: State,
 }
 
-/// Joins the state of a control-flow path into that of a block.
+/// Joins the state of a control-flow path into the state of a block.
 fn merge(into: &mut Option<State>, state: &State) {
     match into {
         None => *into = Some(state.clone()),
@@ -37,22 +37,22 @@ fn merge(into: &mut Option<State>, state: &State) {
     }
 }
 
-impl<'a> Solved<'a> {
-    pub(super) fn new(flat: &'a Flat, input: Register) -> Solved<'a> {
+impl<'a> Solution<'a> {
+    pub(super) fn new(flat: &'a PeriodGraphs, input: Register) -> Solution<'a> {
         let source = flat.registers.get(&input).copied();
         let none = || {
             let mut state = vec![Cell::NONE; flat.places];
             source.into_iter().for_each(|source| state[source] = Cell::INPUT);
             state
         };
-        let solved = |whole, before, after, any| Solved { flat, whole, before, after, any };
+        let solved = |whole, before, after, any| Solution { flat, whole, before, after, any };
         if source.is_none() {
             return solved(true, none(), none(), none());
         }
         // Start with no dependence; each iteration adds one period, and with it more dependences.
         let mut entries: Vec<State> = flat.sections.iter().map(|_| none()).collect();
         for _ in 0..MAX_ROUNDS {
-            let ends: Vec<Ends> =
+            let ends: Vec<SectionStates> =
                 flat.sections.iter().zip(&entries).map(|(section, entry)| flat.run(section, entry)).collect();
             let mut next: Vec<Option<State>> = vec![None; entries.len()];
             for (section, ends) in flat.sections.iter().zip(&ends) {
@@ -64,7 +64,7 @@ impl<'a> Solved<'a> {
             }
             let next: Vec<State> = next.into_iter().map(|state| state.unwrap_or_else(none)).collect();
             if next == entries {
-                let all = |pick: fn(&Ends) -> &State| {
+                let all = |pick: fn(&SectionStates) -> &State| {
                     let mut all = None;
                     ends.iter().for_each(|ends| merge(&mut all, pick(ends)));
                     all.unwrap_or_else(none)
@@ -81,15 +81,15 @@ impl<'a> Solved<'a> {
         solved(false, none(), none(), none())
     }
 
-    pub(super) fn output(&self, output: Register, sent: Sent) -> Option<Periods> {
+    pub(super) fn output(&self, output: Register, sent: OutputEvent) -> Option<Periods> {
         if !self.whole {
             return Some(Periods::UNKNOWN);
         }
         let place = *self.flat.registers.get(&output)?;
         let (least, most) = match sent {
-            Sent::Written => (self.any[place], self.after[place]),
-            Sent::AtWait => (self.before[place], self.before[place]),
-            Sent::By(by) => match self.flat.sent.get(&(output, by))? {
+            OutputEvent::Written => (self.any[place], self.after[place]),
+            OutputEvent::AtWait => (self.before[place], self.before[place]),
+            OutputEvent::By(by) => match self.flat.sent.get(&(output, by))? {
                 (sent, true) => (self.any[*sent], self.after[*sent]),
                 (sent, false) => {
                     let any = self.any[place].with(self.any[*sent]).uncertain();
@@ -97,19 +97,19 @@ impl<'a> Solved<'a> {
                 }
             },
         };
-        // The two come from different states: at first, an output may still hold what the previous period wrote.
+        // Least and most come from different states: at first, an output may still hold the previous period's value.
         let (least, end) = (least.periods()?, most.periods());
         let (most, lasting) = end.map_or((None, false), |end| (end.most, end.lasting));
         Some(Periods { least: least.least, most, lasting })
     }
 }
 
-impl Flat {
+impl PeriodGraphs {
     /// Runs one period from the state at its entry, to the fixed point over its loops.
-    fn run(&self, section: &Section, entry: &State) -> Ends {
+    fn run(&self, section: &Section, entry: &State) -> SectionStates {
         let blocks = &section.blocks;
         let mut after: Vec<Option<State>> = vec![None; blocks.len()];
-        // The abstract value of each block's branch condition; bottom until a path reaches it.
+        // Abstract value of each block's branch condition; bottom until a path reaches it.
         let mut tested = vec![Cell::BOTTOM; blocks.len()];
         let mut changed;
         loop {
@@ -157,7 +157,7 @@ impl Flat {
             };
             let (before, after) = (end(before_end), end(after_end));
             any.iter_mut().zip(&after).for_each(|(any, cell)| *any = any.under(*cell));
-            return Ends { before, after, any };
+            return SectionStates { before, after, any };
         }
     }
 
@@ -182,9 +182,9 @@ impl Flat {
         memory: &mut Option<Cell>,
         any: &mut State,
     ) {
-        let mut read = |from: &Reads| match from {
-            Reads::Places(from) => of_all(from, state),
-            Reads::Memory(which) => {
+        let mut read = |from: &ValueSource| match from {
+            ValueSource::Places(from) => of_all(from, state),
+            ValueSource::Memory(which) => {
                 let words = memory.get_or_insert_with(|| {
                     let words = state[self.memory.clone()].iter().copied().reduce(Cell::or);
                     words.unwrap_or(Cell::NONE)
@@ -195,9 +195,9 @@ impl Flat {
         let values: Vec<Cell> = step.moves.iter().map(|(from, _)| read(from).under(decided)).collect();
         for (&(_, to), value) in step.moves.iter().zip(values) {
             let (place, value) = match to {
-                Writes::Place(place) => (place, value),
-                Writes::Gathered(place) => (place, state[place].or(value)),
-                Writes::Memory => {
+                ValueDestination::Place(place) => (place, value),
+                ValueDestination::Gathered(place) => (place, state[place].or(value)),
+                ValueDestination::Memory => {
                     state[self.memory.clone()].iter_mut().for_each(|word| *word = word.or(value));
                     *memory = memory.map(|words| words.or(value));
                     continue;
@@ -215,7 +215,7 @@ impl Flat {
     }
 }
 
-/// The dependences of an operation that reads all these places.
+/// Dependences of an operation that reads all these places.
 fn of_all(places: &[Storage], state: &State) -> Cell {
     places.iter().fold(Cell::NONE, |all, &place| all.with(state[place]))
 }

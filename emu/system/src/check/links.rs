@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Links: their ends, their ports, and what each kind needs beside.
+//! Checks of links: their ends, their ports, and the keys of each kind.
 
 use super::{Checker, span};
 use crate::file::{FifoTable, SnapshotTable, StatusTable, WireTable};
@@ -62,7 +62,7 @@ impl Checker<'_> {
         inside
     }
 
-    /// Name, ends and latency of a link with a name.
+    /// Name, ends and latency of a named link.
     fn named(
         &mut self,
         name: &Spanned<String>,
@@ -83,7 +83,7 @@ impl Checker<'_> {
         (good && self.one_inside(sender, receiver, to.span())).then_some((sender, receiver))
     }
 
-    /// The fields of a link with a name: `port`, or `port -> port` where the two are named differently.
+    /// Fields of a named link: `port`, or `port -> port` where the two are named differently.
     fn fields(
         &mut self,
         link: &str,
@@ -113,7 +113,7 @@ impl Checker<'_> {
         (fields.len() == ports.get_ref().len()).then_some(fields)
     }
 
-    /// An output port of a core that asks for something, or `None` at the host, who has no ports.
+    /// Output port of a core that triggers an action of the link (strobe, push, pop); `None` at the host, which has no ports.
     fn action(
         &mut self,
         key: &str,
@@ -136,7 +136,7 @@ impl Checker<'_> {
             (End::Core(number), None) => {
                 let text = format!("no `{key}` port");
                 let help = format!(
-                    "`{key} = \"port\"`: the output port of `{}` whose writes do it",
+                    "`{key} = \"port\"`: the output port of `{}` whose writes trigger it",
                     self.cores[number].name
                 );
                 self.mistakes.add("port", place, text).help = Some(help);
@@ -199,7 +199,7 @@ impl Checker<'_> {
             if end == End::Host {
                 let text = format!("`{}` at the host, who has no ports", status.name());
                 self.mistakes.add("port", port.span(), text).help =
-                    Some("leave it out: the host is told in any case".to_owned());
+                    Some("leave it out: the host is notified in any case".to_owned());
                 good = false;
                 continue;
             }

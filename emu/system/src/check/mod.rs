@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! From the file to a checked description, or to what is wrong with it.
+//! Checks a system's file: returns a description, or all mistakes in the file.
 
 mod links;
 
@@ -16,37 +16,37 @@ use takt_isa::system::{Core, Description, End, Field, Link, MAX_CORES, MAX_LATEN
 use takt_isa::{Machine, Program, Type};
 use toml::Spanned;
 
-/// Cycles that a core needs between its ticks beside those in which its snapshots go in.
+/// Least cycles between the ticks of a core, besides the cycles in which its snapshots enter.
 const LEAST_PERIOD: u64 = 16;
-/// The name of what is outside.
+/// Name that files use for the host as a link's end.
 const HOST: &str = "host";
 
-/// A core's program, as the file asks for it.
+/// Request for a core's program, as the file names it.
 pub struct Request<'a> {
-    /// Its path, as the file has it: relative to the file's folder.
+    /// Path as written in the file: relative to the file's folder.
     pub path: &'a str,
-    /// The machine, if the file names one.
+    /// Machine, if the file names one.
     pub machine: Option<&'static Machine>,
 }
 
-/// An error that leaves no program.
+/// Reason why there is no program.
 #[derive(Debug)]
 pub enum ProgramError<E> {
-    /// It is not there, or cannot be read: a mistake of the system's file.
+    /// The program is not there, or cannot be read: a mistake of the system's file.
     Missing {
-        /// The mistake, in words.
+        /// Description of the mistake.
         message: String,
-        /// The mend, if it is known.
+        /// Suggested correction, if known.
         help: Option<String>,
     },
-    /// It has mistakes of its own.
+    /// The program has mistakes of its own.
     Invalid(E),
 }
 
-/// An error that leaves no description.
+/// Reason why there is no description.
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError<E> {
-    /// Mistakes in the file, in its order.
+    /// Mistakes in the file, in the order of their places.
     #[error("{}", .0.render(false))]
     Mistakes(Diagnostics),
     /// A program has mistakes of its own.
@@ -54,11 +54,11 @@ pub enum ReadError<E> {
     Program(E),
 }
 
-/// Reads a system's file, whose text is at most [`TEXT_BYTES`](crate::TEXT_BYTES) long. `load` gets each program. Machines of files
-/// need [`read_with`].
+/// Reads a system's file, whose text is at most [`TEXT_BYTES`](crate::TEXT_BYTES) long. `load` loads each program. Machines from files need
+/// [`read_with`].
 ///
 /// # Errors
-/// The mistakes in a file, all that can be told at once.
+/// The mistakes in the file, as many as can be found at once.
 pub fn read<E>(
     name: &str,
     text: &str,
@@ -67,10 +67,11 @@ pub fn read<E>(
     read_with(name, text, |_| Err("machines of files cannot be read here".to_owned()), load)
 }
 
-/// As [`read`]; `machines` gives the bytes of a machine's file, whose path is as the system's file has it: relative to its folder.
+/// Reads a system's file like [`read`]; `machines` returns the bytes of a machine's file, given its path as written in the system's file:
+/// relative to the system file's folder.
 ///
 /// # Errors
-/// The same.
+/// The mistakes in the file, like [`read`].
 pub fn read_with<E>(
     name: &str,
     text: &str,
@@ -102,7 +103,7 @@ pub fn read_with<E>(
     }
 }
 
-/// The file's tables. A function of its own, so that its parser is compiled here and not with each caller of [`read`].
+/// Parses the file's tables. A function of its own, so that the parser is compiled here and not with each caller of [`read`].
 fn parse(text: &str) -> Result<File, toml::de::Error> {
     toml::from_str(text)
 }
@@ -111,7 +112,7 @@ fn span(range: Range<usize>) -> Span {
     Span::new(range.start as u32, range.end as u32)
 }
 
-/// The message of the reader of TOML.
+/// Diagnostic for an error of the TOML parser.
 fn syntax(error: &toml::de::Error, text: &str) -> Diagnostic {
     let diagnostic = toml_mistake(error, text);
     let has = |file: &toml::Table, keys: &[&str]| keys.iter().any(|key| file.contains_key(*key));
@@ -144,28 +145,28 @@ impl Mistakes {
     }
 }
 
-/// The place where something was named first.
+/// Place of each name's first definition.
 type Places = HashMap<String, Range<usize>>;
 
 struct Checker<'m> {
     mistakes: &'m mut Mistakes,
     cores: Vec<Core>,
-    /// Cores by name; `None` for one whose own mistakes are told already.
+    /// Cores by name; `None` for a core whose mistakes have been reported.
     names: BTreeMap<String, Option<usize>>,
     links: Vec<Link>,
-    /// Links of latency 0, with their places.
+    /// Links of latency 0, with their places in the file.
     zero: Vec<(usize, Range<usize>)>,
     link_names: Places,
-    /// The driver of an input port, or of an output of the system: `core.port`.
+    /// Place of the driver of each input port (`core.port`) and each output of the system.
     driven: Places,
-    /// The inputs that the host drives, each with its type.
+    /// Inputs driven by the host, each with its type.
     host_types: HashMap<String, Type>,
 }
 
-/// A port that a link ends at.
-struct Found {
+/// Port at a link's end.
+struct EndPort {
     name: String,
-    /// None of the host's.
+    /// Core's port; `None` at the host, whose ports have names alone.
     port: Option<Port>,
 }
 
@@ -245,7 +246,7 @@ impl<'m> Checker<'m> {
         number
     }
 
-    /// True if a name can be one; if not, that is said.
+    /// Checks a name; reports an invalid one.
     fn name(&mut self, name: &Spanned<String>, what: &str) -> bool {
         let text = name.get_ref();
         let letters = |c: char| c.is_ascii_alphanumeric() || c == '_';
@@ -257,8 +258,9 @@ impl<'m> Checker<'m> {
             self.mistakes.add("name", name.span(), format!("`{text}` is no name for a {what}")).help =
                 Some(help.to_owned());
         } else if text == HOST {
-            self.mistakes.add("name", name.span(), format!("`{HOST}` is what is outside, no {what}")).help =
-                Some("another name".to_owned());
+            self.mistakes
+                .add("name", name.span(), format!("`{HOST}` stands for the outside and is no {what}"))
+                .help = Some("another name".to_owned());
         }
         good && text != HOST
     }
@@ -307,7 +309,7 @@ impl<'m> Checker<'m> {
                     if let MachineMistake::Name(error) = &mistake
                         && let Some((unknown, known)) = error.unknown()
                     {
-                        // One line of help, as for other names of the file.
+                        // Keep the help to one line, as for other names in the file.
                         let near = nearest(unknown, known.iter().copied());
                         diagnostic.notes.clear();
                         *diagnostic = diagnostic
@@ -334,7 +336,7 @@ impl<'m> Checker<'m> {
         Ok(Some(Core { name: name.clone(), path, program, every, offset }))
     }
 
-    /// The end of this name; `None` if there is no such core, which is said unless its own mistakes are.
+    /// End with this name; reports an unknown core. Returns `None` without a report for a core whose own mistakes have been reported.
     fn end(&mut self, name: &str, place: Range<usize>) -> Option<End> {
         if name == HOST {
             return Some(End::Host);
@@ -349,8 +351,8 @@ impl<'m> Checker<'m> {
         None
     }
 
-    /// The port of this name at an end.
-    fn port(&mut self, end: End, name: &str, input: bool, place: Range<usize>) -> Option<Found> {
+    /// Port with this name at an end.
+    fn port(&mut self, end: End, name: &str, input: bool, place: Range<usize>) -> Option<EndPort> {
         let End::Core(number) = end else {
             let spanned = name.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_')
                 && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
@@ -358,7 +360,7 @@ impl<'m> Checker<'m> {
                 self.mistakes.add("name", place, format!("`{name}` is no name for a port"));
                 return None;
             }
-            return Some(Found { name: name.to_owned(), port: None });
+            return Some(EndPort { name: name.to_owned(), port: None });
         };
         let core = &self.cores[number];
         let (ports, others) = match input {
@@ -366,7 +368,7 @@ impl<'m> Checker<'m> {
             false => (&core.program.outputs, &core.program.inputs),
         };
         if let Some(port) = ports.iter().find(|port| port.name == name) {
-            return Some(Found { name: name.to_owned(), port: Some(port.clone()) });
+            return Some(EndPort { name: name.to_owned(), port: Some(port.clone()) });
         }
         let kind = |input| if input { "input" } else { "output" };
         let near = nearest(name, ports.iter().map(|port| port.name.as_str()));
@@ -384,7 +386,7 @@ impl<'m> Checker<'m> {
         None
     }
 
-    /// Notes what drives a core's input port, or a port of the system's; false if something does already, which is said.
+    /// Records the driver of a core's input port or of an output of the system. Returns false and reports a second driver.
     fn drive(&mut self, end: End, link: Option<&str>, name: &str, place: Range<usize>) -> bool {
         let (key, what) = match (end, link) {
             (End::Core(number), _) => (format!("{}.{name}", self.cores[number].name), "input port"),
@@ -402,11 +404,11 @@ impl<'m> Checker<'m> {
         true
     }
 
-    /// A field from a port to a port, where `from` and `to` are there.
+    /// Field from port to port, if both exist.
     fn field(
         &mut self,
-        (from, from_place): (Option<Found>, Range<usize>),
-        (to, to_place): (Option<Found>, Range<usize>),
+        (from, from_place): (Option<EndPort>, Range<usize>),
+        (to, to_place): (Option<EndPort>, Range<usize>),
         ends: (End, End),
     ) -> Option<Field> {
         let (from, to) = (from?, to?);
@@ -436,14 +438,14 @@ impl<'m> Checker<'m> {
             }
             _ => 0,
         };
-        let register = |found: &Found| found.port.as_ref().map(|port| port.register);
+        let register = |found: &EndPort| found.port.as_ref().map(|port| port.register);
         let (output, input) = (register(&from), register(&to));
         Some(Field { from: from.name, output, to: to.name, input, ty, initial })
     }
 
     fn latency(&mut self, value: Option<&Spanned<i64>>) -> Option<u64> {
         let Some(value) = value else { return Some(MIN_LATENCY) };
-        // Zero is told where loops are looked for, if there is one.
+        // A latency of zero is reported later, with the loop that it closes, if any.
         if *value.get_ref() == 0 {
             return Some(0);
         }
@@ -463,7 +465,7 @@ impl<'m> Checker<'m> {
         self.links.push(link);
     }
 
-    /// Tells of latencies of 0: of a loop once, at its first link.
+    /// Reports latencies of 0; a loop of such links once, at its first link.
     fn zero_latencies(&mut self) {
         let mut told: Vec<Vec<String>> = Vec::new();
         for (number, place) in std::mem::take(&mut self.zero) {
@@ -486,7 +488,7 @@ impl<'m> Checker<'m> {
         }
     }
 
-    /// The way back from where a link of zero latency leads to where it comes from, over others of zero latency.
+    /// Cycle of zero-latency links through this link: the cores on the path back from its receiver to its sender.
     fn closed(&self, last: &Link) -> Option<Vec<String>> {
         let mut ways = vec![vec![last.to]];
         let mut seen = vec![last.to];
@@ -509,7 +511,7 @@ impl<'m> Checker<'m> {
         None
     }
 
-    /// Input ports that nothing drives.
+    /// Reports input ports without a driver.
     fn undriven(&mut self, file: &File) {
         for core in &self.cores {
             let free = |port: &&Port| !self.driven.contains_key(&format!("{}.{}", core.name, port.name));

@@ -3,14 +3,14 @@
 
 use takt_isa::timing::Cycle;
 
-/// Ways from an input to an output at most.
+/// Limit on the paths from an input to an output.
 pub const MAX_WAYS: u64 = 4096;
-/// Links that are followed at most, to find them.
+/// Limit on the links followed in the search for paths.
 pub const MAX_STEPS: u64 = 1 << 18;
-/// Phases of the ticks to each other that are gone through at most, over all ways.
+/// Limit on the phases of the ticks relative to each other, over all paths.
 pub const MAX_PHASES: u64 = 1 << 18;
 
-/// An error that leaves no bound.
+/// Reason why there is no bound.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum LatencyError {
     /// A period can end too late for the next tick.
@@ -18,19 +18,19 @@ pub enum LatencyError {
         "core {core}: a period can take {worst} cycles, and must take fewer than {period} to keep its tick"
     )]
     Deadline {
-        /// The core.
+        /// Name of the core.
         core: String,
-        /// The worst of its periods.
+        /// Worst case over its periods, in cycles.
         worst: Cycle,
-        /// The limit that it must stay below.
+        /// Limit in cycles that the worst case must stay below.
         period: Cycle,
     },
-    /// Too many ways or phases.
+    /// Too many paths or phases.
     #[error("more than {limit} {what}")]
     Limit {
-        /// The limit.
+        /// Value of the limit, in units of `what`.
         limit: u64,
-        /// Of what.
+        /// Unit of the limit, in the plural.
         what: &'static str,
     },
 }

@@ -1,54 +1,54 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Bounds of the time that a host's command takes to reach an output, over cores and links.
+//! Bounds on the time from a host's command to its effect on an output, over cores and links.
 //!
-//! A core that gets a value reads it in its next period and writes what follows from it by that period's end, or as many periods later
-//! as its states take ([`takt_analysis::dependence`]); links and ticks add what `docs/system.md` says. Ticks come on one grid, so that
-//! the way from core to core is followed for every phase that they can have to each other, and not taken as the sum of the worst of each.
+//! A core reads an arriving value in its next period and writes the results by that period's end, or as many periods later as its states
+//! take ([`takt_analysis::dependence`]); links and ticks add the delays of `docs/system.md`. Ticks come on one grid: the path from core to
+//! core is followed for every phase that they can have to each other, which is tighter than a sum of each core's worst case.
 
-mod carried;
+mod dependences;
 mod limits;
-mod pass;
+mod passages;
 
 pub use limits::{LatencyError, MAX_PHASES, MAX_STEPS, MAX_WAYS};
-pub use pass::{Pass, Passages, Route};
+pub use passages::{Pass, Passages, Route};
 
-use pass::{at_once, carry, contention};
+use passages::{at_once, carry, contention};
 use takt_analysis::Bounds;
 use takt_isa::system::{Description, LinkKind};
 use takt_isa::timing::Cycle;
 
-/// Ends among which the least time is looked for, at most, for one phase.
+/// Limit on the ends tried in the search for the least time, for one phase.
 const MAX_ENDS: u32 = 64;
 
-/// A way from a host's command to an output, and how long its first response takes.
+/// Path from a host's command to an output, and the time of the first response.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Latency {
-    /// The system's inputs that begin it, of one link.
+    /// Inputs of the system at which the path begins, on one link.
     pub inputs: Vec<String>,
-    /// The system's outputs that end it, of one link: each follows each of `inputs`.
+    /// Outputs of the system at which the path ends, on one link: each follows each of `inputs`.
     pub outputs: Vec<String>,
-    /// The links, in order.
+    /// Links along the path, by index.
     pub links: Vec<usize>,
-    /// The cores between them.
+    /// Cores between the links.
     pub cores: Vec<usize>,
-    /// For each core, through how many of its periods states carry the value at least: 0 if it can pass directly.
+    /// Least number of periods through which states of each core carry the value: 0 if it can pass directly.
     pub least_states: Vec<u32>,
-    /// Through how many at most; none if branches, or addresses of data memory, can put the response off without end.
+    /// Greatest number of periods; `None` if branches, or addresses of data memory, can delay the response without end.
     pub most_states: Option<Vec<u32>>,
-    /// True if states carry the value on to periods after the first response.
+    /// States carry the value on to periods after the first response.
     pub lasting: bool,
-    /// The FIFOs among the links. They are taken to be empty.
+    /// FIFOs among the links, assumed to be empty.
     pub queues: Vec<usize>,
-    /// No command takes fewer cycles.
+    /// Lower bound in cycles, for every command.
     pub best: Cycle,
-    /// None takes more, if FIFOs are empty, and provided that the value passes through the least states where the most are not known.
+    /// Upper bound in cycles, if FIFOs are empty; where `most_states` is unknown, for a value that passes through the least states.
     pub worst: Cycle,
 }
 
 impl Latency {
-    /// True if the first response is there so many cycles after the command; `None` if that is not certain, because branches or addresses
-    /// decide when it comes, or what is queued in a FIFO. With `empty`, the caller says that FIFOs are empty.
-    pub fn kept(&self, deadline: Cycle, empty: bool) -> Option<bool> {
+    /// The first response meets a deadline of `deadline` cycles after the command; `None` if that is uncertain, because branches or
+    /// addresses decide when it comes, or because of entries queued in a FIFO. With `empty`, the caller promises that FIFOs are empty.
+    pub fn meets_deadline(&self, deadline: Cycle, empty: bool) -> Option<bool> {
         match self.worst <= deadline {
             false => Some(false),
             true => (self.most_states.is_some() && (empty || self.queues.is_empty())).then_some(true),
@@ -56,10 +56,10 @@ impl Latency {
     }
 }
 
-/// Bounds of every way from an input of the system to an output, each core's sections being bounded by `bounds`.
+/// Bounds of every path from an input of the system to an output; `bounds` holds each core's sections.
 ///
 /// # Errors
-/// If a core can miss its tick, or there are too many ways.
+/// If a core can miss its tick, or there are too many paths.
 pub fn latencies(description: &Description, bounds: &[Bounds]) -> Result<Vec<Latency>, LatencyError> {
     let passages = Passages::new(description, bounds);
     if let Some(error) = (0..description.cores.len()).find_map(|core| passages.deadline(core)) {
@@ -79,8 +79,8 @@ fn measure(passages: &Passages<'_>, route: Route) -> Latency {
         let link = &description.links[head];
         for phase in 0..route.phases / description.cores[first].every {
             let tick = grid.offset + phase as i64 * grid.period;
-            // For the best case, as late as it can be for this tick, or for the period that begins with it; for the worst, just too late
-            // for the tick.
+            // Best case: the latest start for this tick, or for the period that begins with it. Worst case: a start just too late for the
+            // tick.
             let start = tick - carry(description, link);
             let runs =
                 passages.span(first).filter(|_| at_once(description, link)).map_or(0, |(_, worst)| worst);
@@ -95,7 +95,7 @@ fn measure(passages: &Passages<'_>, route: Route) -> Latency {
     };
     let mut inputs: Vec<String> = names(head, description.inputs(), &route.inputs);
     if inputs.is_empty() {
-        // A value that goes on several wires.
+        // The host's input drives several wires.
         inputs.extend(description.links[head].fields.first().map(|field| field.from.clone()));
     }
     let outputs = names(tail, description.outputs(), &route.outputs);
@@ -114,22 +114,22 @@ fn measure(passages: &Passages<'_>, route: Route) -> Latency {
     }
 }
 
-/// The cycle in which the host sees what these passages lead to.
+/// Cycle in which the host sees the result of these passages.
 fn end(passages: &Passages<'_>, way: &[usize], passes: &[Pass]) -> i64 {
     let [.., last] = way else { return 0 };
     let description = passages.description();
     passes.last().map_or(0, |pass| pass.leaves) + carry(description, &description.links[*last])
 }
 
-/// The least time that a command takes if it is given in one of the cycles from `first` to `last`.
+/// Least time of a command that is given in one of the cycles from `first` to `last`.
 fn least(passages: &Passages<'_>, route: &Route, first: i64, last: i64) -> i64 {
     let way = &route.links;
     let end = |start| end(passages, way, &passages.fastest(route, start));
-    // No start can save what the links take, and a cycle in each core between them.
+    // Floor: the links' delays, and a cycle in each core between.
     let description = passages.description();
     let carries = way.iter().map(|link| carry(description, &description.links[*link]) + 1);
     let floor = carries.sum::<i64>() - 1;
-    // A later start never ends earlier, so of all starts with the same end the last is the best.
+    // Ends are monotonic in starts: of all starts with the same end, the last is the best.
     let (mut start, mut best, earliest) = (last, i64::MAX, end(first));
     for _ in 0..MAX_ENDS {
         let at = end(start);

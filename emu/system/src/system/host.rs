@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The host's actions between runs.
+//! Actions of the host between runs.
 
 use super::{HostAction, HostError, LinkEventKind, LinkState, System};
 use std::sync::Arc;
@@ -13,8 +13,8 @@ impl System {
         }
     }
 
-    /// Writes an input of the system: it is on its way from now on. A field of a snapshot or of a FIFO waits for
-    /// [`System::publish`], [`System::push`].
+    /// Writes an input of the system, which goes onto its link now. A field of a snapshot or of a FIFO waits for [`System::publish`],
+    /// [`System::push`].
     ///
     /// # Errors
     /// If there is no such input.
@@ -49,10 +49,10 @@ impl System {
         Ok(())
     }
 
-    /// Publishes the host's values of a snapshot.
+    /// Publishes the values of a snapshot that the host has set.
     ///
     /// # Errors
-    /// If it is no snapshot from the host.
+    /// If the link is no snapshot from the host.
     pub fn publish(&mut self, link: usize) -> Result<(), HostError> {
         let description = Arc::clone(&self.description);
         let now = self.now;
@@ -73,11 +73,11 @@ impl System {
         }
     }
 
-    /// Puts the host's values of a FIFO into it. False if that makes it overflow, as far as the host can know: entries on
-    /// their way count, room that is made meanwhile does not.
+    /// Pushes the host's values into a FIFO. Returns false if the FIFO overflows, as far as the host can know: entries on their way count,
+    /// room that is made meanwhile does not.
     ///
     /// # Errors
-    /// If it is no FIFO from the host.
+    /// If the link is no FIFO from the host.
     pub fn push(&mut self, link: usize) -> Result<bool, HostError> {
         let description = Arc::clone(&self.description);
         let now = self.now;
@@ -97,10 +97,10 @@ impl System {
         }
     }
 
-    /// Takes the head of a FIFO to the host; `None` if it is empty.
+    /// Pops the head of a FIFO to the host; `None` if the FIFO is empty.
     ///
     /// # Errors
-    /// If it is no FIFO to the host.
+    /// If the link is no FIFO to the host.
     pub fn pop(&mut self, link: usize) -> Result<Option<Vec<u32>>, HostError> {
         let description = Arc::clone(&self.description);
         let now = self.now;
@@ -120,7 +120,7 @@ impl System {
         }
     }
 
-    /// Does what a host did, as [`System::host_actions`] has it. False if a FIFO was full, or empty.
+    /// Repeats a recorded action ([`System::host_actions`]). Returns false if a FIFO was full, or empty.
     ///
     /// # Errors
     /// If the system has no such input or link.
@@ -133,7 +133,7 @@ impl System {
         }
     }
 
-    /// The bits that the host sees on an output of the system: of a FIFO its head, 0 while it is empty.
+    /// Bits that the host sees on an output of the system; for a FIFO, its head's, 0 while it is empty.
     ///
     /// # Errors
     /// If there is no such output.
@@ -148,18 +148,18 @@ impl System {
         })
     }
 
-    /// As [`System::output`], as a number of the port's type.
+    /// Value of an output like [`System::output`], as a number of the port's type.
     ///
     /// # Errors
-    /// As there.
+    /// If there is no such output.
     pub fn output_number(&self, name: &str) -> Result<Number, HostError> {
         let bits = self.output(name)?;
         let ty = self.description.outputs().iter().find(|port| port.name == name).map(|port| port.ty);
         Ok(ty.map_or(Number::Bits(bits), |ty| Number::of(ty, bits)))
     }
 
-    /// As [`System::output`], by link and field as [`Description::outputs`](crate::Description::outputs) has them: for who
-    /// looks in every tick. `None` if there is no such field.
+    /// Bits of an output by link and field, like [`Description::outputs`](crate::Description::outputs), for callers that poll in every
+    /// tick. `None` if there is no such field.
     pub fn field_bits(&self, link: usize, field: usize) -> Option<u32> {
         match self.links.get(link)? {
             LinkState::Wire { shown, .. } => (field == 0).then_some(*shown),

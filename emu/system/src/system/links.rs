@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Values on their way over links, from one core's output ports to another's input ports.
+//! Transport of values over links, from one core's output ports to another's input ports.
 
 use super::{LinkEvent, LinkEventKind, LinkState, System, latched};
 use crate::fifo::Change;
@@ -10,13 +10,14 @@ use takt_isa::system::{End, Field, Link, LinkKind, Side, Source, Status as FifoS
 use takt_isa::timing::{Cycle, ENDED_DELAY};
 
 impl System {
-    /// Lets a FIFO do what is known of both sides; the cycles that are done.
+    /// Performs a FIFO's pending actions up to the cycle known of both sides. Returns the number of cycles done.
     pub(super) fn carry_out(&mut self, number: usize) -> Cycle {
         let link = &self.description.links[number];
-        let end = (self.known(link.from) + link.transit()).min(self.known(link.to)).min(self.until);
+        let end =
+            (self.known_until(link.from) + link.transit()).min(self.known_until(link.to)).min(self.until);
         let LinkState::Fifo { fifo, .. } = &mut self.links[number] else { return 0 };
         if fifo.next_cycle().is_none_or(|cycle| cycle >= end) {
-            // Nearly always.
+            // Fast path: no action is pending in these cycles.
             fifo.done = fifo.done.max(end);
             return fifo.done;
         }
@@ -71,7 +72,7 @@ impl System {
         }
     }
 
-    /// A value arrives at a core's gate.
+    /// Delivers a value to a core's gate.
     pub(super) fn arrive(&mut self, core: usize, cycle: Cycle, source: Source, value: u32) {
         let state = &mut self.cores[core];
         if let Some(mailbox) = state.mailboxes.iter().position(|mailbox| mailbox.source == source) {
@@ -79,7 +80,7 @@ impl System {
         }
     }
 
-    /// A field of a wire arrives.
+    /// Delivers a field of a wire to its receiver.
     pub(super) fn deliver(&mut self, number: usize, cycle: Cycle, field: usize, value: u32) {
         self.event(cycle, number, LinkEventKind::Value(value));
         match self.description.links[number].to {
@@ -92,11 +93,11 @@ impl System {
         }
     }
 
-    /// Takes the snapshots for a core's next tick, and lets the tick come; false if a sender is not far enough.
+    /// Takes the snapshots for a core's next tick and schedules the tick. Returns false if a sender has not run far enough.
     pub(super) fn take(&mut self, core: usize, cycle: Cycle) -> bool {
         let description = Arc::clone(&self.description);
         let here = |link: &&Link| link.is_snapshot() && link.to == End::Core(core);
-        let far = |link: &Link| self.known(link.from) + ENDED_DELAY + link.transit() >= cycle;
+        let far = |link: &Link| self.known_until(link.from) + ENDED_DELAY + link.transit() >= cycle;
         if !description.links.iter().filter(here).all(far) {
             return false;
         }
@@ -125,7 +126,7 @@ impl System {
         true
     }
 
-    /// Shows what was published of a snapshot and can be seen in a cycle.
+    /// Makes the newest published values of a snapshot that can be seen in a cycle the shown ones.
     pub(super) fn see(&mut self, number: usize, cycle: Cycle) {
         if let LinkState::Snapshot { published, shown, .. } = &mut self.links[number] {
             while let Some((_, values)) = published.pop_front_if(|(first, _)| *first <= cycle) {
@@ -134,7 +135,7 @@ impl System {
         }
     }
 
-    /// Lets values arrive at the host.
+    /// Delivers arrived values to the host.
     pub(super) fn show(&mut self) {
         for number in 0..self.links.len() {
             if matches!(self.links[number], LinkState::Fifo { .. }) {
@@ -151,12 +152,12 @@ impl System {
         }
     }
 
-    /// Puts on the links what a core has written, and what its `wait` in cycle `waited` publishes.
+    /// Puts a core's writes onto the links, and the values that its `wait` in cycle `waited` publishes.
     pub(super) fn send(&mut self, core: usize, writes: &[PortWrite], waited: Option<Cycle>) {
         if writes.is_empty() && waited.is_none() {
             return;
         }
-        // They may change what it sees itself.
+        // The core's own writes may change the FIFOs that it sees.
         self.cores[core].known = 0;
         let description = Arc::clone(&self.description);
         let here = End::Core(core);
@@ -240,8 +241,8 @@ impl System {
     }
 }
 
-/// Follows a core's writes to the fields of a link, and tells what they are whenever `action` is written. What is written in
-/// the same cycle counts.
+/// Applies a core's writes to the fields of a link, and calls `tell` with all fields whenever `action` is written. Writes of fields in the
+/// same cycle count.
 fn follow(
     link: &Link,
     action: Register,

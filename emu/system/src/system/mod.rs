@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The emulator of a system. Each core runs ahead on its own until it needs to know what another one did.
+//! Emulator of a system. Each core runs ahead on its own until it needs to know what another core did.
 //!
-//! A core's reads of linked inputs are where it can see others, and nothing arrives earlier than [`MIN_LATENCY`](crate::MIN_LATENCY) cycles
-//! after it was sent. So a core runs to the next bundle that reads such an input whose value is not known yet (or tick that takes
-//! one), and goes on once every sender has come within the link's latency of that cycle. The core that is behind all others can
-//! always go on.
+//! Reads of linked inputs are the only places at which a core sees others, and no value arrives earlier than
+//! [`MIN_LATENCY`](crate::MIN_LATENCY) cycles after it was sent. So a core runs to the next bundle that reads such an input with an unknown
+//! value (or to a tick that takes a snapshot), and goes on once every sender has come within the link's latency of that cycle. The core
+//! that is farthest behind can always go on.
 
 mod host;
 mod links;
@@ -19,89 +19,89 @@ use takt_isa::system::{Description, End, Link, LinkKind, Mailbox, Source, Status
 use takt_isa::timing::Cycle;
 use takt_isa::{BundleAddress, Program, Register};
 
-/// A core that stopped with a fault: the system stands.
+/// Fault of a core, which stops the whole system.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("core {name}: {fault}")]
 pub struct SystemFault {
-    /// The core.
+    /// Index of the core.
     pub core: usize,
-    /// Its name.
+    /// Name of the core.
     pub name: String,
-    /// The core's own fault.
+    /// Fault of the core's program.
     #[source]
     pub fault: Fault,
 }
 
-/// An error of the host's.
+/// An error of the host's request.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum HostError {
-    /// The system has no such port or link at the host.
+    /// A port or link that the system does not have at the host.
     #[error("the system has no {what} `{name}`")]
     Unknown {
-        /// `input`, `output`, `snapshot from the host`, ….
+        /// Kind of the missing port or link: `input`, `output`, `snapshot from the host`, ….
         what: &'static str,
-        /// The name.
+        /// Name in the request.
         name: String,
     },
-    /// An entry has so many fields.
+    /// A number of values that differs from the link's fields.
     #[error("`{name}` has {wanted} fields, not {given}")]
     Fields {
-        /// The link.
+        /// Name of the link.
         name: String,
-        /// Fields that it has.
+        /// Number of the link's fields.
         wanted: usize,
-        /// Values given.
+        /// Number of values in the request.
         given: usize,
     },
 }
 
-/// Something that happens on a link.
+/// Event on a link, in the global time of the system.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct LinkEvent {
-    /// The cycle.
+    /// Cycle of the event, from reset.
     pub cycle: Cycle,
-    /// The link.
+    /// Index of the link in the description.
     pub link: usize,
-    /// The kind of the event.
+    /// Kind of the event.
     pub kind: LinkEventKind,
 }
 
-/// The kind of an event on a link.
+/// Kind of an event on a link.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum LinkEventKind {
     /// A value of a wire arrives at the receiver.
     Value(u32),
     /// A snapshot's values arrive together.
     Published,
-    /// The receiver takes them, for the tick to come.
+    /// The receiver takes a snapshot's values, for the tick to come.
     Taken,
-    /// The receiver does not wait for its tick in time: it keeps those that it has.
+    /// The receiver does not wait for its tick in time and keeps its old values.
     Skipped,
     /// An entry is put into a FIFO.
     Pushed,
     /// An entry is taken out of a FIFO.
     Popped,
-    /// A FIFO is full: the entry is refused.
+    /// An entry is refused because the FIFO is full.
     Overflow,
-    /// A FIFO is empty: there is no entry to be taken out.
+    /// A pop is refused because the FIFO is empty.
     Underflow,
 }
 
-/// A value on a core's input pins.
+/// Value on a core's input pins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct InputEvent {
-    /// The cycle.
+    /// Cycle in which the value is on the pins.
     pub cycle: Cycle,
-    /// The core.
+    /// Index of the core.
     pub core: usize,
-    /// The input port.
+    /// Register of the input port.
     pub register: Register,
-    /// Its new value.
+    /// New value, as bits.
     pub value: u32,
 }
 
 impl LinkEventKind {
-    /// In words.
+    /// Text for a log, with a wire's value.
     pub fn text(self) -> String {
         match self {
             LinkEventKind::Value(value) => format!("the value 0x{value:08x} arrives"),
@@ -109,7 +109,7 @@ impl LinkEventKind {
         }
     }
 
-    /// In a word or two, without the value.
+    /// Short name of the kind, without the value.
     pub fn name(self) -> &'static str {
         match self {
             LinkEventKind::Value(_) => "value",
@@ -124,14 +124,14 @@ impl LinkEventKind {
     }
 }
 
-/// An action of the host.
+/// Recorded action of the host.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum HostAction {
-    /// [`System::set_input`].
+    /// Call of [`System::set_input`] for a port.
     Input {
-        /// The input's name.
+        /// Name of the input.
         name: String,
-        /// Its value.
+        /// Value as 32 bits.
         bits: u32,
     },
     /// [`System::publish`] of a link.
@@ -142,16 +142,16 @@ pub enum HostAction {
     Pop(usize),
 }
 
-/// Figures over a core's periods.
+/// Statistics of a core's periods.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CorePeriods {
-    /// Periods that ended.
+    /// Number of periods that ended.
     pub count: u64,
-    /// The cycles of the shortest; 0 if there was none.
+    /// Cycles of the shortest period; 0 without periods.
     pub shortest: Cycle,
-    /// The cycles of the longest.
+    /// Cycles of the longest period.
     pub longest: Cycle,
-    /// Ticks for which it took no snapshots, because it did not wait in time.
+    /// Ticks for which the core took no snapshots, because it did not wait in time.
     pub skipped: u64,
 }
 
@@ -160,17 +160,17 @@ struct CoreState {
     emulator: Emulator,
     mailboxes: Arc<[Mailbox]>,
     gate: Gate,
-    /// Of links that drive its input ports at any time, a source of each kind of arrival.
+    /// Sources of the values that can arrive at any time: one for each group that is known up to the same cycle.
     moving: Arc<[Source]>,
-    /// Cycles of which all is known that arrives ([`System::know`] finds more).
+    /// Cycles up to which all arrivals are known ([`System::know`] extends this).
     known: Cycle,
-    /// True if it has no tick to come, for good.
+    /// The core has halted: no tick is to come.
     halted: bool,
-    /// The cycle of its first `wait`, or of its halt before that.
+    /// Cycle of the first `wait`, or of the halt before that.
     waited: Option<Cycle>,
-    /// Its next tick; there only once ticks have started.
+    /// Cycle of the next tick; valid only once ticks have started.
     tick: Cycle,
-    /// True if its snapshots for that tick are dealt with.
+    /// Snapshots for the next tick have been taken or skipped.
     taken: bool,
     periods: CorePeriods,
     last: Option<PeriodReport>,
@@ -179,19 +179,19 @@ struct CoreState {
 #[derive(Clone)]
 enum LinkState {
     Wire {
-        /// The value that the sender's `wait` publishes, if its ports are latched.
+        /// Value that the sender's `wait` publishes, if its ports are latched.
         changed: Option<u32>,
         /// Values on the way to the host, with the cycle in which they arrive.
         host: VecDeque<(Cycle, u32)>,
-        /// The value that the host sees.
+        /// Value that the host sees.
         shown: u32,
     },
     Snapshot {
-        /// As written, of a link with a strobe, or of the host's.
+        /// Latest writes of the fields, for a link with a strobe or from the host.
         working: Vec<u32>,
-        /// Published, with the first cycle in which it can be taken.
+        /// Published values, with the first cycle in which they can be taken.
         published: VecDeque<(Cycle, Vec<u32>)>,
-        /// The values published last, of those that could be seen.
+        /// Newest published values that a receiver can see.
         shown: Vec<u32>,
         taken: u64,
     },
@@ -201,30 +201,30 @@ enum LinkState {
     },
 }
 
-/// A system that runs.
+/// Emulator of a running system.
 #[derive(Clone)]
 pub struct System {
     description: Arc<Description>,
     cores: Vec<CoreState>,
     links: Vec<LinkState>,
     now: Cycle,
-    /// The cycle at which the present run ends.
+    /// Cycle at which the present run ends.
     until: Cycle,
-    /// The first base tick.
+    /// Cycle of the first base tick.
     start: Option<Cycle>,
-    /// True if the present run ends where that is known.
+    /// The present run ends once the cycle of the first base tick is known.
     starting: bool,
     fault: Option<SystemFault>,
     events: Option<Vec<LinkEvent>>,
-    /// Events of the cores, each with its core.
+    /// Events of the cores, each with its core's index.
     recorded: Option<Vec<(usize, Event)>>,
     /// Values on the cores' input pins.
     inputs: Option<Vec<InputEvent>>,
-    /// The host's actions, each with its cycle.
+    /// Actions of the host, each with its cycle.
     actions: Option<Vec<(Cycle, HostAction)>>,
 }
 
-/// The input ports that a bundle of the program reads.
+/// Bundles of the program that read one of these input ports.
 fn readers(program: &Program, ports: &BTreeSet<Register>) -> Vec<BundleAddress> {
     let reads = |address: &BundleAddress| match program.bundle(*address) {
         Some(Ok(bundle)) => {
@@ -236,7 +236,7 @@ fn readers(program: &Program, ports: &BTreeSet<Register>) -> Vec<BundleAddress> 
 }
 
 impl System {
-    /// The system after reset, at the beginning of cycle 0.
+    /// System after reset, at the beginning of cycle 0.
     ///
     /// # Errors
     /// If a core's memories cannot hold its program.
@@ -249,7 +249,7 @@ impl System {
             for port in &core.program.inputs {
                 let mailbox = mailboxes.iter().find(|mailbox| mailbox.register == port.register);
                 let initial = mailbox.map_or(0, |mailbox| description.initial(mailbox.source));
-                // The port is the program's own.
+                // The port belongs to the program, so that setting it cannot fail.
                 let _ = emulator.set_input_bits(port.register, initial);
             }
             emulator.set_watched(watched(&description, number));
@@ -299,9 +299,9 @@ impl System {
         })
     }
 
-    // ---- What there is to see.
+    // ---- Observation.
 
-    /// Cores and links.
+    /// Cores and links of the system.
     pub fn description(&self) -> &Description {
         &self.description
     }
@@ -311,42 +311,42 @@ impl System {
         self.now
     }
 
-    /// The cycle of the first base tick; `None` until every core has waited for the first time.
+    /// Cycle of the first base tick; `None` until every core has waited for the first time.
     pub fn start(&self) -> Option<Cycle> {
         self.start
     }
 
-    /// A core. Between runs it stands at [`System::now`], if it has not halted and there is no fault.
+    /// Emulator of a core. Between runs it stands at [`System::now`], if it has not halted and there is no fault.
     pub fn core(&self, core: usize) -> &Emulator {
         &self.cores[core].emulator
     }
 
-    /// The same, for a debugger.
+    /// Mutable emulator of a core, for a debugger.
     pub fn core_mut(&mut self, core: usize) -> &mut Emulator {
         &mut self.cores[core].emulator
     }
 
-    /// Figures over a core's periods.
+    /// Statistics of a core's periods.
     pub fn periods(&self, core: usize) -> CorePeriods {
         self.cores[core].periods
     }
 
-    /// A core's last period that ended.
+    /// Report of a core's last completed period.
     pub fn last_period(&self, core: usize) -> Option<&PeriodReport> {
         self.cores[core].last.as_ref()
     }
 
-    /// True if every core has halted.
+    /// All cores have halted.
     pub fn halted(&self) -> bool {
         self.cores.iter().all(|core| core.halted)
     }
 
-    /// The fault that it stands with.
+    /// Fault that stopped the system.
     pub fn fault(&self) -> Option<&SystemFault> {
         self.fault.as_ref()
     }
 
-    /// Counts of the events of a FIFO; `None` for other links.
+    /// Event counts of a FIFO; `None` for other links.
     pub fn fifo_counts(&self, link: usize) -> Option<FifoCounts> {
         match self.links.get(link)? {
             LinkState::Fifo { fifo, .. } => Some(fifo.store.counts),
@@ -354,7 +354,7 @@ impl System {
         }
     }
 
-    /// A status of a FIFO now; `None` for other links.
+    /// Present status of a FIFO; `None` for other links.
     pub fn fifo_status(&self, link: usize, status: Status) -> Option<u32> {
         match self.links.get(link)? {
             LinkState::Fifo { fifo, .. } => Some(fifo.store.status(status)),
@@ -362,7 +362,7 @@ impl System {
         }
     }
 
-    /// Entries of a FIFO now, the head first; none of other links.
+    /// Present entries of a FIFO, the head first; empty for other links.
     pub fn fifo_entries(&self, link: usize) -> Vec<Vec<u32>> {
         match self.links.get(link) {
             Some(LinkState::Fifo { fifo, .. }) => fifo.store.entries.iter().cloned().collect(),
@@ -370,48 +370,47 @@ impl System {
         }
     }
 
-    /// Keeps what the cores do from now on, until it is taken. Cores then run slower: no block of bundles runs as a whole.
+    /// Records the cores' events from now on, until they are taken. Cores then run slower, since no block of bundles runs as a whole.
     pub fn keep_core_events(&mut self) {
         self.recorded.get_or_insert_default();
         self.inputs.get_or_insert_default();
     }
 
-    /// Keeps them no longer.
+    /// Stops recording the cores' events.
     pub fn drop_core_events(&mut self) {
         (self.recorded, self.inputs) = (None, None);
     }
 
-    /// The values on the cores' input pins since this was last asked, by cycle; those of the last
-    /// [`INPUT_DELAY`](takt_isa::timing::INPUT_DELAY) cycles comes with the next run.
+    /// Values on the cores' input pins since the last call, by cycle; the values of the last [`INPUT_DELAY`](takt_isa::timing::INPUT_DELAY)
+    /// cycles come with the next run.
     pub fn take_input_events(&mut self) -> Vec<InputEvent> {
         let mut inputs = self.inputs.as_mut().map(std::mem::take).unwrap_or_default();
         inputs.sort();
         inputs
     }
 
-    /// The cores' events since this was last asked: of each core in the order of its run. After a fault, cores that had run
-    /// ahead of it are in it with what came later.
+    /// Events of the cores since the last call, each core's in the order of its run. After a fault, they include later events of cores that
+    /// had run ahead.
     pub fn take_core_events(&mut self) -> Vec<(usize, Event)> {
         self.recorded.as_mut().map(std::mem::take).unwrap_or_default()
     }
 
-    /// Keeps what the host does from now on.
+    /// Records the host's actions from now on.
     pub fn keep_host_actions(&mut self) {
         self.actions.get_or_insert_default();
     }
 
-    /// The host's actions since, each with the cycle before which it was done.
+    /// Recorded actions of the host, each with the cycle before which it was done.
     pub fn host_actions(&self) -> &[(Cycle, HostAction)] {
         self.actions.as_deref().unwrap_or_default()
     }
 
-    /// Keeps the events on links from now on, until they are taken.
+    /// Records the events on links from now on, until they are taken.
     pub fn keep_events(&mut self) {
         self.events.get_or_insert_default();
     }
 
-    /// The events on links since this was last asked, by cycle. (Those of the last few cycles may still be missing: they
-    /// come with the next run.)
+    /// Events on links since the last call, by cycle. (Events of the last few cycles may be missing: they come with the next run.)
     pub fn take_events(&mut self) -> Vec<LinkEvent> {
         let mut events = self.events.as_mut().map(std::mem::take).unwrap_or_default();
         events.sort();
@@ -423,7 +422,7 @@ pub(super) fn latched(description: &Description, end: End) -> bool {
     description.core(end).is_some_and(|core| core.program.latched)
 }
 
-/// True if arrivals from two sources are known up to the same cycle.
+/// Arrivals from both sources are known up to the same cycle.
 fn come_together(description: &Description, one: Source, other: Source) -> bool {
     match (one, other) {
         (Source::Status { link, side, .. }, Source::Status { link: l, side: s, .. }) => {
@@ -438,7 +437,7 @@ fn come_together(description: &Description, one: Source, other: Source) -> bool 
     }
 }
 
-/// The output ports of a core that change what it sees of a FIFO itself.
+/// Output ports whose writes push to or pop from a FIFO: the core then sees the FIFO change through its own doing.
 fn acting(description: &Description, core: usize) -> impl Iterator<Item = Register> {
     let here = End::Core(core);
     description
@@ -453,7 +452,7 @@ fn acting(description: &Description, core: usize) -> impl Iterator<Item = Regist
         .flatten()
 }
 
-/// The output ports of a core whose every write counts.
+/// Output ports of a core whose every write counts, even of an unchanged value.
 fn watched(description: &Description, core: usize) -> BTreeSet<Register> {
     let here = End::Core(core);
     let mut ports = BTreeSet::new();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Running ahead: each core to where it needs to know of others.
+//! Scheduler of the cores: each runs ahead to where it needs to know of others.
 
 use super::{InputEvent, System, SystemFault, latched};
 use crate::system::{CoreState, LinkState};
@@ -8,12 +8,12 @@ use takt_emu::{Event, Fault, Status, Stop};
 use takt_isa::system::{End, LinkKind, MIN_LATENCY, Side, Source};
 use takt_isa::timing::{Cycle, ENDED_DELAY};
 
-/// Cycles that a core runs ahead of the one that is behind all others at most, so that what is under way stays small.
+/// Limit on the cycles that a core runs ahead of the last one, which bounds the values under way.
 const WINDOW: Cycle = 1 << 14;
 
 impl System {
-    /// Runs until ticks have started, or every core has halted, but no further than until `limit` cycles have passed. The
-    /// cycle of the first base tick, if it is known then.
+    /// Runs until ticks have started, or every core has halted, but no further than until `limit` cycles have passed. Returns the cycle of
+    /// the first base tick, if known by then.
     ///
     /// # Errors
     /// The first fault of a core; asked again, the same one.
@@ -45,7 +45,7 @@ impl System {
                         Ok(false) => break,
                         Err(fault) => {
                             went = true;
-                            // The others run as far: an earlier one may show.
+                            // The other cores catch up: one may fault in an earlier cycle.
                             self.until = self.until.min(fault.cycle + 1);
                             let name = self.description.cores[core].name.clone();
                             let earlier =
@@ -69,7 +69,7 @@ impl System {
         self.now = self.until;
         for core in 0..self.cores.len() {
             self.know(core);
-            // A value that counts from the cycle to come on goes in when that begins.
+            // The value for the coming cycle enters when that cycle begins.
             self.enter(core, self.now.saturating_sub(1));
         }
         self.show();
@@ -79,8 +79,8 @@ impl System {
         }
     }
 
-    /// Ticks start once every core has waited, in the first cycle that is a multiple of their distance and that leaves the
-    /// host and the snapshots their time.
+    /// Starts the ticks once every core has waited: in the first cycle that is a multiple of their distance and that leaves the host and
+    /// the snapshots enough time.
     fn try_start(&mut self) {
         if self.start.is_some() || self.halted() || self.cores.iter().any(|core| core.waited.is_none()) {
             return;
@@ -90,7 +90,7 @@ impl System {
         let start = (last + MIN_LATENCY + self.description.lead()).div_ceil(tick) * tick;
         self.start = Some(start);
         if self.starting {
-            // No core is further, and the host is in time for the first tick.
+            // No core has passed this cycle, and the host is in time for the first tick.
             self.until = self.until.min(last + MIN_LATENCY);
         }
         for (core, known) in self.cores.iter_mut().zip(&self.description.cores) {
@@ -98,8 +98,8 @@ impl System {
         }
     }
 
-    /// Cycles of which all that an end does is known.
-    pub(super) fn known(&self, end: End) -> Cycle {
+    /// Cycles up to which all actions of a link's end are known.
+    pub(super) fn known_until(&self, end: End) -> Cycle {
         match end {
             End::Host => self.until.max(self.now),
             End::Core(core) => match &self.cores[core] {
@@ -111,14 +111,14 @@ impl System {
         }
     }
 
-    /// Finds out of which cycles all is known that arrives at a core, if it does nothing from now on that changes it: it pauses if
-    /// it does.
+    /// Determines the cycles up to which all arrivals at a core are known, provided that the core itself changes none of its FIFOs: it
+    /// pauses if it does.
     fn know(&mut self, core: usize) {
         let description = Arc::clone(&self.description);
         let moving = Arc::clone(&self.cores[core].moving);
         let arrivals = moving.iter().map(|source| {
             let link = &description.links[source.link()];
-            let known = self.known(link.from) + link.transit();
+            let known = self.known_until(link.from) + link.transit();
             let LinkKind::Fifo { .. } = link.kind else {
                 return if latched(&description, link.from) { known + ENDED_DELAY } else { known };
             };
@@ -131,26 +131,26 @@ impl System {
         self.cores[core].known = arrivals.min().unwrap_or(Cycle::MAX / 2);
     }
 
-    /// Cycles in which a FIFO stays as it is, if a core at one side of it does nothing more.
+    /// Cycle up to which a FIFO stays unchanged, if the core at one side does nothing more.
     fn undisturbed(&self, number: usize, core: usize) -> Cycle {
         let link = &self.description.links[number];
         let LinkState::Fifo { fifo, .. } = &self.links[number] else { return 0 };
         let other = if link.to == End::Core(core) {
-            self.known(link.from) + link.transit()
+            self.known_until(link.from) + link.transit()
         } else {
-            self.known(link.to)
+            self.known_until(link.to)
         };
         other.min(fifo.next_cycle().unwrap_or(Cycle::MAX))
     }
 
-    /// Lets values go in that count before or in cycle `now` of a core.
+    /// Sets the core's inputs that count in cycle `now` or earlier.
     fn enter(&mut self, core: usize, now: Cycle) {
         let delay = self.description.cores[core].input_delay();
         let CoreState { emulator, gate, mailboxes, .. } = &mut self.cores[core];
         let inputs = &mut self.inputs;
         gate.run((now + 1).saturating_sub(delay), |cycle, mailbox, value| {
             let register = mailboxes[mailbox].register;
-            // A mailbox's port is an input.
+            // The register is an input port, so that setting it cannot fail.
             let _ = emulator.set_input_bits(register, value);
             if let Some(inputs) = inputs {
                 inputs.push(InputEvent { cycle, core, register, value });
@@ -158,7 +158,7 @@ impl System {
         });
     }
 
-    /// Lets a core run on, at most until cycle `until`, to where it needs to know of others. False if it cannot.
+    /// Runs a core, at most until cycle `until`, to where it needs to know of others. Returns false if it cannot go on.
     fn segment(&mut self, core: usize, until: Cycle) -> Result<bool, Fault> {
         let state = &self.cores[core];
         let now = state.emulator.now();
@@ -177,7 +177,7 @@ impl System {
         let state = &self.cores[core];
         if self.start.is_none() {
             if state.waited.is_some() {
-                // Ticks do not start before the others have waited.
+                // Ticks do not start before the other cores have waited.
                 let others = self.cores.iter().filter(|other| other.waited.is_none() && !other.halted);
                 let Some(first) = others.map(|other| other.emulator.now()).min() else { return Ok(false) };
                 end = end.min(first + MIN_LATENCY);
@@ -187,7 +187,7 @@ impl System {
             }
         } else {
             let taking = self.description.taking(core);
-            // When the last value has gone in: in the tick's cycle if that takes latched inputs, or in the one after.
+            // Cycle in which the last snapshot value enters: the tick's own for latched inputs, otherwise the next.
             let entered = state.tick - ENDED_DELAY + delay;
             let take = state.tick - taking;
             if !state.taken && now >= take {
@@ -200,7 +200,7 @@ impl System {
         }
         self.enter(core, now);
         let state = &mut self.cores[core];
-        // Until then its inputs stay as they are.
+        // Inputs do not change before this cycle.
         let change = state.gate.next_change().map_or(Cycle::MAX, |cycle| cycle + delay);
         state.emulator.set_pause_from(change.min(known + 1));
         let stop = match &mut self.recorded {
@@ -226,7 +226,7 @@ impl System {
             _ => None,
         };
         state.waited = state.waited.or(waited).or(halted);
-        // Its inputs for the tick are in: on to the next one.
+        // Inputs for the tick have entered: go on to the next tick.
         if self.start.is_some() && state.taken && state.emulator.now() >= state.tick - ENDED_DELAY + delay {
             state.taken = false;
             state.tick += self.description.cores[core].period(self.description.tick);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The tree to a list of operations, in which every name has a meaning. A program can then stand still anywhere, as single
-//! steps and waits need it.
+//! Compiler from the tree to a list of operations, with every name resolved. A list of operations can pause anywhere, which single steps
+//! and waits need.
 
 use super::table::{self, function_named};
 use super::tree::{
@@ -13,79 +13,79 @@ use takt_diagnostics::diag::Diagnostic;
 use takt_diagnostics::nearest;
 use takt_diagnostics::source::Span;
 
-/// Components of a pose or frame, in their order.
+/// Components of a pose, in their order.
 pub const POSE_COMPONENTS: [&str; 6] = ["x", "y", "z", "roll", "pitch", "yaw"];
-/// Components of a frame.
+/// Components of a frame, in their order.
 pub const FRAME_COMPONENTS: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
-/// Components of joint angles.
+/// Components of joint angles, in their order.
 pub const JOINT_COMPONENTS: [&str; 6] = ["q1", "q2", "q3", "q4", "q5", "q6"];
 
-/// An operation.
+/// Operation of the compiled program.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Operation {
-    /// The statement that it comes from.
+    /// Statement that the operation comes from.
     pub span: Span,
-    /// Its kind, with its operands.
+    /// Kind with its operands.
     pub kind: OperationKind,
 }
 
-/// The kinds of operations. Targets are places in [`Code::operations`].
+/// Kinds of operations. Targets are indices into [`Code::operations`].
 #[derive(Clone, Debug, PartialEq)]
 pub enum OperationKind {
-    /// An action.
+    /// Executes a statement without a block.
     Do(Action),
-    /// Goes elsewhere if it does not hold.
+    /// Jumps to the target if the condition is false.
     Unless(Expression, usize),
-    /// Goes elsewhere.
+    /// Jumps to the target.
     Jump(usize),
-    /// Begins to count down.
+    /// Pushes a counter with this number of rounds.
     Count(Expression),
-    /// One round less; elsewhere if there is none left.
+    /// Counts down; pops an exhausted counter and jumps to the target.
     Next(usize),
-    /// A subprogram.
+    /// Calls a subprogram with arguments.
     Call(String, Vec<Expression>),
-    /// Back from it.
+    /// Returns from a subprogram.
     Return,
-    /// From here on, errors go there.
+    /// Pushes an error handler at the target.
     Try(usize),
-    /// No longer.
+    /// Pops the latest error handler.
     Tried,
 }
 
-/// A subprogram.
+/// Subprogram within the code of its program.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Subprogram {
-    /// Its parameters.
+    /// Names of its parameters.
     pub parameters: Vec<String>,
-    /// Its first operation.
+    /// Index of its first operation.
     pub entry: usize,
 }
 
-/// A program that can be executed.
+/// Compiled program, ready for execution.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Code {
-    /// The program's own operations, then its subprograms'.
+    /// Operations of the program, then of its subprograms.
     pub operations: Vec<Operation>,
-    /// Its subprograms.
+    /// Subprograms of the program by name.
     pub subprograms: BTreeMap<String, Subprogram>,
-    /// A command of the prompt alone: with the number of operations that come before it.
+    /// Commands for the prompt alone, each with the number of operations before it.
     pub console: Vec<(usize, Span, Console)>,
 }
 
-/// Names known before a program: names of values, and subprograms with their numbers of parameters.
+/// Names known before compilation: values, and subprograms with their numbers of parameters.
 #[derive(Clone, Debug, Default)]
-pub struct Known {
-    /// Names of values.
+pub struct KnownNames {
+    /// Names of known values.
     pub values: BTreeSet<String>,
-    /// Subprograms.
+    /// Known subprograms, with their numbers of parameters.
     pub subprograms: BTreeMap<String, usize>,
 }
 
-/// Makes code of a program. `console` says whether the prompt's own commands may be in it.
+/// Compiles a program. `console` permits the prompt's own commands.
 ///
 /// # Errors
-/// All mistakes.
-pub fn compile(block: &Block, known: &Known, console: bool) -> Result<Code, Vec<Diagnostic>> {
+/// All mistakes in the program.
+pub fn compile(block: &Block, known: &KnownNames, console: bool) -> Result<Code, Vec<Diagnostic>> {
     let mut compiler =
         Compiler { known: known.clone(), code: Code::default(), mistakes: Vec::new(), console };
     let mut first: BTreeMap<&str, Span> = BTreeMap::new();
@@ -118,7 +118,7 @@ pub fn compile(block: &Block, known: &Known, console: bool) -> Result<Code, Vec<
     if compiler.mistakes.is_empty() { Ok(compiler.code) } else { Err(compiler.mistakes) }
 }
 
-/// The names that a block gives to values.
+/// Collects the names that a block gives to values.
 fn define(block: &Block, names: &mut BTreeSet<String>) {
     for statement in block {
         match &statement.kind {
@@ -140,7 +140,7 @@ fn define(block: &Block, names: &mut BTreeSet<String>) {
 }
 
 struct Compiler {
-    known: Known,
+    known: KnownNames,
     code: Code,
     mistakes: Vec<Diagnostic>,
     console: bool,
@@ -152,13 +152,13 @@ impl Compiler {
         self.code.operations.len() - 1
     }
 
-    fn here(&self) -> usize {
+    fn next_index(&self) -> usize {
         self.code.operations.len()
     }
 
-    /// Lets an operation that goes elsewhere go to here.
+    /// Sets the target of a jumping operation to the next operation.
     fn land(&mut self, operation: usize) {
-        let here = self.here();
+        let here = self.next_index();
         match &mut self.code.operations[operation].kind {
             OperationKind::Unless(_, target)
             | OperationKind::Jump(target)
@@ -249,7 +249,7 @@ impl Compiler {
                 self.land(end);
             }
             StatementKind::Console(console) if self.console => {
-                let here = self.here();
+                let here = self.next_index();
                 self.code.console.push((here, span, console.clone()));
             }
             StatementKind::Console(_) => {
@@ -297,7 +297,7 @@ impl Compiler {
         values.into_iter().for_each(|value| self.expression(value, false));
     }
 
-    /// `hole` says whether `_` may stand here.
+    /// Checks the names of an expression. `hole` permits `_`.
     fn expression(&mut self, expression: &Expression, hole: bool) {
         match &expression.kind {
             ExpressionKind::Number(_) => {}

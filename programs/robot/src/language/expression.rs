@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Expressions, by precedence.
+//! Expression parser: precedence climbing.
 
 use super::parse::{Outcome, Parser, fail};
 use super::table::function_named;
@@ -9,7 +9,7 @@ use crate::limits;
 use takt_diagnostics::diag::Diagnostic;
 use takt_diagnostics::source::Span;
 
-/// Binding power of `not` and of a minus sign to what follows.
+/// Binding powers of the prefix operators `not` and minus.
 const NOT: u8 = 3;
 const MINUS: u8 = 7;
 
@@ -29,7 +29,7 @@ fn binding(binary: Binary) -> u8 {
 }
 
 impl Expression {
-    /// `function(of) == on`.
+    /// Builds the expression `function(of) == on`.
     pub(super) fn is(span: Span, function: Name, of: Expression, on: bool) -> Expression {
         let value = Expression { span, kind: ExpressionKind::Call(function, vec![of]) };
         let wanted = Expression { span, kind: ExpressionKind::Number(f64::from(u8::from(on))) };
@@ -55,7 +55,7 @@ impl Parser<'_> {
             String::new()
         };
         if !message.is_empty() {
-            // The next line begins anew.
+            // Parsing resumes on the next line with fresh limits.
             self.depth = 0;
             return fail(
                 Diagnostic::error("limit", self.span(), message).help("give parts of it names with `let`"),
@@ -113,7 +113,7 @@ impl Parser<'_> {
 
     fn component(&mut self) -> Outcome<Expression> {
         let mut value = self.value()?;
-        // Of a component there is no component.
+        // Components have no components of their own.
         if self.take(Token::Point) {
             let span = self.expect(Token::Word, "a component, as `x` or `q1`")?;
             let name = Name { text: self.text(span).to_owned(), span };
@@ -176,7 +176,7 @@ impl Parser<'_> {
         }
     }
 
-    /// Values in parentheses; `_` may be one.
+    /// Arguments in parentheses; `_` is permitted.
     pub(super) fn arguments(&mut self) -> Outcome<Vec<Expression>> {
         self.expect(Token::Open, "`(`")?;
         let mut values = Vec::new();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The language of the command level: text to code. docs/robot-commands.md is its contract.
+//! Language of the command level, from text to code. docs/robot-commands.md is its contract.
 //!
 //! ```text
 //! text ─ tokens ─ parse ─ tree ─ compile ─ Code, which `level` executes
@@ -13,4 +13,4 @@ pub mod table;
 mod tokens;
 pub mod tree;
 
-pub use parse::{Parsed, parse};
+pub use parse::{ParsedText, parse};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Tokens to the tree. A line with a mistake is left out, and the rest is read all the same.
+//! Parser from tokens to the tree. It skips a line with a mistake and goes on with the next.
 
 use super::table;
 use super::tokens::Token;
@@ -14,48 +14,48 @@ use takt_diagnostics::diag::Diagnostic;
 use takt_diagnostics::nearest;
 use takt_diagnostics::source::Span;
 
-/// The parse of a text.
+/// Result of parsing a text.
 #[derive(Debug, Default)]
-pub struct Parsed {
-    /// Its statements.
+pub struct ParsedText {
+    /// Statements without a mistake.
     pub block: Block,
-    /// The mistakes in it.
+    /// Mistakes in the text.
     pub mistakes: Vec<Diagnostic>,
-    /// True if a block is open at its end: a prompt asks for more lines.
+    /// A block is open at the end: a prompt asks for more lines.
     pub open: bool,
 }
 
-/// Reads a text whose first byte has the offset `base` among all sources.
-pub fn parse(text: &str, base: u32) -> Parsed {
+/// Parses a text whose first byte has the offset `base` among all sources.
+pub fn parse(text: &str, base: u32) -> ParsedText {
     let mut tokens = Vec::new();
     let place = |range: std::ops::Range<usize>| Span::new(base + range.start as u32, base + range.end as u32);
     for (token, range) in Token::lexer(text).spanned() {
         tokens.push((token.unwrap_or(Token::Bad), place(range)));
     }
     tokens.push((Token::Newline, place(text.len()..text.len())));
-    let mut parser = Parser { text, base, tokens, at: 0, depth: 0, size: 0, parsed: Parsed::default() };
+    let mut parser = Parser { text, base, tokens, at: 0, depth: 0, size: 0, parsed: ParsedText::default() };
     let block = parser.block(&mut Vec::new(), &[]);
-    Parsed { block, ..parser.parsed }
+    ParsedText { block, ..parser.parsed }
 }
 
 pub(super) type Outcome<T> = Result<T, Box<Diagnostic>>;
 
-/// A mistake, in place of a value.
+/// Fails with a mistake.
 pub(super) fn fail<T>(mistake: Diagnostic) -> Outcome<T> {
     Err(Box::new(mistake))
 }
 
-/// The parser on its way.
+/// Cursor over the tokens, and the result so far.
 pub(super) struct Parser<'t> {
     text: &'t str,
     base: u32,
     tokens: Vec<(Token, Span)>,
     at: usize,
-    /// Of expressions in one another.
+    /// Nesting depth of expressions at the cursor.
     pub(super) depth: usize,
-    /// Parts of the expression at hand.
+    /// Number of values and operators in the present expression.
     pub(super) size: usize,
-    parsed: Parsed,
+    parsed: ParsedText,
 }
 
 impl<'t> Parser<'t> {
@@ -68,7 +68,7 @@ impl<'t> Parser<'t> {
         self.tokens.get(self.at).map_or(last, |(_, span)| *span)
     }
 
-    /// The span of the token before.
+    /// Span of the previous token.
     pub(super) fn before(&self) -> Span {
         self.at.checked_sub(1).and_then(|at| self.tokens.get(at)).map_or(Span::default(), |(_, span)| *span)
     }
@@ -77,7 +77,7 @@ impl<'t> Parser<'t> {
         self.text.get((span.start - self.base) as usize..(span.end - self.base) as usize).unwrap_or("")
     }
 
-    /// The word at hand, or nothing.
+    /// Present token if it is a word, else an empty text.
     pub(super) fn word(&self) -> &'t str {
         if self.peek() == Token::Word { self.text(self.span()) } else { "" }
     }
@@ -104,7 +104,7 @@ impl<'t> Parser<'t> {
         is
     }
 
-    /// The token that stands where another was expected, in words.
+    /// Diagnostic for an unexpected token.
     pub(super) fn unexpected(&self, expected: &str) -> Diagnostic {
         let (token, span) = (self.peek(), self.span());
         let there = match token {
@@ -120,7 +120,7 @@ impl<'t> Parser<'t> {
         if self.peek() == token { Ok(self.advance()) } else { fail(self.unexpected(what)) }
     }
 
-    /// One of these words; its place among them.
+    /// Takes one of these words; returns its index.
     fn one_of(&mut self, words: &[&str]) -> Outcome<usize> {
         let word = self.word();
         if let Some(place) = words.iter().position(|known| *known == word) {
@@ -148,7 +148,7 @@ impl<'t> Parser<'t> {
         Ok(Name { text, span })
     }
 
-    /// A text in quotes: its inside.
+    /// Takes a quoted text; returns its inside.
     fn quoted(&mut self, what: &str) -> Outcome<Name> {
         let span = self.expect(Token::Text, what)?;
         let text = self.text(span).trim_matches('"').to_owned();
@@ -157,7 +157,7 @@ impl<'t> Parser<'t> {
 
     // ---- Lines and blocks.
 
-    /// Goes to the next line.
+    /// Skips to the end of the line.
     fn skip_line(&mut self) {
         while self.peek() != Token::Newline {
             self.advance();
@@ -170,7 +170,7 @@ impl<'t> Parser<'t> {
         }
     }
 
-    /// Statements up to one of the words that end this block, which stays. `open` has the lines that opened blocks.
+    /// Parses statements up to one of the words that end this block, which is not consumed. `open` holds the lines of open blocks.
     fn block(&mut self, open: &mut Vec<Span>, ends: &[&str]) -> Block {
         let mut block = Vec::new();
         loop {
@@ -180,7 +180,7 @@ impl<'t> Parser<'t> {
                     self.parsed.open = true;
                     let mistake = Diagnostic::error("syntax", line, "this block has no `end`");
                     self.wrong(mistake.help("write `end` on a line of its own after the block"));
-                    // One message is enough.
+                    // A single message suffices for nested open blocks.
                     open.clear();
                 }
                 return block;
@@ -205,7 +205,7 @@ impl<'t> Parser<'t> {
         }
     }
 
-    /// A block that a line opens, to its `end`; or to `else`, where `ends` has that.
+    /// Parses a block after the line that opens it, to its `end`; or to `else`, if `ends` contains it.
     fn inner(&mut self, open: &mut Vec<Span>, line: Span, ends: &[&str]) -> Outcome<Block> {
         if self.peek() != Token::Newline {
             let mistake = self.unexpected("the end of the line");
@@ -213,7 +213,7 @@ impl<'t> Parser<'t> {
             self.skip_line();
         }
         if open.len() >= limits::BLOCK_DEPTH {
-            // Its contents are read no further.
+            // The contents of a block nested too deeply are skipped.
             self.at = self.tokens.len();
             open.clear();
             let message = format!("more than {} blocks in one another", limits::BLOCK_DEPTH);
@@ -309,7 +309,7 @@ impl<'t> Parser<'t> {
         Ok(Statement { span: begin.to(self.before()), kind })
     }
 
-    /// Parses the head of a block behind its first word. If that is wrong, the block is read all the same.
+    /// Parses the head of a block after its first word. After a mistake, the block is parsed all the same.
     fn header<T>(&mut self, read: impl FnOnce(&mut Self) -> Outcome<T>) -> Option<T> {
         match read(self) {
             Ok(value) => Some(value),
@@ -322,7 +322,7 @@ impl<'t> Parser<'t> {
         }
     }
 
-    /// A subprogram's name and parameters.
+    /// Parses a subprogram's name and parameters.
     fn subprogram(&mut self) -> Outcome<(Name, Vec<Name>)> {
         let name = self.name("a subprogram")?;
         let mut parameters: Vec<Name> = Vec::new();
@@ -346,13 +346,13 @@ impl<'t> Parser<'t> {
         Ok((name, parameters))
     }
 
-    // ---- What takes no block.
+    // ---- Statements without a block.
 
     fn console(&mut self) -> Outcome<Option<Console>> {
         let next = self.tokens.get(self.at + 1).map_or(Token::Newline, |(token, _)| *token);
         let word = self.word();
         let known = match word {
-            // `check move ...` is a program's.
+            // A `check move ...` belongs to programs.
             "check" => next != Token::Word,
             _ => table::command_named(word).is_some_and(|command| command.console),
         };
@@ -479,7 +479,7 @@ impl<'t> Parser<'t> {
         })
     }
 
-    /// True if the word at hand is a function that is called.
+    /// The present word is followed by `(`: a call.
     fn calls(&self) -> bool {
         self.tokens.get(self.at + 1).is_some_and(|(token, _)| *token == Token::Open)
     }
@@ -557,7 +557,7 @@ impl<'t> Parser<'t> {
         self.list(6, what)
     }
 
-    /// So many values between commas.
+    /// Parses `count` values between commas.
     fn list(&mut self, count: usize, what: &str) -> Outcome<Vec<Expression>> {
         let mut values = vec![self.expression()?];
         while values.len() < count {

@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The commands and functions: one table each, for the parser's suggestions, `help`, completion and the documentation.
+//! Tables of commands and functions, for the parser's suggestions, `help`, completion and the documentation.
 
-/// A command.
+/// Command of the language or of the prompt.
 #[derive(Clone, Copy, Debug)]
 pub struct Command {
-    /// Its first word.
+    /// First word of the command.
     pub name: &'static str,
-    /// Its syntax.
+    /// Syntax, with placeholders in capitals.
     pub syntax: &'static str,
-    /// One that can be typed.
+    /// Complete command that can be typed.
     pub example: &'static str,
-    /// Its effect, in words.
+    /// Description for `help` and the documentation.
     pub text: &'static str,
-    /// True if only the prompt knows it.
+    /// Known to the prompt alone.
     pub console: bool,
 }
 
@@ -29,7 +29,7 @@ const fn console(
     Command { name, syntax, example, text, console: true }
 }
 
-/// All commands.
+/// All commands, in the order of the documentation.
 pub const COMMANDS: &[Command] = &[
     row(
         "move",
@@ -116,7 +116,7 @@ pub const COMMANDS: &[Command] = &[
         "if input(1)\nend",
         "Does one or the other.",
     ),
-    row("repeat", "repeat NUMBER ... end", "repeat 3\nend", "Does it so many times."),
+    row("repeat", "repeat NUMBER ... end", "repeat 3\nend", "Repeats the block this many times."),
     row(
         "while",
         "while CONDITION ... end",
@@ -127,7 +127,7 @@ pub const COMMANDS: &[Command] = &[
         "sub",
         "sub NAME(PARAMETER, ...) ... end",
         "sub pick(place)\nmovel place\nend",
-        "Makes a subprogram; what it gives names is its own.",
+        "Defines a subprogram; names assigned in it are local.",
     ),
     row("call", "call NAME(VALUE, ...)", "call pick(pose())", "Calls a subprogram."),
     row("return", "return", "sub nothing()\nreturn\nend", "Ends a subprogram."),
@@ -153,23 +153,23 @@ pub const COMMANDS: &[Command] = &[
         "record",
         "record on|off",
         "record on",
-        "Whether the commands that are typed are added to the session's program.",
+        "Turns recording of typed commands into the session's program on or off.",
     ),
     console("step", "step", "step", "Executes the next statement of the session's program."),
     console("continue", "continue", "continue", "Executes the rest of it."),
     console("quit", "quit", "quit", "Ends the session."),
 ];
 
-/// A function.
+/// Function of the language.
 #[derive(Clone, Copy, Debug)]
 pub struct Function {
-    /// Its name.
+    /// Name of the function.
     pub name: &'static str,
-    /// Its syntax.
+    /// Syntax with the names of its arguments.
     pub syntax: &'static str,
-    /// Numbers of arguments that it takes.
+    /// Permitted numbers of arguments.
     pub arguments: &'static [usize],
-    /// Its result, in words.
+    /// Description of the result.
     pub text: &'static str,
 }
 
@@ -182,7 +182,7 @@ const fn function(
     Function { name, syntax, arguments, text }
 }
 
-/// All functions.
+/// All functions, in the order of the documentation.
 pub const FUNCTIONS: &[Function] = &[
     function(
         "joints",
@@ -217,29 +217,29 @@ pub const FUNCTIONS: &[Function] = &[
     function("floor", "floor(x)", &[1], "The next whole number below."),
 ];
 
-/// Words that are no names of variables.
+/// Words that cannot name a variable.
 pub const RESERVED: &[&str] = &[
     "and", "or", "not", "else", "end", "at", "in", "for", "fast", "after", "on", "off", "done", "until", "_",
 ];
 
-/// True if a word means something already.
+/// A reserved word, command or function, which cannot name a variable.
 pub fn is_reserved(word: &str) -> bool {
     RESERVED.contains(&word)
         || COMMANDS.iter().any(|command| command.name == word)
         || FUNCTIONS.iter().any(|function| function.name == word)
 }
 
-/// The function of this name.
+/// Function with this name.
 pub fn function_named(name: &str) -> Option<&'static Function> {
     FUNCTIONS.iter().find(|function| function.name == name)
 }
 
-/// The command of this name.
+/// Command with this name.
 pub fn command_named(name: &str) -> Option<&'static Command> {
     COMMANDS.iter().find(|command| command.name == name)
 }
 
-/// Names of commands that begin so, for completion.
+/// Names of commands with this prefix, for completion.
 pub fn complete(begin: &str) -> Vec<String> {
     let names = COMMANDS.iter().map(|command| command.name);
     names.filter(|name| name.starts_with(begin)).map(str::to_owned).collect()

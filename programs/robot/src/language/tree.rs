@@ -1,86 +1,86 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The tree of a program.
+//! Syntax tree of a program.
 
 use crate::packet::{JogMode, Profile};
 use takt_diagnostics::source::Span;
 
-/// A name and its place.
+/// Name with its place.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Name {
-    /// The name.
+    /// Text of the name.
     pub text: String,
-    /// Its place.
+    /// Place in the sources.
     pub span: Span,
 }
 
-/// A value to be computed.
+/// Expression with its place.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Expression {
-    /// Its place.
+    /// Place in the sources.
     pub span: Span,
-    /// Its kind.
+    /// Kind with its operands.
     pub kind: ExpressionKind,
 }
 
-/// The kinds of expressions.
+/// Kinds of expressions, with their operands.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ExpressionKind {
-    /// A number.
+    /// Literal number without a unit.
     Number(f64),
-    /// `_`: as it is.
+    /// Hole `_`: the present value of a component.
     Hole,
-    /// A variable.
+    /// Variable, referred to by name.
     Name(String),
-    /// A function.
+    /// Function call with arguments.
     Call(Name, Vec<Expression>),
-    /// `of.name`.
+    /// Component of a value: `of.name`.
     Component(Box<Expression>, Name),
-    /// `-` or `not`.
+    /// Prefix operator with its operand.
     Unary(Unary, Box<Expression>),
-    /// Two values.
+    /// Infix operator with its operands.
     Binary(Binary, Box<Expression>, Box<Expression>),
 }
 
-/// Operators before a value.
+/// Operators before their operand.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unary {
-    /// `-`
+    /// Arithmetic negation of the operand, `-`
     Minus,
-    /// `not`
+    /// Logical negation of the operand, `not`
     Not,
 }
 
-/// Operators between values.
+/// Operators between their operands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Binary {
-    /// `or`
+    /// Logical or, with short circuit: `or`
     Or,
-    /// `and`
+    /// Logical and, with short circuit: `and`
     And,
-    /// `==`
+    /// Test for equality, `==`
     Equal,
-    /// `!=`
+    /// Test for inequality, `!=`
     Unequal,
-    /// `<`
+    /// Test for a smaller left operand, `<`
     Less,
-    /// `<=`
+    /// Less or equal, `<=`
     AtMost,
-    /// `>`
+    /// Test for a larger left operand, `>`
     Greater,
-    /// `>=`
+    /// Greater or equal, `>=`
     AtLeast,
-    /// `+`
+    /// Sum of operands, `+`
     Plus,
-    /// `-`
+    /// Difference of operands, `-`
     Minus,
-    /// `*`
+    /// Product of operands, `*`
     Times,
-    /// `/`
+    /// Quotient of operands, `/`
     Over,
 }
 
 impl Binary {
-    /// Its name in a program.
+    /// Spelling in a program.
     pub const fn text(self) -> &'static str {
         match self {
             Binary::Or => "or",
@@ -99,166 +99,166 @@ impl Binary {
     }
 }
 
-/// Statements that follow one another.
+/// Sequence of statements, in order.
 pub type Block = Vec<Statement>;
 
-/// A statement.
+/// Statement with its place.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Statement {
-    /// Its first line, or the whole of it if it has one line.
+    /// First line of the statement; the whole statement if it has one line.
     pub span: Span,
-    /// Its kind.
+    /// Kind with its operands and blocks.
     pub kind: StatementKind,
 }
 
-/// The kinds of statements.
+/// Kinds of statements, with their operands.
 #[derive(Clone, Debug, PartialEq)]
 pub enum StatementKind {
-    /// A statement that is done at once.
+    /// Statement without a block.
     Do(Action),
-    /// Conditions with their blocks, and what is done if none holds.
+    /// Conditions with their blocks, and the `else` block.
     If(Vec<(Expression, Block)>, Block),
-    /// A number of times.
+    /// Loop with a number of rounds.
     Repeat(Expression, Block),
-    /// As long as it holds.
+    /// Loop while a condition holds.
     While(Expression, Block),
-    /// A subprogram.
+    /// Definition of a subprogram.
     Sub(Name, Vec<Name>, Block),
-    /// A call of one.
+    /// Call of a subprogram.
     Call(Name, Vec<Expression>),
-    /// Back from one.
+    /// Return from a subprogram.
     Return,
-    /// A block, and another that runs if the robot refuses or stops.
+    /// Block, and its handler for a refusal or stop of the robot.
     Try(Block, Block),
-    /// A command of the prompt alone.
+    /// Command for the prompt alone.
     Console(Console),
 }
 
 /// Speed or time of a motion.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Pace {
-    /// `at`: deg/s of the fastest joint, or mm/s along the line.
+    /// Keyword `at`: deg/s of the fastest joint, or mm/s along the line.
     At(Expression),
-    /// `in`: s.
+    /// Keyword `in`: duration, s.
     In(Expression),
-    /// `fast`: as the limits allow.
+    /// Keyword `fast`: as the limits allow.
     Fast,
 }
 
-/// The manner in which the program carries out a motion.
+/// Execution of a motion by the program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Course {
-    /// The program waits for its end.
+    /// The program waits for the motion's end.
     Whole,
-    /// `via`: it goes on into the next one.
+    /// Keyword `via`: the motion blends into the next one.
     Via,
-    /// `start`: the program goes on while it moves.
+    /// Keyword `start`: the program goes on during the motion.
     Start,
-    /// `check`: it is only checked.
+    /// Keyword `check`: the motion is checked and not executed.
     Check,
 }
 
 /// Statements without a block.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Action {
-    /// A value gets a name.
+    /// Gives a name to a value.
     Let(Name, Expression),
-    /// A motion.
+    /// Motion to a target.
     Move {
-        /// Along a line in the world.
+        /// Straight line in the world; else in joint space.
         line: bool,
-        /// The manner in which the program goes on.
+        /// Course of the program during the motion.
         course: Course,
-        /// The target.
+        /// Target pose or joint angles.
         target: Expression,
-        /// The speed, if the motion has its own.
+        /// Speed or time, if the motion has its own.
         pace: Option<Pace>,
-        /// Its profile, if it says so itself.
+        /// Profile, if the motion has its own.
         profile: Option<Profile>,
     },
-    /// Rates, and for how long; without that until the next one.
+    /// Jog at these rates for a duration; without one, until the next jog.
     Jog(JogMode, Vec<Expression>, Option<Expression>),
-    /// All rates 0.
+    /// Ends the jog: all rates become 0.
     JogOff,
-    /// At once.
+    /// Stops the robot at once.
     Stop,
-    /// Of joints, and along lines.
+    /// Sets the speeds of joints and along lines.
     Speed(Expression, Option<Expression>),
-    /// Everything as fast as the limits allow.
+    /// Lets motions run as fast as the limits allow.
     SpeedFast,
-    /// Of the motions that follow.
+    /// Sets the profile of the following motions.
     Profile(Profile),
-    /// A digital output.
+    /// Sets a digital output.
     Signal(Expression, bool),
-    /// An analogue output.
+    /// Sets an analogue output.
     Level(Expression, Expression),
-    /// s.
+    /// Waits for a time, s.
     Wait(Expression),
-    /// Until the robot stands.
+    /// Waits until the robot stands.
     WaitDone,
-    /// Until it holds, and how long at most.
+    /// Waits until a condition holds; the second value limits the time.
     WaitUntil(Expression, Option<Expression>),
-    /// The tool's point, mm.
+    /// Sets the tool point, mm.
     Tool(Vec<Expression>),
-    /// Velocities, deg/s.
+    /// Limits the joint velocities, deg/s.
     LimitSpeed(Vec<Expression>),
-    /// Torques, N·m.
+    /// Limits the torques, N·m.
     LimitTorque(Vec<Expression>),
-    /// After an error.
+    /// Ends the state after an error.
     Reset,
-    /// Shows where the robot is.
+    /// Shows the position of the robot.
     Where,
-    /// Texts and values.
+    /// Shows texts and values.
     Say(Vec<Item>),
-    /// The present place gets a name: as joint angles if so.
+    /// Gives a name to the present position; the flag selects joint angles.
     Teach(Name, bool),
-    /// Something happens in the robot's surroundings, perhaps later.
+    /// Schedules an event around the robot, after a delay if given.
     Simulate(Simulation, Option<Expression>),
 }
 
-/// A part of what `say` shows.
+/// Part of a message of `say`.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Item {
-    /// As it stands.
+    /// Literal text in the message.
     Text(String),
-    /// A value.
+    /// Value of an expression.
     Value(Expression),
 }
 
-/// Events around the robot.
+/// Simulated events around the robot.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Simulation {
-    /// A digital input.
+    /// Change of a digital input.
     Input(Expression, bool),
-    /// An analogue input.
+    /// Change of an analogue input.
     Analogue(Expression, Expression),
-    /// On the link.
+    /// Fault of the link.
     Fault(crate::host::LinkFault),
 }
 
-/// Commands of the prompt alone.
+/// Commands for the prompt alone.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Console {
-    /// Of a command, or of all.
+    /// Shows help on a command, or on all.
     Help(Option<Name>),
-    /// Ends the session.
+    /// Ends the session at the prompt.
     Quit,
     /// Runs a file, or the session's program.
     Run(Option<Name>),
-    /// Runs it in a copy of the robot.
+    /// Runs a program in a copy of the robot.
     Check(Option<Name>),
     /// Makes a file the session's program.
     Load(Name),
-    /// Writes the session's program.
+    /// Writes the session's program to a file.
     Save(Name),
-    /// Shows it.
+    /// Shows the session's program.
     List,
-    /// Empties it.
+    /// Empties the session's program.
     New,
-    /// True if commands go into it.
+    /// Starts or ends the recording of commands into the program.
     Record(bool),
     /// Executes the program's next statement.
     Step,
-    /// Executes the rest of them.
+    /// Executes the remaining statements.
     Continue,
 }

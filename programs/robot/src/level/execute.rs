@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Code on its way: where it stands, what it counts, whom it returns to.
+//! Interpreter of compiled code: call frames, counters and error handlers.
 
 use super::Session;
 use super::value::{self, Surroundings, Value, evaluate, number_in};
@@ -14,31 +14,31 @@ use std::sync::Arc;
 use takt_diagnostics::diag::Diagnostic;
 use takt_diagnostics::source::Span;
 
-/// A program or subprogram on its way.
+/// Call frame of a program or subprogram.
 #[derive(Clone, Debug)]
 struct Frame {
     code: Arc<Code>,
     at: usize,
-    /// Its own values; none of the program itself, whose values are the session's.
+    /// Local values; `None` for the program itself, whose values belong to the session.
     own: Option<BTreeMap<String, Value>>,
-    /// Rounds that are left.
+    /// Remaining rounds of the active `repeat` loops, innermost last.
     counters: Vec<u64>,
-    /// The operation to which errors go, and the number of counters there.
+    /// Error handlers: target operation, and the number of counters to keep.
     handlers: Vec<(usize, usize)>,
-    /// The call.
+    /// Place of the call.
     from: Span,
 }
 
-/// A program on its way.
+/// Execution state of a program.
 #[derive(Clone, Debug)]
 pub(super) struct Machine {
     frames: Vec<Frame>,
-    /// Operations since something took time, and when that was.
+    /// Operations since simulated time last advanced, and that time.
     idle: u64,
     time: f64,
 }
 
-/// Rounds of `repeat` at most.
+/// Limit on the rounds of `repeat`.
 const ROUNDS: f64 = 1e9;
 
 impl Machine {
@@ -59,7 +59,7 @@ impl Machine {
         frame.code.operations.get(frame.at)
     }
 
-    /// True if the next operation is a statement of its own to who looks on.
+    /// The next operation is a statement that single steps show.
     pub(super) fn is_shown(&self) -> bool {
         self.next().is_some_and(|operation| {
             use OperationKind::{Jump, Next, Tried, Try};
@@ -67,10 +67,10 @@ impl Machine {
         })
     }
 
-    /// The statement that is next to be shown.
+    /// Place of the next statement to be shown.
     pub(super) fn next_span(&self) -> Option<Span> {
         let mut frame = self.frames.last()?.clone();
-        // Operations that are not shown are few before the program comes round to one that is.
+        // The search follows jumps: a bound on its steps ends it in an empty loop.
         for _ in 0..=frame.code.operations.len() {
             let operation = frame.code.operations.get(frame.at)?;
             match operation.kind {
@@ -92,8 +92,8 @@ impl Machine {
     }
 }
 
-/// The view that expressions have of a session.
-pub(super) struct Around<'a, R> {
+/// Environment of expressions: a session with the frame's local values.
+pub(super) struct ExpressionEnvironment<'a, R> {
     own: Option<&'a BTreeMap<String, Value>>,
     values: &'a BTreeMap<String, Value>,
     host: &'a Host<R>,
@@ -101,7 +101,7 @@ pub(super) struct Around<'a, R> {
     cause: u32,
 }
 
-impl<R: Robot> Surroundings for Around<'_, R> {
+impl<R: Robot> Surroundings for ExpressionEnvironment<'_, R> {
     fn value(&self, name: &str) -> Option<Value> {
         self.own.and_then(|own| own.get(name)).or_else(|| self.values.get(name)).copied()
     }
@@ -133,11 +133,11 @@ impl<R: Robot> Surroundings for Around<'_, R> {
     }
 }
 
-/// An error of a step.
+/// Error of an operation.
 pub(super) enum Failure {
-    /// The program is wrong.
+    /// A mistake of the program.
     Program(Box<Diagnostic>),
-    /// The robot, at a statement.
+    /// An error of the robot or the host.
     Robot(Problem),
 }
 
@@ -154,8 +154,8 @@ impl From<Problem> for Failure {
 }
 
 impl<R: Robot + Clone> Session<R> {
-    pub(super) fn around<'a>(&'a self, machine: &'a Machine) -> Around<'a, R> {
-        Around {
+    pub(super) fn environment<'a>(&'a self, machine: &'a Machine) -> ExpressionEnvironment<'a, R> {
+        ExpressionEnvironment {
             own: machine.own(),
             values: &self.values,
             host: &self.host,
@@ -164,7 +164,7 @@ impl<R: Robot + Clone> Session<R> {
         }
     }
 
-    /// Executes an operation; whether there are more.
+    /// Executes an operation; returns false at the program's end.
     pub(super) fn step(&mut self, machine: &mut Machine) -> Result<bool, Box<Diagnostic>> {
         let Some(operation) = machine.next().cloned() else { return Ok(false) };
         let span = operation.span;
@@ -179,7 +179,7 @@ impl<R: Robot + Clone> Session<R> {
                 Diagnostic::error("limit", span, message).help("put a `wait` into the loop"),
             ));
         }
-        // Long calculations can be interrupted like motions.
+        // Interrupts long calculations as well as motions.
         if self.interrupted() {
             return Err(self.failed(machine, span, &Problem::Interrupted));
         }
@@ -207,7 +207,7 @@ impl<R: Robot + Clone> Session<R> {
         }
     }
 
-    /// A message with its line.
+    /// Message with its file and line.
     pub(super) fn placed(&self, span: Span, text: &str) -> String {
         let Some(file) = self.sources.files().get(self.sources.file_of(span.start)) else {
             return text.to_owned();
@@ -216,7 +216,7 @@ impl<R: Robot + Clone> Session<R> {
         format!("{}:{line}: {text}", file.name)
     }
 
-    /// The error of a statement, with the motion that was under way, and the callers.
+    /// Diagnostic of a failed statement, with the motion under way and the callers.
     fn failed(&self, machine: &Machine, span: Span, problem: &Problem) -> Box<Diagnostic> {
         let mut mistake = Diagnostic::error("robot", span, problem.to_string());
         if let Problem::Stopped(report) = problem {
@@ -242,7 +242,8 @@ impl<R: Robot + Clone> Session<R> {
             }
             OperationKind::Jump(target) => frame.at = *target,
             OperationKind::Count(count) => {
-                let rounds = number_in(count, "the number of rounds", 0.0, ROUNDS, &self.around(machine))?;
+                let rounds =
+                    number_in(count, "the number of rounds", 0.0, ROUNDS, &self.environment(machine))?;
                 if let Some(frame) = machine.frames.last_mut() {
                     frame.counters.push(rounds.floor() as u64);
                 }
@@ -268,7 +269,7 @@ impl<R: Robot + Clone> Session<R> {
     }
 
     pub(super) fn holds(&self, machine: &Machine, condition: &Expression) -> Result<bool, Failure> {
-        Ok(value::number(condition, &self.around(machine))? != 0.0)
+        Ok(value::number(condition, &self.environment(machine))? != 0.0)
     }
 
     fn call(
@@ -287,14 +288,14 @@ impl<R: Robot + Clone> Session<R> {
             let mistake = Diagnostic::error("limit", span, message);
             return Err(Box::new(mistake.help("a subprogram that calls itself must end some time")).into());
         }
-        // Another text may have given it other parameters since.
+        // A later text may have redefined the subprogram with other parameters.
         if subprogram.parameters.len() != arguments.len() {
             let message = format!("`{name}` takes {} values", subprogram.parameters.len());
             return Err(Box::new(Diagnostic::error("call", span, message)).into());
         }
         let mut own = BTreeMap::new();
         for (parameter, argument) in subprogram.parameters.iter().zip(arguments) {
-            own.insert(parameter.clone(), evaluate(argument, &self.around(machine))?);
+            own.insert(parameter.clone(), evaluate(argument, &self.environment(machine))?);
         }
         machine.frames.push(Frame {
             code: subprogram.code,
@@ -308,12 +309,12 @@ impl<R: Robot + Clone> Session<R> {
     }
 }
 
-/// Calls that are shown with a mistake.
+/// Limit on the calls shown with a mistake.
 const CALLERS: usize = 4;
 
 fn callers(machine: &Machine, mut mistake: Box<Diagnostic>) -> Box<Diagnostic> {
     for frame in machine.frames.iter().skip(1).rev().take(CALLERS) {
-        // One that calls itself calls from the same line again and again.
+        // Recursive calls come from the same line again and again: show it once.
         if mistake.labels.iter().all(|label| label.span != frame.from) {
             *mistake = mistake.also(frame.from, "called from here");
         }

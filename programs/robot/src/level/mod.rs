@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The command level: a session that executes commands and programs, on a [`Robot`] behind the [`Host`]'s end of the link.
-//! Nothing here prints or opens files: what there is to say is in [`Session::take_messages`], files are [`Files`].
+//! Command level: a session that executes commands and programs on a [`Robot`] behind the [`Host`]'s end of the link. Nothing here prints
+//! or opens files: messages are taken with [`Session::take_messages`], files are [`Files`].
 //!
 //! The files import each other in a circle because they share the session: it executes operations (`execute.rs`), which act on it
-//! (`act.rs`).
+//! (`actions.rs`).
 
-mod act;
+mod actions;
 mod execute;
 pub mod value;
 
 use crate::dynamics::Joints;
 use crate::geometry::pose_of;
-use crate::host::{Event, Host, News, Problem, Robot, degrees};
-use crate::language::code::{Code, Known, compile};
+use crate::host::{Event, Host, HostEvent, Problem, Robot, degrees};
+use crate::language::code::{Code, KnownNames, compile};
 use crate::language::tree::{Console, StatementKind};
 use crate::language::{parse, table};
 use crate::limits;
@@ -26,21 +26,21 @@ use takt_diagnostics::nearest;
 use takt_diagnostics::source::{Lines, Sources, Span};
 use value::Value;
 
-/// Files, as the session's surroundings have them. Errors are in words.
+/// File access of a session. Errors are texts for the user.
 pub trait Files {
-    /// The text of a file.
+    /// Returns the text of a file.
     ///
     /// # Errors
     /// If it cannot be read.
     fn read(&self, name: &str) -> Result<String, String>;
-    /// Writes a file whole.
+    /// Writes a file, replacing its contents.
     ///
     /// # Errors
     /// If it cannot be written.
     fn write(&self, name: &str, text: &str) -> Result<(), String>;
 }
 
-/// Surroundings without files.
+/// File access that refuses every file.
 pub struct NoFiles;
 
 impl Files for NoFiles {
@@ -53,44 +53,44 @@ impl Files for NoFiles {
     }
 }
 
-/// A message to whoever watches the session.
+/// Message to the session's observer.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Message {
-    /// s since power-up.
+    /// Time since power-up, s.
     pub time: f64,
-    /// `say`, `note`, `signal`, `stopped`, `caught` or `check`.
+    /// Kind: `say`, `note`, `signal`, `stopped`, `caught` or `check`.
     pub kind: &'static str,
-    /// In words.
+    /// Text of the message.
     pub text: String,
 }
 
-/// The outcome of an entered text.
+/// Outcome of an entered text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Answer {
-    /// It is executed.
+    /// The text has been executed.
     Done,
-    /// A block is open: the same text with further lines is to be entered.
+    /// A block is open: enter the same text again with further lines.
     More,
 }
 
-/// Settings of motions that have none of their own.
+/// Defaults for motions without settings of their own.
 #[derive(Clone, Debug)]
 struct Settings {
-    /// deg/s, mm/s.
+    /// Speeds in deg/s and mm/s; `None`: as fast as the limits allow.
     speed: Option<(f64, f64)>,
     profile: Profile,
-    /// mm.
+    /// Tool point in the flange's frame, mm.
     tool: [f64; 3],
-    /// rad/s, N·m.
+    /// Limits in rad/s and N·m.
     limits: [[f32; 6]; 2],
 }
 
-/// The speeds that a session begins with: deg/s of the fastest joint, mm/s along lines.
+/// Initial speeds of a session: deg/s of the fastest joint, mm/s along lines.
 pub const SPEEDS: (f64, f64) = (45.0, 150.0);
-/// The controller's own limits, rad/s and N·m: it refuses higher ones.
+/// Limits of the controller itself, rad/s and N·m: it refuses higher ones.
 const BUILT_IN: [[f64; 6]; 2] = [takt_programs::three::VELOCITIES, takt_programs::three::TORQUES];
 
-/// A subprogram, wherever it came from.
+/// Subprogram from any text entered so far.
 #[derive(Clone, Debug)]
 struct Subprogram {
     code: Arc<Code>,
@@ -98,11 +98,11 @@ struct Subprogram {
     entry: usize,
 }
 
-/// A program on its way.
+/// Program in execution: [`Session::begin`] starts it.
 #[derive(Clone, Debug)]
-pub struct Running(Machine);
+pub struct Execution(Machine);
 
-/// A session of the command level.
+/// Session of the command level with a robot.
 #[derive(Clone)]
 pub struct Session<R> {
     host: Host<R>,
@@ -112,28 +112,28 @@ pub struct Session<R> {
     values: BTreeMap<String, Value>,
     subprograms: BTreeMap<String, Subprogram>,
     settings: Settings,
-    /// The joints at the end of the last accepted motion, deg.
+    /// Joint angles at the end of the last accepted motion, deg.
     planned: Joints,
-    /// Motions whose end has not been reported.
+    /// Commands whose end has not been reported, by sequence number.
     open: Vec<u32>,
-    /// The places of the latest motions in the sources.
+    /// Source places of the latest motions, by sequence number.
     motions: VecDeque<(u32, Span)>,
-    /// The jog that is held.
+    /// Mode of the active jog.
     jogging: Option<JogMode>,
     cause: u32,
     messages: Vec<Message>,
-    /// The session's program, its lines.
+    /// Lines of the session's program.
     program: Vec<String>,
     recording: bool,
     stepping: Option<Machine>,
-    /// True if it only checks that a program can run.
+    /// Dry run that only checks that a program can run.
     checking: bool,
-    /// True if it is over.
+    /// The session has ended.
     pub quit: bool,
 }
 
 impl<R: Robot + Clone> Session<R> {
-    /// A session with a robot that has just been powered up.
+    /// Session with a robot that has just been powered up.
     ///
     /// # Errors
     /// If the controller does not get ready.
@@ -172,17 +172,17 @@ impl<R: Robot + Clone> Session<R> {
         })
     }
 
-    /// The host's end of the link.
+    /// Host's end of the link.
     pub fn host(&self) -> &Host<R> {
         &self.host
     }
 
-    /// Something is to happen around the robot, so many s from now.
+    /// Schedules an event around the robot in `after` seconds.
     pub fn schedule(&mut self, after: f64, event: Event) {
         self.host.schedule(after, event);
     }
 
-    /// Messages, in their order.
+    /// Messages since the last call, in order.
     pub fn take_messages(&mut self) -> Vec<Message> {
         self.hear();
         std::mem::take(&mut self.messages)
@@ -196,20 +196,20 @@ impl<R: Robot + Clone> Session<R> {
         }
     }
 
-    /// Turns the news of the link into messages.
+    /// Turns news of the link into messages.
     fn hear(&mut self) {
         for (time, news) in self.host.take_news() {
             let (kind, text) = match news {
-                News::Output(number, on) => {
+                HostEvent::Output(number, on) => {
                     ("signal", format!("output {number} {}", if on { "on" } else { "off" }))
                 }
-                News::Level(channel, value) => {
+                HostEvent::Level(channel, value) => {
                     ("signal", format!("level {channel} is {}", value::short(f64::from(value))))
                 }
-                News::Report(report) if report.kind == ReportKind::Stopped && report.cause.is_some() => {
+                HostEvent::Report(report) if report.kind == ReportKind::Stopped && report.cause.is_some() => {
                     ("stopped", Problem::Stopped(report).to_string())
                 }
-                News::Report(_) => continue,
+                HostEvent::Report(_) => continue,
             };
             if self.messages.len() < limits::MESSAGES {
                 self.messages.push(Message { time, kind, text });
@@ -221,8 +221,8 @@ impl<R: Robot + Clone> Session<R> {
         Diagnostics { sources: Arc::new(self.sources.clone()), list, ..Diagnostics::default() }
     }
 
-    fn known(&self) -> Known {
-        Known {
+    fn known_names(&self) -> KnownNames {
+        KnownNames {
             values: self.values.keys().cloned().collect(),
             subprograms: self
                 .subprograms
@@ -232,12 +232,12 @@ impl<R: Robot + Clone> Session<R> {
         }
     }
 
-    /// The planned place of the robot, as a pose: mm, deg.
+    /// Planned position of the robot, as a pose: mm, deg.
     fn planned_pose(&self) -> [f64; 6] {
         pose_of(&self.planned, self.settings.tool).0
     }
 
-    /// Reads a text into code. `Ok(None)`: a block is open at its end, and `more` lines may come.
+    /// Parses and compiles a text. Returns `Ok(None)` if a block is open at its end and `more` lines may come.
     fn read(
         &mut self,
         name: &str,
@@ -271,10 +271,10 @@ impl<R: Robot + Clone> Session<R> {
             let mistake = Diagnostic::error("command", span, "this command stands by itself");
             return Err(self.diagnostics(vec![mistake]));
         }
-        compile(&parsed.block, &self.known(), console).map(Some).map_err(|list| self.diagnostics(list))
+        compile(&parsed.block, &self.known_names(), console).map(Some).map_err(|list| self.diagnostics(list))
     }
 
-    /// Executes what was typed at the prompt, or a line of a script.
+    /// Executes a text typed at the prompt, or a line of a script.
     ///
     /// # Errors
     /// A mistake in the text, or an error while it runs.
@@ -291,7 +291,7 @@ impl<R: Robot + Clone> Session<R> {
         result.map(|()| Answer::Done)
     }
 
-    /// Runs a program.
+    /// Runs a program to its end.
     ///
     /// # Errors
     /// A mistake in the text, or an error while it runs.
@@ -302,27 +302,27 @@ impl<R: Robot + Clone> Session<R> {
         }
     }
 
-    /// Begins a program, which [`Session::advance`] executes statement by statement.
+    /// Compiles a program for execution by [`Session::advance`], operation by operation.
     ///
     /// # Errors
     /// A mistake in the text.
-    pub fn begin(&mut self, name: &str, text: &str) -> Result<Running, Diagnostics> {
+    pub fn begin(&mut self, name: &str, text: &str) -> Result<Execution, Diagnostics> {
         let code = self.read(name, text, false, false)?.unwrap_or_default();
-        Ok(Running(Machine::new(self.adopt(code))))
+        Ok(Execution(Machine::new(self.adopt(code))))
     }
 
-    /// Executes a program's next operation; whether there are more.
+    /// Executes a program's next operation; returns false at its end.
     ///
     /// # Errors
-    /// An error of the run: the program is over.
-    pub fn advance(&mut self, running: &mut Running) -> Result<bool, Diagnostics> {
+    /// An error of the run, which ends the program.
+    pub fn advance(&mut self, running: &mut Execution) -> Result<bool, Diagnostics> {
         self.step(&mut running.0).map_err(|mistake| self.broken_off(*mistake))
     }
 
-    /// Runs a program in a copy of the robot, which stays where it is. Signals are taken to come.
+    /// Runs a program in a copy of the robot; the robot itself does not move. Awaited signals count as given.
     ///
     /// # Errors
-    /// A mistake in the text, or an error that its run would end with.
+    /// A mistake in the text, or the error with which the run would end.
     pub fn check(&mut self, name: &str, text: &str) -> Result<(), Diagnostics> {
         let Some(code) = self.read(name, text, false, false)? else { return Ok(()) };
         let mut copy = self.clone();
@@ -365,7 +365,7 @@ impl<R: Robot + Clone> Session<R> {
         }
     }
 
-    /// A program has ended with an error: the robot does not go on without it.
+    /// Ends a program after an error: stops the robot, which must not go on without its program.
     fn broken_off(&mut self, mistake: Diagnostic) -> Diagnostics {
         self.interrupt.store(false, Ordering::Relaxed);
         let list = match (self.host.stopped(), self.host.stands()) {
@@ -378,10 +378,10 @@ impl<R: Robot + Clone> Session<R> {
         self.diagnostics(list)
     }
 
-    /// Waits until nothing moves: at the end of a script.
+    /// Waits until the robot stands, at the end of a script.
     ///
     /// # Errors
-    /// If the robot is stopped on its way.
+    /// If the robot is stopped with an error.
     pub fn finish(&mut self) -> Result<(), Diagnostics> {
         if self.host.stopped().is_some() {
             return Ok(());
@@ -389,7 +389,7 @@ impl<R: Robot + Clone> Session<R> {
         self.enter("end", "wait done", false).map(|_| ())
     }
 
-    /// True if somebody wants it to end: asked once.
+    /// An interrupt has been requested.
     fn interrupted(&self) -> bool {
         self.interrupt.load(Ordering::Relaxed)
     }
@@ -412,7 +412,7 @@ impl<R: Robot + Clone> Session<R> {
         self.program.iter().map(|line| format!("{line}\n")).collect()
     }
 
-    /// A file's name and text, or the session's program.
+    /// Name and text of a file, or of the session's program.
     fn text_of(&self, file: Option<&crate::language::tree::Name>) -> Result<(String, String), Diagnostics> {
         match file {
             Some(file) => {
@@ -426,7 +426,7 @@ impl<R: Robot + Clone> Session<R> {
         }
     }
 
-    // ---- The prompt's own commands.
+    // ---- Commands of the prompt.
 
     fn console(&mut self, span: Span, console: &Console) -> Result<(), Diagnostics> {
         match console {
@@ -508,7 +508,7 @@ impl<R: Robot + Clone> Session<R> {
         Ok(())
     }
 
-    /// Executes one statement of the session's program, and says which one is next.
+    /// Executes one statement of the session's program, and announces the next.
     fn single_step(&mut self, span: Span) -> Result<(), Diagnostics> {
         let mut machine = match self.stepping.take() {
             Some(machine) => machine,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Values of programs, and what operators and functions make of them.
+//! Values of programs, and the semantics of operators and functions.
 
 use crate::dynamics::Joints;
 use crate::geometry::Transform;
@@ -8,21 +8,21 @@ use crate::language::tree::{Binary, Expression, ExpressionKind, Name, Unary};
 use std::fmt;
 use takt_diagnostics::diag::Diagnostic;
 
-/// A value. In poses and joint angles, NaN stands for "as it is".
+/// Value of an expression. In poses and joint angles, NaN stands for an open component, `_`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Value {
-    /// A number; of conditions, 0 does not hold.
+    /// Number; as a condition, 0 is false.
     Number(f64),
-    /// Joint angles, deg.
+    /// Joint angles in degrees.
     Joints(Joints),
-    /// x, y, z, roll, pitch, yaw: mm, deg.
+    /// Pose x, y, z, roll, pitch, yaw: mm, deg.
     Pose([f64; 6]),
-    /// x, y, z, rx, ry, rz: mm, deg.
+    /// Frame x, y, z, rx, ry, rz: mm, deg.
     Frame([f64; 6]),
 }
 
 impl Value {
-    /// The kind of value that it is.
+    /// Kind of the value, for messages.
     pub const fn kind(&self) -> &'static str {
         match self {
             Value::Number(_) => "a number",
@@ -33,7 +33,7 @@ impl Value {
     }
 }
 
-/// A number as people write it, to three digits behind the point.
+/// Formats a number with at most three decimals; NaN as `_`.
 pub fn short(number: f64) -> String {
     if number.is_nan() {
         return "_".to_owned();
@@ -47,7 +47,7 @@ pub fn short(number: f64) -> String {
 }
 
 impl fmt::Display for Value {
-    /// As it could stand in a program.
+    /// Formats the value as program text.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (name, numbers) = match self {
             Value::Number(number) => return f.write_str(&short(*number)),
@@ -60,21 +60,21 @@ impl fmt::Display for Value {
     }
 }
 
-/// The surroundings of an expression: names, inputs, the robot.
+/// Environment of an expression: names, inputs, the robot.
 pub trait Surroundings {
-    /// The value of a name, if it has one yet.
+    /// Value of a name, if it has been assigned.
     fn value(&self, name: &str) -> Option<Value>;
-    /// The present joint angles, deg.
+    /// Present joint angles, deg.
     fn joints(&self) -> Joints;
-    /// The present pose, mm and deg.
+    /// Present pose, mm and deg.
     fn pose(&self) -> [f64; 6];
-    /// True if a digital input is on; `None` if there is no such input.
+    /// State of a digital input; `None` if there is no such input.
     fn input(&self, number: f64) -> Option<bool>;
-    /// An analogue input; `None` if there is no such channel.
+    /// Value of an analogue input; `None` if there is no such channel.
     fn analogue(&self, channel: f64) -> Option<f64>;
-    /// s since power-up.
+    /// Time since power-up, s.
     fn time(&self) -> f64;
-    /// Of the last error.
+    /// Cause of the last error, as a number; 0 without one.
     fn cause(&self) -> u32;
 }
 
@@ -84,10 +84,10 @@ fn wrong<T>(expression: &Expression, message: String) -> Outcome<T> {
     Err(Box::new(Diagnostic::error("value", expression.span, message)))
 }
 
-/// The value of an expression.
+/// Evaluates an expression in its surroundings.
 ///
 /// # Errors
-/// If kinds do not fit, or the result is no number.
+/// If the kinds of the operands do not fit, or the result is NaN.
 pub fn evaluate(expression: &Expression, around: &dyn Surroundings) -> Outcome<Value> {
     let value = match &expression.kind {
         ExpressionKind::Number(number) => Value::Number(*number),
@@ -105,7 +105,7 @@ pub fn evaluate(expression: &Expression, around: &dyn Surroundings) -> Outcome<V
             (_, other) => return wrong(of, format!("expected a number, but this is {}", other.kind())),
         },
         ExpressionKind::Binary(binary, left, right) => {
-            // An operand that decides alone is asked alone: `input(1) or risky`.
+            // Short circuit: the first operand may decide alone, as in `input(1) or risky`.
             let first = evaluate(left, around)?;
             match (binary, first) {
                 (Binary::And, Value::Number(0.0)) => return Ok(truth(false)),
@@ -178,10 +178,10 @@ fn combine(binary: Binary, left: Value, right: Value) -> Option<Value> {
     })
 }
 
-/// A number, or a mistake at its place.
+/// Evaluates an expression that must be a number.
 ///
 /// # Errors
-/// If it is another kind of value.
+/// If the value is of another kind.
 pub fn number(expression: &Expression, around: &dyn Surroundings) -> Outcome<f64> {
     match evaluate(expression, around)? {
         Value::Number(number) => Ok(number),
@@ -189,10 +189,10 @@ pub fn number(expression: &Expression, around: &dyn Surroundings) -> Outcome<f64
     }
 }
 
-/// A number within bounds.
+/// Evaluates a number within bounds.
 ///
 /// # Errors
-/// If it is not.
+/// If the value is of another kind or out of bounds.
 pub fn number_in(
     expression: &Expression,
     what: &str,
@@ -235,7 +235,7 @@ fn call(
     arguments: &[Expression],
     around: &dyn Surroundings,
 ) -> Outcome<Value> {
-    // `frame(pose)` and `inverse(frame)` take no numbers.
+    // The functions `frame(pose)` and `inverse(frame)` take no numbers.
     match (name.text.as_str(), arguments) {
         ("frame", [of]) => {
             return match evaluate(of, around)? {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A stand-in for the cores: it takes packets as they do, and moves at once along straight lines in time. What it does not have
-//! are dynamics, profiles and limits.
+//! Stand-in for the cores: takes packets like them, and moves at once along straight lines in time. It has no dynamics, profiles or limits.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::atomic::AtomicBool;
@@ -20,7 +19,7 @@ struct Segment {
     via: bool,
 }
 
-/// The stand-in.
+/// Stand-in with shared state, so that tests can observe a robot that the session owns.
 pub(crate) struct StandIn(Arc<Mutex<State>>);
 
 #[derive(Clone)]
@@ -63,24 +62,24 @@ impl StandIn {
         StandIn(Arc::new(Mutex::new(state)))
     }
 
-    /// The same one, to look at.
+    /// Second handle to the same stand-in, for observation.
     pub(crate) fn shared(&self) -> StandIn {
         StandIn(Arc::clone(&self.0))
     }
 
-    /// From now on, it does not report why it stops.
+    /// Suppresses the reports of stops from now on.
     pub(crate) fn mute(&self) {
         self.0.lock().expect("one thread").mute = true;
     }
 
-    /// Kinds of the packets that have come, but NOPs.
+    /// Kinds of the packets received, without NOPs.
     pub(crate) fn packets(&self) -> Vec<Kind> {
         let state = self.0.lock().expect("one thread");
         state.packets.iter().copied().filter(|kind| *kind != Kind::Nop).collect()
     }
 }
 
-/// Another one in the same state.
+/// Deep copy: a second stand-in in the same state.
 impl Clone for StandIn {
     fn clone(&self) -> StandIn {
         StandIn(Arc::new(Mutex::new(self.0.lock().expect("one thread").clone())))
@@ -269,7 +268,7 @@ impl Robot for StandIn {
     }
 }
 
-/// Files in memory.
+/// Files in memory, by name.
 #[derive(Default)]
 pub(crate) struct Memory(Mutex<BTreeMap<String, String>>);
 
@@ -291,7 +290,7 @@ pub(crate) fn session() -> (Session<StandIn>, StandIn) {
     (session.expect("it gets ready"), robot)
 }
 
-/// Messages as lines.
+/// Messages as lines `kind: text`.
 pub(crate) fn lines(messages: Vec<Message>) -> Vec<String> {
     messages.into_iter().map(|message| format!("{}: {}", message.kind, message.text)).collect()
 }

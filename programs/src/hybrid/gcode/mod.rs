@@ -1,58 +1,69 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Reader of the G-code that the hybrid robot understands.
+//! Reader of the hybrid robot's G-code dialect.
 //!
-//! Supported: G0 G1 G2 G3 (modal; arcs in the XY plane by centre I J or radius R, a full circle where the end is
-//! the start), G17 G21 G90, M2 M30, words X Y Z (mm), A C (deg), F (mm/min), line numbers N, and comments
-//! `; …` and `( … )`. Everything else is an error that names the line, the column and what would be right.
-//! The first motion must be a G0 with X, Y and Z; it places the robot and takes no time. Text after M2 or M30
-//! is not interpreted.
+//! [`codes`] is the table of codes that are read, passed over and refused; `docs/readers.md` shows it. An error names the line, the column
+//! and the mend. The first motions must be G0s that give X, Y and Z; they place the robot and take no time. Text after the end (M2, M30, a
+//! second `%`) is not read.
 //!
-//! The words are split by the crate [`gcode`] 0.7, used through its allocation-free visitor. It was preferred to
-//! `g-code` 0.6 because it is linear by construction, does not recurse, goes on after an error, and gives each
-//! word its span; `g-code` is a backtracking grammar that recurses on nested comments and stops at the first
-//! non-ASCII character of a comment. Two of its habits are worked around here: it hands out numbers in binary32
-//! (ours are read again from the span, in binary64), and it drops or misreads some numbers of codes, like `G1.`
-//! and `G429496730` (both are refused beforehand).
-//!
-//! The files of this folder are one module and import one another: the reader's types and limits are here, its errors state them.
+//! The files of this folder are one module and import one another: the reader's types and limits are here, and its errors state them.
 
+mod codes;
 mod error;
 mod interpret;
 mod syntax;
 
+pub use codes::reference;
 pub use error::{GcodeError, GcodeErrorKind};
 
 use crate::path::{Move, Pose};
 
 /// Speed of positioning moves (G0), m/s.
 pub const RAPID_SPEED: f64 = 0.2;
-/// By how much the radius of an arc may differ between its ends, m: the printed digits are finite.
+/// Tolerance of an arc's radius between its ends, m: the printed digits are finite.
 pub const ARC_TOLERANCE: f64 = 1e-5;
 /// Longest integer part of a number, in digits.
 pub const MAX_INTEGER_DIGITS: usize = 8;
 
-/// A tool path read from G-code, in SI units.
+/// Tool path read from G-code, in SI units.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Program {
-    /// The pose in which the robot starts: the target of the first motion.
+    /// Pose in which the robot starts: the target of the first G0s.
     pub start: Pose,
-    /// The moves in order, each starting where the one before ended; may include moves of length 0.
+    /// Moves in order, each starting at the end of its predecessor; may include moves of length 0.
     pub moves: Vec<Move>,
+    /// Codes and marks that were passed over, since they do not change the path, each with the line of its first use.
+    pub passed_over: Vec<(String, usize)>,
 }
 
-/// Reads a program.
+impl Program {
+    /// Message that lists the codes passed over; `None` without any.
+    #[must_use]
+    pub fn note(&self) -> Option<String> {
+        let mut lines: Vec<(usize, Vec<&str>)> = Vec::new();
+        for (code, line) in &self.passed_over {
+            match lines.last_mut() {
+                Some((last, codes)) if last == line => codes.push(code),
+                _ => lines.push((*line, vec![code])),
+            }
+        }
+        let lines: Vec<String> =
+            lines.iter().map(|(line, codes)| format!("{} (line {line})", codes.join(" "))).collect();
+        (!lines.is_empty())
+            .then(|| format!("passed over, because the path does not depend on these: {}", lines.join(", ")))
+    }
+}
+
+/// Reads a program from text, in one pass.
 ///
-/// Takes time and memory linear in the length of the text, and does not panic on any.
+/// Takes time and memory linear in the length of the text, and never panics.
 ///
 /// # Errors
 ///
 /// The first error of the program.
 pub fn read(source: &str) -> Result<Program, GcodeError> {
-    // Editors on some systems begin a file with a mark that is not part of its text.
+    // Editors on some systems put a byte order mark at the beginning.
     let source = source.strip_prefix('\u{feff}').unwrap_or(source);
-    syntax::check(source)
-        .and_then(|()| syntax::read(source))
-        .map_err(|(kind, offset)| locate(source, offset, kind))
+    syntax::read(source).map_err(|(kind, offset)| locate(source, offset, kind))
 }
 
 /// Reads a program from the bytes of a file; see [`read`].
@@ -70,8 +81,8 @@ pub fn read_bytes(bytes: &[u8]) -> Result<Program, GcodeError> {
     }
 }
 
-/// An error kind and the byte offset it is at.
-type Located = (GcodeErrorKind, usize);
+/// Error kind with its byte offset.
+type LocatedError = (GcodeErrorKind, usize);
 
 fn locate(source: &str, offset: usize, kind: GcodeErrorKind) -> GcodeError {
     let before = source.get(..offset).unwrap_or(source);

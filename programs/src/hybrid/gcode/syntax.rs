@@ -1,229 +1,187 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! From text to words: drives the parser crate and collects each line for the interpreter.
-
-use gcode::core::{
-    BlockVisitor, CommandVisitor, ControlFlow, Diagnostics, HasDiagnostics, Number, ProgramVisitor, Span,
-    TokenType, Value,
-};
+//! Lexer: splits each line into words, in one pass.
 
 use super::interpret::{Interpreter, Word};
-use super::{GcodeErrorKind, Located, MAX_INTEGER_DIGITS, Program};
+use super::{GcodeErrorKind, LocatedError, MAX_INTEGER_DIGITS, Program};
 
-/// Refuses what the parser crate would silently misread: comments left open (it would take the rest of the file
-/// for comment), carriage returns alone (it takes them for blanks), overlong numbers (they overflow), and codes
-/// with a fraction (it drops malformed ones without a diagnostic that could be received).
-pub(super) fn check(source: &str) -> Result<(), Located> {
-    let bytes = source.as_bytes();
-    let mut open = Vec::new();
-    let mut line_comment = false;
-    // The word being read, and the digits of its integer part so far.
-    let (mut word, mut digits, mut fraction) = (0, 0, false);
-    for (at, &byte) in bytes.iter().enumerate() {
-        match byte {
-            b'\r' if bytes.get(at + 1) != Some(&b'\n') => {
-                return Err((GcodeErrorKind::LoneCarriageReturn, at));
+/// Reads a program line by line and interprets its words.
+pub(super) fn read(source: &str) -> Result<Program, LocatedError> {
+    let mut interpreter = Interpreter::default();
+    let mut begun = false;
+    let mut start = 0;
+    for (index, whole) in source.split('\n').enumerate() {
+        let text = whole.strip_suffix('\r').unwrap_or(whole);
+        let mut line = Line { text, at: 0, start, number: index + 1 };
+        start += whole.len() + 1;
+        line.blanks();
+        if line.take('%') {
+            // The text after the mark is a name.
+            if begun {
+                break;
             }
-            b'\n' if !open.is_empty() => break,
-            b'\n' => line_comment = false,
-            _ if line_comment => continue,
-            b'(' => open.push(at),
-            b')' => drop(open.pop()),
-            _ if !open.is_empty() => continue,
-            b';' => line_comment = true,
-            _ => {}
+            begun = true;
+            continue;
         }
-        match byte {
-            b'.' if matches!(bytes[word], b'G' | b'g' | b'M' | b'm') => {
-                return Err((fractional_code(&source[word..]), word));
+        let words = line.words(&mut interpreter)?;
+        begun |= !words.is_empty();
+        if interpreter.line(&words, index + 1)? {
+            break;
+        }
+    }
+    interpreter.finish().map_err(|kind| (kind, source.len()))
+}
+
+/// Cursor in a line.
+struct Line<'s> {
+    text: &'s str,
+    /// Offset of the next character within the line.
+    at: usize,
+    /// Offset of the line in the source.
+    start: usize,
+    /// Line number, from 1.
+    number: usize,
+}
+
+impl<'s> Line<'s> {
+    fn rest(&self) -> &'s str {
+        &self.text[self.at..]
+    }
+
+    fn blanks(&mut self) {
+        self.at += self.rest().len() - self.rest().trim_start_matches([' ', '\t']).len();
+    }
+
+    fn take(&mut self, expected: char) -> bool {
+        let found = self.rest().starts_with(expected);
+        self.at += if found { expected.len_utf8() } else { 0 };
+        found
+    }
+
+    fn fail(&self, kind: GcodeErrorKind, at: usize) -> LocatedError {
+        (kind, self.start + at)
+    }
+
+    /// Error for unexpected text at an offset, which quotes at most 20 characters.
+    fn unexpected(&self, at: usize) -> LocatedError {
+        let text = &self.text[at..];
+        if text.starts_with('\r') {
+            return self.fail(GcodeErrorKind::LoneCarriageReturn, at);
+        }
+        let end =
+            text.char_indices().skip(1).find(|(_, c)| matches!(c, ' ' | '\t' | '\r')).map(|(end, _)| end);
+        let found = text[..end.unwrap_or(text.len())].chars().take(20).collect();
+        self.fail(GcodeErrorKind::Syntax { found }, at)
+    }
+
+    /// Skips blanks and comments; returns true if the line goes on.
+    fn goes_on(&mut self) -> Result<bool, LocatedError> {
+        loop {
+            self.blanks();
+            match self.rest().bytes().next() {
+                None | Some(b';') => return self.is_whole().map(|()| false),
+                Some(b'(') => self.comment()?,
+                Some(_) => return Ok(true),
             }
-            b'.' => fraction = true,
-            b'0'..=b'9' if fraction => {}
-            b'0'..=b'9' => digits += 1,
-            _ => {
-                (digits, fraction) = (0, false);
-                // A sign or a blank may stand between a letter and its number.
-                if !matches!(byte, b' ' | b'\t' | b'+' | b'-') {
-                    word = at;
+        }
+    }
+
+    /// Rejects a carriage return in a comment to the end of the line: it would hide the next line.
+    fn is_whole(&self) -> Result<(), LocatedError> {
+        match self.rest().find('\r') {
+            Some(at) => Err(self.fail(GcodeErrorKind::LoneCarriageReturn, self.at + at)),
+            None => Ok(()),
+        }
+    }
+
+    /// Skips a comment in parentheses, which may nest.
+    fn comment(&mut self) -> Result<(), LocatedError> {
+        let mut depth = 0;
+        for (at, byte) in self.rest().bytes().enumerate() {
+            match byte {
+                b'(' => depth += 1,
+                b')' => depth -= 1,
+                b'\r' => return Err(self.fail(GcodeErrorKind::LoneCarriageReturn, self.at + at)),
+                _ => {}
+            }
+            if depth == 0 {
+                self.at += at + 1;
+                return Ok(());
+            }
+        }
+        Err(self.fail(GcodeErrorKind::UnclosedComment, self.at))
+    }
+
+    /// Words of the line; other marks are passed over.
+    fn words(mut self, interpreter: &mut Interpreter) -> Result<Vec<Word<'s>>, LocatedError> {
+        let mut words = Vec::new();
+        if self.take('/') {
+            interpreter.pass("/", self.number);
+        }
+        while self.goes_on()? {
+            let at = self.at;
+            let letter = self.rest().chars().next().unwrap_or_default();
+            match letter {
+                'a'..='z' | 'A'..='Z' => {
+                    self.at += 1;
+                    let letter = letter.to_ascii_uppercase();
+                    let (value, number) = self.value(at)?;
+                    match letter {
+                        'N' => {}
+                        'O' => self.program_number(at)?,
+                        _ => words.push(Word { letter, value, number, at: self.start + at }),
+                    }
                 }
+                ':' => {
+                    self.at += 1;
+                    self.value(at)?;
+                    self.program_number(at)?;
+                }
+                '*' => {
+                    self.at += 1;
+                    self.value(at)?;
+                    interpreter.pass("*", self.number);
+                }
+                '#' | '[' => return Err(self.fail(GcodeErrorKind::Expression(letter), at)),
+                _ => return Err(self.unexpected(at)),
             }
+        }
+        Ok(words)
+    }
+
+    /// Checks that a program's number ends its line.
+    fn program_number(&mut self, at: usize) -> Result<(), LocatedError> {
+        if self.goes_on()? { Err(self.fail(GcodeErrorKind::Subroutine, at)) } else { Ok(()) }
+    }
+
+    /// Parses the number of the word that begins at an offset; also returns its digits without sign. Blanks may precede and follow the
+    /// sign.
+    fn value(&mut self, word: usize) -> Result<(f64, &'s str), LocatedError> {
+        self.blanks();
+        let negative = self.take('-');
+        if !negative {
+            self.take('+');
+        }
+        self.blanks();
+        let first = self.at;
+        let (mut digits, mut fraction) = (0, false);
+        for byte in self.rest().bytes() {
+            match byte {
+                b'0'..=b'9' if fraction => {}
+                b'0'..=b'9' => digits += 1,
+                b'.' if !fraction => fraction = true,
+                _ => break,
+            }
+            self.at += 1;
+        }
+        let number = &self.text[first..self.at];
+        if matches!(self.rest().chars().next(), Some('#' | '[')) && number.is_empty() {
+            let letter = self.rest().chars().next().unwrap_or_default();
+            return Err(self.fail(GcodeErrorKind::Expression(letter), self.at));
         }
         if digits > MAX_INTEGER_DIGITS {
-            return Err((GcodeErrorKind::NumberTooLong, at + 1 - digits));
+            return Err(self.fail(GcodeErrorKind::NumberTooLong, first));
         }
-    }
-    match open.first() {
-        Some(&at) => Err((GcodeErrorKind::UnclosedComment, at)),
-        None => Ok(()),
-    }
-}
-
-/// The error for a G or M code like `G91.1`, at the start of `text`.
-fn fractional_code(text: &str) -> GcodeErrorKind {
-    let code = text.char_indices().take_while(|&(i, c)| i == 0 || c.is_ascii_digit() || c == '.');
-    GcodeErrorKind::UnsupportedCode {
-        code: code.map(|(_, c)| c.to_ascii_uppercase()).take(12).collect(),
-        hint: "supported are G0 G1 G2 G3 G17 G21 G90 M2 M30",
-    }
-}
-
-/// Parses and interprets a checked source.
-pub(super) fn read(source: &str) -> Result<Program, Located> {
-    let mut reader =
-        Reader { source, interpreter: Interpreter::default(), words: Vec::new(), error: None, ended: false };
-    gcode::core::parse(source, &mut reader);
-    match reader.error {
-        Some(error) => Err(error),
-        None => reader.interpreter.finish().ok_or((GcodeErrorKind::Empty, source.len())),
-    }
-}
-
-struct Reader<'s> {
-    source: &'s str,
-    interpreter: Interpreter,
-    /// Words of the current line; kept for its allocation.
-    words: Vec<Word<'s>>,
-    /// The first error.
-    error: Option<Located>,
-    /// True once M2 or M30 has been read.
-    ended: bool,
-}
-
-impl<'s> Reader<'s> {
-    fn fail(&mut self, kind: GcodeErrorKind, at: usize) {
-        self.error.get_or_insert((kind, at));
-    }
-
-    fn syntax(&mut self, text: &str, span: Span) {
-        // Enough to recognise it by; the text may be a whole line.
-        let found = text.trim_end().chars().take(20).collect::<String>();
-        let found = if found.is_empty() { "end of line".to_owned() } else { found };
-        self.fail(GcodeErrorKind::Syntax { found }, span.start);
-    }
-
-    /// The word that starts at a letter and extends to `end` at most.
-    fn word(&mut self, start: usize, end: usize) -> Option<Word<'s>> {
-        let text = self.source.get(start..end)?;
-        let letter = text.chars().next()?;
-        let rest = text[letter.len_utf8()..].trim_start();
-        let (negative, rest) = match rest.as_bytes().first() {
-            Some(b'-') => (true, rest[1..].trim_start()),
-            Some(b'+') => (false, rest[1..].trim_start()),
-            _ => (false, rest),
-        };
-        let length = rest.bytes().take_while(|byte| byte.is_ascii_digit() || *byte == b'.').count();
-        let number = &rest[..length];
-        let Ok(value) = number.parse::<f64>() else {
-            self.fail(GcodeErrorKind::Syntax { found: number.chars().take(20).collect() }, start);
-            return None;
-        };
-        let value = if negative { -value } else { value };
-        Some(Word { letter: letter.to_ascii_uppercase(), value, number, at: start })
-    }
-
-    fn push_word(&mut self, span: Span) {
-        if let Some(word) = self.word(span.start, span.end()) {
-            self.words.push(word);
-        }
-    }
-
-    /// Reserves the place of a code before its arguments, since its span comes after them.
-    fn command(&mut self) -> Command<'_, 's> {
-        let slot = self.words.len();
-        self.words.push(Word { letter: ' ', value: 0.0, number: "", at: 0 });
-        Command { reader: self, slot }
-    }
-}
-
-impl Diagnostics for Reader<'_> {
-    fn emit_unknown_content(&mut self, text: &str, span: Span) {
-        self.syntax(text, span);
-    }
-
-    fn emit_unexpected(&mut self, actual: &str, _expected: &[TokenType], span: Span) {
-        self.syntax(actual, span);
-    }
-
-    fn emit_parse_int_error(&mut self, value: &str, _error: std::num::ParseIntError, span: Span) {
-        self.syntax(value, span);
-    }
-}
-
-impl ProgramVisitor for Reader<'_> {
-    fn start_block(&mut self) -> ControlFlow<impl BlockVisitor + '_> {
-        if self.error.is_some() || self.ended {
-            return ControlFlow::Break(());
-        }
-        self.words.clear();
-        ControlFlow::Continue(Line(self))
-    }
-}
-
-/// A line being read.
-struct Line<'r, 's>(&'r mut Reader<'s>);
-
-impl HasDiagnostics for Line<'_, '_> {
-    fn diagnostics(&mut self) -> &mut dyn Diagnostics {
-        self.0
-    }
-}
-
-impl<'s> BlockVisitor for Line<'_, 's> {
-    fn program_number(&mut self, _number: u32, span: Span) {
-        self.0.fail(GcodeErrorKind::UnknownLetter('O'), span.start);
-    }
-
-    fn program_delimiter(&mut self, span: Span) {
-        self.0.syntax("%", span);
-    }
-
-    fn word_address(&mut self, _letter: char, _value: Value<'_>, span: Span) {
-        self.0.push_word(span);
-    }
-
-    fn start_general_code(&mut self, _number: Number) -> ControlFlow<impl CommandVisitor + '_> {
-        ControlFlow::Continue(self.0.command())
-    }
-
-    fn start_miscellaneous_code(&mut self, _number: Number) -> ControlFlow<impl CommandVisitor + '_> {
-        ControlFlow::Continue(self.0.command())
-    }
-
-    fn start_tool_change_code(&mut self, _number: Number) -> ControlFlow<impl CommandVisitor + '_> {
-        ControlFlow::Continue(self.0.command())
-    }
-
-    fn end_line(self, span: Span) {
-        let reader = self.0;
-        if reader.error.is_some() {
-            return;
-        }
-        match reader.interpreter.line(&reader.words, span.line + 1) {
-            Ok(ended) => reader.ended = ended,
-            Err(error) => reader.error = Some(error),
-        }
-    }
-}
-
-/// A G, M or T code being read; its number arrives with the span at the end.
-struct Command<'r, 's> {
-    reader: &'r mut Reader<'s>,
-    slot: usize,
-}
-
-impl HasDiagnostics for Command<'_, '_> {
-    fn diagnostics(&mut self) -> &mut dyn Diagnostics {
-        self.reader
-    }
-}
-
-impl CommandVisitor for Command<'_, '_> {
-    fn argument(&mut self, _letter: char, _value: Value<'_>, span: Span) {
-        self.reader.push_word(span);
-    }
-
-    fn end_command(self, span: Span) {
-        if let Some(word) = self.reader.word(span.start, span.end()) {
-            self.reader.words[self.slot] = word;
-        }
+        let value: f64 = number.parse().map_err(|_| self.unexpected(word))?;
+        Ok((if negative { -value } else { value }, number))
     }
 }

@@ -1,25 +1,25 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Estimation and control in binary64, as `programs/library/control.s` computes them.
+//! Estimation and control in binary64, with the algorithms of `programs/library/control.s`.
 
 use super::{Arrays, product, solved, times, turned};
 
-/// a + factor·b.
+/// Sum a + factor·b of vectors.
 fn plus(a: &[f64], b: &[f64], factor: f64) -> Vec<f64> {
     a.iter().zip(b).map(|(a, b)| a + factor * b).collect()
 }
 
-/// State and covariance behind a correction, from those predicted: `e` is the innovation, `h` its derivatives.
+/// State and covariance after a correction, from the predicted ones: `e` is the innovation, `h` the derivatives of the measurement.
 fn corrected(m: &[f64], n: &[f64], h: &[f64], r: &[f64], e: &[f64]) -> (Vec<f64>, Vec<f64>) {
     let (states, measured) = (m.len(), e.len());
     let g = product(n, &turned(h, states), states);
     let s = plus(&product(h, &g, states), r, 1.0);
-    // K·S = G, by rows: S is symmetric.
+    // Solves K·S = G by rows, since S is symmetric.
     let gain: Vec<f64> = g.chunks(measured).flat_map(|row| solved(&s, row)).collect();
     let correction = product(&gain, &turned(&g, measured), measured);
     (plus(m, &times(&gain, e), 1.0), plus(n, &correction, -1.0))
 }
 
-/// F·P·Fᵀ + Q.
+/// Predicted covariance F·P·Fᵀ + Q.
 fn predicted(f: &[f64], p: &[f64], q: &[f64], states: usize) -> Vec<f64> {
     plus(&product(&product(f, p, states), &turned(f, states), states), q, 1.0)
 }
@@ -52,7 +52,7 @@ pub(super) fn riccati(arrays: &mut Arrays, _: &mut Vec<f64>) {
     let [a, b, q, r, p] = [0, 1, 2, 3, 4].map(|which| arrays[which].clone());
     let (a_turned, b_turned) = (turned(&a, 12), turned(&b, 4));
     let s = plus(&product(&b_turned, &product(&p, &b, 12), 12), &r, 1.0);
-    // Bᵀ·P·A, and its columns as rows.
+    // Matrix Bᵀ·P·A; its columns are solved as rows.
     let g = product(&b_turned, &product(&p, &a, 12), 12);
     let k: Vec<f64> = turned(&g, 12).chunks(4).flat_map(|column| solved(&s, column)).collect();
     let gain = turned(&k, 4);
@@ -74,7 +74,7 @@ pub(super) fn qp(arrays: &mut Arrays, _: &mut Vec<f64>) {
     (arrays[4], arrays[5]) = (z, y);
 }
 
-/// A value in bounds: its dual, and the linear cost that follows.
+/// Slack variable of a bounded value: updates its dual and the linear cost.
 fn slack(value: f64, bound: f64, dual: &mut f64, cost: &mut f64) {
     let sum = value + *dual;
     let within = sum.clamp(-bound, bound);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! `programs/kernels`, `programs/taclebench`: programs over arrays in memory against the same computation in binary64, and
-//! what they cost, in `docs/library.md`.
+//! Kernels in `programs/kernels` and `programs/taclebench`: programs over arrays in memory against the same computation in binary64, and
+//! their costs, in `docs/library.md`.
 
 mod control;
 mod taclebench;
@@ -12,35 +12,35 @@ use takt_emu::Emulator;
 use takt_isa::{Machine, T1, T3, T4};
 use takt_programs::{KERNELS, LIBRARY, TACLEBENCH};
 
-/// An array of a program, as the values that a period finds and leaves.
+/// Arrays of a program, before and after a period.
 type Arrays = Vec<Vec<f64>>;
 
 struct Kernel {
     name: &'static str,
     machines: &'static [&'static Machine],
-    /// The lengths of the program's first arrays, in the order of their declaration.
+    /// Lengths of the program's first arrays, in the order of their declaration.
     lengths: &'static [usize],
-    /// Those that random numbers fill before a period.
+    /// Arrays that random numbers fill before a period.
     filled: &'static [usize],
-    /// Those that are compared behind it.
+    /// Arrays to compare after a period.
     results: &'static [usize],
-    /// Products that are added to something, in a period.
+    /// Number of multiply-add pairs in a period.
     products: u32,
-    /// Makes random numbers what the program expects.
+    /// Makes valid operands from random numbers.
     prepare: fn(&mut Arrays),
-    /// A period; the last argument holds what the program keeps elsewhere.
+    /// Model of a period; the last argument holds the program's other state.
     model: fn(&mut Arrays, &mut Vec<f64>),
 }
 
 const ALL: &[&Machine] = &[&T3, &T1, &T4];
 
-fn as_it_is(_: &mut Arrays) {}
+fn unchanged(_: &mut Arrays) {}
 
 fn times(a: &[f64], x: &[f64]) -> Vec<f64> {
     a.chunks(x.len()).map(|row| row.iter().zip(x).map(|(a, x)| a * x).sum()).collect()
 }
 
-/// C = A·B, of rows of A and columns of B.
+/// Product C = A·B, both stored by rows; `inner` is the number of A's columns.
 fn product(a: &[f64], b: &[f64], inner: usize) -> Vec<f64> {
     let columns = b.len() / inner;
     let element = |row: &[f64], j: usize| (0..inner).map(|k| row[k] * b[k * columns + j]).sum();
@@ -51,7 +51,7 @@ fn turned(a: &[f64], columns: usize) -> Vec<f64> {
     (0..columns).flat_map(|j| a.iter().skip(j).step_by(columns).copied()).collect()
 }
 
-/// The solution of A·x = b, by elimination with pivoting.
+/// Solution of A·x = b, by elimination with pivoting.
 fn solved(a: &[f64], b: &[f64]) -> Vec<f64> {
     let n = b.len();
     let mut rows: Vec<Vec<f64>> =
@@ -87,7 +87,7 @@ fn relu(x: f64) -> f64 {
     x.max(0.0)
 }
 
-/// The place of x in a table of n values: the interval, and the part of it.
+/// Position of x in a table of n values: the interval, and the fraction within.
 fn place(x: f64, n: usize) -> (usize, f64) {
     let at = x.clamp(0.0, (n - 1) as f64);
     let k = (at as usize).min(n - 2);
@@ -102,7 +102,7 @@ const LIST: &[Kernel] = &[
         filled: &[0, 1],
         results: &[2],
         products: 256,
-        prepare: as_it_is,
+        prepare: unchanged,
         model: |arrays, _| arrays[2] = times(&arrays[0], &arrays[1]),
     },
     Kernel {
@@ -112,7 +112,7 @@ const LIST: &[Kernel] = &[
         filled: &[0, 1],
         results: &[2],
         products: 144,
-        prepare: as_it_is,
+        prepare: unchanged,
         model: |arrays, _| arrays[2] = times(&arrays[0], &arrays[1]),
     },
     Kernel {
@@ -122,7 +122,7 @@ const LIST: &[Kernel] = &[
         filled: &[0, 1],
         results: &[2],
         products: 1728,
-        prepare: as_it_is,
+        prepare: unchanged,
         model: |arrays, _| arrays[2] = product(&arrays[0], &arrays[1], 12),
     },
     Kernel {
@@ -154,7 +154,7 @@ const LIST: &[Kernel] = &[
         products: 1120,
         prepare: |arrays| (0..8).for_each(|i| arrays[0][9 * i] += 3.0),
         model: |arrays, _| {
-            // The normal equations.
+            // Normal equations of the least-squares problem.
             let turned = turned(&arrays[0], 8);
             let square = product(&turned, &arrays[0], 16);
             arrays[2] = solved(&square, &times(&turned, &arrays[1]));
@@ -239,7 +239,7 @@ const LIST: &[Kernel] = &[
         filled: &[0, 1, 2, 3, 4],
         results: &[5, 6],
         products: 864,
-        prepare: as_it_is,
+        prepare: unchanged,
         model: |arrays, _| {
             arrays[5] = layer(&arrays[0], &arrays[1], &arrays[4], relu);
             arrays[6] = layer(&arrays[2], &arrays[3], &arrays[5], |x| x);
@@ -252,7 +252,7 @@ const LIST: &[Kernel] = &[
         filled: &[0, 1, 2, 3, 4],
         results: &[5, 6],
         products: 864,
-        prepare: as_it_is,
+        prepare: unchanged,
         model: |arrays, _| {
             arrays[5] = layer(&arrays[0], &arrays[1], &arrays[4], f64::tanh);
             arrays[6] = layer(&arrays[2], &arrays[3], &arrays[5], f64::tanh);
@@ -265,7 +265,7 @@ const LIST: &[Kernel] = &[
         filled: &[0, 1, 2, 3, 4, 5, 6],
         results: &[7],
         products: 24_064,
-        prepare: as_it_is,
+        prepare: unchanged,
         model: |arrays, _| {
             let first = layer(&arrays[0], &arrays[1], &arrays[6], relu);
             let second = layer(&arrays[2], &arrays[3], &first, relu);
@@ -316,9 +316,9 @@ const LIST: &[Kernel] = &[
         lengths: &[256; 4],
         filled: &[0, 1],
         results: &[0, 1],
-        // It has fewer products than sums.
+        // The transform has fewer products than sums.
         products: 5248,
-        prepare: as_it_is,
+        prepare: unchanged,
         model: |arrays, _| {
             let (r, m) = (arrays[0].clone(), arrays[1].clone());
             let angle = |j: usize, k: usize| std::f64::consts::TAU * (j * k % 256) as f64 / 256.0;
@@ -393,11 +393,11 @@ const LIST: &[Kernel] = &[
     },
 ];
 
-/// Runs periods with random numbers, compares, and returns the cycles of one.
+/// Runs periods with random numbers, compares the results, and returns the cycles of a period.
 fn judge(kernel: &Kernel, machine: &'static Machine, sources: &[(&str, &str)]) -> u64 {
     let file = format!("{}.s", kernel.name);
     let source = sources.iter().find(|(name, _)| *name == file).expect("it is in the folder").1;
-    // A program that states its memories says t3.
+    // Programs with a directive `.machine` name t3.
     let source = source.replace(".machine t3", &format!(".machine {}", machine.name));
     let loader = Search::new(MemoryLoader::of(&file, source)).library(LIBRARY);
     let assembled = takt_asm::assemble(&file, &loader, &Options { machine, ..Options::default() });
@@ -410,7 +410,7 @@ fn judge(kernel: &Kernel, machine: &'static Machine, sources: &[(&str, &str)]) -
     for period in 0..8 {
         let mut arrays: Arrays = kernel.lengths.iter().map(|length| vec![0.0; *length]).collect();
         for &which in kernel.filled {
-            // Binary32 numbers between -1 and 1.
+            // Random binary32 numbers between -1 and 1.
             arrays[which].fill_with(|| f64::from(((random.next() >> 40) as f32) / (1 << 23) as f32 - 1.0));
         }
         (kernel.prepare)(&mut arrays);
@@ -437,7 +437,7 @@ fn judge(kernel: &Kernel, machine: &'static Machine, sources: &[(&str, &str)]) -
     cycles.unwrap_or(0)
 }
 
-/// Judges a list of programs, two at a time, and returns the table of what they cost.
+/// Judges a list of programs in parallel, and returns the table of their costs.
 fn table(list: &[Kernel], sources: &[(&str, &str)]) -> String {
     let jobs: Vec<(&Kernel, &'static Machine)> = list
         .iter()
@@ -445,7 +445,7 @@ fn table(list: &[Kernel], sources: &[(&str, &str)]) -> String {
         .filter(|(kernel, machine)| kernel.machines.contains(machine))
         .collect();
     let count = jobs.len() as u64;
-    // From both ends of the list by turns: the long ones stand together.
+    // Takes jobs from both ends of the list by turns, since the long ones stand together.
     let job = |index: u64| if index.is_multiple_of(2) { index / 2 } else { count - 1 - index / 2 };
     let work = |range: std::ops::Range<u64>| -> Vec<(u64, u64)> {
         range.map(job).map(|at| (at, judge(jobs[at as usize].0, jobs[at as usize].1, sources))).collect()
@@ -463,7 +463,7 @@ fn table(list: &[Kernel], sources: &[(&str, &str)]) -> String {
                 row += " | - | -";
                 continue;
             };
-            // A product and a sum each take an operation of t1's slot; t4 does two of both in a cycle.
+            // Lower bound: on t1 a product and a sum each take an operation of the slot; t4 performs two of both per cycle.
             let least = match machine.name {
                 "t1" => 2.0 * f64::from(kernel.products),
                 "t4" => f64::from(kernel.products) / 2.0,
@@ -480,11 +480,11 @@ fn table(list: &[Kernel], sources: &[(&str, &str)]) -> String {
 }
 
 #[test]
-fn kernels_compute_what_they_should_in_the_documented_cycles() {
+fn kernels_compute_expected_values_in_documented_cycles() {
     check_table("docs/library.md", "kernels", &table(LIST, KERNELS));
 }
 
 #[test]
-fn kernels_of_taclebench_do_too() {
+fn kernels_of_taclebench_keep_the_documented_cycles() {
     check_table("docs/library.md", "taclebench", &table(taclebench::LIST, TACLEBENCH));
 }

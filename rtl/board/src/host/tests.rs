@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The host's end of the line with boards that answer as none should.
+//! The host's end of the line with misbehaving boards.
 
 use super::*;
 use crate::protocol::{BUSY, DONE, MAGIC, READ_ONLY, id};
@@ -7,9 +7,9 @@ use crate::protocol::{BUSY, DONE, MAGIC, READ_ONLY, id};
 /// A board's answer to a request: status and words, from the request's bytes.
 type Answers = fn(&[u8]) -> Option<(u8, Vec<u32>)>;
 
-/// A board that brings a byte at a time, or noise for ever.
+/// A board that sends a byte at a time, or endless noise.
 #[derive(Debug)]
-struct Slow {
+struct ScriptedBoard {
     bytes: VecDeque<u8>,
     noise: bool,
     sent: u32,
@@ -17,7 +17,7 @@ struct Slow {
     answers: Answers,
 }
 
-impl Line for Slow {
+impl Line for ScriptedBoard {
     fn send(&mut self, request: &[u8]) -> std::io::Result<()> {
         self.sent += 1;
         if let Some((status, words)) = (self.answers)(request).filter(|_| !self.noise) {
@@ -40,11 +40,11 @@ impl Line for Slow {
     }
 }
 
-fn slow(answers: Answers) -> Slow {
-    Slow { bytes: VecDeque::new(), noise: false, sent: 0, heard: 0, answers }
+fn slow(answers: Answers) -> ScriptedBoard {
+    ScriptedBoard { bytes: VecDeque::new(), noise: false, sent: 0, heard: 0, answers }
 }
 
-/// The words that a right board has: its `id`, 1 (it runs) in `control`, and 0.
+/// Words of a correct board: its `id`, 1 (running) in `control`, and 0 elsewhere.
 fn right(request: &[u8]) -> Option<(u8, Vec<u32>)> {
     let words = if request[2] == 1 { usize::from(request[3]) } else { 0 };
     let first = match request[4..6] {
@@ -55,7 +55,7 @@ fn right(request: &[u8]) -> Option<(u8, Vec<u32>)> {
     Some((DONE, vec![first; words]))
 }
 
-fn connected(answers: Answers) -> Host<Slow> {
+fn connected(answers: Answers) -> Host<ScriptedBoard> {
     let mut host = Host::connect(slow(right), 1).unwrap();
     host.line.answers = answers;
     host.line.sent = 0;
@@ -77,11 +77,11 @@ fn an_answer_may_come_in_any_number_of_pieces() {
 
 #[test]
 fn noise_without_end_is_no_answer() {
-    let error = Host::connect(Slow { noise: true, ..slow(right) }, 1).unwrap_err();
+    let error = Host::connect(ScriptedBoard { noise: true, ..slow(right) }, 1).unwrap_err();
     assert!(matches!(error, LinkError::Silence(ATTEMPTS)), "{error}");
 }
 
-/// However many words are missing, or too many, the board is asked only so often.
+/// A wrong number of words is retried, but only up to the limit.
 #[test]
 fn another_number_of_words_is_no_answer() {
     for (answers, came) in [
@@ -101,9 +101,9 @@ fn another_number_of_words_is_no_answer() {
     assert_eq!(host.line.sent, ATTEMPTS);
 }
 
-/// A byte now and then is no silence, but a request does not take for ever.
+/// Occasional bytes are no silence, but a request still ends.
 #[test]
-fn bytes_now_and_then_are_heard_no_longer_than_the_limit() {
+fn sparse_bytes_end_at_the_time_limit() {
     let mut host = connected(|_| None);
     host.line.bytes = vec![0x11; 1 << 20].into();
     let before = host.line.time();
@@ -111,7 +111,7 @@ fn bytes_now_and_then_are_heard_no_longer_than_the_limit() {
     assert!(host.line.time() - before <= LIMIT + Duration::from_secs(1));
 }
 
-/// A request that waits for the program leaves the board time to say that it does not wait.
+/// A request that waits for the program leaves the board time to refuse.
 #[test]
 fn a_late_refusal_is_heard() {
     let mut host = connected(|_| None);
@@ -124,7 +124,7 @@ fn a_late_refusal_is_heard() {
 }
 
 #[test]
-fn what_a_board_refuses_is_an_error() {
+fn refusals_of_a_board_are_errors() {
     let mut host = connected(|_| Some((READ_ONLY, vec![])));
     let error = host.write(protocol::OUTPUTS + 3, &[1, 2]).unwrap_err();
     assert!(matches!(error, LinkError::ReadOnly { address: 0x2003, words: 2 }), "{error}");
@@ -134,7 +134,7 @@ fn what_a_board_refuses_is_an_error() {
 }
 
 #[test]
-fn a_program_that_never_waits_is_asked_so_often() {
+fn limits_polls_of_a_program_that_never_waits() {
     let mut host = connected(right);
     assert!(matches!(host.settle(), Err(LinkError::Busy)));
     assert_eq!(host.line.sent, 1 + ASKED);

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The ways through cores with links. `takt_system` finds the cores and links that they take, and the cycles in which each core reads and
-//! waits (docs/system.md); the parts that a board adds before and after are here (docs/board.md).
+//! Latencies through cores with links. `takt_system` finds the routes, and the cycles in which each core reads and waits (docs/system.md);
+//! this file adds the board's parts before and after (docs/board.md).
 
-use super::peripherals::{inputs, others, outputs};
-use super::way::{End, Part, Way, Ways, states_text};
+use super::peripherals::{inputs, outputs, peripherals_without_path};
+use super::pin_path::{End, Part, PinPath, PinPaths, states_text};
 use crate::application::Application;
 use crate::kind::Direction;
 use crate::sinks::{Sink, sinks, transit};
@@ -13,14 +13,14 @@ use takt_isa::timing::ENDED_DELAY;
 use takt_system::LinkKind;
 use takt_system::latency::{LatencyError, Pass, Passages, Route};
 
-/// From the board's tick, at which peripherals capture their registers, to the cycle in which these are written to links.
+/// Cycles from the board's tick, at which peripherals capture their registers, to the write of the captured values to links.
 const DUE: i64 = 1;
-/// `takt_output_latch`: from `ended`, two cycles after a `wait`, to the cycle in which `put` is high, with no output and no register on a link.
+/// Cycles of `takt_output_latch` from `ended`, two cycles after a `wait`, to `put`, with no output and no register on a link.
 const TURN: i64 = 8;
-/// The part of `TURN` from the cycle in which `takt_output_latch` takes the links' values to `put`, with no output.
+/// Part of `TURN` from the cycle in which `takt_output_latch` takes the links' values to `put`, with no output.
 const PUT: i64 = 7;
 
-/// The least and the most of something.
+/// Least and greatest number of cycles.
 #[derive(Clone, Copy)]
 struct Range(i64, i64);
 
@@ -37,19 +37,19 @@ impl Range {
     }
 }
 
-/// Ends of ways, by the link that begins or ends at them, with the link's field.
-type ByLink = BTreeMap<usize, Vec<(usize, End)>>;
+/// Ends of ways, by the link that begins or ends there, with the link's field.
+type EndsByLink = BTreeMap<usize, Vec<(usize, End)>>;
 
-/// The ways through a system's cores, through none twice, if no deadline is missed. A core is assumed to read a value in the first period
-/// with it, and to write what follows from it by that period's `wait`, or as many periods later as its states take.
+/// Ways through a system's cores, visiting no core twice, if no deadline is missed. A core is assumed to read a value in the first period
+/// with it, and to write its consequence by that period's `wait`, or as many periods later as its states take.
 ///
 /// # Errors
-/// If there are too many ways to find, or too many phases of ticks to go through.
+/// If there are too many ways, or too many phases of ticks.
 pub(super) fn ways(
     wiring: &Wiring,
     application: &Application<'_>,
     passages: &Passages<'_>,
-) -> Result<Ways, LatencyError> {
+) -> Result<PinPaths, LatencyError> {
     let description = passages.description();
     let sinks = sinks(application, wiring);
     let (heads, tails) = (heads(application, wiring), tails(application, wiring, &sinks));
@@ -75,30 +75,44 @@ pub(super) fn ways(
         }
         let (between, periods) =
             between(passages, &route, *core, (&sinks[*core], transit(application, &sinks[*core])));
-        ways.push(Way {
-            cores: route.cores.iter().map(|core| description.cores[*core].name.clone()).collect(),
-            links: route.links.iter().map(|link| description.links[*link].name.clone()).collect(),
-            inputs,
-            between,
-            periods,
-            outputs,
-            is_certain: route.most.is_some(),
-        });
+        for inputs in inputs.chunk_by(|a, b| (&a.until, a.sample) == (&b.until, b.sample)) {
+            let until = &inputs[0].until;
+            let (mut between, mut periods) = (between.clone(), periods.clone());
+            periods.best += until.best;
+            periods.worst += until.worst;
+            if inputs[0].sample.is_some() {
+                between[0] = until.clone();
+            }
+            ways.push(PinPath {
+                cores: route.cores.iter().map(|core| description.cores[*core].name.clone()).collect(),
+                links: route.links.iter().map(|link| description.links[*link].name.clone()).collect(),
+                inputs: inputs.to_vec(),
+                between,
+                periods,
+                outputs: outputs.clone(),
+                is_certain: route.most.is_some(),
+            });
+        }
     }
     let is_on_way = |core: &usize| ways.iter().any(|way| way.cores.contains(&description.cores[*core].name));
     let cores = (0..description.cores.len()).filter(is_on_way);
     let late = cores.filter_map(|core| Some(passages.deadline(core)?.to_string())).collect();
-    Ok(Ways { ways, others: others(wiring), queues: queues.into_iter().collect(), late })
+    Ok(PinPaths {
+        ways,
+        others: peripherals_without_path(wiring),
+        queues: queues.into_iter().collect(),
+        late,
+    })
 }
 
-/// The links that carry values that a peripheral captures.
-fn heads(application: &Application<'_>, wiring: &Wiring) -> ByLink {
-    let (description, mut heads) = (application.description(), ByLink::new());
-    for (port, end) in wiring.peripherals.iter().flat_map(inputs) {
+/// Links that carry values captured by a peripheral.
+fn heads(application: &Application<'_>, wiring: &Wiring) -> EndsByLink {
+    let (description, mut heads) = (application.description(), EndsByLink::new());
+    for (port, end) in wiring.peripherals.iter().flat_map(|of| inputs(wiring, of)) {
         let (Ok(found), Some(end)) = (application.connect(Direction::Input, port), end) else { continue };
         let driven = &application.endpoints().inputs[found.number];
         for (number, link) in description.links.iter().enumerate() {
-            // One value of the host's may go on several wires.
+            // Several wires may carry one value of the host.
             let same = matches!(link.kind, LinkKind::Wire)
                 && link.from == takt_system::End::Host
                 && link.fields.iter().any(|field| field.from == driven.name);
@@ -110,11 +124,11 @@ fn heads(application: &Application<'_>, wiring: &Wiring) -> ByLink {
     heads
 }
 
-/// The links from which a peripheral takes values.
-fn tails(application: &Application<'_>, wiring: &Wiring, sinks: &[Vec<Sink<'_>>]) -> ByLink {
-    let mut tails = ByLink::new();
+/// Links from which a peripheral takes values.
+fn tails(application: &Application<'_>, wiring: &Wiring, sinks: &[Vec<Sink<'_>>]) -> EndsByLink {
+    let mut tails = EndsByLink::new();
     for peripheral in &wiring.peripherals {
-        for (port, end) in outputs(peripheral) {
+        for (port, end) in outputs(wiring, peripheral, None) {
             let Some(end) = end else { continue };
             let mut all = sinks.iter().flatten();
             let found = all.find(|sink| sink.peripheral.name == peripheral.name && sink.written.port == port);
@@ -127,8 +141,8 @@ fn tails(application: &Application<'_>, wiring: &Wiring, sinks: &[Vec<Sink<'_>>]
     tails
 }
 
-/// The parts between the peripherals' registers at both ends of a way, and all of them together; `sinks` are those of the last core, with
-/// the most pipeline registers on a link to them.
+/// Parts between the peripherals' registers at both ends of a way, and their total from the board's tick on; `sinks` are the last core's, with the most pipeline
+/// registers on a link to them.
 fn between(
     passages: &Passages<'_>,
     route: &Route,
@@ -138,7 +152,7 @@ fn between(
     let (description, cores) = (passages.description(), &route.cores);
     let (tick, lead) = (description.tick as i64, description.lead() as i64);
     let puts = puts(passages, last, sinks, &route.links);
-    // Cycles from one stage to the next: the board's tick, each core's read, the last core's `wait`.
+    // Cycles from stage to stage: the board's tick, each core's read, the last core's `wait`.
     let mut stages = vec![Range::NONE; cores.len() + 1];
     let (mut all, mut under_way) = (Range::NONE, vec![false; cores.len()]);
     for phase in 0..route.phases as i64 {
@@ -175,21 +189,26 @@ fn between(
     if puts.late > 0 {
         after.insert(0, Range(0, puts.late).part("if written with `wait`: to the next"));
     }
-    let total = Part::sum("", [&parts[0], &all.part("")].into_iter().chain(&after));
+    let total = Part::sum("", [&all.part("")].into_iter().chain(&after));
     parts.extend(after);
     (parts, total)
 }
 
-/// From a core's `wait` to the cycle in which the peripherals take on what it has written.
-struct Puts {
+/// Cycles from a core's `wait` to the update of the peripherals with its outputs.
+struct OutputCycles {
     cycles: Range,
-    /// Cycles that are added if the `wait`'s own bundle writes outputs: these are taken at the next `wait`.
+    /// Additional cycles if the `wait`'s own bundle writes outputs: these are taken at the next `wait`.
     late: i64,
-    /// True if values can be taken in the turn of the `wait` before their own, as soon as they are written.
+    /// Values may be taken by the turn of an earlier `wait`, as soon as they are written.
     early: bool,
 }
 
-fn puts(passages: &Passages<'_>, core: usize, (sinks, most): (&[Sink<'_>], u64), way: &[usize]) -> Puts {
+fn puts(
+    passages: &Passages<'_>,
+    core: usize,
+    (sinks, most): (&[Sink<'_>], u64),
+    way: &[usize],
+) -> OutputCycles {
     let description = passages.description();
     let period = description.cores[core].period(description.tick) as i64;
     let (best, worst) = passages.span(core).unwrap_or((0, 0));
@@ -197,11 +216,11 @@ fn puts(passages: &Passages<'_>, core: usize, (sinks, most): (&[Sink<'_>], u64),
     let most = most as i64;
     let own = way.last().map_or(0, |link| description.links[*link].transit() as i64);
     let turn = most + registers + TURN;
-    // A `wait` that comes before the registers of the last one were put has its turn after that.
+    // A `wait` that comes before the last turn has finished gets its turn afterwards.
     let again = (turn - (period - (worst - best))).clamp(0, turn - 1);
-    // Values are looked at when those of the slowest link have arrived.
+    // The latch samples values when the slowest link's have arrived.
     let early = worst + most - own + again >= period;
     let least = if early { own + 1 + registers + PUT } else { ended + turn };
     let late = if passages.late(core) > ended { period } else { 0 };
-    Puts { cycles: Range(least, ended + turn + again), late, early }
+    OutputCycles { cycles: Range(least, ended + turn + again), late, early }
 }

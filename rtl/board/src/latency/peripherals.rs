@@ -1,76 +1,177 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The parts of a way within peripherals: from a pin's edge to a register, and from a register to a pin.
+//! Parts of a way within peripherals: from a pin's edge to a register, and from a register to a pin.
 
-use super::way::{Answer, End, Part};
-use crate::wiring::{Peripheral, Wiring};
+use super::pin_path::{Answer, End, Part, Sample};
+use crate::wiring::{Peripheral, Starts, Wiring};
+
+/// Cycles from the put of a duty to the first in which it can act.
+const ACTS: u64 = 2;
 
 fn parameter(peripheral: &Peripheral, name: &str) -> u64 {
     peripheral.parameter(name).into()
 }
 
-/// From a pin's edge to the register, of peripherals that have such a pin.
-fn edge_in(peripheral: &Peripheral, register: &str) -> Option<Vec<Part>> {
+/// Cycles of an SPI's frame, from the fall of its select pin to the new value of its register.
+pub(crate) fn frame(peripheral: &Peripheral) -> u64 {
+    parameter(peripheral, "half") * (2 * parameter(peripheral, "bits") + 1)
+}
+
+/// The parts from a pin's edge to the register, then to the board's tick, of peripherals with such an edge; and what a carrier samples.
+fn edge_in(
+    wiring: &Wiring,
+    peripheral: &Peripheral,
+    register: &str,
+) -> Option<(Vec<Part>, Part, Option<Sample>)> {
+    let to_tick = |text: &str, (best, worst): (u32, u32), less: u64| {
+        Part::new(text, u64::from(best) - less, u64::from(worst) - less)
+    };
+    if let (Starts::At(instant), "spi", "received") = (peripheral.starts, peripheral.kind.name, register) {
+        // The pin falls in the cycle after the instant.
+        let frame = frame(peripheral);
+        let cycles = wiring.cycles_to_tick(instant, frame as u32 + 1);
+        let parts = vec![Part::new("the frame, from its sample on", frame, frame)];
+        return Some((parts, to_tick("until the tick", cycles, frame + 1), Some(Sample::Frame)));
+    }
     let cycles = match (peripheral.kind.name, register) {
         ("quadrature" | "step", _) => parameter(peripheral, "filter") + 3,
         ("digital-in", "level") => parameter(peripheral, "hold") + 2,
         ("digital-in", _) => parameter(peripheral, "hold") + 3,
         _ => return None,
     };
-    Some(vec![Part::new(format!("edge to `{register}`"), cycles, cycles)])
+    let mut parts = vec![Part::new(format!("edge to `{register}`"), cycles, cycles)];
+    let Some(instant) = peripheral.latch else {
+        return Some((parts, Part::new("until the tick", 0, u64::from(wiring.period) - 1), None));
+    };
+    let period = u64::from(wiring.carriers[instant.carrier].period());
+    parts.push(Part::new("until the carrier's sample", 0, period - 1));
+    let until = to_tick("from the sample to the tick", wiring.cycles_to_tick(instant, 0), 0);
+    Some((parts, until, Some(Sample::Latch)))
 }
 
-/// From the register to what the pin answers with.
-fn answer(peripheral: &Peripheral) -> Option<(Vec<Part>, Answer)> {
-    let edge = |parts| Some((parts, Answer::Edge));
+/// The update of half bridges on a carrier: the least and greatest cycles from a put to the instant from which it acts; and by how much the
+/// cycles from the tick differ from the sums with `busy`, the least and greatest cycles from tick to put, if those are known.
+pub(crate) fn update(
+    wiring: &Wiring,
+    peripheral: &Peripheral,
+    busy: Option<[u64; 2]>,
+) -> ([u64; 2], [u64; 2]) {
+    let Some(carrier) = peripheral.carrier else { return ([ACTS; 2], [0; 2]) };
+    let half = u64::from(wiring.carriers[carrier].half);
+    // Places at which an update acts: `from`, and every `every` cycles.
+    let (from, every) = match parameter(peripheral, "update") {
+        0 => return ([ACTS; 2], [0; 2]),
+        1 => (0, 2 * half),
+        2 => (half, 2 * half),
+        _ => (0, half),
+    };
+    let wait = |at: u64| ACTS + (from + 2 * half * (at / half + 2) - at - ACTS) % every;
+    let (Some([best, worst]), Some(ticks)) = (busy, wiring.tick_positions(carrier)) else {
+        return ([ACTS, ACTS + every - 1], [0; 2]);
+    };
+    let (mut waits, mut acts) = ([u64::MAX, 0], [u64::MAX, 0]);
+    for tick in ticks.into_iter().map(u64::from) {
+        let [first, last] = [best, worst].map(|busy| busy + wait(tick + busy));
+        let [least, most] = match first == last {
+            true => [last - worst, first - best],
+            // The puts lie before a place and after it.
+            false => [ACTS, (first - best).max(ACTS + every - 1)],
+        };
+        waits = [waits[0].min(least), waits[1].max(most)];
+        acts = [acts[0].min(first), acts[1].max(last)];
+    }
+    (waits, [acts[0] - (best + waits[0]), worst + waits[1] - acts[1]])
+}
+
+/// Cycles from the register to the pin's answer.
+fn answer(
+    wiring: &Wiring,
+    peripheral: &Peripheral,
+    busy: Option<[u64; 2]>,
+) -> Option<(Vec<Part>, Answer, Option<[u64; 2]>)> {
+    let edge = |parts| Some((parts, Answer::Edge, None));
     match peripheral.kind.name {
-        // One cycle more of an odd pulse moves its end only, and the longest one that has an end ends with the period. A long dead time
-        // can move the beginning of the shortest pulse that it leaves, dead + 1 cycles about the middle, beyond that; and, by dead / 2
-        // into the next period, the rise of the lower switch in the shortest gap that it leaves. Where one switch is to stay on, it comes
-        // on after the dead time.
+        // An additional cycle of an odd pulse moves only its end, and the longest pulse with an end ends with the period. A long dead time
+        // can move the beginning of the shortest remaining pulse, dead + 1 cycles about the middle, beyond that; and, by dead / 2 into the
+        // next period, the rise of the lower switch in the shortest remaining gap. A switch that is to stay on comes on after the dead
+        // time.
         "pwm" => {
             let (half, dead) = (parameter(peripheral, "half"), parameter(peripheral, "dead"));
             let has_low = peripheral.pins.get(1).is_some_and(Option::is_some);
             let high = (2 * half).max(half + 1 + dead - (dead + 2) / 2);
             let low = if has_low { 2 * half + dead.div_ceil(2) } else { 0 };
-            // A longer dead time leaves no pulse and no gap.
+            // A longer dead time leaves neither pulse nor gap.
             let moves = if dead < 2 * half { high.max(low) } else { 0 }.max(dead + 1);
             edge(vec![
                 Part::new("to the next period of the PWM", 2, 2 * half + 1),
                 Part::new("its first edge that moves", 1, moves),
             ])
         }
+        // A duty that differs by one cycle moves an edge of one half alone, which may just be past. A switch goes off at once; without the
+        // low switches' pins an edge is seen after the dead time.
+        "pwm3" => {
+            let half = peripheral.carrier.map_or(0, |carrier| u64::from(wiring.carriers[carrier].half));
+            let has_low = [1, 3, 5].iter().all(|pin| peripheral.pins[*pin].is_some());
+            let dead = if has_low { 0 } else { parameter(peripheral, "dead") };
+            let ([best, worst], surplus) = update(wiring, peripheral, busy);
+            let parts = vec![
+                Part::new("until the duty acts", best, worst),
+                Part::new("its first edge that moves", 1, 2 * half + dead),
+            ];
+            Some((parts, Answer::Edge, Some(surplus)))
+        }
         "digital-out" => edge(vec![Part::new("to the pin", 1, 1)]),
-        "sigma-delta" => Some((vec![Part::new("to the modulator", 1, 1)], Answer::Density)),
-        // A converter's frames begin at ticks, or with the outputs, whatever their values.
+        "sigma-delta" => Some((vec![Part::new("to the modulator", 1, 1)], Answer::Density, None)),
+        // A converter's frames begin at ticks, or with the outputs, independent of values.
         _ => None,
     }
 }
 
-/// The input ports of a peripheral, with the end of ways at each; none if there is no edge to count from.
-pub(super) fn inputs(peripheral: &Peripheral) -> impl Iterator<Item = (&str, Option<End>)> {
+/// Input ports of a peripheral, with the end of ways at each; `None` without an edge to count from.
+pub(super) fn inputs<'a>(
+    wiring: &'a Wiring,
+    peripheral: &'a Peripheral,
+) -> impl Iterator<Item = (&'a str, Option<End>)> {
     let registers = peripheral.kind.reads.iter().zip(&peripheral.reads);
-    registers.filter_map(|(register, port)| {
+    registers.filter_map(move |(register, port)| {
         let port = port.as_deref()?;
-        let parts = edge_in(peripheral, register.name);
-        Some((port, parts.map(|parts| end(peripheral, port, (parts, Answer::Edge)))))
+        let end = edge_in(wiring, peripheral, register.name).map(|(parts, until, sample)| End {
+            peripheral: peripheral.name.clone(),
+            port: port.to_owned(),
+            parts,
+            answer: Answer::Edge,
+            until,
+            sample,
+            update: None,
+        });
+        Some((port, end))
     })
 }
 
-/// The output ports of a peripheral, with the end of ways at each; none if there is no edge to count to.
-pub(super) fn outputs(peripheral: &Peripheral) -> impl Iterator<Item = (&str, Option<End>)> {
-    peripheral.writes.iter().flatten().map(|write| {
-        (write.port.as_str(), answer(peripheral).map(|answer| end(peripheral, &write.port, answer)))
+/// Output ports of a peripheral, with the end of ways at each; `None` without an edge to count to. `busy`: the least and greatest cycles from
+/// the tick to the outputs' update, if known.
+pub(super) fn outputs<'a>(
+    wiring: &'a Wiring,
+    peripheral: &'a Peripheral,
+    busy: Option<[u64; 2]>,
+) -> impl Iterator<Item = (&'a str, Option<End>)> {
+    peripheral.writes.iter().flatten().map(move |write| {
+        let end = answer(wiring, peripheral, busy).map(|(parts, answer, update)| End {
+            peripheral: peripheral.name.clone(),
+            port: write.port.clone(),
+            parts,
+            answer,
+            until: Part::sum("", []),
+            sample: None,
+            update,
+        });
+        (write.port.as_str(), end)
     })
 }
 
-fn end(peripheral: &Peripheral, port: &str, (parts, answer): (Vec<Part>, Answer)) -> End {
-    End { peripheral: peripheral.name.clone(), port: port.to_owned(), parts, answer }
-}
-
-/// Peripherals of a wiring with no port that is an end of a way.
-pub(super) fn others(wiring: &Wiring) -> Vec<String> {
+/// Peripherals of a wiring without a port at an end of a way.
+pub(super) fn peripherals_without_path(wiring: &Wiring) -> Vec<String> {
     let is_other = |peripheral: &&Peripheral| {
-        !inputs(peripheral).chain(outputs(peripheral)).any(|(_, end)| end.is_some())
+        !inputs(wiring, peripheral).chain(outputs(wiring, peripheral, None)).any(|(_, end)| end.is_some())
     };
     wiring.peripherals.iter().filter(is_other).map(|peripheral| peripheral.name.clone()).collect()
 }

@@ -1,31 +1,36 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The ways through a core without links.
 
-use super::peripherals::{inputs, others, outputs};
-use super::way::{End, Part, Way, Ways, states_text};
+use super::peripherals::{inputs, outputs, peripherals_without_path};
+use super::pin_path::{End, Part, PinPath, PinPaths, states_text};
 use crate::wiring::Wiring;
 use std::collections::{BTreeMap, BTreeSet};
-use takt_analysis::dependence::{Dependence, Sent};
+use takt_analysis::dependence::{Dependence, OutputEvent};
 use takt_isa::Program;
 use takt_isa::program::Port;
 use takt_isa::timing::Span;
 
-/// `takt_exchange`: from the board's tick to the core's, with no input.
+/// Cycles that `takt_exchange` takes, without any input, from the board's tick to the core's tick.
 const BEGIN: u64 = 5;
-/// From the cycle in which `wait` issues to the one in which `put` is high, with no output: the core's `waiting`, `takt_exchange` and the
-/// rounding of the last output.
+/// The cycles, without any output, from the cycle in which `wait` issues to the cycle in which `put` is high: the core's `waiting`,
+/// `takt_exchange` and the rounding of the last output.
 const END: u64 = 14;
 
-/// The ways of a program, with the periods that states add: inputs and outputs with the same states share one. Outputs that follow none of
-/// the inputs are left out.
-pub(super) fn ways(wiring: &Wiring, program: &Program, span: Span) -> Ways {
-    let way = undivided(wiring, span);
+/// Cycles of a period that the program does not take: `reads` registers become input ports, and output ports become `writes` registers.
+pub(crate) fn copies(reads: usize, writes: usize) -> u64 {
+    reads as u64 + BEGIN + writes as u64 + END
+}
+
+/// The ways of a program, with the periods that states add: inputs and outputs with equal states share a way. Outputs that follow no input
+/// are left out.
+pub(super) fn ways(wiring: &Wiring, program: &Program, span: Span) -> PinPaths {
+    let ways = undivided(wiring, span);
     let dependence = Dependence::new(program, &BTreeSet::new()).unwrap_or_else(|_| Dependence::unknown());
-    let sent = if program.latched { Sent::AtWait } else { Sent::Written };
+    let sent = if program.latched { OutputEvent::AtWait } else { OutputEvent::Written };
     let register =
         |ports: &[Port], name: &str| ports.iter().find(|port| port.name == name).map(|port| port.register);
-    let split = |way: Way| {
-        // For the same states, each input's outputs; for the same of both, all inputs.
+    let split = |way: PinPath| {
+        // The first map has the outputs of each input, by equal states; the second has all inputs, by equal states and outputs.
         let (mut outputs, mut inputs) = (BTreeMap::<_, Vec<usize>>::new(), BTreeMap::<_, Vec<usize>>::new());
         for (number, input) in way.inputs.iter().enumerate() {
             let Some(input) = register(&program.inputs, &input.port) else { continue };
@@ -47,7 +52,7 @@ pub(super) fn ways(wiring: &Wiring, program: &Program, span: Span) -> Ways {
             let latest = most.unwrap_or(least);
             let mut between = way.between.clone();
             if let Some(text) = states_text(least, latest) {
-                // Behind the program, before the output registers.
+                // The part of the states goes behind the program, before the output registers.
                 between.insert(
                     between.len() - 1,
                     Part::new(text, u64::from(least) * period, u64::from(latest) * period),
@@ -55,37 +60,58 @@ pub(super) fn ways(wiring: &Wiring, program: &Program, span: Span) -> Ways {
             }
             let periods = Part::sum("", &between);
             let [inputs, outputs] = [of(&way.inputs, &inputs), of(&way.outputs, &outputs)];
-            Way { inputs, outputs, between, periods, is_certain: most.is_some(), ..way.clone() }
+            PinPath { inputs, outputs, between, periods, is_certain: most.is_some(), ..way.clone() }
         };
         inputs.into_iter().map(each).collect::<Vec<_>>()
     };
-    let busy = way.as_ref().map_or(0, |way| Part::sum("", &way.between[1..]).worst);
+    let busy = ways.first().map_or(0, |way| Part::sum("", &way.between[1..]).worst);
     let late = (busy >= u64::from(wiring.period))
         .then(|| format!("{busy} cycles from the tick, of {}", wiring.period));
-    Ways {
-        ways: way.into_iter().flat_map(split).collect(),
-        others: others(wiring),
+    PinPaths {
+        ways: ways.into_iter().flat_map(split).collect(),
+        others: peripherals_without_path(wiring),
         queues: Vec::new(),
         late: late.into_iter().collect(),
     }
 }
 
-/// The way from all inputs of a wiring to all of its outputs, whatever depends on what, through a core without links whose periods take
-/// the cycles of `span` from tick to `wait`, the next tick coming after the `wait`; `None` if there is no such input or output.
-pub fn undivided(wiring: &Wiring, span: Span) -> Option<Way> {
-    let inputs: Vec<_> = wiring.peripherals.iter().flat_map(inputs).collect();
-    let outputs: Vec<_> = wiring.peripherals.iter().flat_map(outputs).collect();
-    let (reads, writes) = (inputs.len() as u64, outputs.len() as u64);
-    let between = vec![
-        Part::new("until the tick", 0, u64::from(wiring.period) - 1),
+/// The ways from all inputs of a wiring to all of its outputs, whatever depends on what, through a core without links: one for the inputs that
+/// wait for a tick, and for each time from a carrier's sample to the tick. The periods of the core take the cycles of `span` from tick to
+/// `wait`, and the next tick comes after the `wait`. Empty if the wiring has no such input, or no such output.
+pub fn undivided(wiring: &Wiring, span: Span) -> Vec<PinPath> {
+    let inputs: Vec<_> = wiring.peripherals.iter().flat_map(|of| inputs(wiring, of)).collect();
+    let writes = wiring.peripherals.iter().map(|of| of.writes.iter().flatten().count() as u64).sum::<u64>();
+    let reads = inputs.len() as u64;
+    let after = [
         Part::new(format!("registers to input ports ({reads})"), reads + BEGIN, reads + BEGIN),
         Part::new("the program, from tick to `wait`", span.best, span.worst),
         Part::new(format!("output ports to registers ({writes})"), writes + END, writes + END),
     ];
-    let [inputs, outputs] =
-        [inputs, outputs].map(|ends| ends.into_iter().filter_map(|(_, end)| end).collect::<Vec<_>>());
-    let periods = Part::sum("", &between);
-    let way =
-        Way { cores: Vec::new(), links: Vec::new(), inputs, between, periods, outputs, is_certain: true };
-    Some(way).filter(|way| !way.inputs.is_empty() && !way.outputs.is_empty())
+    let busy = Part::sum("", &after);
+    let busy = Some([busy.best, busy.worst]);
+    let outputs = wiring.peripherals.iter().flat_map(|of| outputs(wiring, of, busy));
+    let outputs: Vec<End> = outputs.filter_map(|(_, end)| end).collect();
+    if outputs.is_empty() {
+        return Vec::new();
+    }
+    let mut ways: Vec<PinPath> = Vec::new();
+    for input in inputs.into_iter().filter_map(|(_, end)| end) {
+        let key = |end: &End| (end.until.clone(), end.sample);
+        if let Some(way) = ways.iter_mut().find(|way| key(&way.inputs[0]) == key(&input)) {
+            way.inputs.push(input);
+            continue;
+        }
+        let between: Vec<Part> = std::iter::once(input.until.clone()).chain(after.clone()).collect();
+        let periods = Part::sum("", &between);
+        ways.push(PinPath {
+            cores: Vec::new(),
+            links: Vec::new(),
+            inputs: vec![input],
+            between,
+            periods,
+            outputs: outputs.clone(),
+            is_certain: true,
+        });
+    }
+    ways
 }

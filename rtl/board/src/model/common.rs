@@ -3,7 +3,7 @@
 
 use super::clocked::{Model, high, word};
 
-/// `takt_tick`: takes rst, run, period, lead; drives tick, early, left.
+/// Model of `takt_tick`: the inputs are rst, run, period, lead, and the outputs tick, early, left.
 #[derive(Clone, Debug, Default)]
 pub struct Tick {
     runs: bool,
@@ -39,12 +39,12 @@ impl Model for Tick {
     }
 }
 
-/// `takt_uart_receive`: takes rst, pin; drives valid, data, broken.
+/// Model of `takt_uart_receive`: the inputs are rst, pin, and the outputs valid, data, broken.
 #[derive(Clone, Debug)]
 pub struct UartReceive {
     divide: u32,
     synchroniser: [bool; 2],
-    /// Cycles until the next bit's middle, and which bit it is: 0 the start bit, 9 the stop bit.
+    /// Cycles until the middle of the next bit, and the bit's number: 0 is the start bit, 9 the stop bit.
     next: Option<(u32, u32)>,
     data: u8,
     valid: bool,
@@ -52,7 +52,7 @@ pub struct UartReceive {
 }
 
 impl UartReceive {
-    /// With the cycles of a bit.
+    /// A receiver with `divide` cycles for each bit.
     pub fn new(divide: u32) -> UartReceive {
         let synchroniser = [true; 2];
         UartReceive { divide, synchroniser, next: None, data: 0, valid: false, broken: false }
@@ -88,7 +88,7 @@ impl Model for UartReceive {
     }
 }
 
-/// `takt_uart_send`: takes rst, start, data; drives ready, pin.
+/// Model of `takt_uart_send`: the inputs are rst, start, data, and the outputs ready, pin.
 #[derive(Clone, Debug)]
 pub struct UartSend {
     divide: u32,
@@ -97,7 +97,7 @@ pub struct UartSend {
 }
 
 impl UartSend {
-    /// With the cycles of a bit.
+    /// A sender with `divide` cycles for each bit.
     pub fn new(divide: u32) -> UartSend {
         UartSend { divide, sends: None }
     }

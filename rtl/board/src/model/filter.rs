@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! `takt_filter`.
+//! Model of the circuit `takt_filter`.
 
 /// A pin from outside in step with the clock, without pulses that are too short.
 #[derive(Clone, Debug)]
@@ -11,17 +11,17 @@ pub struct Filter {
 }
 
 impl Filter {
-    /// A filter that lets pass what has stood for `hold` cycles.
+    /// A filter that passes a level which has stood for `hold` cycles.
     pub fn new(hold: u32) -> Filter {
         Filter { hold: hold.max(1), synchroniser: [false; 2], held: 0, level: false }
     }
 
-    /// The filtered pin.
+    /// The level of the filtered pin.
     pub fn level(&self) -> bool {
         self.level
     }
 
-    /// The clock's edge.
+    /// Takes the clock's edge, with the levels of reset and pin.
     pub fn clock(&mut self, rst: bool, pin: bool) {
         let [first, second] = self.synchroniser;
         let passes = self.held == self.hold - 1;

@@ -4,7 +4,7 @@
 use super::clocked::{Model, high};
 use super::filter::Filter;
 
-/// `takt_quadrature`.
+/// Model of the circuit `takt_quadrature`.
 #[derive(Clone, Debug)]
 pub struct Quadrature {
     pins: [Filter; 3],
@@ -15,7 +15,7 @@ pub struct Quadrature {
 }
 
 impl Quadrature {
-    /// With levels that have stood for `filter` cycles, and the count after a reset.
+    /// A counter of levels that have stood for `filter` cycles, with the count `start` after a reset.
     pub fn new(filter: u32, start: u32) -> Quadrature {
         let pins = [(); 3].map(|()| Filter::new(filter));
         let now = [start, 0, 0, 0];
@@ -42,7 +42,7 @@ impl Model for Quadrature {
         }
         match (a != was_a, b != was_b) {
             (true, true) => *errors = errors.wrapping_add(1),
-            // In the order 00, 10, 11, 01 of (a, b), going up.
+            // Upwards, (a, b) goes through 00, 10, 11, 01.
             (true, false) => *count = count.wrapping_add(if a != b { 1 } else { u32::MAX }),
             (false, true) => *count = count.wrapping_add(if a == b { 1 } else { u32::MAX }),
             (false, false) => {}
@@ -58,7 +58,7 @@ impl Model for Quadrature {
     }
 }
 
-/// `takt_step`.
+/// Model of the circuit `takt_step`.
 #[derive(Clone, Debug)]
 pub struct Step {
     step: Filter,
@@ -69,7 +69,7 @@ pub struct Step {
 }
 
 impl Step {
-    /// With levels that have stood for `filter` cycles.
+    /// A counter of levels that have stood for `filter` cycles.
     pub fn new(filter: u32) -> Step {
         Step { step: Filter::new(filter), direction: Filter::new(filter), was: false, count: 0, taken: 0 }
     }
@@ -97,7 +97,7 @@ impl Model for Step {
     }
 }
 
-/// `takt_digital_in`.
+/// Model of the circuit `takt_digital_in`.
 #[derive(Clone, Debug)]
 pub struct DigitalIn {
     pin: Filter,
@@ -108,7 +108,7 @@ pub struct DigitalIn {
 }
 
 impl DigitalIn {
-    /// With a level that has stood for `hold` cycles.
+    /// An input whose levels have stood for `hold` cycles.
     pub fn new(hold: u32, invert: bool) -> DigitalIn {
         DigitalIn { pin: Filter::new(hold), invert, was: false, rises: 0, taken: [0; 2] }
     }

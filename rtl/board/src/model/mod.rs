@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Behavioural models of the peripherals: the same pins and registers, cycle by cycle, as the Verilog files of `rtl/board/verilog/`.
+//! Behavioural models of the peripherals: pins and registers have, cycle by cycle, the values of the Verilog files of `rtl/board/verilog/`.
 //!
-//! They are what an emulated board is made of, and what the circuits are compared with (`rtl/board/tests/peripherals.rs`).
+//! An emulated board is made of the models, and `rtl/board/tests/peripherals.rs` compares the circuits with the models.
 
 mod clocked;
 mod common;
 mod filter;
 mod inputs;
+mod motor;
 mod outputs;
 mod spi;
 
@@ -14,12 +15,14 @@ pub use clocked::Model;
 pub use common::{Tick, UartReceive, UartSend};
 pub use filter::Filter;
 pub use inputs::{DigitalIn, Quadrature, Step};
+pub use motor::{Bridges, Carrier, Pwm3, Trip};
 pub use outputs::{DigitalOut, Pwm, SigmaDelta};
 pub use spi::Spi;
 
 use crate::Kind;
 
-/// The model of a peripheral with these parameters, in the order of its table; what is missing has its default.
+/// The model of a peripheral with the parameters given in the order of the kind's table; a missing parameter has its default. Of a kind on a
+/// carrier, half the carrier's period in cycles follows.
 pub fn of(kind: &Kind, parameters: &[u32]) -> Option<Box<dyn Model>> {
     let value = |i: usize| {
         parameters.get(i).copied().unwrap_or_else(|| kind.parameters.get(i).map_or(0, |p| p.default))
@@ -28,6 +31,16 @@ pub fn of(kind: &Kind, parameters: &[u32]) -> Option<Box<dyn Model>> {
         "quadrature" => Box::new(Quadrature::new(value(0), value(1))),
         "step" => Box::new(Step::new(value(0))),
         "pwm" => Box::new(Pwm::new(value(0), value(1), value(2) != 0)),
+        "pwm3" => Box::new(Pwm3::new(Bridges {
+            half: parameters.get(kind.parameters.len()).copied()?,
+            dead: value(0),
+            minimum: value(1),
+            update: value(2),
+            signed: value(3) != 0,
+            invert: [value(4) != 0, value(5) != 0],
+            rests: [value(6), value(7)],
+        })),
+        "trip" => Box::new(Trip::new(value(0), value(1) != 0)),
         "sigma-delta" => Box::new(SigmaDelta::new(value(0) != 0)),
         "spi" => {
             Box::new(Spi::new(value(0), value(1), value(2) != 0, value(3) != 0, value(4) != 0, value(5)))

@@ -3,13 +3,13 @@
 
 use super::clocked::{Model, high, word};
 
-/// A signed number of 32 bits plus an offset, between 0 and `most`.
-fn clamped(value: u32, offset: u32, most: u32) -> u32 {
-    // No wrap: 64 bits hold every sum; a value between 0 and `most` fits 32.
+/// The sum of a signed number of 32 bits and an offset, clamped to 0 to `most`.
+pub(super) fn clamped(value: u32, offset: u32, most: u32) -> u32 {
+    // The conversion cannot wrap: 64 bits hold every sum, and 32 bits hold every value between 0 and `most`.
     (i64::from(value as i32) + i64::from(offset)).clamp(0, i64::from(most)) as u32
 }
 
-/// `takt_pwm`.
+/// Model of the circuit `takt_pwm`.
 #[derive(Clone, Debug)]
 pub struct Pwm {
     half: u32,
@@ -24,7 +24,7 @@ pub struct Pwm {
 }
 
 impl Pwm {
-    /// With half a period and dead time in cycles.
+    /// A modulator with half a period, and the dead time, in cycles.
     pub fn new(half: u32, dead: u32, signed: bool) -> Pwm {
         let zero = if signed { half } else { 0 };
         Pwm { half, dead, zero, next: zero, on: zero, place: 0, back: false, stood: [0; 2], pins: [false; 2] }
@@ -42,7 +42,7 @@ impl Model for Pwm {
             *self = Pwm::new(self.half, self.dead, self.zero > 0);
             return;
         }
-        // An odd cycle more goes before the middle.
+        // The part before the middle has the odd cycle.
         let part = if self.back { self.on / 2 } else { self.on.div_ceil(2) };
         let pulse = self.half - self.place <= part;
         self.pins = [pulse, !pulse].map(|on| on && self.stood[usize::from(!pulse)] == self.dead);
@@ -64,7 +64,7 @@ impl Model for Pwm {
     }
 }
 
-/// `takt_sigma_delta`.
+/// Model of the circuit `takt_sigma_delta`.
 #[derive(Clone, Debug)]
 pub struct SigmaDelta {
     zero: u32,
@@ -74,7 +74,7 @@ pub struct SigmaDelta {
 }
 
 impl SigmaDelta {
-    /// At rest.
+    /// A modulator at rest.
     pub fn new(signed: bool) -> SigmaDelta {
         let zero = if signed { 1 << 15 } else { 0 };
         SigmaDelta { zero, value: zero, sum: 0, pin: false }
@@ -99,7 +99,7 @@ impl Model for SigmaDelta {
     }
 }
 
-/// `takt_digital_out`.
+/// Model of the circuit `takt_digital_out`.
 #[derive(Clone, Debug)]
 pub struct DigitalOut {
     safe: bool,
@@ -107,7 +107,7 @@ pub struct DigitalOut {
 }
 
 impl DigitalOut {
-    /// With the level of the pin while it is not enabled.
+    /// An output whose pin has the level `safe` while it is not enabled.
     pub fn new(safe: bool) -> DigitalOut {
         DigitalOut { safe, pin: safe }
     }

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! `takt_spi`.
+//! Model of the circuit `takt_spi`.
 
 use super::clocked::{Model, high, word};
 
-/// An SPI master.
+/// Model of the SPI master.
 #[derive(Clone, Debug)]
 pub struct Spi {
     half: u32,
@@ -25,8 +25,8 @@ pub struct Spi {
 }
 
 impl Spi {
-    /// At rest, with half a bit in cycles, bits of a frame, SPI's two mode bits, whether what is received is signed, and what is
-    /// sent first.
+    /// A master at rest. `half` is half a bit in cycles, and `bits` the length of a frame; `polarity` and `second_edge` are the mode bits
+    /// of SPI; `signed` tells if the received number is signed, and `preset` is the first number sent.
     pub fn new(half: u32, bits: u32, polarity: bool, second_edge: bool, signed: bool, preset: u32) -> Spi {
         Spi {
             half,
@@ -47,7 +47,7 @@ impl Spi {
         }
     }
 
-    /// The end of half `half` of a frame: what its edge does. The halves 0 to 2·bits - 1 end with an edge of the clock.
+    /// Ends half `half` of a frame. The halves 0 to 2·bits - 1 end with an edge of the clock.
     fn edge(&mut self, half: u32) {
         if half == 2 * self.bits {
             (self.at, self.select, self.out) = (None, true, false);
@@ -63,7 +63,7 @@ impl Spi {
         if first != self.second_edge {
             self.shift = self.shift << 1 | u32::from(self.synchroniser[1]);
         } else if half < 2 * self.bits - 1 {
-            // The other edge moves to the next bit; there is none after the last.
+            // The other edge moves to the next bit; the last bit has no next bit.
             self.out = before >> 31 == 1;
         }
     }

@@ -3,7 +3,7 @@
 
 use crate::place::PlaceError;
 use serde_json::Value;
-use takt_rtl::synthesis::Resources;
+use takt_family::{Family, Resources};
 
 /// The resources of a design, from those of it in its wrapper.
 pub fn less(all: Resources, wrapper: Resources) -> Resources {
@@ -28,29 +28,34 @@ pub fn clock(report: &Value) -> Result<f64, PlaceError> {
     achieved.reduce(f64::min).ok_or_else(|| lacking("clock"))
 }
 
-/// The resources that nextpnr counts.
+/// The resources of a design: as nextpnr counts them, if a report is given and the family's has them; else as yosys' statistics do, of which
+/// carry chains always come.
 ///
 /// # Errors
-/// If it counts one of them not.
-pub fn ecp5(report: &Value) -> Result<Resources, PlaceError> {
+/// If nextpnr's report lacks one of them.
+pub fn resources(
+    family: &Family,
+    statistics: &Value,
+    report: Option<&Value>,
+) -> Result<Resources, PlaceError> {
+    let counted = family.cells.resources(statistics);
+    let placed = report.zip(family.place.as_ref().and_then(|place| place.used));
+    let Some((report, [luts, flip_flops, multipliers, block_rams])) = placed else { return Ok(counted) };
     let used = |cell: &str| report["utilization"][cell]["used"].as_u64().ok_or_else(|| lacking(cell));
     Ok(Resources {
-        luts: used("TRELLIS_COMB")?,
-        carries: None,
-        flip_flops: used("TRELLIS_FF")?,
-        multipliers: used("MULT18X18D")?,
-        block_rams: used("DP16KD")?,
+        luts: used(luts)?,
+        carries: counted.carries,
+        flip_flops: used(flip_flops)?,
+        multipliers: used(multipliers)?,
+        block_rams: used(block_rams)?,
     })
-}
-
-/// Halves of carry chains' cells, each of which takes the place of a LUT4; from yosys' statistics.
-pub fn halves_of_carries(statistics: &Value) -> u64 {
-    2 * statistics["design"]["num_cells_by_type"]["CCU2C"].as_u64().unwrap_or(0)
 }
 
 /// The longest path from register to register, in words: its time, the signals on it that have a name in the source, and
 /// what it passes through.
-pub fn critical_path(report: &Value) -> Option<String> {
+pub fn critical_path(report: &Value, family: &Family) -> Option<String> {
+    let ports = family.carry.map_or(&[][..], |carry| carry.ports);
+    let suffixes = family.place.as_ref()?.suffixes;
     let paths = report["critical_paths"].as_array()?;
     let steps = paths
         .iter()
@@ -65,14 +70,14 @@ pub fn critical_path(report: &Value) -> Option<String> {
     for (index, step) in steps.iter().enumerate() {
         let (from, to) = (&step["from"], &step["to"]);
         if step["type"] == "logic" {
-            let carries = |end: &Value| matches!(end["port"].as_str(), Some("FCI" | "FCO"));
+            let carries = |end: &Value| end["port"].as_str().is_some_and(|port| ports.contains(&port));
             chains += u32::from(!carries(from) && carries(to));
             levels += u32::from(!carries(from) && !carries(to));
         }
         let last = index + 1 == steps.len();
         let cell =
             if last { to["cell"].as_str()? } else { step["net"].as_str().unwrap_or(from["cell"].as_str()?) };
-        let name = signal(cell);
+        let name = signal(cell, suffixes);
         if names.last() != Some(&name) {
             names.push(name);
         }
@@ -92,9 +97,8 @@ fn total(steps: &[Value], kinds: &[&str]) -> f64 {
 }
 
 /// The name that a net or cell has in the source: without what yosys and nextpnr append.
-fn signal(name: &str) -> String {
-    let cut = ["_LUT4", "_CCU2C", "_TRELLIS", "_PFUMX", "_L6MUX", "_DPR16X4", "_DI", "_MULT18", "$"];
-    let end = cut.iter().filter_map(|suffix| name.find(suffix)).min().unwrap_or(name.len());
+fn signal(name: &str, suffixes: &[&str]) -> String {
+    let end = suffixes.iter().filter_map(|suffix| name.find(suffix)).min().unwrap_or(name.len());
     let name = &name[..end];
     name.split('[').next().unwrap_or(name).to_owned()
 }
@@ -103,34 +107,40 @@ fn signal(name: &str) -> String {
 mod tests {
     use super::*;
     use serde_json::json;
+    use takt_family::REFERENCE;
 
     #[test]
-    fn names_are_those_of_the_source() {
-        assert_eq!(signal("unit.rest_TRELLIS_FF_Q_12_DI_LUT4_Z"), "unit.rest");
-        assert_eq!(signal("core.bank[12]"), "core.bank");
-        assert_eq!(signal("unit.less_2_CCU2C_A0_S1$CCU2_COMB1"), "unit.less_2");
+    fn names_equal_the_sources() {
+        let suffixes = ["_LUT", "_CARRY", "_FF", "$"];
+        assert_eq!(signal("unit.rest_FF_Q_12_D_LUT4_Z", &suffixes), "unit.rest");
+        assert_eq!(signal("core.bank[12]", &suffixes), "core.bank");
+        assert_eq!(signal("unit.less_2_CARRY_A0_S1$COMB1", &suffixes), "unit.less_2");
     }
 
     #[test]
     fn path_in_words() {
+        let [carry, flip_flop] = [REFERENCE.cells.carries[0].0, REFERENCE.cells.flip_flops[0].0];
+        let [into, out] =
+            [REFERENCE.carry.expect("a chain").ports[0], REFERENCE.carry.expect("a chain").ports[1]];
+        let (x, y, sum) = (format!("x_{flip_flop}_Q"), format!("y_{flip_flop}_Q"), format!("sum_{carry}"));
         let end = |cell: &str, port: &str| json!({"cell": cell, "port": port});
         let step = |kind: &str, delay: f64, from: Value, to: Value| json!({"type": kind, "delay": delay, "from": from, "to": to});
-        let mut wire = step("routing", 1.0, end("x_TRELLIS_FF_Q", "Q"), end("sum_CCU2C", "A"));
+        let mut wire = step("routing", 1.0, end(&x, "Q"), end(&sum, "A"));
         wire["net"] = json!("x[3]");
         let steps = json!([
-            step("clk-to-q", 0.5, end("x_TRELLIS_FF_Q", "Q"), end("x_TRELLIS_FF_Q", "Q")),
+            step("clk-to-q", 0.5, end(&x, "Q"), end(&x, "Q")),
             wire,
-            step("logic", 0.25, end("sum_CCU2C", "A"), end("sum_CCU2C", "FCO")),
-            step("logic", 0.25, end("sum_CCU2C", "FCI"), end("sum_CCU2C", "F")),
+            step("logic", 0.25, end(&sum, "A"), end(&sum, out)),
+            step("logic", 0.25, end(&sum, into), end(&sum, "F")),
             step("logic", 0.5, end("y_LUT4_Z", "A"), end("y_LUT4_Z", "F")),
-            step("setup", 0.0, end("y_TRELLIS_FF_Q", "DI"), end("y_TRELLIS_FF_Q", "DI")),
+            step("setup", 0.0, end(&y, "DI"), end(&y, "DI")),
         ]);
         let report = json!({"critical_paths": [
             {"from": "<async>", "to": "posedge clk", "path": [step("routing", 99.0, end("p", "O"), end("x", "A"))]},
             {"from": "posedge clk", "to": "posedge clk", "path": steps},
         ]});
         assert_eq!(
-            critical_path(&report).as_deref(),
+            critical_path(&report, REFERENCE).as_deref(),
             Some("2.5 ns, 1.0 of them routing, logic levels 1, carry chains 1: x → sum → y")
         );
     }

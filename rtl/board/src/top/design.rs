@@ -12,8 +12,6 @@ use takt_system::Description;
 /// The cores, with their links.
 pub(super) struct Design {
     pub(super) files: Vec<DesignFile>,
-    /// Modules that take the place of those of the same name on Lattice ECP5.
-    pub(super) ecp5: Vec<DesignFile>,
     /// The module of the core, or of the system.
     pub(super) top: String,
     /// The number by which the host knows it again.
@@ -26,14 +24,14 @@ impl Design {
     pub(super) fn of(application: &Application<'_>, library: &Library) -> Result<Design, TopError> {
         if application.is_program() {
             let program = &application.description().cores[0].program;
-            let takt_rtl::Design { files, ecp5, top, .. } =
+            let takt_rtl::Design { files, top, .. } =
                 export(program.machine, library)?.latching(program.latched_inputs())?;
-            return Ok(Design { files, ecp5, top, number: number_of_program(program), plan: None });
+            return Ok(Design { files, top, number: number_of_program(program), plan: None });
         }
         let design = system(application.description(), library)?;
         let number = number_of_system(&design);
-        let SystemDesign { files, ecp5, top, plan, .. } = design;
-        Ok(Design { files, ecp5, top, number, plan: Some(plan) })
+        let SystemDesign { files, top, plan, .. } = design;
+        Ok(Design { files, top, number, plan: Some(plan) })
     }
 }
 

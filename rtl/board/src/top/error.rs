@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The reasons for which there is no circuit.
 
-use crate::pll::NoClock;
 use crate::protocol::{PAGE, PAGES};
+use takt_family::PllError;
 use thiserror::Error;
 
-/// Records that an image may have: the protocol has addresses for so many.
+/// Records that an image may have: limited by the protocol's addresses.
 pub(super) const MOST_RECORDS: usize = PAGES * PAGE;
 
 /// The reason for which there is no circuit.
@@ -18,10 +18,34 @@ pub enum TopError {
     TooBig(&'static str, usize),
     /// The device has too little block RAM.
     #[error(transparent)]
-    Memory(#[from] TooMuch),
+    Memory(#[from] MemoryExcess),
+    /// Memories without a place in look-up tables take too many flip-flops.
+    #[error(
+        "the {kind} needs {needed} flip-flops at least for output ports and return stacks, as {family} has no memory in look-up tables; the {device} has {has}"
+    )]
+    FlipFlops {
+        /// Program or system.
+        kind: &'static str,
+        /// Flip-flops of these memories.
+        needed: u64,
+        /// The family's text.
+        family: &'static str,
+        /// Device.
+        device: &'static str,
+        /// Flip-flops of the device.
+        has: u64,
+    },
+    /// Block RAM starts without contents.
+    #[error("block RAM of {0} starts without contents: program and tables cannot be in the bitstream")]
+    NoContents(&'static str),
+    /// Flip-flops start with any value.
+    #[error(
+        "flip-flops of {0} start with any value: the board needs a reset button, a table `reset` in its file"
+    )]
+    NoReset(&'static str),
     /// The clock cannot be made.
     #[error(transparent)]
-    Clock(#[from] NoClock),
+    Clock(#[from] PllError),
     /// The machine has no circuit.
     #[error(transparent)]
     Export(#[from] takt_rtl::ExportError),
@@ -35,7 +59,7 @@ pub enum TopError {
 #[error(
     "the {kind} needs {needed} block RAMs at least, {image} of them for the image of {records} records, {cores} for its cores{copies}; the {device} has {has}"
 )]
-pub struct TooMuch {
+pub struct MemoryExcess {
     pub(super) kind: &'static str,
     pub(super) needed: u64,
     pub(super) image: u64,

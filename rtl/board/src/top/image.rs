@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The image: the records that are written into the cores at a start, as they lie in block RAM.
+//! The image: the records that a start writes into the cores, as they lie in block RAM.
 
 use super::error::{MOST_RECORDS, TopError};
 use crate::application::Application;
@@ -7,25 +7,25 @@ use crate::protocol::record_words;
 use std::fmt::Write as _;
 use takt_rtl::system_records;
 
-/// Records that every image has room for.
+/// Number of records that every image has room for.
 pub const RECORDS: usize = 2048;
 
 /// The contents of an image.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Contents {
-    /// Records, each as its three words in the image.
+    /// The records, each as its three words in the image.
     pub records: Vec<[u32; 3]>,
-    /// Records that there is room for.
+    /// The number of records that the image has room for.
     pub room: usize,
 }
 
 impl Contents {
-    /// Bits of a record's number.
+    /// Number of bits in the number of a record.
     pub(super) fn bits(&self) -> u32 {
         self.room.next_power_of_two().trailing_zeros()
     }
 
-    /// The file that `takt_boot` reads; of several cores, records have the core's number.
+    /// The text of the file that `takt_boot` reads; with several cores, records have the number of their core.
     pub(super) fn file(&self, cores: usize) -> String {
         let mut hex =
             String::from("// core, slot, space, address, value: what takt_boot writes at a start\n");
@@ -38,10 +38,10 @@ impl Contents {
     }
 }
 
-/// The image of an application: the records that change what zeros everywhere leave.
+/// The image of an application: the records that change memories which are 0 everywhere.
 ///
 /// # Errors
-/// If there are too many.
+/// Fails if the application has too many records.
 pub fn image<'a>(application: impl Into<Application<'a>>) -> Result<Contents, TopError> {
     let application = application.into();
     let records = system_records(application.description()).into_iter();

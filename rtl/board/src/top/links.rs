@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The connections of cores with links: host endpoints, ticks, and outputs at the cores' `wait`s.
+//! The connections of cores with links: host endpoints, ticks, and outputs at the `wait` of each core.
 
-use super::peripherals::{Connected, net, scale};
-use super::shadow::Shadow;
+use super::peripherals::{PeripheralConnections, net, scale};
+use super::shadow_memory::Shadow;
 use super::template::Values;
 use crate::endpoints::Endpoints;
 use crate::sinks::{Sink, transit};
@@ -11,17 +11,17 @@ use takt_rtl::system::{Pin, PinKind, SystemPlan};
 use takt_rtl::verilog;
 use takt_system::{LinkKind, Status};
 
-/// A section that is being written.
+/// The section that is being written.
 struct Section<'a> {
     plan: &'a SystemPlan,
-    connected: &'a Connected<'a>,
+    connected: &'a PeripheralConnections<'a>,
     endpoints: &'a Endpoints,
 }
 
 /// The placeholders of the section; `to_integer` is the converter's code for float to integer.
 pub(super) fn section(
     plan: &SystemPlan,
-    connected: &Connected<'_>,
+    connected: &PeripheralConnections<'_>,
     observe: bool,
     to_integer: &str,
 ) -> Values {
@@ -39,7 +39,7 @@ pub(super) fn section(
 }
 
 impl Section<'_> {
-    /// The host endpoints: their declarations, their writes, their reads.
+    /// The host endpoints: declarations, writes and reads.
     fn endpoints(&self) -> Values {
         let (mut nets, mut acts, mut writes) = (String::new(), String::new(), String::new());
         let (mut resets, mut reads, mut writable) = (String::new(), String::new(), String::new());
@@ -101,12 +101,12 @@ impl Section<'_> {
         ]
     }
 
-    /// A core's tick divider, and the latch of its outputs.
+    /// The tick divider of a core, and the latch of its outputs.
     fn core(&self, k: usize, to_integer: &str) -> String {
         let (description, sinks) = (&self.plan.description, &self.connected.sinks[k]);
         let core = &description.cores[k];
         let n = sinks.len();
-        // The first sink is the lowest; above the last there is an element more.
+        // The first sink is the lowest element; an extra element is above the last sink.
         let vector = |of: &dyn Fn(&Sink<'_>) -> String, extra: &str| {
             let each = sinks.iter().rev().map(of);
             format!("{{{}}}", std::iter::once(extra.to_owned()).chain(each).collect::<Vec<_>>().join(", "))
@@ -140,7 +140,7 @@ impl Section<'_> {
         text
     }
 
-    /// Connections of the system's top.
+    /// The connections of the system's top.
     fn system(&self, observe: bool) -> String {
         let mut text = String::new();
         for pin in self.plan.pins() {

@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The check that memories fit into a device, before the tools say so after minutes.
 
-use super::error::TooMuch;
+use super::error::{MemoryExcess, TopError};
 use super::image::Contents;
-use super::shadow::copied_words;
+use super::shadow_memory::copied_words;
 use crate::application::Application;
 use crate::boards::Board;
 use crate::wiring::Wiring;
 use takt_isa::Machine;
-use takt_isa::memory::block_rams;
-use takt_rtl::synthesis;
+use takt_isa::memory::{BlockRam, Shape};
+use takt_rtl::plan::Plan;
+use takt_rtl::{Library, memories};
 
 /// Bits of a record of the image, for so many cores: a single one has no number (`takt_boot`).
 fn record_bits(cores: usize) -> u64 {
@@ -17,9 +18,10 @@ fn record_bits(cores: usize) -> u64 {
 }
 
 /// Block RAMs of the copies that the host reads, of a core among so many.
-fn copies(machine: &Machine, cores: usize) -> u64 {
-    let banks = machine.slots.iter().map(|slot| block_rams(slot.bank.depth.into(), 32));
-    banks.sum::<u64>() + block_rams(copied_words(machine, cores).into(), 32)
+fn copies(machine: &Machine, cores: usize, block: &BlockRam) -> u64 {
+    let words = |words: u32| block.blocks(Shape { words: words.into(), bits: 32 });
+    let banks = machine.slots.iter().map(|slot| words(slot.bank.depth.into()));
+    banks.sum::<u64>() + words(copied_words(machine, cores))
 }
 
 pub(super) fn check(
@@ -27,22 +29,55 @@ pub(super) fn check(
     wiring: &Wiring,
     application: &Application<'_>,
     contents: &Contents,
-) -> Result<(), TooMuch> {
-    let machines = || application.description().cores.iter().map(|known| known.program.machine);
-    let cores = machines().map(synthesis::block_rams).sum();
-    let count = application.description().cores.len();
-    let observers = if wiring.observe { machines().map(|machine| copies(machine, count)).sum() } else { 0 };
-    let image = block_rams(contents.room as u64, record_bits(count));
-    let (needed, has) = (cores + image + observers, board.device.blocks);
-    if needed <= has {
-        return Ok(());
+    library: &Library,
+) -> Result<(), TopError> {
+    let (memories, block) = (&board.family.memories, board.family.block_ram());
+    if !block.is_initial {
+        return Err(TopError::NoContents(board.family.text));
     }
-    let (device, records) = (board.device.part, contents.records.len());
-    let copies = match observers {
-        0 => String::new(),
-        n => format!(
-            ", {n} for copies of registers and data that the host reads (`observe = false` leaves them out)"
-        ),
-    };
-    Err(TooMuch { kind: application.kind(), needed, image, records, cores, copies, device, has })
+    if !board.family.initial_registers && board.reset.is_none() {
+        return Err(TopError::NoReset(board.family.text));
+    }
+    let Some(room) = board.device.room else { return Ok(()) };
+    let machines = || application.description().cores.iter().map(|core| core.program.machine);
+    let mut cores = 0;
+    for machine in machines() {
+        // A machine without a circuit is the export's to report.
+        let Ok(plan) = Plan::new(machine, library) else { return Ok(()) };
+        cores += memories::block_rams(&plan, library, block);
+    }
+    let count = application.description().cores.len();
+    let observers =
+        if wiring.observe { machines().map(|machine| copies(machine, count, block)).sum() } else { 0 };
+    let image = block.blocks(Shape { words: contents.room as u64, bits: record_bits(count) });
+    let (needed, has) = (cores + image + observers, room.block_rams);
+    let device = board.device.name;
+    if needed > has {
+        let records = contents.records.len();
+        let copies = match observers {
+            0 => String::new(),
+            n => format!(
+                ", {n} for copies of registers and data that the host reads (`observe = false` leaves them out)"
+            ),
+        };
+        return Err(MemoryExcess {
+            kind: application.kind(),
+            needed,
+            image,
+            records,
+            cores,
+            copies,
+            device,
+            has,
+        }
+        .into());
+    }
+    let programs = application.description().cores.iter().map(|core| &core.program);
+    let small = programs.flat_map(|program| program.machine.logic_memories(program.latched_inputs() > 0));
+    let (needed, has) = (small.map(|memory| memories.flip_flops(memory)).sum::<u64>(), room.flip_flops);
+    if needed > has {
+        let (kind, family) = (application.kind(), board.family.text);
+        return Err(TopError::FlipFlops { kind, needed, family, device, has });
+    }
+    Ok(())
 }

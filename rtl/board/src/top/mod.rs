@@ -2,7 +2,6 @@
 //! The circuit that is generated for a wiring: the module around cores and peripherals, the board's top level, the image in block RAM, the
 //! pins.
 
-mod around;
 mod board;
 mod design;
 mod error;
@@ -11,19 +10,21 @@ mod links;
 mod memory;
 mod peripherals;
 mod ports;
-mod shadow;
+mod shadow_memory;
 mod template;
+mod wrapper;
 
-pub use around::AROUND;
 pub use board::{RESET, TOP};
 pub use design::circuit_number;
 pub use error::TopError;
 pub use image::{Contents, RECORDS, image};
 pub(crate) use peripherals::own_pins;
+pub use wrapper::AROUND;
 
 use crate::VERILOG;
 use crate::application::Application;
 use crate::boards::Board;
+use crate::kind::Strobes;
 use crate::wiring::Wiring;
 use design::Design;
 use takt_rtl::Library;
@@ -34,10 +35,8 @@ use takt_rtl::export::DesignFile;
 pub struct Circuit {
     /// Verilog files and `image.hex`.
     pub files: Vec<DesignFile>,
-    /// Modules that take the place of those of the same name on Lattice ECP5.
-    pub ecp5: Vec<DesignFile>,
-    /// The places of the top's ports, for nextpnr.
-    pub pins: String,
+    /// The places of the top's ports, for place and route: the file's name and text.
+    pub pins: (&'static str, String),
     /// The core's clock in MHz.
     pub clock: f64,
     /// Records of the program.
@@ -57,9 +56,9 @@ pub fn circuit<'a>(
 ) -> Result<Circuit, TopError> {
     let (application, library) = (application.into(), Library::builtin());
     let contents = image(application.clone())?;
-    memory::check(board, wiring, &application, &contents)?;
+    memory::check(board, wiring, &application, &contents, &library)?;
     let mut design = Design::of(&application, &library)?;
-    let around = around::around(wiring, &application, &design, &contents, &library);
+    let around = wrapper::wrapper(wiring, &application, &design, &contents, &library);
     let mut files = std::mem::take(&mut design.files);
     let mut put = |name: &str, text: String| {
         if !files.iter().any(|file| file.name.rsplit('/').next() == name.rsplit('/').next()) {
@@ -75,7 +74,9 @@ pub fn circuit<'a>(
         true => &["takt_tick_divider.v", "takt_output_latch.v"],
         false => &["takt_exchange.v"],
     };
-    for (name, text) in VERILOG.iter().filter(|(name, _)| !others.contains(name)) {
+    let unused = unused(wiring);
+    let is_needed = |name: &&str| !others.contains(name) && !unused.contains(name);
+    for (name, text) in VERILOG.iter().filter(|(name, _)| is_needed(name)) {
         put(&format!("board/{name}"), (*text).to_owned());
     }
     put(&format!("{AROUND}.v"), around);
@@ -83,10 +84,24 @@ pub fn circuit<'a>(
     put("image.hex", contents.file(application.description().cores.len()));
     Ok(Circuit {
         files,
-        ecp5: design.ecp5,
-        pins: board::pins(board, wiring),
+        pins: (board.pinout.file, board::pins(board, wiring)),
         clock: wiring.clock,
         records: contents.records.len(),
         room: contents.room,
     })
+}
+
+/// The files of carriers and trips that a wiring does not need.
+fn unused(wiring: &Wiring) -> Vec<&'static str> {
+    let has = |strobe: fn(&Strobes) -> bool| {
+        wiring.peripherals.iter().any(|peripheral| strobe(&peripheral.kind.strobes))
+    };
+    let needed = [
+        ("takt_carrier.v", !wiring.carriers.is_empty()),
+        ("takt_align.v", wiring.tick.is_some()),
+        ("takt_pwm3.v", has(|strobes| strobes.carrier)),
+        ("takt_pwm_phase.v", has(|strobes| strobes.carrier)),
+        ("takt_trip.v", has(|strobes| strobes.trips)),
+    ];
+    needed.into_iter().filter(|(_, is_needed)| !is_needed).map(|(name, _)| name).collect()
 }

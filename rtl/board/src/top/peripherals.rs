@@ -3,13 +3,14 @@
 
 use super::template::Values;
 use crate::application::Application;
+use crate::carrier::{Carrier, Instant};
 use crate::kind::Direction;
 use crate::sinks::{Sink, sinks};
-use crate::wiring::{Peripheral, SIGNALS, Wiring, Write};
+use crate::wiring::{Peripheral, SIGNALS, Starts, Wiring, Write};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-/// The pins of peripherals and signals: name, direction, the board's pin.
+/// The pins of peripherals and signals: name, direction, pin of the board.
 pub(crate) fn own_pins(wiring: &Wiring) -> Vec<(String, Direction, String)> {
     let mut pins = Vec::new();
     for (signal, pin) in SIGNALS.iter().zip(&wiring.signals) {
@@ -38,22 +39,69 @@ pub(super) fn net(peripheral: &Peripheral, register: &str) -> String {
     format!("{}_{}_{register}", if reads { "r" } else { "w" }, peripheral.name)
 }
 
-/// Bit and exponent of a register's scale, as `takt_scale` takes them: 1 if it is written as a float.
+/// The net of a trip.
+pub(super) fn trip_net(name: &str) -> String {
+    format!("trip_{name}")
+}
+
+/// The nets of a carrier: its place, and its half.
+fn carrier_nets(carrier: &Carrier) -> [String; 2] {
+    ["place", "back"].map(|net| format!("carrier_{}_{net}", carrier.name))
+}
+
+/// An expression that is 1 in the cycle of an instant.
+fn at(wiring: &Wiring, instant: Instant) -> String {
+    let carrier = &wiring.carriers[instant.carrier];
+    let [place, back] = carrier_nets(carrier);
+    let (at, behind) = (instant.at % carrier.half, instant.at >= carrier.half);
+    format!("{place} == 16'd{at} & {}{back}", if behind { "" } else { "~" })
+}
+
+/// The carriers, and the signal that lets ticks begin: wherever they do if no carrier gives them.
+pub(super) fn carriers(wiring: &Wiring) -> Values {
+    let mut text = String::new();
+    for carrier in &wiring.carriers {
+        let [place, back] = carrier_nets(carrier);
+        let _ = writeln!(
+            text,
+            "    wire [15:0] {place};\n    wire        {back};\n    takt_carrier #(.HALF({}), .START({})) carrier_{} (.clk(clk), .rst(rst), .place({place}), .back({back}));",
+            carrier.half,
+            carrier.start(),
+            carrier.name
+        );
+    }
+    let wanted = "ready & ~hold";
+    let Some((instant, in_both)) = wiring.aligned() else {
+        return vec![("CARRIERS", text), ("RUN", wanted.to_owned())];
+    };
+    let carrier = &wiring.carriers[instant.carrier];
+    let place = match in_both {
+        true => format!("{} == 16'd{}", carrier_nets(carrier)[0], instant.at % carrier.half),
+        false => at(wiring, instant),
+    };
+    let _ = writeln!(
+        text,
+        "    wire        ticks_run;\n    takt_align align (.clk(clk), .rst(rst), .wanted({wanted}), .place({place}), .run(ticks_run));"
+    );
+    vec![("CARRIERS", text), ("RUN", "ticks_run".to_owned())]
+}
+
+/// Bit and exponent of a register's scale, as `takt_scale` takes them: the bit is 1 if the port is a float.
 pub(super) fn scale(write: &Write) -> (u8, i32) {
     (u8::from(write.scale.is_some()), write.scale.unwrap_or(0).rem_euclid(1024))
 }
 
 /// The connections between peripherals and cores, by [`Connection::number`](crate::application::Connection::number).
-pub(super) struct Connected<'a> {
+pub(super) struct PeripheralConnections<'a> {
     pub(super) application: &'a Application<'a>,
-    /// The nets of peripherals that drive inputs, by the inputs' numbers.
+    /// The nets of the peripherals that drive inputs, by the inputs' numbers.
     pub(super) driven: BTreeMap<usize, String>,
     /// The sinks of each core.
     pub(super) sinks: Vec<Vec<Sink<'a>>>,
 }
 
-impl<'a> Connected<'a> {
-    pub(super) fn new(application: &'a Application<'a>, wiring: &'a Wiring) -> Connected<'a> {
+impl<'a> PeripheralConnections<'a> {
+    pub(super) fn new(application: &'a Application<'a>, wiring: &'a Wiring) -> PeripheralConnections<'a> {
         let mut driven = BTreeMap::new();
         for peripheral in &wiring.peripherals {
             for (register, port) in peripheral.kind.reads.iter().zip(&peripheral.reads) {
@@ -63,7 +111,7 @@ impl<'a> Connected<'a> {
                 }
             }
         }
-        Connected { application, driven, sinks: sinks(application, wiring) }
+        PeripheralConnections { application, driven, sinks: sinks(application, wiring) }
     }
 
     /// Nets and instances of the peripherals.
@@ -77,33 +125,58 @@ impl<'a> Connected<'a> {
         for sink in self.sinks.iter().flatten() {
             let _ = writeln!(nets, "    {kind} [31:0] {};", net(sink.peripheral, sink.register));
         }
+        for trip in wiring.peripherals.iter().filter(|peripheral| peripheral.kind.strobes.trips) {
+            let _ = writeln!(nets, "    wire {};", trip_net(&trip.name));
+        }
         for peripheral in &wiring.peripherals {
-            instances += &self.instance(peripheral);
+            instances += &self.instance(wiring, peripheral);
         }
         vec![("NETS", nets), ("PERIPHERALS", instances)]
     }
 
-    /// A peripheral. Its outputs are published at the `wait` of the core that writes them, or of the first.
-    fn instance(&self, peripheral: &Peripheral) -> String {
+    /// The instance of a peripheral, whose outputs are published at the `wait` of the core that writes them, or of core 0 if no core does.
+    fn instance(&self, wiring: &Wiring, peripheral: &Peripheral) -> String {
         let (name, kind) = (&peripheral.name, peripheral.kind);
         let is_own = |sink: &&Sink<'_>| sink.peripheral.name == *name;
         let core = self.sinks.iter().position(|sinks| sinks.iter().any(|sink| is_own(&sink))).unwrap_or(0);
         let put = format!("puts[{core}]");
         let parameters = kind.parameters.iter().zip(&peripheral.parameters);
-        let parameters: Vec<String> = parameters
+        let mut parameters: Vec<String> = parameters
             .map(|(parameter, value)| format!(".{}(32'd{value})", parameter.name.to_uppercase()))
             .collect();
+        let carrier = peripheral.carrier.map(|carrier| &wiring.carriers[carrier]);
+        parameters.extend(carrier.map(|carrier| format!(".HALF(32'd{})", carrier.half)));
         let list =
             if parameters.is_empty() { String::new() } else { format!("#({}) ", parameters.join(", ")) };
         let mut ports = vec![".clk(clk)".to_owned(), ".rst(rst)".to_owned()];
+        let trips: Vec<String> = peripheral.trips.iter().map(|name| trip_net(name)).collect();
         if kind.strobes.enable {
-            ports.push(".enable(drive)".to_owned());
+            let trips = if kind.strobes.trip { &[] } else { &trips[..] };
+            let trips: String = trips.iter().map(|trip| format!(" & ~{trip}")).collect();
+            ports.push(format!(".enable(drive{trips})"));
+        }
+        if kind.strobes.trip {
+            let trips = if trips.is_empty() { "1'b0".to_owned() } else { trips.join(" | ") };
+            ports.push(format!(".trip({trips})"));
+        }
+        if kind.strobes.trips {
+            ports.push(format!(".clear(core_rst), .trip({})", trip_net(name)));
         }
         if kind.strobes.start {
-            ports.push(format!(".start({})", if peripheral.at_publish { &put } else { "early | steps" }));
+            let start = match peripheral.starts {
+                Starts::Lead => "early | steps".to_owned(),
+                Starts::Publish => put.clone(),
+                Starts::At(instant) => at(wiring, instant),
+            };
+            ports.push(format!(".start({start})"));
+        }
+        if let Some(carrier) = carrier {
+            let [place, back] = carrier_nets(carrier);
+            ports.push(format!(".place({place}), .back({back})"));
         }
         if !kind.reads.is_empty() {
-            ports.push(".take(take)".to_owned());
+            let take = peripheral.latch.map_or_else(|| "take".to_owned(), |instant| at(wiring, instant));
+            ports.push(format!(".take({take})"));
         }
         if !kind.writes.is_empty() {
             ports.push(format!(".put({put})"));
@@ -122,7 +195,7 @@ impl<'a> Connected<'a> {
         }
         for register in kind.writes {
             let is_sink = |sink: &Sink<'_>| is_own(&sink) && sink.register == register.name;
-            // An SPI whose register nobody writes sends its preset, others stay at rest.
+            // An SPI whose register nobody writes sends its preset; other peripherals stay at rest.
             let value = match self.sinks.iter().flatten().any(is_sink) {
                 true => net(peripheral, register.name),
                 false => format!("32'd{}", peripheral.parameter(register.name)),

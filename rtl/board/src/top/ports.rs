@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The connections of a core without links: peripherals and host reach its ports themselves.
+//! The connections of a core without links: peripherals and host reach the ports of the core themselves.
 
-use super::peripherals::{Connected, net, scale};
-use super::shadow::Shadow;
+use super::peripherals::{PeripheralConnections, net, scale};
+use super::shadow_memory::Shadow;
 use super::template::Values;
 use crate::protocol;
 use std::fmt::Write as _;
@@ -10,7 +10,12 @@ use takt_rtl::Library;
 use takt_rtl::wishbone::open_streams;
 
 /// The placeholders of the section, in which the core is the module `core`.
-pub(super) fn section(connected: &Connected<'_>, core: &str, observe: bool, library: &Library) -> Values {
+pub(super) fn section(
+    connected: &PeripheralConnections<'_>,
+    core: &str,
+    observe: bool,
+    library: &Library,
+) -> Values {
     let machine = connected.application.description().cores[0].program.machine;
     let input_bits = machine.inputs.depth.trailing_zeros();
     let port_bits = machine.outputs_per_bank.trailing_zeros();
@@ -20,7 +25,8 @@ pub(super) fn section(connected: &Connected<'_>, core: &str, observe: bool, libr
             inputs,
             "            8'd{n}: {{in_index, in_value}} <= {{{input_bits}'d{index}, {net}}};"
         );
-        // The host cannot write a port that a peripheral drives: what counts is the last value before the tick, the peripheral's.
+        // The host cannot write a port that a peripheral drives: the program reads the last value before the tick, which is the
+        // peripheral's.
         let at = usize::from(protocol::INPUTS) + index;
         let _ = writeln!(writable, "            16'd{at}: writable <= 1'b0;");
     }

@@ -5,7 +5,7 @@ use takt_board::Host;
 use takt_board::protocol::{self, Line, LinkError, Receiver};
 use takt_board::simulation::Simulation;
 
-/// Checks that a write is refused, that nothing of it is written, and that a repetition of the same request is answered alike.
+/// Checks that a write is refused, that no word of it is written, and that a repetition of the request is answered alike.
 pub(crate) fn refuses(host: &mut Host<Simulation>, address: u16, words: &[u32]) {
     let was = host.read(address, words.len()).expect("it can be read");
     let error = host.write(address, words).expect_err("it cannot be written");
@@ -27,20 +27,20 @@ pub(crate) fn refuses(host: &mut Host<Simulation>, address: u16, words: &[u32]) 
     }
 }
 
-/// True if a running program leaves the word at an address as it is.
+/// Tells if a running program leaves the word at an address unchanged.
 fn is_constant(address: u16) -> bool {
     !matches!(address, 2..=3 | 7..=11 | 19 | 0x102 | 0x3400..)
 }
 
 /// The ticks of a board that shows them at a pin.
 pub(crate) struct Ticks {
-    /// A cycle with one.
+    /// The number of a cycle with a tick.
     first: u64,
-    /// Cycles from one to the next.
+    /// Cycles from a tick to the next.
     period: u32,
 }
 
-/// Cycles that are looked through in one go.
+/// Cycles that a simulation runs between two looks at the output.
 pub(crate) const STRETCH: u32 = 1000;
 
 impl Ticks {
@@ -53,7 +53,7 @@ impl Ticks {
         Ticks { first: board.cycles - 1, period }
     }
 
-    /// Cycles from a change of an input, so many cycles before a tick, to the edge of an output that stands until then.
+    /// Cycles from a change of an input, `before` cycles before a tick, to the edge of an output that stands until then.
     pub(crate) fn measured(
         &self,
         board: &mut Simulation,
@@ -64,7 +64,7 @@ impl Ticks {
         self.run_to(board, before, 0);
         let was = board.output(output).expect("a pin").0;
         change(board);
-        // An encoder's edge is at a run's end.
+        // The edge of an encoder is at the end of a run.
         board.run(1, &[]).expect("it runs");
         let mut cycles = 1;
         for _ in 0..20 * self.period / STRETCH {
@@ -78,7 +78,7 @@ impl Ticks {
         panic!("{output} does not follow");
     }
 
-    /// Runs until a tick comes in so many cycles and so many more.
+    /// Runs until the next tick comes `before` and `more` cycles later.
     pub(crate) fn run_to(&self, board: &mut Simulation, before: u64, more: u32) {
         let period = u64::from(self.period);
         let past = (board.cycles + before + u64::from(more) - self.first) % period;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Peripherals in Verilator: all of them in one simulation, each compared with its model in every cycle.
+//! Simulates peripherals in Verilog: all in a single simulation, each compared with its model in every cycle.
 
 pub(crate) mod board;
 
@@ -18,11 +18,11 @@ pub(crate) struct Part {
     pub(crate) takes: Vec<(String, u32)>,
     pub(crate) drives: Vec<(String, u32)>,
     pub(crate) model: Box<dyn Model>,
-    /// Inputs of a cycle, the reset apart, from its number.
+    /// The inputs of a cycle, except for the reset, by the cycle's number.
     pub(crate) stimulus: Box<dyn FnMut(u32) -> Vec<u32>>,
 }
 
-/// Cycles of reset at the beginning, before anything is compared: registers start with random values.
+/// Cycles of reset at the beginning, which are not compared: registers start with random values.
 const RESET: u32 = 40;
 
 const DRIVER: &str = r#"
@@ -51,7 +51,7 @@ int main(int argc, char **argv) {
 }
 "#;
 
-/// A module with all parts, each signal in a word of its own.
+/// A module with all parts, in which each signal has a word of its own.
 fn wrapper(parts: &[Part]) -> (String, usize, usize) {
     let (mut text, mut takes, mut drives) = (String::new(), 0, 0);
     for part in parts {
@@ -110,7 +110,7 @@ pub(crate) fn build(name: &str, files: &[(&str, String)], parts: &[Part]) -> Pat
         .unwrap_or_else(|error| panic!("{error}: `cargo xtask test` installs what the tests need"))
 }
 
-/// Runs so many cycles and says of each part in which cycle it first differed from its model, and how.
+/// Runs `cycles` cycles, and says for each part in which cycle it first differed from its model, and how.
 pub(crate) fn compare(
     name: &str,
     files: &[(&str, String)],
@@ -120,7 +120,7 @@ pub(crate) fn compare(
     run(&build(name, files, parts), &[], parts, cycles)
 }
 
-/// The same with what has been built, and arguments for it.
+/// Runs a program that [`build`] has built, with arguments, and compares the parts as [`compare`] does.
 pub(crate) fn run(
     program: &Path,
     arguments: &[String],

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A system on both sides.
+//! Lockstep of a system on emulator and circuit.
 
 use crate::compare::{Comparison, Core, Difference};
 use crate::event::{CircuitEvent, CoreEvent, EventKind, bare, circuit_stops, expect};
@@ -12,10 +12,9 @@ use takt_rtl::system::{Pin, PinKind, SystemPlan};
 use takt_rtl::verilog::Direction;
 use takt_system::{Description, HostAction, HostError, LinkEventKind, LinkKind, System, SystemFault};
 
-/// A system on the emulator and on the circuit.
+/// A system running on the emulator and on the circuit.
 ///
-/// The emulator goes ahead; the circuit follows to the same cycle, with what the host does put on its pins in the cycle in which
-/// the emulator's host did it.
+/// The emulator runs ahead; the circuit follows to the same cycle, with the actions of the emulator's host on its pins in the same cycles.
 pub struct SystemLockstep {
     system: System,
     simulation: Simulation,
@@ -23,17 +22,17 @@ pub struct SystemLockstep {
     events: Comparison<CircuitEvent>,
     actions: Vec<PinAction>,
     simulated: Cycle,
-    /// Of each link, what the host has written to a FIFO's fields, by pin; and the first cycles in which its next entry goes in,
-    /// and comes out.
+    /// For each link, values that the host has written to a FIFO's fields, by pin; and the first cycles in which the FIFO can take the
+    /// host's next entry, and give one.
     working: Vec<BTreeMap<usize, u32>>,
     free: Vec<[Cycle; 2]>,
 }
 
 impl SystemLockstep {
-    /// Both sides after reset.
+    /// Resets emulator and circuit.
     ///
     /// # Errors
-    /// If the emulator does not take a program.
+    /// If the emulator does not accept a program.
     pub fn new(
         description: &Description,
         plan: &SystemPlan,
@@ -54,20 +53,20 @@ impl SystemLockstep {
         })
     }
 
-    /// The emulator.
+    /// Emulator of the system.
     pub fn system(&self) -> &System {
         &self.system
     }
 
-    /// Events and values on pins that were the same on both sides.
+    /// Number of equal events and pins so far.
     pub fn compared(&self) -> u64 {
         self.events.compared
     }
 
-    /// As [`System::set_input`].
+    /// Sets an input of the host, as [`System::set_input`].
     ///
     /// # Errors
-    /// As there.
+    /// See [`System::set_input`].
     pub fn set_input(&mut self, name: &str, bits: u32) -> Result<(), LockstepError> {
         self.system.set_input(name, bits)?;
         let description = self.system.description();
@@ -92,26 +91,26 @@ impl SystemLockstep {
                 self.strobe(now, link, PinKind::Send);
             }
             LinkKind::Snapshot { .. } => self.actions.push((now, pin, bits)),
-            // On the pins when its entry goes in.
+            // On the pins in the cycle of the push.
             LinkKind::Fifo { .. } => drop(self.working[link].insert(pin, bits)),
         }
         Ok(())
     }
 
-    /// As [`System::publish`].
+    /// Publishes a snapshot of the host, as [`System::publish`].
     ///
     /// # Errors
-    /// As there.
+    /// See [`System::publish`].
     pub fn publish(&mut self, link: usize) -> Result<(), LockstepError> {
         self.system.publish(link)?;
         self.strobe(self.system.now(), link, PinKind::Send);
         Ok(())
     }
 
-    /// As [`System::push`]: of several in one cycle, each goes in a cycle after the one before.
+    /// Pushes an entry of the host, as [`System::push`]. Several pushes at one time enter the circuit in successive cycles.
     ///
     /// # Errors
-    /// As there.
+    /// See [`System::push`].
     pub fn push(&mut self, link: usize) -> Result<bool, LockstepError> {
         let room = self.system.push(link)?;
         let cycle = self.turn(link, 0);
@@ -125,17 +124,17 @@ impl SystemLockstep {
         self.actions.extend(pin.map(|pin| (cycle, pin, 1)));
     }
 
-    /// The cycle in which a FIFO takes the host's next entry, or gives it one: one a cycle.
+    /// Cycle in which a FIFO takes the host's next entry, or gives one: one entry per cycle.
     fn turn(&mut self, link: usize, way: usize) -> Cycle {
         let cycle = self.system.now().max(self.free[link][way]);
         self.free[link][way] = cycle + 1;
         cycle
     }
 
-    /// As [`System::act`].
+    /// Carries out an action of the host, as [`System::act`].
     ///
     /// # Errors
-    /// As there.
+    /// See [`System::act`].
     pub fn act(&mut self, action: &HostAction) -> Result<bool, LockstepError> {
         match action {
             HostAction::Input { name, bits } => self.set_input(name, *bits).map(|()| true),
@@ -145,11 +144,11 @@ impl SystemLockstep {
         }
     }
 
-    /// The host writes all fields of a link that it drives: of a wire its value, of a snapshot what it publishes, of a FIFO an
-    /// entry. False if a FIFO is full, as far as the host can know.
+    /// Writes all fields of a link that the host drives: sets the value of a wire, publishes a snapshot, or pushes an entry. False if a
+    /// FIFO is full, as far as the host can know.
     ///
     /// # Errors
-    /// If it drives no such link.
+    /// If the host drives no such link.
     pub fn write(&mut self, link: usize, values: &[u32]) -> Result<bool, LockstepError> {
         let unknown = || HostError::Unknown { what: "link from the host", name: link.to_string() };
         let known = self.system.description().links.get(link).cloned().ok_or_else(unknown)?;
@@ -166,7 +165,7 @@ impl SystemLockstep {
         }
     }
 
-    /// The host takes the head of a FIFO; `None` if it is empty. Of several in one cycle as of [`SystemLockstep::push`].
+    /// Pops the head of a FIFO for the host; `None` if the FIFO is empty. Several pops at one time reach the circuit in successive cycles.
     ///
     /// # Errors
     /// If there is no such FIFO.
@@ -179,33 +178,33 @@ impl SystemLockstep {
         Ok(head)
     }
 
-    /// Runs both until ticks have started, or every core has halted, but no further than until `limit` cycles have passed. The
-    /// cycle of the first base tick, if it is known then.
+    /// Runs both sides until ticks have started, every core has halted, or `limit` cycles have passed. Returns the cycle of the first base
+    /// tick, if it is known by then.
     ///
     /// # Errors
-    /// A difference, or a simulation that ended.
+    /// A difference, or the end of the simulation.
     pub fn run_to_start(&mut self, limit: Cycle) -> Result<Option<Cycle>, LockstepError> {
         let start = self.system.run_to_start(limit);
         self.follow()?;
         Ok(start.unwrap_or_default())
     }
 
-    /// Runs both until `cycle` cycles have passed; false if a core has stopped the system with a fault.
+    /// Runs both sides until `cycle` cycles have passed; false if a fault has stopped the system.
     ///
     /// # Errors
-    /// A difference, or a simulation that ended.
+    /// A difference, or the end of the simulation.
     pub fn run_until(&mut self, cycle: Cycle) -> Result<bool, LockstepError> {
         let result = self.system.run_until(cycle);
         self.follow()?;
         Ok(result.is_ok())
     }
 
-    /// The fault that the emulator stopped with.
+    /// Fault at which the emulator stopped.
     pub fn fault(&self) -> Option<&SystemFault> {
         self.system.fault()
     }
 
-    /// Lets the circuit follow, and compares.
+    /// Runs the circuit up to the emulator, and compares.
     fn follow(&mut self) -> Result<(), LockstepError> {
         let now = self.system.now();
         let cores = self.system.take_core_events().into_iter();
@@ -235,16 +234,16 @@ impl SystemLockstep {
         Ok(())
     }
 
-    /// Lets the circuit tell of the last cycles, and compares them. The host can do nothing more.
+    /// Collects the circuit's reports of the last cycles, and compares them. The host can do nothing more.
     ///
     /// # Errors
-    /// A difference, or a simulation that ended.
+    /// A difference, or the end of the simulation.
     pub fn finish(&mut self) -> Result<(), LockstepError> {
         let now = self.system.now();
         let (found, _) = self.simulation.run(now + REPORT_DELAY, &[])?;
         self.events.found.extend(found);
         self.simulated = now + REPORT_DELAY;
-        // A fault that the circuit does not look at is no event, and what it does in that cycle is another thing.
+        // Faults that the circuit does not detect are no events, and its behaviour in that cycle is undefined.
         let end = match self.system.fault() {
             Some(fault) if circuit_stops(&fault.fault) => fault.fault.cycle + 1,
             Some(fault) => fault.fault.cycle,
@@ -262,7 +261,7 @@ impl SystemLockstep {
             let link = &self.system.description().links[pin.link];
             let expected = match (pin.kind, &link.kind) {
                 (PinKind::Status(status), _) => self.system.fifo_status(pin.link, status),
-                // Without an entry there is no head.
+                // An empty queue has no head.
                 (_, LinkKind::Fifo { .. }) if self.system.fifo_entries(pin.link).is_empty() => None,
                 (PinKind::Field(field), kind) => {
                     let name = &link.fields[field].to;
@@ -292,7 +291,7 @@ impl SystemLockstep {
 
     /// Compares the events before a cycle, in order.
     fn check(&mut self, end: Cycle) -> Result<(), LockstepError> {
-        // After its halt a core is still ticked, of which the emulator says nothing.
+        // A halted core still gets ticks, which the emulator does not report.
         let description = self.system.description();
         let halts: Vec<Option<Cycle>> = (0..description.cores.len())
             .map(|core| match *self.system.core(core).status() {
@@ -313,7 +312,7 @@ impl SystemLockstep {
             }
             _ => false,
         };
-        // The emulator puts a value on the pins when it counts.
+        // The emulator reports a value on the pins only when bundles can read it, INPUT_DELAY cycles later.
         let known = |event: &CircuitEvent| match event {
             CircuitEvent::Core { event, .. } if event.kind == EventKind::Input => {
                 event.cycle + INPUT_DELAY < end

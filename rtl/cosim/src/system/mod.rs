@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A system of several cores: its circuit against its emulator, in lockstep.
+//! Lockstep of a system of several cores on emulator and circuit.
 //!
-//! [`SystemModel`] compiles an exported system with Verilator, [`SystemLockstep`] runs it and its emulator and compares, cycle by
-//! cycle, what every core does, what happens on every link, and what the host sees. [`random`] makes systems for it.
+//! [`SystemModel`] compiles an exported system with Verilator. [`SystemLockstep`] runs the system and its emulator and compares, cycle by
+//! cycle, the events of every core and link, and the host's pins. [`random`] makes systems.
 
 mod lockstep;
 mod model;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A system in Verilator: compiled once for each circuit, run as a process with a memory image.
+//! A system in Verilator: compiled once per circuit, run as a process with a memory image.
 
 use super::probe::{self, PROBE};
 use crate::model::sources;
@@ -20,7 +20,7 @@ pub struct SystemModel {
 }
 
 impl SystemModel {
-    /// Compiles a system, or finds it in the folder as it was compiled before. With `trace` it can write waveforms.
+    /// Compiles a system, or finds an earlier build in the folder. With `trace` the model can write waveforms.
     ///
     /// # Errors
     /// If Verilator or a C++ compiler is missing or fails.
@@ -39,8 +39,8 @@ impl SystemModel {
         })
     }
 
-    /// Starts a simulation with the contents of a memory image: the cores are loaded, and cycle 0 is to come. A model that can
-    /// trace writes its waveform to the first argument; others are Verilog's plusargs.
+    /// Starts a simulation with the contents of a memory image: the cores are loaded, and cycle 0 comes next. A model with `trace` writes
+    /// its waveform to the first argument; other arguments are Verilog's plusargs.
     ///
     /// # Errors
     /// If the image cannot be written or the process cannot be started.

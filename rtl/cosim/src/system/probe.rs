@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A module around the top that brings the nets inside of it to its ports, and the driver's header for those.
+//! Probe: a module around the top that brings inner nets to its ports, and the driver's header for these ports.
 
 use std::fmt::Write as _;
 use takt_rtl::system::{PinKind, SystemDesign};
 use takt_rtl::verilog::{Direction, Net};
 use takt_system::{End, LinkKind};
 
-/// The module.
+/// Module name of the probe.
 pub const PROBE: &str = "takt_system_probe";
-/// The driver's part for a system.
+/// Part of the main program for a system.
 const SYSTEM: &str = include_str!("system.h");
 
 /// Nets of a core, with their widths.
@@ -48,8 +48,8 @@ fn core_nets(design: &SystemDesign, core: usize) -> Vec<Net> {
     nets
 }
 
-/// An event of a link: the link, its name in the driver, the expression in the probe that is 1 when it happens, and that of its
-/// value, if it has one.
+/// Event of a link: index of the link, name of the event in the driver, expression in the probe that is 1 in the event's cycle, and
+/// expression of its value, if any.
 type LinkNet = (usize, &'static str, String, Option<String>);
 
 fn link_nets(design: &SystemDesign) -> Vec<LinkNet> {
@@ -86,7 +86,7 @@ fn range(width: u32) -> String {
     if width > 1 { format!("[{}:0] ", width - 1) } else { String::new() }
 }
 
-/// The module's text: the host's pins go through, everything else comes out.
+/// Text of the probe: the host's pins pass through, and all other nets become outputs.
 pub(super) fn module(design: &SystemDesign) -> String {
     let mut ports =
         vec!["input wire clk".to_owned(), "input wire rst".to_owned(), "output wire running".to_owned()];
@@ -123,7 +123,7 @@ pub(super) fn module(design: &SystemDesign) -> String {
     )
 }
 
-/// The driver's header.
+/// Header of the driver for a system.
 pub(super) fn header(design: &SystemDesign) -> String {
     let pins = design.plan.pins();
     let cores = design.plan.cores.len();

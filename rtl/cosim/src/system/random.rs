@@ -2,6 +2,7 @@
 //! Random systems, their programs, and the actions of their host.
 
 use super::lockstep::SystemLockstep;
+use crate::random::with_inputs_at;
 use crate::{LockstepError, Simulation};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -12,33 +13,33 @@ use takt_rtl::system::SystemPlan;
 use takt_system::testing::random_description;
 use takt_system::{Description, End, LinkKind};
 
-/// Cycles that a random system runs, unless a core stops it before.
+/// Cycles of a random system, unless a core stops it earlier.
 pub const CYCLES: Cycle = 4000;
 
-/// Counts of what random systems did.
+/// Counts of the events in random runs.
 #[derive(Clone, Debug, Default)]
 pub struct Coverage {
-    /// Runs.
+    /// Runs to the end.
     pub runs: u64,
-    /// Cycles.
+    /// Cycles of all runs.
     pub cycles: u64,
-    /// Events and pins that were the same on both sides.
+    /// Events and pins that were equal on both sides.
     pub compared: u64,
     /// Runs in which base ticks started.
     pub started: u64,
-    /// Runs that a fault stopped.
+    /// Runs stopped by a fault.
     pub faults: u64,
     /// Deadlines that were missed.
     pub missed: u64,
 }
 
-/// A random system, and others that differ from it in their programs alone: as [`variants`] of it.
+/// A random system and its [`variants`].
 pub fn systems(seed: u64, machines: &[&'static Machine], count: u64) -> Vec<Description> {
     variants(random_description(seed, machines), seed, count)
 }
 
-/// A system of random programs, and others that differ from it in their programs alone: one circuit, with other contents of its
-/// memories. Ports, and what the loader writes to output ports, are the first one's: they are part of the circuit.
+/// A system, and others that differ only in their random programs: one circuit with different memory contents. Ports and presets of output
+/// ports stay the first system's, because they are part of the circuit.
 pub fn variants(first: Description, seed: u64, count: u64) -> Vec<Description> {
     let others = (1..count).map(|number| {
         let mut other = first.clone();
@@ -54,9 +55,11 @@ pub fn variants(first: Description, seed: u64, count: u64) -> Vec<Description> {
 
 fn another(first: &Program, seed: u64) -> Program {
     let machine = first.machine;
-    // Few, so that a port is not written in every period; many, so that periods are longer than ticks are apart.
+    // Few bundles, so that some periods write no port; many, so that some periods exceed the distance of ticks.
     let bundles = 2 + Random::new(seed).below(45);
     let program = random_program(seed, machine, Options { bundles, ..Options::TAME });
+    let inputs: Vec<_> = first.inputs.iter().map(|port| port.register).collect();
+    let program = with_inputs_at(program, &inputs);
     let presets: BTreeMap<_, _> =
         first.constants.iter().copied().filter(|(register, _)| machine.is_output(*register)).collect();
     let constants = program
@@ -67,10 +70,10 @@ fn another(first: &Program, seed: u64) -> Program {
     Program { latched: first.latched, constants, ..program }
 }
 
-/// Runs a system on both sides and adds to the coverage; the host does what the seed says.
+/// Runs a system on both sides, with a host controlled by the seed, and adds to the coverage.
 ///
 /// # Errors
-/// A difference, or a simulation that ended.
+/// A difference, or the end of the simulation.
 pub fn run(
     seed: u64,
     description: &Description,
@@ -85,7 +88,7 @@ pub fn run(
         for (number, link) in description.links.iter().enumerate() {
             if link.from == End::Host && random.once_in(2) {
                 let values: Vec<u32> = link.fields.iter().map(|_| random.word()).collect();
-                // One value of the host's may go on several wires.
+                // Several wires may carry one value of the host.
                 if !shares_a_name(description, number) {
                     lockstep.write(number, &values)?;
                 }
@@ -108,7 +111,7 @@ pub fn run(
     Ok(())
 }
 
-/// True if another wire from the host has the same name.
+/// An earlier wire from the host has the same name.
 fn shares_a_name(description: &Description, number: usize) -> bool {
     let link = &description.links[number];
     let mut before = description.links[..number].iter();

@@ -1,4 +1,4 @@
-// A system of cores. Behind what is generated: PINS, set_pin, pin, clear_strobes, and observe, which calls what stands here.
+// Driver of a system of cores. The generated part before it defines PINS, set_pin, pin, clear_strobes and observe.
 
 static void look(bool watch) {
     if (watch) observe();
@@ -19,7 +19,7 @@ static void reset() {
     cycle = 0;
 }
 
-// The image is in the memories, and a system is loaded once.
+// A system loads itself from its image, once.
 static void load() {
     fprintf(stderr, "a system is not loaded\n");
     exit(1);

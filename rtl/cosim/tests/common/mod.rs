@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Helpers of the tests.
+//! Helpers of the tests: compiled designs, programs, the robot in closed loop.
 
 use std::path::PathBuf;
 use takt_cosim::Model;
@@ -10,24 +10,24 @@ use takt_programs::hybrid::{Outputs, ports};
 use takt_programs::trajectory::Trajectory;
 use takt_rtl::{Design, Library, export};
 
-/// The folder of compiled designs.
+/// Folder of compiled designs.
 pub(crate) fn folder() -> PathBuf {
     PathBuf::from(env!("CARGO_TARGET_TMPDIR"))
 }
 
-/// A machine's circuit, compiled.
+/// Compiles a machine's circuit with direct ports.
 pub(crate) fn model(machine: &'static Machine) -> Model {
     latched_model(machine, 0)
 }
 
-/// Likewise, so many of its input ports latched.
+/// Compiles a machine's circuit with `latched` latched input ports.
 pub(crate) fn latched_model(machine: &'static Machine, latched: u16) -> Model {
     let design = export(machine, &Library::builtin()).expect("every machine has a circuit");
     let design = Design { latched, ..design };
     Model::build(&design, &folder(), false).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// One of the programs that come with Takt.
+/// Assembles a program that comes with Takt.
 pub(crate) fn assemble(machine: &'static Machine, source: &str) -> Program {
     let options = takt_asm::Options { machine, ..takt_asm::Options::default() };
     let loader = takt_asm::MemoryLoader::new(takt_programs::SOURCES);
@@ -35,8 +35,8 @@ pub(crate) fn assemble(machine: &'static Machine, source: &str) -> Program {
     assembled.unwrap_or_else(|diagnostics| panic!("{}", diagnostics.render(false))).program
 }
 
-/// Drives the robot along the letters with a tracking program: `period` is given the inputs by register and gives the
-/// values of output ports, by register.
+/// Drives the robot along the letters with a tracking program. `period` gets the inputs by register, and returns the values of output ports
+/// by register.
 pub(crate) fn drive<E: std::fmt::Display>(
     program: &Program,
     periods: usize,

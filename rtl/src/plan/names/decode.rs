@@ -6,7 +6,7 @@ use crate::verilog::{Expr, Net, hexadecimal, no};
 use takt_isa::Shape;
 use takt_isa::shape::{OPCODE, WORD_BITS};
 
-/// Port: the word.
+/// Port: word to be decoded.
 pub const WORD: Net = Net::bus("word", WORD_BITS);
 /// Port: the operand is the constant.
 pub const IMMEDIATE: Net = Net::bit("immediate");
@@ -16,12 +16,12 @@ pub const ILLEGAL: Net = Net::bit("illegal");
 pub const BAD: Net = Net::bit("bad");
 /// The operation writes a register.
 pub const WRITES: Net = Net::bit("writes");
-/// The sources that it reads.
+/// Sources that the operation reads, a bit each.
 pub const READS: Net = Net::bus("reads", 3);
-/// The fields that a slot does not need.
+/// Dummy that collects fields which the slot does not need.
 pub const UNUSED: Net = Net::bit("unused");
 
-/// Port: the register that is written.
+/// Port: destination, as an index.
 pub fn dest(plan: &Plan) -> Net {
     Net::bus("dest", plan.index)
 }
@@ -31,17 +31,17 @@ pub fn constant(slot: &SlotPlan) -> Net {
     Net::bus("constant", slot.constant_bits())
 }
 
-/// Port: the control bits.
+/// Port: control bits of the operation.
 pub fn control(slot: &SlotPlan) -> Net {
     Net::bus("control", slot.width())
 }
 
-/// Port: the bank of a source.
+/// Port: bank of a source, one-hot.
 pub fn bank(plan: &Plan, operand: usize) -> Net {
     Net::named(format!("{}_bank", LETTERS[operand])).wide(plan.slot_count() + 1)
 }
 
-/// Port: its index in the bank.
+/// Port: index of a source in its bank.
 pub fn index(plan: &Plan, operand: usize) -> Net {
     Net::named(format!("{}_index", LETTERS[operand])).wide(plan.index)
 }
@@ -56,7 +56,7 @@ pub fn stray(shape: Shape) -> Net {
     Net::named(format!("stray_{}", format!("{shape:?}").to_lowercase()))
 }
 
-/// The expression that is 1 if a word has a bit set that the shape does not use.
+/// Expression that is 1 if a word has a bit set that the shape does not use.
 pub fn is_stray(shape: Shape) -> Expr {
     match !shape.mask() & ((1 << OPCODE.low) - 1) {
         0 => no(),

@@ -11,7 +11,7 @@ macro_rules! nets {
     (@ $net:literal $width:literal) => { Net::bus($net, $width) };
 }
 
-/// Parameter: the number of input ports that are latched.
+/// Parameter: number of latched input ports.
 pub static LATCHED: Net = Net::bit("LATCHED");
 
 /// Parameter: cycles of delay from an output port's number to its value.
@@ -19,29 +19,29 @@ pub static READ_DELAY: Net = Net::bit("READ_DELAY");
 
 nets! {
     // ---- ports
-    /// The clock.
+    /// Clock of the whole core.
     CLK "clk";
-    /// Synchronous reset.
+    /// Synchronous reset, active high.
     RST "rst";
-    /// The loader writes.
+    /// The loader writes a word.
     LOAD "load";
-    /// The memory.
+    /// Memory that the loader writes.
     LOAD_SPACE "load_space" 2;
-    /// The slot.
+    /// Slot of the loader's word, in program memory.
     LOAD_SLOT "load_slot" 3;
-    /// The word's address.
+    /// Address of the loader's word.
     LOAD_ADDRESS "load_address" 16;
-    /// The word.
+    /// Word that the loader writes.
     LOAD_VALUE "load_value" 48;
     /// An input port is written.
     INPUT_WRITE "input_write";
-    /// The word.
+    /// Value written to the input port.
     INPUT_VALUE "input_value" 32;
-    /// The visible value of the output port whose number is on the input.
+    /// Visible value of the output port whose number is on the input.
     READ_VALUE "read_value" 32;
     /// A `wait` issued two cycles ago.
     ENDED "ended";
-    /// The tick.
+    /// Tick, high for one cycle.
     TICK "tick";
     /// The program waits for the tick.
     WAITING "waiting";
@@ -55,35 +55,35 @@ nets! {
     HALTED "halted";
     /// A bundle was at fault.
     FAULT "fault";
-    /// The kind of the fault.
+    /// Kind of the fault.
     FAULT_KIND "fault_kind" 3;
-    /// The slot of the fault.
+    /// Slot of the fault.
     FAULT_SLOT "fault_slot" 3;
-    /// The address of the bundle at fault.
+    /// Address of the bundle at fault.
     FAULT_ADDRESS "fault_address" 16;
     /// A bundle issued two cycles ago.
     ISSUED "issued";
-    /// Its address.
+    /// Address of the bundle that issued two cycles ago.
     ISSUED_ADDRESS "issued_address" 16;
     /// A word was stored.
     STORED "stored";
-    /// The address of the stored word.
+    /// Address of the stored word.
     STORED_ADDRESS "stored_address" 16;
-    /// The stored value.
+    /// Value of the stored word.
     STORED_VALUE "stored_value" 32;
-    /// The sticky flags.
+    /// Sticky flags: invalid, divide by zero, overflow.
     STATUS "status" 3;
 
     // ---- loader and inputs, registered
-    /// The loader writes.
+    /// The loader writes a word; registered.
     LOADS "loads";
-    /// The memory.
+    /// Memory that the loader writes; registered.
     LOADS_SPACE "loads_space" 2;
-    /// The slot.
+    /// Slot of the loader's word; registered.
     LOADS_SLOT "loads_slot" 3;
-    /// The word's address.
+    /// Address of the loader's word; registered.
     LOADS_ADDRESS "loads_address" 16;
-    /// The word.
+    /// Word that the loader writes; registered.
     LOADS_VALUE "loads_value" 48;
     /// The loader writes the data memory.
     LOAD_DATA "load_data";
@@ -91,13 +91,13 @@ nets! {
     LOAD_REGISTER "load_register";
     /// The loader's value for a register, on the buses.
     LOADED_VALUE "loaded_value" 32;
-    /// An input port is written.
+    /// An input port is written; registered.
     INPUT1 "input1";
-    /// The word.
+    /// Value written to the input port; registered.
     INPUT1_VALUE "input1_value" 32;
-    /// The same one cycle later.
+    /// Value written to the input port, one cycle after `input1_value`.
     INPUT2_VALUE "input2_value" 32;
-    /// Its buffer, of the two of a latched port.
+    /// Buffer (0 or 1) of the latched port that is written.
     INPUT1_PLACE "input1_place";
     /// Bundles read the value from now on.
     INPUT1_NOW "input1_now";
@@ -105,7 +105,7 @@ nets! {
     INPUTS_OPEN "inputs_open";
     /// The buffers of latched input ports are swapped: the values written before are read from now on.
     INPUTS_TAKEN "inputs_taken";
-    /// The tick, registered.
+    /// Tick, masked in reset; registered.
     TICKS "ticks";
 
     // ---- control
@@ -115,7 +115,7 @@ nets! {
     ISSUE "issue";
     /// The bundles fetched after the redirecting one are squashed.
     FLUSH "flush";
-    /// Nothing issues in the next cycle.
+    /// No bundle issues in the next cycle.
     BLOCK "block";
     /// The bundle in issue would be next, but is illegal.
     REFUSED "refused";
@@ -125,7 +125,7 @@ nets! {
     F_OUTSIDE "f_outside";
     /// The address of the word in decode is outside of the program memory.
     D_OUTSIDE "d_outside";
-    /// The address of the bundle in issue.
+    /// Address of the bundle in issue.
     I_ADDRESS "i_address" 16;
     /// A result will be in flight in the next cycle.
     PENDING "pending";
@@ -143,19 +143,19 @@ nets! {
     // ---- execute
     /// A bundle issued in the last cycle.
     X_ISSUED "x_issued";
-    /// Its address.
+    /// Address of the bundle that issued in the last cycle.
     X_ADDRESS "x_address" 16;
     /// A bundle issued two cycles ago.
     WAS_ISSUED "was_issued";
-    /// Its address.
+    /// Address of the bundle that issued two cycles ago.
     WAS_ADDRESS "was_address" 16;
-    /// A store is executed.
+    /// A store is in execute.
     X_STORE "x_store";
 
     // ---- status
-    /// The sticky flags up to the last cycle.
+    /// Sticky flags up to the last cycle.
     STICKY "sticky" 3;
-    /// The sticky flags in this cycle.
+    /// Sticky flags, this cycle's included.
     STICKY_NOW "sticky_now" 3;
     /// Flags that are raised in this cycle.
     NEW_FLAGS "new_flags" 3;

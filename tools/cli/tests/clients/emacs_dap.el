@@ -1,5 +1,5 @@
 ;;; emacs_dap.el --- `takt dap' and Emacs's dap-mode  -*- lexical-binding: t -*-
-;; emacs --batch -l tools/editors/emacs/takt.el -l this -f takt-test TAKT FOLDER: what happens goes to standard output as JSON.
+;; emacs --batch -l tools/editors/emacs/takt.el -l this -f takt-test TAKT FOLDER: writes its findings to standard output as JSON.
 ;;; Code:
 
 (setq user-emacs-directory (file-name-as-directory (make-temp-file "takt-emacs-" t)))
@@ -8,7 +8,7 @@
 (require 'takt)
 (require 'dap-mode)
 (require 'dap-overlays)
-;; Without it dap-mode has no filters of exceptions.
+;; dap-mode needs this for exception filters.
 (require 'dap-ui)
 
 (defvar takt-test--found (make-hash-table :test 'equal))
@@ -99,7 +99,7 @@
   (let ((threads (gethash "threads" (takt-test--ask "threads"))))
     (takt-test--put "threads" (mapcar (lambda (thread) (gethash "name" thread)) threads)))
   (takt-test--put "first" (takt-test--at))
-  ;; To the other core, as `dap-switch-thread' does.
+  ;; Switch to the other core, as `dap-switch-thread' does.
   (setf (dap--debug-session-active-frame (takt-test--session)) nil)
   (dap--select-thread-id (takt-test--session) 2 t)
   (takt-test--put "second" (takt-test--at))

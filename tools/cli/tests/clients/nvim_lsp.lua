@@ -1,7 +1,7 @@
--- Neovim's own client against `takt lsp`: what it finds goes to the file $OUT as JSON.
+-- Neovim's own client, run against `takt lsp`: writes its findings to the file $OUT as JSON.
 local takt, file, out = vim.env.TAKT, vim.env.FILE, vim.env.OUT
 local found = {}
--- Line and column of a text, from 0.
+-- Line and column of the first occurrence of a text, from 0.
 local function place(buffer, text, after)
   for index, line in ipairs(vim.api.nvim_buf_get_lines(buffer, 0, -1, false)) do
     local start = line:find(text, 1, true)
@@ -39,7 +39,7 @@ local function run()
   local document = { textDocument = vim.lsp.util.make_text_document_params() }
 
   found.hover = ask('textDocument/hover', at('fmul    zz')).contents.value
-  -- A mistake as it is typed, and the assembler's own advice.
+  -- A mistake while typing, and the assembler's quick fix.
   local line, column = place(buffer, 'fmul    zz')
   vim.api.nvim_buf_set_text(buffer, line, column, line, column + 4, { 'fmull' })
   assert(vim.wait(20000, function() return #vim.diagnostic.get(buffer) > 0 end, 20), 'no diagnostic')
@@ -58,7 +58,7 @@ local function run()
   found.symbols = #ask('textDocument/documentSymbol', document)
   found.folds = #ask('textDocument/foldingRange', document)
 
-  -- Cycles come when the program is scheduled.
+  -- Cycles arrive after scheduling.
   assert(vim.wait(60000, function()
     local lenses = ask('textDocument/codeLens', document)
     found.lenses = vim.tbl_map(function(lens) return lens.command.title end, lenses)
@@ -71,7 +71,7 @@ local function run()
   found.hints = #hints
   found.hint = vim.tbl_filter(function(hint) return hint.position.line == line end, hints)[1].label
 
-  -- By Neovim's own commands: over a repetition, and over a file that is included.
+  -- With Neovim's own commands: across a repetition, and across an included file.
   for text, name in pairs({ ['p{i} c{i} dn{i}:int'] = 'pos{i}', ['ms*c^2'] = 'slider' }) do
     go(buffer, text)
     vim.lsp.buf.rename(name)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The binary under test, and folders to run it in.
+//! The binary under test, and temporary folders.
 
 pub(crate) mod protocol;
 
@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// Sums a table, a call for each element.
+/// Sums a table, with a call for each element.
 pub(crate) const SUM: &str = "\
 .output sum, count:int
 .reg    i:int n:int x
@@ -29,12 +29,12 @@ add:    ld      x, table[i]
 table:  .float  0.5, 0.25, -1.75
 ";
 
-/// A source that comes with the repository.
+/// Path of a source in the repository.
 pub(crate) fn source(name: &str) -> String {
     format!("{}/../../programs/hybrid/{name}", env!("CARGO_MANIFEST_DIR"))
 }
 
-/// A folder of its own for a test, removed afterwards.
+/// A temporary folder of a test.
 pub(crate) struct Folder(PathBuf);
 
 impl Folder {
@@ -62,7 +62,7 @@ impl Folder {
         String::from_utf8(self.read(name)).unwrap()
     }
 
-    /// Names of the files in it, sorted.
+    /// Names of the files in the folder, sorted.
     pub(crate) fn list(&self) -> Vec<String> {
         let entries = std::fs::read_dir(&self.0).unwrap();
         let mut names: Vec<String> =
@@ -71,8 +71,8 @@ impl Folder {
         names
     }
 
-    /// `takt` in this folder, with at most 1 GiB of address space and 60 s of processor time: what hangs or fills the
-    /// memory dies, and its status is no exit code.
+    /// `takt` in this folder, limited to 1 GiB of address space and 60 s of processor time: a runaway process is killed by a signal, which
+    /// is no exit status.
     pub(crate) fn command(&self, arguments: &[impl AsRef<OsStr>]) -> Command {
         let mut command = Command::new("/bin/sh");
         command
@@ -87,32 +87,32 @@ impl Folder {
         command
     }
 
-    /// Runs it without standard input.
-    pub(crate) fn takt(&self, arguments: &[impl AsRef<OsStr>]) -> Done {
-        Done::of(self.command(arguments))
+    /// Runs `takt` without standard input.
+    pub(crate) fn takt(&self, arguments: &[impl AsRef<OsStr>]) -> RunOutput {
+        RunOutput::of(self.command(arguments))
     }
 
-    /// Runs it; arguments are separated by blanks.
-    pub(crate) fn line(&self, line: &str) -> Done {
+    /// Runs `takt`; arguments are separated by blanks.
+    pub(crate) fn line(&self, line: &str) -> RunOutput {
         self.takt(&line.split_whitespace().collect::<Vec<_>>())
     }
 
-    /// Runs it with bytes on standard input.
-    pub(crate) fn fed(&self, line: &str, input: &[u8]) -> Done {
+    /// Runs `takt` with these bytes on standard input.
+    pub(crate) fn fed(&self, line: &str, input: &[u8]) -> RunOutput {
         self.fed_by(line, |stdin| {
-            // It may well end before it has read everything.
+            // The process may end before it has read everything.
             let _ = stdin.write_all(input);
         })
     }
 
-    /// Runs it with `feed` on the other end of standard input.
-    pub(crate) fn fed_by(&self, line: &str, feed: impl FnOnce(&mut dyn Write) + Send) -> Done {
+    /// Runs `takt` with `feed` as the writer of standard input.
+    pub(crate) fn fed_by(&self, line: &str, feed: impl FnOnce(&mut dyn Write) + Send) -> RunOutput {
         let mut command = self.command(&line.split_whitespace().collect::<Vec<_>>());
         let mut child = command.stdin(Stdio::piped()).spawn().unwrap();
         let mut stdin = child.stdin.take().unwrap();
         std::thread::scope(|scope| {
             scope.spawn(move || feed(&mut stdin));
-            Done::from(child.wait_with_output().unwrap())
+            RunOutput::from(child.wait_with_output().unwrap())
         })
     }
 }
@@ -123,21 +123,21 @@ impl Drop for Folder {
     }
 }
 
-/// The outcome of a run.
+/// Outcome of a run.
 #[derive(Debug)]
-pub(crate) struct Done {
-    /// `None` if a signal ended it.
+pub(crate) struct RunOutput {
+    /// Exit status; `None` after a signal.
     pub(crate) status: Option<i32>,
     pub(crate) stdout: String,
     pub(crate) stderr: String,
 }
 
-impl Done {
-    pub(crate) fn of(mut command: Command) -> Done {
-        Done::from(command.output().unwrap())
+impl RunOutput {
+    pub(crate) fn of(mut command: Command) -> RunOutput {
+        RunOutput::from(command.output().unwrap())
     }
 
-    /// Standard output of a run that must succeed without a message.
+    /// Standard output of a run that must succeed without messages.
     #[track_caller]
     pub(crate) fn ok(self) -> String {
         assert_eq!((self.status, self.stderr.as_str()), (Some(0), ""));
@@ -145,9 +145,9 @@ impl Done {
     }
 }
 
-impl From<std::process::Output> for Done {
-    fn from(output: std::process::Output) -> Done {
-        Done {
+impl From<std::process::Output> for RunOutput {
+    fn from(output: std::process::Output) -> RunOutput {
+        RunOutput {
             status: output.status.code(),
             stdout: String::from_utf8_lossy(&output.stdout).into_owned(),
             stderr: String::from_utf8_lossy(&output.stderr).into_owned(),
@@ -155,22 +155,24 @@ impl From<std::process::Output> for Done {
     }
 }
 
-/// `takt board sim`, ended with the test.
+/// A `takt board sim` process, killed on drop.
 #[cfg(unix)]
 pub(crate) struct SimulatedBoard {
     process: std::process::Child,
-    /// The name of its pseudo-terminal.
+    /// Path of the board's pseudo-terminal.
     pub(crate) port: String,
     pub(crate) baud: String,
 }
 
 #[cfg(unix)]
 impl SimulatedBoard {
-    /// Starts it, and reads where its UART is.
+    /// Starts the simulation, and reads the path of its UART.
     pub(crate) fn start(line: &str, folder: &Path) -> SimulatedBoard {
         let mut command = Command::new(env!("CARGO_BIN_EXE_takt"));
         command.args(line.split_whitespace()).current_dir(folder);
-        let mut process = command.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
+        // What it tells on standard error is kept beside its files.
+        let told = std::fs::File::create(folder.join("told.txt")).unwrap();
+        let mut process = command.stdout(Stdio::piped()).stderr(told).spawn().unwrap();
         let mut said = String::new();
         let stdout = process.stdout.take().unwrap();
         std::io::BufRead::read_line(&mut std::io::BufReader::new(stdout), &mut said).unwrap();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A client of a server on standard input and output: frames of JSON.
+//! Client of a server on standard input and output with framed JSON messages.
 
 use super::Folder;
 use serde_json::{Value, json};
@@ -7,13 +7,13 @@ use std::collections::VecDeque;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::process::{Child, ChildStdin, ChildStdout, Stdio};
 
-/// A running server.
+/// A running server process.
 pub(crate) struct Client {
     child: Child,
     stdin: Option<ChildStdin>,
     stdout: BufReader<ChildStdout>,
     sent: i64,
-    /// Messages that came while an answer was awaited.
+    /// Messages received while waiting for an answer.
     pub(crate) other: VecDeque<Value>,
 }
 
@@ -25,7 +25,7 @@ impl Client {
         Client { child, stdin, stdout, sent: 0, other: VecDeque::new() }
     }
 
-    /// Bytes as they are.
+    /// Sends bytes without a frame.
     pub(crate) fn raw(&mut self, bytes: &[u8]) {
         let stdin = self.stdin.as_mut().unwrap();
         stdin.write_all(bytes).and_then(|()| stdin.flush()).unwrap();
@@ -36,7 +36,7 @@ impl Client {
         self.raw(format!("Content-Length: {}\r\n\r\n{text}", text.len()).as_bytes());
     }
 
-    /// The next message, of those that came first.
+    /// The next message; earlier unread ones come first.
     #[track_caller]
     pub(crate) fn receive(&mut self) -> Value {
         self.read().expect("the server has not ended")
@@ -60,7 +60,7 @@ impl Client {
         Some(serde_json::from_slice(&bytes).unwrap())
     }
 
-    /// A message for which a condition holds: one that came before, or the next.
+    /// Waits for a message with this property, including earlier unread ones.
     #[track_caller]
     pub(crate) fn wait(&mut self, wanted: impl Fn(&Value) -> bool) -> Value {
         if let Some(at) = self.other.iter().position(&wanted) {
@@ -75,7 +75,7 @@ impl Client {
         }
     }
 
-    /// A request of the language server protocol, and its whole answer.
+    /// Sends a request of the language server protocol; returns the whole answer.
     #[track_caller]
     pub(crate) fn ask(&mut self, method: &str, params: Value) -> Value {
         self.sent += 1;
@@ -88,7 +88,7 @@ impl Client {
         self.send(&json!({ "jsonrpc": "2.0", "method": method, "params": params }));
     }
 
-    /// A request of the debug adapter protocol, and its whole answer.
+    /// Sends a request of the debug adapter protocol; returns the whole answer.
     #[track_caller]
     pub(crate) fn command(&mut self, command: &str, arguments: Value) -> Value {
         self.sent += 1;
@@ -102,7 +102,7 @@ impl Client {
         self.wait(|message| message["type"] == "event" && message["event"] == event)
     }
 
-    /// Closes standard input; the exit status and what is on standard error.
+    /// Closes standard input; returns the exit status and standard error.
     pub(crate) fn end(mut self) -> (Option<i32>, String) {
         drop(self.stdin.take());
         while self.read().is_some() {}

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A board's side of the console: the machine is held, run a period at a time, let run, and left as it was found.
+//! Console commands on a board: hold the machine, run single periods, let it run, and leave it as it was found.
 
 use super::inspector::Inspector;
 use super::moves::End;
@@ -7,28 +7,28 @@ use super::table::{BACK, inside};
 use super::{Console, Engine};
 use crate::panes;
 use crate::remote::{Activity, RemoteError, RemoteSession};
-use crate::session::{Move, Place, Session, Unit, Why};
+use crate::session::{Move, Place, Session, StopReason, Unit};
 
-/// The state in which the machine is left when the session ends.
+/// Final state of the machine when the session ends.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Leave {
+enum FinalState {
     Running,
     AsItIs,
 }
 
-/// A machine that runs elsewhere, with what commands add to it.
+/// A machine that runs elsewhere, with the console's settings.
 pub(super) struct Board {
     session: RemoteSession,
-    /// True if somebody can press Ctrl-C.
+    /// A user at a terminal can press Ctrl-C.
     interactive: bool,
-    /// `None` once it has been left.
-    leave: Option<Leave>,
+    /// State in which to leave the machine; `None` after `release`.
+    leave: Option<FinalState>,
 }
 
 impl Board {
     pub(super) fn new(session: RemoteSession, restart: bool, interactive: bool) -> Board {
         let runs = session.state().activity == Activity::Runs;
-        let leave = Some(if runs && !restart { Leave::Running } else { Leave::AsItIs });
+        let leave = Some(if runs && !restart { FinalState::Running } else { FinalState::AsItIs });
         Board { session, interactive, leave }
     }
 
@@ -36,7 +36,7 @@ impl Board {
         if self.session.state().drives { "outputs drive" } else { "outputs are safe" }
     }
 
-    /// The place of the program, as far as it is known.
+    /// Position of the program, as far as the board reports it.
     pub(super) fn place(&self, view: &mut Inspector) -> String {
         let (state, drive, program) = (self.session.state(), self.drive(), self.session.program());
         let (periods, issued) = (state.periods, program.bundle_text(state.issued));
@@ -59,20 +59,20 @@ impl Board {
         }
     }
 
-    /// Checks that values can be read; the error says why not.
+    /// Checks that values can be read; the error gives the obstacle.
     pub(super) fn needs_values(&self) -> Result<(), String> {
         let why = match &self.session.state().activity {
             Activity::Runs => "the program runs: `hold` first",
             Activity::InPeriod => {
                 "the program is in a period: `hold` waits for its end, `goto start` starts it again"
             }
-            _ if !self.session.is_settled() => "what the program does is not known: `hold` asks again",
+            _ if !self.session.is_settled() => "the program's state is unknown: `hold` asks again",
             _ => return Ok(()),
         };
         Err(why.to_owned())
     }
 
-    /// Checks that a period can be run; the error says why not.
+    /// Checks that a period can be run; the error gives the obstacle.
     fn needs_held(&self) -> Result<(), String> {
         self.needs_values()?;
         let state = match self.session.state().activity {
@@ -84,12 +84,12 @@ impl Board {
         Err(format!("the program {state}: `goto start` starts it again"))
     }
 
-    /// Moves the machine. `view` shows it.
-    pub(super) fn go(&mut self, view: &mut Inspector, to: &Move) -> Result<Why, String> {
+    /// Moves the machine and shows it in `view`.
+    pub(super) fn go(&mut self, view: &mut Inspector, to: &Move) -> Result<StopReason, String> {
         let session = &mut view.session;
         let moved = match to {
             Move::Start => {
-                self.leave = Some(Leave::AsItIs);
+                self.leave = Some(FinalState::AsItIs);
                 self.session.restart()
             }
             Move::Step(Unit::Period, count) => {
@@ -125,14 +125,18 @@ impl Board {
         self.moved(view, moved)
     }
 
-    /// Holds the machine, or starts it again.
-    fn stop(&mut self, view: &mut Inspector, restart: bool) -> Result<Why, String> {
+    /// Holds the machine, or restarts its program.
+    fn stop(&mut self, view: &mut Inspector, restart: bool) -> Result<StopReason, String> {
         let moved = if restart { self.session.restart() } else { self.session.hold() };
         self.moved(view, moved)
     }
 
-    /// Shows the machine after a move; the error says where it is instead.
-    fn moved(&mut self, view: &mut Inspector, moved: Result<Why, RemoteError>) -> Result<Why, String> {
+    /// Shows the machine after a move; the error reports its actual state.
+    fn moved(
+        &mut self,
+        view: &mut Inspector,
+        moved: Result<StopReason, RemoteError>,
+    ) -> Result<StopReason, String> {
         match moved {
             Ok(why) => {
                 self.session.show(&mut view.session);
@@ -145,7 +149,7 @@ impl Board {
         }
     }
 
-    /// Sets an input port.
+    /// Sets an input port of the machine.
     pub(super) fn set(&mut self, view: &mut Session, place: Place, bits: u32) -> Result<(), String> {
         let inputs = &self.session.program().inputs;
         let port = inputs.iter().map(|port| port.register).find(|port| place == Place::Register(*port));
@@ -162,20 +166,20 @@ impl Board {
             self.needs_held()?;
         }
         self.session.go().map_err(|error| error.to_string())?;
-        self.leave = Some(Leave::Running);
+        self.leave = Some(FinalState::Running);
         Ok(())
     }
 
-    /// Leaves the machine as it was found, or as was asked for since; returns its state then, in words.
+    /// Leaves the machine as it was found, or as the last `hold` or `go` demands; returns its final state in words.
     ///
     /// # Errors
-    /// If it does not answer.
+    /// If the board does not answer.
     pub(super) fn release(&mut self) -> Result<String, String> {
         let Some(leave) = self.leave.take() else { return Ok(String::new()) };
         let known = if self.session.is_settled() { Ok(()) } else { self.session.ask() };
         let held = matches!(self.session.state().activity, Activity::Held | Activity::InPeriod);
         let left = match known {
-            Ok(()) if leave == Leave::Running && held => self.session.go(),
+            Ok(()) if leave == FinalState::Running && held => self.session.go(),
             known => known,
         };
         left.map_err(|error| error.to_string())?;
@@ -190,7 +194,7 @@ impl Board {
     }
 }
 
-/// However the session ends, that alone does not leave the machine held.
+/// A session that ends in any way, even by a panic, does not leave the machine held.
 impl Drop for Board {
     fn drop(&mut self) {
         let _ = self.release();
@@ -205,13 +209,13 @@ impl Console {
         }
     }
 
-    /// Holds a board, or starts it again; returns what to print of that.
+    /// Holds a board, or restarts it; returns the first message.
     pub(super) fn begin(&mut self, restart: bool) -> Result<String, String> {
         let (board, view) = self.board()?;
         let begun = board.stop(view, restart).and_then(|why| self.arrive(End { core: 0, why }));
         let (board, _) = self.board()?;
         begun.or_else(|said| {
-            // A difference, or a program that does not wait.
+            // The session continues after a difference, or with a program that does not reach its `wait`.
             let goes_on = board.session.is_settled() || board.session.state().activity == Activity::InPeriod;
             if goes_on { Ok(format!("{said}\n")) } else { Err(said) }
         })
@@ -219,7 +223,7 @@ impl Console {
 
     pub(super) fn hold(&mut self) -> Result<String, String> {
         let (board, view) = self.board()?;
-        board.leave = Some(Leave::AsItIs);
+        board.leave = Some(FinalState::AsItIs);
         if board.needs_values().is_ok() {
             return Ok(board.place(view));
         }

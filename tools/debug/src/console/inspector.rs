@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Shows one core at its position: its place, its source, the operations in flight, displayed values.
+//! View of one core at its position: place, source, operations in flight, displayed values.
 
-use crate::panes::{self, Flying, Panes};
-use crate::session::{Live, Session, Shown, hex_float};
+use crate::panes::{self, InFlightOperation, Panes};
+use crate::session::{Session, ValueNotations, WatchExpression, hex_float, noted};
 use std::fmt::Write as _;
 use takt_asm::expr::Value;
 use takt_isa::timing::Cycle;
 
-/// A core's session and what is displayed of it.
+/// Session of one core, with the expressions on display.
 pub(super) struct Inspector {
     pub(super) session: Session,
-    displays: Vec<Live>,
-    /// The values of named registers before the last command that moved or changed something.
+    displays: Vec<WatchExpression>,
+    /// Values of named registers before the last command that moved or changed something.
     before: Vec<Option<u32>>,
 }
 
@@ -21,12 +21,12 @@ impl Inspector {
         Inspector { session, displays: Vec::new(), before }
     }
 
-    /// The cycle, and what named registers hold.
+    /// Cycle and values of the named registers.
     pub(super) fn position(&self) -> (Cycle, Vec<Option<u32>>) {
         (self.session.cycle(), panes::values(&self.session))
     }
 
-    /// Marks what has changed since a position, if anything has.
+    /// Takes the values from before a command as the reference for change marks, if the position or a value differs.
     pub(super) fn moved_from(&mut self, before: (Cycle, Vec<Option<u32>>)) {
         if self.position() != before {
             self.before = before.1;
@@ -38,26 +38,30 @@ impl Inspector {
         Panes::new(&mut self.session, &self.before, displays)
     }
 
-    /// The displayed expressions with their values.
+    /// Expressions on display with their values.
     pub(super) fn displayed(&self) -> Vec<(String, String)> {
         self.displays.iter().map(|live| (live.text().to_owned(), self.short(live))).collect()
     }
 
-    /// A value in one way, that of its type.
-    pub(super) fn short(&self, live: &Live) -> String {
-        match self.session.place(live) {
-            Ok(Some((_, ty, Some(bits)))) => Shown::new(ty, bits).text,
+    /// Value in the notation of its type, with a note if it is stale.
+    pub(super) fn short(&self, live: &WatchExpression) -> String {
+        let value = match self.session.place(live) {
+            Ok(Some((_, ty, Some(bits)))) => ValueNotations::new(ty, bits).text,
             Ok(Some((.., None))) => "(never written)".to_owned(),
-            _ => self.session.evaluate(live).map_or_else(|error| format!("({error})"), number),
-        }
+            _ => match self.session.evaluate(live) {
+                Ok(value) => number(value),
+                Err(error) => return format!("({error})"),
+            },
+        };
+        format!("{value}{}", noted(self.session.note(live)))
     }
 
-    /// The position in one line, then the source line, the bundle and the calls.
+    /// Position in one line, followed by the source line, the bundle and the active calls.
     pub(super) fn place(&mut self) -> String {
         format!("{}\n{}", panes::head(&mut self.session), self.at_hand())
     }
 
-    /// The source line and the bundle at this position, and the calls that lead to it.
+    /// Source line and bundle at this position, with the active calls.
     pub(super) fn at_hand(&self) -> String {
         let (session, mut text) = (&self.session, String::new());
         if let Some(location) = session.location()
@@ -83,7 +87,7 @@ impl Inspector {
         let mut text = String::new();
         let flying = panes::flight(&self.session);
         let width = flying.iter().map(|row| row.register.len()).max().unwrap_or(0).max(12);
-        for Flying { left, register, mnemonic, from } in flying {
+        for InFlightOperation { left, register, mnemonic, from } in flying {
             let cycles = if left == 1 { "cycle" } else { "cycles" };
             let _ = writeln!(text, "{left:>3} {cycles:<6}  {register:<width$} {mnemonic} of {from}");
         }
@@ -130,7 +134,7 @@ impl Inspector {
     }
 }
 
-/// A computed value, and the nearest binary32.
+/// A computed value: with its hexadecimal notation if it is a binary32 number, otherwise with the nearest binary32.
 pub(super) fn number(value: Value) -> String {
     let Value::Real(real) = value else { return value.to_string() };
     let near = real as f32;

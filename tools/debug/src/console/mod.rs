@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Commands in, text out: the console that a prompt, a script, an editor and the full-screen view share. It is the same for
-//! a program, the cores of a system, and a board.
+//! Console: commands in, text out. A prompt, a script, an editor and the full-screen view share it, for a program, a system's cores, and a
+//! board alike.
 
 mod board;
 mod inspector;
@@ -20,27 +20,27 @@ use crate::session::{Place, Session};
 use crate::system::SystemSession;
 use board::Board;
 use inspector::Inspector;
-use table::{Does, find, split};
+use table::{CommandEffect, find, split};
 
-/// The run that the commands move. There is an [`Inspector`] for each of its cores.
+/// The run under the console's control. Each of its cores has an [`Inspector`].
 enum Engine {
-    /// A program: its inspector's own session is the run.
+    /// A program: the inspector's session is the run.
     Program,
-    /// The cores of a system, whose state the inspectors' sessions show.
+    /// A system; the inspectors' sessions show its cores.
     System(Box<SystemSession>),
-    /// A board, whose state the inspector's session shows.
+    /// A board; the inspector's session shows it.
     Board(Box<Board>),
 }
 
-/// A session with what commands add to it.
+/// The console: a run, the sessions that show its cores, and the state of the command language.
 pub struct Console {
     engine: Engine,
     cores: Vec<Inspector>,
-    /// The core that commands are about: the last one that stopped, or was selected.
+    /// Selected core: commands refer to it, and a core that stops becomes the selected one.
     selected: usize,
-    /// True once `quit` was said.
+    /// The user entered `quit`.
     pub quit: bool,
-    /// The last step, which an empty line repeats.
+    /// Last step command; an empty line repeats it.
     last: String,
 }
 
@@ -50,21 +50,20 @@ impl Console {
         Console { engine, cores, selected: 0, quit: false, last: String::new() }
     }
 
-    /// Commands on a program's session.
+    /// A console on a program's session.
     pub fn new(session: Session) -> Console {
         Console::with(Engine::Program, vec![session])
     }
 
-    /// Commands on a system's session; `cores` has a session for each core, of its program, with its names and sources.
+    /// A console on a system's session. `cores` has a session of each core's program, with its names and sources.
     pub fn of_system(session: SystemSession, cores: Vec<Session>) -> Console {
         let mut console = Console::with(Engine::System(Box::new(session)), cores);
         console.look_at_cores();
         console
     }
 
-    /// Commands on a machine that runs elsewhere, which is held, or started again if `restart` is set; `view` is a session of
-    /// its program, with its names and sources. Somebody can press Ctrl-C if `interactive`. Returned with them: what to print
-    /// first.
+    /// A console on a machine that runs elsewhere. The machine is held, or restarted if `restart`; `view` is a session of its program, with
+    /// its names and sources. `interactive`: a user can press Ctrl-C. Also returns the first message.
     ///
     /// # Errors
     /// If the machine does not answer. A program that does not reach its `wait` is no error.
@@ -80,7 +79,7 @@ impl Console {
         Ok((console, said))
     }
 
-    /// The kind of run.
+    /// Kind of the run.
     pub fn target(&self) -> Target {
         match &self.engine {
             Engine::Program => Target::Program,
@@ -91,58 +90,58 @@ impl Console {
 
     // ---- Cores.
 
-    /// The number of cores.
+    /// Number of cores under the console.
     pub fn cores(&self) -> usize {
         self.cores.len()
     }
 
-    /// A core's name in its system; `core` of a program.
+    /// Name of a core in its system; `core` for a program.
     pub fn name(&self, core: usize) -> &str {
         let description = self.system().map(|system| system.system().description());
         description.and_then(|description| description.cores.get(core)).map_or("core", |core| &core.name)
     }
 
-    /// The core that commands are about.
+    /// Core that commands refer to.
     pub fn selected(&self) -> usize {
         self.selected
     }
 
-    /// Selects a core, if there is such a one.
+    /// Selects a core; no effect if the core does not exist.
     pub fn select(&mut self, core: usize) {
         if core < self.cores.len() {
             self.selected = core;
         }
     }
 
-    fn shown(&self) -> &Inspector {
+    fn inspector(&self) -> &Inspector {
         &self.cores[self.selected]
     }
 
-    fn shown_mut(&mut self) -> &mut Inspector {
+    fn inspector_mut(&mut self) -> &mut Inspector {
         &mut self.cores[self.selected]
     }
 
-    /// The session that shows the selected core.
+    /// Session of the selected core.
     pub fn session(&self) -> &Session {
-        &self.shown().session
+        &self.inspector().session
     }
 
-    /// The same, to change it. Of a system, [`Console::go`] moves the run, and [`Console::set`] changes it.
+    /// Session of the selected core, to change it. Use [`Console::go`] and [`Console::set`] to move and change a system.
     pub fn session_mut(&mut self) -> &mut Session {
-        &mut self.shown_mut().session
+        &mut self.inspector_mut().session
     }
 
-    /// The session that shows a core, if there is such a one.
+    /// Session that shows a core; `None` if the core does not exist.
     pub fn core(&self, core: usize) -> Option<&Session> {
         self.cores.get(core).map(|core| &core.session)
     }
 
-    /// The same, to change it.
+    /// Mutable session of a core, if the core exists.
     pub fn core_mut(&mut self, core: usize) -> Option<&mut Session> {
         self.cores.get_mut(core).map(|core| &mut core.session)
     }
 
-    /// The system's session, if it is one.
+    /// Session of the system, if the run is a system's.
     pub fn system(&self) -> Option<&SystemSession> {
         match &self.engine {
             Engine::System(system) => Some(system),
@@ -156,7 +155,7 @@ impl Console {
         }
     }
 
-    /// Sets for how many cycles a command may run; returns for how many it might.
+    /// Sets the maximal number of cycles of a command; returns the previous limit.
     pub fn set_run_limit(&mut self, cycles: u64) -> u64 {
         let limit = match &mut self.engine {
             Engine::System(system) => &mut system.run_limit,
@@ -165,7 +164,7 @@ impl Console {
         std::mem::replace(limit, cycles)
     }
 
-    /// The unit of [`Control::cycle`](crate::session::Control::cycle).
+    /// Unit in which [`Control::cycle`](crate::session::Control::cycle) counts.
     pub fn counts(&self) -> &'static str {
         match self.target() {
             Target::Program | Target::System => "cycle",
@@ -175,17 +174,17 @@ impl Console {
 
     // ---- Commands.
 
-    /// Executes a line; returns what it has to say, in whole lines.
+    /// Executes a command line; returns the answer in whole lines.
     ///
     /// # Errors
-    /// If something is wrong with it. The session is as it was.
+    /// If the command fails; the session is then unchanged.
     pub fn execute(&mut self, line: &str) -> Result<String, String> {
         let repeated = self.last.clone();
         let line = if line.trim().is_empty() { &repeated } else { line };
         let Some((name, arguments)) = split(line) else { return Ok(String::new()) };
         let command = find(name, self.target())?;
-        self.last = if command.does == Does::Steps { line.to_owned() } else { String::new() };
-        if let (Engine::Board(board), Does::Shows) = (&self.engine, command.does) {
+        self.last = if command.does == CommandEffect::Steps { line.to_owned() } else { String::new() };
+        if let (Engine::Board(board), CommandEffect::Shows) = (&self.engine, command.does) {
             board.needs_values()?;
         }
         let before: Vec<_> = self.cores.iter().map(Inspector::position).collect();
@@ -196,7 +195,7 @@ impl Console {
         result
     }
 
-    /// The position: that of the selected core.
+    /// Position of the selected core.
     pub fn place(&mut self) -> String {
         let inspector = &mut self.cores[self.selected];
         let place = match &self.engine {
@@ -209,14 +208,14 @@ impl Console {
         }
     }
 
-    /// The displayed expressions of a core, with their values.
+    /// Expressions on display of a core, with their values.
     pub fn displayed(&self, core: usize) -> Vec<(String, String)> {
         self.cores.get(core).map_or(Vec::new(), Inspector::displayed)
     }
 
-    /// The contents of the panes at this position.
+    /// Contents of the panes at this position.
     pub fn panes(&mut self) -> Panes {
-        let mut panes = self.shown_mut().panes();
+        let mut panes = self.inspector_mut().panes();
         panes.target = self.target();
         panes.cores = self.core_lines();
         if let Some(core) = panes.cores.get(self.selected) {
@@ -229,22 +228,22 @@ impl Console {
         if let Engine::Board(board) = &self.engine {
             board.needs_values()?;
         }
-        let (place, bits, text) = self.shown().setting(arguments)?;
+        let (place, bits, text) = self.inspector().setting(arguments)?;
         self.set(self.selected, place, bits)?;
         Ok(text)
     }
 
-    /// Sets a register or a data word of a core. What was recorded of the run after this position is forgotten.
+    /// Sets a register or a data word of a core. Records of the run after this position are dropped.
     ///
     /// # Errors
-    /// If there is no such place, or it cannot be set.
+    /// If the place does not exist, or cannot be set.
     pub fn set(&mut self, core: usize, place: Place, bits: u32) -> Result<(), String> {
         let inspector = self.cores.get_mut(core).ok_or("there is no such core")?;
         match &mut self.engine {
             Engine::Board(board) => return board.set(&mut inspector.session, place, bits),
             Engine::Program => inspector.session.set(place, bits)?,
             Engine::System(system) => {
-                // The core's session knows which places there are.
+                // Check the place through the core's session.
                 inspector.session.set(place, bits)?;
                 system.set(core, place, bits);
             }
@@ -253,10 +252,10 @@ impl Console {
         Ok(())
     }
 
-    /// Ends the session; returns what there is to say of what it leaves behind.
+    /// Ends the session; returns a message about the state in which the board is left.
     ///
     /// # Errors
-    /// If a board cannot be left as it should be.
+    /// If the board cannot be brought to its final state.
     pub fn leave(&mut self) -> Result<String, String> {
         match &mut self.engine {
             Engine::Board(board) => board.release(),
@@ -265,7 +264,7 @@ impl Console {
     }
 }
 
-/// The sessions that show the cores.
+/// Sessions of all cores.
 fn sessions(cores: &mut [Inspector]) -> Vec<&mut Session> {
     cores.iter_mut().map(|core| &mut core.session).collect()
 }

@@ -1,45 +1,45 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Moves of the run, forward and back, and what is said where they end.
+//! Moves of the run, forward and back, with the messages at the position reached.
 
 use super::table::inside;
 use super::{Console, Engine, sessions};
 use crate::accuracy;
-use crate::session::{Move, Unit, Why};
-use crate::system::{SystemSession, SystemWhy};
+use crate::session::{Move, StopReason, Unit};
+use crate::system::{SystemSession, SystemStopReason};
 use crate::target::Target;
 use std::fmt::Write as _;
 use takt_analysis::accuracy::Shadow;
 use takt_asm::nearest;
 
-/// The end of a move: the core that it is about, and the reason.
+/// End of a move: the core, and the reason.
 #[derive(Clone, Debug, PartialEq)]
 pub struct End {
-    /// The core.
+    /// Index of the core that ended the move.
     pub core: usize,
-    /// The reason.
-    pub why: Why,
+    /// Reason why the move ended.
+    pub why: StopReason,
 }
 
 impl Console {
-    /// Moves the run; `core` is the one whose steps and periods are meant.
+    /// Moves the run. Steps and periods are counted on `core`.
     ///
     /// # Errors
-    /// If a board does not move so, or does not answer.
+    /// If a board cannot make this move, or does not answer.
     pub fn go(&mut self, core: usize, to: &Move) -> Result<End, String> {
         if let Engine::Board(board) = &mut self.engine {
             return Ok(End { core: 0, why: board.go(&mut self.cores[0], to)? });
         }
         let now = self.cores[0].session.cycle();
         Ok(match to {
-            Move::Back(Unit::Cycle, _) if now == 0 => End { core, why: Why::Start },
-            // At once, however many.
+            Move::Back(Unit::Cycle, _) if now == 0 => End { core, why: StopReason::Start },
+            // Cycles are stepped in one move, in any number.
             Move::Back(Unit::Cycle, count) => self.go_once(core, &Move::Cycle(now.saturating_sub(*count))),
             Move::Step(Unit::Cycle, count) => self.go_once(core, &Move::Cycle(now.saturating_add(*count))),
             Move::Step(_, count) | Move::Back(_, count) => {
-                let mut end = End { core, why: Why::Done };
+                let mut end = End { core, why: StopReason::Done };
                 for _ in 0..*count {
                     end = self.go_once(core, to);
-                    if end.why != Why::Done {
+                    if end.why != StopReason::Done {
                         break;
                     }
                 }
@@ -49,7 +49,7 @@ impl Console {
         })
     }
 
-    /// Moves the run of an emulator, by one step only, and selects the core that it ends in.
+    /// Makes a single move or step of an emulated run, and selects the core in which it ends.
     fn go_once(&mut self, core: usize, to: &Move) -> End {
         let Engine::System(system) = &mut self.engine else {
             return End { core: 0, why: self.cores[0].session.go(to) };
@@ -62,48 +62,56 @@ impl Console {
         End { core: found.unwrap_or(core), why }
     }
 
-    /// Does what a command asks for, and says where that ends.
+    /// Executes a move command; returns the message at its end.
     fn goes(&mut self, to: &Move) -> Result<String, String> {
         let end = self.go(self.selected, to)?;
         self.arrive(end)
     }
 
-    /// The end of a move, the position, and displayed values. A difference is an error, so that a script fails.
+    /// Breakpoints that the last move passed because their conditions could not be decided, one line each.
+    pub fn doubts(&self) -> Vec<String> {
+        let doubts = self.cores.iter().flat_map(|core| core.session.control().take_doubts());
+        let line = |(id, doubt)| format!("stop {id} was passed, its condition reads an old value: {doubt}");
+        doubts.map(line).collect()
+    }
+
+    /// Message at the end of a move: reason, position, and displayed values. A difference is an error, so that a script fails.
     pub(super) fn arrive(&mut self, end: End) -> Result<String, String> {
-        let mut text = self.render(&end);
+        let mut text: String = self.doubts().iter().map(|doubt| format!("{doubt}\n")).collect();
+        text.push_str(&self.render(&end));
         text.push_str(&self.place());
         for (name, value) in self.displayed(self.selected) {
             let _ = writeln!(text, "    {name} = {value}");
         }
         match end.why {
-            Why::Differs(different) => Err(format!("{different}\n{}", text.trim_end())),
+            StopReason::Differs(different) => Err(format!("{different}\n{}", text.trim_end())),
             _ => Ok(text),
         }
     }
 
-    /// The end of a move in whole lines.
+    /// Reason for the end of a move, in whole lines.
     fn render(&self, End { core, why }: &End) -> String {
         match why {
-            Why::Done | Why::Differs(_) => String::new(),
-            Why::Stop { id, text, change: None } => format!("stop {id}: {text}\n"),
-            Why::Stop { id, text, change: Some((before, now)) } => {
+            StopReason::Done | StopReason::Differs(_) => String::new(),
+            StopReason::Stop { id, text, change: None } => format!("stop {id}: {text}\n"),
+            StopReason::Stop { id, text, change: Some((before, now)) } => {
                 format!("stop {id}: {text}: {before} -> {now}\n")
             }
-            Why::Holds => "the expression holds\n".to_owned(),
-            Why::Start => "the beginning of the run\n".to_owned(),
-            Why::Halted if self.target() == Target::System => "every core has halted\n".to_owned(),
-            Why::Halted => "the program has halted\n".to_owned(),
-            Why::InputsEnd => "the recorded inputs end here\n".to_owned(),
-            Why::Fault(fault) => {
+            StopReason::Holds => "the expression holds\n".to_owned(),
+            StopReason::Start => "the beginning of the run\n".to_owned(),
+            StopReason::Halted if self.target() == Target::System => "every core has halted\n".to_owned(),
+            StopReason::Halted => "the program has halted\n".to_owned(),
+            StopReason::InputsEnd => "the recorded inputs end here\n".to_owned(),
+            StopReason::Fault(fault) => {
                 let rendered = self.cores[*core].session.diagnose(fault).render(false);
                 match self.target() {
                     Target::System => format!("core {}:\n{rendered}", self.name(*core)),
                     Target::Program | Target::Board => rendered,
                 }
             }
-            Why::Limit(count) => format!("nothing to stop at in {count} {}s\n", self.counts()),
-            Why::Interrupted => "interrupted\n".to_owned(),
-            Why::Other(text) => format!("{text}\n"),
+            StopReason::Limit(count) => format!("nothing to stop at in {count} {}s\n", self.counts()),
+            StopReason::Interrupted => "interrupted\n".to_owned(),
+            StopReason::Other(text) => format!("{text}\n"),
         }
     }
 
@@ -119,7 +127,13 @@ impl Console {
 
     pub(super) fn until(&mut self, arguments: &str) -> Result<String, String> {
         let live = self.session().parse(arguments)?;
-        self.goes(&Move::Until(Box::new(live)))
+        let end = self.go(self.selected, &Move::Until(Box::new(live.clone())))?;
+        let note = self.session().note(&live).filter(|_| end.why == StopReason::Holds);
+        let text = self.arrive(end)?;
+        Ok(match note {
+            Some(note) => format!("with old values: {note}\n{text}"),
+            None => text,
+        })
     }
 
     pub(super) fn go_to(&mut self, arguments: &str) -> Result<String, String> {
@@ -147,37 +161,41 @@ impl Console {
             Engine::Program | Engine::Board(_) => self.cores[0].session.replay(&mut issued),
         };
         match why {
-            Why::Interrupted => Err("interrupted on the way from reset to here".to_owned()),
+            StopReason::Interrupted => Err("interrupted on the way from reset to here".to_owned()),
             _ => Ok(accuracy::report(self.session(), &shadow, &registers)),
         }
     }
 }
 
-/// The core and the reason for which a move of a system ended.
-fn end(system: &SystemSession, why: SystemWhy) -> (Option<usize>, Why) {
+/// Core and reason at the end of a system's move.
+fn end(system: &SystemSession, why: SystemStopReason) -> (Option<usize>, StopReason) {
     let why = match why {
-        SystemWhy::Core(core, Why::Halted) => {
+        SystemStopReason::Core(core, StopReason::Halted) => {
             let name = &system.system().description().cores[core].name;
-            return (Some(core), Why::Other(format!("core {name} has halted")));
+            return (Some(core), StopReason::Other(format!("core {name} has halted")));
         }
-        SystemWhy::Core(core, why) => return (Some(core), why),
-        SystemWhy::Fault(fault) => return (Some(fault.core), Why::Fault(fault.fault)),
-        SystemWhy::Stop(id) => {
+        SystemStopReason::Core(core, why) => return (Some(core), why),
+        SystemStopReason::Fault(fault) => return (Some(fault.core), StopReason::Fault(fault.fault)),
+        SystemStopReason::Stop(id) => {
             let known = system.stops().find(|(known, _)| *known == id);
-            Why::Stop { id, text: known.map_or(String::new(), |(_, text)| text.to_owned()), change: None }
+            StopReason::Stop {
+                id,
+                text: known.map_or(String::new(), |(_, text)| text.to_owned()),
+                change: None,
+            }
         }
-        SystemWhy::Done => Why::Done,
-        SystemWhy::Start => Why::Start,
-        SystemWhy::Halted => Why::Halted,
-        SystemWhy::InputsEnd => Why::InputsEnd,
-        SystemWhy::Limit(cycles) => Why::Limit(cycles),
-        SystemWhy::Interrupted => Why::Interrupted,
-        SystemWhy::Host(error) => Why::Other(error.to_string()),
+        SystemStopReason::Done => StopReason::Done,
+        SystemStopReason::Start => StopReason::Start,
+        SystemStopReason::Halted => StopReason::Halted,
+        SystemStopReason::InputsEnd => StopReason::InputsEnd,
+        SystemStopReason::Limit(cycles) => StopReason::Limit(cycles),
+        SystemStopReason::Interrupted => StopReason::Interrupted,
+        SystemStopReason::Host(error) => StopReason::Other(error.to_string()),
     };
     (None, why)
 }
 
-/// The unit of a step, and how many steps.
+/// Unit and number of steps, from the arguments.
 fn steps(arguments: &str, unit: Unit) -> Result<(Unit, u64), String> {
     let (mut unit, mut count) = (unit, 1);
     for word in arguments.split_whitespace() {

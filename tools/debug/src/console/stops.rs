@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Breakpoints and watchpoints.
+//! Console commands for breakpoints and watchpoints.
 
 use super::table::inside;
 use super::{Console, Engine};
 use crate::info;
-use crate::session::{Session, Stop, Test, Where};
+use crate::session::{BreakpointLocation, Session, Stop, Test};
 use crate::system::SystemStop;
 use crate::target::Target;
 
 impl Console {
-    // ---- As plain data.
+    // ---- For editors: stops as plain data.
 
-    /// Adds a stop of a core; returns its number, which no other stop of the session has.
+    /// Adds a stop of a core; returns its number, unique in the console.
     pub fn add_stop(&mut self, core: usize, stop: Stop) -> u32 {
         let next = self.next_stop();
         let session = &mut self.cores[core].session;
@@ -19,12 +19,12 @@ impl Console {
         session.add_stop(stop)
     }
 
-    /// The stop that `link NAME [EVENT]` means; `None` if the text means none, or this is no system.
+    /// Parses `link NAME [EVENT]`; `None` for any other text, or without a system.
     pub fn link_stop(&self, text: &str) -> Option<Result<SystemStop, String>> {
         SystemStop::parse(text, self.system()?.system().description())
     }
 
-    /// Adds a stop at an event on a link; returns its number, if this is a system.
+    /// Adds a stop at an event on a link; returns its number, or `None` without a system.
     pub fn add_link_stop(&mut self, stop: SystemStop, text: String) -> Option<u32> {
         let next = self.next_stop();
         let Engine::System(system) = &mut self.engine else { return None };
@@ -32,7 +32,7 @@ impl Console {
         Some(system.add_stop(stop, text))
     }
 
-    /// One count for links and for all cores' sessions.
+    /// Next stop number, counted over links and all cores' sessions together.
     fn next_stop(&mut self) -> u32 {
         let links = match &mut self.engine {
             Engine::System(system) => *system.next_stop(),
@@ -41,7 +41,7 @@ impl Console {
         self.cores.iter_mut().fold(links, |next, core| next.max(*core.session.next_stop()))
     }
 
-    /// Removes a stop, of links or of a core; true if there was one.
+    /// Removes a stop of a link or of a core; returns whether it existed.
     pub fn remove_stop(&mut self, id: u32) -> bool {
         let of_link = match &mut self.engine {
             Engine::System(system) => system.remove_stop(id),
@@ -50,7 +50,7 @@ impl Console {
         of_link || self.cores.iter_mut().any(|core| core.session.remove_stop(id))
     }
 
-    /// Numbers and texts of all stops, in the order of their numbers.
+    /// Numbers and texts of all stops, in order of number.
     fn all_stops(&self) -> Vec<(u32, String)> {
         let links = self.system().into_iter().flat_map(|system| system.stops());
         let mut stops: Vec<(u32, String)> = links.map(|(id, text)| (id, text.to_owned())).collect();
@@ -60,7 +60,7 @@ impl Console {
                 Target::Program | Target::Board => String::new(),
             };
             let text = |stop: &Stop| match stop {
-                Stop::Break { at: Where::Line(_, bundles), text, .. } if bundles.len() > 1 => {
+                Stop::Break { at: BreakpointLocation::Line(_, bundles), text, .. } if bundles.len() > 1 => {
                     format!("{text}{of}  ({} places)", bundles.len())
                 }
                 Stop::Break { text, .. } | Stop::Watch { text, .. } => format!("{text}{of}"),
@@ -71,7 +71,7 @@ impl Console {
         stops
     }
 
-    // ---- As commands.
+    // ---- For the command line.
 
     pub(super) fn add_break(&mut self, arguments: &str) -> Result<String, String> {
         let text = format!("break {arguments}");
@@ -84,8 +84,8 @@ impl Console {
             None => (arguments, None),
         };
         let program = self.session().program();
-        let at = Where::parse(place, program)?;
-        if self.target() == Target::Board && !matches!(at, Where::Period(_)) {
+        let at = BreakpointLocation::parse(place, program)?;
+        if self.target() == Target::Board && !matches!(at, BreakpointLocation::Period(_)) {
             return Err(inside(&format!("break {place}")));
         }
         let places = info::places(program, &at);
@@ -97,7 +97,7 @@ impl Console {
         let (what, test) = watched(arguments, self.session())?;
         let what = self.session().parse(what)?;
         what.variants()?;
-        let now = self.shown().short(&what);
+        let now = self.inspector().short(&what);
         let stop = Stop::Watch { what: Box::new(what), test, text: format!("watch {arguments}") };
         let id = self.add_stop(self.selected, stop);
         Ok(format!("stop {id}; now {now}\n"))
@@ -118,7 +118,7 @@ impl Console {
     }
 }
 
-/// The value that a text watches, and the test.
+/// Splits the arguments of `watch` into the watched expression and the test.
 fn watched<'t>(text: &'t str, session: &Session) -> Result<(&'t str, Test), String> {
     let other = |text: &str| session.parse(text).map(Box::new);
     Ok(if let Some(what) = text.strip_suffix(" nan") {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The cores of a system, and its links.
+//! Console commands for the cores of a system and for its links.
 
 use super::Console;
 use crate::panes::{self, CoreLine};
@@ -7,7 +7,7 @@ use crate::system::{link_named, link_text};
 use std::fmt::Write as _;
 
 impl Console {
-    /// A line for each core of a system.
+    /// A status line for each core of a system.
     pub(super) fn core_lines(&mut self) -> Vec<CoreLine> {
         let Some(system) = self.system() else { return Vec::new() };
         let names: Vec<String> =
@@ -54,8 +54,8 @@ impl Console {
         Ok(shown.map(|(link, row)| format!("{}: {}\n", row.name, link_text(system, link))).collect())
     }
 
-    /// Carries a command out whose arguments are about the selected core, or name another one's values as `core.name`. What it
-    /// says is then preceded by the core's name, and the selected one stays selected unless the session moves.
+    /// Executes a command on the selected core, or on another core that the arguments name as `core.name`. The answer is then prefixed with
+    /// the core's name, and the selection changes only if the session moves.
     pub(super) fn about_a_core(
         &mut self,
         arguments: &str,
@@ -65,7 +65,7 @@ impl Console {
             Err(error) if self.system().is_some() => error,
             result => return result,
         };
-        // A name of the selected core's own program comes first.
+        // Names of the selected core's own program take precedence: the command failed there.
         let names: Vec<&str> = (0..self.cores()).map(|core| self.name(core)).collect();
         let (cores, own) = core_names(arguments, &names);
         let core = match cores[..] {
@@ -88,7 +88,7 @@ impl Console {
     }
 }
 
-/// The cores whose names are before a dot in a text, each once, and the text without them: `outer.p` is `p` of core `outer`.
+/// Core names that precede a dot in a text, without repetition, and the text without them: `outer.p` is `p` of core `outer`.
 fn core_names(text: &str, names: &[&str]) -> (Vec<usize>, String) {
     let is_name = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '.';
     let (mut cores, mut own, mut rest) = (Vec::new(), String::new(), text);
@@ -107,7 +107,7 @@ fn core_names(text: &str, names: &[&str]) -> (Vec<usize>, String) {
             }
             None => own.push_str(word),
         }
-        // The characters between two words.
+        // Separators up to the next word.
         let next = behind.find(is_name).unwrap_or(behind.len());
         own.push_str(&behind[..next]);
         rest = &behind[next..];

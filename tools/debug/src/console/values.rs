@@ -1,66 +1,58 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Values: what there is to see of registers, ports and memory, and what is set.
+//! Console commands that show and set values of registers, ports and memory.
 
 use super::inspector::{Inspector, number};
 use crate::info;
 use crate::panes::{self, Kind};
-use crate::session::{Live, Place, Shown, ulp_distance};
+use crate::session::{Place, ValueNotations, WatchExpression, noted, ulp_distance};
 use std::fmt::Write as _;
-use takt_asm::expr::Value;
 use takt_isa::Type;
 use takt_isa::program::Space;
 
 impl Inspector {
     pub(super) fn print(&self, arguments: &str) -> Result<String, String> {
         let mut text = String::new();
-        for part in parts(arguments) {
-            let live = self.session.parse(part)?;
+        let each = |part: &str| self.session.elements(part).unwrap_or_else(|| vec![part.to_owned()]);
+        for part in parts(arguments).into_iter().flat_map(each) {
+            let live = self.session.parse(&part)?;
             let _ = match self.session.place(&live)? {
                 Some((place, ty, Some(bits))) => {
-                    let note = self.note(&live, place);
-                    writeln!(text, "{} = {}{note}", live.text(), Shown::every_way(ty, bits))
+                    let note = self.note(&live, Some(place));
+                    writeln!(text, "{} = {}{note}", live.text(), ValueNotations::every_way(ty, bits))
                 }
                 Some((place, _, None)) => {
-                    writeln!(text, "{} = (never written){}", live.text(), self.note(&live, place))
+                    writeln!(text, "{} = (never written){}", live.text(), self.note(&live, Some(place)))
                 }
-                None => writeln!(text, "{} = {}", live.text(), number(self.session.evaluate(&live)?)),
+                None => {
+                    let value = number(self.session.evaluate(&live)?);
+                    writeln!(text, "{} = {value}{}", live.text(), self.note(&live, None))
+                }
             };
         }
         Ok(text)
     }
 
-    /// Which value of a name it is that is shown, and whether another one is on its way to its register.
-    fn note(&self, live: &Live, place: Place) -> String {
-        let mut notes = Vec::new();
-        if let Some(label) = self.session.label(live) {
+    /// Note on a value: its own name if the name has several, and the operands that are stale.
+    fn note(&self, live: &WatchExpression, place: Option<Place>) -> String {
+        let label = self.session.label(live).map(|label| {
             let at = match place {
-                Place::Register(register) => self.session.program().machine.register_name(register),
-                Place::Word(_) => None,
+                Some(Place::Register(register)) => self.session.program().machine.register_name(register),
+                Some(Place::Word(_)) | None => None,
             };
-            notes.push(format!("{label} in {}", at.unwrap_or_default()));
-        }
-        if let Place::Register(register) = place
-            && let Some(left) = self.session.arrives(register)
-        {
-            let cycles = if left == 1 { "cycle" } else { "cycles" };
-            notes.push(format!("a new value is in flight, {left} {cycles} to go"));
-        } else if let Place::Register(register) = place
-            && let Some(bundle) = self.session.writes_yet(register)
-        {
-            let bundle = self.session.program().bundle_text(bundle);
-            notes.push(format!("{bundle} is still to compute the one that this line would read"));
-        }
-        if notes.is_empty() { String::new() } else { format!("  ({})", notes.join("; ")) }
+            format!("{label} in {}", at.unwrap_or_default())
+        });
+        let notes: Vec<String> = label.into_iter().chain(self.session.note(live)).collect();
+        noted((!notes.is_empty()).then(|| notes.join("; ")))
     }
 
     pub(super) fn info(&self, arguments: &str) -> Result<String, String> {
         info::info(&self.session, arguments)
     }
 
-    /// The place that is to be set, its bits, and what is said of it.
+    /// Parses an assignment: its destination, the new bits, and the answer to print.
     ///
     /// # Errors
-    /// If something is wrong with it.
+    /// If the assignment is malformed, or its destination cannot be set.
     pub(super) fn setting(&self, arguments: &str) -> Result<(Place, u32, String), String> {
         let (target, value) = arguments.split_once('=').ok_or("set takes `place = expression`")?;
         let target = self.session.parse(target)?;
@@ -70,26 +62,33 @@ impl Inspector {
             .ok_or_else(|| format!("`{}` is no register, port or data word", target.text()))?;
         let value = self.session.parse(value)?;
         let bits = self.session.evaluate(&value)?.bits(ty).map_err(|fault| fault.to_string())?;
-        Ok((place, bits, format!("{} = {}\n", target.text(), Shown::every_way(ty, bits))))
+        let note = noted(self.session.note(&value));
+        Ok((place, bits, format!("{} = {}{note}\n", target.text(), ValueNotations::every_way(ty, bits))))
     }
 
     pub(super) fn ulp(&self, arguments: &str) -> Result<String, String> {
         let [a, b] = parts(arguments)[..] else { return Err("ulp takes two expressions".to_owned()) };
-        let value = |text| self.session.evaluate(&self.session.parse(text)?).map(Value::real);
-        let distance = ulp_distance(value(a)?, value(b)?);
+        let value = |text| {
+            let live = self.session.parse(text)?;
+            Ok::<_, String>((self.session.evaluate(&live)?.real(), self.session.note(&live)))
+        };
+        let ((first, of_first), (second, of_second)) = (value(a)?, value(b)?);
+        let distance = ulp_distance(first, second);
+        let note = noted(of_first.or(of_second));
         let steps = match distance.steps {
             Some(1) => "1 number further as binary32".to_owned(),
             Some(steps) => format!("{steps} numbers further as binary32"),
             None => "a NaN is no distance away".to_owned(),
         };
-        Ok(format!("{a} is {:.3} ulp from {b}; {steps}\n", distance.error))
+        Ok(format!("{a} is {:.3} ulp from {b}; {steps}{note}\n", distance.error))
     }
 
     pub(super) fn check(&self, arguments: &str) -> Result<String, String> {
         let live = self.session.parse(arguments)?;
         let holds = self.session.evaluate(&live);
         if holds.as_ref().is_ok_and(|value| !value.is_zero()) {
-            return Ok(String::new());
+            let note = self.session.note(&live);
+            return Ok(note.map_or(String::new(), |note| format!("{} holds  ({note})\n", live.text())));
         }
         let why = holds.err().map_or(String::new(), |error| format!(" ({error})"));
         let mut text = format!("check failed in {}: {}{why}", self.session.time(), live.text());
@@ -107,8 +106,9 @@ impl Inspector {
         let rows = kinds.flat_map(|kind| panes::named(&self.session, kind));
         let rows: Vec<_> = rows.filter(|row| crate::matches(pattern, &row.name)).collect();
         let width = rows.iter().map(|row| row.name.len()).max().unwrap_or(0).max(12);
-        let line =
-            |row: &panes::Named| format!("{:<width$} {:<5} {}\n", row.name, row.place, row.every_way());
+        let line = |row: &panes::NamedRegister| {
+            format!("{:<width$} {:<5} {}\n", row.name, row.place, row.every_way())
+        };
         rows.iter().map(line).collect()
     }
 
@@ -129,24 +129,25 @@ impl Inspector {
         };
         let live = self.session.parse(address)?;
         let start = self.session.evaluate(&live)?.integer().map_err(|fault| fault.to_string())?;
+        let note = self.session.note(&live);
         let memory = self.session.emulator().memory();
         let start = usize::try_from(start)
             .ok()
             .filter(|start| *start < memory.len())
             .ok_or_else(|| format!("data word {start}: the memory has words 0 to {}", memory.len() - 1))?;
         let program = self.session.program();
-        let mut text = String::new();
+        let mut text = note.map_or(String::new(), |note| format!("({note})\n"));
         for (word, bits) in memory.iter().enumerate().skip(start).take(count) {
             let labels = program.symbols.iter().filter(|symbol| symbol.space == Space::Data);
             let label = labels.into_iter().find(|symbol| symbol.address as usize == word);
             let label = label.map_or("", |symbol| symbol.name.as_str());
-            let _ = writeln!(text, "{word:>5} {label:<12} {}", Shown::every_way(Type::F, *bits));
+            let _ = writeln!(text, "{word:>5} {label:<12} {}", ValueNotations::every_way(Type::F, *bits));
         }
         Ok(text)
     }
 }
 
-/// The parts of a list between commas that stand in no brackets.
+/// Splits a list at the commas outside brackets.
 fn parts(text: &str) -> Vec<&str> {
     let (mut depth, mut start, mut parts) = (0i32, 0, Vec::new());
     for (at, byte) in text.bytes().enumerate() {

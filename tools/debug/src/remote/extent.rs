@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Which registers and data words a program uses, and so which are read from its machine.
+//! Registers and data words that a program uses: the state to read from its machine.
 
 use std::collections::BTreeSet;
 use takt_isa::{Effect, Program, Register};
@@ -9,11 +9,11 @@ use takt_isa::{Effect, Program, Register};
 pub(super) struct Extent {
     /// Registers that the program writes.
     pub(super) written: Vec<Register>,
-    /// These, and those that the loader sets.
+    /// Registers that the program or the loader writes.
     pub(super) registers: Vec<Register>,
-    /// Data words that it may write.
+    /// Data words that the program may write.
     pub(super) written_words: Vec<u32>,
-    /// These, and those that the loader sets.
+    /// Data words that the program or the loader writes.
     pub(super) words: Vec<u32>,
 }
 
@@ -28,7 +28,7 @@ impl Extent {
                     (Effect::Store, Register::ZERO) => {
                         words.insert(instruction.constant);
                     }
-                    // It may be any word.
+                    // The address is not static: assume every word.
                     (Effect::Store, _) => words.extend(0..machine.data_depth),
                     _ => {}
                 }

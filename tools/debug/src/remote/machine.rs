@@ -1,56 +1,56 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A machine that runs elsewhere: what it does, and what it can be asked to do.
+//! Interface to a machine that runs elsewhere: its state and its commands.
 
 use takt_emu::LoadError;
 use takt_isa::fp::Flags;
 use takt_isa::{BundleAddress, Register};
 
-/// The activity of a machine that runs elsewhere.
+/// Activity of a machine that runs elsewhere.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Activity {
-    /// It is in reset.
+    /// In reset: the program does not run.
     Stopped,
-    /// Its periods follow one another.
+    /// Executes period after period.
     Runs,
-    /// It gets no tick, and waits for one.
+    /// At its `wait`, without ticks.
     Held,
-    /// It gets no tick, but has not come to its `wait` yet.
+    /// Without ticks, before its `wait`.
     InPeriod,
-    /// `halt` stopped it.
+    /// Stopped by the program's `halt`.
     Halted,
-    /// A fault stopped it, at this bundle, for this reason.
+    /// Stopped by a fault in this bundle, for this reason.
     Faulted(BundleAddress, String),
 }
 
-/// The state that such a machine reports at any time.
+/// State that the machine reports at any time, even while it runs.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct State {
-    /// Its activity.
+    /// Activity at the time of the query.
     pub activity: Activity,
-    /// The bundle that issued last.
+    /// Bundle that issued last.
     pub issued: BundleAddress,
-    /// Periods that have ended since its start.
+    /// Number of periods ended since the start.
     pub periods: u64,
-    /// The sticky exception flags.
+    /// Sticky exception flags of the machine.
     pub flags: Flags,
-    /// True if its outputs drive.
+    /// Output pins drive; otherwise they are at their safe levels.
     pub drives: bool,
 }
 
 impl State {
-    /// True if values can be read, and stay the same until a command moves the machine.
+    /// Values can be read, and stay unchanged until a command moves the machine.
     pub(super) fn is_still(&self) -> bool {
         !matches!(self.activity, Activity::Runs | Activity::InPeriod)
     }
 }
 
-/// The reason why the machine did not do what was asked.
+/// Errors of a machine that runs elsewhere.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum RemoteError {
-    /// The program does not come to its `wait`.
+    /// The program does not reach its `wait`.
     #[error("the program does not come to its `wait`, and values can be read only where it waits")]
     Busy,
-    /// Anything else, such as no answer, in words.
+    /// Another error, in words, for example no answer.
     #[error("{0}")]
     Other(String),
 }
@@ -61,39 +61,39 @@ impl From<LoadError> for RemoteError {
     }
 }
 
-/// A machine that runs elsewhere. Each method may fail because the machine does not answer.
+/// A machine that runs elsewhere. Each method fails if the machine does not answer.
 #[allow(clippy::missing_errors_doc, reason = "said above, once")]
 pub trait Remote {
-    /// Its state now.
+    /// Queries the state without delay.
     fn state(&mut self) -> Result<State, RemoteError>;
 
-    /// The same, after a short time, so that it is not asked all the time.
+    /// Queries the state after a short delay, which limits the rate of queries in a waiting loop.
     fn poll(&mut self) -> Result<State, RemoteError>;
 
-    /// Gives no more ticks. On return, the machine waits between two periods, or has stopped.
+    /// Stops the ticks. On return the machine waits between two periods, or has stopped.
     fn hold(&mut self) -> Result<(), RemoteError>;
 
-    /// Gives ticks again.
+    /// Resumes the ticks after `hold`.
     fn go(&mut self) -> Result<(), RemoteError>;
 
-    /// Runs one period while the machine is held. On return, it waits again, or has stopped.
+    /// Runs one period of a held machine. On return it waits again, or has stopped.
     fn step(&mut self) -> Result<(), RemoteError>;
 
-    /// Runs from the beginning to the first `wait`, where the machine is held, or to where it stops.
+    /// Restarts the program up to its first `wait`, where the machine is held, or to an earlier stop.
     fn restart(&mut self) -> Result<(), RemoteError>;
 
-    /// Sets an input port for the periods to come.
+    /// Sets an input port for all later periods.
     fn set_input(&mut self, port: Register, bits: u32) -> Result<(), RemoteError>;
 
-    /// Input ports as the period had them, in the program's order.
+    /// Input ports with their values during the last period, in the program's order.
     fn inputs(&mut self) -> Result<Vec<u32>, RemoteError>;
 
-    /// Output ports as the outside sees them, in the program's order.
+    /// Output ports as visible outside the core, in the program's order.
     fn outputs(&mut self) -> Result<Vec<u32>, RemoteError>;
 
-    /// The values of registers, given in ascending order.
+    /// Values of registers, which are given in ascending order.
     fn registers(&mut self, registers: &[Register]) -> Result<Vec<u32>, RemoteError>;
 
-    /// The values of data words, given in ascending order.
+    /// Values of data words, which are given in ascending order.
     fn words(&mut self, words: &[u32]) -> Result<Vec<u32>, RemoteError>;
 }

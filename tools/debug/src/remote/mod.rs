@@ -1,60 +1,59 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A debug session on a machine that runs elsewhere, such as a board: the machine can be held at the end of a period, looked at, and
-//! made to run one more period.
+//! Debug session on a machine that runs elsewhere, such as a board. The machine can be held at the end of a period, inspected, and run for
+//! single periods.
 //!
-//! **What there is to see** is read from the machine and shown by an emulator that is placed in the machine's state
-//! ([`RemoteSession::show`]), so everything that looks at a [`Session`] works. What cannot be known is left out: operations in flight
-//! (there are none between two periods), cycles, the return stack.
+//! **State.** The session reads the machine's state into an emulator ([`RemoteSession::show`]), so that all code for a [`Session`] works.
+//! Unknown data is left out: operations in flight (none exist between two periods), cycles, the return stack.
 //!
-//! **The shadow** is another emulator, which runs alongside the machine with the same inputs, read back after each period. A difference
-//! is reported, and the shadow continues from the machine's values.
+//! **Shadow.** A second emulator runs in step with the machine on the same inputs, which are read back after each period. A difference is
+//! reported, and the shadow continues from the machine's values.
 
 mod extent;
 mod machine;
-mod shadow;
+mod reference_run;
 
 pub use machine::{Activity, Remote, RemoteError, State};
 
-use crate::session::{Control, Live, Search, Session, Why};
+use crate::session::{Control, Search, Session, StopReason, WatchExpression};
 use extent::Extent;
-use shadow::{End, Shadow};
+use reference_run::{End, Shadow};
 use std::sync::Arc;
 use takt_emu::{Emulator, MachineState, Position};
 use takt_isa::fp::Flags;
 use takt_isa::{Program, Register};
 
-/// The most periods for which a command runs.
+/// Maximal number of periods of one command.
 pub const PERIODS: u64 = 1_000_000;
 
-/// The end that a command waits for, with the registers and memory that must be read for it.
+/// End condition of a command, with the registers and memory that it reads.
 pub(crate) struct Goal {
     search: Search,
     registers: Vec<Register>,
     memory: bool,
 }
 
-/// A session.
+/// Debug session on a machine that runs elsewhere, with an emulator in step as its shadow.
 pub struct RemoteSession {
     remote: Box<dyn Remote + Send>,
     control: Arc<Control>,
     extent: Extent,
-    /// The program after a reset; copies of it are placed in the machine's state.
+    /// Program after a reset; copies of it are placed in the machine's state.
     base: Emulator,
     state: State,
-    /// The values that were read last.
+    /// State that was read last.
     seen: MachineState,
     shadow: Shadow,
-    /// True if `seen` is what the machine has.
+    /// `seen` equals the machine's state.
     settled: bool,
-    /// The watched values as they were seen last.
+    /// Search with the last known values of watched expressions.
     watched: Option<Search>,
 }
 
 impl RemoteSession {
-    /// A session on a machine that carries this program. [`RemoteSession::hold`] or [`RemoteSession::restart`] comes next.
+    /// A session on a machine that carries this program. Call [`RemoteSession::hold`] or [`RemoteSession::restart`] next.
     ///
     /// # Errors
-    /// If the machine does not answer, or the emulator cannot hold the program. A program that does not come to its `wait` is no error.
+    /// If the machine does not answer, or the emulator cannot hold the program. A program that does not reach its `wait` is no error.
     pub fn attach(
         program: &Program,
         mut remote: Box<dyn Remote + Send>,
@@ -80,42 +79,42 @@ impl RemoteSession {
         })
     }
 
-    /// The state of the machine when it was last asked.
+    /// State of the machine at the last query.
     pub fn state(&self) -> &State {
         &self.state
     }
 
-    /// True if the values shown are the machine's.
+    /// Values on display equal the machine's.
     pub fn is_settled(&self) -> bool {
         self.settled
     }
 
-    /// The program.
+    /// Program that the machine carries.
     pub fn program(&self) -> &Program {
         self.base.program()
     }
 
-    /// Shows the machine in a session of its program.
+    /// Shows the machine's state in a session of its program.
     pub fn show(&self, view: &mut Session) {
         let mut emulator = self.base.clone();
         let mut seen = self.seen.clone();
-        seen.registers.retain(|register, _| self.is_known(*register));
+        seen.registers.retain(|register, _| self.has_value(*register));
         emulator.restore(&seen);
         view.look_afar(emulator, self.state.periods);
     }
 
-    /// True if a register was ever written. An unwritten one is not shown.
-    fn is_known(&self, register: Register) -> bool {
+    /// A register without any write has no value to show. Input ports always have one.
+    fn has_value(&self, register: Register) -> bool {
         self.program().machine.is_input(register) || self.shadow.register(register).is_some()
     }
 
     // ---- Moving.
 
-    /// Holds the machine at the end of its period, and reads it. The shadow continues from there.
+    /// Holds the machine at the end of its period, and reads its state. The shadow continues from there.
     ///
     /// # Errors
-    /// If it does not answer, or does not wait.
-    pub fn hold(&mut self) -> Result<Why, RemoteError> {
+    /// If the machine does not answer, or does not reach its `wait`.
+    pub fn hold(&mut self) -> Result<StopReason, RemoteError> {
         self.settled = false;
         self.state = self.remote.state()?;
         if !self.state.is_still() {
@@ -127,37 +126,37 @@ impl RemoteSession {
         let extent = self.extent.clone();
         self.read(&extent.registers, &extent.words)?;
         self.synchronise()?;
-        // Once the program has started, what it does not write must be as it was loaded.
+        // After the start, registers and words that the program does not write must still have their loaded values.
         let started = self.state.activity != Activity::Stopped;
-        let loaded = if started { shadow::loaded(&self.base, &self.seen, &self.extent) } else { None };
+        let loaded = if started { reference_run::loaded(&self.base, &self.seen, &self.extent) } else { None };
         self.settled = true;
-        Ok(loaded.map_or_else(|| self.why(None), Why::Differs))
+        Ok(loaded.map_or_else(|| self.stop_reason(None), StopReason::Differs))
     }
 
-    /// Asks the machine what it does.
+    /// Queries the machine's state.
     ///
     /// # Errors
-    /// If it does not answer.
+    /// If the machine does not answer.
     pub fn ask(&mut self) -> Result<(), RemoteError> {
         self.state = self.remote.state()?;
         Ok(())
     }
 
-    /// Lets the machine run.
+    /// Lets the machine run freely.
     ///
     /// # Errors
-    /// If it does not answer.
+    /// If the machine does not answer.
     pub fn go(&mut self) -> Result<(), RemoteError> {
         self.settled = false;
         self.remote.go()?;
         self.ask()
     }
 
-    /// Lets the machine run until somebody interrupts it or it stops, and holds it.
+    /// Lets the machine run until it stops or the user interrupts; then holds it.
     ///
     /// # Errors
-    /// If it does not answer, or does not wait.
-    pub fn run_freely(&mut self) -> Result<Why, RemoteError> {
+    /// If the machine does not answer, or does not reach its `wait`.
+    pub fn run_freely(&mut self) -> Result<StopReason, RemoteError> {
         self.go()?;
         let mut interrupted = false;
         while self.state.activity == Activity::Runs && !interrupted {
@@ -165,16 +164,16 @@ impl RemoteSession {
             interrupted = self.interrupted();
         }
         match self.hold()? {
-            Why::Done if interrupted => Ok(Why::Interrupted),
+            StopReason::Done if interrupted => Ok(StopReason::Interrupted),
             why => Ok(why),
         }
     }
 
-    /// Starts the program again, held at its first `wait`. The shadow starts with it.
+    /// Restarts the program, held at its first `wait`, together with the shadow.
     ///
     /// # Errors
-    /// If it does not answer, or does not wait.
-    pub fn restart(&mut self) -> Result<Why, RemoteError> {
+    /// If the machine does not answer, or does not reach its `wait`.
+    pub fn restart(&mut self) -> Result<StopReason, RemoteError> {
         self.settled = false;
         self.watched = None;
         let restarted = self.remote.restart();
@@ -190,17 +189,17 @@ impl RemoteSession {
         self.end_of_move(different, end)
     }
 
-    /// Runs `count` periods, or until `goal` is reached; [`PERIODS`] at most.
+    /// Runs `count` periods, or fewer if `goal` is reached; at most [`PERIODS`].
     ///
     /// # Errors
-    /// If the machine does not answer, or does not wait.
+    /// If the machine does not answer, or does not reach its `wait`.
     pub(crate) fn advance(
         &mut self,
         view: &mut Session,
         count: Option<u64>,
         mut goal: Option<Goal>,
-    ) -> Result<Why, RemoteError> {
-        let (mut why, mut different, mut end) = (Why::Done, None, None);
+    ) -> Result<StopReason, RemoteError> {
+        let (mut why, mut different, mut end) = (StopReason::Done, None, None);
         self.settled = false;
         let most = count.filter(|count| *count <= PERIODS);
         for number in 0.. {
@@ -208,11 +207,11 @@ impl RemoteSession {
                 break;
             }
             if number == PERIODS {
-                why = Why::Limit(PERIODS);
+                why = StopReason::Limit(PERIODS);
                 break;
             }
             if self.interrupted() {
-                why = Why::Interrupted;
+                why = StopReason::Interrupted;
                 break;
             }
             (different, end) = self.period()?;
@@ -237,35 +236,39 @@ impl RemoteSession {
         self.read(&extent.written, &extent.written_words)?;
         let different = different.or_else(|| self.compare_all());
         match self.end_of_move(different, end)? {
-            Why::Done => Ok(why),
+            StopReason::Done => Ok(why),
             other => Ok(other),
         }
     }
 
-    /// The end of a command, once all that the program writes has been read. After a difference, the shadow continues from the machine.
-    fn end_of_move(&mut self, different: Option<String>, end: Option<End>) -> Result<Why, RemoteError> {
+    /// Ends a command after all written state was read. After a difference, the shadow continues from the machine's state.
+    fn end_of_move(
+        &mut self,
+        different: Option<String>,
+        end: Option<End>,
+    ) -> Result<StopReason, RemoteError> {
         self.record_position()?;
         let why = match different {
             Some(different) => {
                 self.synchronise()?;
-                Why::Differs(different)
+                StopReason::Differs(different)
             }
-            None => self.why(end),
+            None => self.stop_reason(end),
         };
         self.settled = true;
         Ok(why)
     }
 
-    /// The reason why the machine cannot go on, if the emulator shares it; `Done` otherwise.
-    fn why(&self, end: Option<End>) -> Why {
+    /// Reason why the machine cannot continue, if the emulator agrees; otherwise `Done`.
+    fn stop_reason(&self, end: Option<End>) -> StopReason {
         match (&self.state.activity, end) {
-            (Activity::Halted, _) => Why::Halted,
-            (Activity::Faulted(..), Some(End::Fault(fault))) => Why::Fault(fault),
-            _ => Why::Done,
+            (Activity::Halted, _) => StopReason::Halted,
+            (Activity::Faulted(..), Some(End::Fault(fault))) => StopReason::Fault(fault),
+            _ => StopReason::Done,
         }
     }
 
-    /// Runs one period of machine and shadow: the first difference at their outputs, and what stopped the shadow.
+    /// Runs one period of machine and shadow; returns the first difference at their outputs, and the event that stopped the shadow.
     fn period(&mut self) -> Result<(Option<String>, Option<End>), RemoteError> {
         let before = self.state.periods;
         let stepped = self.remote.step();
@@ -274,7 +277,7 @@ impl RemoteSession {
         if self.state.activity == Activity::Held
             && self.state.periods as u32 != (before as u32).wrapping_add(1)
         {
-            let text = "it did not run the one period that was asked for: is another host connected?";
+            let text = "it did not run the requested period: is another host connected?";
             return Err(RemoteError::Other(text.to_owned()));
         }
         self.read_inputs()?;
@@ -293,7 +296,7 @@ impl RemoteSession {
 
     // ---- Reading and setting.
 
-    /// Sets an input port.
+    /// Sets an input port of the machine.
     ///
     /// # Errors
     /// If the machine does not answer.
@@ -326,7 +329,7 @@ impl RemoteSession {
         ports.filter_map(|port| Some((port, *self.seen.registers.get(&port)?))).collect()
     }
 
-    /// Records the machine's position.
+    /// Records the machine's position in `seen`.
     fn record_position(&mut self) -> Result<(), RemoteError> {
         let State { activity, issued, flags, .. } = &self.state;
         self.seen.flags = *flags;
@@ -343,7 +346,7 @@ impl RemoteSession {
         Err(RemoteError::Other(text))
     }
 
-    /// Makes the shadow continue from the machine's state.
+    /// Places the shadow in the machine's state.
     fn synchronise(&mut self) -> Result<(), RemoteError> {
         self.record_position()?;
         self.shadow = Shadow::placed(&self.base, &self.seen);
@@ -352,7 +355,7 @@ impl RemoteSession {
 
     // ---- Comparing.
 
-    /// The first difference in how the period ended, or at the outputs.
+    /// First difference in the way the period ended, or at the outputs.
     fn compare(&self, outputs: &[u32], end: Option<&End>) -> Option<String> {
         let different = self.shadow.ended(&self.state, end, self.program()).or_else(|| {
             let inputs = self.inputs();
@@ -361,20 +364,20 @@ impl RemoteSession {
         Some(format!("period {}: {different}", self.state.periods))
     }
 
-    /// The first difference in a register or data word that the program writes.
+    /// First difference in a register or data word that the program writes.
     fn compare_all(&self) -> Option<String> {
         let different = self.shadow.values(&self.seen, &self.extent, self.program())?;
         Some(format!("after period {}: {different}", self.state.periods))
     }
 
-    /// The goal of waiting for an expression, or, without one, for the session's stops; `None` if there are none.
-    pub(crate) fn goal(&self, view: &Session, live: Option<Live>) -> Option<Goal> {
+    /// Goal of a wait: an expression, or the session's stops if there is no expression. `None` without stops.
+    pub(crate) fn goal(&self, view: &Session, live: Option<WatchExpression>) -> Option<Goal> {
         let reads = view.reads(live.as_ref());
         let search = match live {
             Some(live) => Search::value(live, view),
             None => {
                 let mut search = Search::stops(view)?;
-                // Values seen last cannot be looked for: the machine does not go back.
+                // The search cannot look back for previous values, since the machine does not go back; take them from the last command.
                 self.watched.iter().for_each(|watched| search.complete(watched));
                 search
             }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Expressions over live values: the assembler's own language, and in it, as operands write them,
+//! Expressions over live values: the assembler's expression language, with these additional operands:
 //!
 //! | written | means |
 //! |---|---|
@@ -11,7 +11,7 @@
 //! | `cycle period address depth` | cycles and periods that have passed; the next bundle; entries of the return stack |
 
 use super::machine::{Machine, Place};
-use super::meaning::{At, Held, Life, Meaning, Name, held};
+use super::meaning::{LiveRange, Meaning, Name, NameMeaning, NameValue, held};
 use std::collections::BTreeSet;
 use takt_asm::Expression;
 use takt_asm::diag::Diagnostics;
@@ -21,22 +21,22 @@ use takt_asm::nearest;
 use takt_isa::program::Space;
 use takt_isa::{BundleAddress, Program, Register, Type};
 
-/// Values that a watched expression may have at one time; more is an error.
+/// Maximal number of variants of a watched expression.
 const VARIANTS: usize = 64;
-/// Brackets within brackets; more is an error.
+/// Maximal depth of nested brackets.
 const NESTING: usize = 16;
 
-/// The meaning of an operand of an expression.
+/// Meaning of an operand.
 #[derive(Clone, Debug)]
 enum Operand {
     Register(Register, Type),
-    /// A name that stands for different things at different places; and the type that it is read as, if one is given.
+    /// A name whose meaning depends on the position, with the type in which it is read, if given.
     Name(Box<Name>, Option<Type>),
-    /// One of the values of such a name.
-    Held(Box<Held>, Option<Type>),
+    /// A particular value of a name that has several.
+    Held(Box<NameValue>, Option<Type>),
     Memory {
-        offset: Box<Live>,
-        index: Box<Live>,
+        offset: Box<WatchExpression>,
+        index: Box<WatchExpression>,
         ty: Type,
     },
     Constant(Value),
@@ -46,29 +46,29 @@ enum Operand {
     Depth,
 }
 
-/// The parts of the machine that an expression reads.
+/// Parts of the machine that an expression reads.
 #[derive(Default)]
-pub(crate) struct Reads {
+pub(crate) struct ReadSet {
     pub(crate) registers: BTreeSet<Register>,
     pub(crate) memory: bool,
-    /// True if it reads what changes in every cycle.
+    /// An operand changes in every cycle.
     pub(crate) clock: bool,
-    /// True if it reads what can change in every cycle in which something happens.
+    /// An operand can change at every event.
     pub(crate) every: bool,
-    /// Addresses between which the next bundle must be for one of its values to be there ([`Held::range`]).
+    /// Address ranges of the next bundle in which the operands' values are in their registers ([`Held::range`]).
     pub(crate) ranges: Vec<(BundleAddress, BundleAddress)>,
 }
 
 /// An expression with its names resolved.
 #[derive(Clone, Debug)]
-pub struct Live {
+pub struct WatchExpression {
     text: String,
     expression: Expression,
-    /// Each as the expression has it, what it stands for, and as it was written.
+    /// Operands: the placeholder in `expression`, the meaning, and the text that the user wrote.
     operands: Vec<(String, Operand, String)>,
 }
 
-/// A value of a type from its bits.
+/// Interprets bits in a type.
 pub(crate) fn value(ty: Type, bits: u32) -> Value {
     match ty {
         Type::F => Value::Real(f32::from_bits(bits).into()),
@@ -90,27 +90,27 @@ const fn is_name(byte: u8) -> bool {
     byte.is_ascii_alphanumeric() || matches!(byte, b'_' | b'.')
 }
 
-impl Live {
+impl WatchExpression {
     /// Parses an expression and resolves its names in a program.
     ///
     /// # Errors
-    /// If something is wrong; a mistake in the language is pointed at.
+    /// If the expression is malformed or a name is unknown; the message points at the mistake.
     pub fn parse(
         text: &str,
         program: &Program,
         constants: &[(String, Value)],
         names: &Names,
-    ) -> Result<Live, String> {
-        parse(text, Known { program, constants, names }, NESTING)
+    ) -> Result<WatchExpression, String> {
+        parse(text, LookupTables { program, constants, names }, NESTING)
     }
 
-    /// The text that it was parsed from.
+    /// Source text of the expression.
     pub fn text(&self) -> &str {
         &self.text
     }
 
-    /// Adds what it reads.
-    pub(crate) fn reads(&self, reads: &mut Reads) {
+    /// Adds the registers, memory and times that the expression reads.
+    pub(crate) fn reads(&self, reads: &mut ReadSet) {
         for (_, operand, _) in &self.operands {
             match operand {
                 Operand::Register(register, _) => {
@@ -118,7 +118,7 @@ impl Live {
                 }
                 Operand::Name(name, _) => {
                     reads.registers.extend(name.values().map(|value| value.register));
-                    // It is another value where another line is at hand.
+                    // The name's value depends on the line at hand.
                     reads.every = true;
                 }
                 Operand::Held(value, _) => {
@@ -132,19 +132,18 @@ impl Live {
                 }
                 Operand::Cycle => reads.clock = true,
                 Operand::Address | Operand::Depth => reads.every = true,
-                // Periods end where every search looks.
+                // Every search visits the ends of periods.
                 Operand::Constant(_) | Operand::Period => {}
             }
         }
     }
 
-    /// True if every value in it is there: one that shares its register, or is one of several of its name, is not there
-    /// everywhere.
+    /// Every value in the expression is in its register. A register that several values share holds each only in a range of addresses.
     pub(crate) fn is_there(&self, machine: &Machine<'_>, program: &Program) -> bool {
         self.operands.iter().all(|(_, operand, _)| match operand {
             Operand::Name(name, _) => match name.at(machine) {
-                Ok(At::Value(value)) => value.is_there(machine, program).is_ok(),
-                Ok(At::Constant(_)) => true,
+                Ok(NameMeaning::Value(value)) => value.is_there(machine, program).is_ok(),
+                Ok(NameMeaning::Constant(_)) => true,
                 Err(_) => false,
             },
             Operand::Held(value, _) => value.is_there(machine, program).is_ok(),
@@ -155,7 +154,44 @@ impl Live {
         })
     }
 
-    /// The first name in it that is not known of a machine which runs elsewhere.
+    /// Registers that an evaluation reads, with the text of each operand.
+    fn registers(&self, machine: &Machine<'_>) -> Vec<(&str, Register)> {
+        let mut read = Vec::new();
+        for (_, operand, written) in &self.operands {
+            let register = match operand {
+                Operand::Register(register, _) => Some(*register),
+                Operand::Held(value, _) => Some(value.register),
+                Operand::Name(name, _) => match name.at(machine) {
+                    Ok(NameMeaning::Value(value)) => Some(value.register),
+                    Ok(NameMeaning::Constant(_)) | Err(_) => None,
+                },
+                Operand::Memory { offset, index, .. } => {
+                    read.extend([offset, index].iter().flat_map(|part| part.registers(machine)));
+                    None
+                }
+                _ => None,
+            };
+            read.extend(register.map(|register| (written.as_str(), register)));
+        }
+        read
+    }
+
+    /// Note on the operands that are stale at the line at hand; `None` if all are current.
+    pub(crate) fn note(&self, machine: &Machine<'_>, program: &Program) -> Option<String> {
+        let is_alone = matches!(self.only(), Some(operand) if !matches!(operand, Operand::Memory { .. }));
+        let mut notes: Vec<String> = Vec::new();
+        for (name, register) in self.registers(machine) {
+            let Some(stale) = machine.stale(register) else { continue };
+            let text = stale.text(program);
+            let note = if is_alone { text } else { format!("{name}: {text}") };
+            if !notes.contains(&note) {
+                notes.push(note);
+            }
+        }
+        (!notes.is_empty()).then(|| notes.join("; "))
+    }
+
+    /// The first operand that is unknown on a machine that runs elsewhere.
     pub(crate) fn hidden(&self) -> Option<&str> {
         self.operands.iter().find_map(|(_, operand, written)| match operand {
             Operand::Cycle | Operand::Depth => Some(written.as_str()),
@@ -164,7 +200,7 @@ impl Live {
         })
     }
 
-    /// The registers and data words that it reads, as written.
+    /// Registers and data words that the expression reads, as written.
     pub(crate) fn places(&self) -> Vec<&str> {
         let is_place = |operand: &Operand| {
             matches!(
@@ -181,12 +217,11 @@ impl Live {
         places
     }
 
-    /// The expression in each of the ways in which it can be read: for each choice of values for the names in it that have
-    /// several.
+    /// All variants of the expression: one for each choice of a value for each name that has several.
     ///
     /// # Errors
-    /// If there are more than [`VARIANTS`].
-    pub(crate) fn variants(&self) -> Result<Vec<Live>, String> {
+    /// If their number exceeds [`VARIANTS`].
+    pub(crate) fn variants(&self) -> Result<Vec<WatchExpression>, String> {
         let mut variants = vec![self.clone()];
         for (i, (_, operand, written)) in self.operands.iter().enumerate() {
             let values: Vec<Operand> = match operand {
@@ -197,7 +232,7 @@ impl Live {
                     let (offsets, indices) = (offset.variants()?, index.variants()?);
                     let pairs =
                         offsets.iter().flat_map(|offset| indices.iter().map(move |index| (offset, index)));
-                    let memory = |(offset, index): (&Live, &Live)| Operand::Memory {
+                    let memory = |(offset, index): (&WatchExpression, &WatchExpression)| Operand::Memory {
                         offset: Box::new(offset.clone()),
                         index: Box::new(index.clone()),
                         ty: *ty,
@@ -224,12 +259,12 @@ impl Live {
         Ok(variants)
     }
 
-    /// The variants, or if there are too many the expression as it is.
-    pub(crate) fn each(&self) -> Vec<Live> {
+    /// All variants of the expression; the expression itself if their number exceeds the limit.
+    pub(crate) fn each(&self) -> Vec<WatchExpression> {
         self.variants().unwrap_or_else(|_| vec![self.clone()])
     }
 
-    /// Of a variant that is one value of a name, that value's own name.
+    /// Name of the value, if this variant consists of a single value of a name.
     pub(crate) fn held(&self) -> Option<&str> {
         match self.only()? {
             Operand::Held(value, _) => Some(&value.label),
@@ -237,17 +272,17 @@ impl Live {
         }
     }
 
-    /// The one operand that the expression is, if it is nothing else.
+    /// The operand, if the expression consists of a single operand.
     fn only(&self) -> Option<&Operand> {
         let [(name, operand, _)] = &self.operands[..] else { return None };
-        // Placeholders are as long as what they stand for.
+        // Placeholders have the length of the text that they replace.
         let mut names = self.expression.names();
         (names.next() == Some(name) && self.text.len() == name.len()).then_some(operand)
     }
 
-    /// The registers that the expression, if it is a name of any, may stand for.
-    pub(crate) fn lives(&self, machine: &Machine<'_>, program: &Program) -> Vec<Life> {
-        let life = |value: &Held, at_hand| Life {
+    /// Registers that the expression may stand for, if it is a name of any.
+    pub(crate) fn lives(&self, machine: &Machine<'_>, program: &Program) -> Vec<LiveRange> {
+        let life = |value: &NameValue, at_hand| LiveRange {
             label: value.label.clone(),
             register: value.register,
             ty: value.ty,
@@ -257,7 +292,7 @@ impl Live {
         match self.only() {
             Some(Operand::Name(name, _)) => {
                 let at_hand = match name.at(machine) {
-                    Ok(At::Value(value)) => Some(value),
+                    Ok(NameMeaning::Value(value)) => Some(value),
                     _ => None,
                 };
                 name.values().map(|value| life(value, at_hand == Some(value))).collect()
@@ -265,24 +300,24 @@ impl Live {
             Some(Operand::Held(value, _)) => vec![life(value, true)],
             Some(Operand::Register(register, ty)) => {
                 let (label, register, ty) = (program.register_text(*register), *register, *ty);
-                vec![Life { label, register, ty, bundles: None, at_hand: true }]
+                vec![LiveRange { label, register, ty, bundles: None, at_hand: true }]
             }
             _ => Vec::new(),
         }
     }
 
-    /// The value's own name, if the expression is a name that has several, of which this is the one at hand.
+    /// Name of the value at hand, if the expression is a name with several values.
     pub(crate) fn label(&self, machine: &Machine<'_>) -> Option<String> {
         match self.only()? {
             Operand::Name(name, _) => match name.at(machine).ok()? {
-                At::Value(value) => Some(value.label.clone()),
-                At::Constant(_) => None,
+                NameMeaning::Value(value) => Some(value.label.clone()),
+                NameMeaning::Constant(_) => None,
             },
             _ => None,
         }
     }
 
-    /// The place that the expression is, if it is nothing else, and the type that it is read as.
+    /// Register or data word that the expression consists of, and the type in which it is read.
     pub(crate) fn place(
         &self,
         machine: &Machine<'_>,
@@ -292,8 +327,8 @@ impl Live {
         Ok(match operand {
             Operand::Register(register, ty) => Some((Place::Register(*register), *ty)),
             Operand::Name(name, ty) => match name.at(machine)? {
-                At::Constant(_) => None,
-                At::Value(value) => {
+                NameMeaning::Constant(_) => None,
+                NameMeaning::Value(value) => {
                     value.is_there(machine, program)?;
                     Some((Place::Register(value.register), ty.unwrap_or(value.ty)))
                 }
@@ -318,8 +353,8 @@ impl Live {
                     machine.read(Place::Register(*register), program).map(|bits| value(*ty, bits))
                 }
                 Operand::Name(name, ty) => name.at(machine).and_then(|at| match at {
-                    At::Constant(constant) => Ok(constant),
-                    At::Value(held) => read_held(held, *ty, machine, program),
+                    NameMeaning::Constant(constant) => Ok(constant),
+                    NameMeaning::Value(held) => read_held(held, *ty, machine, program),
                 }),
                 Operand::Held(held, ty) => read_held(held, *ty, machine, program),
                 Operand::Memory { offset, index, ty } => word(offset, index, machine, program)
@@ -331,7 +366,7 @@ impl Live {
                 Operand::Address => Ok(Value::Int(machine.emulator.next_address().get().into())),
                 Operand::Depth => Ok(Value::Int(machine.emulator.stack().len() as i64)),
             };
-            // Any value will do: the fault is what is rendered.
+            // The value is arbitrary after a fault: only the fault is reported.
             Some(read.unwrap_or_else(|error| {
                 fault.get_or_insert(error);
                 Value::Int(1)
@@ -345,7 +380,7 @@ impl Live {
 }
 
 fn read_held(
-    held: &Held,
+    held: &NameValue,
     ty: Option<Type>,
     machine: &Machine<'_>,
     program: &Program,
@@ -355,24 +390,29 @@ fn read_held(
     Ok(value(ty.unwrap_or(held.ty), bits))
 }
 
-fn word(offset: &Live, index: &Live, machine: &Machine<'_>, program: &Program) -> Result<u32, String> {
-    let integer = |live: &Live| {
+fn word(
+    offset: &WatchExpression,
+    index: &WatchExpression,
+    machine: &Machine<'_>,
+    program: &Program,
+) -> Result<u32, String> {
+    let integer = |live: &WatchExpression| {
         live.evaluate(machine, program)?.integer().map_err(|fault| format!("`{}`: {fault}", live.text))
     };
     let word = integer(offset)?.saturating_add(integer(index)?);
     u32::try_from(word).map_err(|_| format!("data word {word} does not exist"))
 }
 
-/// The tables in which names are looked up.
+/// Tables for the lookup of names.
 #[derive(Clone, Copy)]
-struct Known<'k> {
+struct LookupTables<'k> {
     program: &'k Program,
     constants: &'k [(String, Value)],
     names: &'k Names,
 }
 
-/// The register at a place in the machine.
-fn machine_register(place: &str, known: Known<'_>) -> Result<Register, String> {
+/// Register at a place of the machine, such as `m12`.
+fn machine_register(place: &str, known: LookupTables<'_>) -> Result<Register, String> {
     let machine = known.program.machine;
     machine.register_address(place).ok_or_else(|| {
         let banks: Vec<String> = machine.banks().map(|bank| format!("{}0 …", bank.name)).collect();
@@ -380,8 +420,13 @@ fn machine_register(place: &str, known: Known<'_>) -> Result<Register, String> {
     })
 }
 
-/// The array's element or data word that a text begins with, `head` being before its bracket; and where it ends.
-fn element(text: &str, head: &str, known: Known<'_>, depth: usize) -> Result<(Operand, usize), String> {
+/// Parses an element of an array or a data word at the start of a text; `head` precedes the bracket. Also returns the end of the match.
+fn element(
+    text: &str,
+    head: &str,
+    known: LookupTables<'_>,
+    depth: usize,
+) -> Result<(Operand, usize), String> {
     let open = head.len();
     let close =
         closing(text.as_bytes(), open).ok_or_else(|| format!("`{}`: a `]` is missing", &text[open..]))?;
@@ -402,7 +447,7 @@ fn element(text: &str, head: &str, known: Known<'_>, depth: usize) -> Result<(Op
     Ok((Operand::Memory { offset, index, ty: Type::F }, close + 1))
 }
 
-/// Offset and index of an array's element, as expressions, given its subscripts.
+/// Offset and index of an array's element, as expressions of its subscripts.
 fn place(array: &NamedArray, subscripts: &str) -> Result<(String, String), String> {
     let NamedArray { name, base, sizes, .. } = array;
     let mut parts = vec![String::new()];
@@ -433,7 +478,7 @@ fn place(array: &NamedArray, subscripts: &str) -> Result<(String, String), Strin
     Ok((base.to_string(), index))
 }
 
-fn parse(text: &str, known: Known<'_>, depth: usize) -> Result<Live, String> {
+fn parse(text: &str, known: LookupTables<'_>, depth: usize) -> Result<WatchExpression, String> {
     if depth == 0 {
         return Err(format!("brackets nested more than {NESTING} deep"));
     }
@@ -471,7 +516,7 @@ fn parse(text: &str, known: Known<'_>, depth: usize) -> Result<Live, String> {
             at += 1 + length;
         }
         let is_name = head.starts_with(|first: char| first.is_ascii_alphabetic() || first == '_');
-        // Part of a name in braces, or a function: the language's own.
+        // A function, or a part of a name in braces, belongs to the assembler's language.
         let own = !is_name || matches!(bytes.get(at), Some(b'(' | b'{'));
         if operand.is_none() && own {
             plain.push_str(&text[start..at]);
@@ -488,7 +533,7 @@ fn parse(text: &str, known: Known<'_>, depth: usize) -> Result<Live, String> {
                 _ => return Err(format!("`{head}` is no register: it has no type")),
             }
         }
-        // As long as what it stands for, so that messages point at the right place.
+        // The placeholder has the length of the text, so that columns in messages stay right.
         let length = at - start;
         let placeholder = if head.len() == length && !head.starts_with('@') {
             head.to_owned()
@@ -499,16 +544,16 @@ fn parse(text: &str, known: Known<'_>, depth: usize) -> Result<Live, String> {
         operands.push((placeholder, operand, text[start..at].to_owned()));
     }
     let expression = Expression::parse(&plain).map_err(|diagnostics| rendered(&diagnostics))?;
-    Ok(Live { text: text.to_owned(), expression, operands })
+    Ok(WatchExpression { text: text.to_owned(), expression, operands })
 }
 
-/// Diagnostics without their head, which says that they are errors: whoever shows them says so.
+/// Rendered diagnostics without `error:`, which the caller prints.
 fn rendered(diagnostics: &Diagnostics) -> String {
     let text = diagnostics.render(false);
     text.split_once("]: ").map_or(text.as_str(), |(_, text)| text).trim_end().to_owned()
 }
 
-/// The bracket that closes the one at `open`.
+/// Index of the bracket that closes the bracket at `open`.
 fn closing(bytes: &[u8], open: usize) -> Option<usize> {
     let mut depth = 0;
     for (i, byte) in bytes.iter().enumerate().skip(open) {
@@ -522,7 +567,7 @@ fn closing(bytes: &[u8], open: usize) -> Option<usize> {
     None
 }
 
-/// The counters of a session.
+/// The session's own counters: cycle, period, address, depth.
 fn counter(name: &str) -> Option<Operand> {
     Some(match name {
         "cycle" => Operand::Cycle,
@@ -533,8 +578,8 @@ fn counter(name: &str) -> Option<Operand> {
     })
 }
 
-fn name(name: &str, known: Known<'_>) -> Result<Operand, String> {
-    let Known { program, names, .. } = known;
+fn name(name: &str, known: LookupTables<'_>) -> Result<Operand, String> {
+    let LookupTables { program, names, .. } = known;
     if let Some(found) = meanings(name, known) {
         return Ok(match found.fixed() {
             Some(Meaning::Constant(value)) => Operand::Constant(*value),
@@ -561,15 +606,15 @@ fn name(name: &str, known: Known<'_>) -> Result<Operand, String> {
     Err(format!("nothing is named `{name}`{near}"))
 }
 
-/// The meanings that a name of the source may have.
-fn meanings(name: &str, known: Known<'_>) -> Option<Name> {
-    let Known { program, constants, names } = known;
+/// Meanings of a name of the source.
+fn meanings(name: &str, known: LookupTables<'_>) -> Option<Name> {
+    let LookupTables { program, constants, names } = known;
     let constant = |value| Some(Meaning::Constant(value));
     let global = held(name, names).map(Meaning::Values).or_else(|| {
         let mut ports = program.inputs.iter().chain(&program.outputs).chain(&program.registers);
-        Some(Meaning::Values(vec![Held::always(ports.find(|port| port.name == name)?)]))
+        Some(Meaning::Values(vec![NameValue::always(ports.find(|port| port.name == name)?)]))
     });
-    // A label called `period` is common, and its address is not what `until period == 3` asks for.
+    // Many programs have a label `period`; in `until period == 3` the counter is meant.
     let symbol =
         || program.symbols.iter().find(|symbol| symbol.name == name).filter(|_| counter(name).is_none());
     let named = || constants.iter().find(|constant| constant.0 == name);
@@ -578,7 +623,7 @@ fn meanings(name: &str, known: Known<'_>) -> Option<Name> {
     Name::find(name, global, program, names)
 }
 
-/// Names that complete one that is being typed.
+/// Completions of a partial name.
 pub(crate) fn names<'p>(
     program: &'p Program,
     constants: &'p [(String, Value)],
@@ -592,7 +637,7 @@ pub(crate) fn names<'p>(
         .chain(names.values.iter().flat_map(|value| [value.name.as_str(), value.label.as_str()]))
 }
 
-/// The label and the distance that a code place such as `loop+3` names.
+/// Address of a code place such as `loop+3`.
 pub(crate) fn code_address(text: &str, program: &Program) -> Option<u32> {
     let (label, distance) = match text.split_once('+') {
         Some((label, distance)) => (label.trim(), distance.trim().parse().ok()?),

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The machine at a position: registers as the bundle to come reads them, data words, the source line at hand.
+//! The machine at a position: registers as the next bundle reads them, data words, and the source line at hand.
 
+use super::stale::Writers;
 use takt_asm::names::{Names, Position};
 use takt_emu::Emulator;
 use takt_isa::program::Location;
-use takt_isa::timing::Cycle;
-use takt_isa::{BundleAddress, Program, Register};
+use takt_isa::{Program, Register};
 
 /// A register or a data word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,18 +16,24 @@ pub enum Place {
     Word(u32),
 }
 
-/// The machine as expressions see it.
+/// View of the machine for the evaluation of expressions.
 pub(crate) struct Machine<'e> {
     pub(crate) emulator: &'e Emulator,
     pub(crate) periods: u64,
     pub(crate) names: &'e Names,
-    /// The line at hand, if it is not the one that the next bundle shows.
+    pub(super) writers: &'e Writers,
+    /// Line at hand, if it differs from the next bundle's line.
     pub(crate) line: Option<Location>,
+    /// Registers are read as by the line at hand, with results still in flight.
+    pub(crate) ahead: bool,
 }
 
 impl Machine<'_> {
-    /// The value that a bundle issued in the cycle to come would read.
+    /// Value that a bundle would read if it issued in the cycle to come.
     pub(crate) fn register(&self, register: Register) -> Option<u32> {
+        if let Some(coming) = self.coming(register).filter(|_| self.ahead) {
+            return Some(coming);
+        }
         let now = self.emulator.now();
         let due = self.emulator.in_flight().filter(|retire| retire.cycle == now);
         due.filter(|retire| retire.register == Some(register))
@@ -36,7 +42,7 @@ impl Machine<'_> {
             .or_else(|| self.emulator.register(register))
     }
 
-    /// The position of the source line at hand.
+    /// Position of the line at hand in the source order.
     pub(crate) fn at_hand(&self) -> Position {
         let (slots, next) = (self.emulator.machine().slots.len(), self.emulator.next_address());
         let start = next.index() * slots;
@@ -44,29 +50,6 @@ impl Machine<'_> {
         let word = lines.iter().position(|line| line.is_some() && *line == self.line);
         let position = word.and_then(|word| self.names.positions.get(start + word).copied().flatten());
         position.unwrap_or_else(|| self.names.at_hand(slots, next))
-    }
-
-    /// A bundle that is still to write a register although it comes before the line at hand in the source: what is there now
-    /// is older than what that line would read.
-    pub(crate) fn writes_yet(&self, register: Register) -> Option<BundleAddress> {
-        let program = self.emulator.program();
-        let (position, slots) = (self.at_hand(), program.machine.slots);
-        let end = BundleAddress::new(program.bundles());
-        self.emulator.next_address().until(end).find(|address| {
-            let words = address.index() * slots.len()..(address.index() + 1) * slots.len();
-            let Some(Ok(bundle)) = program.bundle(*address) else { return false };
-            let positions = self.names.positions.get(words).unwrap_or_default();
-            bundle.iter().zip(slots).zip(positions).any(|((instruction, slot), at)| {
-                instruction.writes(slot) == Some(register) && at.is_some_and(|at| at.order < position.order)
-            })
-        })
-    }
-
-    /// Cycles until the result in flight to a register is there, if there is one.
-    pub(crate) fn arrives(&self, register: Register) -> Option<Cycle> {
-        let now = self.emulator.now();
-        let flying = self.emulator.in_flight().filter(|retire| retire.register == Some(register));
-        flying.map(|retire| retire.cycle.saturating_sub(now)).filter(|left| *left > 0).max()
     }
 
     pub(crate) fn read(&self, place: Place, program: &Program) -> Result<u32, String> {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The meaning of a source's name at a position: the value that the line at hand would read.
+//! Meaning of a source's name at a position: the value that the line at hand would read.
 //!
-//! The assembler gives values of one name registers of their own, several of them one register one after the other, and a
-//! macro's names are other ones in each use: see [`takt_asm::names`].
+//! The assembler allots separate registers to the values of one name, shares a register between successive values, and renames a macro's
+//! names in each use: see [`takt_asm::names`].
 
 use super::machine::Machine;
 use std::collections::HashMap;
@@ -11,41 +11,41 @@ use takt_asm::names::{NamedValue, Names};
 use takt_isa::program::Port;
 use takt_isa::{BundleAddress, Program, Register, Type};
 
-/// The meaning of a name in one scope.
+/// Meaning of a name in one scope.
 #[derive(Clone, Debug)]
 pub(super) enum Meaning {
     /// A constant or an address.
     Constant(Value),
-    /// Registers: one, or one for each value.
-    Values(Vec<Held>),
+    /// Registers: a single one, or one for each value of the name.
+    Values(Vec<NameValue>),
 }
 
-/// A value in its register.
+/// A value of a name, with its register.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Held {
-    /// Its own name.
+pub(crate) struct NameValue {
+    /// Name of this value alone (`t.1`), or the source's name if it has one value.
     pub(crate) label: String,
     pub(crate) register: Register,
     pub(crate) ty: Type,
-    /// As [`NamedValue::orders`].
+    /// Order numbers in the source; see [`NamedValue::orders`].
     pub(crate) orders: Option<(u32, u32)>,
-    /// As [`NamedValue::bundles`].
+    /// First and last bundle of the value's life; see [`NamedValue::bundles`].
     pub(crate) bundles: Option<(BundleAddress, BundleAddress)>,
-    /// Bundles that write the register for the first time for another value, with that value's name.
+    /// Bundles that first write the register for another value, with that value's name.
     rivals: Vec<(BundleAddress, String)>,
 }
 
-impl Held {
-    pub(super) fn always(port: &Port) -> Held {
+impl NameValue {
+    pub(super) fn always(port: &Port) -> NameValue {
         let Port { name, register, ty } = port;
         let (label, register, ty) = (name.clone(), *register, *ty);
-        Held { label, register, ty, orders: None, bundles: None, rivals: Vec::new() }
+        NameValue { label, register, ty, orders: None, bundles: None, rivals: Vec::new() }
     }
 
-    fn of(value: &NamedValue, names: &Names) -> Held {
+    fn of(value: &NamedValue, names: &Names) -> NameValue {
         let rivals = names.values.iter().filter(|other| other.register == value.register && *other != value);
         let rivals = rivals.filter_map(|rival| Some((rival.bundles?.0, rival.label.clone())));
-        Held {
+        NameValue {
             label: value.label.clone(),
             register: value.register,
             ty: value.ty,
@@ -55,20 +55,19 @@ impl Held {
         }
     }
 
-    /// True if no other value uses its register.
+    /// The register holds no other value of the program.
     pub(crate) fn is_alone(&self) -> bool {
         self.rivals.is_empty()
     }
 
-    /// The addresses between which the next bundle must be for it to be there: above the first, up to the second. `None`:
-    /// it is there wherever the program is.
+    /// Address range of the next bundle in which the register holds the value: above the first, up to the second. `None`: everywhere.
     pub(crate) fn range(&self) -> Option<(BundleAddress, BundleAddress)> {
         let (first, _) = self.bundles.filter(|_| self.orders.is_some() || !self.is_alone())?;
         let rivals = self.rivals.iter().map(|(at, _)| *at).filter(|at| first < *at);
         Some((first, rivals.min().unwrap_or(BundleAddress::new(u32::MAX))))
     }
 
-    /// Checks that its register holds it, or is about to.
+    /// Checks that the register holds the value, or is about to.
     ///
     /// # Errors
     /// If the register holds another value; the message says which.
@@ -85,8 +84,8 @@ impl Held {
                 let at = program.bundle_text(*at);
                 Err(format!("{} is gone: its register {place} has {rival} since {at}", self.label))
             }
-            None if self.is_alone() => Ok(()),
-            // Until it arrives, the register has what it had before.
+            None if self.is_alone() || machine.ahead => Ok(()),
+            // Before its arrival the register still holds the previous value.
             None => match machine.arrives(self.register) {
                 None => Ok(()),
                 Some(left) => Err(format!("{} is in flight: it arrives in {left} cycles", self.label)),
@@ -95,33 +94,33 @@ impl Held {
     }
 }
 
-/// A register that a name stands for, and where.
+/// A register that a name stands for, with the value's range.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Life {
-    /// The value's own name: that of the source, or `t.1`.
+pub struct LiveRange {
+    /// Name of this value alone: the source's name, or `t.1`.
     pub label: String,
-    /// The register.
+    /// Register that holds the value.
     pub register: Register,
-    /// The type as which its bits are read.
+    /// Type in which the bits are interpreted.
     pub ty: Type,
-    /// The first bundle that writes it and the last one that uses it, if it lives only there.
+    /// First writing and last reading bundle of the value; `None` if the value lives everywhere.
     pub bundles: Option<(BundleAddress, BundleAddress)>,
-    /// True if the line at hand would read it.
+    /// The line at hand would read this value.
     pub at_hand: bool,
 }
 
-/// A name that does not stand for the same thing everywhere.
+/// A name whose meaning depends on the position.
 #[derive(Clone, Debug)]
 pub(super) struct Name {
     name: String,
-    /// The meaning where no scope has one of its own.
+    /// Meaning in scopes without a meaning of their own.
     global: Option<Meaning>,
-    /// By the number of the scope, ascending.
+    /// Meanings by scope number, ascending.
     scoped: Vec<(u32, Meaning)>,
 }
 
 impl Name {
-    /// The meanings of a name; `None` if it has none.
+    /// Meanings of a name; `None` if the name is unknown.
     pub(super) fn find(
         name: &str,
         global: Option<Meaning>,
@@ -137,7 +136,7 @@ impl Name {
         }
         let register = |name: &str| {
             held(name, names)
-                .or_else(|| known.get(name).map(|port| vec![Held::always(port)]))
+                .or_else(|| known.get(name).map(|port| vec![NameValue::always(port)]))
                 .map(Meaning::Values)
         };
         let scoped = (0..).zip(&names.scopes).skip(1).filter_map(|(number, scope)| {
@@ -157,7 +156,7 @@ impl Name {
         (name.global.is_some() || !name.scoped.is_empty()).then_some(name)
     }
 
-    /// Its meaning everywhere, if that is one.
+    /// The name's meaning, if it is the same at every position.
     pub(super) fn fixed(&self) -> Option<&Meaning> {
         match &self.global {
             Some(Meaning::Values(values)) if !matches!(&values[..], [only] if only.is_alone()) => None,
@@ -166,23 +165,23 @@ impl Name {
         }
     }
 
-    /// Its meaning where a bundle is next.
+    /// The name's meaning at the machine's position.
     ///
     /// # Errors
-    /// If the line there knows no such name.
-    pub(super) fn at(&self, machine: &Machine<'_>) -> Result<At<'_>, String> {
+    /// If the name is unknown in the scope at that position.
+    pub(super) fn at(&self, machine: &Machine<'_>) -> Result<NameMeaning<'_>, String> {
         let names = machine.names;
         let position = machine.at_hand();
         let scope = self.scoped.binary_search_by_key(&position.scope(), |(number, _)| *number);
         let meaning = scope.ok().map(|index| &self.scoped[index].1).or(self.global.as_ref());
         match meaning {
-            Some(Meaning::Constant(value)) => Ok(At::Constant(*value)),
+            Some(Meaning::Constant(value)) => Ok(NameMeaning::Constant(*value)),
             Some(Meaning::Values(values)) => {
                 let reads =
                     |(after, through): (u32, u32)| after < position.order && position.order <= through;
                 let at_hand = values.iter().find(|value| value.orders.is_some_and(reads));
                 let at_hand = at_hand.or_else(|| values.iter().find(|value| value.orders.is_none()));
-                at_hand.map(At::Value).ok_or_else(|| format!("no line here reads `{}`", self.name))
+                at_hand.map(NameMeaning::Value).ok_or_else(|| format!("no line here reads `{}`", self.name))
             }
             None => {
                 let full = self.scoped.iter().filter_map(|(number, _)| names.scopes.get(*number as usize));
@@ -199,8 +198,8 @@ impl Name {
         }
     }
 
-    /// Every value that it may stand for.
-    pub(super) fn values(&self) -> impl Iterator<Item = &Held> {
+    /// All values that the name may stand for.
+    pub(super) fn values(&self) -> impl Iterator<Item = &NameValue> {
         let all = self.global.iter().chain(self.scoped.iter().map(|(_, meaning)| meaning));
         all.flat_map(|meaning| match meaning {
             Meaning::Values(values) => &values[..],
@@ -209,22 +208,22 @@ impl Name {
     }
 }
 
-/// The meaning of a name at a position.
+/// Meaning of a name at a position.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum At<'n> {
+pub(super) enum NameMeaning<'n> {
     Constant(Value),
-    Value(&'n Held),
+    Value(&'n NameValue),
 }
 
-/// The values of a name that has several, or that shares its register; or the one value that has the name for its own.
-pub(super) fn held(name: &str, names: &Names) -> Option<Vec<Held>> {
+/// Values of a name that has several or shares its register; also the single value whose own name this is.
+pub(super) fn held(name: &str, names: &Names) -> Option<Vec<NameValue>> {
     let of = |wanted: &dyn Fn(&NamedValue) -> bool| {
         let values = names.values.iter().filter(|value| wanted(value));
-        let values: Vec<Held> = values.map(|value| Held::of(value, names)).collect();
+        let values: Vec<NameValue> = values.map(|value| NameValue::of(value, names)).collect();
         (!values.is_empty()).then_some(values)
     };
     of(&|value| value.name == name).or_else(|| {
-        // Under its own name a value is the same everywhere.
+        // A value's own name has the same meaning everywhere.
         let mut values = of(&|value| value.label == name)?;
         values.truncate(1);
         values[0].orders = None;

@@ -1,103 +1,119 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A debug session: a run that can be stopped anywhere, looked at, changed, and stepped forward and back, exactly to the cycle.
+//! Debug session: a cycle-accurate run with breakpoints, inspection, edits, and steps forward and back.
 //!
-//! **Positions.** The session stands between two cycles: at position *n*, cycles 0 to *n* - 1 have passed. What it shows is
-//! what a bundle would read that issued in cycle *n*. Breakpoints stop where their bundle is about to issue, so that what
-//! is set there is read by it.
+//! **Positions.** The session stands between two cycles: at position *n*, cycles 0 to *n* - 1 have passed. Registers show the values that a
+//! bundle would read if it issued in cycle *n*. A breakpoint stops just before its bundle issues, so that the bundle reads values set
+//! there.
 //!
-//! **Going back.** The machine is deterministic, and what came from outside (inputs of each period, what the user set) is
-//! recorded. Checkpoints are kept along the way, at most [`CHECKPOINTS`], ever farther apart; going back is restoring one
-//! and running from there.
+//! **Going back.** The machine is deterministic, and external events (inputs of each period, edits by the user) are recorded. The session
+//! keeps at most [`CHECKPOINTS`] checkpoints, at growing distances, and goes back by a restore and a run forward.
 //!
-//! **Inputs.** Without recorded inputs periods follow one another with the inputs as they are. With them, each period takes
-//! the next row when its predecessor's `wait` issues, as `takt run --inputs` does; after the last, the run ends.
+//! **Inputs.** Without recorded inputs, period follows period with constant inputs. With a recording, each period takes the next row when
+//! the previous `wait` issues, as in `takt run --inputs`; after the last row the run ends.
 
 mod expression;
-mod interest;
-mod known;
 mod machine;
 mod meaning;
 mod number;
+mod previous_values;
 mod run;
 mod search;
+mod search_positions;
+mod stale;
 mod stops;
 
-pub use expression::Live;
-pub(crate) use expression::Reads;
+pub(crate) use expression::ReadSet;
+pub use expression::WatchExpression;
 pub use machine::Place;
-pub use meaning::Life;
-pub use number::{Shown, UlpDistance, hex_float, ulp_distance};
+pub use meaning::LiveRange;
+pub use number::{UlpDistance, ValueNotations, hex_float, ulp_distance};
 pub(crate) use search::Search;
+pub use stale::StaleReason;
+use stale::Writers;
 use stops::Watcher;
-pub use stops::{Stop, Test, Where};
+pub(crate) use stops::noted;
+pub use stops::{BreakpointLocation, Stop, Test};
 
-use crate::along::{self, Along};
+use crate::samples::{self, ThinnedSeries};
 use machine::Machine;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::num::NonZeroU64;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 use takt_asm::diag::Diagnostics;
 use takt_asm::expr::Value;
 use takt_asm::names::Names;
 use takt_emu::{Emulator, Fault, LoadError, PeriodReport, Retire, Rows, Status};
 use takt_isa::program::Location;
+use takt_isa::text::element_names;
 use takt_isa::timing::{Cause, Cycle};
 use takt_isa::{BundleAddress, Program, Register, SlotIndex, Type};
 
-/// Checkpoints that are kept. At 10⁸ cycles they are at most 2¹⁹ cycles apart.
-pub const CHECKPOINTS: usize = along::MOST;
-/// Cycles between checkpoints at first.
+/// Maximal number of checkpoints. At 10⁸ cycles their distance is at most 2¹⁹ cycles.
+pub const CHECKPOINTS: usize = samples::MOST;
+/// Initial distance between checkpoints, in cycles.
 const INTERVAL: Cycle = 1 << 12;
-/// Cycles that run at once at most: so often is looked for an interrupt.
+/// Maximal number of cycles between two polls for an interrupt.
 const SLICE: Cycle = 1 << 20;
-/// Positions that are searched first, looking back.
+/// Initial number of positions examined in a search back; it grows.
 const WINDOW: Cycle = 1 << 6;
-/// Cycles for which a command runs unless told otherwise.
+/// Default for the maximal number of cycles of a command.
 pub const RUN_LIMIT: Cycle = 1_000_000_000;
 
-/// The options of a session.
+/// Options of a session.
 #[derive(Clone, Default)]
 pub struct Options {
-    /// Values of input ports, register and bits, one row for each period; `None`: they are 0, and stay as they are set.
+    /// Input ports as pairs of register and bits, one row for each period; `None`: they start at 0 and change only by edits.
     pub inputs: Option<Arc<Rows>>,
-    /// Cycles between ticks; `None`: the tick comes when the program is ready.
+    /// Cycles between ticks; `None`: a tick comes as soon as the program waits.
     pub tick: Option<NonZeroU64>,
     /// Named constants of the source.
     pub constants: Vec<(String, Value)>,
-    /// Sources, by the names that the program has for them.
+    /// Source texts, under the names that the program has for them.
     pub sources: Vec<(String, String)>,
-    /// The meanings of the source's names.
+    /// Meanings of the source's names, from the assembler.
     pub names: Names,
-    /// The state shared with whoever watches.
+    /// State shared with an observer of long commands.
     pub control: Arc<Control>,
 }
 
-/// The state that a session shares with whoever watches a command that runs, from another thread or a signal handler.
+/// State shared by a session and an observer of a running command, in another thread or a signal handler.
 #[derive(Default, Debug)]
 pub struct Control {
     interrupt: AtomicBool,
     cycle: AtomicU64,
+    /// Breakpoints passed although their conditions read stale values, by number, with the reason.
+    doubts: Mutex<BTreeMap<u32, String>>,
 }
 
 impl Control {
-    /// Stops the command that runs.
+    /// Interrupts the running command.
     pub fn interrupt(&self) {
         self.interrupt.store(true, Ordering::Relaxed);
     }
 
-    /// Forgets an interrupt that no command has heard.
+    /// Clears an interrupt that no command has consumed.
     pub fn clear(&self) {
         self.interrupt.store(false, Ordering::Relaxed);
     }
 
-    /// Tells how far the command has come; whether it is to stop.
+    /// Reports the command's progress; returns whether to stop.
     pub(crate) fn report(&self, cycle: Cycle) -> bool {
         self.cycle.store(cycle, Ordering::Relaxed);
         self.interrupt.load(Ordering::Relaxed)
     }
 
-    /// The position that the command has come to.
+    /// Records that a breakpoint was passed although its condition could not be decided.
+    fn doubt(&self, id: u32, reason: String) {
+        self.doubts.lock().unwrap_or_else(PoisonError::into_inner).entry(id).or_insert(reason);
+    }
+
+    /// Takes the breakpoints that were passed undecided, by number, with the first reason of each.
+    pub fn take_doubts(&self) -> BTreeMap<u32, String> {
+        std::mem::take(&mut self.doubts.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    /// Progress of the running command, in cycles.
     pub fn cycle(&self) -> Cycle {
         self.cycle.load(Ordering::Relaxed)
     }
@@ -117,95 +133,95 @@ pub(crate) fn put(emulator: &mut Emulator, place: Place, bits: u32) {
     }
 }
 
-/// The reason why a command stopped.
+/// Reason why a command stopped.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Why {
-    /// It is done.
+pub enum StopReason {
+    /// The command is complete.
     Done,
-    /// A breakpoint or watchpoint, by number. For a watchpoint, what was seen before and is seen now.
+    /// A breakpoint or watchpoint; for a watchpoint, with the values before and after the change.
     Stop {
-        /// Its number.
+        /// Number of the stop.
         id: u32,
-        /// Its text.
+        /// Text of the stop, as the user wrote it.
         text: String,
-        /// Before and now, where it watches.
+        /// Values before and after the change, for a watchpoint.
         change: Option<(String, String)>,
     },
-    /// The expression holds.
+    /// The expression of [`Move::Until`] is not zero.
     Holds,
-    /// The beginning was reached.
+    /// The run is back at its beginning.
     Start,
     /// The program has halted.
     Halted,
-    /// The last period of the recorded inputs is over.
+    /// The recorded inputs end with this period.
     InputsEnd,
-    /// The program stopped with a fault.
+    /// A fault stopped the program.
     Fault(Fault),
-    /// The command ran for as many cycles as it may.
+    /// The command reached its limit of cycles.
     Limit(Cycle),
-    /// Somebody interrupted it.
+    /// The user interrupted the command.
     Interrupted,
-    /// A machine that runs elsewhere differs from its emulator: the first difference, in words.
+    /// A machine that runs elsewhere differs from its emulator; the text is the first difference.
     Differs(String),
-    /// Something else, in words.
+    /// Another error, in words.
     Other(String),
 }
 
-/// A move of a run.
+/// A move along a run.
 #[derive(Clone, Debug)]
 pub enum Move {
-    /// So many steps.
+    /// A number of steps forward.
     Step(Unit, u64),
-    /// So many steps back.
+    /// A number of steps back.
     Back(Unit, u64),
-    /// On to a breakpoint or watchpoint.
+    /// Forward to a breakpoint or watchpoint.
     Resume,
-    /// Back to one.
+    /// Back to a breakpoint or watchpoint.
     ResumeBack,
-    /// On to where an expression is not zero.
-    Until(Box<Live>),
-    /// To where so many cycles have passed.
+    /// Forward to a position at which an expression is not zero.
+    Until(Box<WatchExpression>),
+    /// To the position after this number of cycles.
     Cycle(Cycle),
-    /// To where so many periods have ended.
+    /// To the position after this number of periods.
     Period(u64),
-    /// To the beginning.
+    /// To the first position of the run.
     Start,
 }
 
-/// The unit of a step.
+/// Unit of a step.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Unit {
-    /// A cycle.
+    /// A single clock cycle.
     Cycle,
-    /// To where a bundle is about to issue.
+    /// To a position just before a bundle issues.
     Bundle,
-    /// To where the first bundle of another source line is about to issue.
+    /// To a position just before the first bundle of another source line issues.
     Line,
-    /// To where a period's `wait` has issued.
+    /// To the position after a period's `wait`.
     Period,
-    /// As a bundle, but calls are passed over whole.
+    /// A bundle, or a subroutine call with its whole body.
     Call,
-    /// To where the subroutine's caller goes on.
+    /// To the continuation in the subroutine's caller.
     Out,
 }
 
 impl Unit {
-    /// The names of all.
+    /// Names of all units, in the order of the variants.
     pub const NAMES: [&str; 6] = ["cycle", "bundle", "line", "period", "call", "out"];
     const ALL: [Unit; 6] = [Unit::Cycle, Unit::Bundle, Unit::Line, Unit::Period, Unit::Call, Unit::Out];
 
-    /// Its name.
+    /// Name of the unit in commands.
     pub fn name(self) -> &'static str {
         Unit::NAMES[self as usize]
     }
 
-    /// The unit of a name.
+    /// Unit with this name in commands.
     pub fn named(name: &str) -> Option<Unit> {
         Unit::ALL.into_iter().find(|unit| unit.name() == name)
     }
 }
 
-/// A value that was set by hand.
+/// A value set by the user, replayed at its cycle.
 #[derive(Clone, Copy, Debug)]
 struct Edit {
     cycle: Cycle,
@@ -213,44 +229,45 @@ struct Edit {
     bits: u32,
 }
 
-/// The run up to some position, and what is needed to go on from there.
+/// State of the run at a position, sufficient to continue from there.
 #[derive(Clone)]
 struct Core {
     emulator: Emulator,
-    /// Periods that have ended.
+    /// Number of ended periods.
     periods: u64,
-    /// True if a period ended in the cycle before.
+    /// A period ended in the previous cycle.
     boundary: bool,
     report: Option<PeriodReport>,
-    /// Edits that have been made.
+    /// Number of edits already made.
     edits: usize,
 }
 
-/// A debug session.
+/// Debug session of one program: an emulated run with checkpoints, edits and stops.
 pub struct Session {
     options: Options,
     core: Core,
-    /// By cycle, ascending; the first is cycle 0.
-    checkpoints: Along<Core>,
-    /// By cycle, ascending.
+    writers: Writers,
+    /// Checkpoints by ascending cycle; the first is at cycle 0.
+    checkpoints: ThinnedSeries<Core>,
+    /// Edits, by ascending cycle.
     edits: Vec<Edit>,
     stops: Vec<(u32, Stop)>,
-    /// The watched values at positions of the run.
-    known: Along<Watcher>,
+    /// Watchers with their known values, along the run.
+    known: ThinnedSeries<Watcher>,
     next_id: u32,
-    /// The line that a breakpoint stopped at, and the cycle.
+    /// Line of the breakpoint that stopped the run, and the cycle at which it did.
     line: Option<(Cycle, Location)>,
-    /// True if the machine that it looks at runs elsewhere, so that cycles and calls are not known.
+    /// The machine runs elsewhere: cycles and calls are not known.
     afar: bool,
-    /// Cycles for which a command may run.
+    /// Maximal number of cycles of a command.
     pub run_limit: Cycle,
 }
 
-/// The end of a run.
-type End = Why;
+/// Reason for the end of a run.
+type End = StopReason;
 
 impl Session {
-    /// A session at the beginning of a program.
+    /// A session at the start of a program.
     ///
     /// # Errors
     /// If the machine cannot hold the program.
@@ -258,17 +275,18 @@ impl Session {
         let mut emulator = Emulator::new(program)?;
         emulator.set_tick_period(options.tick);
         for port in program.inputs.iter().filter(|_| options.inputs.is_none()) {
-            // The loader accepted the ports.
+            // Cannot fail: the loader accepted the ports.
             let _ = emulator.set_input_bits(port.register, 0);
         }
         let core = Core { emulator, periods: 0, boundary: true, report: None, edits: 0 };
         let mut session = Session {
+            writers: Writers::of(program, &options.names),
             options,
             core,
-            checkpoints: Along::every(INTERVAL),
+            checkpoints: ThinnedSeries::every(INTERVAL),
             edits: Vec::new(),
             stops: Vec::new(),
-            known: Along::every(INTERVAL),
+            known: ThinnedSeries::every(INTERVAL),
             next_id: 1,
             line: None,
             afar: false,
@@ -279,40 +297,40 @@ impl Session {
         Ok(session)
     }
 
-    // ---- What there is to see.
+    // ---- Inspection.
 
-    /// The program.
+    /// Program of the session.
     pub fn program(&self) -> &Program {
         self.core.emulator.program()
     }
 
-    /// The machine at this position. (Registers are better read through [`Session::register`].)
+    /// Machine at this position. (Read registers through [`Session::register`].)
     pub fn emulator(&self) -> &Emulator {
         &self.core.emulator
     }
 
-    /// Cycles that have passed.
+    /// Number of cycles since reset.
     pub fn cycle(&self) -> Cycle {
         self.core.emulator.now()
     }
 
-    /// Periods that have ended.
+    /// Number of ended periods.
     pub fn period(&self) -> u64 {
         self.core.periods
     }
 
-    /// The last period that ended.
+    /// Report on the last ended period.
     pub fn report(&self) -> Option<&PeriodReport> {
         self.core.report.as_ref()
     }
 
-    /// The bundle that issues next, and the cycle in which it will if the program runs.
+    /// Next bundle, and the cycle of its issue if the program runs on.
     pub fn next_issue(&mut self) -> (BundleAddress, Option<Cycle>) {
         let issue = self.core.emulator.upcoming().map(|upcoming| upcoming.issue.cycle);
         (self.core.emulator.next_address(), issue)
     }
 
-    /// The cause that the cycle to come is charged to; `None` if a bundle issues in it, or the machine has stopped.
+    /// Stall cause of the cycle to come; `None` if a bundle issues, or the machine has stopped.
     pub fn stall(&mut self) -> Option<Cause> {
         let now = self.cycle();
         match self.core.emulator.status() {
@@ -322,7 +340,7 @@ impl Session {
         }
     }
 
-    /// The source line at hand: the one that a breakpoint stopped at, or else that of the bundle that issues next.
+    /// Source line at hand: the line that a breakpoint stopped at, otherwise the line of the next bundle.
     pub fn location(&self) -> Option<Location> {
         if let Some(line) = self.machine().line {
             return Some(line);
@@ -331,23 +349,23 @@ impl Session {
         self.program().location(address)
     }
 
-    /// A fault of this program, at its source line.
+    /// Diagnostic of a fault, at its source line.
     pub fn diagnose(&self, fault: &Fault) -> Diagnostics {
         crate::fault::diagnose(fault, self.program(), &self.options.sources)
     }
 
-    /// The text of a source line, without its end.
+    /// Text of a source line, without its line break.
     pub fn source_line(&self, location: Location) -> Option<&str> {
         self.source(location.file)?.lines().nth(location.line.checked_sub(1)? as usize)
     }
 
-    /// The text of a source by its number in the program.
+    /// Text of a source file by its number in the program.
     pub fn source(&self, file: u32) -> Option<&str> {
         let name = self.program().files.get(file as usize)?;
         self.options.sources.iter().find(|(known, _)| known == name).map(|(_, text)| text.as_str())
     }
 
-    /// The operations of a bundle as text, one for each slot; `None` for those that do nothing.
+    /// Operations of a bundle as text, by slot; `None` for an idle slot.
     pub fn bundle(&self, address: BundleAddress) -> Vec<Option<String>> {
         let program = self.program();
         let Some(bundle) = program.bundle(address) else { return Vec::new() };
@@ -370,16 +388,17 @@ impl Session {
     fn machine(&self) -> Machine<'_> {
         let Core { emulator, periods, .. } = &self.core;
         let line = self.line.filter(|(cycle, _)| *cycle == self.cycle()).map(|(_, line)| line);
-        Machine { emulator, periods: *periods, names: &self.options.names, line }
+        let (names, writers) = (&self.options.names, &self.writers);
+        Machine { emulator, periods: *periods, names, writers, line, ahead: false }
     }
 
-    /// The value that a bundle issued in the cycle to come would read from a register.
+    /// Value of a register for a bundle that would issue in the cycle to come.
     pub fn register(&self, register: Register) -> Option<u32> {
         self.machine().register(register)
     }
 
-    /// Operations issued and not yet written back, in the order of their writebacks, each with the cycles to go: 1 for
-    /// one whose result is there for the bundle that issues next but one. What is there already is left out.
+    /// Operations before their writeback, in the order of writebacks, each with its remaining cycles: 1 if the bundle after the next can
+    /// read the result. Results that the next bundle can read are left out.
     pub fn in_flight(&self) -> Vec<(Retire, Cycle)> {
         let now = self.cycle();
         let pending = self.core.emulator.in_flight().filter(|retire| retire.cycle > now);
@@ -391,32 +410,37 @@ impl Session {
     /// Parses an expression over this program.
     ///
     /// # Errors
-    /// If something is wrong with it.
-    pub fn parse(&self, text: &str) -> Result<Live, String> {
+    /// If the expression is malformed, or a name is unknown.
+    pub fn parse(&self, text: &str) -> Result<WatchExpression, String> {
         if text.trim().is_empty() {
             return Err("an expression is missing".to_owned());
         }
-        let live = Live::parse(text.trim(), self.program(), &self.options.constants, &self.options.names)?;
+        let live = WatchExpression::parse(
+            text.trim(),
+            self.program(),
+            &self.options.constants,
+            &self.options.names,
+        )?;
         match live.hidden().filter(|_| self.afar) {
             Some(name) => Err(format!("a board does not report `{name}`; `period` and `address` are known")),
             None => Ok(live),
         }
     }
 
-    /// The value of an expression.
+    /// Evaluates an expression at this position.
     ///
     /// # Errors
-    /// If it has none; the message says why.
-    pub fn evaluate(&self, live: &Live) -> Result<Value, String> {
+    /// If an operand has no value here; the message says why.
+    pub fn evaluate(&self, live: &WatchExpression) -> Result<Value, String> {
         live.evaluate(&self.machine(), self.program())
     }
 
-    /// The register or data word that an expression is, if it is one, with the type that it is read as, and its bits.
+    /// Register or data word that an expression denotes, with its type and bits; `None` if it is a computed value.
     ///
     /// # Errors
-    /// If it has none; the message says why.
+    /// If the value is not in its register here, or an index has no value; the message says why.
     #[allow(clippy::type_complexity)]
-    pub fn place(&self, live: &Live) -> Result<Option<(Place, Type, Option<u32>)>, String> {
+    pub fn place(&self, live: &WatchExpression) -> Result<Option<(Place, Type, Option<u32>)>, String> {
         let (machine, program) = (self.machine(), self.program());
         let Some((place, ty)) = live.place(&machine, program)? else { return Ok(None) };
         let bits = match place {
@@ -426,36 +450,59 @@ impl Session {
         Ok(Some((place, ty, bits)))
     }
 
-    /// The value's own name (`t.1`), if an expression is a name that stands for several, of which this is the one at hand.
-    pub fn label(&self, live: &Live) -> Option<String> {
+    /// Name of the value at hand (`t.1`), if the expression is a name with several values.
+    pub fn label(&self, live: &WatchExpression) -> Option<String> {
         live.label(&self.machine())
     }
 
-    /// A bundle that is still to write a register although it comes before the line at hand in the source: what the register
-    /// holds is older than what that line would read.
-    pub fn writes_yet(&self, register: Register) -> Option<BundleAddress> {
-        self.machine().writes_yet(register)
+    /// Reason why a register's value is older than the line at hand would read; `None` if it is current.
+    pub fn stale(&self, register: Register) -> Option<StaleReason> {
+        self.machine().stale(register)
     }
 
-    /// The registers that an expression, if it is a name of any, may stand for, and where each lives.
-    pub fn lives(&self, live: &Live) -> Vec<Life> {
+    /// Note on the stale operands of an expression; `None` if all are current.
+    pub fn note(&self, live: &WatchExpression) -> Option<String> {
+        live.note(&self.machine(), self.program())
+    }
+
+    /// State shared with an observer.
+    pub fn control(&self) -> &Control {
+        &self.options.control
+    }
+
+    /// Registers that an expression may stand for, with their ranges, if it is a name of any.
+    pub fn lives(&self, live: &WatchExpression) -> Vec<LiveRange> {
         live.lives(&self.machine(), self.program())
     }
 
-    /// Cycles until the result in flight to a register is there; `None` if none is.
-    pub fn arrives(&self, register: Register) -> Option<Cycle> {
-        self.machine().arrives(register)
+    /// Elements of an array, as expressions name them, in index order; `None` if the name is no array's.
+    pub fn elements(&self, name: &str) -> Option<Vec<String>> {
+        let names = &self.options.names;
+        if let Some(array) = names.arrays.iter().find(|array| array.name == name) {
+            return Some(element_names(&array.name, &array.sizes));
+        }
+        // An array in registers: each element is a separate value.
+        let mut all: Vec<&str> = names.values.iter().map(|value| value.name.as_str()).collect();
+        all.extend(self.program().registers.iter().map(|port| port.name.as_str()));
+        let is_element = |other: &str| other.strip_prefix(name).is_some_and(|rest| rest.starts_with('['));
+        let mut elements: Vec<String> = Vec::new();
+        for element in all.into_iter().filter(|other| is_element(other)) {
+            if !elements.iter().any(|known| known == element) {
+                elements.push(element.to_owned());
+            }
+        }
+        (!elements.is_empty()).then_some(elements)
     }
 
-    /// Names that begin like this.
+    /// Names with this prefix.
     pub fn names(&self, beginning: &str) -> Vec<String> {
         let names = expression::names(self.program(), &self.options.constants, &self.options.names);
         let found: BTreeSet<&str> = names.filter(|name| name.starts_with(beginning)).collect();
         found.into_iter().map(str::to_owned).collect()
     }
 
-    /// Looks at a machine that somebody else runs, of this program: what there is to see is its. This session does not move it.
-    /// `boundary`: whether a period has just ended.
+    /// Shows the state of a machine that another party runs with this program; this session does not move it. `boundary`: a period has just
+    /// ended.
     pub(crate) fn look(&mut self, emulator: Emulator, periods: u64, boundary: bool) {
         self.core = Core { emulator, periods, boundary, report: None, edits: 0 };
         self.checkpoints.clear();
@@ -463,13 +510,13 @@ impl Session {
         self.known.clear();
     }
 
-    /// Looks at a machine that runs elsewhere, between two periods.
+    /// Shows the state of a machine that runs elsewhere, between two periods.
     pub(crate) fn look_afar(&mut self, emulator: Emulator, periods: u64) {
         self.afar = true;
         self.look(emulator, periods, true);
     }
 
-    /// This position's time, as far as it is known.
+    /// Time of this position: the cycle, or the period if the machine runs elsewhere.
     pub(crate) fn time(&self) -> String {
         match self.afar {
             true => format!("period {}", self.period()),
@@ -477,14 +524,14 @@ impl Session {
         }
     }
 
-    /// The same, with the periods that have passed.
+    /// Time of this position, with the number of periods.
     pub(crate) fn times(&self) -> String {
         if self.afar { self.time() } else { format!("{}, period {}", self.time(), self.period()) }
     }
 
-    /// The registers and memory that an expression reads, or, without one, the stops.
-    pub(crate) fn reads(&self, live: Option<&Live>) -> Reads {
-        let mut reads = Reads::default();
+    /// Registers and memory that an expression reads; without an expression, the union over all stops.
+    pub(crate) fn reads(&self, live: Option<&WatchExpression>) -> ReadSet {
+        let mut reads = ReadSet::default();
         match live {
             Some(live) => live.reads(&mut reads),
             None => self.stops.iter().for_each(|(_, stop)| stop.reads(&mut reads)),
@@ -494,10 +541,10 @@ impl Session {
 
     // ---- Changing.
 
-    /// Sets a register or a data word. What was recorded of the run after this position is forgotten.
+    /// Sets a register or a data word. Records of the run after this position are dropped.
     ///
     /// # Errors
-    /// If there is no such place.
+    /// If the register or data word does not exist, or is `zero`.
     pub fn set(&mut self, place: Place, bits: u32) -> Result<(), String> {
         match place {
             Place::Register(Register::ZERO) => return Err("`zero` is always zero".to_owned()),
@@ -518,7 +565,7 @@ impl Session {
         Ok(())
     }
 
-    /// Makes the edits of this position that have not been made.
+    /// Makes the pending edits of this position.
     fn make_edits(&mut self) {
         let now = self.core.emulator.now();
         while let Some(edit) = self.edits.get(self.core.edits).filter(|edit| edit.cycle == now) {
@@ -527,18 +574,18 @@ impl Session {
         }
     }
 
-    /// Sets the inputs of the period to come.
+    /// Sets the inputs of the next period from the recording.
     fn set_row(&mut self) {
         let Some(rows) = &self.options.inputs else { return };
         for &(register, bits) in rows.get(self.core.periods as usize).into_iter().flatten() {
-            // Rows are made for the program's ports.
+            // Cannot fail: rows are made for the program's ports.
             let _ = self.core.emulator.set_input_bits(register, bits);
         }
     }
 
     // ---- Breakpoints and watchpoints.
 
-    /// Adds a breakpoint or watchpoint; its number.
+    /// Adds a breakpoint or watchpoint; returns its number.
     pub fn add_stop(&mut self, stop: Stop) -> u32 {
         let id = self.next_id;
         self.next_id += 1;
@@ -546,19 +593,19 @@ impl Session {
         id
     }
 
-    /// The number that the next one gets.
+    /// Counter for the number of the next stop.
     pub(crate) fn next_stop(&mut self) -> &mut u32 {
         &mut self.next_id
     }
 
-    /// Removes one; whether there was one.
+    /// Removes a breakpoint or watchpoint; returns whether it existed.
     pub fn remove_stop(&mut self, id: u32) -> bool {
         let before = self.stops.len();
         self.stops.retain(|(known, _)| *known != id);
         self.stops.len() < before
     }
 
-    /// All of them.
+    /// All breakpoints and watchpoints, with their numbers.
     pub fn stops(&self) -> &[(u32, Stop)] {
         &self.stops
     }

@@ -1,35 +1,35 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Numbers as a debugger shows them.
+//! Notations of numbers in the debugger.
 
 use crate::value;
 use takt_isa::Type;
 
-/// A value in every way in which it can be read.
+/// A value in all notations.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Shown {
-    /// As its type has it: the shortest decimal that reads back as the same binary32, or an integer, or hexadecimal.
+pub struct ValueNotations {
+    /// Text in the notation of the type: the shortest decimal that reads back as the same binary32, an integer, or hexadecimal.
     pub text: String,
-    /// As binary32 in hexadecimal, which the assembler reads.
+    /// Hexadecimal notation of the binary32 value, in the assembler's syntax.
     pub hex_float: String,
-    /// As binary32 in decimal.
+    /// Value as a binary32 number.
     pub float: f32,
-    /// As an integer.
+    /// Value as a signed integer.
     pub integer: i32,
-    /// Its bits.
+    /// Raw bits, from which all other fields are derived.
     pub bits: u32,
 }
 
-impl Shown {
-    /// The bits as a value of a type.
-    pub fn new(ty: Type, bits: u32) -> Shown {
+impl ValueNotations {
+    /// Bits as a value of a type, in all notations.
+    pub fn new(ty: Type, bits: u32) -> ValueNotations {
         let (float, integer) = (f32::from_bits(bits), bits.cast_signed());
         let text = value::text(ty, bits);
-        Shown { text, hex_float: hex_float(float), float, integer, bits }
+        ValueNotations { text, hex_float: hex_float(float), float, integer, bits }
     }
 
-    /// Bits as their type has them, then in the other ways.
+    /// Bits in the notation of their type, then in the others.
     pub fn every_way(ty: Type, bits: u32) -> String {
-        let shown = Shown::new(ty, bits);
+        let shown = ValueNotations::new(ty, bits);
         match ty {
             Type::F => format!("{:<14} {}  0x{bits:08x}", shown.text, shown.hex_float),
             Type::I => format!("{:<14} 0x{bits:08x}", shown.text),
@@ -38,7 +38,7 @@ impl Shown {
     }
 }
 
-/// A binary32 value in hexadecimal, exactly: `0x1.99999ap-4`.
+/// Exact hexadecimal notation of a binary32 value: `0x1.99999ap-4`.
 pub fn hex_float(value: f32) -> String {
     if !value.is_finite() {
         return format!("{value:?}");
@@ -57,25 +57,25 @@ pub fn hex_float(value: f32) -> String {
     format!("{sign}0x{lead}{point}{digits}p{power}")
 }
 
-/// The distance of two values in units in the last place of binary32.
+/// Distance of two values in binary32 steps and in ulp.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UlpDistance {
-    /// Of the values rounded to binary32: how many numbers further. `None` if one is a NaN.
+    /// Number of binary32 steps between the rounded values; `None` if one is a NaN.
     pub steps: Option<u64>,
-    /// Of the first, exactly, from the second, exactly, in units of the second's last place.
+    /// Exact difference of the unrounded values, in ulp of the second.
     pub error: f64,
 }
 
-/// The distance of `a` from `b`.
+/// Distance of `a` from `b`.
 pub fn ulp_distance(a: f64, b: f64) -> UlpDistance {
-    // Ordered as the numbers are, the two zeros being one.
+    // Monotonic integer order of binary32, with both zeros equal.
     let order = |value: f32| {
         let magnitude = i64::from(value.to_bits() & 0x7fff_ffff);
         if value.is_sign_negative() { -magnitude } else { magnitude }
     };
     let (near_a, near_b) = (a as f32, b as f32);
     let steps = (!near_a.is_nan() && !near_b.is_nan()).then(|| order(near_a).abs_diff(order(near_b)));
-    // The last place of a number of this exponent; of subnormals that of the smallest normal.
+    // The ulp of this exponent; subnormals have the ulp of the smallest normal number.
     let exponent = (near_b.to_bits() >> 23 & 0xff).max(1) as i32;
     UlpDistance { steps, error: (a - b) / 2f64.powi(exponent - 150) }
 }

@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Going forward and back: to a cycle or a period, by steps, to where something is found.
+//! Movement along a run: to a cycle or a period, by steps, and to the hit of a search.
 
-use super::interest::Interest;
 use super::machine::Machine;
-use super::stops::{Stop, Where};
-use super::{Core, Cycle, End, Live, Move, SLICE, Session, Unit, WINDOW, Why};
+use super::search_positions::Interest;
+use super::stops::{BreakpointLocation, Stop};
+use super::{Core, Cycle, End, Move, SLICE, Session, StopReason, Unit, WINDOW, WatchExpression};
 use std::sync::atomic::Ordering;
-use takt_emu::{Emulator, PeriodError, Upcoming};
+use takt_emu::{Emulator, PeriodError, PredictedIssue};
 use takt_isa::program::Location;
 use takt_isa::{BundleAddress, Flow};
 
 impl Session {
-    /// Runs on to a cycle; less far if the run ends or is interrupted.
+    /// Runs forward to a cycle, or to an earlier end or interrupt.
     fn advance(&mut self, target: Cycle) -> Result<(), End> {
         self.make_edits();
         while self.cycle() < target {
@@ -20,16 +20,16 @@ impl Session {
         Ok(())
     }
 
-    /// Runs on towards a cycle: to the end of the period, to the next edit or checkpoint, if they come before.
+    /// Runs one slice towards a cycle: at most to the end of the period, the next edit, or the next checkpoint.
     fn slice(&mut self, target: Cycle) -> Result<(), End> {
         let control = &self.options.control;
         control.cycle.store(self.cycle(), Ordering::Relaxed);
         if control.interrupt.load(Ordering::Relaxed) {
             control.clear();
-            return Err(Why::Interrupted);
+            return Err(StopReason::Interrupted);
         }
         if self.options.inputs.as_ref().is_some_and(|rows| self.core.periods >= rows.len() as u64) {
-            return Err(Why::InputsEnd);
+            return Err(StopReason::InputsEnd);
         }
         let edit = self.edits.get(self.core.edits).map_or(Cycle::MAX, |edit| edit.cycle);
         let checkpoint = self.checkpoints.due(self.cycle());
@@ -45,31 +45,30 @@ impl Session {
                 self.core.report = Some(report);
                 self.set_row();
             }
-            Err(PeriodError::Fault(fault)) => return Err(Why::Fault(fault)),
-            // The position behind the last cycle is one of the run's: who goes on from there learns that it has halted.
+            Err(PeriodError::Fault(fault)) => return Err(StopReason::Fault(fault)),
+            // The position after the last cycle belongs to the run; only the next move reports the halt.
             Err(PeriodError::Halted) if self.cycle() > begin => {}
-            // Nothing asks for ports by name.
-            Err(PeriodError::Halted | PeriodError::Port(_)) => return Err(Why::Halted),
+            // A port error cannot occur: this loop names no ports.
+            Err(PeriodError::Halted | PeriodError::Port(_)) => return Err(StopReason::Halted),
         }
         if self.cycle() >= checkpoint {
-            // Before its edits.
+            // The checkpoint is taken before this position's edits.
             self.checkpoints.add(self.cycle(), self.core.clone());
         }
         self.make_edits();
         Ok(())
     }
 
-    /// Runs again from the beginning to this position, and shows the machine after each cycle in which a bundle issued, with that
-    /// bundle. The session stays where it is.
+    /// Repeats the run from reset to this position, and shows the machine after each issue, with the bundle. The session stays where it is.
     ///
     /// # Returns
-    /// [`Why::Done`], or that it was interrupted.
-    pub fn replay(&mut self, visit: &mut dyn FnMut(&Emulator, BundleAddress)) -> Why {
+    /// [`Why::Done`], or [`Why::Interrupted`].
+    pub fn replay(&mut self, visit: &mut dyn FnMut(&Emulator, BundleAddress)) -> StopReason {
         let here = self.cycle();
-        let Some(beginning) = self.checkpoints.first().cloned() else { return Why::Start };
+        let Some(beginning) = self.checkpoints.first().cloned() else { return StopReason::Start };
         let core = std::mem::replace(&mut self.core, beginning);
         self.make_edits();
-        let mut why = Why::Done;
+        let mut why = StopReason::Done;
         while self.cycle() < here {
             let now = self.cycle();
             let upcoming = self.core.emulator.upcoming().filter(|upcoming| upcoming.issue.cycle == now);
@@ -77,7 +76,7 @@ impl Session {
                 why = end;
                 break;
             }
-            if let Some(Upcoming { address, .. }) = upcoming {
+            if let Some(PredictedIssue { address, .. }) = upcoming {
                 visit(&self.core.emulator, address);
             }
         }
@@ -85,21 +84,21 @@ impl Session {
         why
     }
 
-    /// The cycles of the checkpoints.
+    /// Cycles of the checkpoints.
     pub fn checkpoints(&self) -> Vec<Cycle> {
         self.checkpoints.cycles().collect()
     }
 
-    /// Goes back, or on, to a cycle.
+    /// Goes to a cycle, forward or back.
     ///
     /// # Returns
-    /// [`Why::Done`], or why the run ends before.
-    pub fn go_to(&mut self, cycle: Cycle) -> Why {
+    /// [`Why::Done`], or the reason why the run ends earlier.
+    pub fn go_to(&mut self, cycle: Cycle) -> StopReason {
         self.approach(|core| core.emulator.now() <= cycle);
-        self.advance(cycle).err().unwrap_or(Why::Done)
+        self.advance(cycle).err().unwrap_or(StopReason::Done)
     }
 
-    /// Restores the last checkpoint at which `is_before` holds, unless this position is nearer to the end of those.
+    /// Restores the last checkpoint at which `is_before` holds, unless the present position satisfies it and is later.
     fn approach(&mut self, is_before: impl Fn(&Core) -> bool) {
         let Some(checkpoint) = self.checkpoints.last_while(&is_before) else { return };
         if checkpoint.emulator.now() > self.cycle() || !is_before(&self.core) {
@@ -108,15 +107,15 @@ impl Session {
         self.make_edits();
     }
 
-    /// Goes to where so many periods have ended.
-    pub fn go_to_period(&mut self, period: u64) -> Why {
+    /// Goes to the position after this number of periods.
+    pub fn go_to_period(&mut self, period: u64) -> StopReason {
         self.approach(|core| core.periods < period || core.periods == period && core.boundary);
         while self.period() < period {
             if let Err(end) = self.run_period() {
                 return end;
             }
         }
-        Why::Done
+        StopReason::Done
     }
 
     /// Runs to the end of the period.
@@ -125,20 +124,20 @@ impl Session {
         self.make_edits();
         while self.period() == periods {
             if self.cycle() >= until {
-                return Err(Why::Limit(self.run_limit));
+                return Err(StopReason::Limit(self.run_limit));
             }
             self.slice(until)?;
         }
         Ok(())
     }
 
-    /// Visits the positions after this one that are of interest, up to `until`, until `visit` finds one.
+    /// Visits the relevant positions after this one, up to `until`, until `visit` returns a hit.
     pub(super) fn scan(
         &mut self,
         until: Cycle,
         interest: &Interest,
-        visit: &mut dyn FnMut(&Session, Option<BundleAddress>) -> Option<Why>,
-    ) -> Result<Why, End> {
+        visit: &mut dyn FnMut(&Session, Option<BundleAddress>) -> Option<StopReason>,
+    ) -> Result<StopReason, End> {
         self.core.emulator.set_pauses(interest.pauses());
         let result = self.scan_positions(until, interest, visit);
         self.core.emulator.set_pauses([]);
@@ -149,12 +148,12 @@ impl Session {
         &mut self,
         until: Cycle,
         interest: &Interest,
-        visit: &mut dyn FnMut(&Session, Option<BundleAddress>) -> Option<Why>,
-    ) -> Result<Why, End> {
+        visit: &mut dyn FnMut(&Session, Option<BundleAddress>) -> Option<StopReason>,
+    ) -> Result<StopReason, End> {
         self.make_edits();
         let mut upcoming = self.core.emulator.upcoming();
         while self.cycle() < until {
-            let is_now = |upcoming: &Upcoming| upcoming.issue.cycle == self.cycle();
+            let is_now = |upcoming: &PredictedIssue| upcoming.issue.cycle == self.cycle();
             let issuing = upcoming.filter(is_now).map(|upcoming| upcoming.address);
             self.slice(interest.next(&self.core.emulator, issuing, until))?;
             let now = self.cycle();
@@ -166,38 +165,38 @@ impl Session {
                 return Ok(why);
             }
         }
-        Err(Why::Limit(self.run_limit))
+        Err(StopReason::Limit(self.run_limit))
     }
 
-    /// Goes to the next position that `visit` finds.
+    /// Goes to the next position at which `visit` returns a hit.
     fn forward(
         &mut self,
         interest: &Interest,
-        mut visit: impl FnMut(&Session, Option<BundleAddress>) -> Option<Why>,
-    ) -> Why {
+        mut visit: impl FnMut(&Session, Option<BundleAddress>) -> Option<StopReason>,
+    ) -> StopReason {
         let until = self.cycle().saturating_add(self.run_limit);
         self.scan(until, interest, &mut visit).unwrap_or_else(|end| end)
     }
 
-    /// Goes to the last position before this one that `visit` finds; `begin` is told where each stretch begins. Interrupted,
-    /// it stays here.
-    fn backward<V: FnMut(&Session, Option<BundleAddress>) -> Option<Why>>(
+    /// Goes to the last earlier position at which `visit` returns a hit; `begin` is called at the start of each stretch. An interrupt
+    /// leaves the session in place.
+    fn backward<V: FnMut(&Session, Option<BundleAddress>) -> Option<StopReason>>(
         &mut self,
         interest: &Interest,
         begin: impl Fn(&mut Session) -> Result<V, End>,
-    ) -> Why {
+    ) -> StopReason {
         let from = self.cycle();
-        // Positions from here on are seen, or not wanted.
+        // Positions from `end` on have been searched, or are out of range.
         let (mut end, mut window) = (from, WINDOW);
         while end >= 2 {
-            // A position that is found lies behind the beginning of the stretch, so that the state before it is known. What is
-            // looked for may be near, and else a stretch begins at a checkpoint.
+            // A hit lies after the start of its stretch, so that the previous state is known. Search a short window first, as a hit may be
+            // near; later stretches begin at checkpoints.
             let near = (end - 1).saturating_sub(window);
             let start = near.max(self.checkpoints.before(end - 2).map_or(0, |(cycle, _)| cycle));
             window = window.saturating_mul(8);
             let mut found = self.go_to(start);
             let mut last = None;
-            if found == Why::Done {
+            if found == StopReason::Done {
                 found = match begin(self) {
                     Ok(mut visit) => {
                         let mut all = |session: &Session, issuing| {
@@ -211,7 +210,7 @@ impl Session {
                     Err(end) => end,
                 };
             }
-            if found == Why::Interrupted {
+            if found == StopReason::Interrupted {
                 self.go_to(from);
                 return found;
             }
@@ -220,16 +219,16 @@ impl Session {
                 return why;
             }
             if from - start > self.run_limit {
-                return Why::Limit(self.run_limit);
+                return StopReason::Limit(self.run_limit);
             }
             end = start + 1;
         }
         self.go_to(0);
-        Why::Start
+        StopReason::Start
     }
 
-    /// Moves the run; of a step, by one.
-    pub fn go(&mut self, to: &Move) -> Why {
+    /// Makes one move of the run; for steps, a single step.
+    pub fn go(&mut self, to: &Move) -> StopReason {
         match to {
             Move::Step(unit, _) => self.step(*unit),
             Move::Back(unit, _) => self.step_back(*unit),
@@ -242,18 +241,18 @@ impl Session {
         }
     }
 
-    /// Steps forward.
-    pub fn step(&mut self, unit: Unit) -> Why {
+    /// Steps forward by one unit.
+    pub fn step(&mut self, unit: Unit) -> StopReason {
         match unit {
             Unit::Cycle => return self.go_to(self.cycle() + 1),
-            Unit::Period => return self.run_period().err().unwrap_or(Why::Done),
+            Unit::Period => return self.run_period().err().unwrap_or(StopReason::Done),
             _ => {}
         }
         let stack = self.core.emulator.stack();
         let (depth, caller) = (stack.len(), stack.last().copied());
         let next = self.core.emulator.next_address();
         let interest = match unit {
-            // Nowhere else does it end that it is over.
+            // A completed call ends in no other place.
             Unit::Call if self.calls(next) => Interest::bundles([next, next.next()]),
             Unit::Out => Interest::bundles(caller),
             _ => Interest::everything(),
@@ -261,16 +260,16 @@ impl Session {
         self.forward(&interest, move |session, issuing| session.ends_step(unit, depth, issuing))
     }
 
-    /// True if a bundle calls a subroutine.
+    /// The bundle contains a subroutine call.
     fn calls(&self, address: BundleAddress) -> bool {
         let bundle = self.program().bundle(address).and_then(Result::ok);
         bundle.is_some_and(|bundle| matches!(Flow::of(&bundle), Flow::Call(_)))
     }
 
-    /// Steps back.
-    pub fn step_back(&mut self, unit: Unit) -> Why {
+    /// Steps back by one unit.
+    pub fn step_back(&mut self, unit: Unit) -> StopReason {
         if self.cycle() == 0 {
-            return Why::Start;
+            return StopReason::Start;
         }
         match unit {
             Unit::Cycle => return self.go_to(self.cycle() - 1),
@@ -287,8 +286,13 @@ impl Session {
         })
     }
 
-    /// The end of a step by `unit` that began `depth` calls deep, if it ends here, where `issuing` is about to issue.
-    pub(super) fn ends_step(&self, unit: Unit, depth: usize, issuing: Option<BundleAddress>) -> Option<Why> {
+    /// End of a step by `unit` that began at call depth `depth`, if it ends at this position, where `issuing` is about to issue.
+    pub(super) fn ends_step(
+        &self,
+        unit: Unit,
+        depth: usize,
+        issuing: Option<BundleAddress>,
+    ) -> Option<StopReason> {
         let address = issuing?;
         let now = self.core.emulator.stack().len();
         let ends = match unit {
@@ -301,37 +305,37 @@ impl Session {
                 line(address).is_some_and(|line| Some(line) != last)
             }
         };
-        ends.then_some(Why::Done)
+        ends.then_some(StopReason::Done)
     }
 
-    /// Runs on to the next breakpoint or watchpoint.
-    pub fn resume(&mut self) -> Why {
+    /// Runs forward to the next breakpoint or watchpoint.
+    pub fn resume(&mut self) -> StopReason {
         let mut watcher = match self.watcher() {
             Ok(watcher) => watcher,
             Err(end) => return end,
         };
         let interest = Interest::stops(&self.stops, self.program());
         let why = self.forward(&interest, |session, issuing| watcher.visit(session, issuing));
-        if matches!(why, Why::Stop { .. } | Why::Limit(_)) {
+        if matches!(why, StopReason::Stop { .. } | StopReason::Limit(_)) {
             self.keep_watcher(watcher);
         }
         self.stopped(why)
     }
 
-    /// Takes the line of the breakpoint that it stopped at for the line at hand.
-    pub(crate) fn stopped(&mut self, why: Why) -> Why {
+    /// Makes the line of the breakpoint that stopped the run the line at hand.
+    pub(crate) fn stopped(&mut self, why: StopReason) -> StopReason {
         let stop = match &why {
-            Why::Stop { id, .. } => self.stops.iter().find(|(known, _)| known == id),
+            StopReason::Stop { id, .. } => self.stops.iter().find(|(known, _)| known == id),
             _ => None,
         };
-        if let Some((_, Stop::Break { at: Where::Line(line, _), .. })) = stop {
+        if let Some((_, Stop::Break { at: BreakpointLocation::Line(line, _), .. })) = stop {
             self.line = Some((self.cycle(), *line));
         }
         why
     }
 
-    /// Runs back to the last breakpoint or watchpoint.
-    pub fn resume_back(&mut self) -> Why {
+    /// Runs back to the previous breakpoint or watchpoint.
+    pub fn resume_back(&mut self) -> StopReason {
         let interest = Interest::stops(&self.stops, self.program());
         let why = self.backward(&interest, |session| {
             let mut watcher = session.watcher()?;
@@ -340,33 +344,58 @@ impl Session {
         self.stopped(why)
     }
 
-    /// Runs on to the next position at which an expression holds (is not zero). Where it has no value it does not.
-    pub fn run_until(&mut self, live: &Live) -> Why {
-        // An expression that holds already may still hold in the next cycle, in which nothing need change that the search looks for.
+    /// Runs forward to the next position at which an expression is not zero. An expression without a value does not hold.
+    pub fn run_until(&mut self, live: &WatchExpression) -> StopReason {
+        // An expression that already holds may hold in the next cycle too, without any change that the search would visit.
         if self.holds(live) {
             match self.go_to(self.cycle() + 1) {
-                Why::Done if self.holds(live) => return Why::Holds,
-                Why::Done => {}
+                StopReason::Done if self.holds(live) => return StopReason::Holds,
+                StopReason::Done => {}
                 end => return end,
             }
         }
         let interest = Interest::value(live, self.program());
-        self.forward(&interest, |session, _| session.holds(live).then_some(Why::Holds))
+        self.forward(&interest, |session, _| session.holds(live).then_some(StopReason::Holds))
     }
 
-    /// True if an expression has a value other than zero where this line is at hand.
-    pub(super) fn holds_at(&self, line: Location, live: &Live) -> bool {
-        let machine = Machine { line: Some(line), ..self.machine() };
-        live.evaluate(&machine, self.program()).is_ok_and(|value| !value.is_zero())
+    /// Evaluates a breakpoint's condition as the line at hand would read it, with results in flight. Returns whether it holds, and the
+    /// operands that no bundle has computed yet, in words.
+    pub(super) fn judge(
+        &self,
+        line: Option<Location>,
+        condition: &WatchExpression,
+    ) -> (bool, Option<String>) {
+        let (own, program) = (self.machine(), self.program());
+        let machine = Machine { line: line.or(own.line), ahead: true, ..own };
+        let value = condition.evaluate(&machine, program);
+        let error = || value.as_ref().err().filter(|_| !condition.is_there(&machine, program)).cloned();
+        let doubt = condition.note(&machine, program).or_else(error);
+        (value.as_ref().is_ok_and(|value| !value.is_zero()), doubt)
     }
 
-    /// True if every value in an expression is there.
-    pub(super) fn is_there(&self, live: &Live) -> bool {
+    /// The condition of a breakpoint holds here. An operand that is not computed yet is recorded as a doubt
+    /// ([`Control::take_doubts`](super::Control::take_doubts)).
+    pub fn meets(&self, id: u32, condition: &WatchExpression) -> bool {
+        let (holds, doubt) = self.judge(None, condition);
+        self.remember(id, doubt.filter(|_| !holds));
+        holds
+    }
+
+    /// Records that a breakpoint was passed here with a doubt.
+    pub(super) fn remember(&self, id: u32, doubt: Option<String>) {
+        if let Some(doubt) = doubt {
+            let first = doubt.lines().next().unwrap_or_default();
+            self.options.control.doubt(id, format!("{}: {first}", self.time()));
+        }
+    }
+
+    /// Every value in the expression is in its register.
+    pub(super) fn is_there(&self, live: &WatchExpression) -> bool {
         live.is_there(&self.machine(), self.program())
     }
 
-    /// True if an expression has a value other than zero.
-    pub(crate) fn holds(&self, live: &Live) -> bool {
+    /// The expression has a value other than zero.
+    pub(crate) fn holds(&self, live: &WatchExpression) -> bool {
         self.evaluate(live).is_ok_and(|value| !value.is_zero())
     }
 }

@@ -1,58 +1,58 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Searches in a machine that somebody else runs: the core of a system, which shows itself to its session
-//! ([`Session::look`]) at the positions that matter.
+//! Searches in a machine that another party runs: the core of a system, which shows its state ([`Session::look`]) at the positions of
+//! interest.
 
-use super::interest::Interest;
+use super::search_positions::Interest;
 use super::stops::Watcher;
-use super::{Live, Session, Unit, Why};
+use super::{Session, StopReason, Unit, WatchExpression};
 use std::collections::BTreeSet;
 use takt_emu::Event;
 use takt_isa::BundleAddress;
 use takt_isa::timing::{Cycle, INPUT_DELAY};
 use takt_system::InputEvent;
 
-/// A search through a run, from the position on at which it was made.
+/// A search forward from the position at which it was made.
 #[derive(Clone)]
 pub(crate) struct Search {
     interest: Interest,
     goal: Goal,
-    /// Positions beyond the last range that matter for what happened in it; `None`: no range was asked for yet.
+    /// Relevant positions beyond the last range, due to events in it; `None` before the first range.
     ahead: Option<BTreeSet<Cycle>>,
 }
 
-/// An event of a cycle matters at most so many positions later; results in flight are told of when they arrive.
+/// Number of positions for which an event stays relevant. Results in flight are reported on their arrival.
 const AHEAD: Cycle = if INPUT_DELAY + 1 > 3 { INPUT_DELAY + 1 } else { 3 };
 
 #[derive(Clone)]
 enum Goal {
-    /// The session's breakpoints and watchpoints.
+    /// Breakpoints and watchpoints of the session.
     Stops(Watcher),
-    /// That this is not zero.
-    Holds(Box<Live>),
-    /// The end of a step that began so many calls deep.
+    /// A value of this expression other than zero.
+    Holds(Box<WatchExpression>),
+    /// The end of a step that began at this call depth.
     Step { unit: Unit, depth: usize },
 }
 
 impl Search {
-    /// For the session's stops; `None` if it has none. It knows of watched values what there is to see where the session looks
-    /// now ([`Search::is_complete`]).
+    /// A search for the session's stops; `None` without stops. Previous values of watched expressions are those at the session's position;
+    /// [`Search::is_complete`] tells whether any is missing.
     pub(crate) fn stops(session: &Session) -> Option<Search> {
         let goal = Goal::Stops(Watcher::new(session));
         let interest = Interest::stops(&session.stops, session.program());
         (!session.stops.is_empty()).then_some(Search { interest, goal, ahead: None })
     }
 
-    /// True if it knows each watched value as it was where it was there last.
+    /// The last value of each watched expression is known.
     pub(crate) fn is_complete(&self) -> bool {
         self.watcher().is_none_or(Watcher::is_complete)
     }
 
-    /// True if it is one for the session's stops as they are now.
+    /// The search has the session's current stops.
     pub(crate) fn is_of(&self, session: &Session) -> bool {
         self.watcher().is_some_and(|watcher| watcher.is_of(session))
     }
 
-    /// Takes from a search that was made for an earlier position, or went on from one, what this one does not know.
+    /// Copies missing previous values from a search of an earlier position.
     pub(crate) fn complete(&mut self, earlier: &Search) {
         if let (Goal::Stops(watcher), Some(earlier)) = (&mut self.goal, earlier.watcher()) {
             watcher.complete(earlier);
@@ -66,20 +66,20 @@ impl Search {
         }
     }
 
-    /// For an expression that holds.
-    pub(crate) fn value(live: Live, session: &Session) -> Search {
+    /// A search for a position at which the expression is not zero.
+    pub(crate) fn value(live: WatchExpression, session: &Session) -> Search {
         let interest = Interest::value(&live, session.program());
         Search { interest, goal: Goal::Holds(Box::new(live)), ahead: None }
     }
 
-    /// For the end of a step from where the session looks now: by a bundle, a line, a call, or out of a subroutine.
+    /// A search for the end of a step from the session's position: by a bundle, a line, a call, or out of a subroutine.
     pub(crate) fn step(unit: Unit, session: &Session) -> Search {
         let depth = session.core.emulator.stack().len();
         Search { interest: Interest::default(), goal: Goal::Step { unit, depth }, ahead: None }
     }
 
-    /// The positions from `begin` to `end` that matter, given what the machine did meanwhile; ranges follow one another. What
-    /// it did before the first of them is not known, and the first few positions of it matter.
+    /// Relevant positions from `begin` to `end`, given the machine's events in the range. Ranges are consecutive. Events before the first
+    /// range are unknown, so its first few positions are relevant.
     pub(crate) fn positions(
         &mut self,
         events: &[&Event],
@@ -93,25 +93,25 @@ impl Search {
         }
         for event in events {
             match event {
-                // A step ends where a bundle is about to issue, and nowhere else.
+                // A step ends only just before an issue.
                 Event::Issue { cycle, .. } if matches!(self.goal, Goal::Step { .. }) => {
                     positions.insert(*cycle);
                 }
                 Event::Issue { cycle, address } if self.interest.is_of(*address) => {
                     positions.extend([*cycle, cycle + 1]);
                 }
-                // A result is seen by what issues from its writeback on.
+                // Bundles read a result from its writeback on.
                 Event::Retire(retire) if self.interest.is_of(retire.address) => {
                     positions.extend([retire.cycle, retire.cycle + 1]);
                 }
-                // A period has ended, and latched ports have their values.
+                // A period ends, and latched output ports take their values.
                 Event::Wait { cycle, .. } => positions.extend(cycle + 1..=cycle + 3),
-                // Latched inputs have new values.
+                // Latched input ports take new values.
                 Event::Tick { cycle } => positions.extend(*cycle..=cycle + 2),
                 _ => {}
             }
         }
-        // An input is seen a few cycles after it is on its pins.
+        // The core reads an input a few cycles after its arrival at the pins.
         let seen = inputs.iter().flat_map(|input| input.cycle..=input.cycle + INPUT_DELAY + 1);
         positions.extend(seen);
         positions.extend(self.interest.cycles(begin, end));
@@ -119,11 +119,11 @@ impl Search {
         positions.split_off(&begin)
     }
 
-    /// The reason to stop where the session looks now, and `issuing` is about to issue, if there is one.
-    pub(crate) fn visit(&mut self, session: &Session, issuing: Option<BundleAddress>) -> Option<Why> {
+    /// Reason to stop at the session's position, where `issuing` is about to issue.
+    pub(crate) fn visit(&mut self, session: &Session, issuing: Option<BundleAddress>) -> Option<StopReason> {
         match &mut self.goal {
             Goal::Stops(watcher) => watcher.visit(session, issuing),
-            Goal::Holds(live) => session.holds(live).then_some(Why::Holds),
+            Goal::Holds(live) => session.holds(live).then_some(StopReason::Holds),
             Goal::Step { unit, depth } => session.ends_step(*unit, *depth, issuing),
         }
     }

@@ -1,76 +1,75 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Breakpoints and watchpoints.
+//! Breakpoints and watchpoints of a session, and the watcher that tests them.
 
-use super::expression::{self, Live, Reads};
-use super::{Session, Why};
+use super::expression::{self, ReadSet, WatchExpression};
+use super::{Session, StopReason};
 use std::sync::Arc;
 use takt_asm::expr::Value;
 use takt_isa::program::{Location, Space};
 use takt_isa::timing::Cycle;
 use takt_isa::{BundleAddress, Program};
 
-/// The place where a breakpoint stops.
+/// Place of a breakpoint: in the program, or in the time of the run.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Where {
-    /// The position where this bundle is about to issue.
+pub enum BreakpointLocation {
+    /// Just before this bundle issues.
     Bundle(BundleAddress),
-    /// The position where a bundle with an operation of this line is about to issue; these have one. A line of a macro
-    /// or a repetition has several.
+    /// Just before a bundle with an operation of this line issues. A line of a macro or a repetition has several bundles.
     Line(Location, Vec<BundleAddress>),
-    /// When so many cycles have passed.
+    /// A number of cycles since reset.
     Cycle(Cycle),
-    /// When so many periods have ended.
+    /// A number of ended periods.
     Period(u64),
 }
 
-/// The test of a watchpoint: it holds, and did not hold the cycle before.
+/// Test of a watchpoint: triggers when it begins to hold.
 #[derive(Clone, Debug)]
 pub enum Test {
-    /// The value is another.
+    /// The value differs from the previous one.
     Changed,
-    /// It equals another.
-    Equals(Box<Live>),
-    /// It is above another.
-    Above(Box<Live>),
-    /// It is a NaN.
+    /// The value equals another expression's.
+    Equals(Box<WatchExpression>),
+    /// The value is above another expression's.
+    Above(Box<WatchExpression>),
+    /// The value is a NaN.
     Nan,
-    /// It is a subnormal number.
+    /// The value is a subnormal number.
     Subnormal,
 }
 
-/// A breakpoint or watchpoint.
+/// A breakpoint or a watchpoint.
 #[derive(Clone, Debug)]
 pub enum Stop {
-    /// Stops at a place, if the condition, if any, holds.
+    /// Stops at a place, if the optional condition holds.
     Break {
-        /// The place.
-        at: Where,
-        /// The condition.
-        condition: Option<Box<Live>>,
-        /// As the user wrote it.
+        /// Place in the program or time in the run.
+        at: BreakpointLocation,
+        /// Expression that must be nonzero at the place.
+        condition: Option<Box<WatchExpression>>,
+        /// Text of the breakpoint, as the user wrote it.
         text: String,
     },
-    /// Stops when a value becomes what is waited for.
+    /// Stops when the test begins to hold for a value.
     Watch {
-        /// The value.
-        what: Box<Live>,
-        /// The test.
+        /// Expression whose value is tested.
+        what: Box<WatchExpression>,
+        /// Test of the expression's value.
         test: Test,
-        /// As the user wrote it.
+        /// Text of the watchpoint, as the user wrote it.
         text: String,
     },
 }
 
 impl Stop {
-    /// As the user wrote it.
+    /// Text of the stop, as the user wrote it.
     pub fn text(&self) -> &str {
         match self {
             Stop::Break { text, .. } | Stop::Watch { text, .. } => text,
         }
     }
 
-    /// Adds what its expressions read.
-    pub(super) fn reads(&self, reads: &mut Reads) {
+    /// Adds the registers and memory that the stop's expressions read.
+    pub(super) fn reads(&self, reads: &mut ReadSet) {
         match self {
             Stop::Break { condition, .. } => condition.iter().for_each(|condition| condition.reads(reads)),
             Stop::Watch { what, test, .. } => {
@@ -83,12 +82,22 @@ impl Stop {
     }
 }
 
-impl Where {
-    /// The place that a text names: `label`, `label+2`, `file.s:12` or `:12`, `bundle 3`, `cycle 100`, `period 5`.
+impl BreakpointLocation {
+    /// The session is at this place, where `issuing` is about to issue.
+    fn is_here(&self, session: &Session, issuing: Option<BundleAddress>) -> bool {
+        match self {
+            BreakpointLocation::Bundle(address) => issuing == Some(*address),
+            BreakpointLocation::Line(_, bundles) => issuing.is_some_and(|address| bundles.contains(&address)),
+            BreakpointLocation::Cycle(cycle) => session.cycle() == *cycle,
+            BreakpointLocation::Period(period) => session.core.boundary && session.period() == *period,
+        }
+    }
+
+    /// Parses a place: `label`, `label+2`, `file.s:12` or `:12`, `bundle 3`, `cycle 100`, `period 5`.
     ///
     /// # Errors
-    /// If something is wrong with it.
-    pub fn parse(text: &str, program: &Program) -> Result<Where, String> {
+    /// If the text is not a place of this program.
+    pub fn parse(text: &str, program: &Program) -> Result<BreakpointLocation, String> {
         let text = text.trim();
         let number = |rest: &str, what: &str| {
             rest.trim().parse::<u64>().map_err(|_| format!("`{}` is no number of a {what}", rest.trim()))
@@ -97,8 +106,8 @@ impl Where {
         if let Some((word, rest)) = text.split_once(' ').filter(|(word, _)| known.contains(word)) {
             let number = number(rest, word)?;
             return match word {
-                "cycle" => Ok(Where::Cycle(number)),
-                "period" => Ok(Where::Period(number)),
+                "cycle" => Ok(BreakpointLocation::Cycle(number)),
+                "period" => Ok(BreakpointLocation::Period(number)),
                 _ => bundle(number, program),
             };
         }
@@ -120,18 +129,18 @@ impl Where {
     }
 }
 
-fn bundle(number: u64, program: &Program) -> Result<Where, String> {
+fn bundle(number: u64, program: &Program) -> Result<BreakpointLocation, String> {
     let bundles = program.bundles();
     let address = u32::try_from(number).ok().filter(|address| *address < bundles);
     address
-        .map(|address| Where::Bundle(BundleAddress::new(address)))
+        .map(|address| BreakpointLocation::Bundle(BundleAddress::new(address)))
         .ok_or_else(|| format!("bundle {number}: the program has bundles 0 to {}", bundles - 1))
 }
 
-/// The bundles with an operation of a source line, ascending.
-fn line_bundles(file: &str, line: u64, program: &Program) -> Result<Where, String> {
+/// Bundles with an operation of a source line, ascending.
+fn line_bundles(file: &str, line: u64, program: &Program) -> Result<BreakpointLocation, String> {
     let names = || program.files.iter().map(String::as_str);
-    // A file by its name alone, whichever folder or library it is of.
+    // Match the file's name alone, in any folder or library.
     let alone =
         |name: &str| name.trim_start_matches('<').trim_end_matches('>').rsplit('/').next() == Some(file);
     let ends = |name: &str| name == file || alone(name);
@@ -149,46 +158,46 @@ fn line_bundles(file: &str, line: u64, program: &Program) -> Result<Where, Strin
     if let Some(&(_, place)) = of_line.peek() {
         let mut bundles: Vec<BundleAddress> = of_line.map(|(address, _)| address).collect();
         bundles.dedup();
-        return Ok(Where::Line(place, bundles));
+        return Ok(BreakpointLocation::Line(place, bundles));
     }
     let next = places().map(|(_, location)| location.line).filter(|next| u64::from(*next) > line).min();
     let next = next.map_or(String::new(), |next| format!("; the next line with one is {next}"));
     Err(format!("line {line} of {} has no instruction{next}", program.files[file]))
 }
 
-/// Sees from position to position whether there is a reason to stop.
+/// Tests the stops at each position.
 ///
-/// A value that is not there everywhere, because it shares its register or is one of several of its name, is compared with
-/// what it was where it was there last. That may be long before the position at which a search begins; a watcher that does
-/// not know yet is not complete, and [`Session::watcher`] completes it.
+/// A value that is not in its register everywhere (shared register, or one of several values of a name) is compared with its last
+/// occurrence, which may lie long before the search's beginning. A watcher with unknown previous values is incomplete, and
+/// [`Session::watcher`] completes it.
 #[derive(Clone)]
 pub(super) struct Watcher {
-    /// For each stop, its number and what it watches, in each of the ways in which its names can be read.
-    watched: Vec<(u32, Vec<Watched>)>,
+    /// Per stop: its number, and its watched expression in all variants of its names.
+    watched: Vec<(u32, Vec<Watchpoint>)>,
 }
 
-/// A watched value and what it was where it was there last; `None`: that is not known, or it was not there yet.
+/// Watched expression with its last known value; `None` before the first value, or if the value is unknown.
 #[derive(Clone)]
-struct Watched {
-    live: Arc<Live>,
-    last: Option<Seen>,
+struct Watchpoint {
+    live: Arc<WatchExpression>,
+    last: Option<WatchState>,
 }
 
-/// A watched value and whether it was as waited for.
+/// State of a watched expression: its value, and whether the test holds.
 #[derive(Clone, Copy, Default)]
-struct Seen {
+struct WatchState {
     value: Option<Value>,
     is: bool,
 }
 
 impl Watcher {
-    /// One that knows what there is to see where the session looks now.
+    /// A watcher whose previous values are those at the session's position.
     pub(super) fn new(session: &Session) -> Watcher {
         let each = |stop: &Stop| match stop {
             Stop::Break { .. } => Vec::new(),
             Stop::Watch { what, .. } => {
                 let each = what.each().into_iter();
-                each.map(|live| Watched { live: Arc::new(live), last: None }).collect()
+                each.map(|live| Watchpoint { live: Arc::new(live), last: None }).collect()
             }
         };
         let watched = session.stops.iter().map(|(id, stop)| (*id, each(stop))).collect();
@@ -197,17 +206,17 @@ impl Watcher {
         watcher
     }
 
-    /// True if it knows each value as it was last.
+    /// The last value of each watched expression is known.
     pub(super) fn is_complete(&self) -> bool {
         self.watched.iter().flat_map(|(_, each)| each).all(|watched| watched.last.is_some())
     }
 
-    /// True if it is one for the session's stops as they are now.
+    /// The watcher has the session's current stops.
     pub(super) fn is_of(&self, session: &Session) -> bool {
         self.watched.iter().map(|(id, _)| id).eq(session.stops.iter().map(|(id, _)| id))
     }
 
-    /// Takes from a watcher of an earlier position what this one does not know.
+    /// Copies missing previous values from a watcher of an earlier position.
     pub(super) fn complete(&mut self, earlier: &Watcher) {
         for (id, each) in &mut self.watched {
             let Some((_, known)) = earlier.watched.iter().find(|(known, _)| known == id) else { continue };
@@ -217,30 +226,21 @@ impl Watcher {
         }
     }
 
-    pub(super) fn visit(&mut self, session: &Session, issuing: Option<BundleAddress>) -> Option<Why> {
+    pub(super) fn visit(&mut self, session: &Session, issuing: Option<BundleAddress>) -> Option<StopReason> {
         let mut why = None;
         for ((id, stop), (_, each)) in session.stops.iter().zip(&mut self.watched) {
             match stop {
                 Stop::Break { at, condition, text } => {
-                    let here = match at {
-                        Where::Bundle(address) => issuing == Some(*address),
-                        Where::Line(_, bundles) => issuing.is_some_and(|address| bundles.contains(&address)),
-                        Where::Cycle(cycle) => session.cycle() == *cycle,
-                        Where::Period(period) => session.core.boundary && session.period() == *period,
-                    };
-                    if here
-                        && why.is_none()
-                        && condition.as_ref().is_none_or(|condition| match at {
-                            Where::Line(line, _) => session.holds_at(*line, condition),
-                            _ => session.holds(condition),
-                        })
+                    if why.is_none()
+                        && at.is_here(session, issuing)
+                        && let Some(note) = passes_condition(session, *id, at, condition.as_deref())
                     {
-                        why = Some(Why::Stop { id: *id, text: text.clone(), change: None });
+                        why = Some(StopReason::Stop { id: *id, text: format!("{text}{note}"), change: None });
                     }
                 }
                 Stop::Watch { test, text, .. } => {
-                    for Watched { live, last } in each {
-                        // That it is not there is no change.
+                    for Watchpoint { live, last } in each {
+                        // The absence of a value is not a change.
                         let Some(now) = see(session, live, test) else { continue };
                         let before = last.replace(now).unwrap_or_default();
                         let hit = match test {
@@ -248,9 +248,18 @@ impl Watcher {
                             _ => now.is && !before.is,
                         };
                         if hit && why.is_none() {
-                            let change = Some((shown(before.value), shown(now.value)));
+                            let change = Some((shortest_decimal(before.value), shortest_decimal(now.value)));
                             let label = live.held().map_or(String::new(), |label| format!(" ({label})"));
-                            why = Some(Why::Stop { id: *id, text: format!("{text}{label}"), change });
+                            let other = match test {
+                                Test::Equals(other) | Test::Above(other) => session.note(other),
+                                Test::Changed | Test::Nan | Test::Subnormal => None,
+                            };
+                            let note = noted(session.note(live).or(other));
+                            why = Some(StopReason::Stop {
+                                id: *id,
+                                text: format!("{text}{label}{note}"),
+                                change,
+                            });
                         }
                     }
                 }
@@ -260,7 +269,29 @@ impl Watcher {
     }
 }
 
-/// Bit for bit: a NaN is the same as itself, the two zeros are not.
+/// Checks a breakpoint's condition; if it holds or is absent, returns the note to print.
+fn passes_condition(
+    session: &Session,
+    id: u32,
+    at: &BreakpointLocation,
+    condition: Option<&WatchExpression>,
+) -> Option<String> {
+    let Some(condition) = condition else { return Some(String::new()) };
+    let line = if let BreakpointLocation::Line(line, _) = at { Some(*line) } else { None };
+    let (holds, doubt) = session.judge(line, condition);
+    if !holds {
+        session.remember(id, doubt);
+        return None;
+    }
+    Some(noted(doubt))
+}
+
+/// A note in parentheses, to follow another text.
+pub(crate) fn noted(note: Option<String>) -> String {
+    note.map_or(String::new(), |note| format!("  ({note})"))
+}
+
+/// Bitwise comparison: a NaN equals itself, the two zeros differ.
 fn same(a: Option<Value>, b: Option<Value>) -> bool {
     let bits = |value: Option<Value>| match value {
         None => (0, 0),
@@ -270,8 +301,8 @@ fn same(a: Option<Value>, b: Option<Value>) -> bool {
     bits(a) == bits(b)
 }
 
-/// A value in the fewest digits that tell it from its neighbours.
-fn shown(value: Option<Value>) -> String {
+/// Shortest decimal of a value that identifies it in its format.
+fn shortest_decimal(value: Option<Value>) -> String {
     match value {
         None => "(no value)".to_owned(),
         Some(Value::Int(value)) => value.to_string(),
@@ -280,8 +311,8 @@ fn shown(value: Option<Value>) -> String {
     }
 }
 
-/// The visible state of a value; `None` if it, or the value that it is compared with, is not there.
-fn see(session: &Session, what: &Live, test: &Test) -> Option<Seen> {
+/// State of a watched expression; `None` if an operand of it, or of the comparison, is not in its register.
+fn see(session: &Session, what: &WatchExpression, test: &Test) -> Option<WatchState> {
     let compared = match test {
         Test::Equals(other) | Test::Above(other) => Some(&**other),
         Test::Changed | Test::Nan | Test::Subnormal => None,
@@ -291,7 +322,7 @@ fn see(session: &Session, what: &Live, test: &Test) -> Option<Seen> {
     }
     let value = session.evaluate(what).ok();
     let real = value.map(Value::real);
-    let other = |live: &Live| session.evaluate(live).ok().map(Value::real);
+    let other = |live: &WatchExpression| session.evaluate(live).ok().map(Value::real);
     let is = match test {
         Test::Changed => false,
         Test::Equals(live) => real.is_some() && real == other(live),
@@ -299,5 +330,5 @@ fn see(session: &Session, what: &Live, test: &Test) -> Option<Seen> {
         Test::Nan => real.is_some_and(f64::is_nan),
         Test::Subnormal => real.is_some_and(|value| (value as f32).is_subnormal()),
     };
-    Some(Seen { value, is })
+    Some(WatchState { value, is })
 }

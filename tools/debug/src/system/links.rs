@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Links as a session shows them, and stops at what happens on them.
+//! Links as text, and stops at link events.
 
 use super::SystemStop;
-use crate::session::Shown;
+use crate::session::ValueNotations;
 use takt_asm::nearest;
 use takt_system::{Description, End, LinkEventKind, LinkKind, System};
 
@@ -18,13 +18,13 @@ const EVENTS: [LinkEventKind; 8] = [
 ];
 
 impl SystemStop {
-    /// The stop that `link NAME [EVENT]` means; `None` if the text does not begin with `link`.
+    /// Parses `link NAME [EVENT]`; `None` if the text does not begin with `link`.
     ///
     /// # Errors
-    /// If there is no such link.
+    /// If the link does not exist.
     pub fn parse(text: &str, description: &Description) -> Option<Result<SystemStop, String>> {
         let rest = text.trim().strip_prefix("link ")?;
-        // Names of wires have blanks in them.
+        // Names of wires contain blanks.
         let event = rest.rsplit_once(' ').and_then(|(name, event)| {
             let kind = EVENTS.into_iter().find(|kind| kind.name() == event)?;
             Some((name.trim(), kind))
@@ -44,7 +44,7 @@ impl SystemStop {
     }
 }
 
-/// A link by its name.
+/// Index of a link with this name.
 pub(crate) fn link_named(name: &str, description: &Description) -> Result<usize, String> {
     description.link_named(name).ok_or_else(|| {
         let names: Vec<&str> = description.links.iter().map(|link| link.name.as_str()).collect();
@@ -54,10 +54,10 @@ pub(crate) fn link_named(name: &str, description: &Description) -> Result<usize,
     })
 }
 
-/// The contents of a link: values that arrived last, a set, entries.
+/// Contents of a link: last arrived values, a snapshot's set, or FIFO entries.
 pub fn link_text(system: &System, number: usize) -> String {
     let Some(link) = system.description().links.get(number) else { return String::new() };
-    let value = |bits: u32, field: usize| Shown::new(link.fields[field].ty, bits).text;
+    let value = |bits: u32, field: usize| ValueNotations::new(link.fields[field].ty, bits).text;
     let values = |bits: &[u32]| {
         let each = bits.iter().enumerate().map(|(field, &bits)| value(bits, field));
         each.collect::<Vec<_>>().join(", ")
@@ -74,7 +74,7 @@ pub fn link_text(system: &System, number: usize) -> String {
             counts.underflows
         );
     }
-    // The receiver's values.
+    // Values at the receiver.
     let seen: Vec<u32> = link
         .fields
         .iter()

@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A debug session on a system of several cores: one global time, forward and back.
+//! Debug session on a system of several cores: one global time, forward and back.
 //!
-//! **Positions** are those of a single core's session, for all cores at once: at position *n*, cycles 0 to *n* - 1 have passed in
-//! each. What happens on a link in cycle *c* has happened at position *c* + 1; a bundle that issues in *c* is about to at *c*.
+//! **Positions** are as in a session of one core, for all cores at once: at position *n*, cycles 0 to *n* - 1 have passed in each core. A
+//! link event of cycle *c* is visible at position *c* + 1; a bundle that issues in *c* is about to issue at position *c*.
 //!
-//! **Going back** is restoring a checkpoint and running from there. **The host** takes its turn as `takt run` has it: a row of
-//! inputs for each base tick, written so early that the periods which begin there read them; of each FIFO to it, one entry taken.
+//! **Going back** restores a checkpoint and runs forward. **The host** acts as in `takt run`: at each base tick it writes a row of inputs,
+//! early enough for the periods that begin there, and takes one entry from each of its FIFOs.
 //!
-//! Looking back and ahead for what a command waits for, all that happens in a stretch is recorded, and the session then goes to
-//! the first or the last of it. What a core's own session stops at (breakpoints with conditions, watchpoints) is asked of that
-//! session, which looks at the core at each position that matters to it.
+//! A search records the events of a stretch, and then moves to the first or last hit. Conditional breakpoints and watchpoints belong to the
+//! core's session, which is shown the core at each position of interest.
 
 mod links;
 mod seek;
@@ -17,8 +16,8 @@ mod seek;
 pub(crate) use links::link_named;
 pub use links::link_text;
 
-use crate::along::Along;
-use crate::session::{self, Control, Place, RUN_LIMIT, Why};
+use crate::samples::ThinnedSeries;
+use crate::session::{self, Control, Place, RUN_LIMIT, StopReason};
 use std::sync::Arc;
 use takt_emu::{Emulator, Event, LoadError};
 use takt_isa::BundleAddress;
@@ -27,82 +26,82 @@ use takt_system::{
     Description, HostError, InputEvent, LinkEvent, LinkEventKind, MAX_LATENCY, System, SystemFault,
 };
 
-/// Cycles that are recorded at once.
+/// Number of cycles recorded at a time.
 const STRETCH: Cycle = 1 << 12;
-/// An event on a link is told of at most so many cycles late: what is under way, and a few more.
+/// Largest delay, in cycles, of the report of a link event: the latency of values under way, and a margin.
 const LATE: Cycle = MAX_LATENCY + 8;
 
-/// The host's actions at a base tick.
+/// Host actions at a base tick.
 #[derive(Clone, Debug, Default)]
-pub struct Turn {
-    /// Inputs of the system that it writes.
+pub struct TickActions {
+    /// System inputs to write.
     pub inputs: Vec<(String, u32)>,
-    /// Snapshots that it publishes.
+    /// Numbers of the snapshots to publish.
     pub publish: Vec<usize>,
-    /// FIFOs that it puts an entry into.
+    /// FIFOs to put an entry into.
     pub push: Vec<usize>,
 }
 
-/// The options of a session.
+/// Options of a session on a system.
 #[derive(Clone, Default)]
 pub struct SystemOptions {
-    /// A turn for each base tick; `None`: each is `idle`.
-    pub turns: Option<Arc<Vec<Turn>>>,
-    /// A turn of a host that writes zeros.
-    pub idle: Turn,
-    /// FIFOs to the host, of which it takes an entry each time.
+    /// Host turn of each base tick; `None`: `idle` at each.
+    pub turns: Option<Arc<Vec<TickActions>>>,
+    /// Turn that writes zeros.
+    pub idle: TickActions,
+    /// FIFOs to the host from which it takes an entry in each turn.
     pub pops: Vec<usize>,
-    /// The state shared with whoever watches.
+    /// State shared with an observer.
     pub control: Arc<Control>,
 }
 
-/// The reason why a command stopped.
+/// Reason why a command stopped.
 #[derive(Clone, Debug, PartialEq)]
-pub enum SystemWhy {
-    /// It is done.
+pub enum SystemStopReason {
+    /// The command is complete.
     Done,
-    /// An event on a link, by the stop's number.
+    /// Stop at an event on a link, by its number.
     Stop(u32),
-    /// The reason why the session of a core stopped.
-    Core(usize, Why),
-    /// The beginning was reached.
+    /// A core's session stopped, for this reason.
+    Core(usize, StopReason),
+    /// The run is back at its beginning.
     Start,
     /// Every core has halted.
     Halted,
-    /// The last turn of the recorded inputs is over.
+    /// The recorded inputs end with this turn.
     InputsEnd,
-    /// A core stopped the system.
+    /// A core faulted, which stops the system.
     Fault(SystemFault),
-    /// There was nothing to stop at in so many cycles.
+    /// No stop was reached within this number of cycles.
     Limit(Cycle),
-    /// Somebody interrupted it.
+    /// The user interrupted the command.
     Interrupted,
-    /// The host was refused.
+    /// The system refused an action of the host.
     Host(HostError),
 }
 
-/// A stop at an event on a link; without a kind, any. (Stops at what a core does are those of its own session.)
+/// A stop at events of a link: of one kind, or of any. (Stops at events of a core belong to the core's session.)
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SystemStop {
-    /// The link.
+    /// Index of the link.
     pub link: usize,
-    /// The event.
+    /// Kind of event; `None` for any.
     pub kind: Option<LinkEventKind>,
 }
 
-/// The run up to some position.
+/// State of the run at a position.
 #[derive(Clone)]
 struct Point {
     system: System,
-    /// Turns that the host has taken.
+    /// Number of host turns taken.
     turns: u64,
-    /// Events on links that may be ahead of the position.
+    /// Link events that may lie ahead of the position.
     links: Vec<LinkEvent>,
-    /// Edits that have been made.
+    /// Number of edits already made.
     edits: usize,
 }
 
-/// A value that was set by hand.
+/// A value set by the user, replayed at its cycle.
 #[derive(Clone, Copy, Debug)]
 struct Edit {
     cycle: Cycle,
@@ -111,31 +110,31 @@ struct Edit {
     bits: u32,
 }
 
-/// The events of the cores in a stretch.
+/// Events of the cores in a stretch.
 #[derive(Default)]
-struct Seen {
+struct StretchEvents {
     cores: Vec<(usize, Event)>,
     inputs: Vec<InputEvent>,
 }
 
-/// A debug session on a system.
+/// Debug session of a system.
 pub struct SystemSession {
     options: SystemOptions,
     point: Point,
-    /// By cycle, ascending; the first is cycle 0.
-    checkpoints: Along<Point>,
+    /// Checkpoints by ascending cycle; the first is at cycle 0.
+    checkpoints: ThinnedSeries<Point>,
     stops: Vec<(u32, SystemStop, String)>,
     next_id: u32,
-    /// By cycle, ascending.
+    /// Edits, by ascending cycle.
     edits: Vec<Edit>,
-    /// Searches for the stops of the cores' sessions that have gone through the run up to positions of it.
-    known: Along<seek::Searches>,
-    /// Cycles for which a command may run.
+    /// Searches for the stops of the cores' sessions, as of positions along the run.
+    known: ThinnedSeries<seek::Searches>,
+    /// Maximal number of cycles of a command.
     pub run_limit: Cycle,
 }
 
 impl SystemSession {
-    /// A session at the beginning.
+    /// A session at the start of a system's run.
     ///
     /// # Errors
     /// If a core's memories cannot hold its program.
@@ -143,7 +142,7 @@ impl SystemSession {
         let mut system = System::new(description)?;
         system.keep_events();
         let point = Point { system, turns: 0, links: Vec::new(), edits: 0 };
-        let mut checkpoints = Along::every(STRETCH);
+        let mut checkpoints = ThinnedSeries::every(STRETCH);
         checkpoints.add(0, point.clone());
         Ok(SystemSession {
             options,
@@ -152,29 +151,29 @@ impl SystemSession {
             stops: Vec::new(),
             next_id: 1,
             edits: Vec::new(),
-            known: Along::every(STRETCH),
+            known: ThinnedSeries::every(STRETCH),
             run_limit: RUN_LIMIT,
         })
     }
 
-    /// The system at this position.
+    /// State of the system at this position.
     pub fn system(&self) -> &System {
         &self.point.system
     }
 
-    /// Cycles that have passed.
+    /// Number of cycles since reset.
     pub fn cycle(&self) -> Cycle {
         self.point.system.now()
     }
 
-    /// Base ticks for which the host has taken its turn.
+    /// Number of base ticks with a host turn taken.
     pub fn turns(&self) -> u64 {
         self.point.turns
     }
 
     // ---- Stops.
 
-    /// Adds a stop; its number.
+    /// Adds a stop; returns its number.
     pub fn add_stop(&mut self, stop: SystemStop, text: String) -> u32 {
         let id = self.next_id;
         self.next_id += 1;
@@ -182,19 +181,19 @@ impl SystemSession {
         id
     }
 
-    /// The number that the next one gets: one count for links and for all cores' sessions.
+    /// Counter for the number of the next stop, common to links and all cores' sessions.
     pub(crate) fn next_stop(&mut self) -> &mut u32 {
         &mut self.next_id
     }
 
-    /// Removes one; whether there was one.
+    /// Removes a stop; returns whether it existed.
     pub fn remove_stop(&mut self, id: u32) -> bool {
         let before = self.stops.len();
         self.stops.retain(|(known, ..)| *known != id);
         self.stops.len() < before
     }
 
-    /// Numbers and texts of all.
+    /// Numbers and texts of all stops at link events.
     pub fn stops(&self) -> impl Iterator<Item = (u32, &str)> {
         self.stops.iter().map(|(id, _, text)| (*id, text.as_str()))
     }
@@ -202,34 +201,38 @@ impl SystemSession {
     // ---- Moving.
 
     /// Goes to a position, forward or back.
-    pub fn go_to(&mut self, cycle: Cycle) -> SystemWhy {
+    pub fn go_to(&mut self, cycle: Cycle) -> SystemStopReason {
         if cycle < self.cycle() {
             self.restore(cycle);
         }
         loop {
             let next = cycle.min(self.cycle() + STRETCH);
             let why = self.advance(next, None);
-            if why != SystemWhy::Done || self.cycle() >= cycle {
+            if why != SystemStopReason::Done || self.cycle() >= cycle {
                 return why;
             }
             if self.interrupted() {
-                return SystemWhy::Interrupted;
+                return SystemStopReason::Interrupted;
             }
         }
     }
 
-    /// Runs again from the beginning to this position, and shows a core after each cycle in which a bundle of it issued, with
-    /// that bundle. The session stays where it is.
+    /// Repeats the run from reset to this position, and shows a core after each of its issues, with the bundle. The session stays where it
+    /// is.
     ///
     /// # Returns
-    /// [`SystemWhy::Done`], or that it was interrupted.
-    pub fn replay(&mut self, core: usize, visit: &mut dyn FnMut(&Emulator, BundleAddress)) -> SystemWhy {
+    /// [`SystemWhy::Done`], or [`SystemWhy::Interrupted`].
+    pub fn replay(
+        &mut self,
+        core: usize,
+        visit: &mut dyn FnMut(&Emulator, BundleAddress),
+    ) -> SystemStopReason {
         let here = self.cycle();
-        let Some(beginning) = self.checkpoints.first().cloned() else { return SystemWhy::Start };
+        let Some(beginning) = self.checkpoints.first().cloned() else { return SystemStopReason::Start };
         let point = std::mem::replace(&mut self.point, beginning);
-        let mut why = SystemWhy::Done;
-        while self.cycle() < here && why == SystemWhy::Done {
-            let (now, mut seen) = (self.cycle(), Seen::default());
+        let mut why = SystemStopReason::Done;
+        while self.cycle() < here && why == SystemStopReason::Done {
+            let (now, mut seen) = (self.cycle(), StretchEvents::default());
             why = self.advance(now + 1, Some(&mut seen));
             for (own, event) in seen.cores {
                 match event {
@@ -240,14 +243,14 @@ impl SystemSession {
                 }
             }
             if self.interrupted() {
-                why = SystemWhy::Interrupted;
+                why = SystemStopReason::Interrupted;
             }
         }
         self.point = point;
         why
     }
 
-    /// Sets a register or a data word of a core. What was recorded of the run after this position is forgotten.
+    /// Sets a register or a data word of a core. Records of the run after this position are dropped.
     pub fn set(&mut self, core: usize, place: Place, bits: u32) {
         let now = self.cycle();
         self.edits.truncate(self.point.edits);
@@ -261,25 +264,24 @@ impl SystemSession {
         self.options.control.report(self.cycle())
     }
 
-    /// To the last checkpoint not after a cycle.
+    /// Restores the last checkpoint at or before a cycle.
     fn restore(&mut self, cycle: Cycle) {
         if let Some((_, point)) = self.checkpoints.before(cycle) {
             self.point = point.clone();
         }
     }
 
-    /// Lets the system run until so many cycles have passed, with the host's turns and the edits on the way. `seen` gets what the
-    /// cores do.
-    fn advance(&mut self, cycle: Cycle, mut seen: Option<&mut Seen>) -> SystemWhy {
+    /// Runs the system up to this cycle, with the host's turns and the edits on the way. Events of the cores go to `seen`.
+    fn advance(&mut self, cycle: Cycle, mut seen: Option<&mut StretchEvents>) -> SystemStopReason {
         let point = &mut self.point;
         make_edits(&self.edits, point);
         let now = point.system.now();
-        // Events of long ago are of no interest.
+        // Drop events too old to be reported.
         point.links.retain(|event| event.cycle + LATE + STRETCH >= now);
-        let mut why = SystemWhy::Done;
-        while why == SystemWhy::Done && point.system.now() < cycle {
+        let mut why = SystemStopReason::Done;
+        while why == SystemStopReason::Done && point.system.now() < cycle {
             if point.system.halted() {
-                why = SystemWhy::Halted;
+                why = SystemStopReason::Halted;
                 break;
             }
             let turn = turn(&point.system, point.turns);
@@ -300,25 +302,25 @@ impl SystemSession {
                 seen.inputs.extend(point.system.take_input_events());
             }
             if let Err(fault) = result {
-                why = SystemWhy::Fault(fault);
+                why = SystemStopReason::Fault(fault);
             } else if turn == Some(point.system.now()) {
                 why = match take_turn(&self.options, point) {
-                    Ok(true) => SystemWhy::Done,
-                    Ok(false) => SystemWhy::InputsEnd,
-                    Err(error) => SystemWhy::Host(error),
+                    Ok(true) => SystemStopReason::Done,
+                    Ok(false) => SystemStopReason::InputsEnd,
+                    Err(error) => SystemStopReason::Host(error),
                 };
             }
             make_edits(&self.edits, point);
         }
         self.options.control.report(self.cycle());
-        if why == SystemWhy::Done && self.cycle() >= self.checkpoints.due(self.cycle()) {
+        if why == SystemStopReason::Done && self.cycle() >= self.checkpoints.due(self.cycle()) {
             self.checkpoints.add(self.cycle(), self.point.clone());
         }
         why
     }
 }
 
-/// Makes the edits of this position that have not been made.
+/// Makes the pending edits of this position.
 fn make_edits(edits: &[Edit], point: &mut Point) {
     while let Some(edit) = edits.get(point.edits).filter(|edit| edit.cycle == point.system.now()) {
         session::put(point.system.core_mut(edit.core), edit.place, edit.bits);
@@ -326,13 +328,13 @@ fn make_edits(edits: &[Edit], point: &mut Point) {
     }
 }
 
-/// The cycle of the host's next turn, once ticks have started.
+/// Cycle of the host's next turn, once ticks have started.
 fn turn(system: &System, turns: u64) -> Option<Cycle> {
     let description = system.description();
     Some(system.start()? - description.lead() + turns * description.tick)
 }
 
-/// Takes the host's turn; false if there is none any more.
+/// Takes the host's turn; false if no turns are left.
 fn take_turn(options: &SystemOptions, point: &mut Point) -> Result<bool, HostError> {
     let turn = match &options.turns {
         None => &options.idle,
@@ -353,7 +355,7 @@ fn take_turn(options: &SystemOptions, point: &mut Point) -> Result<bool, HostErr
         point.system.publish(link)?;
     }
     for &link in &turn.push {
-        // One that finds it full is refused, and counted.
+        // A full FIFO refuses the entry and counts the refusal.
         point.system.push(link)?;
     }
     point.turns += 1;

@@ -1,25 +1,25 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Looking ahead and back for what a command waits for: events on links, steps of a core, stops of the cores' sessions.
+//! Searches over a system, forward and back: link events, steps of a core, and stops of the cores' sessions.
 
-use super::{LATE, Point, STRETCH, Seen, SystemSession, SystemStop, SystemWhy};
-use crate::session::{Live, Move, Search, Session, Unit, Why};
+use super::{LATE, Point, STRETCH, StretchEvents, SystemSession, SystemStop, SystemStopReason};
+use crate::session::{Move, Search, Session, StopReason, Unit, WatchExpression};
 use std::collections::BTreeMap;
 use takt_emu::{Event, Status};
 use takt_isa::timing::Cycle;
 use takt_system::{InputEvent, LinkEvent};
 
-/// A find of a core's session: the cycle, the core, and the reason.
-type Found = (Cycle, usize, Why);
+/// A hit in a core's session: the cycle, the core, and the reason.
+type Hit = (Cycle, usize, StopReason);
 
-/// Positions at which to stop, with the stop's number if it is one.
+/// Positions at which to stop, with the number of the stop, if any.
 type Hits = Vec<(Cycle, Option<u32>)>;
 
-/// For each core what is looked for in its session.
+/// Search in the session of each core.
 pub(super) type Searches = Vec<Option<Search>>;
 
 impl SystemSession {
-    /// Moves the run; of a step, by one, of this core. `views` has a session for each core.
-    pub fn go(&mut self, views: &mut [&mut Session], core: usize, to: &Move) -> SystemWhy {
+    /// Makes one move of the run; a step counts on this core. `views` has a session for each core.
+    pub fn go(&mut self, views: &mut [&mut Session], core: usize, to: &Move) -> SystemStopReason {
         match to {
             Move::Step(unit, _) => self.step(views, core, *unit),
             Move::Back(unit, _) => self.step_back(views, core, *unit),
@@ -32,50 +32,52 @@ impl SystemSession {
         }
     }
 
-    /// Goes on by a step of a core; all others go on meanwhile. `views` has a session for each core, or, for steps by cycle,
-    /// bundle or period, none.
+    /// Steps one core forward, and all others along with it. `views` has a session for each core; it may be empty for steps by cycle,
+    /// bundle or period.
     ///
     /// # Returns
-    /// [`SystemWhy::Done`]; that this core has halted; or why the system stopped before.
-    pub fn step(&mut self, views: &mut [&mut Session], core: usize, unit: Unit) -> SystemWhy {
+    /// [`SystemWhy::Done`]; the halt of this core; or the reason why the system stopped earlier.
+    pub fn step(&mut self, views: &mut [&mut Session], core: usize, unit: Unit) -> SystemStopReason {
         let why = match unit {
             Unit::Cycle => return self.go_to(self.cycle() + 1),
-            _ if self.has_halted(core) => return SystemWhy::Core(core, Why::Halted),
+            _ if self.has_halted(core) => return SystemStopReason::Core(core, StopReason::Halted),
             Unit::Bundle | Unit::Period => self.seek(&mut [], &mut [], |cores, _| ends(unit, core, cores)),
             Unit::Line | Unit::Call | Unit::Out => {
                 let mut searches = self.step_searches(views, core, unit);
-                // It may halt on the way.
+                // The core may halt before the step ends.
                 self.seek(views, &mut searches, |cores, _| ends(unit, core, cores))
             }
         };
         match why {
-            SystemWhy::Core(_, Why::Done) => SystemWhy::Done,
-            SystemWhy::Done if self.has_halted(core) => SystemWhy::Core(core, Why::Halted),
+            SystemStopReason::Core(_, StopReason::Done) => SystemStopReason::Done,
+            SystemStopReason::Done if self.has_halted(core) => {
+                SystemStopReason::Core(core, StopReason::Halted)
+            }
             why => why,
         }
     }
 
-    /// Goes back by a step.
-    pub fn step_back(&mut self, views: &mut [&mut Session], core: usize, unit: Unit) -> SystemWhy {
+    /// Steps one core back.
+    pub fn step_back(&mut self, views: &mut [&mut Session], core: usize, unit: Unit) -> SystemStopReason {
         let why = match (unit, self.cycle()) {
-            (_, 0) => return SystemWhy::Start,
+            (_, 0) => return SystemStopReason::Start,
             (Unit::Cycle, now) => return self.go_to(now - 1),
             (Unit::Bundle | Unit::Period, _) => {
                 self.seek_back(&mut [], |_, _| Ok(Vec::new()), |cores, _| ends(unit, core, cores))
             }
             (Unit::Line | Unit::Call | Unit::Out, _) => {
-                // The depth of calls now counts, not that where the search begins.
+                // The call depth of this position decides, not that at the start of the search.
                 let wanted = self.step_searches(views, core, unit);
                 self.seek_back(views, |_, _| Ok(wanted.clone()), |_, _| Hits::new())
             }
         };
         match why {
-            SystemWhy::Core(_, Why::Done) => SystemWhy::Done,
+            SystemStopReason::Core(_, StopReason::Done) => SystemStopReason::Done,
             why => why,
         }
     }
 
-    /// For each core what is looked for: of one, the end of its step.
+    /// A search for the end of a step, in the session of one core.
     fn step_searches(&self, views: &mut [&mut Session], core: usize, unit: Unit) -> Searches {
         self.show(views);
         let search =
@@ -87,18 +89,18 @@ impl SystemSession {
         matches!(self.system().core(core).status(), Status::Halted { .. })
     }
 
-    /// Goes to where so many periods of a core have ended, forward or back.
-    pub fn go_to_period(&mut self, core: usize, period: u64) -> SystemWhy {
+    /// Goes forward or back to the position after this number of periods of a core.
+    pub fn go_to_period(&mut self, core: usize, period: u64) -> SystemStopReason {
         let ended = |system: &takt_system::System| system.periods(core).count;
         if period == 0 {
             return self.go_to(0);
         }
         while ended(self.system()) < period {
             if self.has_halted(core) {
-                return SystemWhy::Core(core, Why::Halted);
+                return SystemStopReason::Core(core, StopReason::Halted);
             }
             let why = self.go_to(self.cycle() + STRETCH);
-            if why != SystemWhy::Done && ended(self.system()) < period {
+            if why != SystemStopReason::Done && ended(self.system()) < period {
                 return why;
             }
         }
@@ -107,15 +109,15 @@ impl SystemSession {
         }
         while ended(self.system()) < period {
             let why = self.step(&mut [], core, Unit::Period);
-            if why != SystemWhy::Done {
+            if why != SystemStopReason::Done {
                 return why;
             }
         }
-        SystemWhy::Done
+        SystemStopReason::Done
     }
 
-    /// Runs on to a stop: an event on a link, or one of a core's session. `views` has a session for each core, or none.
-    pub fn resume(&mut self, views: &mut [&mut Session]) -> SystemWhy {
+    /// Runs forward to a stop: a link event, or a stop of a core's session. `views` has a session for each core, or is empty.
+    pub fn resume(&mut self, views: &mut [&mut Session]) -> SystemStopReason {
         let stops = self.stops.clone();
         let mut searches = match self.stop_searches(views) {
             Ok(searches) => searches,
@@ -125,16 +127,16 @@ impl SystemSession {
         self.arrived(views, why)
     }
 
-    /// Runs back to one.
-    pub fn resume_back(&mut self, views: &mut [&mut Session]) -> SystemWhy {
+    /// Runs back to a stop.
+    pub fn resume_back(&mut self, views: &mut [&mut Session]) -> SystemStopReason {
         let stops = self.stops.clone();
         let why = self.seek_back(views, SystemSession::stop_searches, |_, links| stopped(&stops, links));
         self.arrived(views, why)
     }
 
-    /// Lets a core's session take the line of the breakpoint that it stopped at for the line at hand.
-    fn arrived(&self, views: &mut [&mut Session], why: SystemWhy) -> SystemWhy {
-        if let SystemWhy::Core(core, found) = &why
+    /// Makes the line of the breakpoint that stopped a core's session the line at hand.
+    fn arrived(&self, views: &mut [&mut Session], why: SystemStopReason) -> SystemStopReason {
+        if let SystemStopReason::Core(core, found) = &why
             && let Some(view) = views.get_mut(*core)
         {
             self.show_core(*core, view, false);
@@ -143,18 +145,23 @@ impl SystemSession {
         why
     }
 
-    /// Runs on to the next position at which an expression over a core holds.
-    pub fn run_until(&mut self, views: &mut [&mut Session], core: usize, live: Live) -> SystemWhy {
-        let Some(view) = views.get_mut(core) else { return SystemWhy::Done };
-        // As of a single core: what holds already may still hold in the next cycle.
+    /// Runs forward to the next position at which an expression over a core is not zero.
+    pub fn run_until(
+        &mut self,
+        views: &mut [&mut Session],
+        core: usize,
+        live: WatchExpression,
+    ) -> SystemStopReason {
+        let Some(view) = views.get_mut(core) else { return SystemStopReason::Done };
+        // An expression that already holds may still hold in the next cycle, as in a session of one core.
         if view.holds(&live) {
             let why = self.go_to(self.cycle() + 1);
-            if why != SystemWhy::Done {
+            if why != SystemStopReason::Done {
                 return why;
             }
             self.show_core(core, view, false);
             if view.holds(&live) {
-                return SystemWhy::Core(core, Why::Holds);
+                return SystemStopReason::Core(core, StopReason::Holds);
             }
         }
         let mut searches: Searches = views.iter().map(|_| None).collect();
@@ -162,12 +169,12 @@ impl SystemSession {
         self.seek(views, &mut searches, |_, _| Hits::new())
     }
 
-    /// The searches for the stops of the cores' sessions from this position on, which know of each watched value what it was
-    /// last, even if it is not there now. The session stays where it is.
+    /// Searches for the stops of all cores' sessions from this position on, with the last value of every watched expression, even of one
+    /// that is not in its register now. The session stays where it is.
     ///
     /// # Errors
-    /// If it was interrupted.
-    fn stop_searches(&mut self, views: &mut [&mut Session]) -> Result<Searches, SystemWhy> {
+    /// If the user interrupted the search.
+    fn stop_searches(&mut self, views: &mut [&mut Session]) -> Result<Searches, SystemStopReason> {
         self.show(views);
         let mut searches: Searches = views.iter().map(|view| Search::stops(view)).collect();
         if searches.iter().flatten().all(Search::is_complete) {
@@ -180,13 +187,12 @@ impl SystemSession {
         result.map(|()| searches)
     }
 
-    /// Completes this position's searches: from what there is to see since the last checkpoint, or from all of the run that is not
-    /// known yet.
+    /// Completes this position's searches from the positions since the last checkpoint, or from the whole unknown part of the run.
     fn look_back(
         &mut self,
         views: &mut [&mut Session],
         searches: &mut [Option<Search>],
-    ) -> Result<(), SystemWhy> {
+    ) -> Result<(), SystemStopReason> {
         let is_of = |known: &Searches, views: &[&mut Session]| {
             known.iter().zip(views).all(|(search, view)| match search {
                 Some(search) => search.is_of(view),
@@ -225,37 +231,37 @@ impl SystemSession {
         Ok(())
     }
 
-    fn move_to(&mut self, cycle: Cycle) -> Result<(), SystemWhy> {
+    fn move_to(&mut self, cycle: Cycle) -> Result<(), SystemStopReason> {
         match self.go_to(cycle) {
-            SystemWhy::Done => Ok(()),
+            SystemStopReason::Done => Ok(()),
             end => Err(end),
         }
     }
 
-    /// Runs on to a position of the run that is known, and shows searches what there is to see on the way.
+    /// Runs forward to a known position, and shows the searches each position on the way.
     fn watch_until(
         &mut self,
         until: Cycle,
         views: &mut [&mut Session],
         searches: &mut [Option<Search>],
-    ) -> Result<(), SystemWhy> {
+    ) -> Result<(), SystemStopReason> {
         let origin = self.cycle();
         while self.cycle() < until {
             let (begin, from) = (self.point.clone(), self.cycle().max(origin + 1));
-            let mut seen = Seen::default();
+            let mut seen = StretchEvents::default();
             let why = self.advance((self.cycle() + STRETCH).min(until), Some(&mut seen));
-            if why != SystemWhy::Done {
+            if why != SystemStopReason::Done {
                 return Err(why);
             }
             self.walk(begin, (from, self.cycle()), &seen, views, searches, false);
             if self.interrupted() {
-                return Err(SystemWhy::Interrupted);
+                return Err(SystemStopReason::Interrupted);
             }
         }
         Ok(())
     }
 
-    /// Shows the cores to their sessions.
+    /// Puts each core's state into its session.
     pub(crate) fn show(&self, views: &mut [&mut Session]) {
         for (core, view) in views.iter_mut().enumerate() {
             self.show_core(core, view, false);
@@ -267,20 +273,20 @@ impl SystemSession {
         view.look(system.core(core).clone(), system.periods(core).count, boundary);
     }
 
-    /// Goes on to the first position after this one that is looked for.
+    /// Goes to the first hit after this position.
     fn seek(
         &mut self,
         views: &mut [&mut Session],
         searches: &mut [Option<Search>],
         wanted: impl Fn(&[(usize, Event)], &[LinkEvent]) -> Hits,
-    ) -> SystemWhy {
+    ) -> SystemStopReason {
         let origin = self.cycle();
         let looks = searches.iter().any(Option::is_some);
         loop {
             let begin = looks.then(|| self.point.clone());
-            // Issues at the end of a stretch are events of the next one.
+            // A stretch ends before the issues at its last position; the next stretch records them.
             let from = self.cycle().max(origin + 1);
-            let mut seen = Seen::default();
+            let mut seen = StretchEvents::default();
             let left = self.run_limit.saturating_sub(self.cycle() - origin).max(1);
             let why = self.advance(self.cycle() + STRETCH.min(left), Some(&mut seen));
             let now = self.cycle();
@@ -291,34 +297,33 @@ impl SystemSession {
                 let found = self.walk(begin, (from, end), &seen, views, searches, true).pop();
                 if let Some((cycle, core, why)) = found {
                     self.go_to(cycle);
-                    return SystemWhy::Core(core, why);
+                    return SystemStopReason::Core(core, why);
                 }
             }
             if let Some((cycle, id)) = first {
                 self.go_to(cycle);
-                return id.map_or(SystemWhy::Done, SystemWhy::Stop);
+                return id.map_or(SystemStopReason::Done, SystemStopReason::Stop);
             }
-            if why != SystemWhy::Done {
+            if why != SystemStopReason::Done {
                 return why;
             }
             if now - origin >= self.run_limit {
-                return SystemWhy::Limit(now - origin);
+                return SystemStopReason::Limit(now - origin);
             }
             if self.interrupted() {
-                return SystemWhy::Interrupted;
+                return SystemStopReason::Interrupted;
             }
         }
     }
 
-    /// Goes back to the last position before this one that is looked for: that `wanted` finds, or one of the searches that `begin`
-    /// makes where each stretch begins.
+    /// Goes to the last hit before this position: of `wanted`, or of one of the searches that `begin` makes at the start of each stretch.
     fn seek_back(
         &mut self,
         views: &mut [&mut Session],
-        begin: impl Fn(&mut SystemSession, &mut [&mut Session]) -> Result<Searches, SystemWhy>,
+        begin: impl Fn(&mut SystemSession, &mut [&mut Session]) -> Result<Searches, SystemStopReason>,
         wanted: impl Fn(&[(usize, Event)], &[LinkEvent]) -> Hits,
-    ) -> SystemWhy {
-        // Looked for are positions before `end`, from a checkpoint before `before` on.
+    ) -> SystemStopReason {
+        // Search for hits before `end`, in stretches that begin at a checkpoint before `before`.
         let (mut end, mut before) = (self.cycle(), self.cycle());
         while before > 0 {
             self.restore(before - 1);
@@ -330,12 +335,12 @@ impl SystemSession {
             };
             let looks = searches.iter().any(Option::is_some);
             let mut hits = Hits::new();
-            let mut found: Option<Found> = None;
-            // Late events count, too.
+            let mut found: Option<Hit> = None;
+            // Record `LATE` further cycles: events are reported late.
             while self.cycle() < end + LATE {
                 let from = self.cycle().max(start + 1);
                 let begin = (looks && from < end).then(|| self.point.clone());
-                let mut seen = Seen::default();
+                let mut seen = StretchEvents::default();
                 let why = self.advance((self.cycle() + STRETCH).min(end + LATE), Some(&mut seen));
                 hits.extend(wanted(&seen.cores, &self.point.links));
                 if let Some(begin) = begin {
@@ -343,44 +348,44 @@ impl SystemSession {
                     found =
                         self.walk(begin, (from, last), &seen, views, &mut searches, false).pop().or(found);
                 }
-                if why != SystemWhy::Done {
+                if why != SystemStopReason::Done {
                     break;
                 }
             }
-            // Events just before a stretch are those of the one before.
+            // Events just before a stretch belong to the previous stretch.
             let last =
                 hits.into_iter().filter(|(cycle, _)| *cycle < end && (*cycle > start || start == 0)).max();
             match (last, found) {
                 (last, Some((cycle, core, why))) if last.is_none_or(|(other, _)| other < cycle) => {
                     self.go_to(cycle);
-                    return SystemWhy::Core(core, why);
+                    return SystemStopReason::Core(core, why);
                 }
                 (Some((cycle, id)), _) => {
                     self.go_to(cycle);
-                    return id.map_or(SystemWhy::Done, SystemWhy::Stop);
+                    return id.map_or(SystemStopReason::Done, SystemStopReason::Stop);
                 }
                 _ => {}
             }
             (end, before) = (start + 1, start);
             if self.interrupted() {
-                return SystemWhy::Interrupted;
+                return SystemStopReason::Interrupted;
             }
         }
         self.go_to(0);
-        SystemWhy::Start
+        SystemStopReason::Start
     }
 
-    /// Goes again over a stretch in which the cores did what was seen, and shows each core to its session at each position of a
-    /// range that matters to its search. What they have found, in order: the first, or all. The session is where it was.
+    /// Repeats a stretch whose events are known, and shows each core to its session at each position of a range that matters to its search.
+    /// Returns the first hit or all hits, in order. The session stays where it was.
     fn walk(
         &mut self,
         begin: Point,
         (from, end): (Cycle, Cycle),
-        seen: &Seen,
+        seen: &StretchEvents,
         views: &mut [&mut Session],
         searches: &mut [Option<Search>],
         first: bool,
-    ) -> Vec<Found> {
+    ) -> Vec<Hit> {
         let here = std::mem::replace(&mut self.point, begin);
         let mut positions: BTreeMap<Cycle, Vec<usize>> = BTreeMap::new();
         let mut issues = BTreeMap::new();
@@ -401,7 +406,7 @@ impl SystemSession {
             let edits = self.edits.iter().filter(|edit| edit.core == core).map(|edit| edit.cycle);
             own.extend(edits.filter(|cycle| (from..=end).contains(cycle)));
             if from == 1 {
-                // The first values of input ports are there from the first cycle on.
+                // Input ports have their first values from the first cycle on.
                 own.insert(1);
             }
             for position in own {
@@ -410,7 +415,7 @@ impl SystemSession {
         }
         let mut found = Vec::new();
         'positions: for (cycle, cores) in positions {
-            if self.advance(cycle, None) != SystemWhy::Done || self.cycle() != cycle {
+            if self.advance(cycle, None) != SystemStopReason::Done || self.cycle() != cycle {
                 break;
             }
             for core in cores {
@@ -429,7 +434,7 @@ impl SystemSession {
     }
 }
 
-/// Takes from searches of an earlier position what these do not know.
+/// Copies missing previous values from searches of an earlier position.
 fn complete(searches: &mut [Option<Search>], earlier: &[Option<Search>]) {
     for (search, earlier) in searches.iter_mut().zip(earlier) {
         if let (Some(search), Some(earlier)) = (search, earlier) {
@@ -438,8 +443,7 @@ fn complete(searches: &mut [Option<Search>], earlier: &[Option<Search>]) {
     }
 }
 
-/// Ends of steps of a core, of those that its own session need not be asked about: by bundles and periods; and all where it
-/// halts.
+/// Ends of a core's step that its events alone decide: bundles, periods, and `halt`.
 fn ends(unit: Unit, core: usize, cores: &[(usize, Event)]) -> Hits {
     let own = cores.iter().filter(|(own, _)| *own == core);
     own.filter_map(|(_, event)| match event {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The retire log: a JSON object a line for each completed operation and each event of the period.
+//! Retire log in JSON lines: one object for each completed operation and each event of a period.
 
 use super::signal::{Signal, Source};
-use super::{Passed, Writer};
+use super::{CompletedCycle, Writer};
 use crate::value;
 use serde::Serialize;
 use serde_json::Value;
@@ -13,9 +13,9 @@ use takt_isa::{BundleAddress, Program, Register, Type};
 
 pub(super) struct JsonLines<'w> {
     target: Box<dyn Write + 'w>,
-    /// Registers that are of interest.
+    /// Registers whose writes are logged; empty for all.
     registers: Vec<Register>,
-    /// True if operations that write no register are of interest.
+    /// Operations that write no register are written too.
     rest: bool,
 }
 
@@ -29,7 +29,7 @@ impl<'w> JsonLines<'w> {
             })
             .collect();
         let ports = program.inputs.len() + program.outputs.len() + program.registers.len();
-        // All of the program's: then registers without a name, too.
+        // With all named registers selected, log registers without a name as well.
         let rest = named.len() == ports;
         JsonLines { target, registers: if rest { Vec::new() } else { named }, rest }
     }
@@ -61,7 +61,7 @@ impl<'w> JsonLines<'w> {
     }
 }
 
-/// A line of the log, in the order of its keys; what does not apply is left out.
+/// A line of the log, with its keys in order; inapplicable keys are omitted.
 #[derive(Default, Serialize)]
 struct LogLine {
     cycle: Cycle,
@@ -97,9 +97,9 @@ impl LogLine {
 }
 
 impl Writer for JsonLines<'_> {
-    fn cycle(&mut self, _: Cycle, passed: Passed<'_>) -> io::Result<()> {
-        // A system is traced as a waveform only.
-        let Passed::Core(record, emulator) = passed else { return Ok(()) };
+    fn cycle(&mut self, _: Cycle, passed: CompletedCycle<'_>) -> io::Result<()> {
+        // Systems are traced as waveforms only.
+        let CompletedCycle::Core(record, emulator) = passed else { return Ok(()) };
         let program = emulator.program();
         for event in &record.events {
             let line = match event {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Kanata 0004, which the pipeline viewer Konata opens. An operation is a row; its stages:
+//! Writer of Kanata 0004, the log format of the pipeline viewer Konata. Each operation is a row; its stages:
 //!
 //! | stage | cycles |
 //! |---|---|
@@ -8,9 +8,9 @@
 //! | `Ex` | between issue and writeback |
 //! | `Wb` | of its writeback |
 //!
-//! Arrows lead from an operation to those that wait for its result or take it as it arrives.
+//! Arrows lead from an operation to the operations that wait for its result or are forwarded it.
 
-use super::{Passed, Writer};
+use super::{CompletedCycle, Writer};
 use std::collections::{BTreeMap, HashMap};
 use std::fmt::Write as _;
 use std::io::{self, Write};
@@ -18,20 +18,20 @@ use takt_emu::{Emulator, Event};
 use takt_isa::timing::{Cause, Cycle};
 use takt_isa::{BundleAddress, Function, Instruction, Program, Register, SlotIndex};
 
-/// Stages of waiting, in the order of [`Cause::KINDS`] (a bundle that waits for the tick is issued already).
+/// Names of the waiting stages, in the order of [`Cause::KINDS`]. (A bundle that waits for the tick has issued already.)
 const WAITING: [&str; 7] = ["Fr", "Op", "De", "Un", "Dr", "Wp", "Ti"];
 
 pub(super) struct Kanata<'w> {
     target: Box<dyn Write + 'w>,
-    /// The cycle that the file has come to.
+    /// Cycle up to which the file is written.
     at: Cycle,
-    /// Lines for cycles to come.
+    /// Lines of later cycles.
     ahead: BTreeMap<Cycle, String>,
     next_id: u64,
     retired: u64,
-    /// The bundle that waits to issue: its rows, each with its slot, the stage that they are in, and since when.
+    /// Bundle that waits to issue: its rows with their slots, and the present stage with its first cycle.
     front: Option<Front>,
-    /// For each register, the row that writes it last, and when.
+    /// Last writer of each register: its row, and the cycle of the writeback.
     writers: HashMap<Register, (u64, Cycle)>,
 }
 
@@ -57,13 +57,13 @@ impl<'w> Kanata<'w> {
         })
     }
 
-    /// Adds a line to a cycle.
+    /// Queues a line for a cycle.
     fn line(&mut self, cycle: Cycle, line: std::fmt::Arguments<'_>) {
-        // A String takes all.
+        // Writing to a String cannot fail.
         let _ = writeln!(self.ahead.entry(cycle).or_default(), "{line}");
     }
 
-    /// Writes all cycles before `cycle`.
+    /// Writes all lines of cycles before `cycle`.
     fn flush_before(&mut self, cycle: Cycle) -> io::Result<()> {
         while let Some(entry) = self.ahead.first_entry().filter(|entry| *entry.key() < cycle) {
             let (next, lines) = entry.remove_entry();
@@ -76,7 +76,7 @@ impl<'w> Kanata<'w> {
         Ok(())
     }
 
-    /// The rows of a bundle, which waits to issue from `cycle` on.
+    /// Begins the rows of a bundle that waits to issue from `cycle` on.
     fn enter(
         &mut self,
         program: &Program,
@@ -162,9 +162,9 @@ impl<'w> Kanata<'w> {
 }
 
 impl Writer for Kanata<'_> {
-    fn cycle(&mut self, cycle: Cycle, passed: Passed<'_>) -> io::Result<()> {
-        // A system is traced as a waveform only.
-        let Passed::Core(record, emulator) = passed else { return Ok(()) };
+    fn cycle(&mut self, cycle: Cycle, passed: CompletedCycle<'_>) -> io::Result<()> {
+        // Systems are traced as waveforms only.
+        let CompletedCycle::Core(record, emulator) = passed else { return Ok(()) };
         let program = emulator.program();
         let stage = match (record.issued, record.stall) {
             (Some(address), _) => Some((address, "Is")),
@@ -191,7 +191,7 @@ impl Writer for Kanata<'_> {
                 self.front = Some(front);
             }
         }
-        // A bundle that never issues is flushed.
+        // A bundle that never issues ends as flushed.
         if record.events.iter().any(|event| matches!(event, Event::Fault(_)))
             && let Some(front) = self.front.take()
         {

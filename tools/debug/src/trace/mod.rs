@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Traces: what a run did, cycle by cycle, as a file for other tools. `docs/traces.md` says what stands in each.
+//! Traces: the events of a run, cycle by cycle, in file formats of other tools. `docs/traces.md` specifies the contents of each.
 //!
-//! [`Tracer`] runs an emulator in the place of its own `run` and `run_period`. Outside of the window of cycles the machine
-//! runs at full speed; within it each cycle is looked at. A trace that reaches its limit of bytes ends there, complete.
+//! [`Tracer`] replaces the emulator's own `run` and `run_period`. Outside the window of traced cycles the machine runs at full speed;
+//! within it every cycle is recorded. A trace that reaches its size limit ends there as a complete file.
 
 mod jsonl;
 mod kanata;
@@ -24,7 +24,7 @@ pub use signal::SignalError;
 pub use system::SystemTracer;
 pub use timeline::Timeline;
 
-/// The file format of a trace.
+/// File format of a trace.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Format {
     /// Value change dump, IEEE 1364.
@@ -33,12 +33,12 @@ pub enum Format {
     Fst,
     /// Kanata 0004, the pipeline log of the viewer Konata.
     Kanata,
-    /// A JSON object a line for each completed operation.
+    /// JSON lines, one object for each completed operation.
     JsonLines,
 }
 
 impl Format {
-    /// Every format, by the extension of its files.
+    /// All formats by file extension.
     pub const ALL: [(&'static str, Format); 4] = [
         ("vcd", Format::Vcd),
         ("fst", Format::Fst),
@@ -46,36 +46,36 @@ impl Format {
         ("jsonl", Format::JsonLines),
     ];
 
-    /// The format that a file's extension asks for.
+    /// Format with this file extension.
     pub fn of_extension(extension: &str) -> Option<Format> {
         Format::ALL.iter().find(|(known, _)| *known == extension).map(|(_, format)| *format)
     }
 }
 
-/// The extent of a trace that is wanted.
+/// Extent of the trace to write.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// The format.
+    /// Format of the file.
     pub format: Format,
-    /// The cycles that are traced.
+    /// Window of traced cycles.
     pub cycles: Range<Cycle>,
-    /// Names of signals, alone or with their groups as in `outputs.F1`, `*` standing for any characters; empty for all.
+    /// Patterns of signal names, alone or with their groups as in `outputs.F1`; `*` stands for any characters. Empty: all signals.
     pub signals: Vec<String>,
-    /// Bytes, roughly: the cycle in which a trace has more is its last.
+    /// Approximate size limit in bytes: the trace ends in the cycle that exceeds it.
     pub limit: u64,
 }
 
-/// One cycle of a core, as formats see it.
+/// Events of one cycle of a core, in the form that all formats read.
 struct Record {
-    /// The bundle that issued.
+    /// Bundle that issued in the cycle.
     issued: Option<BundleAddress>,
-    /// Otherwise the bundle that could not, and why; for [`Cause::Wait`] the one that waits.
+    /// In a stall, the bundle that could not issue, with the cause. For [`Cause::Wait`] the bundle of the `wait`.
     stall: Option<(BundleAddress, Cause)>,
     events: Vec<Event>,
 }
 
 impl Record {
-    /// The cycle to come: a bundle issues, or stalls. Its events are not known yet.
+    /// Record of the cycle to come: a bundle issues, or stalls. Its events are not known yet.
     fn to_come(emulator: &mut Emulator) -> Record {
         let cycle = emulator.now();
         let (stall, issued) = match *emulator.status() {
@@ -90,33 +90,33 @@ impl Record {
     }
 }
 
-/// A cycle that has passed.
+/// A completed cycle of the run.
 #[derive(Clone, Copy)]
-enum Passed<'s> {
-    /// Of a program: its record, and the machine after it.
+enum CompletedCycle<'s> {
+    /// A cycle of a program: its record, and the machine after it.
     Core(&'s Record, &'s Emulator),
-    /// Of a system: a record for each core, and the system after it.
+    /// A cycle of a system: a record for each core, and the system after it.
     System(&'s [Record], &'s System),
 }
 
-/// A format's writer.
+/// Writer of one trace format.
 trait Writer {
-    fn cycle(&mut self, cycle: Cycle, passed: Passed<'_>) -> io::Result<()>;
-    /// The trace ends before `cycle`.
+    fn cycle(&mut self, cycle: Cycle, passed: CompletedCycle<'_>) -> io::Result<()>;
+    /// Ends the trace before `cycle`.
     fn finish(self: Box<Self>, cycle: Cycle) -> io::Result<()>;
-    /// Bytes that are kept and not yet written.
-    fn kept(&self) -> u64 {
+    /// Size in bytes of buffered output.
+    fn buffered_bytes(&self) -> u64 {
         0
     }
 }
 
-/// Counts the bytes that pass.
-struct Counted<'w> {
+/// Counts the bytes written through it.
+struct CountingWriter<'w> {
     inner: Box<dyn Write + 'w>,
     bytes: Rc<Cell<u64>>,
 }
 
-impl Write for Counted<'_> {
+impl Write for CountingWriter<'_> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         let count = self.inner.write(bytes)?;
         self.bytes.set(self.bytes.get() + count as u64);
@@ -128,49 +128,50 @@ impl Write for Counted<'_> {
     }
 }
 
-/// The extent of a trace.
+/// Extent of a finished trace.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Summary {
-    /// The cycles that it covers; empty if the run did not reach the window.
+    /// Cycles in the trace; empty if the run did not reach the window.
     pub cycles: Range<Cycle>,
-    /// True if it ended because of its size.
+    /// The trace ended at its size limit.
     pub cut: bool,
 }
 
-/// A trace that is being written, of a program or a system.
+/// A trace under construction, of a program or a system.
 struct Log<'w> {
     options: Options,
     bytes: Rc<Cell<u64>>,
-    /// Until the window's first cycle, where it goes.
+    /// Destination; moves to `writer` in the window's first cycle.
     target: Option<Box<dyn Write + 'w>>,
     writer: Option<Box<dyn Writer + 'w>>,
     summary: Summary,
-    /// The first error of writing; nothing is written after it.
+    /// First write error; nothing is written after it.
     error: Option<io::Error>,
 }
 
 impl<'w> Log<'w> {
     fn new(target: Box<dyn Write + 'w>, options: Options) -> Log<'w> {
         let bytes = Rc::new(Cell::new(0));
-        let target: Box<dyn Write + 'w> = Box::new(Counted { inner: target, bytes: Rc::clone(&bytes) });
+        let target: Box<dyn Write + 'w> =
+            Box::new(CountingWriter { inner: target, bytes: Rc::clone(&bytes) });
         let start = options.cycles.start;
         let summary = Summary { cycles: start..start, cut: false };
         Log { options, bytes, target: Some(target), writer: None, summary, error: None }
     }
 
-    /// True if the cycle to come is traced.
+    /// The cycle to come is traced.
     fn looks(&self, now: Cycle) -> bool {
         self.options.cycles.contains(&now) && !self.summary.cut && self.error.is_none()
     }
 
-    /// The cycle up to which the run need not be looked at; `None` if it is to be looked at now.
+    /// Cycle up to which the run may go at full speed; `None` if the present cycle must be recorded.
     fn next(&self, now: Cycle) -> Option<Cycle> {
         let start = self.options.cycles.start;
         let until = if now < start { start } else { Cycle::MAX };
         (!self.looks(now)).then_some(until)
     }
 
-    /// Begins the file, once.
+    /// Begins the file, unless it is begun already.
     fn begin(
         &mut self,
         now: Cycle,
@@ -184,8 +185,8 @@ impl<'w> Log<'w> {
         }
     }
 
-    /// Writes a cycle, which counts if it has passed whole.
-    fn record(&mut self, cycle: Cycle, passed: Passed<'_>, whole: bool) {
+    /// Writes a cycle; only a complete one (`whole`) extends the trace.
+    fn record(&mut self, cycle: Cycle, passed: CompletedCycle<'_>, whole: bool) {
         let Some(writer) = &mut self.writer else { return };
         if let Err(error) = writer.cycle(cycle, passed) {
             self.error = Some(error);
@@ -193,7 +194,7 @@ impl<'w> Log<'w> {
         if whole {
             self.summary.cycles.end = cycle + 1;
         }
-        self.summary.cut = self.bytes.get() + writer.kept() > self.options.limit;
+        self.summary.cut = self.bytes.get() + writer.buffered_bytes() > self.options.limit;
     }
 
     fn finish(self) -> io::Result<Summary> {
@@ -207,35 +208,35 @@ impl<'w> Log<'w> {
     }
 }
 
-/// Somebody else who hears what happens.
-pub type Also<'a> = Option<&'a mut dyn FnMut(&Event)>;
+/// Additional observer of the run's events.
+pub type ExtraObserver<'a> = Option<&'a mut dyn FnMut(&Event)>;
 
-/// Runs an emulator and writes what it does.
+/// Runs an emulator and writes a trace of it.
 pub struct Tracer<'w>(Log<'w>);
 
 impl<'w> Tracer<'w> {
-    /// A trace of the program in `emulator`, to be written to `target`.
+    /// A trace of the program in `emulator`, written to `target`.
     ///
     /// # Errors
-    /// If a name of a signal matches none.
+    /// If a pattern matches no signal.
     pub fn new(
         emulator: &Emulator,
         target: Box<dyn Write + 'w>,
         options: Options,
     ) -> Result<Tracer<'w>, SignalError> {
-        // Known wrong now rather than at the window.
+        // Report unknown names now, not at the window's start.
         signal::select(emulator.program(), options.format, &options.signals)?;
         Ok(Tracer(Log::new(target, options)))
     }
 
-    /// As [`Emulator::run_period`] with the inputs as they are; `also` hears what happens, within the window or not.
+    /// Runs a period as [`Emulator::run_period`] does, with unchanged inputs. `also` receives every event, inside the window or not.
     ///
     /// # Errors
-    /// Those of the emulator. Errors of writing are told by [`Tracer::finish`].
+    /// Errors of the emulator. [`Tracer::finish`] returns write errors.
     pub fn run_period(
         &mut self,
         emulator: &mut Emulator,
-        mut also: Also<'_>,
+        mut also: ExtraObserver<'_>,
     ) -> Result<PeriodReport, PeriodError> {
         loop {
             if let Some(report) = self.advance(emulator, &mut also, |emulator, until, sink| match sink {
@@ -247,14 +248,14 @@ impl<'w> Tracer<'w> {
         }
     }
 
-    /// As [`Emulator::run`]; `also` hears what happens, within the window or not.
+    /// Runs as [`Emulator::run`] does. `also` receives every event, inside the window or not.
     ///
     /// # Errors
-    /// Those of the emulator. Errors of writing are told by [`Tracer::finish`].
+    /// Errors of the emulator. [`Tracer::finish`] returns write errors.
     pub fn run(
         &mut self,
         emulator: &mut Emulator,
-        mut also: Also<'_>,
+        mut also: ExtraObserver<'_>,
     ) -> Result<takt_emu::Stop, PeriodError> {
         use takt_emu::Stop;
         loop {
@@ -263,7 +264,7 @@ impl<'w> Tracer<'w> {
                     Some(sink) => emulator.observed(sink).run_until(until)?,
                     None => emulator.run_until(until)?,
                 };
-                // A program that waits without a tick to come would let cycles pass for ever.
+                // Without a tick to come, a waiting program would let cycles pass forever.
                 let idle =
                     matches!(emulator.status(), Status::Waiting { .. }) && emulator.next_tick().is_none();
                 let reached = stop == Stop::Reached;
@@ -275,11 +276,11 @@ impl<'w> Tracer<'w> {
         }
     }
 
-    /// Runs to the window, or for a cycle within it, or beyond it.
+    /// Runs up to the window, or one cycle within it, or beyond it.
     fn advance<T>(
         &mut self,
         emulator: &mut Emulator,
-        also: &mut Also<'_>,
+        also: &mut ExtraObserver<'_>,
         run: impl FnOnce(&mut Emulator, Cycle, Option<&mut dyn FnMut(&Event)>) -> Result<Option<T>, PeriodError>,
     ) -> Result<Option<T>, PeriodError> {
         let now = emulator.now();
@@ -302,7 +303,7 @@ impl<'w> Tracer<'w> {
         let whole = emulator.now() > now;
         record.events = events;
         record.issued = record.issued.filter(|_| whole);
-        self.0.record(now, Passed::Core(&record, emulator), whole);
+        self.0.record(now, CompletedCycle::Core(&record, emulator), whole);
         result
     }
 
@@ -320,17 +321,17 @@ impl<'w> Tracer<'w> {
         });
     }
 
-    /// True if writing has failed, so that nothing more is written.
+    /// Writing has failed; nothing more is written.
     pub fn has_failed(&self) -> bool {
         self.0.error.is_some()
     }
 
-    /// Completes the trace.
+    /// Writes the end of the trace.
     ///
     /// # Errors
-    /// The first error of writing.
+    /// The first write error.
     pub fn finish(mut self, emulator: &Emulator) -> io::Result<Summary> {
-        // A window that was never reached makes an empty trace.
+        // A run that never reached the window yields an empty trace.
         self.begin(emulator);
         self.0.finish()
     }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Signals: what a waveform shows.
+//! Signals of a waveform: their names, types and values.
 
-use super::{Format, Passed, Record};
+use super::{CompletedCycle, Format, Record};
 use crate::matches;
 use std::sync::Arc;
 use takt_asm::nearest;
@@ -10,58 +10,58 @@ use takt_isa::timing::Cause;
 use takt_isa::{BundleAddress, Program, Register, Type};
 use takt_system::{End, LinkKind};
 
-/// The source of a signal's value.
+/// Origin of a signal's value.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Source {
-    /// One if a bundle issued.
+    /// 1 in a cycle in which a bundle issued.
     Issue,
-    /// The bundle that issued or waits to.
+    /// Address of the bundle that issued or waits to issue.
     Bundle,
-    /// One if the tick was seen.
+    /// 1 in a cycle with a tick.
     Tick,
-    /// One if a deadline was missed, or the tick lost.
+    /// 1 in a cycle with a missed deadline or a lost tick.
     Missed,
-    /// One if the cycle is charged to this kind of cause.
+    /// 1 in a cycle charged to a cause of this kind.
     Stall(usize),
-    /// A register.
+    /// Value of a register.
     Register(Register),
-    /// Of a system: what arrived last on a link, the field.
+    /// Last arrival on a link of a system: link and field.
     Arrived(usize, usize),
-    /// The number of entries of a FIFO.
+    /// Number of entries in a FIFO.
     Count(usize),
 }
 
-/// A signal.
+/// A signal with its place in the hierarchy of the trace.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(super) struct Signal {
-    /// The core of a system that it belongs to, or `links`; none of a single core.
+    /// Core of a system, or `links`; `None` in a trace of one core.
     pub(super) part: Option<Arc<str>>,
-    /// The group that it stands in; none at the top.
+    /// Group within the part; `None` at the top level.
     pub(super) scope: Option<&'static str>,
     pub(super) name: String,
     pub(super) source: Source,
     pub(super) ty: SignalType,
 }
 
-/// The format of a signal's value.
+/// Representation of a signal's values.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum SignalType {
     Real,
     Bits(u32),
 }
 
-/// The group that all signals stand in.
+/// Top-level group of all signals.
 pub(super) const TOP: &str = "takt";
 
 impl Signal {
-    /// Its name with the groups that it stands in, as viewers show it.
+    /// Full path of the signal, as viewers show it.
     fn path(&self) -> String {
         let group = |name: Option<&str>| name.map_or(String::new(), |name| format!("{name}."));
         format!("{TOP}.{}{}{}", group(self.part.as_deref()), group(self.scope), self.name)
     }
 
-    /// True if a pattern means it: by its name, by its group and name, or by its whole path. A name may have points of its
-    /// own, and `*` before the first point stands for one group.
+    /// The pattern matches the name, the group and name, or the whole path. A name may contain points, and `*` before the first point
+    /// stands for one group.
     fn is(&self, pattern: &str) -> bool {
         let grouped = |(group, name): (&str, &str)| {
             self.scope.is_some_and(|scope| matches(group, scope)) && matches(name, &self.name)
@@ -77,11 +77,11 @@ impl Signal {
                 && matches(pattern, &self.path())
     }
 
-    /// Its value after a cycle: `None` while unknown.
-    pub(super) fn value(&self, passed: Passed<'_>) -> Option<u32> {
+    /// Value after a cycle; `None` while unknown.
+    pub(super) fn value(&self, passed: CompletedCycle<'_>) -> Option<u32> {
         let (records, system) = match passed {
-            Passed::Core(record, emulator) => return self.value_in(record, emulator),
-            Passed::System(records, system) => (records, system),
+            CompletedCycle::Core(record, emulator) => return self.value_in(record, emulator),
+            CompletedCycle::System(records, system) => (records, system),
         };
         let description = system.description();
         match self.source {
@@ -105,7 +105,7 @@ impl Signal {
         }
     }
 
-    /// The value of a core's own signal.
+    /// Value of a signal that belongs to a core.
     fn value_in(&self, record: &Record, emulator: &Emulator) -> Option<u32> {
         let heard = |is: fn(&Event) -> bool| Some(record.events.iter().any(is).into());
         match self.source {
@@ -123,32 +123,32 @@ impl Signal {
                 emulator.output_bits(register)
             }
             Source::Register(register) => emulator.register(register),
-            // Those of a system's links.
+            // Signals of links belong to the system, not to a core.
             Source::Arrived(..) | Source::Count(_) => None,
         }
     }
 }
 
-/// The reason why signals cannot be selected.
+/// Errors of the selection of signals.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SignalError {
-    /// A name that matches nothing.
+    /// A name without a matching signal.
     #[error("no signal is named `{name}`{}", near.as_ref().map_or(String::new(), |near| format!("; did you mean `{near}`?")))]
     Unknown {
-        /// The name.
+        /// Name that matches no signal.
         name: String,
-        /// A name that may be meant.
+        /// Closest existing name, as a suggestion.
         near: Option<String>,
     },
-    /// A name that matches signals, but no register, and the format selects by registers.
+    /// A name of signals that are no registers, in a format that selects by registers.
     #[error("`{0}` is no register: a retire log has the operations that write the registers selected")]
     NoRegister(String),
-    /// A format without signals.
+    /// Signals requested for a format that has none.
     #[error("a Kanata trace shows operations; it has no signals to select")]
     None,
 }
 
-/// Every signal of a program.
+/// All signals of a program.
 pub(super) fn all(program: &Program) -> Vec<Signal> {
     let address_bits = u32::BITS - program.bundles().leading_zeros();
     let wire = |scope, name: &str, source, width| Signal {
@@ -181,7 +181,7 @@ pub(super) fn all(program: &Program) -> Vec<Signal> {
     signals
 }
 
-/// The signals that match the patterns, all if there is none.
+/// Signals of a program that match the patterns; all signals if there are no patterns.
 pub(super) fn select(
     program: &Program,
     format: Format,
@@ -190,7 +190,7 @@ pub(super) fn select(
     select_of(all(program), format, patterns)
 }
 
-/// Those of some signals that match the patterns.
+/// Signals that match the patterns, out of `signals`.
 pub(super) fn select_of(
     signals: Vec<Signal>,
     format: Format,
@@ -206,7 +206,7 @@ pub(super) fn select_of(
         let mut meant = signals.iter().filter(|signal| signal.is(pattern)).peekable();
         if meant.peek().is_none() {
             let paths: Vec<String> = signals.iter().map(Signal::path).collect();
-            // As much of the path as the pattern has.
+            // Suggestions have as many path components as the pattern.
             let grouped =
                 |path: &'_ str| path.split_once('.').map_or(String::new(), |(_, rest)| rest.to_owned());
             let groups: Vec<String> = paths.iter().map(|path| grouped(path)).collect();

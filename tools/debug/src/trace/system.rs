@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Traces of a system: the signals of all cores, and what is on the links, on one axis of time.
+//! Traces of a system: the signals of all cores and links on one axis of time.
 
 use super::signal::{self, Signal, SignalType, Source};
-use super::{Format, Log, Options, Passed, Record, SignalError, Summary, Timeline, wave};
+use super::{CompletedCycle, Format, Log, Options, Record, SignalError, Summary, Timeline, wave};
 use std::io::{self, Write};
 use std::ops::Range;
 use std::sync::Arc;
@@ -10,12 +10,12 @@ use takt_isa::Type;
 use takt_isa::timing::Cycle;
 use takt_system::{LinkKind, System, SystemFault};
 
-/// The group of what is on the links.
+/// Group of the links' signals.
 const LINKS: &str = "links";
-/// Bits of a FIFO's number of entries.
+/// Bits of a FIFO's entry count.
 const COUNT: u32 = 13;
 
-/// Every signal of a system.
+/// All signals of a system.
 fn all(system: &System) -> Vec<Signal> {
     let description = system.description();
     let mut signals = Vec::new();
@@ -35,7 +35,7 @@ fn all(system: &System) -> Vec<Signal> {
         }
         for (field, names) in link.fields.iter().enumerate() {
             let ty = if names.ty == Type::F { SignalType::Real } else { SignalType::Bits(32) };
-            // Names of waveforms have no blanks.
+            // Names in waveforms have no blanks.
             let from = description.core(link.from).map_or("host", |core| &core.name);
             put(format!("{from}.{}_to_{}", names.from, names.to), Source::Arrived(number, field), ty);
         }
@@ -43,18 +43,18 @@ fn all(system: &System) -> Vec<Signal> {
     signals
 }
 
-/// Runs a system and writes what it does.
+/// Runs a system and writes a trace of it.
 pub struct SystemTracer<'w> {
     log: Log<'w>,
-    /// In the place of a file.
+    /// Destination instead of a file.
     timeline: Option<Timeline>,
 }
 
 impl<'w> SystemTracer<'w> {
-    /// A trace of a system, to be written to `target`. A format that is no waveform shows one core: with it there is none.
+    /// A trace of a system, written to `target`. Other formats than waveforms cannot show a system.
     ///
     /// # Errors
-    /// If a name of a signal matches none.
+    /// If a pattern matches no signal.
     pub fn new(
         system: &System,
         target: Box<dyn Write + 'w>,
@@ -75,18 +75,18 @@ impl<'w> SystemTracer<'w> {
         Ok(SystemTracer { log, timeline: None })
     }
 
-    /// A picture of these cycles in the place of a trace: [`SystemTracer::finish_timeline`] gives it.
+    /// Collects a timeline of these cycles instead of a trace; [`SystemTracer::finish_timeline`] returns it.
     pub fn timeline(cycles: Range<Cycle>) -> SystemTracer<'static> {
         let options = Options { format: Format::Vcd, cycles, signals: Vec::new(), limit: u64::MAX };
         SystemTracer { log: Log::new(Box::new(io::sink()), options), timeline: Some(Timeline::default()) }
     }
 
-    /// The picture, if it is one.
+    /// The collected timeline; `None` after [`SystemTracer::new`].
     pub fn finish_timeline(self) -> Option<Timeline> {
         self.timeline
     }
 
-    /// As [`System::run_to_start`].
+    /// Runs and traces as [`System::run_to_start`] does.
     ///
     /// # Errors
     /// If a core faults.
@@ -97,7 +97,7 @@ impl<'w> SystemTracer<'w> {
         Ok(system.start())
     }
 
-    /// As [`System::run_until`].
+    /// Runs and traces as [`System::run_until`] does.
     ///
     /// # Errors
     /// If a core faults.
@@ -108,7 +108,7 @@ impl<'w> SystemTracer<'w> {
         Ok(())
     }
 
-    /// Lets a cycle pass, or a stretch that is not looked at.
+    /// Runs one recorded cycle, or a stretch outside the window.
     fn run(
         &mut self,
         system: &mut System,
@@ -138,14 +138,14 @@ impl<'w> SystemTracer<'w> {
             timeline.add(now, &records, system.take_events());
             self.log.summary = Summary { cycles: timeline.cycles(), cut: timeline.is_full() };
         }
-        self.log.record(now, Passed::System(&records, system), true);
+        self.log.record(now, CompletedCycle::System(&records, system), true);
         result
     }
 
-    /// Completes the trace.
+    /// Writes the end of the trace.
     ///
     /// # Errors
-    /// The first error of writing.
+    /// The first write error.
     pub fn finish(self) -> io::Result<Summary> {
         self.log.finish()
     }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The timeline of a system: all cores in a window of cycles, and the events on its links, on one axis: as JSON, and as
-//! a page for a browser. [`SystemTracer`](super::SystemTracer) fills it.
+//! Timeline of a system: all cores and link events in a window of cycles on one axis, as JSON and as an HTML page.
+//! [`SystemTracer`](super::SystemTracer) fills it.
 
 use super::Record;
 use crate::value;
@@ -12,38 +12,38 @@ use takt_isa::text::in_script;
 use takt_isa::timing::{Cause, Cycle};
 use takt_system::{Core, Description, End, Link, LinkEvent, LinkEventKind, LinkKind, System};
 
-/// Stretches and events that a timeline holds at most; it ends in the cycle in which it has more.
+/// Maximal number of stretches and events; the timeline ends in the cycle that exceeds it.
 const MOST: usize = 1 << 18;
 
-/// A stretch of cycles of a core: bundles issue, one a cycle, or one of them stalls.
+/// A stretch of consecutive cycles of a core in which bundles issue, or one bundle stalls.
 struct Stretch {
     at: Cycle,
     cycles: Cycle,
-    /// The reason why nothing issues; `None` where bundles do.
+    /// Cause of the stall; `None` where bundles issue.
     stall: Option<Cause>,
     first: BundleAddress,
     last: BundleAddress,
 }
 
-/// Cycles of a system, as [`SystemTracer`](super::SystemTracer) saw them.
+/// Timeline of a system, as recorded by [`SystemTracer`](super::SystemTracer).
 #[derive(Default)]
 pub struct Timeline {
     cycles: Range<Cycle>,
-    /// Of each core.
+    /// Stretches of each core.
     cores: Vec<Vec<Stretch>>,
     events: Vec<LinkEvent>,
-    /// Of each link, how many entries it had at the beginning.
+    /// Number of entries of each link's FIFO at the beginning.
     entries: Vec<usize>,
     size: usize,
 }
 
 impl Timeline {
-    /// True if it holds as much as it may.
+    /// The timeline has reached its size limit.
     pub(super) fn is_full(&self) -> bool {
         self.size > MOST
     }
 
-    /// Before the first cycle.
+    /// Records the state before the first cycle.
     pub(super) fn begin(&mut self, system: &System) {
         let description = system.description();
         self.cycles = system.now()..system.now();
@@ -51,7 +51,7 @@ impl Timeline {
         self.entries = (0..description.links.len()).map(|link| system.fifo_entries(link).len()).collect();
     }
 
-    /// A cycle that has passed: a record for each core.
+    /// Adds a completed cycle, with a record for each core.
     pub(super) fn add(&mut self, now: Cycle, records: &[Record], events: Vec<LinkEvent>) {
         self.cycles.end = now + 1;
         self.size += events.len();
@@ -75,12 +75,12 @@ impl Timeline {
         }
     }
 
-    /// The cycles that it covers.
+    /// Range of recorded cycles.
     pub fn cycles(&self) -> Range<Cycle> {
         self.cycles.clone()
     }
 
-    /// The data of the picture. `start` is the cycle of the first base tick.
+    /// Contents of the timeline as JSON. `start` is the cycle of the first base tick.
     pub fn json(&self, description: &Description, start: Cycle, name: &str) -> Value {
         let core = |(number, core)| self.core(number, core, start, description.tick);
         let link = |(number, link)| self.link(number, link, description);
@@ -94,7 +94,7 @@ impl Timeline {
         })
     }
 
-    /// The ticks in the window.
+    /// Ticks within the window.
     fn ticks(&self, first: Cycle, period: Cycle) -> Vec<Cycle> {
         let skipped = self.cycles.start.saturating_sub(first).div_ceil(period);
         (first + skipped * period..self.cycles.end).step_by(period as usize).collect()
@@ -162,7 +162,7 @@ impl Timeline {
         })
     }
 
-    /// The picture as a page for a browser, which needs nothing else.
+    /// The timeline as a self-contained HTML page.
     pub fn html(&self, description: &Description, start: Cycle, name: &str) -> String {
         let data = in_script(&self.json(description, start, name).to_string());
         include_str!("timeline.html").replace("/*DATA*/", &data)

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Waveforms: VCD and FST, from the same samples. A time unit is a cycle.
+//! Waveforms in VCD and FST, from the same samples. The time unit is one cycle.
 
 use super::signal::{Signal, SignalType};
-use super::{Passed, Writer};
+use super::{CompletedCycle, Writer};
 use fst_writer::{
     FstBodyWriter, FstFileType, FstHeaderWriter, FstInfo, FstScopeType, FstSignalId, FstSignalType,
     FstVarDirection, FstVarType, FstWriteError,
@@ -11,28 +11,28 @@ use std::fmt::Write as _;
 use std::io::{self, Cursor, Write};
 use takt_isa::timing::Cycle;
 
-/// A file that takes changes of values.
+/// A waveform file: accepts value changes in order of time.
 trait File {
     fn time(&mut self, cycle: Cycle) -> io::Result<()>;
     fn real(&mut self, signal: usize, value: f64) -> io::Result<()>;
-    /// `digits` are 0, 1 and x, as many as the signal is wide.
+    /// `digits` are 0, 1 or x, one for each bit of the signal.
     fn bits(&mut self, signal: usize, digits: &str) -> io::Result<()>;
     fn finish(self: Box<Self>) -> io::Result<()>;
-    fn kept(&self) -> u64;
+    fn buffered_bytes(&self) -> u64;
 }
 
-/// Samples signals and writes those that changed.
+/// Waveform writer: samples the signals in each cycle and writes the changes.
 pub(super) struct Wave<'w> {
     file: Box<dyn File + 'w>,
     signals: Vec<Signal>,
-    /// The value that was last written for each.
+    /// Last written value of each signal.
     last: Vec<Option<Option<u32>>>,
     digits: String,
 }
 
 impl Writer for Wave<'_> {
-    /// Writes what has changed in a cycle.
-    fn cycle(&mut self, cycle: Cycle, passed: Passed<'_>) -> io::Result<()> {
+    /// Writes the changes of a cycle.
+    fn cycle(&mut self, cycle: Cycle, passed: CompletedCycle<'_>) -> io::Result<()> {
         let mut timed = false;
         for (i, signal) in self.signals.iter().enumerate() {
             let value = signal.value(passed);
@@ -45,7 +45,7 @@ impl Writer for Wave<'_> {
             }
             match signal.ty {
                 SignalType::Real => {
-                    // A real has no unknown value; NaN is as near as it gets.
+                    // Reals have no unknown value; NaN stands for it.
                     self.file.real(i, value.map_or(f64::NAN, |bits| f32::from_bits(bits).into()))?;
                 }
                 SignalType::Bits(width) => {
@@ -67,8 +67,8 @@ impl Writer for Wave<'_> {
         self.file.finish()
     }
 
-    fn kept(&self) -> u64 {
-        self.file.kept()
+    fn buffered_bytes(&self) -> u64 {
+        self.file.buffered_bytes()
     }
 }
 
@@ -76,9 +76,9 @@ fn wave<'w>(file: Box<dyn File + 'w>, signals: Vec<Signal>) -> Box<Wave<'w>> {
     Box::new(Wave { file, last: vec![None; signals.len()], signals, digits: String::new() })
 }
 
-/// Calls `signal` for each signal and `scope` where a group begins (with its name) and ends.
+/// Visits each signal, and the begin and end of each group.
 fn hierarchy<E>(signals: &[Signal], mut visit: impl FnMut(ScopeItem<'_>) -> Result<(), E>) -> Result<(), E> {
-    // The groups that are open: of a system's core, and in it.
+    // Open groups: the system's core, and the group in it.
     let mut inside: (Option<&str>, Option<&str>) = (None, None);
     visit(ScopeItem::Begin(super::signal::TOP))?;
     for (i, signal) in signals.iter().enumerate() {
@@ -110,7 +110,7 @@ enum ScopeItem<'s> {
     Signal(usize, &'s Signal),
 }
 
-/// A VCD's short name of a signal: its number in the printable characters.
+/// Identifier code of a signal in VCD: its number in base 94, in printable characters.
 fn identifier(mut signal: usize) -> String {
     let mut text = String::new();
     loop {
@@ -128,7 +128,7 @@ struct Vcd<'w> {
     identifiers: Vec<String>,
 }
 
-/// A VCD of these signals.
+/// A VCD writer for these signals.
 pub(super) fn vcd<'w>(
     of: &str,
     signals: Vec<Signal>,
@@ -155,7 +155,7 @@ impl File for Vcd<'_> {
     }
 
     fn real(&mut self, signal: usize, value: f64) -> io::Result<()> {
-        // As C's printf writes them, which is how the standard has them.
+        // The standard takes the notation of C's printf.
         let text = if value.is_nan() { "nan".to_owned() } else { format!("{value:e}") };
         writeln!(self.target, "r{text} {}", self.identifiers[signal])
     }
@@ -169,7 +169,7 @@ impl File for Vcd<'_> {
         self.target.flush()
     }
 
-    fn kept(&self) -> u64 {
+    fn buffered_bytes(&self) -> u64 {
         0
     }
 }
@@ -180,18 +180,18 @@ struct Fst<'w> {
     target: Box<dyn Write + 'w>,
 }
 
-/// An FST of these signals. It is made in memory, since its format needs to go back in its file and targets may be pipes.
+/// An FST writer for these signals. The file is built in memory: the format needs seeks, and the target may be a pipe.
 pub(super) fn fst<'w>(
     start: Cycle,
     signals: Vec<Signal>,
     target: Box<dyn Write + 'w>,
 ) -> io::Result<Box<Wave<'w>>> {
     let info = FstInfo {
-        // The writer's own start; before the window, values are unknown.
+        // Time 0, with unknown values before the window.
         start_time: 0,
         timescale_exponent: -9,
         version: format!("takt {}", env!("CARGO_PKG_VERSION")),
-        // Equal runs give equal files.
+        // Equal runs yield equal files.
         date: String::new(),
         file_type: FstFileType::Verilog,
     };
@@ -249,7 +249,7 @@ impl File for Fst<'_> {
         target.flush()
     }
 
-    fn kept(&self) -> u64 {
+    fn buffered_bytes(&self) -> u64 {
         self.body.size() as u64
     }
 }

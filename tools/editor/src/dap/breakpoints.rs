@@ -1,41 +1,41 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Breakpoints: those that the client asks for as stops of the session, and what the session does not know of them: how often
-//! one must be met, and what it logs.
+//! Breakpoints: the client's requests as stops of the session, with two features that the session lacks: hit counts and log messages.
 
 use super::protocol::{
     Answer, Body, Breakpoint, BreakpointRequest, DataBreakpointInfo, NamedArguments, SetBreakpointsArguments,
     answer,
 };
-use super::{CORE, Debugged};
+use super::{CORE, DebuggedSession};
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
 use takt_debug::console::Target;
-use takt_debug::session::{Session, Stop, Test, Where};
+use takt_debug::session::{BreakpointLocation, Session, Stop, Test};
 use takt_debug::system::SystemStop;
 use takt_isa::BundleAddress;
 use takt_isa::Program;
 
-/// The times of being met at which a breakpoint stops.
+/// Hit condition: the hits at which a breakpoint stops.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Hits {
-    /// From so many times on.
+    /// Every hit from this number on.
     AtLeast(u64),
-    /// At so many times only.
+    /// Only the hit of this number.
     Exactly(u64),
-    /// Every so many times.
+    /// Each hit whose number is a multiple.
     Every(u64),
 }
 
-/// A stop that a breakpoint asks for.
-enum Wanted {
-    /// Of a core's session.
+/// A stop requested by a breakpoint.
+enum RequestedStop {
+    /// A stop in a core's session.
     Core(usize, Stop),
-    /// At an event on a link, with its text.
+    /// A stop at an event on a link, with its text.
     Link(SystemStop, String),
 }
 
-/// Makes stops of a request's entry, at least one, and says the line, if there is one to say.
-type Make<'m> = &'m dyn Fn(&Debugged, &BreakpointRequest) -> Result<(Vec<Wanted>, Option<u64>), String>;
+/// Turns a request's entry into at least one stop, and the actual line if it is known.
+type Make<'m> =
+    &'m dyn Fn(&DebuggedSession, &BreakpointRequest) -> Result<(Vec<RequestedStop>, Option<u64>), String>;
 
 impl Hits {
     fn parse(text: &str) -> Result<Hits, String> {
@@ -61,49 +61,48 @@ impl Hits {
     }
 }
 
-/// A stop's features that the session does not know.
+/// Features of a stop beyond the session's.
 #[derive(Clone, Debug, Default)]
-pub(super) struct More {
+pub(super) struct StopFeatures {
     pub(super) reason: &'static str,
     pub(super) hits: Option<Hits>,
     pub(super) met: u64,
-    /// A text that is logged, in place of stopping.
+    /// Text to log instead of stopping.
     pub(super) log: Option<String>,
-    /// Of a data breakpoint: another condition that must hold.
+    /// Additional condition of a data breakpoint.
     pub(super) condition: Option<String>,
 }
 
-impl More {
-    /// True if the other condition holds, or there is none.
-    pub(super) fn holds(&self, session: &Session) -> bool {
-        let value = |condition: &String| session.parse(condition).and_then(|live| session.evaluate(&live));
-        self.condition.as_ref().is_none_or(|condition| value(condition).is_ok_and(|value| !value.is_zero()))
+impl StopFeatures {
+    /// The additional condition holds, or is absent.
+    pub(super) fn holds(&self, id: u32, session: &Session) -> bool {
+        let meets = |condition: &String| session.parse(condition).is_ok_and(|live| session.meets(id, &live));
+        self.condition.as_ref().is_none_or(meets)
     }
 }
 
-/// The breakpoints by number, that of their first stop, and which of them were asked for together: those of one source, or of one
-/// kind.
+/// Breakpoints, numbered by their first stop, in groups that a request replaces together: one group per source or per kind.
 #[derive(Debug, Default)]
 pub(super) struct Breakpoints {
-    /// The stops of each group.
+    /// Stops of each group.
     groups: BTreeMap<String, Vec<u32>>,
-    /// The breakpoint of each stop: where several cores run a source, it has one in each.
+    /// Breakpoint of each stop: a source on several cores has a stop in each.
     stops: BTreeMap<u32, u32>,
-    more: BTreeMap<u32, More>,
+    more: BTreeMap<u32, StopFeatures>,
 }
 
 impl Breakpoints {
-    /// The breakpoint that a stop is of.
+    /// Breakpoint to which a stop belongs.
     pub(super) fn of(&self, stop: u32) -> u32 {
         self.stops.get(&stop).copied().unwrap_or(stop)
     }
 
-    pub(super) fn more_of(&mut self, stop: u32) -> Option<&mut More> {
+    pub(super) fn more_of(&mut self, stop: u32) -> Option<&mut StopFeatures> {
         self.more.get_mut(&self.stops.get(&stop).copied()?)
     }
 }
 
-impl Debugged {
+impl DebuggedSession {
     /// Replaces the breakpoints of a group.
     fn replace(
         &mut self,
@@ -133,7 +132,7 @@ impl Debugged {
         answer(Body::Breakpoints(answers))
     }
 
-    /// Adds a breakpoint: its stops, and its line, if there is one to say.
+    /// Adds a breakpoint: its stops, and its actual line if known.
     fn add(
         &mut self,
         reason: &'static str,
@@ -145,7 +144,7 @@ impl Debugged {
         let log = one.log_message().map(str::to_owned);
         let mut condition = None;
         for wanted in &wanted {
-            let Wanted::Core(core, stop) = wanted else { continue };
+            let RequestedStop::Core(core, stop) = wanted else { continue };
             let session = self.session(*core);
             if let Some(log) = &log {
                 check_log(session, log)?;
@@ -158,23 +157,23 @@ impl Debugged {
         let mut stops = Vec::new();
         for wanted in wanted {
             stops.extend(match wanted {
-                Wanted::Core(core, stop) => Some(self.console.add_stop(core, stop)),
-                Wanted::Link(stop, text) => self.console.add_link_stop(stop, text),
+                RequestedStop::Core(core, stop) => Some(self.console.add_stop(core, stop)),
+                RequestedStop::Link(stop, text) => self.console.add_link_stop(stop, text),
             });
         }
         if let Some(&first) = stops.first() {
             self.breakpoints.stops.extend(stops.iter().map(|stop| (*stop, first)));
-            self.breakpoints.more.insert(first, More { reason, hits, met: 0, log, condition });
+            self.breakpoints.more.insert(first, StopFeatures { reason, hits, met: 0, log, condition });
         }
         Ok((stops, line))
     }
 
-    /// A source's number in the programs of the cores that have it.
+    /// Number of a source in the program of each core that contains it.
     fn files(&self, path: &str, reference: u64) -> Vec<(usize, String)> {
         let cores = || 0..self.console.cores();
         let files = |core: usize| self.session(core).program().files.iter();
         if reference > 0 {
-            // One that is on no disk: the same name and the same text.
+            // A source without a file: match name and text.
             let Some(core) = self.checked(reference / CORE) else { return Vec::new() };
             let number = (reference % CORE).wrapping_sub(1);
             let text = |core: usize, number: usize| self.session(core).source(number as u32);
@@ -188,7 +187,7 @@ impl Debugged {
         let path = Path::new(path);
         let whole = |path: &Path| -> Option<PathBuf> { path.canonicalize().ok() };
         let wanted = whole(path);
-        // On this disk it is one file; elsewhere, as of an image from another machine, names tell.
+        // Sources on this disk are compared as files; others, for example in an image from elsewhere, by name.
         let on_disk = |core: usize| {
             let is = |name: &&String| wanted.is_some() && whole(&self.folders[core].join(name)) == wanted;
             Some((core, files(core).find(is)?.clone()))
@@ -205,7 +204,7 @@ impl Debugged {
         let SetBreakpointsArguments { source, breakpoints } = arguments;
         let path = source.path.or(source.name).ok_or("`source` has a `path`")?;
         let files = self.files(&path, source.source_reference.unwrap_or(0));
-        let make = |debugged: &Debugged, one: &BreakpointRequest| {
+        let make = |debugged: &DebuggedSession, one: &BreakpointRequest| {
             if files.is_empty() {
                 let programs = (0..debugged.console.cores()).map(|core| debugged.session(core).program());
                 let mut sources: Vec<&str> =
@@ -219,8 +218,8 @@ impl Debugged {
             let stops = files.iter().map(|(core, file)| {
                 let session = debugged.session(*core);
                 let text = format!("{file}:{line}");
-                let at = Where::parse(&text, session.program())?;
-                Ok(Wanted::Core(*core, break_at(session, at, one, text)?))
+                let at = BreakpointLocation::parse(&text, session.program())?;
+                Ok(RequestedStop::Core(*core, break_at(session, at, one, text)?))
             });
             Ok((any(stops)?, Some(asked)))
         };
@@ -228,20 +227,20 @@ impl Debugged {
     }
 
     pub(super) fn set_functions(&mut self, arguments: SetBreakpointsArguments) -> Answer {
-        let make = |debugged: &Debugged, one: &BreakpointRequest| {
+        let make = |debugged: &DebuggedSession, one: &BreakpointRequest| {
             let name = one.name.as_deref().ok_or("a breakpoint has a `name`")?;
             if let Some(stop) = debugged.console.link_stop(name) {
                 return Ok((vec![no_condition(stop?, one, name)?], None));
             }
-            // `servo.period` is that of a core, `period` that of each that has one.
+            // `servo.period` names a place in one core, `period` a place in each core that has it.
             let (cores, place) = match debugged.split(name, '.') {
                 Some((core, place)) => (core..core + 1, place),
                 None => (0..debugged.console.cores(), name),
             };
             let stops = cores.map(|core| {
                 let session = debugged.session(core);
-                let at = Where::parse(place, session.program())?;
-                Ok(Wanted::Core(core, break_at(session, at, one, name.to_owned())?))
+                let at = BreakpointLocation::parse(place, session.program())?;
+                Ok(RequestedStop::Core(core, break_at(session, at, one, name.to_owned())?))
             });
             Ok((any(stops)?, None))
         };
@@ -249,21 +248,21 @@ impl Debugged {
     }
 
     pub(super) fn set_instructions(&mut self, arguments: SetBreakpointsArguments) -> Answer {
-        let make = |debugged: &Debugged, one: &BreakpointRequest| {
+        let make = |debugged: &DebuggedSession, one: &BreakpointRequest| {
             let reference =
                 one.instruction_reference.as_deref().ok_or("a breakpoint has an `instructionReference`")?;
             let (core, address) =
                 debugged.address(reference).ok_or_else(|| format!("`{reference}` is no bundle's address"))?;
             let address = i64::from(address.get()).saturating_add(one.offset.unwrap_or(0));
             let session = debugged.session(core);
-            let at = Where::parse(&format!("bundle {address}"), session.program())?;
+            let at = BreakpointLocation::parse(&format!("bundle {address}"), session.program())?;
             let stop = break_at(session, at, one, format!("bundle {address}"))?;
-            Ok((vec![Wanted::Core(core, stop)], None))
+            Ok((vec![RequestedStop::Core(core, stop)], None))
         };
         self.replace("instructions".to_owned(), "instruction breakpoint", arguments.breakpoints, &make)
     }
 
-    /// Tells whether something can be watched: an expression over a core, or a link.
+    /// Answers whether a value can be watched: an expression over a core, or a link.
     pub(super) fn data_info(&mut self, NamedArguments { name, of }: NamedArguments) -> Answer {
         let info = |id: String, conditions: String| {
             let description = format!("{id} ({conditions})");
@@ -274,7 +273,7 @@ impl Debugged {
             return answer(info(format!("link {name}"), conditions));
         }
         let core = self.core_of(&of)?;
-        // An expression without a value yet can be watched all the same.
+        // Expressions without a present value can be watched too.
         if let Err(description) = self.session(core).parse(&name) {
             return answer(DataBreakpointInfo {
                 data_id: None,
@@ -291,13 +290,13 @@ impl Debugged {
     }
 
     pub(super) fn set_data(&mut self, arguments: SetBreakpointsArguments) -> Answer {
-        let make = |debugged: &Debugged, one: &BreakpointRequest| {
+        let make = |debugged: &DebuggedSession, one: &BreakpointRequest| {
             let name = one.data_id.as_deref().ok_or("a breakpoint has a `dataId`")?;
             let condition = one.condition();
             if name.starts_with("link ") {
                 let text = condition.map_or(name.to_owned(), |event| format!("{name} {event}"));
                 let stop = debugged.console.link_stop(&text).ok_or("a program alone has no links")??;
-                return Ok((vec![Wanted::Link(stop, text)], None));
+                return Ok((vec![RequestedStop::Link(stop, text)], None));
             }
             let (core, name) = match debugged.split(name, ':') {
                 Some(found) => found,
@@ -314,14 +313,14 @@ impl Debugged {
             }
             let condition = condition.map_or(String::new(), |condition| format!(" {condition}"));
             let stop = Stop::Watch { what, test, text: format!("{name}{condition}") };
-            Ok((vec![Wanted::Core(core, stop)], None))
+            Ok((vec![RequestedStop::Core(core, stop)], None))
         };
         self.replace("data".to_owned(), "data breakpoint", arguments.breakpoints, &make)
     }
 }
 
-/// The stops that can be made; if none can, why the first one cannot.
-fn any(stops: impl Iterator<Item = Result<Wanted, String>>) -> Result<Vec<Wanted>, String> {
+/// The stops that can be made; if none, the first error.
+fn any(stops: impl Iterator<Item = Result<RequestedStop, String>>) -> Result<Vec<RequestedStop>, String> {
     let (made, refused): (Vec<_>, Vec<_>) = stops.partition(Result::is_ok);
     match refused.into_iter().next() {
         Some(Err(error)) if made.is_empty() => Err(error),
@@ -329,20 +328,20 @@ fn any(stops: impl Iterator<Item = Result<Wanted, String>>) -> Result<Vec<Wanted
     }
 }
 
-/// A stop at a link's event, which no core's expressions can say more of.
-fn no_condition(stop: SystemStop, one: &BreakpointRequest, text: &str) -> Result<Wanted, String> {
+/// Rejects conditions on a link's event: no core's expressions apply there.
+fn no_condition(stop: SystemStop, one: &BreakpointRequest, text: &str) -> Result<RequestedStop, String> {
     match one.condition() {
         Some(_) => {
             Err("a breakpoint on a link has no condition; it can say an event, as `link moves pushed`"
                 .to_owned())
         }
-        None => Ok(Wanted::Link(stop, text.to_owned())),
+        None => Ok(RequestedStop::Link(stop, text.to_owned())),
     }
 }
 
-/// The test that a data breakpoint's condition means, if it is no expression.
+/// The test in a data breakpoint's condition; `None` if the condition is an expression.
 fn test(session: &Session, condition: &str) -> Option<Result<Test, String>> {
-    let with = |rest: &str, make: fn(Box<takt_debug::session::Live>) -> Test| {
+    let with = |rest: &str, make: fn(Box<takt_debug::session::WatchExpression>) -> Test| {
         Some(session.parse(rest).map(|live| make(Box::new(live))))
     };
     match condition {
@@ -354,12 +353,17 @@ fn test(session: &Session, condition: &str) -> Option<Result<Test, String>> {
     }
 }
 
-fn break_at(session: &Session, at: Where, one: &BreakpointRequest, text: String) -> Result<Stop, String> {
+fn break_at(
+    session: &Session,
+    at: BreakpointLocation,
+    one: &BreakpointRequest,
+    text: String,
+) -> Result<Stop, String> {
     let condition = one.condition().map(|condition| session.parse(condition).map(Box::new)).transpose()?;
     Ok(Stop::Break { at, condition, text })
 }
 
-/// The program's name for a file: the longest that the path ends with.
+/// The program's name of a file: the longest name with which the path ends.
 fn file_of(program: &Program, path: &Path) -> Option<String> {
     let parts: Vec<Component<'_>> = path.components().collect();
     let ends = |name: &&String| {
@@ -371,7 +375,7 @@ fn file_of(program: &Program, path: &Path) -> Option<String> {
     program.files.iter().filter(ends).max_by_key(|name| name.len()).cloned()
 }
 
-/// A bundle's or a word's address as references have it, decimal or `0x15`, with its core: that of core *c* is *c* 2³² higher.
+/// Address of a bundle or word in a memory reference, decimal or `0x15`, with the core in the upper 32 bits.
 pub(super) fn address(text: &str) -> Option<(u64, BundleAddress)> {
     let text = text.trim();
     let number: u64 = match text.strip_prefix("0x") {
@@ -381,12 +385,12 @@ pub(super) fn address(text: &str) -> Option<(u64, BundleAddress)> {
     Some((number >> 32, BundleAddress::new(number as u32)))
 }
 
-/// An address as references have it.
+/// Memory reference of an address: the core in the upper 32 bits.
 pub(super) fn reference(core: usize, address: u64) -> String {
     format!("0x{:x}", (core as u64) << 32 | address)
 }
 
-/// The pieces of a log message: text, and expressions in braces.
+/// Splits a log message into text and expressions in braces.
 fn pieces(log: &str) -> impl Iterator<Item = Result<&str, &str>> {
     log.split_inclusive(['{', '}']).scan(false, |inside, piece| {
         let is = *inside;
@@ -403,10 +407,15 @@ fn check_log(session: &Session, log: &str) -> Result<(), String> {
     Ok(())
 }
 
-/// A log message with its values.
+/// Log message with its expressions evaluated.
 pub(super) fn logged(session: &Session, log: &str) -> String {
-    let value = |expression: &str| match session.parse(expression).and_then(|live| session.evaluate(&live)) {
-        Ok(value) => value.to_string(),
+    let evaluated = |expression: &str| {
+        let live = session.parse(expression)?;
+        let note = session.note(&live).map_or(String::new(), |note| format!(" ({note})"));
+        Ok::<_, String>(format!("{}{note}", session.evaluate(&live)?))
+    };
+    let value = |expression: &str| match evaluated(expression) {
+        Ok(value) => value,
         Err(error) => format!("({})", error.lines().next().unwrap_or("")),
     };
     pieces(log).map(|piece| piece.map_or_else(value, str::to_owned)).collect()

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The debug adapter: the protocol's requests on a session that goes forward and back, of a program or of a system, each of
-//! whose cores is a thread.
+//! Debug adapter: serves the protocol's requests from a reversible debug session of a program or a system. Each core is a thread.
 //!
-//! One thread answers, one request after the other; whoever reads the stream hears a `pause` at once ([`interrupts`]).
+//! A single thread answers the requests in order. Only `pause` and the like are handled by the stream's reader at once ([`interrupts`]).
 
 mod breakpoints;
 mod protocol;
@@ -15,7 +14,7 @@ use breakpoints::Breakpoints;
 use crossbeam_channel::{Receiver, Sender};
 use protocol::{
     Answer, Body, Capabilities, Event, ExceptionInfo, GotoArguments, InitializeArguments, Kind,
-    LaunchArguments, MoveArguments, Output, Refusal, Request, Response, Scoped, Thread, answer, read,
+    LaunchArguments, MoveArguments, Output, Refusal, Request, Response, ScopeArguments, Thread, answer, read,
 };
 use run::Filters;
 use serde_json::Value;
@@ -25,29 +24,29 @@ use std::sync::Arc;
 use takt_debug::console::{Console, Target};
 use takt_debug::session::{Control, Move, Session, Unit};
 
-/// Numbers of frames and of lists of variables that a core has; the core's number stands above them.
+/// Range of frame and variable-list numbers of a core; the core's number occupies the bits above.
 const CORE: u64 = 1 << 16;
 
-/// Makes a session of the arguments of a `launch` or `attach` request.
+/// Creates a session from the arguments of a `launch` or `attach` request.
 pub trait Launcher {
-    /// Makes it.
+    /// Creates the session of a request.
     ///
     /// # Errors
-    /// If something is wrong with the arguments, or with the program.
-    fn launch(&mut self, arguments: &Value, control: &Arc<Control>) -> Result<Launched, String>;
+    /// If an argument is invalid, or the program cannot be loaded.
+    fn launch(&mut self, arguments: &Value, control: &Arc<Control>) -> Result<LaunchedSession, String>;
 }
 
-/// A session that is to be debugged.
-pub struct Launched {
-    /// The session, at its beginning or where there is something to see.
+/// A session to debug.
+pub struct LaunchedSession {
+    /// Console of the session, at its beginning or at a position of interest.
     pub console: Console,
-    /// A note for the user, if there is one.
+    /// Note for the user.
     pub note: Option<String>,
-    /// For each core, the folder that its program's sources lie in.
+    /// Folder of each core's sources.
     pub folders: Vec<PathBuf>,
 }
 
-/// True if a message asks for what runs to be stopped: it is to be heard before its turn.
+/// The message interrupts a running command: handle it before its turn.
 pub fn interrupts(message: &Value) -> bool {
     matches!(message["command"].as_str(), Some("pause" | "disconnect" | "terminate"))
 }
@@ -56,45 +55,45 @@ struct Server<'c> {
     sender: &'c Sender<Option<Message>>,
     sent: i64,
     control: Arc<Control>,
-    debugged: Option<Debugged>,
+    debugged: Option<DebuggedSession>,
     filters: Filters,
-    /// Lines and columns count from 1.
+    /// Lines and columns count from 1 (otherwise from 0).
     from_one: (bool, bool),
     stop_on_entry: bool,
-    /// The client only wants it run: nothing stops it, and its end is the session's.
+    /// Run without stops; the end of the run ends the session.
     no_debug: bool,
-    /// The consequence of the request, once the answer is sent.
-    then: Then,
+    /// Action to take after the answer is sent.
+    then: FollowUp,
     ended: bool,
 }
 
-/// The session that is being debugged.
-struct Debugged {
+/// Session under debugging, with the client's view of it.
+struct DebuggedSession {
     console: Console,
     breakpoints: Breakpoints,
-    /// For each core, where its sources are.
+    /// Folder of each core's sources.
     folders: Vec<PathBuf>,
-    /// The last exception, for `exceptionInfo`.
+    /// Last exception, for `exceptionInfo`: name and description.
     exception: Option<(String, String)>,
-    /// It has halted, and the client knows.
+    /// The run has ended, and the client has been notified.
     over: bool,
 }
 
-/// The consequence of a request, once it is answered.
+/// Action that follows the answer to a request.
 #[derive(Clone, Debug)]
-enum Then {
+enum FollowUp {
     Nothing,
     Initialized,
     Enter,
     Continue,
     Back,
-    /// A step of a core; true if it passes over calls.
+    /// Step of a core; `true` steps over calls.
     Step(usize, Unit, bool),
-    /// Another move of a core, and the reason that the client is told.
+    /// Another move of a core, with the stop reason for the client.
     Move(usize, Move, &'static str),
 }
 
-/// Serves a client until it disconnects or goes. `control` is interrupted by whoever reads the client's stream.
+/// Serves a client until it disconnects or its stream ends. The reader of the client's stream interrupts via `control`.
 pub fn serve(
     receiver: &Receiver<Value>,
     sender: &Sender<Option<Message>>,
@@ -110,7 +109,7 @@ pub fn serve(
         from_one: (true, true),
         stop_on_entry: true,
         no_debug: false,
-        then: Then::Nothing,
+        then: FollowUp::Nothing,
         ended: false,
     };
     for message in receiver {
@@ -121,7 +120,7 @@ pub fn serve(
     }
 }
 
-/// The first line of a message, with the place that it is about: many a client shows nothing else.
+/// First line of a message with its place; many clients show only one line.
 fn brief(text: &str) -> String {
     let first = text.lines().next().unwrap_or("");
     match text.lines().find_map(|line| line.trim_start().strip_prefix("┌─ ")) {
@@ -133,7 +132,7 @@ fn brief(text: &str) -> String {
 impl Server<'_> {
     fn send(&mut self, kind: Kind) {
         self.sent += 1;
-        // If nobody receives it, the client is gone, and the loop ends.
+        // Without a receiver the client is gone, and the loop ends.
         let _ = self.sender.send(Some(Message { seq: self.sent, kind }));
     }
 
@@ -141,7 +140,7 @@ impl Server<'_> {
         self.send(Kind::Event(event));
     }
 
-    /// A line in the client's console.
+    /// Prints a line to the client's console.
     fn output(&mut self, text: &str) {
         let output = format!("{}\n", text.trim_end());
         self.event(Event::Output(Output { category: "console", output }));
@@ -161,12 +160,12 @@ impl Server<'_> {
             let text = "this is no request: it has no `command` and `seq`";
             return self.respond(0, String::new(), Err(text.to_owned()));
         };
-        self.then = Then::Nothing;
-        // A mistake of ours in one answer is no reason to end the session.
+        self.then = FollowUp::Nothing;
+        // A panic in one answer must not end the session.
         let answered = catch_unwind(AssertUnwindSafe(|| self.answer(&command, &arguments, launcher)));
         let answered =
             answered.unwrap_or_else(|_| Err(format!("a defect in Takt: `{command}` could not be answered")));
-        let then = if answered.is_ok() { self.then.clone() } else { Then::Nothing };
+        let then = if answered.is_ok() { self.then.clone() } else { FollowUp::Nothing };
         self.respond(seq, command, answered);
         if catch_unwind(AssertUnwindSafe(|| self.go(then))).is_err() {
             self.output("a defect in Takt: the run ended");
@@ -189,7 +188,7 @@ impl Server<'_> {
                 }
                 return Ok(Value::Null);
             }
-            // Nothing runs while a request is answered; one that runs was interrupted.
+            // No command runs at this point: a running one was interrupted already.
             "pause" => return Ok(Value::Null),
             _ => {}
         }
@@ -214,38 +213,43 @@ impl Server<'_> {
         if self.debugged.is_some() {
             return Err("a program is being debugged already".to_owned());
         }
-        let Launched { console, note, folders } = launcher.launch(arguments, &self.control)?;
+        let LaunchedSession { console, note, folders } = launcher.launch(arguments, &self.control)?;
         let LaunchArguments { no_debug, stop_on_entry } = read(arguments)?;
         self.no_debug = no_debug.unwrap_or(false);
         self.stop_on_entry = !self.no_debug && stop_on_entry.unwrap_or(true);
         let breakpoints = Breakpoints::default();
-        self.debugged = Some(Debugged { console, breakpoints, folders, exception: None, over: false });
+        self.debugged = Some(DebuggedSession { console, breakpoints, folders, exception: None, over: false });
         if let Some(note) = note {
             self.output(&note);
         }
-        self.then = Then::Initialized;
+        self.then = FollowUp::Initialized;
         Ok(Value::Null)
     }
 }
 
-impl Debugged {
-    /// The move that a request asks for; `None` if it asks for none.
-    fn moves(&self, command: &str, arguments: &Value, stop_on_entry: bool) -> Result<Option<Then>, String> {
+impl DebuggedSession {
+    /// The move that a request demands, if any.
+    fn moves(
+        &self,
+        command: &str,
+        arguments: &Value,
+        stop_on_entry: bool,
+    ) -> Result<Option<FollowUp>, String> {
         Ok(Some(match command {
-            "configurationDone" if stop_on_entry => Then::Enter,
-            "configurationDone" | "continue" => Then::Continue,
-            "reverseContinue" => Then::Back,
+            "configurationDone" if stop_on_entry => FollowUp::Enter,
+            "configurationDone" | "continue" => FollowUp::Continue,
+            "reverseContinue" => FollowUp::Back,
             "next" | "stepIn" | "stepOut" | "stepBack" => {
                 let MoveArguments { thread_id, granularity } = read(arguments)?;
                 let core = self.thread(thread_id)?;
                 match (command, granularity.as_deref() == Some("instruction")) {
-                    ("next", true) => Then::Step(core, Unit::Call, true),
-                    ("next", false) => Then::Step(core, Unit::Line, true),
-                    ("stepIn", true) => Then::Step(core, Unit::Bundle, false),
-                    ("stepIn", false) => Then::Step(core, Unit::Line, false),
-                    ("stepOut", _) => Then::Step(core, Unit::Out, false),
-                    (_, true) => Then::Move(core, Move::Back(Unit::Bundle, 1), "step"),
-                    (_, false) => Then::Move(core, Move::Back(Unit::Line, 1), "step"),
+                    ("next", true) => FollowUp::Step(core, Unit::Call, true),
+                    ("next", false) => FollowUp::Step(core, Unit::Line, true),
+                    ("stepIn", true) => FollowUp::Step(core, Unit::Bundle, false),
+                    ("stepIn", false) => FollowUp::Step(core, Unit::Line, false),
+                    ("stepOut", _) => FollowUp::Step(core, Unit::Out, false),
+                    (_, true) => FollowUp::Move(core, Move::Back(Unit::Bundle, 1), "step"),
+                    (_, false) => FollowUp::Move(core, Move::Back(Unit::Line, 1), "step"),
                 }
             }
             "takt/gotoCycle" | "takt/gotoPeriod" => {
@@ -253,13 +257,13 @@ impl Debugged {
                 let wrong = |_| format!("`{name}` is a whole number, and not negative");
                 let GotoArguments { count, thread_id } = read(arguments).map_err(wrong)?;
                 let to = if name == "cycle" { Move::Cycle(count) } else { Move::Period(count) };
-                Then::Move(self.thread(thread_id)?, to, "goto")
+                FollowUp::Move(self.thread(thread_id)?, to, "goto")
             }
             _ => return Ok(None),
         }))
     }
 
-    /// The answer to a request that only asks, or sets something.
+    /// Answers a request that reads or sets state without a move.
     fn answer(&mut self, command: &str, arguments: &Value, from_one: (bool, bool)) -> Answer {
         let cores = 0..self.console.cores();
         match command {
@@ -296,12 +300,12 @@ impl Debugged {
         }
     }
 
-    /// The session of a core whose number has been checked.
+    /// Session of a valid core number.
     fn session(&self, core: usize) -> &Session {
         self.console.core(core).unwrap_or_else(|| self.console.session())
     }
 
-    /// The number of a core, if there is such a one.
+    /// Checks a core number.
     fn checked(&self, core: u64) -> Option<usize> {
         usize::try_from(core).ok().filter(|core| *core < self.console.cores())
     }
@@ -313,22 +317,22 @@ impl Debugged {
         }
     }
 
-    /// The core that a name before a separator says, and what follows: of a system.
+    /// Splits a text at a separator if a core's name precedes it; only in systems.
     fn split<'t>(&self, text: &'t str, separator: char) -> Option<(usize, &'t str)> {
         let (name, rest) = text.split_once(separator)?;
         let core = self.console.system()?.system().description().core_named(name.trim())?;
         Some((core, rest))
     }
 
-    /// The core of a request's thread; if none is said, the one that stopped last.
+    /// Core of a request's thread; by default the core that stopped last.
     fn thread(&self, thread: Option<u64>) -> Result<usize, String> {
         let Some(thread) = thread else { return Ok(self.console.selected()) };
         let core = thread.checked_sub(1).and_then(|core| self.checked(core));
         core.ok_or_else(|| format!("there is no thread {thread} (threads: 1 to {})", self.console.cores()))
     }
 
-    /// The core that a request's frame or list of variables is of; if neither is said, the one that stopped last.
-    fn core_of(&self, of: &Scoped) -> Result<usize, String> {
+    /// Core of a request's frame or variable list; by default the core that stopped last.
+    fn core_of(&self, of: &ScopeArguments) -> Result<usize, String> {
         let (name, number) = match (of.frame_id, of.variables_reference) {
             (Some(frame), _) => ("frameId", frame),
             (None, Some(list)) => ("variablesReference", list),
@@ -337,7 +341,7 @@ impl Debugged {
         self.checked(number / CORE).ok_or_else(|| format!("there is no `{name}` {number}"))
     }
 
-    /// The path of a source, if it lies on the disk.
+    /// Path of a source file on disk, if it exists.
     fn path_of(&self, core: usize, file: u32) -> Option<PathBuf> {
         let name = self.session(core).program().files.get(file as usize)?;
         let path = self.folders.get(core)?.join(name);

@@ -1,21 +1,21 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The messages of the debug adapter protocol that this adapter reads and writes, with the fields that it uses.
-//! The names are the protocol's own: <https://microsoft.github.io/debug-adapter-protocol/specification>.
+//! Messages of the debug adapter protocol, restricted to the fields in use. Names are the protocol's own:
+//! <https://microsoft.github.io/debug-adapter-protocol/specification>.
 
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
 
-/// The body of an answer, or the reason why there is none.
+/// Body of an answer, or an error message.
 pub(super) type Answer = Result<Value, String>;
 
-/// An answer's body.
+/// Serialises an answer's body.
 pub(super) fn answer(body: impl Serialize) -> Answer {
     serde_json::to_value(body).map_err(|error| error.to_string())
 }
 
-/// The arguments of a request. Clients leave them out where all are optional.
+/// Deserialises a request's arguments. Clients may omit the object if all its fields are optional.
 pub(super) fn read<T: DeserializeOwned>(arguments: &Value) -> Result<T, String> {
     let arguments = if arguments.is_null() { Value::Object(Map::new()) } else { arguments.clone() };
     serde_json::from_value(arguments).map_err(|error| format!("wrong arguments: {error}"))
@@ -38,7 +38,7 @@ pub(super) struct InitializeArguments {
     pub(super) columns_start_at1: Option<bool>,
 }
 
-/// The rest of a launch configuration is the [`Launcher`](super::Launcher)'s.
+/// Launch arguments of the protocol. All others belong to the [`Launcher`](super::Launcher).
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct LaunchArguments {
@@ -46,7 +46,7 @@ pub(super) struct LaunchArguments {
     pub(super) stop_on_entry: Option<bool>,
 }
 
-/// Of every request that moves.
+/// Arguments of all requests that move the run.
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct MoveArguments {
@@ -54,7 +54,7 @@ pub(super) struct MoveArguments {
     pub(super) granularity: Option<String>,
 }
 
-/// Of `takt/gotoCycle` and `takt/gotoPeriod`.
+/// Arguments of `takt/gotoCycle` and `takt/gotoPeriod`.
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct GotoArguments {
@@ -70,7 +70,7 @@ pub(super) struct SetBreakpointsArguments {
     pub(super) breakpoints: Option<Vec<BreakpointRequest>>,
 }
 
-/// A breakpoint of any kind: in a source, of a name, of a bundle, of a value.
+/// A breakpoint of any kind: source, function, instruction or data.
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct BreakpointRequest {
@@ -98,7 +98,7 @@ impl BreakpointRequest {
     }
 }
 
-/// Clients write an empty text for none.
+/// Nonblank text; some clients send an empty string for an absent one.
 fn filled(text: Option<&String>) -> Option<&str> {
     text.map(|text| text.trim()).filter(|text| !text.is_empty())
 }
@@ -132,10 +132,10 @@ pub(super) struct StackTraceArguments {
     pub(super) levels: Option<u64>,
 }
 
-/// The place that a request is about: a frame or a list of variables, whichever it names.
+/// Scope of a request: a frame or a variable list.
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
-pub(super) struct Scoped {
+pub(super) struct ScopeArguments {
     pub(super) frame_id: Option<u64>,
     pub(super) variables_reference: Option<u64>,
 }
@@ -144,7 +144,7 @@ pub(super) struct Scoped {
 pub(super) struct NamedArguments {
     pub(super) name: String,
     #[serde(flatten)]
-    pub(super) of: Scoped,
+    pub(super) of: ScopeArguments,
 }
 
 #[derive(Deserialize)]
@@ -167,14 +167,14 @@ impl Format {
     }
 }
 
-/// Of `setVariable` and `setExpression`.
+/// Arguments of `setVariable` and `setExpression`.
 #[derive(Deserialize)]
 pub(super) struct SetArguments {
     #[serde(alias = "expression")]
     pub(super) name: String,
     pub(super) value: String,
     #[serde(flatten)]
-    pub(super) of: Scoped,
+    pub(super) of: ScopeArguments,
 }
 
 #[derive(Deserialize)]
@@ -183,7 +183,7 @@ pub(super) struct EvaluateArguments {
     pub(super) context: Option<String>,
     pub(super) format: Option<Format>,
     #[serde(flatten)]
-    pub(super) of: Scoped,
+    pub(super) of: ScopeArguments,
 }
 
 #[derive(Deserialize)]
@@ -191,7 +191,7 @@ pub(super) struct CompletionsArguments {
     pub(super) text: String,
     pub(super) column: Option<u64>,
     #[serde(flatten)]
-    pub(super) of: Scoped,
+    pub(super) of: ScopeArguments,
 }
 
 #[derive(Deserialize)]
@@ -221,7 +221,7 @@ pub(super) struct SourceArguments {
 
 // ---- Messages to the client.
 
-/// A message to the client.
+/// A message from the adapter to the client.
 #[derive(Serialize, Debug)]
 pub struct Message {
     pub(super) seq: i64,
@@ -230,7 +230,7 @@ pub struct Message {
 }
 
 impl Message {
-    /// An error of the stream, for the client's console.
+    /// An error of the stream, as output to the client's console.
     pub fn complaint(text: &str) -> Message {
         let output = Output { category: "stderr", output: format!("{text}\n") };
         Message { seq: 0, kind: Kind::Event(Event::Output(output)) }
@@ -259,7 +259,7 @@ pub(super) struct Response {
 pub(super) enum Event {
     Initialized,
     Output(Output),
-    Stopped(Stopped),
+    Stopped(StoppedEvent),
     Terminated,
 }
 
@@ -271,7 +271,7 @@ pub(super) struct Output {
 
 #[derive(Serialize, Debug)]
 #[serde(rename_all = "camelCase")]
-pub(super) struct Stopped {
+pub(super) struct StoppedEvent {
     pub(super) reason: &'static str,
     pub(super) thread_id: usize,
     pub(super) all_threads_stopped: bool,
@@ -283,7 +283,7 @@ pub(super) struct Stopped {
     pub(super) hit_breakpoint_ids: Vec<u32>,
 }
 
-/// The body of a refusal. `format` stands for the text as it is, so that nothing in the text stands for a variable.
+/// Body of an error answer. The text is a variable of `format`, so that braces in it are literal.
 #[derive(Serialize)]
 pub(super) struct Refusal {
     error: ErrorMessage,
@@ -349,7 +349,7 @@ pub(super) struct ExceptionFilter {
     pub(super) default: bool,
 }
 
-/// Answers that are one list or one value, by its name.
+/// Answers that consist of one list or one value, keyed by its name.
 #[derive(Serialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) enum Body {
@@ -381,7 +381,7 @@ pub(super) struct Breakpoint {
     pub(super) line: Option<u64>,
 }
 
-/// The identifier by which a value is watched; a value that cannot be has none.
+/// Identifier for watching a value; `None` if the value cannot be watched.
 #[derive(Serialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct DataBreakpointInfo {
@@ -450,10 +450,10 @@ pub(super) struct Variable {
     pub(super) variables_reference: u64,
 }
 
-/// Of `evaluate` (`result`), and of `setVariable` and `setExpression` (`value`).
+/// Result of `evaluate` (`result`), `setVariable` and `setExpression` (`value`).
 #[derive(Serialize, Default)]
 #[serde(rename_all = "camelCase")]
-pub(super) struct Evaluated {
+pub(super) struct EvaluateResponse {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) result: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Running, forward and back, to what stops it.
+//! Runs of the program, forward and back, to the next stop.
 
 use super::breakpoints::logged;
-use super::protocol::{Event, ExceptionArguments, ExceptionFilter, Stopped};
-use super::{Debugged, Server, Then};
+use super::protocol::{Event, ExceptionArguments, ExceptionFilter, StoppedEvent};
+use super::{DebuggedSession, FollowUp, Server};
 use std::ops::Range;
 use takt_debug::console::{Console, End};
-use takt_debug::session::{Move, Session, Unit, Why};
+use takt_debug::session::{Move, Session, StopReason, Unit};
 use takt_isa::fp::Flags;
 use takt_isa::timing::Cycle;
 use takt_isa::{Effect, Instruction};
 
-/// Cycles between two looks for exceptions.
+/// Cycles between two checks for exceptions.
 const SLICE: Cycle = 1 << 14;
 
-/// Which exceptions stop a run.
+/// Exceptions that stop a run.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(super) struct Filters {
     invalid: bool,
@@ -24,7 +24,7 @@ pub(super) struct Filters {
 }
 
 impl Filters {
-    /// Name, label and description of each.
+    /// Name, label and description of each filter.
     const ALL: [(&'static str, &'static str, &'static str); 4] = [
         ("invalid", "Invalid operation", "An operation raises the flag `invalid`, which was not set"),
         ("overflow", "Overflow", "An operation raises the flag `overflow`, which was not set"),
@@ -50,7 +50,7 @@ impl Filters {
         Ok(filters)
     }
 
-    /// All, for the client to choose from.
+    /// Filters offered to the client.
     pub(super) fn described() -> Vec<ExceptionFilter> {
         let filter =
             |(filter, label, description)| ExceptionFilter { filter, label, description, default: false };
@@ -68,30 +68,30 @@ impl Filters {
     }
 }
 
-/// The exceptions that there were up to a position, in a core.
+/// Exceptions of a core up to a position.
 #[derive(Clone, PartialEq, Debug)]
-struct Met {
+struct ExceptionCounts {
     flags: Vec<(&'static str, bool)>,
     missed: u64,
     nan: bool,
 }
 
-impl Met {
-    fn now(session: &Session, filters: Filters) -> Met {
+impl ExceptionCounts {
+    fn now(session: &Session, filters: Filters) -> ExceptionCounts {
         let emulator = session.emulator();
         let statistics = emulator.statistics();
-        // A flag raised in the cycle to come counts: the operation that clears the flags may issue in that very cycle.
+        // Include flags raised in the cycle to come: the operation that clears the flags may issue in that cycle.
         let raised = emulator.in_flight().filter(|retire| retire.cycle <= emulator.now());
         let flags = raised.fold(emulator.flags(), |flags, retire| flags | retire.flags);
-        Met {
+        ExceptionCounts {
             flags: filters.flags().into_iter().map(|(flag, name)| (name, flags.contains(flag))).collect(),
             missed: if filters.missed { statistics.missed } else { 0 },
             nan: filters.nan && statistics.nan_writes > 0,
         }
     }
 
-    /// The exception that is new since.
-    fn since(&self, before: &Met) -> Option<(String, String)> {
+    /// First exception that was not present before.
+    fn since(&self, before: &ExceptionCounts) -> Option<(String, String)> {
         for ((name, now), (_, before)) in self.flags.iter().zip(&before.flags) {
             if *now && !before {
                 return Some(((*name).to_owned(), format!("an operation raised the flag `{name}`")));
@@ -105,54 +105,54 @@ impl Met {
     }
 }
 
-/// The exceptions that there were, core by core.
-fn met(console: &Console, filters: Filters) -> Vec<Met> {
+/// Exceptions so far, core by core.
+fn exception_counts(console: &Console, filters: Filters) -> Vec<ExceptionCounts> {
     let sessions = (0..console.cores()).filter_map(|core| console.core(core));
-    sessions.map(|session| Met::now(session, filters)).collect()
+    sessions.map(|session| ExceptionCounts::now(session, filters)).collect()
 }
 
-/// The first core that has an exception which is new since.
-fn since(now: &[Met], before: &[Met]) -> Option<Exception> {
+/// First core with an exception that was not present before.
+fn since(now: &[ExceptionCounts], before: &[ExceptionCounts]) -> Option<Exception> {
     let mut cores = now.iter().zip(before).enumerate();
     cores.find_map(|(core, (now, before))| now.since(before).map(|(id, text)| (core, id, text)))
 }
 
-/// An exception: the core, its name, and what it is.
+/// An exception: core, name and description.
 type Exception = (usize, String, String);
 
 impl Server<'_> {
-    /// Does what a request asked for.
-    pub(super) fn go(&mut self, then: Then) {
+    /// Executes the action of a request.
+    pub(super) fn go(&mut self, then: FollowUp) {
         let Some(debugged) = &mut self.debugged else { return };
         match then {
-            Then::Nothing | Then::Initialized | Then::Enter => {}
+            FollowUp::Nothing | FollowUp::Initialized | FollowUp::Enter => {}
             _ => {
-                // An interrupt that was meant for what has ended.
+                // Clear an interrupt of a command that has ended.
                 self.control.clear();
                 debugged.exception = None;
             }
         }
         match then {
-            Then::Nothing => {}
-            Then::Initialized => self.event(Event::Initialized),
-            Then::Enter => {
+            FollowUp::Nothing => {}
+            FollowUp::Initialized => self.event(Event::Initialized),
+            FollowUp::Enter => {
                 let core = debugged.console.selected();
                 self.stopped(core, "entry", None, None);
             }
-            Then::Continue => self.resume(),
-            Then::Back => self.resume_back(),
-            Then::Step(core, unit, over) => {
+            FollowUp::Continue => self.resume(),
+            FollowUp::Back => self.resume_back(),
+            FollowUp::Step(core, unit, over) => {
                 let end = debugged.step(core, unit, over);
-                self.tell(end, "step");
+                self.report_stop(end, "step");
             }
-            Then::Move(core, to, reason) => {
+            FollowUp::Move(core, to, reason) => {
                 let end = debugged.go(core, &to);
-                self.tell(end, reason);
+                self.report_stop(end, reason);
             }
         }
     }
 
-    /// Runs on to what stops, past what only logs or has not been met often enough.
+    /// Runs forward to a stop, past log messages and hits before the hit condition.
     fn resume(&mut self) {
         loop {
             let filters = if self.no_debug { Filters::default() } else { self.filters };
@@ -163,14 +163,14 @@ impl Server<'_> {
                 return self.stopped(core, "exception", Some(text), None);
             }
             match why {
-                Why::Limit(_) => {}
-                Why::Stop { .. } if self.no_debug => {}
-                Why::Stop { id, .. } => {
+                StopReason::Limit(_) => {}
+                StopReason::Stop { .. } if self.no_debug => {}
+                StopReason::Stop { id, .. } => {
                     let session = debugged.console.core(core).unwrap_or_else(|| debugged.console.session());
                     let Some(more) = debugged.breakpoints.more_of(id) else {
-                        return self.tell(End { core, why }, "breakpoint");
+                        return self.report_stop(End { core, why }, "breakpoint");
                     };
-                    if !more.holds(session) {
+                    if !more.holds(id, session) {
                         continue;
                     }
                     more.met += 1;
@@ -182,44 +182,46 @@ impl Server<'_> {
                             let text = logged(session, log);
                             self.output(&text);
                         }
-                        None => return self.tell(End { core, why }, "breakpoint"),
+                        None => return self.report_stop(End { core, why }, "breakpoint"),
                     }
                 }
-                why => return self.tell(End { core, why }, "breakpoint"),
+                why => return self.report_stop(End { core, why }, "breakpoint"),
             }
         }
     }
 
-    /// Runs back to what stops: past what only logs, or would not stop here. How often a breakpoint was met counts forward only.
+    /// Runs back to a stop, past log messages and breakpoints whose condition fails. Hits are counted only forward.
     fn resume_back(&mut self) {
         loop {
             let Some(debugged) = &mut self.debugged else { return };
             let end = debugged.go(debugged.console.selected(), &Move::ResumeBack);
             let session = debugged.console.core(end.core).unwrap_or_else(|| debugged.console.session());
-            if let Why::Stop { id, .. } = end.why
+            if let StopReason::Stop { id, .. } = end.why
                 && let Some(more) = debugged.breakpoints.more_of(id)
-                && (more.log.is_some() || !more.holds(session))
+                && (more.log.is_some() || !more.holds(id, session))
             {
                 continue;
             }
-            return self.tell(end, "breakpoint");
+            return self.report_stop(end, "breakpoint");
         }
     }
 
-    /// Tells the client why the program stopped.
-    fn tell(&mut self, End { core, why }: End, reason: &'static str) {
+    /// Reports the stop and its reason to the client.
+    fn report_stop(&mut self, End { core, why }: End, reason: &'static str) {
         let Some(debugged) = &mut self.debugged else { return };
         let over = std::mem::take(&mut debugged.over);
         match why {
-            Why::Done | Why::Holds => self.stopped(core, reason, None, None),
-            Why::Stop { id, text, change } => {
+            StopReason::Done | StopReason::Holds => self.stopped(core, reason, None, None),
+            StopReason::Stop { id, text, change } => {
                 let breakpoint = debugged.breakpoints.of(id);
                 let reason = debugged.breakpoints.more_of(id).map_or("breakpoint", |more| more.reason);
                 let change = change.map_or(String::new(), |(before, now)| format!(": {before} → {now}"));
                 self.stopped(core, reason, Some(format!("{text}{change}")), Some(breakpoint));
             }
-            Why::Start => self.stopped(core, "entry", Some("the beginning of the run".to_owned()), None),
-            Why::Fault(fault) => {
+            StopReason::Start => {
+                self.stopped(core, "entry", Some("the beginning of the run".to_owned()), None)
+            }
+            StopReason::Fault(fault) => {
                 let rendered = debugged.session(core).diagnose(&fault).render(false);
                 let text = rendered.lines().next().unwrap_or("").to_owned();
                 debugged.exception = Some((fault.kind.name().to_owned(), rendered.clone()));
@@ -229,13 +231,13 @@ impl Server<'_> {
                 }
                 self.stopped(core, "exception", Some(text), None);
             }
-            // From the end of a run there is still a way back; the second time, it is over.
-            Why::Halted | Why::InputsEnd if over => self.event(Event::Terminated),
-            Why::Halted | Why::InputsEnd => {
+            // The first stop at the end of a run allows steps back; the second ends the session.
+            StopReason::Halted | StopReason::InputsEnd if over => self.event(Event::Terminated),
+            StopReason::Halted | StopReason::InputsEnd => {
                 debugged.over = true;
                 let what = match (&why, debugged.console.cores()) {
-                    (Why::Halted, 1) => "the program has halted",
-                    (Why::Halted, _) => "every core has halted",
+                    (StopReason::Halted, 1) => "the program has halted",
+                    (StopReason::Halted, _) => "every core has halted",
                     _ => "the recorded inputs end here",
                 };
                 self.output(what);
@@ -244,9 +246,11 @@ impl Server<'_> {
                 }
                 self.stopped(core, "pause", Some(what.to_owned()), None);
             }
-            Why::Limit(cycles) => self.stopped(core, "pause", Some(format!("after {cycles} cycles")), None),
-            Why::Interrupted => self.stopped(core, "pause", None, None),
-            Why::Differs(text) | Why::Other(text) => {
+            StopReason::Limit(cycles) => {
+                self.stopped(core, "pause", Some(format!("after {cycles} cycles")), None)
+            }
+            StopReason::Interrupted => self.stopped(core, "pause", None, None),
+            StopReason::Differs(text) | StopReason::Other(text) => {
                 self.output(&text);
                 self.stopped(core, "pause", Some(text), None);
             }
@@ -254,11 +258,13 @@ impl Server<'_> {
     }
 
     fn stopped(&mut self, core: usize, reason: &'static str, text: Option<String>, id: Option<u32>) {
+        let doubts = self.debugged.as_ref().map(|debugged| debugged.console.doubts());
+        doubts.into_iter().flatten().for_each(|doubt| self.output(&doubt));
         let displayed = self.debugged.as_ref().map(|debugged| debugged.console.displayed(core));
         for (name, value) in displayed.into_iter().flatten() {
             self.output(&format!("{name} = {value}"));
         }
-        self.event(Event::Stopped(Stopped {
+        self.event(Event::Stopped(StoppedEvent {
             reason,
             thread_id: core + 1,
             all_threads_stopped: true,
@@ -269,34 +275,34 @@ impl Server<'_> {
     }
 }
 
-impl Debugged {
+impl DebuggedSession {
     pub(super) fn go(&mut self, core: usize, to: &Move) -> End {
-        self.console.go(core, to).unwrap_or_else(|text| End { core, why: Why::Other(text) })
+        self.console.go(core, to).unwrap_or_else(|text| End { core, why: StopReason::Other(text) })
     }
 
-    /// A step of a core, which may pass over calls.
+    /// Steps a core, optionally over calls.
     fn step(&mut self, core: usize, unit: Unit, over: bool) -> End {
-        let depth = |debugged: &Debugged| debugged.session(core).emulator().stack().len();
-        let mut end = End { core, why: Why::Done };
-        // The bundle to come is shown. If it is not about to issue, as before the first one, a step begins where it
-        // is: it would else end there, and seem to have gone nowhere.
+        let depth = |debugged: &DebuggedSession| debugged.session(core).emulator().stack().len();
+        let mut end = End { core, why: StopReason::Done };
+        // The client shows the next bundle. If it is not about to issue, as before the first bundle, begin the step here; otherwise the
+        // step would end at that same bundle and seem to have no effect.
         let now = self.session(core).cycle();
         let issues = self.console.core_mut(core).and_then(|session| session.next_issue().1) == Some(now);
         if unit != Unit::Out && !issues {
             end = self.go(core, &Move::Step(Unit::Bundle, 1));
         }
         let begin = depth(self);
-        if end.why == Why::Done {
+        if end.why == StopReason::Done {
             end = self.go(core, &Move::Step(unit, 1));
         }
-        // A line that calls is over when what it calls has returned.
-        while over && end.why == Why::Done && depth(self) > begin {
+        // A step over a line with a call ends after the subroutine's return.
+        while over && end.why == StopReason::Done && depth(self) > begin {
             end = self.go(core, &Move::Step(Unit::Out, 1));
         }
         end
     }
 
-    /// Runs on to a stop, an exception or the end; or so far that somebody may want to say something.
+    /// Runs to a stop, an exception or the end, or for a slice, so that requests are heard.
     fn run(&mut self, filters: Filters) -> (End, Option<Exception>) {
         let clears = self.clears_flags() && !filters.flags().is_empty();
         let core = self.console.selected();
@@ -304,39 +310,44 @@ impl Debugged {
             return (self.go(core, &Move::Resume), None);
         }
         loop {
-            let (start, before) = (self.session(core).cycle(), met(&self.console, filters));
-            // Flags that a program clears may be gone at the end of a slice.
+            let (start, before) = (self.session(core).cycle(), exception_counts(&self.console, filters));
+            // A program that clears flags may hide an exception within a slice.
             let limit = self.console.set_run_limit(if clears { 1 } else { SLICE });
             let end = self.go(core, &Move::Resume);
             self.console.set_run_limit(limit);
-            if since(&met(&self.console, filters), &before).is_some() {
+            if since(&exception_counts(&self.console, filters), &before).is_some() {
                 let found = self.first(filters, &before, start..self.session(core).cycle());
-                return (End { why: Why::Done, ..end }, found);
+                return (End { why: StopReason::Done, ..end }, found);
             }
-            if !matches!(end.why, Why::Limit(_)) {
+            if !matches!(end.why, StopReason::Limit(_)) {
                 return (end, None);
             }
         }
     }
 
-    /// Goes to the first position at which there is an exception that was not there before: it is there at the end of a range,
-    /// not at its start, and the run has come by both.
-    fn first(&mut self, filters: Filters, before: &[Met], range: Range<Cycle>) -> Option<Exception> {
+    /// Finds the first position with a new exception by bisection. It is present at the range's end and absent at its start, and the run
+    /// has passed both.
+    fn first(
+        &mut self,
+        filters: Filters,
+        before: &[ExceptionCounts],
+        range: Range<Cycle>,
+    ) -> Option<Exception> {
         let (mut none, mut there) = (range.start, range.end);
         while there - none > 1 {
             let middle = none + (there - none) / 2;
             self.go(0, &Move::Cycle(middle));
-            if since(&met(&self.console, filters), before).is_some() {
+            if since(&exception_counts(&self.console, filters), before).is_some() {
                 there = middle;
             } else {
                 none = middle;
             }
         }
         self.go(0, &Move::Cycle(there));
-        since(&met(&self.console, filters), before)
+        since(&exception_counts(&self.console, filters), before)
     }
 
-    /// True if an operation of a program clears the flags.
+    /// An operation of a program clears the flags.
     fn clears_flags(&self) -> bool {
         let programs = (0..self.console.cores()).map(|core| self.session(core).program());
         programs

@@ -1,57 +1,63 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The state at a position: frames, variables, values, bundles, memory.
+//! State at a position: frames, variables, values, bundles, memory.
 
 use super::breakpoints::{address, reference};
 use super::protocol::{
     Answer, Body, CompletionItem, CompletionsArguments, DisassembleArguments, DisassembledInstruction,
-    EvaluateArguments, Evaluated, Format, Memory, ReadMemoryArguments, Scope, Scoped, SetArguments, Source,
-    SourceArguments, StackFrame, StackTrace, StackTraceArguments, Variable, VariablesArguments, answer,
+    EvaluateArguments, EvaluateResponse, Format, Memory, ReadMemoryArguments, Scope, ScopeArguments,
+    SetArguments, Source, SourceArguments, StackFrame, StackTrace, StackTraceArguments, Variable,
+    VariablesArguments, answer,
 };
-use super::{CORE, Debugged};
+use super::{CORE, DebuggedSession};
 use takt_debug::panes::{flight, stalls};
-use takt_debug::session::{Place, Shown};
+use takt_debug::session::{Place, ValueNotations};
 use takt_debug::system::link_text;
 use takt_isa::program::{Location, Port};
 use takt_isa::{BundleAddress, Register, Type};
 
-/// Variables of one list at most.
+/// Maximal number of variables in one list.
 const VARIABLES: usize = 4096;
-/// Names of one completion at most.
+/// Maximal number of completions in an answer.
 const COMPLETIONS: usize = 200;
-/// Bundles of one request at most.
+/// Maximal number of bundles in an answer.
 const BUNDLES: u64 = 4096;
-/// Bytes of memory of one request at most.
+/// Maximal number of memory bytes in an answer.
 const BYTES: u64 = 1 << 20;
 
-/// The lists of variables of a core, by number.
+/// Numbers of a core's variable lists.
 const INPUTS: u64 = 1;
 const OUTPUTS: u64 = 2;
 const NAMED: u64 = 3;
 const FLIGHT: u64 = 4;
 const STALLS: u64 = 5;
 const MACHINE: u64 = 6;
-/// Of a system, the same for each core.
+/// Links of a system, the same list for each core.
 const LINKS: u64 = 7;
-/// From here on, the registers of each bank; then the ways to read each register.
+/// Registers of each bank, from this number on; the notations of each register follow.
 const BANKS: u64 = 16;
 const VIEWS: u64 = 64;
 
-/// A register's bits as they are shown.
-fn shown(ty: Type, bits: Option<u32>, hex: bool) -> String {
+/// Bits of a register as text.
+fn value_text(ty: Type, bits: Option<u32>, hex: bool) -> String {
     match bits {
         None => "(never written)".to_owned(),
         Some(bits) if hex => format!("0x{bits:08x}"),
-        Some(bits) => Shown::new(ty, bits).text,
+        Some(bits) => ValueNotations::new(ty, bits).text,
     }
 }
 
-/// A variable that has no parts.
+/// Value with a note if it is stale.
+fn noted(value: String, note: Option<String>) -> String {
+    note.map_or(value.clone(), |note| format!("{value}  ({note})"))
+}
+
+/// A variable without children.
 fn plain(name: impl Into<String>, value: String) -> Variable {
     Variable { name: name.into(), value, ..Variable::default() }
 }
 
-impl Debugged {
-    /// A source as the protocol has it: its path, or the number by which its text can be had.
+impl DebuggedSession {
+    /// A source in the protocol's form: its path, or a number for requesting its text.
     pub(super) fn source(&self, core: usize, file: u32) -> Source {
         let session = self.session(core);
         let name = session.program().files.get(file as usize).cloned().unwrap_or_default();
@@ -98,7 +104,7 @@ impl Debugged {
         answer(StackTrace { stack_frames, total_frames })
     }
 
-    pub(super) fn scopes(&self, of: &Scoped) -> Answer {
+    pub(super) fn scopes(&self, of: &ScopeArguments) -> Answer {
         let core = self.core_of(of)?;
         let program = self.session(core).program();
         let scope = |name: &str, number: u64, named_variables: usize, expensive: bool| Scope {
@@ -125,7 +131,7 @@ impl Debugged {
         answer(Body::Scopes(scopes))
     }
 
-    /// The links of a system, each with what is on it.
+    /// Links of a system with their contents.
     fn links(&self) -> Vec<Variable> {
         let Some(system) = self.console.system().map(|session| session.system()) else { return Vec::new() };
         let links = system.description().links.iter().enumerate();
@@ -138,7 +144,10 @@ impl Debugged {
         let place = session.program().machine.register_name(register).unwrap_or_default();
         Variable {
             name: name.to_owned(),
-            value: shown(ty, bits, hex),
+            value: noted(
+                value_text(ty, bits, hex),
+                session.stale(register).map(|stale| stale.text(session.program())),
+            ),
             ty: Some(format!("{} in {place}", ty.name())),
             evaluate_name: Some(name.to_owned()),
             variables_reference: if bits.is_some() { views(core, register) } else { 0 },
@@ -189,7 +198,7 @@ impl Debugged {
     }
 
     fn in_flight(&self, core: usize) -> Vec<Variable> {
-        let row = |one: takt_debug::panes::Flying| {
+        let row = |one: takt_debug::panes::InFlightOperation| {
             let register = if one.register.is_empty() { one.mnemonic.to_owned() } else { one.register };
             let cycles = if one.left == 1 { "cycle" } else { "cycles" };
             plain(register, format!("{} {cycles} to go: {} of {}", one.left, one.mnemonic, one.from))
@@ -197,7 +206,7 @@ impl Debugged {
         flight(self.session(core)).into_iter().map(row).collect()
     }
 
-    /// The machine's state apart from registers.
+    /// State of the machine other than registers.
     fn machine(&mut self, core: usize) -> Vec<Variable> {
         let stall = self.console.core_mut(core).and_then(|session| session.stall());
         let session = self.session(core);
@@ -216,12 +225,12 @@ impl Debugged {
         ]
     }
 
-    /// A register's bits in every way.
+    /// Register bits in all notations.
     fn views(&self, core: usize, register: Register) -> Vec<Variable> {
         let Some(bits) = self.session(core).register(register) else { return Vec::new() };
-        let views = Shown::new(Type::F, bits);
+        let views = ValueNotations::new(Type::F, bits);
         let float = views.float;
-        // The distance to the next number: what one unit in the last place is here.
+        // The ulp: distance to the next binary32 number.
         let ulp = f64::from(f32::from_bits(float.abs().to_bits().saturating_add(1))) - f64::from(float.abs());
         vec![
             plain("float", views.text.clone()),
@@ -232,7 +241,7 @@ impl Debugged {
         ]
     }
 
-    /// Sets what an expression names.
+    /// Assigns to the destination that an expression names.
     pub(super) fn set_variable(&mut self, SetArguments { name, value, of }: &SetArguments) -> Answer {
         let core = self.core_of(of)?;
         let session = self.session(core);
@@ -240,15 +249,16 @@ impl Debugged {
         let Some((place, ty, _)) = session.place(&live)? else {
             return Err(format!("`{name}` is neither a register nor a word of memory"));
         };
-        let value = session.parse(value).and_then(|live| session.evaluate(&live))?;
-        let bits = value.bits(ty).map_err(|fault| fault.to_string())?;
+        let live = session.parse(value)?;
+        let note = session.note(&live);
+        let bits = session.evaluate(&live)?.bits(ty).map_err(|fault| fault.to_string())?;
         self.console.set(core, place, bits)?;
         let variables_reference = match place {
             Place::Register(register) => views(core, register),
             Place::Word(_) => 0,
         };
-        let value = Some(shown(ty, Some(bits), false));
-        answer(Evaluated { value, ty: Some(ty.name()), variables_reference, result: None })
+        let value = Some(noted(value_text(ty, Some(bits), false), note));
+        answer(EvaluateResponse { value, ty: Some(ty.name()), variables_reference, result: None })
     }
 
     pub(super) fn evaluate(&mut self, arguments: &EvaluateArguments) -> Answer {
@@ -259,19 +269,23 @@ impl Debugged {
         let evaluated = session.parse(expression).and_then(|live| {
             let (variables_reference, ty, value) = match session.place(&live)? {
                 Some((Place::Register(register), ty, bits)) => {
-                    (views(core, register), ty.name(), shown(ty, bits, hex))
+                    (views(core, register), ty.name(), value_text(ty, bits, hex))
                 }
-                Some((Place::Word(_), ty, bits)) => (0, ty.name(), shown(ty, bits, hex)),
+                Some((Place::Word(_), ty, bits)) => (0, ty.name(), value_text(ty, bits, hex)),
                 None => (0, "value", session.evaluate(&live)?.to_string()),
             };
-            Ok(Evaluated { result: Some(value), ty: Some(ty), variables_reference, value: None })
+            let value = noted(value, session.note(&live));
+            Ok(EvaluateResponse { result: Some(value), ty: Some(ty), variables_reference, value: None })
         });
         match evaluated {
-            // In the console, the debugger's own commands that only look.
+            // The console also accepts the debugger's read-only commands.
             Err(error) if context.as_deref() == Some("repl") => {
                 self.console.select(core);
                 let text = self.console.look(expression).unwrap_or(Err(error))?;
-                answer(Evaluated { result: Some(text.trim_end().to_owned()), ..Evaluated::default() })
+                answer(EvaluateResponse {
+                    result: Some(text.trim_end().to_owned()),
+                    ..EvaluateResponse::default()
+                })
             }
             evaluated => answer(evaluated?),
         }
@@ -300,7 +314,7 @@ impl Debugged {
         answer(Body::Instructions(rows.collect()))
     }
 
-    /// A bundle, or the place of one where there is none.
+    /// Disassembly of a bundle, or a placeholder beyond the program.
     fn instruction(&self, core: usize, number: i64, from_one: bool) -> DisassembledInstruction {
         let session = self.session(core);
         let program = session.program();
@@ -330,13 +344,13 @@ impl Debugged {
         }
     }
 
-    /// An address with its core, if there is such a core.
+    /// Parses an address with its core; `None` if the core does not exist.
     pub(super) fn address(&self, text: &str) -> Option<(usize, BundleAddress)> {
         let (core, address) = address(text)?;
         Some((self.checked(core)?, address))
     }
 
-    /// Data memory: `memoryReference` is a word's address, bytes are little-endian.
+    /// Reads data memory: `memoryReference` is a word address; bytes are little-endian.
     pub(super) fn read_memory(&mut self, arguments: &ReadMemoryArguments) -> Answer {
         let asked = &arguments.memory_reference;
         let (core, word) = self.address(asked).ok_or_else(|| format!("`{asked}` is no word's address"))?;
@@ -354,12 +368,12 @@ impl Debugged {
     }
 }
 
-/// The number of the list of ways to read a register.
+/// Number of a register's list of notations.
 fn views(core: usize, register: Register) -> u64 {
     core as u64 * CORE + VIEWS + u64::from(register.get())
 }
 
-/// Bytes in base 64, as the protocol has them.
+/// Base64 encoding of bytes.
 fn base64(bytes: &[u8]) -> String {
     const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Completion: the texts that can be written at a place.
+//! Completion at a position.
 
 use crate::lsp::program::{File, Front};
 use crate::lsp::{Settings, hover};
@@ -15,17 +15,17 @@ use takt_asm::source::Span;
 use takt_asm::tokens::{self, Token, TokenKind};
 use takt_isa::{Machine, Op, Operand, ROWS, Row, Type};
 
-/// The request's options.
-struct Wanted<'a> {
-    /// True if the client fills in operands by their places.
+/// Options of a completion request.
+struct CompletionOptions<'a> {
+    /// The client supports snippets with placeholders.
     snippets: bool,
     range: Range,
     settings: &'a Settings,
-    /// The machine of the program.
+    /// Machine of the program.
     machine: &'static Machine,
 }
 
-impl Wanted<'_> {
+impl CompletionOptions<'_> {
     fn item(&self, label: &str, kind: CompletionItemKind, detail: String, text: String) -> CompletionItem {
         CompletionItem {
             label: label.to_owned(),
@@ -36,7 +36,7 @@ impl Wanted<'_> {
         }
     }
 
-    /// A word and the operands that follow it, in their column.
+    /// An operation with placeholders for its operands, aligned to their column.
     fn with_operands(
         &self,
         label: &str,
@@ -58,7 +58,7 @@ impl Wanted<'_> {
         if self.snippets {
             item.insert_text_format = Some(InsertTextFormat::SNIPPET);
         } else {
-            // Without places to fill in, operands would have to be deleted.
+            // Without placeholders, the user would have to delete the operands.
             item.text_edit = Some(CompletionTextEdit::Edit(TextEdit {
                 range: self.range,
                 new_text: format!("{label}{}", " ".repeat(blanks)),
@@ -80,7 +80,7 @@ impl Wanted<'_> {
     }
 }
 
-/// The texts that can be written at a byte of a file.
+/// Completions at a byte of a file.
 pub(crate) fn complete(
     settings: &Settings,
     front: &Front,
@@ -94,7 +94,7 @@ pub(crate) fn complete(
     let lines = tokens::lines(before);
     let Some(tokens) = lines.first() else { return Vec::new() };
     let touches = |token: &&Token| token.range.end == before.len();
-    // The word that is being written, and what stands before it.
+    // Split off the partial word under the cursor.
     let written = tokens.last().filter(touches).filter(|token| {
         matches!(
             token.kind,
@@ -109,9 +109,9 @@ pub(crate) fn complete(
     let tokens = if written.is_some() { &tokens[..tokens.len() - 1] } else { &tokens[..] };
     let word = |token: &Token| &before[token.range.clone()];
     let range = file.text.range(line.start + start..byte, encoding);
-    let wanted = Wanted { snippets, range, settings, machine: front.machine };
+    let wanted = CompletionOptions { snippets, range, settings, machine: front.machine };
 
-    // The operation that the place is in.
+    // Operation around the cursor.
     let begin = tokens.iter().rposition(|token| token.kind == TokenKind::Bars).map_or(0, |bars| bars + 1);
     let operation = &tokens[begin..];
     let operation = match operation {
@@ -139,10 +139,10 @@ pub(crate) fn complete(
             None => Vec::new(),
         };
     }
-    // Which operand it is.
+    // Index of the operand at the cursor.
     let number = operands.iter().filter(|token| token.kind == TokenKind::Comma).count();
     let Some(op) = Op::from_mnemonic(word(head)) else {
-        // A macro's arguments may be anything.
+        // Arguments of a macro are unrestricted.
         let mut items = named(&wanted, front, file, byte, &ANY);
         items.extend(functions(&wanted));
         return items;
@@ -154,15 +154,15 @@ pub(crate) fn complete(
     }
 }
 
-/// The texts that a directive takes.
+/// Completions of a directive's operands.
 fn of_directive(
-    wanted: &Wanted<'_>,
+    wanted: &CompletionOptions<'_>,
     front: &Front,
     file: &File,
     byte: usize,
     directive: Directive,
 ) -> Vec<CompletionItem> {
-    // `on|off`
+    // Alternatives such as `on|off`.
     if directive.operands().contains('|') {
         let words = directive.operands().split('|');
         let item =
@@ -180,9 +180,9 @@ fn of_directive(
     }
 }
 
-/// The texts that an operand can be; `brackets` if it is an address, and its bracket is open.
+/// Completions of an operand; `brackets`: it is an address, and its bracket is open.
 fn of_operand(
-    wanted: &Wanted<'_>,
+    wanted: &CompletionOptions<'_>,
     front: &Front,
     file: &File,
     byte: usize,
@@ -211,7 +211,7 @@ fn of_operand(
     }
 }
 
-/// Kinds of names that an operation reads.
+/// Kinds of symbols that an operation can read.
 const READABLE: [SymbolKind; 6] = [
     SymbolKind::Register,
     SymbolKind::State,
@@ -235,20 +235,18 @@ const ANY: [SymbolKind; 11] = [
     SymbolKind::Count,
 ];
 
-/// The words that a line, or an operation of a bundle, can begin with.
-fn beginnings(wanted: &Wanted<'_>, front: &Front) -> Vec<CompletionItem> {
+/// Words that can begin a line, or an operation of a bundle.
+fn beginnings(wanted: &CompletionOptions<'_>, front: &Front) -> Vec<CompletionItem> {
     let here =
         |row: &&Row| row.function == takt_isa::Function::Idle || wanted.machine.host(row.function).is_some();
     let mut items: Vec<CompletionItem> =
         ROWS.iter().filter(here).map(|row| wanted.instruction(row)).collect();
     for symbol in front.index.symbols.iter().filter(|symbol| symbol.kind == SymbolKind::Macro) {
         let detail = format!("{} {}", symbol.name, symbol.parameters.join(", "));
-        items.push(wanted.with_operands(
-            &symbol.name,
-            CompletionItemKind::MODULE,
-            detail,
-            &symbol.parameters,
-        ));
+        // Placeholders carry the parameter's name without its type.
+        let bare = |parameter: &String| parameter.split(':').next().unwrap_or_default().to_owned();
+        let operands: Vec<String> = symbol.parameters.iter().map(bare).collect();
+        items.push(wanted.with_operands(&symbol.name, CompletionItemKind::MODULE, detail, &operands));
     }
     for directive in Directive::ALL {
         let detail = format!("{} {}", directive.name(), directive.operands());
@@ -267,7 +265,7 @@ fn beginnings(wanted: &Wanted<'_>, front: &Front) -> Vec<CompletionItem> {
     items
 }
 
-/// The last line, from 0, of the macro that a byte of a file lies in, and its first.
+/// Last line (from 0) and first line of the macro around a byte of a file.
 fn macro_around(front: &Front, file: &File, byte: usize) -> Option<(usize, usize)> {
     let line = file.text.line_of(byte);
     front.index.blocks.iter().filter(|block| block.directive == Directive::Macro).find_map(|block| {
@@ -278,7 +276,7 @@ fn macro_around(front: &Front, file: &File, byte: usize) -> Option<(usize, usize
     })
 }
 
-/// True if a byte of a file lies in the repetition that counts in the name declared at `span`.
+/// The byte lies in the repetition whose index is declared at `span`.
 fn repeats(front: &Front, file: &File, byte: usize, span: Span) -> bool {
     let line = file.text.line_of(byte);
     let mut counting = front.index.blocks.iter().filter(|block| {
@@ -294,9 +292,9 @@ fn repeats(front: &Front, file: &File, byte: usize, span: Span) -> bool {
     })
 }
 
-/// Names of some kinds that can be seen at a place.
+/// Names of some kinds that are visible at a place.
 fn named(
-    wanted: &Wanted<'_>,
+    wanted: &CompletionOptions<'_>,
     front: &Front,
     file: &File,
     byte: usize,
@@ -311,7 +309,7 @@ fn named(
         if symbol.kind == SymbolKind::Count && !repeats(front, file, byte, symbol.span) {
             continue;
         }
-        // A macro's names are seen in it only, as they are written there.
+        // Names of a macro are visible only in its body.
         if within.is_some() && (within != around || !std::ptr::eq(of, file)) {
             continue;
         }
@@ -331,14 +329,14 @@ fn named(
 }
 
 /// Names with a value: constants, data labels, functions.
-fn values(wanted: &Wanted<'_>, front: &Front, file: &File, byte: usize) -> Vec<CompletionItem> {
+fn values(wanted: &CompletionOptions<'_>, front: &Front, file: &File, byte: usize) -> Vec<CompletionItem> {
     let kinds = [SymbolKind::Constant, SymbolKind::Data, SymbolKind::Parameter, SymbolKind::Count];
     let mut items = named(wanted, front, file, byte, &kinds);
     items.extend(functions(wanted));
     items
 }
 
-fn functions(wanted: &Wanted<'_>) -> Vec<CompletionItem> {
+fn functions(wanted: &CompletionOptions<'_>) -> Vec<CompletionItem> {
     let function = |function: &Function| {
         let arguments = match function.arguments() {
             0 => "a, …".to_owned(),
@@ -354,14 +352,14 @@ fn functions(wanted: &Wanted<'_>) -> Vec<CompletionItem> {
 }
 
 /// Files that can be included.
-fn includes(wanted: &Wanted<'_>, file: &File, before: &str, head: &Token) -> Vec<CompletionItem> {
+fn includes(wanted: &CompletionOptions<'_>, file: &File, before: &str, head: &Token) -> Vec<CompletionItem> {
     let rest = before[head.range.end..].trim_start();
-    // The text being written may hold characters that end a token.
+    // The partial path may contain characters that end a token.
     let typed = rest.trim_start_matches(['<', '"']);
     let start = wanted.range.end.character
         - typed.encode_utf16().count().min(wanted.range.end.character as usize) as u32;
     let range = Range::new(lsp_types::Position::new(wanted.range.end.line, start), wanted.range.end);
-    let wanted = Wanted { range, ..*wanted };
+    let wanted = CompletionOptions { range, ..*wanted };
     let file_item =
         |name: &str, text: String| wanted.item(name, CompletionItemKind::FILE, String::new(), text);
     let library = wanted.settings.library.iter().map(|(name, _)| *name);

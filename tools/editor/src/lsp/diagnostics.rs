@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The assembler's diagnostics as the protocol has them, and its own advice as edits.
+//! Diagnostics of the assembler in the protocol's form, and their suggested fixes as edits.
 
 use crate::lsp::program::Files;
 use crate::lsp::text::{Encoding, Text};
@@ -15,16 +15,16 @@ use takt_asm::Directive;
 use takt_asm::diag::{self, Diagnostics, Severity};
 use takt_asm::tokens::{self, Token, TokenKind};
 
-/// The data that a diagnostic carries along for its fixes.
+/// Data attached to a diagnostic for its fixes.
 #[derive(Serialize, Deserialize)]
 struct Data {
-    /// The text for the place of the mistake.
+    /// Replacement of the faulty text.
     replacement: Option<String>,
-    /// Lines of which one is missing.
+    /// Alternative lines; the source lacks such a line.
     missing: Vec<String>,
 }
 
-/// Diagnostics by file; those without a place are at the beginning of `root`.
+/// Diagnostics by file; a diagnostic without a place appears at the beginning of `root`.
 pub(crate) fn by_file(
     files: &Files,
     diagnostics: &Diagnostics,
@@ -40,7 +40,7 @@ pub(crate) fn by_file(
                 shown.range = range;
                 path
             }
-            // In the library: where it is used stands among the other places.
+            // In the library: the place of use is among the other places.
             Some((None, _)) => {
                 let mut others =
                     diagnostic.labels.iter().filter_map(|label| files.range(label.span, encoding));
@@ -91,11 +91,11 @@ fn convert(files: &Files, diagnostic: &diag::Diagnostic, encoding: Encoding) -> 
     }
 }
 
-/// The fixes of diagnostics: what the assembler itself would write there, and lines that it misses.
+/// Quick fixes of diagnostics: the assembler's replacements and missing lines.
 pub(crate) fn fixes(uri: &Uri, text: &Text, range: Range, diagnostics: &[Diagnostic]) -> Vec<CodeAction> {
     let touches = |other: &Range| other.start <= range.end && range.start <= other.end;
     let fix = |diagnostic: &Diagnostic, title: String, preferred: bool, edit: TextEdit| {
-        // Uri has interior mutability in its parsed form; as a key of the protocol's own type there is no way around.
+        // `Uri` has interior mutability in its parsed form; the protocol's own type demands it as a key.
         #[allow(clippy::mutable_key_type)]
         let changes = HashMap::from([(uri.clone(), vec![edit])]);
         CodeAction {
@@ -124,8 +124,8 @@ pub(crate) fn fixes(uri: &Uri, text: &Text, range: Range, diagnostics: &[Diagnos
     found
 }
 
-/// The line, from 0, before which a missing one goes: an `.include` behind the comment that a source begins with, a declaration
-/// before the section that has the mistake.
+/// Line, from 0, before which a missing line is inserted: an `.include` after the leading comment, a declaration before the section with
+/// the mistake.
 fn home(text: &Text, missing: &str, mistake: u32) -> u32 {
     let lines = tokens::lines(&text.text);
     let is_one_of = |line: &Vec<Token>, directives: &[Directive]| {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Messages to the functions that answer them.
+//! Dispatch of messages to their handlers.
 
 use crate::lsp::requests::{Failed, parameters};
 use crate::lsp::text::{Encoding, Text};
@@ -35,7 +35,7 @@ impl Server {
                 Ok(Value::Null)
             }
             (Phase::Running, _) => {
-                // A mistake of ours in one answer is no reason to end the session.
+                // A panic in one answer must not end the session.
                 let answer = catch_unwind(AssertUnwindSafe(|| self.answer(&method, params)));
                 answer.unwrap_or_else(|_| {
                     Err(Failed(
@@ -95,7 +95,7 @@ impl Server {
                 self.touch_all();
                 Ok(())
             }
-            // Others are for information: the protocol has a server pass over those that it does not know.
+            // The protocol asks servers to ignore unknown notifications.
             _ => Ok(()),
         };
         if let Err(Failed(_, message)) = result {
@@ -124,7 +124,7 @@ impl Server {
 
     fn closed(&mut self, params: &DidCloseTextDocumentParams) {
         let path = uri::path(&params.text_document.uri);
-        // The disk's text counts again.
+        // After closing, the text on disk applies again.
         self.touch(&path);
         self.workspace.close(&path);
         self.workspace.scan();

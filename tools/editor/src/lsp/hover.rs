@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Hover: a text on the thing under the cursor, in Markdown. What an instruction, a directive or a function does, the tables
-//! say.
+//! Hover texts in Markdown for the item under the cursor. Texts for instructions, directives and functions come from the tables.
 
-use crate::lsp::program::{Counted, File, Front};
+use crate::lsp::program::{CountedProgram, File, Front};
 use crate::lsp::{plural, timing};
 use std::fmt::Write as _;
 use takt_asm::Directive;
@@ -10,17 +9,17 @@ use takt_asm::expr::{BUILTINS, Function, Value};
 use takt_asm::index::{Symbol, SymbolKind};
 use takt_asm::source::Span;
 use takt_asm::tokens::{self, TokenKind};
-use takt_debug::session::{Shown, ulp_distance};
+use takt_debug::session::{ValueNotations, ulp_distance};
 use takt_isa::program::Space;
 use takt_isa::{BundleAddress, Machine, Op, Register, Row, Type, manual};
 
-/// Symbols of a place in a macro or a repetition that are told one by one.
+/// Maximal number of symbols listed for one place in a macro or a repetition.
 const TOLD: usize = 8;
 
-/// The hover on a byte of a file, and the bytes that it is about.
+/// Hover text at a byte of a file, with the range it describes.
 pub(crate) fn hover(
     front: &Front,
-    counted: Option<&Counted>,
+    counted: Option<&CountedProgram>,
     file: &File,
     byte: usize,
 ) -> Option<(std::ops::Range<usize>, String)> {
@@ -72,7 +71,7 @@ pub(crate) fn hover(
     Some((place, text))
 }
 
-/// An instruction as the manual has it.
+/// Manual entry of an instruction.
 pub(crate) fn instruction(row: &Row, machine: &'static Machine) -> String {
     let manual = manual::manual();
     let Some(entry) = manual.instructions.iter().find(|entry| entry.mnemonic == row.mnemonic) else {
@@ -92,7 +91,7 @@ pub(crate) fn instruction(row: &Row, machine: &'static Machine) -> String {
     let head = format!("{} {}", entry.mnemonic, entry.syntax);
     let head = head.trim_end();
     let said = [head, entry.summary, entry.text];
-    // The manual's entry without what stands above.
+    // Rest of the manual's entry, without lines already shown.
     let more = manual::entry_text(entry);
     let more: Vec<&str> = more.lines().map(str::trim).filter(|line| !said.contains(line)).collect();
     format!(
@@ -103,7 +102,7 @@ pub(crate) fn instruction(row: &Row, machine: &'static Machine) -> String {
     )
 }
 
-/// A directive as the table has it.
+/// Table entry of a directive.
 pub(crate) fn directive(directive: &Directive) -> String {
     format!(
         "```takt\n{}\n```\n{}",
@@ -112,8 +111,8 @@ pub(crate) fn directive(directive: &Directive) -> String {
     )
 }
 
-/// A register by its place.
-fn place_text(machine: &Machine, counted: Option<&Counted>, word: &str) -> Option<String> {
+/// Description of a register given by its place.
+fn place_text(machine: &Machine, counted: Option<&CountedProgram>, word: &str) -> Option<String> {
     let address = machine.register_address(word)?;
     let mut text = format!("`{word}`, register {address} of {}", machine.name);
     if let Some(slot) = machine.slots.iter().find(|slot| slot.bank.contains(address)) {
@@ -128,7 +127,7 @@ fn place_text(machine: &Machine, counted: Option<&Counted>, word: &str) -> Optio
     Some(text)
 }
 
-fn symbol_text(front: &Front, counted: Option<&Counted>, symbol: &Symbol) -> String {
+fn symbol_text(front: &Front, counted: Option<&CountedProgram>, symbol: &Symbol) -> String {
     let Symbol { name, kind, .. } = symbol;
     let mut text = match symbol.ty {
         Some(ty) => format!("**{name}**: {}, `:{}`", kind.text(), ty.name()),
@@ -166,7 +165,7 @@ fn symbol_text(front: &Front, counted: Option<&Counted>, symbol: &Symbol) -> Str
                 if let Some(bits) =
                     counted.and_then(|counted| counted.assembled.program.data.get(word as usize))
                 {
-                    let _ = write!(text, "\n```text\n{}\n```", Shown::every_way(Type::F, *bits));
+                    let _ = write!(text, "\n```text\n{}\n```", ValueNotations::every_way(Type::F, *bits));
                 }
             }
         }
@@ -195,8 +194,8 @@ fn symbol_text(front: &Front, counted: Option<&Counted>, symbol: &Symbol) -> Str
     text
 }
 
-/// The places of an array's elements.
-fn elements(counted: Option<&Counted>, name: &str, text: &mut String) {
+/// Places of an array's elements.
+fn elements(counted: Option<&CountedProgram>, name: &str, text: &mut String) {
     let Some(program) = counted.map(|counted| &counted.assembled.program) else { return };
     let of = |port: &&takt_isa::program::Port| {
         port.name.strip_prefix(name).is_some_and(|rest| rest.starts_with('['))
@@ -207,8 +206,8 @@ fn elements(counted: Option<&Counted>, name: &str, text: &mut String) {
     }
 }
 
-/// The place of a register, and when which of its values is in it.
-fn register(machine: &Machine, counted: Option<&Counted>, symbol: &Symbol, text: &mut String) {
+/// Place of a register, and the ranges of the values that it holds.
+fn register(machine: &Machine, counted: Option<&CountedProgram>, symbol: &Symbol, text: &mut String) {
     let place = |address: Register| {
         let name = machine.register_name(address).unwrap_or_default();
         let bank = machine.slots.iter().find(|slot| slot.bank.contains(address));
@@ -252,7 +251,7 @@ fn register(machine: &Machine, counted: Option<&Counted>, symbol: &Symbol, text:
     }
 }
 
-/// The bundles that write and read a register.
+/// Bundles that write and read a register.
 fn uses(program: &takt_isa::Program, register: Register) -> String {
     let (mut written, mut read) = (Vec::new(), Vec::new());
     for address in program.addresses() {
@@ -274,7 +273,7 @@ fn uses(program: &takt_isa::Program, register: Register) -> String {
     list("written", &written) + &list("read", &read)
 }
 
-/// A value, its bits, and what rounding takes from it.
+/// A constant's value, its bits, and its rounding error.
 fn value_text(value: Value) -> String {
     match value {
         Value::Int(value) => {
@@ -293,13 +292,13 @@ fn value_text(value: Value) -> String {
             }
         }
         Value::Real(value) => {
-            let rounded = Shown::every_way(Type::F, (value as f32).to_bits());
+            let rounded = ValueNotations::every_way(Type::F, (value as f32).to_bits());
             format!("```text\n{value:?}\n{rounded}{}\n```", rounding(value))
         }
     }
 }
 
-/// The distance of binary32 from a value.
+/// Rounding error of the nearest binary32.
 fn rounding(value: f64) -> String {
     let rounded = f64::from(value as f32);
     if !value.is_finite() || rounded.is_infinite() {
@@ -311,7 +310,7 @@ fn rounding(value: f64) -> String {
     }
 }
 
-/// The line that declares something, if it is short.
+/// Line of a declaration, if short enough.
 fn declaration_line(front: &Front, span: Span) -> Option<String> {
     let (file, bytes) = front.files.place(span)?;
     let file = &front.files.0[file];
@@ -321,7 +320,7 @@ fn declaration_line(front: &Front, span: Span) -> Option<String> {
         .then(|| format!("{}:{}\n```takt\n{text}\n```", file.name, line + 1))
 }
 
-/// The hint of a line in full, for a place on that line.
-pub(crate) fn of_line(counted: &Counted, file: &str, line: u32) -> Option<String> {
+/// Full timing hint of a line.
+pub(crate) fn of_line(counted: &CountedProgram, file: &str, line: u32) -> Option<String> {
     timing::hints(counted, file).into_iter().find(|hint| hint.line == line).map(|hint| hint.more)
 }

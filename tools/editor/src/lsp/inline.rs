@@ -1,44 +1,44 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The server without threads and without a clock, for hosts that have neither: a page in a browser.
+//! Language server without threads and clock, for hosts that have neither, such as a web page.
 
-use crate::lsp::worker::Done;
+use crate::lsp::worker::JobResult;
 use crate::lsp::{Phase, Server, Settings, program};
 use crossbeam_channel::{Receiver, unbounded};
 use lsp_server::Message;
 
-/// A server that works while it is called and not otherwise. Its host calls [`Inline::check`] when the client pauses, and
-/// [`Inline::schedule`] when the pause is longer.
+/// A server that works only within calls. The host calls [`Inline::check`] after a pause of the client, and [`Inline::schedule`] after a
+/// longer pause.
 pub struct Inline {
     server: Server,
     sent: Receiver<Message>,
 }
 
 impl Inline {
-    /// A server before `initialize`.
+    /// A server that awaits `initialize`.
     pub fn new(settings: Settings) -> Inline {
         let (sender, sent) = unbounded();
         Inline { server: Server::new(settings, sender, || None, None), sent }
     }
 
-    /// Takes a message of the client's; what the server says to it.
+    /// Handles a message from the client; returns the server's messages.
     pub fn receive(&mut self, message: Message) -> Vec<Message> {
         match message {
             Message::Notification(notification) => self.server.notification(notification),
             Message::Request(request) => self.server.request(request),
             Message::Response(_) => {}
         }
-        self.said()
+        self.messages()
     }
 
-    /// Reads and checks what has changed; what the server says of it.
+    /// Reads and checks changed programs; returns the server's messages.
     pub fn check(&mut self) -> Vec<Message> {
         if self.server.phase == Phase::Running && !self.server.stale.is_empty() {
             self.server.read();
         }
-        self.said()
+        self.messages()
     }
 
-    /// Schedules one program that has changed and counts its cycles; what the server says of it, and whether there are more.
+    /// Schedules one changed program and counts its cycles; returns the server's messages, and whether more programs wait.
     pub fn schedule(&mut self) -> (Vec<Message>, bool) {
         let mut said = self.check();
         if let Some(root) = self.server.unscheduled.pop_first()
@@ -47,13 +47,13 @@ impl Inline {
             let texts = self.server.workspace.texts();
             let (_, checked) = program::check(&self.server.settings, &root, &texts);
             let full = program::finish(&root, checked);
-            self.server.scheduled(Done { root, generation, full });
+            self.server.scheduled(JobResult { root, generation, full });
         }
-        said.extend(self.said());
+        said.extend(self.messages());
         (said, !self.server.unscheduled.is_empty())
     }
 
-    fn said(&self) -> Vec<Message> {
+    fn messages(&self) -> Vec<Message> {
         self.sent.try_iter().collect()
     }
 }
@@ -96,7 +96,7 @@ mod tests {
         published.collect()
     }
 
-    /// Calls alone do what the two threads of [`crate::lsp::serve`] do: diagnostics at the pause, cycles after the longer one.
+    /// Calls alone replace both threads of [`crate::lsp::serve`]: diagnostics after the pause, cycles after the longer one.
     #[test]
     fn works_when_called() {
         let mut server = Inline::new(settings());
@@ -119,11 +119,11 @@ mod tests {
         let rename = |name: &str, line: u32, character: u32| json!({ "textDocument": { "uri": "main.s" }, "position": { "line": line, "character": character }, "newName": name });
         let here = ask(&mut server, "textDocument/rename", rename("other", 7, 12));
         assert_eq!(here["changes"]["main.s"].as_array().map(Vec::len), Some(3), "{here}");
-        // `part.s` is no document of the client's: what is declared there keeps its name.
+        // `part.s` is not open in the client, so names declared there cannot be renamed.
         let there = ask(&mut server, "textDocument/rename", rename("whole", 7, 15));
         assert_eq!(there, Value::Null);
 
-        // A document with no place on a disk has a name.
+        // A document without a file has a name.
         notify(
             &mut server,
             "textDocument/didOpen",

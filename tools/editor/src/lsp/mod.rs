@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The language server.
+//! Language server of the assembly language.
 //!
-//! One thread answers: it drains what the client has sent, reads and checks the programs that changed ([`program::check`], which takes a
-//! fraction of the time between two keystrokes), and answers from what it knows. A second thread schedules and counts cycles;
-//! what it finds for a text that is no longer there is dropped, and a newer job takes the place of one that waits.
+//! A single thread answers: it drains the client's messages, reads and checks the changed programs ([`program::check`] takes a fraction of
+//! the time between two keystrokes), and answers from the result. A second thread schedules and counts cycles; a result for an outdated
+//! text is dropped, and a newer job replaces a waiting one.
 //!
-//! Every diagnostic is the assembler's own: those of [`takt_asm::check`] at once, those of the scheduler when it is done.
+//! Every diagnostic is the assembler's own: from [`takt_asm::check`] at once, from the scheduler when it finishes.
 
 mod complete;
 mod diagnostics;
@@ -28,7 +28,7 @@ pub use inline::Inline;
 use crossbeam_channel::{Receiver, Sender, unbounded};
 use lsp_server::{Connection, ErrorCode, Message, Notification, Request, RequestId, Response};
 use lsp_types::{Diagnostic, PublishDiagnosticsParams};
-use program::{Front, Full};
+use program::{AssemblyResult, Front};
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::path::{Path, PathBuf};
@@ -37,32 +37,32 @@ use takt_asm::levels::Levels;
 use takt_isa::Machine;
 use takt_isa::timing::Cycle;
 use text::Encoding;
-use worker::{Done, Job, Worker};
+use worker::{Job, JobResult, Worker};
 use workspace::Workspace;
 
-/// The time for which the client must be silent before changes are read, at least and at most.
+/// Lower and upper bound of the client's pause before changes are read.
 const PAUSE: (Duration, Duration) = (Duration::from_millis(10), Duration::from_secs(1));
-/// The time for which it must be silent before a program is scheduled.
+/// Pause of the client before a program is scheduled.
 const LONG_PAUSE: Duration = Duration::from_millis(150);
 
-/// The settings that the server is told once.
+/// Settings of the server, fixed at its start.
 #[derive(Clone, Debug)]
 pub struct Settings {
-    /// The machine that programs are assembled for, unless they name another (`.machine`).
+    /// Machine of programs without a `.machine`.
     pub machine: &'static Machine,
-    /// The levels of warnings.
+    /// Levels of the assembler's warnings.
     pub levels: Levels,
-    /// Folders beyond the project where `.include` looks.
+    /// Additional search folders of `.include`.
     pub folders: Vec<PathBuf>,
-    /// The library: names and texts.
+    /// Names and texts of the library's files.
     pub library: &'static [(&'static str, &'static str)],
-    /// The sources that a document that lies nowhere can include by name: names and texts.
+    /// Names and texts of sources that a document without a file can include.
     pub beside: &'static [(&'static str, &'static str)],
-    /// The folder for a copy of the library that an editor is to open; it is not opened if there is none.
+    /// Folder for copies of library files that an editor opens; `None`: they cannot be opened.
     pub library_folder: Option<PathBuf>,
-    /// True if the client opens a library's file by its name: the address of `<math.s>` is `%3Cmath.s%3E`.
+    /// The client opens library files by name: the URI of `<math.s>` is `%3Cmath.s%3E`.
     pub library_by_name: bool,
-    /// Cycles that a period may take.
+    /// Cycle limit of a period, for warnings.
     pub deadline: Option<Cycle>,
 }
 
@@ -82,70 +82,70 @@ impl Default for Settings {
     }
 }
 
-/// The facts about a program.
+/// Analysis results of a program.
 struct Program {
     front: Front,
-    full: Option<Full>,
-    /// Counts the times that it was read.
+    full: Option<AssemblyResult>,
+    /// Number of times the program was read.
     generation: u64,
 }
 
-/// The client's capabilities.
+/// Capabilities of the client.
 #[derive(Clone, Copy, Debug, Default)]
 struct Client {
     encoding: Encoding,
     snippets: bool,
     refreshes_hints: bool,
     refreshes_lenses: bool,
-    /// It wants to be told when a program is counted, for a picture of its own.
+    /// The client draws the pipeline itself and wants a notification when a program's cycles are counted.
     wants_counted: bool,
 }
 
-/// The phase of the session.
+/// Phase of the session.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Phase {
     Starting,
     Running,
-    /// `shutdown` is answered.
+    /// `shutdown` has been answered.
     Ending,
 }
 
-/// Tells the time, where there is one to tell.
+/// Source of time, where the host has one.
 type Clock = fn() -> Option<Instant>;
 
 struct Server {
     settings: Settings,
     sender: Sender<Message>,
-    /// The clock; nothing is put off without one.
+    /// Clock for delays; without one nothing is delayed.
     clock: Clock,
     client: Client,
     phase: Phase,
     workspace: Workspace,
-    /// By the path of the first source.
+    /// Programs by the path of their first source.
     programs: BTreeMap<PathBuf, Program>,
-    /// Programs to be read again, and since when.
+    /// Programs to read again, and the time of the reading.
     stale: BTreeSet<PathBuf>,
     read_at: Option<Instant>,
-    /// Programs to be scheduled again.
+    /// Programs to schedule again.
     unscheduled: BTreeSet<PathBuf>,
     schedule_at: Option<Instant>,
-    /// The time that the last reading took.
+    /// Duration of the last reading.
     took: Duration,
-    /// For each file, what each program says of it.
+    /// Published diagnostics: by file, then by program.
     published: BTreeMap<PathBuf, BTreeMap<PathBuf, Vec<Diagnostic>>>,
-    /// The thread that schedules, if there is one.
+    /// Scheduling thread, if any.
     worker: Option<Worker>,
-    /// Requests of the server's own so far.
+    /// Number of requests sent by the server.
     asked: i32,
 }
 
-/// Serves a client until it says `exit` or goes. True if it said so in order.
+/// Serves a client until `exit` or the end of its stream. Returns whether it exited in order.
 pub fn serve(connection: &Connection, settings: Settings) -> bool {
-    let (done_sender, done): (_, Receiver<Done>) = unbounded();
+    let (done_sender, done): (_, Receiver<JobResult>) = unbounded();
     let worker = Worker::new(settings.clone(), done_sender.clone());
     let clock = || Some(Instant::now());
     let mut server = Server::new(settings, connection.sender.clone(), clock, Some(worker));
-    // So that the channel outlives the thread.
+    // Keeps the channel open beyond the thread's end.
     let _kept = done_sender;
     let mut queue: VecDeque<Message> = VecDeque::new();
     loop {
@@ -154,13 +154,13 @@ pub fn serve(connection: &Connection, settings: Settings) -> bool {
         crossbeam_channel::select! {
             recv(connection.receiver) -> message => match message {
                 Ok(message) => queue.push_back(message),
-                // The client is gone.
+                // The client has closed its stream.
                 Err(_) => return false,
             },
             recv(done) -> done => if let Ok(done) = done { server.scheduled(done) },
             recv(timer) -> _ => server.due(),
         }
-        // The client's cancellations are among what it sent since.
+        // Drain the queue first: it may contain cancellations.
         queue.extend(connection.receiver.try_iter());
         while let Some(message) = queue.pop_front() {
             match message {
@@ -189,7 +189,7 @@ fn is_cancelled(queue: &VecDeque<Message>, id: &RequestId) -> bool {
     })
 }
 
-/// A number and a noun.
+/// A number and a noun in the right form.
 fn plural(number: u64, noun: &str) -> String {
     format!("{number} {noun}{}", if number == 1 { "" } else { "s" })
 }
@@ -216,7 +216,7 @@ impl Server {
     }
 
     fn send(&self, message: impl Into<Message>) {
-        // If nobody receives it, the client is gone, and the loop will see that.
+        // Without a receiver the client is gone; the loop will notice.
         let _ = self.sender.send(message.into());
     }
 
@@ -232,17 +232,17 @@ impl Server {
         self.send(Request::new(format!("takt-{}", self.asked).into(), method.to_owned(), Value::Null));
     }
 
-    /// A document has changed: what it is part of is to be read again, once the client pauses.
+    /// Marks the programs of a changed document for reading after the client's pause.
     fn touch(&mut self, path: &Path) {
         let mut roots = self.workspace.roots(path);
-        // A program that a change of includes takes it out of.
+        // A change of includes may remove the document from a program.
         let of = |(root, program): (&PathBuf, &Program)| program.front.files.of(path).map(|_| root.clone());
         roots.extend(self.programs.iter().filter_map(of));
         self.stale.extend(roots);
         self.read_at = (self.clock)().map(|now| now + self.took.clamp(PAUSE.0, PAUSE.1));
     }
 
-    /// Everything is to be read again.
+    /// Marks all programs for reading.
     fn touch_all(&mut self) {
         self.workspace.scan();
         let open: Vec<PathBuf> = self.workspace.open.keys().cloned().collect();
@@ -266,8 +266,8 @@ impl Server {
         }
     }
 
-    /// Finds out whether files that others include are programs by themselves: those that open a section and assemble alone. Their
-    /// own cycles are shown, not those of a program that includes them.
+    /// Determines which included files are programs of their own: they open a section and assemble alone. Such files show their own cycles,
+    /// not those of a program that includes them.
     fn find_programs(&mut self) {
         for path in self.workspace.candidates() {
             let roots = self.workspace.roots(&path);
@@ -282,13 +282,13 @@ impl Server {
         }
     }
 
-    /// Reads and checks what has changed.
+    /// Reads and checks the changed programs.
     fn read(&mut self) {
         self.read_at = None;
         self.find_programs();
         let wanted: BTreeSet<PathBuf> =
             self.workspace.open.keys().flat_map(|path| self.workspace.roots(path)).collect();
-        // Programs that no open document is part of any more.
+        // Programs without open documents.
         let gone: Vec<PathBuf> =
             self.programs.keys().filter(|root| !wanted.contains(*root)).cloned().collect();
         for root in gone {
@@ -305,7 +305,7 @@ impl Server {
             let generation = before.as_ref().map_or(0, |before| before.generation) + 1;
             self.worker.iter().for_each(|worker| worker.is_at(&root, generation));
             let by_file = diagnostics::by_file(&front.files, &front.diagnostics, &root, self.client.encoding);
-            // A program with mistakes is not scheduled, also if it had none a moment ago: what is known of the text before stays.
+            // A program with errors is not scheduled; the results for its previous text remain.
             if front.diagnostics.has_errors() {
                 self.unscheduled.remove(&root);
             } else {
@@ -319,9 +319,9 @@ impl Server {
         self.took = started.map_or(Duration::ZERO, |started| started.elapsed());
     }
 
-    /// The second thread is done with a program.
-    fn scheduled(&mut self, done: Done) {
-        let Done { root, generation, full } = done;
+    /// Takes over a result of the scheduling thread.
+    fn scheduled(&mut self, done: JobResult) {
+        let JobResult { root, generation, full } = done;
         let Some(program) = self.programs.get_mut(&root).filter(|program| program.generation == generation)
         else {
             return;
@@ -341,13 +341,13 @@ impl Server {
         }
     }
 
-    /// Tells the client what a program says of its files.
+    /// Publishes a program's diagnostics for its files.
     fn publish(&mut self, root: &Path, mut by_file: BTreeMap<PathBuf, Vec<Diagnostic>>) {
         let before =
             self.published.iter().filter(|(_, by)| by.contains_key(root)).map(|(path, _)| path.clone());
         let mut paths: BTreeSet<PathBuf> = before.collect();
         paths.extend(by_file.keys().cloned());
-        // A document without mistakes is told so once it is read.
+        // A document without mistakes gets an empty list once it is read.
         paths.extend(self.workspace.open.keys().filter(|path| !self.published.contains_key(*path)).cloned());
         for path in paths {
             let new = by_file.remove(&path).unwrap_or_default();
@@ -357,7 +357,7 @@ impl Server {
             if known && old.unwrap_or_default() == new {
                 continue;
             }
-            // A diagnostic of several programs on one file is told once.
+            // A diagnostic that several programs report for a file is published once.
             let mut all: Vec<Diagnostic> = Vec::new();
             for one in by.values().flatten() {
                 if !all.contains(one) {

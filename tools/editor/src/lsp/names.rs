@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Definitions and uses of names, and renaming.
+//! Definitions and references of names, and renaming.
 
 use crate::lsp::Settings;
 use crate::lsp::program::{self, Front};
@@ -13,16 +13,16 @@ use takt_asm::source::Span;
 use takt_asm::tokens::{self, TokenKind};
 use takt_isa::Op;
 
-/// Bytes of a file that change, and what they become.
+/// Edits by file: byte ranges with their replacements.
 type Edits = BTreeMap<PathBuf, BTreeMap<(usize, usize), String>>;
 
-/// A name before its first brace, and the rest: `l{i}d` is `l` and `{i}d`.
+/// Splits a name before its first brace: `l{i}d` into `l` and `{i}d`.
 fn halves(name: &str) -> (&str, &str) {
     name.split_at(name.find('{').unwrap_or(name.len()))
 }
 
-/// The new text of a reference when what is declared as `old` is declared as `new`: the same text, or for a name with
-/// braces the same beginning. None if it is put together in another way.
+/// Text of a reference after renaming its declaration from `old` to `new`: equal text is replaced, as is the common beginning of a name
+/// with braces. `None` if the reference is composed in another way.
 fn renamed(reference: &str, old: &str, new: &str) -> Option<String> {
     if reference == old {
         return Some(new.to_owned());
@@ -34,13 +34,15 @@ fn renamed(reference: &str, old: &str, new: &str) -> Option<String> {
     Some(format!("{new}{}", reference.strip_prefix(old)?))
 }
 
-/// The name at a place, as its declaration writes it: what a rename begins with.
+/// The name at a place as its declaration spells it, for the start of a rename.
 pub(crate) fn renamable(front: &Front, offset: u32) -> Result<(Span, String), String> {
     let (span, symbols) = front.at(offset).ok_or("there is no name here that the program declares")?;
     let declared = front.symbol(symbols[0]).span;
     if symbols.iter().any(|symbol| front.symbol(*symbol).span != declared) {
         let text = front.files.text(span);
-        return Err(format!("`{text}` stands for names of several declarations: rename one of those"));
+        return Err(format!(
+            "`{text}` stands for names of several declarations: rename one of the declarations"
+        ));
     }
     match front.files.place(declared).map(|(file, _)| &front.files.0[file]) {
         Some(file) if file.path.is_some() => Ok((span, front.files.text(declared).to_owned())),
@@ -49,10 +51,9 @@ pub(crate) fn renamable(front: &Front, offset: u32) -> Result<(Span, String), St
     }
 }
 
-/// The edits that give a name another one, in every program that a file is of.
+/// Edits that rename a name in all programs of a file.
 ///
-/// The programs are read again with the edits: each must declare and name the same as before, under the new name, and have
-/// no new mistake.
+/// The edited programs are read again: each must declare and reference the same names as before, and have no new mistake.
 pub(crate) fn rename(
     settings: &Settings,
     fronts: &[(&Path, &Front)],
@@ -95,7 +96,7 @@ pub(crate) fn rename(
             };
             spans.insert((reference.span, text));
         }
-        // Code that is not assembled is renamed by its text.
+        // In code that is not assembled, names are matched as text.
         for span in unresolved(front, &old, &symbols) {
             spans.insert((span, new.to_owned()));
         }
@@ -112,15 +113,15 @@ pub(crate) fn rename(
         counts.push(Some(references.len()));
     }
     if counts.iter().all(Option::is_none) {
-        let front = fronts.first().ok_or("the file is of no program")?.1;
-        let file = front.files.of(path).ok_or("the file is of no program")?;
+        let front = fronts.first().ok_or("the file belongs to no program")?.1;
+        let file = front.files.of(path).ok_or("the file belongs to no program")?;
         renamable(front, file.base + byte as u32)?;
     }
     verify(settings, fronts, &edits, open)?;
     Ok(edits)
 }
 
-/// True if a text can be a name.
+/// Checks that a text is a valid name.
 fn check_name(name: &str) -> Result<(), String> {
     let lines = tokens::lines(name);
     let [tokens] = lines.as_slice() else { return Err("a name is one line".to_owned()) };
@@ -139,8 +140,8 @@ fn check_name(name: &str) -> Result<(), String> {
     }
 }
 
-/// Places where a name stands that the assembler never came to: in the body of a macro that nothing uses, in a branch that is
-/// not taken. Names that such a body declares itself are others.
+/// Occurrences of a name in code that is never assembled: the body of an unused macro, or an untaken branch. Names that such a body
+/// declares itself are excluded.
 fn unresolved(front: &Front, name: &str, symbols: &[u32]) -> Vec<Span> {
     let is_macro = symbols.iter().any(|symbol| front.symbol(*symbol).kind == SymbolKind::Macro);
     let local = symbols.iter().any(|symbol| front.symbol(*symbol).kind == SymbolKind::Parameter);
@@ -151,7 +152,7 @@ fn unresolved(front: &Front, name: &str, symbols: &[u32]) -> Vec<Span> {
         if !text.contains(name) {
             continue;
         }
-        // Within a macro: its name, and the names that it has for itself.
+        // Inside a macro: its name, and its local names.
         let mut within: Option<(String, BTreeSet<String>)> = None;
         for tokens in tokens::lines(text) {
             let word = |index: usize| {
@@ -200,7 +201,7 @@ fn unresolved(front: &Front, name: &str, symbols: &[u32]) -> Vec<Span> {
     found
 }
 
-/// Reads the programs with the edits, and compares what they name.
+/// Reads the edited programs, and compares their declarations and references.
 fn verify(settings: &Settings, fronts: &[(&Path, &Front)], edits: &Edits, open: &Open) -> Result<(), String> {
     let mut texts = (**open).clone();
     for (path, edits) in edits {
@@ -236,7 +237,7 @@ fn verify(settings: &Settings, fronts: &[(&Path, &Front)], edits: &Edits, open: 
     Ok(())
 }
 
-/// A text with edits.
+/// Text with the edits applied.
 fn apply(text: &str, edits: &BTreeMap<(usize, usize), String>) -> String {
     let mut out = String::with_capacity(text.len());
     let mut end = 0;
@@ -248,7 +249,7 @@ fn apply(text: &str, edits: &BTreeMap<(usize, usize), String>) -> String {
     out + &text[end..]
 }
 
-/// The edits as the protocol has them.
+/// Edits in the protocol's form.
 pub(crate) fn as_edits(
     fronts: &[(&Path, &Front)],
     edits: &Edits,
@@ -280,7 +281,7 @@ mod tests {
     }
 
     #[test]
-    fn what_can_be_a_name() {
+    fn recognises_valid_names() {
         for good in ["a", "_x.1", "l{i}", "l{i}d", "c{i}{j}", "{s}2"] {
             assert_eq!(check_name(good), Ok(()), "{good}");
         }

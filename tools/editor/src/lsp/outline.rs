@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The outline of a file: symbols, folds, colours.
+//! Structure of a file: document symbols, folds, semantic tokens.
 
 use crate::lsp::program::{File, Front};
 use crate::lsp::text::{Encoding, width};
 use lsp_types::{
     DocumentSymbol, FoldingRange, FoldingRangeKind, Range, SemanticToken, SemanticTokenModifier,
-    SemanticTokenType, SymbolKind as Shown,
+    SemanticTokenType, SymbolKind as ValueNotations,
 };
 use std::collections::BTreeMap;
 use takt_asm::Directive;
@@ -13,10 +13,10 @@ use takt_asm::index::SymbolKind;
 use takt_asm::tokens::{self, Token, TokenKind};
 use takt_isa::Op;
 
-/// The directives that open a section.
+/// Directives that open a section.
 const SECTIONS: [Directive; 3] = [Directive::Once, Directive::Period, Directive::Data];
 
-/// The sections of a file: name, first byte of the directive, and the line of the next one or the last line.
+/// Sections of a file: name, byte range of the directive, and the line of the next section or the last line.
 fn sections(file: &File, lines: &[Vec<Token>]) -> Vec<(&'static str, std::ops::Range<usize>, usize)> {
     let text = &file.text.text;
     let named =
@@ -32,7 +32,7 @@ fn sections(file: &File, lines: &[Vec<Token>]) -> Vec<(&'static str, std::ops::R
     found.into_iter().zip(ends).map(|((name, range, _), end)| (name, range, end)).collect()
 }
 
-/// The line, from 0, that a label begins, or that opens the section of that name.
+/// Line, from 0, of a label, or of the directive that opens a section of that name.
 pub(crate) fn head_line(file: &File, name: &str) -> Option<u32> {
     let text = &file.text.text;
     let lines = tokens::lines(text);
@@ -44,7 +44,7 @@ pub(crate) fn head_line(file: &File, name: &str) -> Option<u32> {
     line.map(|line| line as u32)
 }
 
-/// The symbols that a file declares, and its sections.
+/// Declared symbols of a file, and its sections.
 #[allow(deprecated, reason = "the protocol's type has the field")]
 pub(crate) fn symbols(front: &Front, file: &File, encoding: Encoding) -> Vec<DocumentSymbol> {
     let lines = tokens::lines(&file.text.text);
@@ -63,9 +63,9 @@ pub(crate) fn symbols(front: &Front, file: &File, encoding: Encoding) -> Vec<Doc
     for (name, range, end) in sections(file, &lines) {
         let selection = file.text.range(range.clone(), encoding);
         let whole = file.text.range(range.start..line_end(end), encoding);
-        out.push(symbol(name.to_owned(), String::new(), Shown::NAMESPACE, whole, selection));
+        out.push(symbol(name.to_owned(), String::new(), ValueNotations::NAMESPACE, whole, selection));
     }
-    // One for each declaration, whatever it is expanded to.
+    // Declarations appear once, for any number of expansions.
     let mut declared = BTreeMap::new();
     for symbol in &front.index.symbols {
         let Some((number, bytes)) = front.files.place(symbol.span) else { continue };
@@ -73,16 +73,16 @@ pub(crate) fn symbols(front: &Front, file: &File, encoding: Encoding) -> Vec<Doc
             declared.entry((bytes.start, bytes.end)).or_insert(symbol);
         }
     }
-    // The macro that what follows lies in: its last line, and its place in the list.
+    // Enclosing macro: its last line, and its index in the list.
     let mut within: Option<(usize, usize)> = None;
     for ((start, end), what) in declared {
         let kind = match what.kind {
-            SymbolKind::Register | SymbolKind::State => Shown::VARIABLE,
-            SymbolKind::Input | SymbolKind::Output => Shown::PROPERTY,
-            SymbolKind::Constant => Shown::CONSTANT,
-            SymbolKind::Code => Shown::METHOD,
-            SymbolKind::Data | SymbolKind::Array | SymbolKind::Table => Shown::ARRAY,
-            SymbolKind::Macro => Shown::FUNCTION,
+            SymbolKind::Register | SymbolKind::State => ValueNotations::VARIABLE,
+            SymbolKind::Input | SymbolKind::Output => ValueNotations::PROPERTY,
+            SymbolKind::Constant => ValueNotations::CONSTANT,
+            SymbolKind::Code => ValueNotations::METHOD,
+            SymbolKind::Data | SymbolKind::Array | SymbolKind::Table => ValueNotations::ARRAY,
+            SymbolKind::Macro => ValueNotations::FUNCTION,
             SymbolKind::Parameter | SymbolKind::Count => continue,
         };
         let line = file.text.line_of(start);
@@ -111,7 +111,7 @@ pub(crate) fn symbols(front: &Front, file: &File, encoding: Encoding) -> Vec<Doc
     out
 }
 
-/// The lines that can be folded: blocks, sections, comments of several lines.
+/// Foldable lines: blocks, sections, comments of several lines.
 pub(crate) fn folds(front: &Front, file: &File) -> Vec<FoldingRange> {
     let lines = tokens::lines(&file.text.text);
     let fold = |start: usize, end: usize, kind| FoldingRange {
@@ -147,7 +147,7 @@ pub(crate) fn folds(front: &Front, file: &File) -> Vec<FoldingRange> {
     out
 }
 
-/// The kinds that tokens have, as the client is told.
+/// Types and modifiers of semantic tokens, as announced to the client.
 pub(crate) fn legend() -> (Vec<SemanticTokenType>, Vec<SemanticTokenModifier>) {
     let types = [
         SemanticTokenType::KEYWORD,
@@ -169,7 +169,7 @@ pub(crate) fn legend() -> (Vec<SemanticTokenType>, Vec<SemanticTokenModifier>) {
 const DECLARATION: u32 = 1;
 const READONLY: u32 = 2;
 
-/// Type and modifiers of what a name means.
+/// Type and modifiers of a kind of symbol.
 fn colour(kind: SymbolKind) -> (u32, u32) {
     match kind {
         SymbolKind::Macro => (2, 0),
@@ -183,7 +183,7 @@ fn colour(kind: SymbolKind) -> (u32, u32) {
     }
 }
 
-/// The colours of some lines of a file, as the protocol counts them.
+/// Semantic tokens of some lines of a file, in the protocol's relative encoding.
 pub(crate) fn colours(
     front: &Front,
     file: &File,
@@ -198,7 +198,7 @@ pub(crate) fn colours(
     let (mut last_line, mut last_column) = (0, 0);
     for (line, tokens) in (of.start..).zip(tokens::lines(part)) {
         let Some(bytes) = file.text.line(line) else { break };
-        // The meanings of the names with braces that are open.
+        // Stack of open names with braces, with their types.
         let mut open: Vec<Option<(u32, u32)>> = Vec::new();
         for (index, token) in tokens.iter().enumerate() {
             let place = token.range.start + start..token.range.end + start;

@@ -1,50 +1,50 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The picture of the pipeline, for a view beside the source: what each bundle issues and when, and the lines that it comes
-//! from. The same cycles as in the inlay hints.
+//! Pipeline diagram for a view beside the source: the operations of each bundle, their cycles, and their source lines. Cycles equal those
+//! of the inlay hints.
 
-use crate::lsp::program::Counted;
+use crate::lsp::program::CountedProgram;
 use crate::lsp::timing::cycle_from;
 use lsp_types::Uri;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 use takt_analysis::picture::Picture;
-use takt_analysis::{Ends, StaticIssue, Trace};
+use takt_analysis::{EdgeSlots, StaticIssue, Trace};
 use takt_isa::program::Location;
 use takt_isa::timing::Cycle;
 use takt_isa::{BundleAddress, Instruction, Program, SlotIndex};
 
-/// Bundles of a picture at most.
+/// Maximal number of bundles in a diagram.
 const BUNDLES: usize = 4096;
 
-/// The picture.
+/// Diagram of a program, as JSON for the client.
 #[derive(Serialize)]
 pub(crate) struct Pipeline {
     machine: &'static str,
-    /// False if a source of the program has changed since, included files too.
+    /// No source of the program, including its included files, has changed since.
     #[serde(rename = "current")]
     is_current: bool,
-    /// The cycles of each section in words, those of periods first.
+    /// Cycles of each section in words, periods first.
     sections: Vec<String>,
-    /// The files that operations come from; `None` for one that no editor can open.
+    /// Files of the operations; `None` for a file that editors cannot open.
     files: Vec<Option<Uri>>,
     bundles: Vec<Bundle>,
-    /// The longest chain of each straight line of code.
+    /// Longest dependence chain of each straight-line block.
     chain: Vec<Link>,
-    /// Bundles that are not shown.
+    /// Number of bundles left out.
     more: usize,
 }
 
 #[derive(Serialize)]
 struct Bundle {
     address: BundleAddress,
-    /// The place from which its cycles count: a section, a label, or a bundle.
+    /// Origin of the cycle count: a section, a label, or a bundle.
     from: String,
     cycle: Cycle,
     stalls: Vec<Stall>,
     operations: Vec<Operation>,
 }
 
-/// What a bundle waited for, as `takt analyse` writes it: indices of bundles, and slots where one operation is the reason.
+/// Reason why a bundle waited, as in `takt analyse`: indices of bundles, and slots where a single operation is the reason.
 #[derive(Serialize)]
 struct Link {
     from: usize,
@@ -57,7 +57,7 @@ struct Link {
 
 #[derive(Serialize)]
 struct Stall {
-    /// Its kind, as `takt analyse` names it.
+    /// Kind of the delay, as `takt analyse` names it.
     cause: &'static str,
     cycles: u32,
     text: String,
@@ -68,25 +68,25 @@ struct Operation {
     slot: &'static str,
     unit: &'static str,
     text: String,
-    /// Cycles to its result; `None` if it has none.
+    /// Latency in cycles; `None` for an operation without a result.
     latency: Option<u32>,
-    /// It is on the longest chain.
+    /// The operation is on the longest chain.
     critical: bool,
-    /// Index of its file, and its line there, from 0.
+    /// Index of the operation's file, and the line in it, from 0.
     file: Option<usize>,
     line: Option<u32>,
 }
 
-/// What the picture says of the program as a whole.
-pub(crate) struct Whole {
+/// Facts about the program as a whole, for the diagram.
+pub(crate) struct ProgramFacts {
     pub(crate) is_current: bool,
     pub(crate) sections: Vec<String>,
 }
 
-/// The picture of a program. `line` is where a line of the counted text, from 0, stands in the file now; `uri` is the file.
+/// Diagram of a program. `line` maps a line (from 0) of the scheduled text to its present place; `uri` maps files.
 pub(crate) fn pipeline(
-    counted: &Counted,
-    whole: Whole,
+    counted: &CountedProgram,
+    whole: ProgramFacts,
     uri: impl Fn(&str) -> Option<Uri>,
     line: impl Fn(&str, u32) -> Option<u32>,
 ) -> Pipeline {
@@ -139,18 +139,18 @@ pub(crate) fn pipeline(
     });
     let bundles: Vec<Bundle> = bundles.collect();
     let more = counted.issues.len() - bundles.len();
-    let Whole { is_current, sections } = whole;
+    let ProgramFacts { is_current, sections } = whole;
     Pipeline { machine: program.machine.name, is_current, sections, files, bundles, chain, more }
 }
 
-/// The longest chain of each straight line of code, and the operations on them: index of the bundle, and slot.
+/// Longest chain of each straight-line block, and its operations as pairs of bundle index and slot.
 fn chains(program: &Program, issues: &[StaticIssue]) -> (Vec<Link>, BTreeSet<(usize, SlotIndex)>) {
     let (mut chain, mut critical, mut first) = (Vec::new(), BTreeSet::new(), 0);
     for line in issues.chunk_by(|one, next| one.from == next.from) {
         let picture = Picture::new(program, "", 0, Trace::predicted(line));
         critical.extend(picture.critical().into_iter().map(|(issue, slot)| (first + issue, slot)));
         chain.extend(picture.chain.iter().map(|link| {
-            let Ends { from, to } = link.ends(program, &picture.trace);
+            let EdgeSlots { from, to } = link.ends(program, &picture.trace);
             let name = |slot: Option<SlotIndex>| slot.map(|slot| program.machine.slot(slot).name);
             Link {
                 from: first + link.from,

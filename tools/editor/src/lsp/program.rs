@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A program as an editor sees it: what is known after each keystroke ([`Front`]), and what is known once it is scheduled and
-//! its cycles are counted ([`Full`]).
+//! A program in the editor: analysis after each keystroke ([`Front`]), and results of scheduling and cycle counting ([`AssemblyResult`]).
 
 use crate::lsp::Settings;
 use crate::lsp::text::{Encoding, Text};
@@ -11,21 +10,21 @@ use takt_analysis::{BoundError, Bounds, StaticIssue};
 use takt_asm::diag::Diagnostics;
 use takt_asm::index::{Index, Reference, Symbol};
 use takt_asm::source::{Sources, Span};
-use takt_asm::{Assembled, Checked, FileLoader, Loader, MemoryLoader, Open, Options, Search};
+use takt_asm::{AssembledProgram, CheckedProgram, FileLoader, Loader, MemoryLoader, Open, Options, Search};
 use takt_isa::Machine;
 
-/// A source of a program.
+/// A source file of a program.
 pub(crate) struct File {
-    /// Its path; `None` if it is of the library.
+    /// Path on disk; `None` for a library file.
     pub(crate) path: Option<PathBuf>,
-    /// Its name in the program.
+    /// Name of the file in the program.
     pub(crate) name: Arc<str>,
-    /// Its first byte in the space of all of the program's sources.
+    /// Offset of the file's first byte in the common space of all sources.
     pub(crate) base: u32,
     pub(crate) text: Text,
 }
 
-/// The sources of a program.
+/// Source files of a program.
 #[derive(Default)]
 pub(crate) struct Files(pub(crate) Vec<File>);
 
@@ -34,7 +33,7 @@ impl Files {
         let folder = root.parent().unwrap_or(Path::new(""));
         let file = |source: &takt_asm::source::Source| {
             let name = &*source.name;
-            // As `Search` names them: the library's, those of a further folder, those of the project.
+            // Name forms as in `Search`: library, additional folder, project.
             let path = match name.as_bytes().first() {
                 Some(b'<') => None,
                 Some(b'.' | b'/') => {
@@ -53,7 +52,7 @@ impl Files {
         Files(sources.files().iter().map(file).collect())
     }
 
-    /// The file that a span lies in, and the bytes there.
+    /// File that contains a span, with the byte range in the file.
     pub(crate) fn place(&self, span: Span) -> Option<(usize, std::ops::Range<usize>)> {
         let file = self.0.partition_point(|file| file.base <= span.start).checked_sub(1)?;
         let File { base, text, .. } = &self.0[file];
@@ -71,12 +70,12 @@ impl Files {
         self.place(span).and_then(|(file, bytes)| self.0[file].text.text.get(bytes)).unwrap_or("")
     }
 
-    /// The file of a path.
+    /// File with this path.
     pub(crate) fn of(&self, path: &Path) -> Option<&File> {
         self.0.iter().find(|file| file.path.as_deref() == Some(path))
     }
 
-    /// Whether all of them say what others say.
+    /// Every file has the same name and text as its counterpart.
     pub(crate) fn are(&self, others: &Files) -> bool {
         let same = |(one, other): (&File, &File)| one.name == other.name && one.text.text == other.text.text;
         self.0.len() == others.0.len() && self.0.iter().zip(&others.0).all(same)
@@ -88,15 +87,15 @@ impl Files {
 }
 
 impl File {
-    /// The span of some of its bytes.
+    /// Span of a byte range of the file.
     pub(crate) fn span(&self, bytes: std::ops::Range<usize>) -> Span {
         Span::new(self.base + bytes.start as u32, self.base + bytes.end as u32)
     }
 }
 
-/// The facts about a program that need no schedule.
+/// Analysis of a program without scheduling.
 pub(crate) struct Front {
-    /// The program's machine.
+    /// Machine of the program.
     pub(crate) machine: &'static Machine,
     pub(crate) files: Files,
     pub(crate) index: Index,
@@ -104,7 +103,7 @@ pub(crate) struct Front {
 }
 
 impl Front {
-    /// The meaning of a place in the source: the symbols that are named there, and the span of the name.
+    /// Symbols referenced at a place in the source, with the span of the name.
     pub(crate) fn at(&self, offset: u32) -> Option<(Span, Vec<u32>)> {
         let found = self.index.at(offset);
         Some((found.first()?.span, found.iter().map(|reference| reference.symbol).collect()))
@@ -114,7 +113,7 @@ impl Front {
         &self.index.symbols[number as usize]
     }
 
-    /// All references to what is declared where these symbols are.
+    /// References to the declarations of these symbols.
     pub(crate) fn references(&self, symbols: &[u32]) -> Vec<Reference> {
         let declared: Vec<Span> = symbols.iter().map(|symbol| self.symbol(*symbol).span).collect();
         let same = |reference: &&Reference| declared.contains(&self.symbol(reference.symbol).span);
@@ -124,22 +123,22 @@ impl Front {
     }
 }
 
-/// The facts about a program that assembles, or the reason why it does not.
-pub(crate) struct Full {
+/// Result of assembling a program, or the obstacle.
+pub(crate) struct AssemblyResult {
     pub(crate) files: Files,
     pub(crate) diagnostics: Diagnostics,
-    pub(crate) program: Option<Counted>,
+    pub(crate) program: Option<CountedProgram>,
 }
 
-/// A program and its cycles.
-pub(crate) struct Counted {
-    pub(crate) assembled: Assembled,
+/// An assembled program with its cycle counts.
+pub(crate) struct CountedProgram {
+    pub(crate) assembled: AssembledProgram,
     pub(crate) issues: Vec<StaticIssue>,
     pub(crate) bounds: Result<Bounds, BoundError>,
 }
 
 /// Reads and checks the program whose first source is at `root`.
-pub(crate) fn check(settings: &Settings, root: &Path, open: &Open) -> (Front, Checked) {
+pub(crate) fn check(settings: &Settings, root: &Path, open: &Open) -> (Front, CheckedProgram) {
     let (folder, name) = match (root.parent(), root.file_name()) {
         (Some(folder), Some(name)) if root.is_absolute() => {
             (folder.to_owned(), name.to_string_lossy().into_owned())
@@ -168,11 +167,11 @@ pub(crate) fn check(settings: &Settings, root: &Path, open: &Open) -> (Front, Ch
     (front, checked)
 }
 
-/// The name in messages of a document that lies nowhere: `Untitled-1`, if its URI is `untitled:Untitled-1`.
+/// Name in messages of a document without a file: `Untitled-1` for the URI `untitled:Untitled-1`.
 fn bare_name(root: &Path) -> String {
     let uri = root.to_string_lossy();
     let name = uri.rsplit(['/', '\\', ':']).next().unwrap_or_default();
-    // A name that begins so is a file's of the library, or of a further folder.
+    // Names with such a beginning denote library files or files of an additional folder.
     if name.is_empty() || name.starts_with(['<', '.']) { "untitled.s".to_owned() } else { name.to_owned() }
 }
 
@@ -181,16 +180,16 @@ fn search<L: Loader>(settings: &Settings, project: L, open: &Open) -> Search<L> 
     folders.fold(Search::new(project), Search::folder).with_open(open).library(settings.library)
 }
 
-/// Does the rest: schedules, emits, counts.
-pub(crate) fn finish(root: &Path, checked: Checked) -> Full {
+/// Completes a checked program: schedules it, emits it, and counts its cycles.
+pub(crate) fn finish(root: &Path, checked: CheckedProgram) -> AssemblyResult {
     let files = Files::new(root, checked.sources());
     match checked.finish() {
-        Err(diagnostics) => Full { files, diagnostics, program: None },
+        Err(diagnostics) => AssemblyResult { files, diagnostics, program: None },
         Ok(assembled) => {
             let issues = takt_analysis::static_issue(&assembled.program);
             let bounds = takt_analysis::bound(&assembled.program);
             let diagnostics = assembled.warnings.clone();
-            Full { files, diagnostics, program: Some(Counted { assembled, issues, bounds }) }
+            AssemblyResult { files, diagnostics, program: Some(CountedProgram { assembled, issues, bounds }) }
         }
     }
 }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The answers to requests about a document.
+//! Handlers of the requests on a document.
 
-use crate::lsp::pipeline::{self, Pipeline, Whole};
-use crate::lsp::program::{Counted, File, Front, Full};
+use crate::lsp::pipeline::{self, Pipeline, ProgramFacts};
+use crate::lsp::program::{AssemblyResult, CountedProgram, File, Front};
 use crate::lsp::text::Text;
 use crate::lsp::{Server, complete, diagnostics, hover, names, outline, timing, uri};
 use lsp_server::ErrorCode;
@@ -20,10 +20,10 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use takt_asm::source::{Span, line_feeds};
 
-/// The reason why a request has no answer.
+/// Error answer to a request.
 pub(crate) struct Failed(pub(crate) ErrorCode, pub(crate) String);
 
-/// Parameters of a message.
+/// Deserialises the parameters of a message.
 pub(crate) fn parameters<P: DeserializeOwned>(method: &str, params: Value) -> Result<P, Failed> {
     let error = |error| Failed(ErrorCode::InvalidParams, format!("the parameters of `{method}`: {error}"));
     serde_json::from_value(params).map_err(error)
@@ -37,22 +37,22 @@ fn value(answer: impl Serialize) -> Result<Value, Failed> {
     serde_json::to_value(answer).map_err(|error| Failed(ErrorCode::InternalError, error.to_string()))
 }
 
-/// A document, and the program that it is of.
-struct Here<'s> {
+/// A document and its program.
+struct RequestContext<'s> {
     path: PathBuf,
     front: &'s Front,
-    full: Option<&'s Full>,
+    full: Option<&'s AssemblyResult>,
     file: &'s File,
 }
 
-impl Here<'_> {
-    fn counted(&self) -> Option<&Counted> {
+impl RequestContext<'_> {
+    fn counted(&self) -> Option<&CountedProgram> {
         self.full?.program.as_ref()
     }
 }
 
 impl Server {
-    /// Answers a request from what the documents say now.
+    /// Answers a request on the present texts.
     pub(crate) fn answer(&mut self, method: &str, params: Value) -> Result<Value, Failed> {
         if !self.stale.is_empty() {
             self.read();
@@ -67,12 +67,12 @@ impl Server {
             "textDocument/rename" => value(self.rename(&parameters(method, params)?)?),
             "textDocument/documentSymbol" => {
                 let document = self.document_of(&params)?;
-                let here = self.here(&document)?;
+                let here = self.request_context(&document)?;
                 value(outline::symbols(here.front, here.file, self.client.encoding))
             }
             "textDocument/foldingRange" => {
                 let params: FoldingRangeParams = parameters(method, params)?;
-                let here = self.here(&params.text_document.uri)?;
+                let here = self.request_context(&params.text_document.uri)?;
                 value(outline::folds(here.front, here.file))
             }
             "textDocument/semanticTokens/full" => {
@@ -110,8 +110,8 @@ impl Server {
         Ok(document.uri)
     }
 
-    /// The document of a URI, and the first program that it is of, as the last reading has it.
-    fn here(&self, uri: &Uri) -> Result<Here<'_>, Failed> {
+    /// Document of a URI with its first program, as of the last reading.
+    fn request_context(&self, uri: &Uri) -> Result<RequestContext<'_>, Failed> {
         let path = uri::path(uri);
         if !self.workspace.open.contains_key(&path) {
             return Err(failed(format!("`{}` is not open", uri.as_str())));
@@ -120,15 +120,20 @@ impl Server {
         let found = roots.iter().find_map(|root| {
             let program = self.programs.get(root)?;
             let file = program.front.files.of(&path)?;
-            Some(Here { path: path.clone(), front: &program.front, full: program.full.as_ref(), file })
+            Some(RequestContext {
+                path: path.clone(),
+                front: &program.front,
+                full: program.full.as_ref(),
+                file,
+            })
         });
         found.ok_or_else(|| failed(format!("`{}` could not be read", uri.as_str())))
     }
 
-    /// The program and file that a position of a request is about.
-    fn at(&self, at: &TextDocumentPositionParams) -> Result<(Here<'_>, usize), Failed> {
+    /// Program and file at the position of a request.
+    fn at(&self, at: &TextDocumentPositionParams) -> Result<(RequestContext<'_>, usize), Failed> {
         let encoding = self.client.encoding;
-        let here = self.here(&at.text_document.uri)?;
+        let here = self.request_context(&at.text_document.uri)?;
         let byte = here.file.text.byte(at.position, encoding);
         Ok((here, byte))
     }
@@ -139,7 +144,7 @@ impl Server {
         let Some((bytes, mut text)) = hover::hover(here.front, here.counted(), here.file, byte) else {
             return Ok(None);
         };
-        // On an instruction, what its operations do here.
+        // On an instruction, add the timing of its line.
         let is_fresh = here
             .full
             .and_then(|full| full.files.of(&here.path))
@@ -163,7 +168,7 @@ impl Server {
         Ok(CompletionList { is_incomplete: false, items })
     }
 
-    /// The place of a span, in a file that the client can open.
+    /// Location of a span, in a file that the client can open.
     fn location(&self, front: &Front, span: Span) -> Option<Location> {
         let (file, range) = front.files.range(span, self.client.encoding)?;
         let uri = match &file.path {
@@ -174,14 +179,11 @@ impl Server {
         Some(Location { uri: uri?, range })
     }
 
-    /// A copy of a library's file, for an editor to open.
+    /// Copy of a library file, for an editor to open.
     fn library_copy(&self, file: &File) -> Option<PathBuf> {
         let folder = self.settings.library_folder.as_deref()?;
         let path = folder.join(file.name.trim_matches(['<', '>']));
-        if !std::fs::read(&path).is_ok_and(|known| known == file.text.text.as_bytes()) {
-            std::fs::create_dir_all(folder).ok()?;
-            std::fs::write(&path, file.text.text.as_bytes()).ok()?;
-        }
+        takt_cache::copy(&path, file.text.text.as_bytes()).ok()?;
         Some(path)
     }
 
@@ -200,7 +202,7 @@ impl Server {
         Ok(spans.into_iter().filter_map(|span| self.location(here.front, span)).collect())
     }
 
-    /// Every program that a file is of.
+    /// All programs that contain a file.
     fn fronts(&self, path: &Path) -> Vec<(&Path, &Front)> {
         let of = self.programs.iter().filter(|(_, program)| program.front.files.of(path).is_some());
         of.map(|(root, program)| (root.as_path(), &program.front)).collect()
@@ -264,7 +266,7 @@ impl Server {
 
     fn colours(&self, uri: &Uri, range: Option<Range>) -> Result<SemanticTokens, Failed> {
         let encoding = self.client.encoding;
-        let here = self.here(uri)?;
+        let here = self.request_context(uri)?;
         let lines =
             range.map_or(0..usize::MAX, |range| range.start.line as usize..range.end.line as usize + 1);
         let data = outline::colours(here.front, here.file, lines, encoding);
@@ -273,7 +275,7 @@ impl Server {
 
     fn hints(&self, params: &InlayHintParams) -> Result<Vec<InlayHint>, Failed> {
         let encoding = self.client.encoding;
-        let here = self.here(&params.text_document.uri)?;
+        let here = self.request_context(&params.text_document.uri)?;
         let Some((counted, moved)) = here.counted().and_then(|counted| Some((counted, here.moved()?))) else {
             return Ok(Vec::new());
         };
@@ -297,22 +299,22 @@ impl Server {
         Ok(hints.collect())
     }
 
-    /// The picture of the program that a document is of; none before it is counted.
+    /// Pipeline diagram of the document's program; `None` before its cycles are counted.
     fn pipeline(&self, uri: &Uri) -> Result<Option<Pipeline>, Failed> {
-        let here = self.here(uri)?;
+        let here = self.request_context(uri)?;
         let Some((counted, moved)) = here.counted().and_then(|counted| Some((counted, here.moved()?))) else {
             return Ok(None);
         };
         let path = |name: &str| here.full?.files.named(name)?.path.as_deref().and_then(uri::of_path);
-        // Lines of this document follow what is written; those of others are as they were counted.
+        // Lines of this document follow its edits; lines of other files stay as scheduled.
         let line = |name: &str, line| if *here.file.name == *name { moved.line(line) } else { Some(line) };
         let is_current = here.full.is_some_and(|full| full.files.are(&here.front.files));
-        let whole = Whole { is_current, sections: timing::sections(counted, &self.settings) };
+        let whole = ProgramFacts { is_current, sections: timing::sections(counted, &self.settings) };
         Ok(Some(pipeline::pipeline(counted, whole, path, line)))
     }
 
     fn lenses(&self, uri: &Uri) -> Result<Vec<CodeLens>, Failed> {
-        let here = self.here(uri)?;
+        let here = self.request_context(uri)?;
         let Some((counted, moved)) = here.counted().and_then(|counted| Some((counted, here.moved()?))) else {
             return Ok(Vec::new());
         };
@@ -322,7 +324,7 @@ impl Server {
             let command = Command { title, command: String::new(), arguments: None };
             Some(CodeLens { range: Range::new(position, position), command: Some(command), data: None })
         };
-        // Lines of the older text, as all that is counted; a label's is known as long as it has not moved.
+        // Lines refer to the scheduled text; a label's line is known as long as it has not moved.
         let old = here.full.and_then(|full| full.files.named(&here.file.name));
         let head = |name: &str| old.and_then(|file| outline::head_line(file, name));
         let lenses = timing::lenses(counted, &self.settings, &here.file.name, &head);
@@ -337,7 +339,7 @@ impl Server {
         diagnostics::fixes(&params.text_document.uri, text, params.range, &sent)
     }
 
-    /// The lines that laying the document out changes.
+    /// Edits that lay the document out.
     fn format(&self, uri: &Uri, range: Option<Range>) -> Result<Vec<TextEdit>, Failed> {
         let path = uri::path(uri);
         let text = self
@@ -348,7 +350,7 @@ impl Server {
         let laid = Text::new(takt_asm::format::format(&text.text));
         let mut edits = Vec::new();
         let mut line = 0;
-        // Lines keep their number, but for empty ones at the end.
+        // Layout preserves line numbers, except that it removes empty lines at the end.
         while let (Some(old), Some(new)) = (text.line(line), laid.line(line)) {
             let wanted =
                 range.is_none_or(|range| (range.start.line..=range.end.line).contains(&(line as u32)));
@@ -373,17 +375,17 @@ impl Server {
     }
 }
 
-/// The places of an older text's lines in a newer one: those before and behind what changed.
-struct Moved {
-    /// Lines at the beginning that are the same.
+/// Mapping of an older text's lines to a newer text: a common head and a common tail.
+struct LineMapping {
+    /// Number of equal lines at the beginning.
     head: u32,
-    /// Of the older text, the first line behind what changed.
+    /// First line of the common tail, in the older text.
     tail: u32,
-    /// By how much those are moved.
+    /// Displacement of the tail.
     by: i64,
 }
 
-impl Moved {
+impl LineMapping {
     fn line(&self, line: u32) -> Option<u32> {
         if line < self.head {
             return Some(line);
@@ -392,13 +394,13 @@ impl Moved {
     }
 }
 
-impl Here<'_> {
-    /// The moves of lines since the program was scheduled.
-    fn moved(&self) -> Option<Moved> {
+impl RequestContext<'_> {
+    /// Line mapping since the program was scheduled.
+    fn moved(&self) -> Option<LineMapping> {
         let old = &self.full?.files.named(&self.file.name)?.text.text;
         let (old, new) = (&*line_feeds(old), &*line_feeds(&self.file.text.text));
         if old == new {
-            return Some(Moved { head: u32::MAX, tail: u32::MAX, by: 0 });
+            return Some(LineMapping { head: u32::MAX, tail: u32::MAX, by: 0 });
         }
         let count = |text: &str| text.lines().count();
         let head = old.lines().zip(new.lines()).take_while(|(old, new)| old == new).count();
@@ -406,6 +408,6 @@ impl Here<'_> {
         let tail =
             old.lines().rev().zip(new.lines().rev()).take(most).take_while(|(old, new)| old == new).count();
         let by = count(new) as i64 - count(old) as i64;
-        Some(Moved { head: head as u32, tail: (count(old) - tail) as u32, by })
+        Some(LineMapping { head: head as u32, tail: (count(old) - tail) as u32, by })
     }
 }

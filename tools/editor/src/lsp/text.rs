@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Open documents: their text, and positions in it.
+//! Texts of open documents, and positions in them.
 
 use lsp_types::{Position, Range, TextDocumentContentChangeEvent};
 use std::sync::Arc;
 use takt_asm::source::Lines;
 
-/// The unit of a position's column.
+/// Unit of a position's column.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(crate) enum Encoding {
     Utf8,
@@ -13,7 +13,7 @@ pub(crate) enum Encoding {
     Utf16,
 }
 
-/// A text with its lines.
+/// A text with an index of its lines.
 #[derive(Clone, Debug)]
 pub(crate) struct Text {
     pub(crate) text: Arc<String>,
@@ -25,13 +25,13 @@ impl Text {
         Text::shared(Arc::new(text.into()))
     }
 
-    /// A text that others have, too: an assembler's source.
+    /// A text that shares its string with the assembler's sources.
     pub(crate) fn shared(text: Arc<String>) -> Text {
         let lines = Lines::of(&text);
         Text { text, lines }
     }
 
-    /// The position of a byte.
+    /// Position of a byte offset.
     pub(crate) fn position(&self, byte: usize, encoding: Encoding) -> Position {
         let mut byte = byte.min(self.text.len());
         while !self.text.is_char_boundary(byte) {
@@ -46,7 +46,7 @@ impl Text {
         Range::new(self.position(bytes.start, encoding), self.position(bytes.end, encoding))
     }
 
-    /// The byte at a position; beyond a line or the text, the nearest before.
+    /// Byte offset of a position; clamped to the line and the text.
     pub(crate) fn byte(&self, position: Position, encoding: Encoding) -> usize {
         let Some(range) = self.lines.range(position.line as usize) else { return self.text.len() };
         let line = self.text[range.clone()].trim_end_matches(['\n', '\r']);
@@ -63,19 +63,19 @@ impl Text {
         range.start + line.len()
     }
 
-    /// The bytes of a line, from 0, its line break excluded.
+    /// Byte range of a line (from 0) without its line break.
     pub(crate) fn line(&self, line: usize) -> Option<std::ops::Range<usize>> {
         let range = self.lines.range(line)?;
         let text = self.text[range.clone()].trim_end_matches(['\n', '\r']);
         Some(range.start..range.start + text.len())
     }
 
-    /// The line of a byte, from 0.
+    /// Line of a byte offset, from 0.
     pub(crate) fn line_of(&self, byte: usize) -> usize {
         self.lines.index(byte as u32)
     }
 
-    /// The text after changes, each of the text that the one before it leaves.
+    /// Text after changes, which apply in order, each to the previous result.
     pub(crate) fn changed(&self, changes: Vec<TextDocumentContentChangeEvent>, encoding: Encoding) -> Text {
         let mut text = self.clone();
         for change in changes {
@@ -92,7 +92,7 @@ impl Text {
     }
 }
 
-/// The columns of a text within a line.
+/// Width of a text in columns.
 pub(crate) fn width(text: &str, encoding: Encoding) -> u32 {
     match encoding {
         Encoding::Utf8 => text.len() as u32,
@@ -105,13 +105,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn positions_count_what_the_client_counts() {
+    fn positions_count_the_clients_units() {
         let text = Text::new("a\n; µ𝄞b\r\n\nend");
         for (encoding, column) in [(Encoding::Utf16, 5), (Encoding::Utf8, 8)] {
             let byte = text.text.find('b').expect("it is there");
             assert_eq!(text.position(byte, encoding), Position::new(1, column));
             assert_eq!(text.byte(Position::new(1, column), encoding), byte);
-            // Beyond the line is its end, before the line break; beyond the text its end.
+            // A position beyond the line is clamped to its end before the line break; beyond the text, to the text's end.
             assert_eq!(text.byte(Position::new(1, 99), encoding), byte + 1);
             assert_eq!(text.byte(Position::new(99, 0), encoding), text.text.len());
         }
@@ -127,7 +127,7 @@ mod tests {
         let text = Text::new("one\ntwo\n");
         let changes = vec![change(0, 0, 1, "µ\nO"), change(1, 0, 1, "o"), change(9, 9, 9, "end")];
         assert_eq!(&*text.changed(changes, Encoding::Utf16).text, "µ\none\ntwo\nend");
-        // A range that runs backwards, and one within a character, change what they can.
+        // A reversed range, and a range within a character, are applied as far as possible.
         let back = TextDocumentContentChangeEvent {
             range: Some(Range::new(Position::new(1, 2), Position::new(0, 1))),
             range_length: None,

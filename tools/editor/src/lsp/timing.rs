@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Inlay hints beside a line: when its operations issue and what they wait for; and above a section: the cycles that it
-//! takes.
+//! Timing hints: beside a line, the issue cycles of its operations and the causes of their delays; above a section, its cycles.
 
-use crate::lsp::program::Counted;
+use crate::lsp::program::CountedProgram;
 use crate::lsp::{Settings, plural};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -11,25 +10,25 @@ use takt_asm::schedule::BlockReport;
 use takt_isa::program::Location;
 use takt_isa::{BundleAddress, Instruction, Program, SlotIndex};
 
-/// Cycles of a line that are listed; of more the first and the last are.
+/// Maximal number of cycles listed for a line; if there are more, the first and the last.
 const LISTED: usize = 4;
-/// Operations of a line that are explained.
+/// Maximal number of operations explained for a line.
 const EXPLAINED: usize = 12;
 
-/// The hint beside a line.
+/// Inlay hint beside a line.
 pub(crate) struct Hint {
-    /// The line, from 0.
+    /// Line number, from 0.
     pub(crate) line: u32,
-    /// Cycles, slots, and what they wait for: `12 · mul, waits 4 for l1d`.
+    /// Cycles, slots, and causes of delay: `12 · mul, waits 4 for l1d`.
     pub(crate) text: String,
-    /// A line for each operation.
+    /// Details, one line per operation.
     pub(crate) more: String,
 }
 
-/// A word of the code: its bundle and its slot.
+/// A program word: its bundle and its slot.
 type Word = (BundleAddress, SlotIndex);
 
-/// The words of each line of a file, in the order of their bundles.
+/// Words of each line of a file, in the order of their bundles.
 fn words(program: &Program, file: &str) -> BTreeMap<u32, Vec<Word>> {
     let mut words: BTreeMap<u32, Vec<Word>> = BTreeMap::new();
     let Some(number) = program.files.iter().position(|name| name == file) else { return words };
@@ -45,8 +44,8 @@ fn words(program: &Program, file: &str) -> BTreeMap<u32, Vec<Word>> {
     words
 }
 
-/// The hints of a file's lines.
-pub(crate) fn hints(counted: &Counted, file: &str) -> Vec<Hint> {
+/// Inlay hints of a file.
+pub(crate) fn hints(counted: &CountedProgram, file: &str) -> Vec<Hint> {
     let program = &counted.assembled.program;
     let words = words(program, file);
     words
@@ -59,11 +58,11 @@ pub(crate) fn hints(counted: &Counted, file: &str) -> Vec<Hint> {
         .collect()
 }
 
-fn issue(counted: &Counted, address: BundleAddress) -> Option<&StaticIssue> {
+fn issue(counted: &CountedProgram, address: BundleAddress) -> Option<&StaticIssue> {
     counted.issues.get(address.index())
 }
 
-/// A cycle, and from where it counts where that is not the beginning of a section.
+/// An issue cycle, with its origin unless it counts from the beginning of a section.
 fn cycle(program: &Program, issue: &StaticIssue) -> String {
     if program.sections.iter().any(|section| section.start == issue.from) {
         return issue.cycle.to_string();
@@ -71,7 +70,7 @@ fn cycle(program: &Program, issue: &StaticIssue) -> String {
     format!("{} {}", cycle_from(program, issue.from), issue.cycle)
 }
 
-/// From where cycles count: a section's or a label's name, or a bundle, `@12`.
+/// Origin of a cycle count: the name of a section or label, or a bundle as `@12`.
 pub(crate) fn cycle_from(program: &Program, from: BundleAddress) -> String {
     if let Some(section) = program.sections.iter().find(|section| section.start == from) {
         return section.name.to_string();
@@ -82,7 +81,7 @@ pub(crate) fn cycle_from(program: &Program, from: BundleAddress) -> String {
     }
 }
 
-fn short(counted: &Counted, words: &[Word]) -> String {
+fn short(counted: &CountedProgram, words: &[Word]) -> String {
     let program = &counted.assembled.program;
     let shown = |(address, slot): &Word| {
         let cycle = cycle(program, issue(counted, *address)?);
@@ -95,7 +94,7 @@ fn short(counted: &Counted, words: &[Word]) -> String {
         let ends: Vec<String> = ends.into_iter().flatten().filter_map(shown).collect();
         format!("{} ({} operations)", ends.join(" … "), words.len())
     };
-    // A single operation is held up by what holds its bundle up.
+    // A single operation is delayed by the cause of its bundle.
     if let [(address, _)] = words
         && let Some(issue) = issue(counted, *address)
         && let Some(&(cause, cycles)) = issue.stalls.iter().max_by_key(|(_, cycles)| *cycles)
@@ -105,7 +104,7 @@ fn short(counted: &Counted, words: &[Word]) -> String {
     text
 }
 
-fn explained(counted: &Counted, words: &[Word]) -> String {
+fn explained(counted: &CountedProgram, words: &[Word]) -> String {
     let program = &counted.assembled.program;
     let mut text = String::new();
     for &(address, slot) in words.iter().take(EXPLAINED) {
@@ -140,15 +139,15 @@ fn explained(counted: &Counted, words: &[Word]) -> String {
     text
 }
 
-/// What is said above each section, for where there is no source: the periods first.
-pub(crate) fn sections(counted: &Counted, settings: &Settings) -> Vec<String> {
+/// Cycle texts of all sections, periods first, for clients without a source view.
+pub(crate) fn sections(counted: &CountedProgram, settings: &Settings) -> Vec<String> {
     let Ok(bounds) = &counted.bounds else { return Vec::new() };
     let (once, periods): (Vec<_>, Vec<_>) = bounds.sections.iter().partition(|section| section.once);
     let text = |section: &SectionBounds| section_text(section, &counted.assembled.blocks, settings).0;
     periods.into_iter().chain(once).map(text).collect()
 }
 
-/// The cycles of a section, and the number of the block that it is, if it is one.
+/// Cycles of a section, and its block number if it is a single block.
 fn section_text(
     section: &SectionBounds,
     blocks: &[BlockReport],
@@ -163,7 +162,7 @@ fn section_text(
         text.push_str(" from reset");
         return (text, None);
     }
-    // The one block that a period is.
+    // The section is a single block.
     let whole = |block: &BlockReport| {
         block.address == section.address
             && section.ends.contains(&block.address.offset(block.bundles.saturating_sub(1)))
@@ -172,7 +171,7 @@ fn section_text(
     if let Some(number) = block {
         let _ = write!(text, ", bound {}", blocks[number].bound.cycles());
     }
-    // As `takt bound --deadline` has it.
+    // Same computation as in `takt bound --deadline`.
     let worst = section.in_time.worst + 1;
     if let Some(deadline) = settings.deadline {
         let (what, by) = match deadline.checked_sub(worst) {
@@ -184,9 +183,9 @@ fn section_text(
     (text, block)
 }
 
-/// The hint above a line of a file: lines from 0. `head` knows the lines that labels and section directives stand on.
+/// Code lenses above lines of a file, from 0. `head` maps labels and section directives to their lines.
 pub(crate) fn lenses(
-    counted: &Counted,
+    counted: &CountedProgram,
     settings: &Settings,
     file: &str,
     head: &dyn Fn(&str) -> Option<u32>,
@@ -230,7 +229,7 @@ pub(crate) fn lenses(
     lenses.into_iter().map(|(line, texts)| (line, texts.join(" · "))).collect()
 }
 
-/// Digits in groups of three.
+/// Decimal digits in groups of three.
 fn grouped(number: u64) -> String {
     let digits = number.to_string();
     let groups: Vec<&str> =

@@ -1,24 +1,24 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Paths as the protocol names them.
+//! Conversion between paths and the protocol's URIs.
 
 use lsp_types::Uri;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-/// The path of a `file:` URI; of another one, the URI itself as a path that lies nowhere.
+/// Path of a `file:` URI; any other URI itself serves as the path of a document without a file.
 pub(crate) fn path(uri: &Uri) -> PathBuf {
     let text = uri.as_str();
     let Some(rest) = text.strip_prefix("file://") else { return PathBuf::from(text) };
-    // The host stands before the path.
+    // The host precedes the path.
     let path = rest.find('/').map_or("", |at| &rest[at..]);
     let path = decoded(path);
-    // `/c:/x`
+    // On Windows, `/c:/x` means `c:/x`.
     let drive = path.as_bytes();
     let is_drive = drive.len() > 2 && drive[1].is_ascii_alphabetic() && drive[2] == b':' && cfg!(windows);
     crate::lsp::workspace::normal(Path::new(if is_drive { &path[1..] } else { &path }))
 }
 
-/// The URI of a path.
+/// URI of a path.
 pub(crate) fn of_path(path: &Path) -> Option<Uri> {
     let text = path.to_str()?;
     if !path.is_absolute() {
@@ -33,7 +33,7 @@ pub(crate) fn of_path(path: &Path) -> Option<Uri> {
     Uri::from_str(&uri).ok()
 }
 
-/// The URI of a file that has a name and no place, relative to what the client takes names from.
+/// Relative URI of a file that has only a name, for clients that resolve names.
 pub(crate) fn of_name(name: &str) -> Option<Uri> {
     Uri::from_str(&encoded(name)).ok()
 }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The thread that schedules programs and counts their cycles: what takes longer than a keystroke allows.
+//! Thread that schedules programs and counts their cycles, work too slow for every keystroke.
 
 use crate::lsp::Settings;
-use crate::lsp::program::{self, Full};
+use crate::lsp::program::{self, AssemblyResult};
 use crossbeam_channel::{Receiver, Sender, unbounded};
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -10,43 +10,43 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use takt_asm::Open;
 
-/// A program to be scheduled: its first source, and the texts that are open.
+/// A scheduling job: the program's first source, and the open texts.
 pub(crate) struct Job {
     pub(crate) root: PathBuf,
     pub(crate) generation: u64,
     pub(crate) open: Open,
 }
 
-/// A program that is scheduled.
-pub(crate) struct Done {
+/// Result of a scheduling job.
+pub(crate) struct JobResult {
     pub(crate) root: PathBuf,
     pub(crate) generation: u64,
-    pub(crate) full: Full,
+    pub(crate) full: AssemblyResult,
 }
 
-/// Which texts of which programs are wanted.
-type Wanted = Arc<Mutex<BTreeMap<PathBuf, u64>>>;
+/// Current generation of each program's text; results of other generations are dropped.
+type Generations = Arc<Mutex<BTreeMap<PathBuf, u64>>>;
 
 pub(crate) struct Worker {
     jobs: Sender<Job>,
-    wanted: Wanted,
+    wanted: Generations,
 }
 
-fn lock(wanted: &Wanted) -> MutexGuard<'_, BTreeMap<PathBuf, u64>> {
-    // Numbers only: whoever panicked left them whole.
+fn lock(wanted: &Generations) -> MutexGuard<'_, BTreeMap<PathBuf, u64>> {
+    // Plain numbers stay consistent even if a holder panicked.
     wanted.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Worker {
-    pub(crate) fn new(settings: Settings, done: Sender<Done>) -> Worker {
+    pub(crate) fn new(settings: Settings, done: Sender<JobResult>) -> Worker {
         let (jobs, receiver) = unbounded();
-        let wanted = Wanted::default();
+        let wanted = Generations::default();
         let of_thread = Arc::clone(&wanted);
         std::thread::spawn(move || work(&settings, &receiver, &of_thread, &done));
         Worker { jobs, wanted }
     }
 
-    /// The text of a program is another: what is done for an earlier one is not wanted.
+    /// Sets the current generation of a program's text; work on earlier ones becomes obsolete.
     pub(crate) fn is_at(&self, root: &Path, generation: u64) {
         lock(&self.wanted).insert(root.to_owned(), generation);
     }
@@ -56,12 +56,12 @@ impl Worker {
     }
 
     pub(crate) fn start(&self, job: Job) {
-        // The thread ends with this end of the channel, not before.
+        // The thread outlives this sender, so sending cannot fail.
         let _ = self.jobs.send(job);
     }
 }
 
-fn work(settings: &Settings, jobs: &Receiver<Job>, wanted: &Wanted, done: &Sender<Done>) {
+fn work(settings: &Settings, jobs: &Receiver<Job>, wanted: &Generations, done: &Sender<JobResult>) {
     for Job { root, generation, open } in jobs {
         let is_wanted = || lock(wanted).get(&root) == Some(&generation);
         if !is_wanted() {
@@ -72,7 +72,7 @@ fn work(settings: &Settings, jobs: &Receiver<Job>, wanted: &Wanted, done: &Sende
             is_wanted().then(|| program::finish(&root, checked))
         }));
         if let Ok(Some(full)) = full
-            && done.send(Done { root, generation, full }).is_err()
+            && done.send(JobResult { root, generation, full }).is_err()
         {
             return;
         }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Which program a file is of: what includes what, among the files that are open and those beside them.
+//! Mapping of files to programs: the include graph of open files and files in their folders.
 
 use crate::lsp::text::Text;
 use std::collections::{BTreeMap, BTreeSet};
@@ -10,32 +10,32 @@ use takt_asm::source::line_feeds;
 use takt_asm::tokens::{self, TokenKind};
 use takt_asm::{Directive, Open};
 
-/// Files of a workspace that are looked at for `.include`s.
+/// Maximal number of files scanned for `.include`s.
 const FILES: usize = 2000;
-/// Folders within one another that are looked into.
+/// Maximal depth of nested folders scanned.
 const DEPTH: usize = 6;
-/// Bytes of a file that is looked at.
+/// Maximal size in bytes of a scanned file.
 const FILE_BYTES: u64 = 4 << 20;
-/// Programs of one file that are assembled.
+/// Maximal number of programs assembled for one file.
 pub(crate) const ROOTS: usize = 8;
 
-/// The open documents, and the files beside them.
+/// Open documents, and the files in their folders.
 #[derive(Default)]
 pub(crate) struct Workspace {
-    /// Folders that the client works in.
+    /// Workspace folders of the client.
     pub(crate) folders: Vec<PathBuf>,
-    /// Open documents, by path.
+    /// Texts of open documents, by path.
     pub(crate) open: BTreeMap<PathBuf, Text>,
-    /// The includes of each source on the disk, and of when that is.
+    /// Includes of each source on disk, with the file's time stamp.
     on_disk: BTreeMap<PathBuf, (Option<SystemTime>, Vec<PathBuf>)>,
-    /// The includes of each open source.
+    /// Includes of each open source.
     of_open: BTreeMap<PathBuf, Vec<PathBuf>>,
-    /// Open sources that open a section, and whether they are known to be programs by themselves, whoever includes them.
+    /// Open sources that open a section, and whether each is known to assemble alone.
     sections: BTreeMap<PathBuf, bool>,
 }
 
 impl Workspace {
-    /// A document is open with this text from now on. True if it includes other files than before.
+    /// Sets the text of an open document. Returns whether its includes changed.
     pub(crate) fn set(&mut self, path: &Path, text: Text) -> bool {
         let includes = includes(path, &text.text);
         if opens_section(&text.text) {
@@ -54,22 +54,22 @@ impl Workspace {
         self.sections.remove(path);
     }
 
-    /// Open files that others include and that open a section, but are not known to be programs by themselves.
+    /// Open files that are included elsewhere and open a section, but are not known to assemble alone.
     pub(crate) fn candidates(&self) -> Vec<PathBuf> {
         self.sections.iter().filter(|(_, known)| !**known).map(|(path, _)| path.clone()).collect()
     }
 
-    /// This file assembles by itself. While it is written it may not, and stays a program all the same.
+    /// Records that a file assembles alone. It stays a program even if later edits break it.
     pub(crate) fn is_program(&mut self, path: &Path) {
         self.sections.insert(path.to_owned(), true);
     }
 
-    /// The open texts, as the assembler takes them.
+    /// Texts of open documents, in the assembler's form.
     pub(crate) fn texts(&self) -> Open {
         Arc::new(self.open.iter().map(|(path, text)| (path.clone(), Arc::clone(&text.text))).collect())
     }
 
-    /// Reads the sources on the disk again: those of the client's folders and those beside open ones.
+    /// Scans the sources on disk again: in the client's folders and beside open documents.
     pub(crate) fn scan(&mut self) {
         let mut found = BTreeMap::new();
         let mut folders: Vec<(PathBuf, usize)> =
@@ -110,8 +110,8 @@ impl Workspace {
         self.on_disk = found;
     }
 
-    /// The programs that a file is of: first the file itself, if it is a program; then those files that include it, perhaps
-    /// through others, and that no file includes. The file itself if there is none.
+    /// Programs of a file: the file itself if it is a program; then the files that include it directly or through others and are included
+    /// by none. If there are none, the file itself.
     pub(crate) fn roots(&self, path: &Path) -> Vec<PathBuf> {
         let mut roots = Vec::new();
         let mut seen = BTreeSet::from([path.to_owned()]);
@@ -122,14 +122,14 @@ impl Workspace {
             let all = open.chain(on_disk.map(|(from, (_, to))| (from, to)));
             let by = all.filter(|(_, to)| to.contains(&file));
             let by: Vec<PathBuf> = by.map(|(from, _)| from.clone()).collect();
-            // A program's files lie in the folder of its first.
+            // All files of a program lie in or below the folder of its first file.
             if by.is_empty() && file.parent().is_some_and(|folder| path.starts_with(folder)) {
                 roots.push(file);
             }
             left.extend(by.into_iter().filter(|from| seen.insert(from.clone())));
         }
         if roots.is_empty() {
-            // Files that include one another, or one that nothing can include.
+            // Cyclic includes, or no includer: treat the file as a program.
             roots.push(path.to_owned());
         }
         roots.sort();
@@ -142,7 +142,7 @@ impl Workspace {
     }
 }
 
-/// The files that a source includes by their name beside it.
+/// Files that a source includes by relative path.
 fn includes(path: &Path, text: &str) -> Vec<PathBuf> {
     let folder = path.parent().unwrap_or(Path::new(""));
     let name = Directive::Include.name();
@@ -163,7 +163,7 @@ fn includes(path: &Path, text: &str) -> Vec<PathBuf> {
     files
 }
 
-/// True if a source opens a section of code, as programs do and few parts.
+/// The source opens a section of code, as programs do and most included files do not.
 fn opens_section(text: &str) -> bool {
     let names = [Directive::Once, Directive::Period].map(|directive| directive.name());
     let is_one = |line: &&str| names.iter().any(|name| line.contains(name));
@@ -175,7 +175,7 @@ fn opens_section(text: &str) -> bool {
     })
 }
 
-/// A path without `.` and `..`.
+/// Path without `.` and `..`.
 pub(crate) fn normal(path: &Path) -> PathBuf {
     let mut out = PathBuf::new();
     for part in path.components() {
@@ -195,7 +195,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_part_belongs_to_what_includes_it() {
+    fn included_files_belong_to_their_including_program() {
         let mut workspace = Workspace::default();
         let mut open = |path: &str, text: &str| workspace.set(Path::new(path), Text::new(text));
         open("/p/a.s", "; .include \"c.s\"\n.include \"parts/b.s\"\n");
@@ -211,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn a_program_comes_before_those_that_include_it() {
+    fn program_precedes_its_including_programs() {
         let mut workspace = Workspace::default();
         let (inner, outer) = (Path::new("/p/inner.s"), Path::new("/p/outer.s"));
         workspace.set(outer, Text::new(".include \"inner.s\"\n"));

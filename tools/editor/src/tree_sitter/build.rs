@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The combinators of a tree-sitter grammar, as its `grammar.json` writes them.
+//! Combinators of a tree-sitter grammar, in the form of `grammar.json`.
 
 use serde_json::{Value, json};
 
-/// A rule, or a part of one.
+/// A grammar rule, or a part of one.
 #[derive(Clone, PartialEq)]
 pub(super) struct Rule(pub(super) Value);
 
-/// Nothing at all.
+/// The rule that matches the empty text.
 pub(super) fn blank() -> Rule {
     Rule(json!({ "type": "BLANK" }))
 }
@@ -16,17 +16,17 @@ pub(super) fn symbol(name: impl AsRef<str>) -> Rule {
     Rule(json!({ "type": "SYMBOL", "name": name.as_ref() }))
 }
 
-/// A text as it stands.
+/// A token with fixed text.
 pub(super) fn text(value: &str) -> Rule {
     Rule(json!({ "type": "STRING", "value": value }))
 }
 
-/// A token by its regular expression.
+/// A token by regular expression.
 pub(super) fn pattern(value: &str) -> Rule {
     Rule(json!({ "type": "PATTERN", "value": value }))
 }
 
-/// A token that nothing, not even a blank, precedes.
+/// A token that must follow without a blank.
 pub(super) fn immediate(rule: Rule) -> Rule {
     Rule(json!({ "type": "IMMEDIATE_TOKEN", "content": rule.0 }))
 }
@@ -53,27 +53,27 @@ pub(super) fn repeat1(rule: Rule) -> Rule {
     Rule(json!({ "type": "REPEAT1", "content": rule.0 }))
 }
 
-/// One or more, separated.
+/// A list of at least one element with separators.
 pub(super) fn separated(separator: Rule, rule: Rule) -> Rule {
     seq([rule.clone(), repeat(seq([separator, rule]))])
 }
 
-/// One or more, separated by commas.
+/// A list of at least one element, separated by commas.
 pub(super) fn commas(rule: Rule) -> Rule {
     separated(text(","), rule)
 }
 
-/// One or more, separated by blanks or commas.
+/// A list of at least one element, separated by blanks or commas.
 pub(super) fn blanks(rule: Rule) -> Rule {
     separated(optional(text(",")), rule)
 }
 
-/// Which operand of its node a part is.
+/// A part with a field name in its node.
 pub(super) fn field(name: &str, rule: Rule) -> Rule {
     Rule(json!({ "type": "FIELD", "name": name, "content": rule.0 }))
 }
 
-/// A part that appears in the tree by another name.
+/// A part with another node name in the tree.
 pub(super) fn alias(rule: Rule, name: &str) -> Rule {
     Rule(json!({ "type": "ALIAS", "content": rule.0, "named": true, "value": name }))
 }

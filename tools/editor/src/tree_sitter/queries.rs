@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Highlighting and folding queries for tree-sitter's nodes. No node is captured twice, since editors differ in which of two
-//! captures counts.
+//! Highlighting and folding queries over tree-sitter's nodes. Each node is captured once, since editors disagree on the precedence of
+//! captures.
 
 use takt_asm::Directive;
 use takt_asm::expr::{BUILTINS, Function};
@@ -8,17 +8,17 @@ use takt_isa::ROWS;
 
 const HEADER: &str = "; Generated from the tables by `cargo xtask docs`; do not edit.\n\n";
 
-/// Words as a predicate or a list of nodes names them.
+/// Words in quotes, for a predicate or a node list.
 fn quoted<'w>(words: impl IntoIterator<Item = &'w str>) -> String {
     words.into_iter().map(|word| format!("\"{word}\"")).collect::<Vec<_>>().join(" ")
 }
 
-/// `highlights.scm` with the captures of Helix, which has names of its own for a few.
+/// `highlights.scm` with Helix's capture names.
 pub fn helix_highlights() -> String {
     highlights().replace("@number", "@constant.numeric")
 }
 
-/// `highlights.scm`.
+/// Text of `highlights.scm`: colours for tokens and names.
 pub fn highlights() -> String {
     let mnemonics = quoted(ROWS.iter().map(|row| row.mnemonic));
     let functions = quoted(Function::ALL.iter().map(|function| function.name()));
@@ -42,6 +42,7 @@ pub fn highlights() -> String {
 (const_directive name: (identifier) @constant)
 (cast type: (identifier) @type)
 (declaration type: (identifier) @type)
+(macro_definition type: (identifier) @type)
 (call function: (identifier) @function.builtin (#any-of? @function.builtin {functions}))
 
 ([
@@ -66,7 +67,7 @@ pub fn highlights() -> String {
     )
 }
 
-/// `folds.scm`.
+/// Text of `folds.scm`: the foldable blocks.
 pub fn folds() -> String {
     format!("{HEADER}[\n  (macro_definition)\n  (repetition)\n  (counted_loop)\n  (conditional)\n] @fold\n")
 }

@@ -1,23 +1,23 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The rules: `takt_asm`'s grammar of a line, and of the blocks that lines make.
+//! Grammar rules: `takt_asm`'s syntax of lines, and the blocks that lines form.
 //!
-//! tree-sitter looks for those tokens only that can stand at a place, the assembler always for the longest of all. Where that
-//! makes a difference, the longer token is among those looked for, followed by what never comes ([`NEVER`]).
+//! tree-sitter's lexer tries only tokens that are valid at a place, the assembler's always takes the longest of all. Where the two differ,
+//! the longer token is added as valid, followed by a token that never matches ([`NEVER`]).
 
 use super::build::*;
 use takt_asm::{Directive, Operator};
 
-/// The two kinds of line, whose expressions differ.
+/// Kind of line: each has its own expressions.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum In {
-    /// Operations and directives: a bracket behind an expression is a memory operand's.
+    /// Operations and directives: a bracket after an expression opens a memory operand.
     Line,
-    /// Equations: a bracket behind a name is an element's of an array.
+    /// Equations: a bracket after a name opens an array index.
     Equation,
 }
 
 impl In {
-    /// A rule's name in this kind of line.
+    /// Name of a rule in this kind of line.
     fn name(self, rule: &str) -> String {
         match self {
             In::Line => format!("_line_{rule}"),
@@ -25,7 +25,7 @@ impl In {
         }
     }
 
-    /// A rule of this kind of line, which appears in the tree by its common name.
+    /// A rule of this kind of line, under its common node name in the tree.
     fn node(self, rule: &str) -> Rule {
         alias(symbol(self.name(rule)), rule)
     }
@@ -34,35 +34,35 @@ impl In {
         symbol(self.name("expression"))
     }
 
-    /// A name, plain or with braces. Written out at its place, so that a plain name is the same in both kinds of line.
+    /// A name, plain or with braces. Inlined, so that a plain name is the same in both kinds of line.
     fn any_name(self) -> Rule {
         choice([symbol("identifier"), self.node("template")])
     }
 }
 
-/// A token that no text can be: one that takes every letter and digit there is, then a digit.
+/// A token that never matches: all letters and digits, then one more digit.
 const NEVER: &str = "_never";
 
 const NEWLINE: &str = "_newline";
 
-/// Conflicts: rules that tree-sitter may follow in two ways until a later token decides.
+/// Conflicts: pairs of rules that only a later token tells apart.
 pub(super) fn conflicts() -> Vec<Vec<String>> {
     let both = |rule: &str| vec![In::Line.name(rule), In::Equation.name(rule)];
     vec![
-        // A line that begins with `p[i` or `l{i` is an equation or an operation.
+        // A line that begins with `p[i` or `l{i` may be an equation or an operation.
         both("atom"),
         both("call"),
-        // `t[b` is an element of an array, or an offset and a register.
+        // `t[b` begins an array element, or an offset with a register.
         vec!["_line_element".into(), "_line_atom".into()],
     ]
 }
 
-/// Rules that stand for themselves.
+/// Rules inlined at their uses.
 pub(super) fn inlined() -> Vec<String> {
     vec!["_label".into()]
 }
 
-/// All rules, the first the start.
+/// All rules; the first is the start symbol.
 pub(super) fn rules() -> Vec<(String, Rule)> {
     let mut rules =
         vec![("source_file".to_owned(), seq([optional(symbol("_lines")), optional(symbol("_line"))]))];
@@ -80,13 +80,13 @@ pub(super) fn rules() -> Vec<(String, Rule)> {
     rules
 }
 
-/// The name of a directive's rule, `loop_bound_directive`.
+/// Rule name of a directive: `loop_bound_directive`.
 fn directive_rule(directive: Directive) -> String {
     format!("{}_directive", &directive.name()[1..])
 }
 
-/// The text after a directive that has a rule of its own: not one that opens, parts or closes a block, nor `.raw`, which
-/// stands in bundles.
+/// Operands of a directive with a rule of its own. Excluded are directives that open, divide or close a block, and `.raw`, which stands in
+/// bundles.
 fn operands(directive: Directive) -> Option<Rule> {
     use Directive::*;
     let expression = || In::Line.expression();
@@ -100,7 +100,10 @@ fn operands(directive: Directive) -> Option<Rule> {
         Machine => seq([named(), repeat(seq([optional(text(",")), field("option", name()), assigned()]))]),
         Array => seq([
             blanks(symbol("declaration")),
-            optional(seq([text("="), commas(field("value", expression()))])),
+            optional(seq([
+                text("="),
+                choice([field("file", symbol("text")), commas(field("value", expression()))]),
+            ])),
         ]),
         Const => seq([named(), assigned()]),
         Preset => seq([optional(text("@")), named(), optional(indices()), assigned()]),
@@ -110,7 +113,7 @@ fn operands(directive: Directive) -> Option<Rule> {
         Include => choice([
             symbol("text"),
             symbol("library"),
-            // These are operators, not the beginning of a library file's name.
+            // `<<` and `<=` are operators, not the beginning of a library file's name.
             seq([choice([Operator::Shl, Operator::Le].map(|operator| text(operator.text()))), symbol(NEVER)]),
         ]),
         Error => symbol("text"),
@@ -131,11 +134,11 @@ fn operands(directive: Directive) -> Option<Rule> {
     })
 }
 
-/// Lines, and the blocks that they make.
+/// Lines, and the blocks that they form.
 fn lines(add: &mut impl FnMut(&str, Rule)) {
     let end = |directive: Directive| text(directive.name());
     let expression = || In::Line.expression();
-    // A macro is defined in no block but branches: within macros and repetitions the rules are others.
+    // Macros are defined at top level or in branches; the bodies of macros and repetitions have rules without them.
     for (suffix, macros) in [("", true), ("_within", false)] {
         let rule = |name: &str| format!("{name}{suffix}");
         let mut blocks = vec!["_conditional", "_repetition", "_counted_loop"];
@@ -156,7 +159,7 @@ fn lines(add: &mut impl FnMut(&str, Rule)) {
             &rule("_lines"),
             repeat1(choice([symbol(NEWLINE), seq([symbol(rule("_line")), symbol(NEWLINE)])])),
         );
-        // The lines of a block; a label may stand before what closes it.
+        // Lines of a block; a label may precede the closing directive.
         let lines = symbol(rule("_lines"));
         add(&rule("_body"), choice([seq([lines, optional(symbol("_label"))]), symbol("_label")]));
         let body = || optional(alias(symbol(rule("_body")), "body"));
@@ -183,7 +186,7 @@ fn lines(add: &mut impl FnMut(&str, Rule)) {
         seq([
             text(Directive::Macro.name()),
             name("name"),
-            repeat(seq([optional(text(",")), name("parameter")])),
+            repeat(seq([optional(text(",")), name("parameter"), optional(seq([text(":"), name("type")]))])),
             symbol(NEWLINE),
             body(),
             end(Directive::EndMacro),
@@ -239,15 +242,15 @@ fn lines(add: &mut impl FnMut(&str, Rule)) {
     }
 }
 
-/// Bundles and equations, and what directives are made of.
+/// Bundles, equations, and the parts of directives.
 fn operations(add: &mut impl FnMut(&str, Rule)) {
     let (line, equation) = (In::Line, In::Equation);
     let name = || line.any_name();
-    // `.rawx` is no directive, nor `.raw` and a name: the same holds of every directive, which can all stand here.
+    // Neither `.rawx` nor `.raw` with a name attached is a directive; this holds for every directive.
     let unknown = seq([symbol("directive_name"), symbol(NEVER)]);
     let operation = choice([symbol("operation"), symbol("raw_operation"), unknown]);
     add("bundle", separated(symbol("_bars"), operation));
-    // A line that ends in bars continues on the next.
+    // A line that ends in `||` continues on the next line.
     add("_bars", seq([text("||"), repeat(symbol(NEWLINE))]));
     let operand = || symbol("_operand");
     add("operation", seq([field("mnemonic", name()), optional(commas(field("operand", operand())))]));
@@ -270,7 +273,7 @@ fn operations(add: &mut impl FnMut(&str, Rule)) {
         ]),
     );
     add("_base_cast", cast(base()));
-    // With one index it may be a place in memory, and is that.
+    // With one index, a memory operand takes precedence.
     add(
         &line.name("element"),
         seq([
@@ -307,7 +310,7 @@ fn operations(add: &mut impl FnMut(&str, Rule)) {
     );
 }
 
-/// Expressions in one kind of line.
+/// Expressions of one kind of line.
 fn expressions(kind: In, add: &mut impl FnMut(&str, Rule)) {
     let expression = || kind.expression();
     add(
@@ -337,7 +340,7 @@ fn expressions(kind: In, add: &mut impl FnMut(&str, Rule)) {
         &kind.name("call"),
         seq([field("function", symbol("identifier")), text("("), optional(commas(expression())), text(")")]),
     );
-    // Choices bind least, then the operators by their precedence, then those before an operand; only a power binds closer.
+    // Precedence ascends from the conditional over binary to unary operators; only the power binds tighter.
     let operator = |operator: &Operator| field("operator", text(operator.text()));
     let highest = Operator::Power.precedence();
     add(
@@ -374,10 +377,10 @@ fn expressions(kind: In, add: &mut impl FnMut(&str, Rule)) {
     );
 }
 
-/// Tokens, as the assembler's lexer has them.
+/// Tokens of the assembler's lexer.
 fn tokens(add: &mut impl FnMut(&str, Rule)) {
     let operators = || Operator::ALL.iter().map(|operator| text(operator.text()));
-    // Whatever tokens a library file's name is made of.
+    // The name of a library file may consist of any of these tokens.
     let tokens = ["identifier", "number", "text", "template_begin", "template_middle", "template_end"];
     let tokens = tokens.into_iter().chain(["directive_name"]).map(|token| alias(symbol(token), "path"));
     let signs = [",", ":", "(", ")", "[", "]", "@", "=", "?"].map(text);
@@ -405,7 +408,7 @@ fn tokens(add: &mut impl FnMut(&str, Rule)) {
                 format!("[0-9][0-9_]*\\.[0-9_]*({exponent})?"),
                 format!("[0-9][0-9_]*{exponent}"),
                 format!("\\.[0-9][0-9_]*({exponent})?"),
-                // At least one digit stands among the separators.
+                // At least one digit among the separators.
                 format!("0[xX]_*{digit}{digits}"),
                 "0[bB]_*[01][01_]*".to_owned(),
                 format!("0[xX]_*({digit}{digits}(\\.{digits})?|\\._*{digit}{digits})[pP][+-]?[0-9]+"),
@@ -413,7 +416,7 @@ fn tokens(add: &mut impl FnMut(&str, Rule)) {
             .join("|"),
         ),
     );
-    // Behind `number`, which of the two is taken where both are as long.
+    // Declared after `number`: for equal lengths `number` wins.
     add("_no_number", pattern("[0-9][0-9A-Za-z_.]*"));
     add(NEVER, seq([symbol("_no_number"), immediate(pattern("[0-9]"))]));
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Random sources by the grammar, meaningless but well formed, and ways to spoil a source.
+//! Random well-formed but meaningless sources from the grammar, and mutations of sources.
 
 #[path = "../../../../asm/tests/random_source/mod.rs"]
 pub(crate) mod random_source;
@@ -13,7 +13,7 @@ const NUMBERS: [&str; 16] = [
     "0", "12", "1_000", "0x1f", "0xF_", "0b1_0", "2.", ".5", "0.25e-6", "1e3", "1_.5", "0x1.8p-3", "0x.8P+1",
     "0x1p0", "0x_1", "7_e+1",
 ];
-/// Tokens of every kind, and some that are none.
+/// Tokens of every kind, and some invalid ones.
 const TOKENS: [&str; 66] = [
     "a",
     "fadd",
@@ -83,14 +83,14 @@ const TOKENS: [&str; 66] = [
     "\u{c}",
 ];
 
-/// The place of an expression, which decides whether it may hold elements of arrays.
+/// Context of an expression: decides whether array elements are allowed.
 #[derive(Clone, Copy, PartialEq)]
 enum In {
     Line,
     Equation,
 }
 
-/// Writes random text that the grammar takes.
+/// Writes random text that the grammar accepts.
 struct Writer<'r> {
     random: &'r mut Random,
     text: String,
@@ -101,14 +101,14 @@ impl Writer<'_> {
         self.random.below(of) == 0
     }
 
-    /// A token; now and then blanks around it, where none are needed too.
+    /// Writes a token, sometimes with optional blanks around it.
     fn put(&mut self, token: &str) {
         let word = |c: char| c.is_ascii_alphanumeric() || "_.{}".contains(c);
         let joins = |a: Option<char>, b: Option<char>| match (a, b) {
             (Some(a), Some(b)) => word(a) && word(b) || "<>=!|/".contains(a) && "<>=|/".contains(b),
             _ => false,
         };
-        // Within a name with braces no blank may stand behind the closing one.
+        // Inside a name with braces, no blank may follow the closing brace.
         if joins(self.text.chars().last(), token.chars().next()) || self.chance(3) {
             let blank = self.random.pick(&[" ", " ", "  ", "\t", "\u{c}"]);
             self.text.push_str(blank);
@@ -191,7 +191,7 @@ impl Writer<'_> {
                 self.put(")");
             }
             _ => {
-                // The condition is no choice itself, unless in parentheses.
+                // A nested conditional needs parentheses.
                 self.put("(");
                 self.expression(kind, depth - 1);
                 self.put(")");
@@ -208,7 +208,7 @@ impl Writer<'_> {
         self.put(token);
     }
 
-    /// Those of an element of an array, now and then.
+    /// Array indices, in some of the cases.
     fn indices(&mut self) {
         if self.chance(3) {
             self.put("[");
@@ -310,7 +310,7 @@ impl Writer<'_> {
             let token = self
                 .random
                 .pick(&["robot.s", "a", "/", "-", "..", "2.5", "{", "}", "<", "\"x\"", ".once", "@"]);
-            // `<<` and `<=` are others.
+            // A leading `<` could merge into `<<` or `<=`.
             let token = if index == 0 && token == "<" { "a" } else { token };
             self.put(if token == ".." { "_" } else { token });
         }
@@ -351,7 +351,7 @@ impl Writer<'_> {
         }
     }
 
-    /// A directive and its operands; of a block, all of it.
+    /// A directive with its operands; a block directive with its whole block.
     fn directive(&mut self, within: bool, depth: u32) {
         use Directive::*;
         let choice = Directive::ALL[self.random.below(Directive::ALL.len() as u64) as usize];
@@ -478,7 +478,7 @@ impl Writer<'_> {
         }
     }
 
-    /// The end of the line that opens a block, the block's lines, and perhaps a label before what closes it.
+    /// End of the opening line, the block's lines, and optionally a label before the closing directive.
     fn body(&mut self, within: bool, depth: u32) {
         self.put("\n");
         self.lines(within, depth - 1);
@@ -517,7 +517,7 @@ impl Writer<'_> {
     }
 }
 
-/// Some lines that the assembler's parser takes.
+/// Lines that the assembler's parser accepts.
 pub(crate) fn valid(random: &mut Random) -> String {
     let mut writer = Writer { random, text: String::new() };
     if writer.chance(20) {
@@ -530,7 +530,7 @@ pub(crate) fn valid(random: &mut Random) -> String {
     writer.text
 }
 
-/// A text with a token taken out, doubled, replaced or put in, once or twice.
+/// A text with one or two random mutations: a token deleted, doubled, replaced or inserted.
 pub(crate) fn mutated(random: &mut Random, text: &str) -> String {
     let mut text = text.to_owned();
     for _ in 0..1 + random.below(2) {
@@ -549,7 +549,7 @@ pub(crate) fn mutated(random: &mut Random, text: &str) -> String {
             3 => text.insert_str(range.start, &format!(" {new} ")),
             4 => text.replace_range(range, &other),
             5 => text.insert_str(range.start, &other),
-            // Two tokens grow together, or two lines.
+            // Two tokens merge, or two lines.
             _ => {
                 let blanks = text[range.end..].len() - text[range.end..].trim_start().len();
                 text.replace_range(range.end..range.end + blanks, "");
@@ -559,7 +559,7 @@ pub(crate) fn mutated(random: &mut Random, text: &str) -> String {
     text
 }
 
-/// Tokens in no order.
+/// Random tokens in random order.
 pub(crate) fn tokens(random: &mut Random) -> String {
     let directives: Vec<&str> = Directive::ALL.iter().map(|directive| directive.name()).collect();
     let mut text = String::new();

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
 """Takt as a peripheral of a LiteX SoC.
 
-The circuit is a folder that ``takt rtl -o FOLDER --program PROGRAM`` wrote, or an unpacked archive of ``cargo xtask dist``.
+The circuit is a folder that ``takt rtl -o FOLDER --program PROGRAM`` wrote, or an unpacked archive of ``cargo xtask release --archives``.
 
     from takt_litex import add_takt
     add_takt(soc, "takt", "FOLDER")

@@ -1,5 +1,5 @@
 /* Loads the program into each Takt of the SoC, runs its periods, and prints every output as `<takt> <period> <output> <bits>`.
- * periods.h: inputs and ports, from tools/xtask/src/litex.rs. */
+ * periods.h: inputs and ports, from tools/evidence/src/litex.rs. */
 
 #include <generated/csr.h>
 #include <generated/mem.h>

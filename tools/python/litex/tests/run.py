@@ -1,6 +1,6 @@
 """A SoC with VexRiscv and two Takts, on Wishbone and on AXI4-Lite, simulated in Verilator: run.py FOLDER.
 
-FOLDER has the circuit, the program's C header, periods.h and expected.json (tools/xtask/src/litex.rs writes them).
+FOLDER has the circuit, the program's C header, periods.h and expected.json (tools/evidence/src/litex.rs writes them).
 """
 
 import json

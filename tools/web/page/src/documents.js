@@ -1,12 +1,12 @@
-// The documents that the page keeps in the browser, each under a key of its own: two pages that are open at once do not overwrite
-// one another's. A link or an example opens beside what is there.
+// Documents that the page keeps in the browser, each under its own key, so that two open pages do not overwrite each other's.
+// A link or an example opens as an additional document.
 
 const PREFIX = "takt-playground:";
-/** Where the only document was kept before there were several. */
+/** Key of the single document of earlier versions. */
 const OLD = "takt-playground";
-/** Which document this page shows, for a reload. */
+/** Key of the document that this page shows, for a reload. */
 const HERE = "takt-playground-here";
-/** Documents that nobody has changed are forgotten beyond so many, the longest unused first. */
+/** Maximal number of unchanged documents; beyond it, the longest unused are dropped. */
 const MOST = 12;
 
 export class Documents {
@@ -16,7 +16,7 @@ export class Documents {
       this.write({ ...old, id: crypto.randomUUID?.() ?? `${Date.now()}`, from: "own", changed: true, used: Date.now() });
       localStorage.removeItem(OLD);
     }
-    /** Documents of a browser that keeps nothing. */
+    /** Documents in memory, for a browser without storage. */
     this.here = new Map();
   }
 
@@ -29,7 +29,7 @@ export class Documents {
     }
   }
 
-  /** Keeps a document; false if the browser does not. */
+  /** Stores a document; returns false if the browser does not. */
   write(document) {
     try {
       localStorage.setItem(PREFIX + document.id, JSON.stringify(document));
@@ -44,7 +44,7 @@ export class Documents {
     return this.read(PREFIX + id) ?? this.here.get(id) ?? null;
   }
 
-  /** All documents, in the order in which they were opened. */
+  /** All documents, in order of opening. */
   list() {
     const found = new Map(this.here);
     try {
@@ -53,26 +53,26 @@ export class Documents {
         if (document) found.set(document.id, document);
       }
     } catch {
-      // It keeps nothing.
+      // The browser stores nothing.
     }
     return [...found.values()].sort((a, b) => a.made - b.made);
   }
 
-  /** The document to show when the page opens: that of this page before a reload, else the one used last. */
+  /** Document for the page's start: this page's before a reload, otherwise the last used. */
   last() {
     const all = this.list();
     let here = null;
     try {
       here = sessionStorage.getItem(HERE);
     } catch {
-      // As above.
+      // The browser stores nothing.
     }
     return { reloaded: all.find(({ id }) => id === here) ?? null, last: all.reduce((a, b) => (a && a.used > b.used ? a : b), null) };
   }
 
   /**
-   * The document for a program from elsewhere: one that was opened from the same place and not changed since, else a new one.
-   * `from` is `link` or `example`, `key` says which.
+   * Document for a program from a link or an example: an unchanged one from the same origin, otherwise a new one. `from` is `link` or
+   * `example`; `key` identifies the origin.
    */
   open({ name, machine, source, inputs, periods }, from, key) {
     const known = this.list().find((document) => document.key === key && !document.changed);
@@ -82,7 +82,7 @@ export class Documents {
     return document;
   }
 
-  /** Shows the documents by name, where there are several: each can be opened and closed. `here` is the one that is shown. */
+  /** Shows a list of the documents if there are several, each with buttons to open and close; `here` is the one on display. */
   show(parent, here, open, close) {
     const all = this.list(), button = (set) => Object.assign(document.createElement("button"), set);
     parent.hidden = all.length < 2;
@@ -98,13 +98,13 @@ export class Documents {
     }));
   }
 
-  /** Notes that a document is shown now. */
+  /** Records that a document is now on display. */
   use(document) {
     document.used = Date.now();
     try {
       sessionStorage.setItem(HERE, document.id);
     } catch {
-      // As above.
+      // The browser stores nothing.
     }
     return this.write(document);
   }
@@ -114,7 +114,7 @@ export class Documents {
     try {
       localStorage.removeItem(PREFIX + id);
     } catch {
-      // As above.
+      // The browser stores nothing.
     }
   }
 

@@ -1,16 +1,16 @@
-// The robot's panel: the program drives the robot along the path, and what came of it can be looked at again.
+// Panel of the robot: drives the robot along the path with the program, and replays the drive.
 import { chart } from "./plot.js";
 import { Robot } from "./robot.js";
 
 const el = (id) => document.getElementById(id);
 const plural = (count, noun) => `${count.toLocaleString("en")} ${noun}${count === 1 ? "" : "s"}`;
-/** Periods that a call drives. */
+/** Periods per call. */
 const PERIODS = 2000;
-/** The error that the founding paper allows while cutting, µm. */
+/** Error that the founding paper permits while cutting, µm. */
 const LIMIT = 10;
 
 export class Drive {
-  /** @param machine the worker; work and current as in main.js */
+  /** @param machine the worker; for `work` and `current` see main.js */
   constructor({ machine, work, current }) {
     Object.assign(this, { machine, work, current, driving: false });
     this.robot = new Robot(el("scene"), (pose, index) => this.shows(pose, index), () => (el("play").textContent = "Play"));
@@ -27,25 +27,25 @@ export class Drive {
     this.robot.draw();
   }
 
-  /** Dims what was driven with another program. */
+  /** Dims a drive of an earlier program. */
   set old(on) {
     el("robot").classList.toggle("old", on && this.robot.poses.length > 0);
     if (on) this.robot.play(false);
   }
 
-  /** True while nothing has been driven since a program was opened. */
+  /** Nothing was driven since a program was opened. */
   get idle() {
     return !this.driving && !this.tried;
   }
 
-  /** Says, before anything is driven, whether the program can. */
+  /** Tells before the first drive whether the program can drive the robot. */
   set fits(on) {
     if (!this.idle) return;
     el("drove").replaceChildren(on ? "The program as the controller of the five-axis hybrid robot, in a closed loop." : "This program has other ports than a controller of the five-axis hybrid robot. The example ");
     if (!on) el("drove").append(Object.assign(document.createElement("a"), { href: "#example=tracking.s", textContent: "tracking.s" }), " is one.");
   }
 
-  /** Forgets what was driven. */
+  /** Drops the drive. */
   clear() {
     this.tried = this.driving = false;
     this.drives = (this.drives ?? 0) + 1;

@@ -1,5 +1,5 @@
-// The editor: CodeMirror as a client of Takt's language server. Everything that it knows of the language, the colours too,
-// are the server's answers.
+// Editor: CodeMirror as a client of Takt's language server. All knowledge of the language, including colours, comes from the
+// server.
 import { autocompletion, closeBrackets, closeBracketsKeymap, completionKeymap } from "@codemirror/autocomplete";
 import { defaultKeymap, history, historyKeymap } from "@codemirror/commands";
 import { bracketMatching, foldGutter, foldKeymap, foldService } from "@codemirror/language";
@@ -14,9 +14,9 @@ import {
   LSPClient, LSPPlugin, findReferencesKeymap, formatKeymap, hoverTooltips, jumpToDefinitionKeymap, renameKeymap, serverCompletion,
 } from "@codemirror/lsp-client";
 
-/** The client is silent for so long before the program is read, and before it is scheduled; ms. */
+/** Pause of the user before the program is read, and before it is scheduled; ms. */
 const PAUSE = 60, LONG_PAUSE = 350;
-/** An answer that takes longer ends the server; ms. */
+/** Time limit of an answer, after which the server is restarted; ms. */
 export const LANGUAGE_LIMIT = 20_000;
 
 // ---- Colours, from semantic tokens.
@@ -79,7 +79,7 @@ const hints = StateField.define({
   provide: (field) => EditorView.decorations.from(field),
 });
 
-// ---- Folds: lines by the line that stays.
+// ---- Folds: end of each fold by its visible line.
 
 const setFolds = StateEffect.define();
 const folds = StateField.define({
@@ -93,14 +93,14 @@ const folds = StateField.define({
 const mark = Decoration.mark({});
 const folding = foldService.of((state, start, end) => {
   let found = null;
-  // Of what begins on one line, the longest.
+  // Of several folds that begin on a line, take the longest.
   state.field(folds).between(start, end, (from, to) => {
     if (from >= start && from <= end && to > end && to > (found?.to ?? 0)) found = { from: end, to };
   });
   return found;
 });
 
-/** CodeMirror's own parts. What folds is known when the server has answered. */
+/** CodeMirror's own parts. Folds are known once the server has answered. */
 const base = [
   lineNumbers(), highlightActiveLineGutter(), highlightSpecialChars(), history(), drawSelection(), bracketMatching(), closeBrackets(),
   foldGutter({ foldingChanged: (update) => update.transactions.some((tr) => tr.effects.some((effect) => effect.is(setFolds))) }),
@@ -108,7 +108,7 @@ const base = [
   keymap.of([...closeBracketsKeymap, ...defaultKeymap, ...searchKeymap, ...historyKeymap, ...foldKeymap, ...completionKeymap, ...lintKeymap]),
 ];
 
-// ---- Breakpoints: lines of which the debugger is told each time that it begins anew.
+// ---- Breakpoints: lines that each new debugger receives.
 
 class Stop extends GutterMarker {
   toDOM() {
@@ -130,7 +130,7 @@ const stops = StateField.define({
   },
 });
 
-// ---- Where the debugger stands.
+// ---- Position of the debugger.
 
 class Arrow extends GutterMarker {
   toDOM() {
@@ -166,7 +166,7 @@ const theme = EditorView.theme({
   ".cm-lsp-documentation": { padding: "2px 8px" },
 });
 
-/** A text to be read, with the editor's looks. */
+/** A read-only view in the editor's style. */
 export function reader(parent, text, about) {
   return new EditorView({
     parent,
@@ -176,13 +176,13 @@ export function reader(parent, text, about) {
 
 export class Editor {
   /**
-   * @param parent where it goes
-   * @param thread the language server's worker
-   * @param told called with what goes wrong
-   * @param changed called when the text has changed
-   * @param stopped called with a line whose breakpoint is to be set or removed
-   * @param showFile called with the name of another file; gives the view that shows it, if there is one
-   * @param moved called with the line that the cursor has moved to
+   * @param parent element that receives the editor
+   * @param thread worker of the language server
+   * @param told called with an error message
+   * @param changed called after a change of the text
+   * @param stopped called with a line whose breakpoint is to be toggled
+   * @param showFile called with the name of another file; returns the view that shows it, if any
+   * @param moved called with the new line of the cursor
    */
   constructor(parent, { thread, told, changed, stopped, showFile, moved }) {
     Object.assign(this, { thread, told, showFile });
@@ -254,7 +254,7 @@ export class Editor {
       ],
     });
     this.client = client;
-    // The address of another file is its name, encoded as addresses are: `%3Cmath.s%3E`.
+    // The URI of another file is its name in URI encoding: `%3Cmath.s%3E`.
     client.workspace.displayFile = async (uri) => (uri === this.name ? this.view : this.showFile(decodeURIComponent(uri)));
     await this.ask("lsp.start", { machine: this.machine });
     if (this.client !== client) return;
@@ -274,13 +274,13 @@ export class Editor {
     this.longPause = setTimeout(() => this.count(), 0);
   }
 
-  /** Hands on what the server says to a client, if that is still there. */
+  /** Passes server messages to a client, if it still exists. */
   said(client, messages) {
     if (this.client !== client) return;
     for (const message of messages ?? []) for (const handler of this.handlers) handler(JSON.stringify(message));
   }
 
-  /** Asks the worker; one that does not answer in time is begun again. */
+  /** Calls the worker; restarts it after a timeout. */
   async ask(method, params) {
     const limit = setTimeout(() => {
       this.told(`The language server took more than ${LANGUAGE_LIMIT / 1000} s over this text and was begun again; it goes on when the text changes.`);
@@ -308,7 +308,7 @@ export class Editor {
     this.longPause = setTimeout(() => this.count(), LONG_PAUSE);
   }
 
-  /** What is known at once: diagnostics and colours. */
+  /** Results without scheduling: diagnostics and colours. */
   async read() {
     const { client, version } = this;
     if (!client?.serverCapabilities) return;
@@ -326,11 +326,11 @@ export class Editor {
       const there = ranges.filter(({ endLine }) => endLine < doc.lines).map(fold);
       this.view.dispatch({ effects: [setColours.of(decorations(doc, tokens.data, legend)), setFolds.of(RangeSet.of(there, true))] });
     } catch {
-      // The server was begun again, or the text is another by now.
+      // The server was restarted, or the text has changed.
     }
   }
 
-  /** What scheduling tells: cycles. */
+  /** Results of scheduling: cycles. */
   async count() {
     const { client, version } = this;
     if (!client?.serverCapabilities) return;
@@ -355,7 +355,7 @@ export class Editor {
       this.scheduled = version;
       this.view.dispatch({ effects: setHints.of(Decoration.set(widgets, true)) });
     } catch {
-      // As above.
+      // The server was restarted, or the text has changed.
     }
   }
 
@@ -386,7 +386,7 @@ export class Editor {
       const same = (a, b) => a.message === b.message && JSON.stringify(a.range) === JSON.stringify(b.range);
       show((item) => found.filter((fix) => fix.diagnostics?.some((one) => same(one, item))));
     } catch {
-      // Without fixes, then.
+      // Show the diagnostics without fixes.
     }
   }
 
@@ -396,7 +396,7 @@ export class Editor {
     view.dispatch({ changes: edits.map((edit) => ({ from: plugin.fromPosition(edit.range.start), to: plugin.fromPosition(edit.range.end), insert: edit.newText })), userEvent: "input.fix" });
   }
 
-  /** Shows where the debugger stands: the line that issues next, and those of which operations are in its bundle. */
+  /** Shows the debugger's position: the line that issues next, and the other lines of its bundle. */
   stand(line, part = []) {
     const doc = this.view.state.doc;
     const exists = (number) => number >= 1 && number <= doc.lines;
@@ -408,18 +408,18 @@ export class Editor {
     this.view.dispatch({ effects });
   }
 
-  /** Puts the cursor on a line, from 1, at a column, from 0. */
+  /** Moves the cursor to a line (from 1) and a column (from 0). */
   goTo(line, column) {
     this.view.dispatch({ selection: { anchor: this.view.state.doc.line(line).from + column }, scrollIntoView: true });
     this.focus();
   }
 
-  /** The line of the cursor. */
+  /** Line of the cursor, from 1. */
   get line() {
     return this.view.state.doc.lineAt(this.view.state.selection.main.head).number;
   }
 
-  /** Lines with a breakpoint, where they are by now. */
+  /** Present lines of the breakpoints. */
   get stops() {
     const { doc } = this.view.state, lines = [];
     this.view.state.field(stops).between(0, doc.length, (from) => void lines.push(doc.lineAt(from).number));

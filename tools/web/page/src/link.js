@@ -1,8 +1,8 @@
-// A program in the part of an address behind `#`: compressed, base 64 for addresses. No server sees it.
+// A program in a URL's fragment: compressed, in base64url. Browsers do not send fragments to servers.
 
-/** Characters of a link that is made: what browsers and mail programs carry. */
+/** Maximal length of a generated link, supported by browsers and mail programs. */
 export const LINK_CHARACTERS = 100_000;
-/** Bytes of what a link is unpacked to. */
+/** Maximal size of an unpacked link in bytes. */
 const UNPACKED_BYTES = 8 << 20;
 
 const through = (bytes, stream) => new Response(new Blob([bytes]).stream().pipeThrough(stream)).arrayBuffer();
@@ -19,14 +19,14 @@ export async function pack(program) {
   return fragment;
 }
 
-/** The program of a fragment; null if it has none. */
+/** Program in a fragment; null if it contains none. */
 export async function unpack(fragment) {
   const text = fragment.replace(/^#/, "");
   if (text === "") return null;
   if (/^example=/.test(text)) return { example: decodeURIComponent(text.slice(8)) };
   if (!text.startsWith("p1=")) throw new Error("it does not begin with `p1=`, as Takt's links do");
   let packed;
-  // Each four digits are three bytes: a single one that is left over is none.
+  // Four digits encode three bytes, so a single remaining digit is an error.
   if (/^[\w-]*$/.test(text.slice(3)) && text.slice(3).length % 4 === 1) throw new Error("a part of it is missing or was changed on the way");
   try {
     packed = Uint8Array.from(atob(text.slice(3).replaceAll("-", "+").replaceAll("_", "/")), (c) => c.charCodeAt(0));
@@ -35,7 +35,7 @@ export async function unpack(fragment) {
   }
   let bytes;
   try {
-    // Deflate ends with a sum of what was packed, so that one lost or changed character is found.
+    // The checksum of the compressed data detects any lost or changed character.
     bytes = await unpackBounded(packed);
   } catch (error) {
     throw new Error(error instanceof RangeError ? error.message : "a part of it is missing or was changed on the way");

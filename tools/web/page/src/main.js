@@ -12,18 +12,18 @@ import "./style.css";
 const el = (id) => document.getElementById(id);
 const text = (value) => (value === null || value === undefined ? "" : String(value));
 const plural = (count, noun) => `${count.toLocaleString("en")} ${noun}${count === 1 ? "" : "s"}`;
-/** From a change to its results, if they take no longer than the second; ms. */
+/** Delay from a change to the next run, if a run takes at most the second number; ms. */
 const PAUSE = 400, SOON = 1000;
-/** Periods of a program without inputs, unless it says otherwise. */
+/** Default number of periods of a program without inputs. */
 const PERIODS = 20;
 
-/** Why a worker is stopped for another program. */
+/** Reason for stopping a worker when another program is opened. */
 const REPLACED = "another program was opened";
 
 const state = { works: 0, breaks: [], name: "main.s", about: null, program: null, stale: true, run: null, took: 0, document: null };
 let machine, editor, plots, pipeline, drive, documents;
 
-/** Tells what went wrong; or with an act, a button's text and what it does, what happened. */
+/** Shows an error; with `act` (a button's text and action), a notice. */
 function notice(message, act) {
   el("notice").replaceChildren(message ?? "");
   if (act) el("notice").append(" ", Object.assign(document.createElement("button"), { textContent: act[0], onclick: () => (notice(), act[1]()) }));
@@ -34,7 +34,7 @@ function notice(message, act) {
   el("notice").hidden = !message;
 }
 
-/** Rows of a table: texts, or objects with a class and a title. */
+/** Rows of a table: cells are texts, or objects with class and title. */
 function rows(id, list) {
   el(id).tBodies[0].replaceChildren(...list.map((cells) => {
     const row = document.createElement("tr");
@@ -72,18 +72,18 @@ function select(name, focus) {
   if (name === "pipeline") pipelineInStep();
 }
 
-/** Dims the pipeline if it is of another program than the one that is here. Words instead of a picture are not. */
+/** Dims the diagram of an earlier program. A text in its place is not dimmed. */
 function dimPipeline() {
   el("pipeline").classList.toggle("old", Boolean(state.drawn) && state.drawn !== state.program);
 }
 
-/** Draws the pipeline if it is in sight and of another program than the one that runs. */
+/** Draws the diagram if it is visible and not of the present program. */
 function pipelineInStep() {
   dimPipeline();
   if (state.drawn !== state.program && state.tab === "pipeline" && !state.stale && state.program?.assembled && !state.program.inputs_error) draw();
 }
 
-/** Drives the robot if it is in sight, nothing was driven yet, and the program can. */
+/** Drives the robot if its panel is visible, nothing was driven yet, and the program can drive it. */
 function driveFirst() {
   if (state.tab === "robot" && !state.opening && !state.stale && state.program?.tracks && !state.program.inputs_error && drive.idle) drive.drive();
 }
@@ -104,18 +104,18 @@ for (const [i, tab] of tabs.entries()) {
 const table = () => el("table").value;
 const periods = () => Math.max(1, Math.round(Number(el("periods").value)) || 1);
 
-/** What is shown no longer holds: it is dimmed at once, and computed again in a moment if that takes no longer than a moment. */
+/** Invalidates all results: dims them at once, and recomputes them after a pause if that is fast. */
 function changed(event) {
   if (!state.document) return;
   state.stale = true;
   document.body.classList.add("stale");
-  // A mistake that was told is one of the text before, too.
+  // A reported mistake belongs to the previous text, too.
   el("cycles").classList.remove("now");
   if (!state.opening) {
     state.dirty = true;
-    // On another machine, an example is still the example.
+    // An example on another machine is still the example.
     if (event !== "machine") state.document.changed = true;
-    // The address no longer says what is here.
+    // The URL no longer describes the document.
     if (location.hash) history.replaceState(null, "", location.pathname + location.search);
   }
   clearTimeout(state.keeping);
@@ -125,7 +125,7 @@ function changed(event) {
   el("wait").hidden = state.took <= SOON;
 }
 
-/** Computes again what no longer holds. */
+/** Recomputes invalid results. */
 function again() {
   if (!state.stale || state.took > SOON) return;
   if (machine.busy && !drive.driving) state.soon = setTimeout(again, PAUSE);
@@ -137,7 +137,7 @@ function again() {
 
 function keep() {
   clearTimeout(state.keeping);
-  // What another page has changed meanwhile is not overwritten with what this one only shows.
+  // Do not overwrite another page's changes with a document that is only on display here.
   if (!state.document || !state.dirty) return;
   state.dirty = false;
   Object.assign(state.document, { name: state.name, machine: el("machine").value, source: editor.text, inputs: table(), periods: periods() });
@@ -160,7 +160,7 @@ async function closeDocument(one) {
   if (one.changed) notice(`${one.name} was closed.`, ["Undo", () => (documents.write(one), openDocument(one))]);
 }
 
-/** Shows a document that is kept; the one that was shown stays kept as it is. */
+/** Opens a stored document; the previous one stays stored as it is. */
 async function openDocument(one) {
   keep();
   one = documents.get(one.id) ?? one;
@@ -171,10 +171,10 @@ async function openDocument(one) {
   await open(one);
 }
 
-/** The choice of a machine of a file (docs/machines.md). Its text stands for it wherever else its name does. */
+/** Menu entry of a machine file (docs/machines.md). Everywhere else its text takes the place of the name. */
 const OWN = "own";
 
-/** Offers a machine by the text of its file, and chooses it. */
+/** Adds a machine file to the menu, and selects it. */
 function offer(text) {
   const select = el("machine");
   if (![...select.options].some((option) => option.value === text)) {
@@ -184,7 +184,7 @@ function offer(text) {
   select.value = text;
 }
 
-/** Takes the machine that is chosen, or asks for its file. */
+/** Uses the selected machine, or asks for its file. */
 function useMachine() {
   if (el("machine").value === OWN) {
     el("machine").value = state.document?.machine ?? "t3";
@@ -214,7 +214,7 @@ async function open({ name, source, inputs, periods, machine: wanted }) {
   await opened;
 }
 
-/** The cycles and the bound, which are always in sight. */
+/** Cycles and bound in the summary, which is always visible. */
 function showCycles() {
   const { program, run } = state, out = el("cycles");
   out.replaceChildren();
@@ -236,7 +236,7 @@ function showCycles() {
     put(least === most ? `${most.toLocaleString("en")} cycles` : `${least.toLocaleString("en")} to ${most.toLocaleString("en")} cycles`, "b");
     put(` a period, in ${plural(run.cycles.length, "period")}${run.missed ? `, ${plural(run.missed, "deadline")} missed` : ""}`);
   } else if (run) put(`${plural(run.total, "cycle")}`, "b");
-  // A block that is a whole period has the scheduler's bound: no schedule takes fewer.
+  // A block that is a whole period has the scheduler's bound: no schedule takes fewer cycles.
   const whole = program.blocks.filter((block) => periods.some((section) => section.name === block.label));
   const schedule = whole.reduce((most, block) => (most && most.cycles >= block.cycles ? most : block), null);
   if (schedule) put(` · no schedule takes fewer than ${schedule.bound}`);
@@ -246,7 +246,7 @@ function showCycles() {
   if (program.inputs_of_others) put(` · all inputs are 0: ${program.inputs_of_others}`, "em");
 }
 
-/** Shows a program that was assembled. While one does not assemble, what is known of the text before stays, dimmed. */
+/** Shows an assembled program. While the text has errors, results of the previous text stay, dimmed. */
 function showProgram(program) {
   state.program = program;
   const { inputs_error: wrong } = program, whole = program.assembled && !wrong;
@@ -279,14 +279,14 @@ function showProgram(program) {
 
 const asked = () => ({ name: state.name, source: editor.text, machine: el("machine").value, inputs: table(), tick: Number(el("tick").value) || 0 });
 
-/** Assembles, with the breakpoints that there were. */
+/** Assembles, and sets the previous breakpoints again. */
 async function begin() {
   state.program = await machine.call("assemble", asked());
   await setStops();
   showProgram(state.program);
 }
 
-/** Runs what the machine's worker is asked for; a stop or an error is told. */
+/** Runs a job on the machine's worker; reports a stop or an error. */
 async function work(doing) {
   const mine = ++state.works;
   notice();
@@ -308,7 +308,7 @@ async function work(doing) {
   }
 }
 
-/** Assembles and runs; `told`: somebody asked for it, and is shown what stands in the way. */
+/** Assembles and runs; `told`: on the user's request, so report obstacles. */
 const assemble = (told = true) => work(async () => {
   const begun = performance.now();
   clearTimeout(state.soon);
@@ -323,7 +323,7 @@ const assemble = (told = true) => work(async () => {
   state.took = performance.now() - begun;
 }).then(() => (pipelineInStep(), driveFirst()));
 
-/** Assembles if the text has changed since. */
+/** Assembles if the text has changed. */
 async function current() {
   if (!state.stale && state.program?.assembled && !state.program.inputs_error) return true;
   state.stale = false;
@@ -380,7 +380,7 @@ function showView(view) {
   editor.stops = view.breaks.filter(({ file }) => file === state.name).map(({ line }) => line);
 }
 
-/** Tells a debugger that begins anew of the breakpoints that were set before; those whose line has no code now go. */
+/** Sets the breakpoints in a new debugger; drops those on lines without code. */
 async function setStops() {
   const lines = editor.stops;
   if (!state.program?.view) return;
@@ -408,7 +408,7 @@ function toggleStop(line) {
   });
 }
 
-/** Shows a file that the program includes, to be read. */
+/** Shows a file that the program includes, read-only. */
 async function showFile(name) {
   let source;
   try {
@@ -458,7 +458,7 @@ function draw() {
 /** File and line of a place, `pi.s:12` or `pi.s:12:3-9`. */
 const place = (text) => /^(.*?):(\d+)/.exec(text ?? "")?.slice(1, 3) ?? [null, 0];
 
-/** Marks the operations of a line of the source. */
+/** Marks the operations of a source line in the diagram. */
 function markPipeline(line, show) {
   if (state.tab !== "pipeline") return;
   pipeline.mark((operation) => {
@@ -467,7 +467,7 @@ function markPipeline(line, show) {
   }, show);
 }
 
-/** Shows the line of an operation that was clicked. */
+/** Shows the source line of a clicked operation. */
 async function reveal(operation) {
   const [file, line] = place(operation.place);
   if (!file) return;
@@ -476,13 +476,13 @@ async function reveal(operation) {
   if (view) view.dispatch({ selection: { anchor: view.state.doc.line(Math.min(Number(line), view.state.doc.lines)).from }, scrollIntoView: true });
 }
 
-// ---- Taking away.
+// ---- Downloads and links.
 
 async function link() {
   try {
     const fragment = await pack({ name: state.name, machine: el("machine").value, source: editor.text, inputs: table(), periods: periods() });
     history.replaceState(null, "", `#${fragment}`);
-    // Loaded again, the page shows this document.
+    // A reload shows this document.
     state.document.key = fragment;
     state.dirty = true;
     keep();
@@ -499,10 +499,10 @@ async function link() {
   }
 }
 
-/** Opens what the address says, beside what is there: a program in its fragment, an example; else what was there last. */
+/** Opens the program or example in the URL as an additional document; without one, the last document. */
 async function openAddress(first) {
   const examples = state.about.examples, { reloaded, last } = documents.last(), key = location.hash.slice(1);
-  // Of a page that is loaded again, what it showed: it may have been changed since it was opened.
+  // On a reload, show the page's document: it may have changed since it was opened.
   if (first && reloaded && (key === "" || reloaded.key === key)) return openDocument(reloaded);
   let program = null, complaint = null, from = "link";
   try {
@@ -538,7 +538,7 @@ const EDITOR_KEYS = [["Ctrl-Space", "complete"], ["F12", "to the definition"], [
 function pressed(event) {
   const name = [event.ctrlKey || event.metaKey ? "Mod" : "", event.altKey ? "Alt" : "", event.shiftKey ? "Shift" : "", event.key.length === 1 ? event.key.toLowerCase() : event.key].filter(Boolean).join("-");
   const found = KEYS.find(([key]) => key === name);
-  // A drive leaves room for other work.
+  // A drive permits other work.
   if (!found || (el("assemble").disabled && !drive.driving)) return;
   event.preventDefault();
   event.stopPropagation();
@@ -569,7 +569,7 @@ async function start() {
     const [file] = el("own").files;
     el("own").value = "";
     if (!file) return;
-    // A text of one line would be taken for a name.
+    // Without a line break, the text would be taken for a machine's name.
     offer(`${await file.text()}\n`);
     useMachine();
   });
@@ -625,7 +625,7 @@ async function start() {
   document.body.dataset.ready = "";
 }
 
-// For the tests: a bench of the closed loop, without drawing.
+// For tests: a benchmark of the closed loop without drawing.
 globalThis.takt = {
   async bench(periods) {
     await current();

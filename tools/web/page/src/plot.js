@@ -1,22 +1,22 @@
-// Values of ports over the periods, one chart below the other, with cursors that move in step.
+// Plots of port values over the periods, one chart below another, with synchronised cursors.
 import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
 
 const COLOURS = ["#2f6fbf", "#d9534f", "#5aa469", "#b07cd8", "#d98a1f", "#26a0a8", "#a3156b", "#8d6e63"];
-/** Curves that are shown at first. */
+/** Number of curves shown initially. */
 const SHOWN = 4;
-/** Pixels of a chart, at least and at most. */
+/** Minimal and maximal height of a chart in pixels. */
 const LOW = 96, HIGH = 420;
-/** A limit is drawn where the values come as near to it as this share of it. */
+/** A limit is drawn if a value reaches this fraction of it. */
 const NEAR = 0.4;
-/** Steps of an axis of counts. */
+/** Tick distances of an integer axis. */
 const WHOLE = [...Array(10).keys()].flatMap((power) => [1, 2, 5].map((step) => step * 10 ** power));
 
 const style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 const plural = (count, noun) => `${count.toLocaleString("en")} ${noun}${count === 1 ? "" : "s"}`;
 const isNumber = (value) => typeof value === "number";
 
-/** Runs of indices for which something holds: first and last of each. */
+/** Maximal runs of indices at which `holds` is true: first and last index of each. */
 function runs(length, holds) {
   const found = [];
   for (let i = 0; i < length; i++) {
@@ -27,14 +27,14 @@ function runs(length, holds) {
   return found;
 }
 
-/** Indices of numbers with none beside them, which no line shows. */
+/** Indices of isolated numbers, which a line does not show. */
 const alone = (values) => values.flatMap((value, i) => (isNumber(value) && !isNumber(values[i - 1]) && !isNumber(values[i + 1]) ? [i] : []));
 
 /**
- * A chart in a parent.
- * `x` are the values across, with a `name`, a `unit`, and a `label` if the axis is to have one; `curves` have `name`, `unit`, `values` and perhaps `limit`: values may be
- * `"NaN"`, `"inf"` and `"-inf"`, which are marked. `lines` are levels with a text. `sync` names charts whose cursors move together;
- * `picked` is called with the index where it is clicked.
+ * Creates a chart in a parent element.
+ * `x`: abscissa values with `name`, `unit`, and optional `label` of the axis. `curves`: each with `name`, `unit`, `values` and optional `limit`;
+ * the values `"NaN"`, `"inf"` and `"-inf"` are marked. `lines`: levels with a text. `sync`: key of charts with synchronised cursors.
+ * `picked` is called with the index of a clicked point.
  */
 export function chart(parent, { x, name: across, label, unit, curves, lines = [], height = () => 190, sync, picked }) {
   const axis = { stroke: style("--dim"), grid: { stroke: style("--edge"), width: 0.5 }, ticks: { stroke: style("--edge"), width: 0.5 }, labelSize: 17, labelGap: 0, labelFont: "12px system-ui, sans-serif", font: "11px system-ui, sans-serif" };
@@ -43,7 +43,7 @@ export function chart(parent, { x, name: across, label, unit, curves, lines = []
   const numbers = curves.flatMap((curve) => curve.values.filter(isNumber));
   const most = numbers.reduce((a, b) => Math.max(a, Math.abs(b)), 0);
   const limits = isNumber(limit) && most >= NEAR * limit ? [{ at: limit, text: `limit ${limit}${of ? ` ${of}` : ""}`, signed: true }, { at: -limit, text: `limit −${limit}${of ? ` ${of}` : ""}`, signed: true }] : [];
-  // Of the two signs of a limit those that the values come near.
+  // Of a symmetric limit, keep the sign that the values approach.
   const near = ({ at, signed }) => !signed || numbers.some((value) => Math.sign(value) === Math.sign(at) && Math.abs(value) >= NEAR * Math.abs(at));
   const levels = [...lines, ...limits].filter(near);
   const lost = runs(x.length, (i) => curves.some(({ values }) => values[i] !== null && !isNumber(values[i])));
@@ -94,7 +94,7 @@ export function chart(parent, { x, name: across, label, unit, curves, lines = []
   };
 }
 
-/** Levels as lines, and the periods in which a value is at its limit or is no number. */
+/** Draws levels as lines, and marks periods with a saturated or non-finite value. */
 function mark(plot, { x, levels, lost, saturated }) {
   const { ctx, bbox: { left, top, width, height } } = plot, ratio = devicePixelRatio || 1;
   const half = x.length > 1 ? (x[1] - x[0]) / 2 : 0.5;
@@ -124,13 +124,13 @@ function mark(plot, { x, levels, lost, saturated }) {
     ctx.moveTo(left, y);
     ctx.lineTo(left + width, y);
     ctx.stroke();
-    // Texts of levels that are near each other stand side by side.
+    // Labels of nearby levels are placed side by side.
     const before = levels.slice(0, i).filter((other) => Math.abs(plot.valToPos(other.at, "y", true) - y) < 13 * ratio);
     const inset = before.reduce((sum, other) => sum + ctx.measureText(other.text).width + 14 * ratio, 0);
     ctx.textAlign = "right";
     ctx.textBaseline = "alphabetic";
     ctx.setLineDash([]);
-    // Readable where a curve runs through it.
+    // Keep the label readable on a curve.
     ctx.strokeStyle = style("--bg");
     ctx.lineWidth = 3 * ratio;
     ctx.lineJoin = "round";
@@ -148,10 +148,10 @@ export class Plots {
     new ResizeObserver(() => this.size()).observe(parent.parentElement);
   }
 
-  /** Shows a run: columns of inputs and outputs by name, and cycles; the program has their units and limits. Without a run it says `why`. */
+  /** Shows a run: columns of inputs and outputs by name, and cycles; units and limits come from the program. Without a run, shows `why`. */
   show(run, program, why = "") {
     Object.assign(this, { run, program, why });
-    // In the order of their declaration.
+    // In declaration order.
     const ports = run ? [...(program?.outputs ?? []).map(({ name }) => ["out", name]), ...(program?.inputs ?? []).map(({ name }) => ["in", name])] : [];
     this.facts = new Map([...(program?.outputs ?? []).map((port) => [`out ${port.name}`, port]), ...(program?.inputs ?? []).map((port) => [`in ${port.name}`, port])]);
     this.choice.replaceChildren(...ports.map(([kind, name], i) => {
@@ -166,10 +166,10 @@ export class Plots {
     this.draw();
   }
 
-  /** The height of a chart: together they fill the panel, unless there are many. */
+  /** Height of a chart: the charts fill the panel, unless there are many. */
   height(count) {
     const panel = this.parent.parentElement, above = this.parent.offsetTop - panel.offsetTop;
-    // A chart's title, and the gap below it.
+    // Title of a chart, and the gap below it.
     const room = (panel.clientHeight - above - 16) / Math.max(1, count) - 32;
     return Math.round(Math.min(HIGH, Math.max(LOW, room)));
   }
@@ -197,13 +197,13 @@ export class Plots {
     this.charts.push(chart(this.parent, { x, name: "period", label: "period", curves: [{ name: "cycles", values: run.cycles, stepped: true }], lines: this.levels(), height, sync: "ports" }));
   }
 
-  /** Lines beside the cycles: the bound, the deadline. */
+  /** Levels in the chart of cycles: bound and deadline. */
   levels() {
     const { program, run } = this;
     const periods = program?.bounds?.filter((section) => !section.once) ?? [];
     const worst = periods.reduce((most, section) => Math.max(most, section.cycles.worst), 0);
     const lines = worst ? [{ at: worst, text: `at most ${worst}, whatever the inputs` }] : [];
-    // A deadline far above would flatten the curve.
+    // A distant deadline would flatten the curve.
     const tick = program?.tick;
     if (tick && tick <= 4 * run.longest) lines.push({ at: tick, text: `deadline ${tick}` });
     return lines;

@@ -1,15 +1,15 @@
-// The robot: three arms of changing length from a base triangle to the tool point, over a table that tilts and turns; and the path
-// that the tool has gone, large, beside it. Dragging turns, and the wheel brings nearer, what they are over.
+// The robot: three arms of variable length from a base triangle to the tool, over a table that tilts and turns; beside it, enlarged,
+// the tool's path. Dragging turns the scene under the pointer, and the wheel zooms it.
 
 const style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 const MS = 1000;
-/** The share of the width that the path has; radius of the table, m; pixels around a scene; the error that the founding paper allows while cutting, m. */
+/** Fraction of the width for the path; radius of the table, m; margin of a scene, pixels; error that the founding paper permits while cutting, m. */
 const PATH = 0.62, TABLE = 0.3, MARGIN = 14, ALLOWED = 10e-6;
-/** How the scenes are seen at first: turned about the vertical, from how far above, how near. The path so that its letters can be read. */
+/** Initial views: rotation about the vertical, elevation, zoom. The path faces the viewer, so that its letters are readable. */
 const VIEWS = { robot: { turn: 0.6, rise: 0.42, zoom: 1 }, path: { turn: 0, rise: -1.2, zoom: 1 } };
 
 export class Robot {
-  /** @param moved called with the pose that is shown; ended when playing comes to the end */
+  /** @param moved called with the displayed pose; ended called at the end of the replay */
   constructor(canvas, moved, ended) {
     Object.assign(this, { canvas, moved, ended, poses: [], shown: 0, playing: false, scenes: [] });
     this.reset();
@@ -89,7 +89,7 @@ export class Robot {
     if (this.poses.length) this.moved(this.poses[this.shown], this.shown);
   }
 
-  /** Moves at eight times its real speed. */
+  /** Replays at eight times real speed. */
   play(on) {
     this.playing = on;
     let last = performance.now(), rest = 0;
@@ -123,7 +123,7 @@ export class Robot {
     this.scenes = [];
     if (!this.base || !poses.length) return;
     this.look();
-    // The path is wider than high, and has most of the room: beside the robot, or half of it above where there is little width.
+    // The path is wider than high, and gets most of the room: beside the robot, or in a narrow panel the upper half.
     const beside = width >= 520, across = Math.round(width * PATH), down = height / 2;
     if (beside) {
       this.scene(g, "path", 0, 0, across, height);
@@ -148,13 +148,13 @@ export class Robot {
     g.clip();
     const { turn, rise, zoom } = this.views[name];
     const [ct, st, cr, sr] = [Math.cos(turn), Math.sin(turn), Math.cos(rise), Math.sin(rise)];
-    // z goes down from the base, as the arms do.
+    // The z axis points down from the base, along the arms.
     const flat = ([x, y, z]) => [x * ct - y * st, z * cr + (x * st + y * ct) * sr];
     const all = (name === "robot" ? this.whole() : this.corners()).map(flat);
     const [across, down] = [0, 1].map((i) => all.map((point) => point[i]));
     const [low, high] = [[Math.min(...across), Math.min(...down)], [Math.max(...across), Math.max(...down)]];
     const fits = Math.min((wide - 2 * MARGIN) / Math.max(high[0] - low[0], 1e-3), (tall - 2 * MARGIN - 18) / Math.max(high[1] - low[1], 1e-3));
-    // Brought nearer, the tool stays in sight.
+    // A zoomed view stays centred on the tool.
     const [, ...tool] = this.poses[this.shown], near = Math.min(1, (zoom - 1) / 2), focus = flat(tool);
     const centre = [0, 1].map((i) => (zoom > 1 ? ((low[i] + high[i]) / 2) * (1 - near) + focus[i] * near : (low[i] + high[i]) / 2));
     const at = (point) => flat(point).map((value, i) => (i ? top + tall / 2 + 8 : left + wide / 2) + (value - centre[i]) * fits * zoom);
@@ -170,18 +170,18 @@ export class Robot {
     g.restore();
   }
 
-  /** What the whole robot takes up, however its table is tilted. */
+  /** Outline of the whole robot, for any tilt of its table. */
   whole() {
     return [...this.base.map(([x, y]) => [x, y, 0]), ...this.circle(0.5), ...this.circle(-0.5)];
   }
 
-  /** The box around the path so far. */
+  /** Corners of the box around the path so far. */
   corners() {
     const { low, high } = this.box;
     return [0, 1, 2, 3, 4, 5, 6, 7].map((i) => [0, 1, 2].map((axis) => ((i >> axis) & 1 ? high[axis] : low[axis])));
   }
 
-  /** The table: a disc below the lowest tool point so far, tilted about x, turned about its axis. */
+  /** The table: a disc below the lowest tool point so far, tilted about x and turned about its axis. */
   disc(r, a, tilt) {
     const [u, v] = [r * Math.cos(a), r * Math.sin(a)];
     return [u, v * Math.cos(tilt), this.box.high[2] + 0.03 + v * Math.sin(tilt)];
@@ -220,7 +220,7 @@ export class Robot {
     }
   }
 
-  /** Widens the box around the path by the poses that came. */
+  /** Extends the box around the path by the new poses. */
   look() {
     for (; this.looked < this.poses.length; this.looked++) {
       const [, ...pose] = this.poses[this.looked], { low, high } = this.box;
@@ -228,7 +228,7 @@ export class Robot {
     }
   }
 
-  /** The path so far: cutting moves strong, and in the colour of mistakes where the tool is further off than it may. */
+  /** Path so far: cutting moves strong, and in the error colour where the tool error exceeds the permitted one. */
   path(g, at, weight) {
     const strokes = [[(pose) => pose[7] !== 1, style("--dim"), 1], [(pose) => pose[7] === 1, style("--accent"), weight], [(pose) => pose[7] === 1 && Math.abs(pose[6]) > ALLOWED, style("--bad"), weight + 2]];
     for (const [drawn, colour, wide] of strokes) {

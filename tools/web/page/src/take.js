@@ -1,4 +1,4 @@
-// What can be taken away: source, image, listing, circuit, headers.
+// Downloads: source, image, listing, circuit, headers.
 import { zipSync, strToU8 } from "fflate";
 
 function save(name, content, type) {
@@ -9,7 +9,7 @@ function save(name, content, type) {
   setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
 }
 
-/** The function that saves one of these by its name; the arguments are as in main.js. */
+/** Function that saves a download by name; for the arguments see main.js. */
 export function taker({ machine, work, current, state, editor }) {
   const stem = () => state.name.replace(/\.s$/, "");
   return (what) => {

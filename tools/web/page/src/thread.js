@@ -1,4 +1,4 @@
-// A worker with answers as promises, which can be stopped and begun again.
+// A worker with promises as answers, which can be stopped and restarted.
 
 /** The compiled WebAssembly: fetched once, shared by the workers. */
 export async function load(url) {
@@ -6,7 +6,7 @@ export async function load(url) {
   if (!answer.ok) throw new Error(`${url} cannot be had: ${answer.status} ${answer.statusText}`);
   let bytes = await answer.arrayBuffer();
   const head = new Uint8Array(bytes, 0, 2);
-  // Compressed, unless the server has said so and the browser has undone it.
+  // Decompress, unless the server declared the encoding and the browser has decompressed already.
   if (head[0] === 0x1f && head[1] === 0x8b) {
     const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
     bytes = await new Response(stream).arrayBuffer();
@@ -51,7 +51,7 @@ export class Thread {
     });
   }
 
-  /** Ends what it does; what it knew is gone. */
+  /** Terminates the worker; its state is lost. */
   stop(why = "stopped") {
     this.worker.terminate();
     const waiting = [...this.waiting.values()];

@@ -1,9 +1,9 @@
-// A playground in a thread of its own: requests come in, answers go out, in order. The page makes two, one for the language
-// server and one for the machine, so that neither keeps the page or the other waiting.
+// A playground in its own thread: answers requests in order. The page has two, for the language server and for the machine, so that
+// neither blocks the page or the other.
 
 let takt;
 
-/** Asks the WebAssembly (`tools/web/src/exports.rs`): what goes in and comes out are bytes. */
+/** Calls the WebAssembly (`tools/web/src/exports.rs`), with bytes in and out. */
 function ask(request, call) {
   const bytes = new TextEncoder().encode(request);
   const at = takt.takt_input(bytes.length);
@@ -15,7 +15,7 @@ function ask(request, call) {
 const ready = new Promise((resolve, reject) => {
   self.addEventListener("message", async ({ data }) => {
     if (data.module) {
-      // It asks nothing of its host: an import would be a mistake of the build, and fails here.
+      // The module has no imports: one would be a mistake of the build, and fails here.
       WebAssembly.instantiate(data.module, {}).then(({ exports }) => resolve((takt = exports)), reject);
       return;
     }
@@ -30,7 +30,7 @@ const ready = new Promise((resolve, reject) => {
         self.postMessage(error === undefined ? { id, ok } : { id, error });
       }
     } catch (error) {
-      // A defect of ours: whoever asked is told, and starts another.
+      // A defect in Takt: report it to the caller, which starts another worker.
       self.postMessage({ id, error: `a defect in Takt: ${error.message ?? error}`, broken: true });
     }
   });

@@ -8,7 +8,7 @@ import { chromium } from "playwright-core";
 
 const SITE = process.env.TAKT_BOOK;
 const TYPES = { ".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml" };
-/** A browser on a busy machine; ms. */
+/** Time limit in a browser on a busy machine; ms. */
 const PATIENCE = 120_000;
 
 let server, browser, page, address;
@@ -63,7 +63,7 @@ test("every listing opens in the playground by a click, and assembles there", li
   });
   assert.ok(listings.length > 5, `${listings.length} listings`);
   const done = () => page.waitForFunction(() => document.body.dataset.ready !== undefined && !document.getElementById("assemble").disabled);
-  // The first by its link, as a reader does; the others in the same page.
+  // The first listing by its link, as a reader opens it; the others in the same page.
   await page.goto(address + listings[0].name);
   const book = page;
   [page] = await Promise.all([book.context().waitForEvent("page"), book.locator(".playground-link").first().click()]);

@@ -11,14 +11,14 @@ import { chromium } from "playwright-core";
 const FOLDER = process.env.TAKT_PAGE;
 const TYPES = { ".html": "text/html", ".js": "text/javascript", ".css": "text/css" };
 const PROGRAMS = join(import.meta.dirname, "../../../../programs");
-/** A browser on a busy machine; ms. */
+/** Time limit in a browser on a busy machine; ms. */
 const PATIENCE = 120_000;
 
 let server, browser, address, requests = [];
 
 before(async () => {
   assert.ok(FOLDER, "TAKT_PAGE says where the page is: `cargo xtask web --test` sets it");
-  // A file server and nothing else, which knows neither WebAssembly nor compression.
+  // A bare file server, without knowledge of WebAssembly or compression.
   server = createServer((request, response) => {
     const path = normalize(new URL(request.url, "http://x").pathname).replace(/^\/$/, "/index.html");
     const file = join(FOLDER, path);
@@ -37,13 +37,13 @@ after(async () => {
   server?.close();
 });
 
-// What one page computes would slow the next one down.
+// Work of one page would slow down the next.
 const contexts = [];
 afterEach(async () => {
   for (const context of contexts.splice(0)) await context.close();
 });
 
-/** A fresh page at an address behind `#`; it fails if the page's code does. */
+/** Opens a new page with a URL fragment; errors in the page's code fail the test. */
 async function open(fragment = "", options = {}) {
   const context = await browser.newContext({ viewport: { width: 1400, height: 900 }, acceptDownloads: true, ...options });
   contexts.push(context);
@@ -62,7 +62,7 @@ const cycles = (page) => page.textContent("#cycles");
 const link = (program) => "#p1=" + deflateSync(JSON.stringify(program)).toString("base64url");
 const example = (name) => readFile(join(PROGRAMS, "examples", name), "utf8");
 
-/** Types a text in place of the one there. */
+/** Replaces the text in the editor by typing. */
 async function write(page, text) {
   await page.click(".cm-content");
   await page.keyboard.press("Control+a");
@@ -80,7 +80,7 @@ test("the integrator assembles and runs when the page opens, coloured by the lan
   const { page, errors } = await open();
   await done(page);
   assert.match(await cycles(page), /pi\.s on t3: 38 cycles a period, in \d+ periods · no schedule takes fewer than 38/);
-  // Whatever colours there are come from the server; a second lexer in the page would be found here.
+  // All colours come from the server; a second lexer in the page would fail here.
   await page.waitForSelector(".tok-function");
   const instruction = await page.textContent(".tok-function");
   assert.match(instruction, /^[a-z]\w*$/);
@@ -89,7 +89,7 @@ test("the integrator assembles and runs when the page opens, coloured by the lan
   assert.match((await page.locator(".lens").allTextContents()).join("\n"), /38 cycles/);
   await page.click("#tab-plot");
   await page.waitForSelector("#charts canvas");
-  // The curve is there, not only its axes: pixels of its colour.
+  // The curve itself is drawn, not only its axes: look for pixels of its colour.
   await page.waitForFunction(() => {
     const canvas = document.querySelector("#charts canvas");
     const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
@@ -116,7 +116,7 @@ test("diagnostics, a fix, hover and completion are the language server's", limit
   await page.click("#assemble");
   await page.waitForFunction(() => /cycles a period/.test(document.getElementById("cycles").textContent));
   await page.waitForSelector(".tok-function");
-  // As a hand does that does not get an answer at once: over a text that was just read again there is none.
+  // Move the pointer again until an answer comes: over a text that was just read there is none.
   while (!(await page.locator(".cm-tooltip-hover").count())) {
     await page.mouse.move(0, 0);
     await page.hover(".tok-function");
@@ -153,7 +153,7 @@ test("keyboard only: step on and back, and a command", limit, async () => {
     await done(page);
     assert.equal(await head(), seen[i], "back is exactly where it was");
   }
-  // From the commands by Tab to the panel, by arrows between tabs.
+  // By Tab from the commands to the panel, by arrows between tabs.
   await page.keyboard.press("Control+Alt+c");
   await page.keyboard.type("goto period 3");
   await page.keyboard.press("Enter");
@@ -175,13 +175,13 @@ test("breakpoints are set by a click and by F9, stay where they are written, and
   const { page, errors } = await open();
   await done(page);
   const stops = () => page.evaluate(() => takt.stops);
-  // In the gutter, beside the line that issues first.
+  // Click in the gutter, beside the line that issues first.
   await page.locator(".cm-arrow .cm-gutterElement:visible", { hasText: "▶" }).click();
   await page.waitForFunction(() => takt.stops.length === 1);
   const [first] = await stops();
   await page.click(".cm-content");
   await page.keyboard.press("Control+Home");
-  // The first line is a comment: no code, and a message that says so.
+  // The first line is a comment: no code, and a message.
   await page.keyboard.press("F9");
   await page.waitForSelector("#notice:visible");
   assert.match(await page.textContent("#notice"), /line 1 of pi\.s has no instruction; the next line with one is \d+/);
@@ -248,8 +248,8 @@ test("a loop without end stops at a named limit, and the page answers meanwhile"
   await page.evaluate(() => document.querySelector("[data-step=continue]").click());
   assert.equal(await page.evaluate(() => 1 + 1), 2);
   await done(page);
-  // Stopping loses nothing of the text.
-  // In the page, so that it does not end before a test on a busy machine has come to stop it.
+  // Stopping preserves the text.
+  // Run inside the page, so that the work does not end before a test on a busy machine stops it.
   assert.equal(await page.evaluate(async () => {
     document.querySelector("[data-step=continue]").click();
     await new Promise((resolve) => setTimeout(resolve, 30));
@@ -319,7 +319,7 @@ test("the pipeline is drawn for the machine that is chosen; a click leads to the
   await page.click("#tab-pipeline");
   await page.waitForFunction(() => /pi\.s on t3, period 2: 38 cycles/.test(document.getElementById("drawn").textContent));
   assert.ok((await page.locator(".tp-issue").count()) > 10);
-  // The longest chain runs through operations, not through whole bundles: something beside it is not on it.
+  // The longest chain consists of operations, not of whole bundles: others in its bundles are not on it.
   const [critical, all] = [await page.locator(".tp-on-chain").count(), await page.locator(".tp-label").count()];
   assert.ok(critical > 3 && critical < all, `${critical} of ${all}`);
   assert.match((await page.locator(".tp-legend span").allTextContents()).join("; "), /multiply \d+; .*longest chain/);
@@ -329,7 +329,7 @@ test("the pipeline is drawn for the machine that is chosen; a click leads to the
   assert.equal(await page.locator(".cm-activeLineGutter").first().textContent(), String(line));
   await page.evaluate((line) => takt.goTo(line), line - 1);
   await page.waitForFunction(() => /fadd v, p, s/.test(document.querySelector(".tp-marked")?.textContent ?? ""));
-  // One of the rows is a stop of the tab key, and arrows go on from it.
+  // The tab key stops at one row, and the arrows move from there.
   const stops = () => page.locator(".tp-label[tabindex='0']").evaluateAll((rows) => rows.map((row) => Number(row.dataset.row)));
   assert.equal((await stops()).length, 1);
   await page.locator(".tp-label[tabindex='0']").focus();
@@ -337,7 +337,7 @@ test("the pipeline is drawn for the machine that is chosen; a click leads to the
   await page.keyboard.press("ArrowDown");
   assert.deepEqual(await stops(), [at + 1]);
   assert.equal(await page.evaluate(() => Number(document.activeElement.dataset.row)), at + 1);
-  // Zoom, and labels that leave the chart its room.
+  // Zoom, and labels that leave room for the chart.
   const column = () => page.locator(".tp-issue").first().evaluate((box) => Number(box.getAttribute("width")));
   const before = await column();
   await page.click(".tp-tools button[title^=Wider]");
@@ -382,10 +382,10 @@ test("what no longer holds is dimmed at once, and computed again", limit, async 
   await page.keyboard.type("x");
   assert.ok((await opacity("#cycles")) < 0.5, "the cycles are of the text before");
   assert.ok((await opacity("#step .columns")) < 0.5);
-  // Nobody asks for it.
+  // The page recomputes by itself.
   await page.waitForFunction(() => !document.body.classList.contains("stale"));
   assert.match(await cycles(page), /38 cycles a period/);
-  // With a mistake in it, what was known stays and stays dimmed, and the mistake is told.
+  // With a mistake in the text, results stay dimmed, and the mistake is reported.
   await page.keyboard.press("Enter");
   await page.keyboard.type("  fad e, e, e");
   await page.waitForFunction(() => /does not assemble: line 2: .*fad/.test(document.getElementById("cycles").textContent));
@@ -398,7 +398,7 @@ test("what no longer holds is dimmed at once, and computed again", limit, async 
   await page.waitForFunction(() => document.getElementById("cycles").classList.contains("now"));
   await page.keyboard.press("Control+a");
   await page.keyboard.insertText(await example("foc.s"));
-  // The inputs are still the other program's: it runs with zeros, and says so.
+  // The inputs belong to another program: the run uses zeros, and says so.
   await page.waitForFunction(() => /pi\.s on t3: \d.* · all inputs are 0: inputs: no column for the input ports ia/.test(document.getElementById("cycles").textContent) && !document.body.classList.contains("stale"));
   assert.match(await page.textContent("#text"), /table of inputs is for other ports/);
   await page.click("#tab-inputs");
@@ -412,7 +412,7 @@ test("the pipeline and its heading are dimmed once while they are of another pro
   await done(page);
   await page.click("#tab-pipeline");
   await page.waitForFunction(() => /pi\.s on t3, period 2: 38 cycles/.test(document.getElementById("drawn").textContent));
-  // What is seen of a thing: the opacities of all that it is part of.
+  // Effective opacity of an element: the product over its ancestors.
   const seen = (selector) => page.evaluate((selector) => {
     let product = 1;
     for (let one = document.querySelector(selector); one; one = one.parentElement) product *= Number(getComputedStyle(one).opacity);
@@ -426,7 +426,7 @@ test("the pipeline and its heading are dimmed once while they are of another pro
     for (const [i, part] of (await all()).entries()) assert.ok(part > 0.3 && part < 0.5, `${why}: ${parts[i]} has ${part}`);
     assert.equal(await seen("#draw"), 1, why);
   };
-  // In one go, so that nothing is drawn again before it is looked at.
+  // In a single step, so that nothing is redrawn before the check.
   const changed = await page.evaluate(() => {
     const machine = document.getElementById("machine");
     machine.value = "t1";
@@ -436,7 +436,7 @@ test("the pipeline and its heading are dimmed once while they are of another pro
   assert.ok(changed.every((opacity) => opacity < 0.5), `${changed}: the machine is another one`);
   await page.waitForFunction(() => /pi\.s on t1/.test(document.getElementById("drawn").textContent));
   assert.deepEqual(await all(), [1, 1, 1]);
-  // The picture is out of sight while the program changes, and is then looked at with a mistake in the text.
+  // The diagram is hidden while the program changes, and then shown with a mistake in the text.
   await page.click("#tab-step");
   await page.selectOption("#machine", "t3");
   await page.waitForFunction(() => takt.state.run && /on t3/.test(document.getElementById("cycles").textContent));
@@ -448,7 +448,7 @@ test("the pipeline and its heading are dimmed once while they are of another pro
   await page.click("#tab-pipeline");
   await dimmed("a mistake in the text, and a picture of the machine before");
   await shot(page, "pipeline-stale");
-  // Of a text that never assembled there is no picture, and the words are of this text.
+  // A text that never assembled has no diagram, and the message is about this text.
   await page.evaluate((hash) => (location.hash = hash), link({ name: "a.s", machine: "t3", source: "start:\n    fmull y, x, x\n" }));
   await page.waitForFunction(() => /The program does not assemble/.test(document.getElementById("drawn").textContent));
   assert.equal(await seen("#drawn"), 1);
@@ -463,7 +463,7 @@ test("plots have units, limits and what is no number; without numbers they say w
   assert.match(await page.locator(".chart-head").first().textContent(), /^u, Vat its limit in \d+ periods$/);
   const fills = await page.evaluate(() => [document.getElementById("charts").getBoundingClientRect().bottom, document.getElementById("plot").getBoundingClientRect().bottom]);
   assert.ok(fills[1] - fills[0] < 60, `the charts end at ${fills[0]}, the panel at ${fills[1]}`);
-  // The cursors of all charts move in step.
+  // Cursors of all charts are synchronised.
   await page.locator(".u-over").first().hover();
   await page.waitForFunction(() => {
     const told = [...document.querySelectorAll(".chart-head .at")].map((one) => one.textContent.split(":")[0]);
@@ -511,7 +511,7 @@ test("a number between infinities is seen, and cycles have no halves", limit, as
     for (let i = 0; i < data.length; i += 4) if (data[i] === 0x2f && data[i + 1] === 0x6f && data[i + 2] === 0xbf) return true;
     return false;
   });
-  // The only chart with values of two digits is that of the cycles; periods are whole anyway.
+  // The chart of cycles is the only one with two-digit values; periods are integers anyway.
   const halves = await page.evaluate(() => [...window.written].filter((text) => /^\d\d\.\d/.test(text)));
   assert.deepEqual(halves, []);
   assert.deepEqual(errors, []);
@@ -523,7 +523,7 @@ test("links and examples open beside what one has written", limit, async () => {
   await write(page, ".output y\n.period\nmine:\n    mov y, one\n.const one = 1\n    wait mine\n");
   await page.waitForFunction(() => !document.body.classList.contains("stale") && takt.state.program?.assembled);
   const mine = await page.evaluate(() => takt.text);
-  // In another page of the same browser, as the book opens it.
+  // In another page of the same browser, as opened by the book.
   const other = await context.newPage();
   other.setDefaultTimeout(PATIENCE);
   await other.goto(address + link({ name: "theirs.s", machine: "t1", source: await example("blink.s") }));
@@ -534,7 +534,7 @@ test("links and examples open beside what one has written", limit, async () => {
   await shot(other, "documents");
   await other.locator("#notice button", { hasText: "Back to" }).click();
   await other.waitForFunction((mine) => takt.text === mine, mine);
-  // The first page goes on: neither overwrites the other.
+  // The first page continues: neither overwrites the other.
   await page.click(".cm-content");
   await page.keyboard.press("Control+End");
   await page.keyboard.type("; more");
@@ -543,7 +543,7 @@ test("links and examples open beside what one has written", limit, async () => {
   await other.waitForFunction(() => /lamp/.test(takt.text));
   await other.locator("#documents button", { hasText: "pi.s" }).first().click();
   await other.waitForFunction(() => takt.text.endsWith("; more"));
-  // An example does not replace it either; loaded again, the page shows what it showed.
+  // An example does not replace the document either; a reload shows the same document.
   await page.selectOption("#example", "foc.s");
   await page.waitForFunction(() => /foc\.s on/.test(document.getElementById("cycles").textContent));
   await page.reload();
@@ -552,7 +552,7 @@ test("links and examples open beside what one has written", limit, async () => {
   await page.locator("#documents button", { hasText: "pi.s" }).first().click();
   await page.waitForFunction((mine) => takt.text === `${mine}; more`, mine);
   await done(page);
-  // Closing one can be undone.
+  // Closing a document can be undone.
   await page.locator("#documents .here .close").click();
   await page.waitForFunction(() => !/mine/.test(takt.text));
   await page.locator("#notice button", { hasText: "Undo" }).click();
@@ -635,14 +635,14 @@ test("an example shows what it does when it is chosen, in the tab where one is",
   assert.equal(await page.evaluate(() => takt.state.tab), "robot");
   await page.waitForFunction(() => /^[1-9].* of path/.test(document.getElementById("drove").textContent));
   assert.ok((await page.evaluate(() => takt.drive.robot.poses.length)) > 10);
-  // Another machine in the middle of a drive: it ends, and is not begun again by itself.
+  // Another machine in the middle of a drive ends it, without a restart.
   await page.selectOption("#machine", "t4");
   await page.waitForFunction(() => /tracking\.s on t4: \d/.test(document.getElementById("cycles").textContent) && takt.state.run);
   await done(page);
   assert.equal(await page.evaluate(() => takt.drive.driving), false);
-  // It is the example still.
+  // The document is still the example.
   assert.match(await page.locator("#documents .here small").textContent(), /^example$/);
-  // Who goes to another tab meanwhile stays there.
+  // A user who switches tabs meanwhile stays there.
   await page.evaluate(() => {
     const example = document.getElementById("example");
     example.value = "tracking.s";
@@ -652,7 +652,7 @@ test("an example shows what it does when it is chosen, in the tab where one is",
   await page.waitForFunction(() => /tracking\.s on t[34], period 2/.test(document.getElementById("drawn").textContent));
   await done(page);
   assert.equal(await page.evaluate(() => takt.state.tab), "pipeline");
-  // A lamp that blinks does so in the periods that it is run.
+  // A blinking lamp blinks within the default number of periods.
   await page.selectOption("#example", "blink.s");
   await page.waitForFunction(() => takt.state.name === "blink.s" && takt.state.run?.cycles.length > 20);
   const lit = await page.evaluate(() => takt.state.run.outputs.lamp);

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Listings in colour: the language server's answers, as classes of a style sheet.
+//! Syntax colours of listings: the language server's tokens as CSS classes.
 
 use lsp_server::{Message, Notification, Request};
 use serde_json::{Value, json};
 use std::fmt::Write;
 use takt_editor::lsp::{Inline, Settings};
 
-/// The language server's kinds of words that have a colour. Registers have none, as most words are registers.
+/// Coloured token types of the language server. Registers stay uncoloured, since most words are registers.
 const KINDS: [&str; 10] = [
     "keyword",
     "function",
@@ -20,7 +20,7 @@ const KINDS: [&str; 10] = [
     "comment",
 ];
 
-/// The colours of the kinds, in light and in dark themes: those of the playground.
+/// Colours of the token types in light and dark themes, as in the playground.
 pub(super) const CSS: &str = "\
 code.language-takt { --keyword: #8a3ffc; --function: #1f5fae; --property: #00695c; --number: #9a4a00; --string: #2e7d32; --comment: #697386; --label: #a3156b; }
 :is(.navy, .coal, .ayu) code.language-takt { --keyword: #c4a5ff; --function: #82b6f5; --property: #6fd3c1; --number: #f0b070; --string: #8fce93; --comment: #8d98aa; --label: #ff9dcb; }
@@ -29,10 +29,10 @@ code.language-takt { --keyword: #8a3ffc; --function: #1f5fae; --property: #00695
 .takt-comment { color: var(--comment); font-style: italic; } .takt-parameter { font-style: italic; }
 ";
 
-/// A word of a line: its first byte, its bytes, its kind.
+/// Token of a line: first byte, length in bytes, type.
 type Word = (usize, usize, &'static str);
 
-/// The coloured words of each line of a program; none where the language server does not answer.
+/// Coloured tokens of each line of a program; empty if the language server does not answer.
 fn words(program: &str) -> Vec<Vec<Word>> {
     let mut server = Inline::new(Settings { library: takt_programs::LIBRARY, ..Settings::default() });
     let capabilities = json!({
@@ -83,7 +83,7 @@ fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
-/// A listing as HTML. `shown` are lines of `program`, in its order, and lines that stand for others.
+/// Listing as HTML. `shown` consists of lines of `program`, in order, and of placeholder lines.
 pub(super) fn html(shown: &str, program: &str) -> String {
     let words = words(program);
     let lines: Vec<&str> = program.lines().collect();
@@ -115,7 +115,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn words_have_their_kinds_and_nothing_is_lost() {
+    fn highlighting_classifies_words_and_keeps_the_text() {
         let program = ".input x\n.output y\n.period\nperiod: fmul y, x, 2\n    wait period ; a < b\n";
         let html = html("...\nperiod: fmul y, x, 2\n    wait period ; a < b\n", program);
         assert!(html.contains("<span class=\"takt-comment\">; a &lt; b</span>"), "{html}");

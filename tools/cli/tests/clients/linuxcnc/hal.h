@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-// As much of LinuxCNC's hal.h as hal_takt.c needs: pins are found by their names.
+// Subset of LinuxCNC's hal.h for hal_takt.c, with pins found by name.
 #ifndef HAL_H
 #define HAL_H
 #include <stdint.h>

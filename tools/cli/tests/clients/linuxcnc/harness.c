@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-// LinuxCNC's component without LinuxCNC: moves the robot's first axis by a way, and prints what the component's pins say in the end.
+// Runs LinuxCNC's component without LinuxCNC: moves the robot's first axis a distance, and prints the component's pins at the end.
 //
-//   harness PORT BAUD TIMEOUT
+//   harness PORT BAUD TIMEOUT [PARAMETER=VALUE]...
 
 #include <stdarg.h>
 #include <stdlib.h>
@@ -24,7 +24,7 @@ int hal_export_funct(const char *name, hal_function function, void *argument, in
     (void)name, (void)function, (void)argument, (void)is_float, (void)is_reentrant, (void)id;
     return 0;
 }
-// The pins are reached by the component's own pointers.
+// Pins are accessed through the component's own pointers.
 #define PIN(kind) \
     int hal_pin_##kind##_newf(int way, hal_##kind##_t **pin, int id, const char *format, ...) { \
         (void)way, (void)id, (void)format; \
@@ -38,18 +38,43 @@ int hal_param_float_newf(int way, hal_float_t *pin, int id, const char *format, 
     return 0;
 }
 
-// mm, and ms.
+// A parameter, as `loadrt` gives it.
+static void set(char *text) {
+    struct { const char *name; char **string; int *number; } all[] = {
+        {"joints", &joints, NULL}, {"counts", &counts, NULL}, {"geometry", &geometry, NULL}, {"cores", NULL, &cores},
+        {"encoders", NULL, &encoders}, {"measured", NULL, &measured}, {"fifo", NULL, &fifo}, {"every", NULL, &every},
+        {"servo", NULL, &servo},
+    };
+    char *value = strchr(text, '=');
+    if (!value) exit(2);
+    *value++ = 0;
+    for (unsigned i = 0; i < sizeof all / sizeof *all; i++)
+        if (strcmp(all[i].name, text) == 0) {
+            if (all[i].string) *all[i].string = value;
+            else *all[i].number = (int)strtol(value, NULL, 0);
+            return;
+        }
+    fprintf(stderr, "no parameter %s\n", text);
+    exit(2);
+}
+
+// Distance in mm, and duration in ms.
 static const double WAY = 5;
 enum { MOVE = 200, STAY = 20 };
 
 int main(int count, char **arguments) {
-    double start[AXES], largest = 0;
-    if (count != 4) return 2;
+    double start[MOST], largest = 0;
+    if (count < 4) return 2;
     port = arguments[1];
     baud = atoi(arguments[2]);
     timeout = atoi(arguments[3]);
+    for (int i = 4; i < count; i++) set(arguments[i]);
     if (rtapi_app_main()) return 1;
-    for (int i = 0; i < AXES; i++) {
+    printf("starts");
+    for (int i = 0; i < axes; i++) printf(" %.4f", *hal->feedback[i]);
+    printf("\n");
+    if (strcmp(geometry, "direct") == 0) return 0;
+    for (int i = 0; i < axes; i++) {
         *hal->position[i] = start[i] = *hal->feedback[i];
         hal->limit[i] = 1;
     }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-// As much of LinuxCNC's rtapi.h as hal_takt.c needs, for a program that calls the component without LinuxCNC.
+// Subset of LinuxCNC's rtapi.h for hal_takt.c, in a program that calls the component without LinuxCNC.
 #ifndef RTAPI_H
 #define RTAPI_H
 #define RTAPI_MSG_ERR 1

@@ -17,6 +17,7 @@
 (const_directive name: (identifier) @constant)
 (cast type: (identifier) @type)
 (declaration type: (identifier) @type)
+(macro_definition type: (identifier) @type)
 (call function: (identifier) @function.builtin (#any-of? @function.builtin "sqrt" "sin" "cos" "tan" "atan2" "asin" "acos" "exp" "log" "abs" "min" "max" "floor" "ceil" "round" "int" "float" "xor" "bits"))
 
 ([

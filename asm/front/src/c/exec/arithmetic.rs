@@ -1,0 +1,417 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Operators on numbers and pointers.
+
+use super::Exec;
+use crate::Error;
+use crate::c::ir::{Id, Op};
+use crate::c::types::{INT, Integer, Type};
+use crate::c::value::{Condition, Pointer, Typed, Value};
+use lang_c::ast::BinaryOperator as B;
+
+/// The operator of a compound assignment.
+pub(super) fn of_assignment(operator: &B) -> Option<B> {
+    Some(match operator {
+        B::AssignMultiply => B::Multiply,
+        B::AssignDivide => B::Divide,
+        B::AssignModulo => B::Modulo,
+        B::AssignPlus => B::Plus,
+        B::AssignMinus => B::Minus,
+        B::AssignShiftLeft => B::ShiftLeft,
+        B::AssignShiftRight => B::ShiftRight,
+        B::AssignBitwiseAnd => B::BitwiseAnd,
+        B::AssignBitwiseXor => B::BitwiseXor,
+        B::AssignBitwiseOr => B::BitwiseOr,
+        _ => return None,
+    })
+}
+
+impl Exec<'_> {
+    /// `a operator b`, except for assignments, `&&` and `||`.
+    pub(super) fn arithmetic(&mut self, operator: &B, a: Typed, b: Typed) -> Result<Typed, Error> {
+        let pointers = matches!(a.ty, Type::Pointer(_)) || matches!(b.ty, Type::Pointer(_));
+        match operator {
+            B::Plus | B::Minus if pointers => self.pointer_sum(operator, a, b),
+            B::Equals | B::NotEquals | B::Less | B::LessOrEqual | B::Greater | B::GreaterOrEqual => {
+                let (op, swapped, negated) = match operator {
+                    B::Equals => (Op::IntEqual, false, false),
+                    B::NotEquals => (Op::IntEqual, false, true),
+                    B::Less => (Op::IntLess, false, false),
+                    B::Greater => (Op::IntLess, true, false),
+                    B::LessOrEqual => (Op::LessEqual, false, false),
+                    _ => (Op::LessEqual, true, false),
+                };
+                let (a, b) = if swapped { (b, a) } else { (a, b) };
+                let condition = self.compared(op, a, b)?;
+                let condition = if negated { self.not(condition)? } else { condition };
+                Ok(Typed { ty: Type::Int(INT), value: self.value_of(condition) })
+            }
+            B::ShiftLeft | B::ShiftRight => self.shifted(operator, a, b),
+            _ => {
+                self.arithmetic_types(&a.ty, &b.ty)?;
+                let ty = Self::common(&a.ty, &b.ty);
+                let (a, b) = (self.converted(a, &ty)?, self.converted(b, &ty)?);
+                let value = match ty {
+                    Type::Int(integer) => self.integers(operator, integer, a, b)?,
+                    _ => self.reals(operator, &ty, a, b)?,
+                };
+                Ok(Typed { ty, value })
+            }
+        }
+    }
+
+    fn arithmetic_types(&self, a: &Type, b: &Type) -> Result<(), Error> {
+        for ty in [a, b] {
+            if !matches!(ty, Type::Int(_) | Type::Float | Type::Double) {
+                return self.fail(format!("{} is no operand of this operator", self.structs.shown(ty)));
+            }
+        }
+        Ok(())
+    }
+
+    fn reals(&mut self, operator: &B, ty: &Type, a: Value, b: Value) -> Result<Value, Error> {
+        if let (Value::Real(a), Value::Real(b)) = (&a, &b) {
+            let single = *ty == Type::Float;
+            let (x, y) = (*a as f32, *b as f32);
+            let result = match operator {
+                B::Plus => {
+                    if single {
+                        f64::from(x + y)
+                    } else {
+                        a + b
+                    }
+                }
+                B::Minus => {
+                    if single {
+                        f64::from(x - y)
+                    } else {
+                        a - b
+                    }
+                }
+                B::Multiply => {
+                    if single {
+                        f64::from(x * y)
+                    } else {
+                        a * b
+                    }
+                }
+                B::Divide => {
+                    if single {
+                        f64::from(x / y)
+                    } else {
+                        a / b
+                    }
+                }
+                _ => return self.fail("this operator takes integers"),
+            };
+            return Ok(Value::Real(result));
+        }
+        let op = match operator {
+            B::Plus => Op::Add,
+            B::Minus => Op::Sub,
+            B::Multiply => Op::Mul,
+            B::Divide => Op::Div,
+            _ => return self.fail("this operator takes integers"),
+        };
+        let (Some(a), Some(b)) = (self.register(&a, ty), self.register(&b, ty)) else {
+            return self.fail("this is no number that is known or in a register");
+        };
+        Ok(Value::Node(self.op(op, &[a, b])?))
+    }
+
+    fn integers(&mut self, operator: &B, ty: Integer, a: Value, b: Value) -> Result<Value, Error> {
+        if let (Value::Int(a), Value::Int(b)) = (&a, &b) {
+            return self.known(operator, ty, *a, *b).map(Value::Int);
+        }
+        if ty.bits > 32 {
+            return self.wide();
+        }
+        let of = Type::Int(ty);
+        let (Some(x), Some(y)) = (self.register(&a, &of), self.register(&b, &of)) else {
+            return self.fail("this is no number that is known or in a register");
+        };
+        let known = match &b {
+            Value::Int(value) => Some(*value),
+            _ => None,
+        };
+        let id = match operator {
+            B::Plus => self.op(Op::IntAdd, &[x, y])?,
+            B::Minus => self.op(Op::IntSub, &[x, y])?,
+            B::Multiply => match (&a, &b) {
+                (Value::Int(_), _) => self.op(Op::IntMul, &[y, x])?,
+                _ => self.op(Op::IntMul, &[x, y])?,
+            },
+            B::BitwiseAnd => self.op(Op::And, &[x, y])?,
+            B::BitwiseOr => self.op(Op::Or, &[x, y])?,
+            B::BitwiseXor => self.op(Op::Xor, &[x, y])?,
+            B::Divide | B::Modulo => self.divided(operator, ty, x, known)?,
+            _ => return self.fail("this operator takes no integers"),
+        };
+        Ok(Value::Node(id))
+    }
+
+    /// A quotient or a rest: by a power of two.
+    fn divided(&mut self, operator: &B, ty: Integer, a: Id, by: Option<i64>) -> Result<Id, Error> {
+        if by == Some(0) {
+            return self.fail("this divides by zero");
+        }
+        let power = by.filter(|by| by.unsigned_abs().is_power_of_two());
+        let Some(by) = power else {
+            return self.fail(
+                "the machine divides no integers: divide by a power of two, or in float: `(int)((float)a / (float)b)` is exact \
+                 up to 2^24",
+            );
+        };
+        let signed = ty.signed || self.nodes.range(a).0 >= 0;
+        if !signed {
+            // By shift and mask.
+            let shift = self.nodes.int(by.trailing_zeros() as i32);
+            let mask = self.nodes.int((by - 1) as i32);
+            return match operator {
+                B::Divide => self.op(Op::ShiftRightLogical, &[a, shift]),
+                _ => self.op(Op::And, &[a, mask]),
+            };
+        }
+        if by == i64::from(i32::MIN) {
+            return self.fail("this divides by -2^31: compare with it instead");
+        }
+        let divisor = self.nodes.int(by.unsigned_abs() as u32 as i32);
+        match operator {
+            B::Divide => {
+                let quotient = self.op(Op::IntDiv, &[a, divisor])?;
+                let zero = self.nodes.int(0);
+                if by < 0 { self.op(Op::IntSub, &[zero, quotient]) } else { Ok(quotient) }
+            }
+            _ if by.unsigned_abs() == 1 => Ok(self.nodes.int(0)),
+            _ => self.op(Op::IntRem, &[a, divisor]),
+        }
+    }
+
+    fn known(&self, operator: &B, ty: Integer, a: i64, b: i64) -> Result<i64, Error> {
+        let unsigned = ty.bits == 64 && !ty.signed;
+        let result = match operator {
+            B::Plus => a.wrapping_add(b),
+            B::Minus => a.wrapping_sub(b),
+            B::Multiply => a.wrapping_mul(b),
+            B::BitwiseAnd => a & b,
+            B::BitwiseOr => a | b,
+            B::BitwiseXor => a ^ b,
+            B::Divide | B::Modulo if b == 0 => return self.fail("this divides by zero"),
+            B::Divide if unsigned => (a as u64 / b as u64) as i64,
+            B::Modulo if unsigned => (a as u64 % b as u64) as i64,
+            B::Divide => a.wrapping_div(b),
+            B::Modulo => a.wrapping_rem(b),
+            _ => return self.fail("this operator takes no integers"),
+        };
+        Ok(ty.wrap(result))
+    }
+
+    fn shifted(&mut self, operator: &B, a: Typed, b: Typed) -> Result<Typed, Error> {
+        let (a, b) = (self.promoted(a)?, self.promoted(b)?);
+        let (Type::Int(ty), Type::Int(_)) = (&a.ty, &b.ty) else {
+            return self.fail("shifts take integers");
+        };
+        let ty = *ty;
+        if let Value::Int(by) = b.value
+            && !(0..i64::from(ty.bits)).contains(&by)
+        {
+            return self.fail(format!("a shift by {by} of {} bits: C does not say what it gives", ty.bits));
+        }
+        if let (Value::Int(a), Value::Int(by)) = (&a.value, &b.value) {
+            let shifted = match (operator, ty.bits == 64 && !ty.signed) {
+                (B::ShiftLeft, _) => a.wrapping_shl(*by as u32),
+                (_, true) => (*a as u64 >> by) as i64,
+                _ => a >> by,
+            };
+            return Ok(Typed { ty: Type::Int(ty), value: Value::Int(ty.wrap(shifted)) });
+        }
+        if ty.bits > 32 {
+            return self.wide();
+        }
+        let of = Type::Int(ty);
+        let (Some(x), Some(by)) = (self.register(&a.value, &of), self.register(&b.value, &of)) else {
+            return self.fail("shifts take integers");
+        };
+        let op = match operator {
+            B::ShiftLeft => Op::ShiftLeft,
+            _ if ty.signed || self.nodes.range(x).0 >= 0 => Op::ShiftRight,
+            _ => Op::ShiftRightLogical,
+        };
+        Ok(Typed { ty: of, value: Value::Node(self.op(op, &[x, by])?) })
+    }
+
+    /// `a == b`, `a < b` or `a <= b`, by the integers' operations or [`Op::LessEqual`].
+    pub(super) fn compared(&mut self, op: Op, a: Typed, b: Typed) -> Result<Condition, Error> {
+        if matches!(a.ty, Type::Pointer(_)) || matches!(b.ty, Type::Pointer(_)) {
+            return self.pointers_compared(op, &a.value, &b.value);
+        }
+        self.arithmetic_types(&a.ty, &b.ty)?;
+        let ty = Self::common(&a.ty, &b.ty);
+        let (a, b) = (self.converted(a, &ty)?, self.converted(b, &ty)?);
+        let Type::Int(integer) = ty else {
+            if let (Value::Real(a), Value::Real(b)) = (&a, &b) {
+                return Ok(Condition::Known(match op {
+                    Op::IntEqual => a == b,
+                    Op::IntLess => a < b,
+                    _ => a <= b,
+                }));
+            }
+            let op = match op {
+                Op::IntEqual => Op::Equal,
+                Op::IntLess => Op::Less,
+                other => other,
+            };
+            let (Some(a), Some(b)) = (self.register(&a, &ty), self.register(&b, &ty)) else {
+                return self.fail("this is no number that is known or in a register");
+            };
+            let id = self.op(op, &[a, b])?;
+            return Ok(self.condition_of(id));
+        };
+        if let (Value::Int(a), Value::Int(b)) = (&a, &b) {
+            let unsigned = integer.bits == 64 && !integer.signed;
+            let order = if unsigned { (*a as u64).cmp(&(*b as u64)) } else { a.cmp(b) };
+            return Ok(Condition::Known(match op {
+                Op::IntEqual => order.is_eq(),
+                Op::IntLess => order.is_lt(),
+                _ => order.is_le(),
+            }));
+        }
+        if integer.bits > 32 {
+            return self.wide();
+        }
+        let (Some(a), Some(b)) = (self.register(&a, &ty), self.register(&b, &ty)) else {
+            return self.fail("this is no number that is known or in a register");
+        };
+        let positive = self.nodes.range(a).0 >= 0 && self.nodes.range(b).0 >= 0;
+        let less = if integer.signed || positive { Op::IntLess } else { Op::Below };
+        let id = match op {
+            Op::IntEqual => self.op(Op::IntEqual, &[a, b])?,
+            Op::IntLess => self.op(less, &[a, b])?,
+            _ => {
+                let more = self.op(less, &[b, a])?;
+                self.op(Op::Not, &[more])?
+            }
+        };
+        Ok(self.condition_of(id))
+    }
+
+    fn pointers_compared(&mut self, op: Op, a: &Value, b: &Value) -> Result<Condition, Error> {
+        Ok(match (a, b) {
+            (Value::Int(0), Value::Int(0)) => Condition::Known(op != Op::IntLess),
+            (Value::Int(0), Value::Pointer(_) | Value::Function(_))
+            | (Value::Pointer(_) | Value::Function(_), Value::Int(0)) => {
+                if op != Op::IntEqual {
+                    return self.fail("a pointer is compared with the null pointer by its order");
+                }
+                Condition::Known(false)
+            }
+            (Value::Function(a), Value::Function(b)) => Condition::Known(a == b),
+            (Value::Pointer(a), Value::Pointer(b)) => {
+                if a.object != b.object {
+                    if op == Op::IntEqual {
+                        return Ok(Condition::Known(false));
+                    }
+                    return self.fail("pointers into two objects have no order");
+                }
+                if a.dynamic == b.dynamic {
+                    return Ok(Condition::Known(match op {
+                        Op::IntEqual => a.offset == b.offset,
+                        Op::IntLess => a.offset < b.offset,
+                        _ => a.offset <= b.offset,
+                    }));
+                }
+                let (a, b) = (self.scalars(a)?, self.scalars(b)?);
+                let ty = Type::Int(INT);
+                let typed = |id| Typed { ty: ty.clone(), value: Value::Node(id) };
+                return self.compared(op, typed(a), typed(b));
+            }
+            _ => return self.fail("these pointers are not compared: their objects depend on data"),
+        })
+    }
+
+    /// Scalars before a place of an object, as a node.
+    pub(super) fn scalars(&mut self, pointer: &Pointer) -> Result<Id, Error> {
+        let object = &self.objects[pointer.object];
+        let end = object.leaves.last().map_or(0, |leaf| leaf.offset as i64 + 1);
+        let leaf = match object.leaf(pointer.offset) {
+            Some(leaf) => leaf,
+            None if pointer.offset >= end => object.leaves.len(),
+            None => return self.fail(format!("this points between the members of `{}`", object.name)),
+        };
+        let known = self.nodes.int(leaf as i32);
+        match pointer.dynamic {
+            Some(dynamic) => self.op(Op::IntAdd, &[dynamic, known]),
+            None => Ok(known),
+        }
+    }
+
+    fn pointer_sum(&mut self, operator: &B, a: Typed, b: Typed) -> Result<Typed, Error> {
+        if let (Type::Pointer(to), Type::Pointer(_)) = (&a.ty, &b.ty) {
+            let (Value::Pointer(x), Value::Pointer(y)) = (&a.value, &b.value) else {
+                return self.fail("these pointers have no difference");
+            };
+            if x.object != y.object || *operator == B::Plus {
+                return self.fail("pointers into two objects have no difference");
+            }
+            let size = self.size_of(to)? as i64;
+            if x.dynamic == y.dynamic {
+                let value = Value::Int((x.offset - y.offset) / size);
+                return Ok(Typed { ty: Type::Int(INT), value });
+            }
+            let count = self.structs.leaves(to).map_or(1, |leaves| leaves.len());
+            let (x, y) = (self.scalars(x)?, self.scalars(y)?);
+            let words = self.op(Op::IntSub, &[x, y])?;
+            let id = self.divided(&B::Divide, INT, words, Some(count as i64))?;
+            return Ok(Typed { ty: Type::Int(INT), value: Value::Node(id) });
+        }
+        let (pointer, index) = if matches!(a.ty, Type::Pointer(_)) { (a, b) } else { (b, a) };
+        self.moved(pointer, index, *operator == B::Minus)
+    }
+
+    /// A pointer so many elements further.
+    pub(super) fn moved(&mut self, pointer: Typed, index: Typed, back: bool) -> Result<Typed, Error> {
+        let Type::Pointer(to) = pointer.ty.clone() else { return self.fail("this is no pointer") };
+        let size = self.size_of(&to)? as i64;
+        let Value::Pointer(place) = pointer.value else {
+            return match pointer.value {
+                Value::Int(0) => self.fail("this is the null pointer"),
+                Value::Mixed(reason) => self.fail(format!("this is {reason}")),
+                _ => self.fail("this is no pointer whose object is known"),
+            };
+        };
+        let index = self.promoted(index)?;
+        let moved = match index.value {
+            Value::Int(index) => {
+                let by = index.checked_mul(size).map(|by| if back { -by } else { by });
+                let Some(offset) = by.and_then(|by| place.offset.checked_add(by)) else {
+                    return self.fail("this index is far outside");
+                };
+                Pointer { offset, ..place }
+            }
+            Value::Node(id) => {
+                let Some(count) = self.structs.leaves(&to).map(|leaves| leaves.len()) else {
+                    return self.fail("an index that depends on data needs elements of a known size");
+                };
+                let count = self.nodes.int(count as i32);
+                let mut words = self.op(Op::IntMul, &[id, count])?;
+                if back {
+                    let zero = self.nodes.int(0);
+                    words = self.op(Op::IntSub, &[zero, words])?;
+                }
+                let dynamic = match place.dynamic {
+                    Some(before) => self.op(Op::IntAdd, &[before, words])?,
+                    None => words,
+                };
+                Pointer { dynamic: Some(dynamic), ..place }
+            }
+            _ => return self.fail("this index is no integer"),
+        };
+        Ok(Typed { ty: pointer.ty, value: Value::Pointer(moved) })
+    }
+
+    pub(super) fn size_of(&self, ty: &Type) -> Result<usize, Error> {
+        match self.structs.size(ty) {
+            Some(size) => Ok(size),
+            None => self.fail(format!("{} has no known size", self.structs.shown(ty))),
+        }
+    }
+}

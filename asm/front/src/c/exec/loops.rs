@@ -1,0 +1,298 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Loops: executed iteration by iteration, and so written out, while that stays short; otherwise they stay loops (`rolled.rs`).
+
+use super::Exec;
+use crate::Error;
+use crate::c::ir::Block;
+use crate::c::value::{Condition, Exit, Memory, Outcome};
+use lang_c::ast::{Expression, ForInitializer, Statement};
+use lang_c::span::Node;
+
+/// Most values that a loop which is written out computes, before it is tried as a loop.
+const SHORT: usize = 320;
+/// Most iterations, entered under conditions, of a loop that is written out.
+const OPEN: u64 = 24;
+
+/// A loop of any kind.
+#[derive(Clone, Copy)]
+pub(super) struct Repetition<'a> {
+    pub(super) condition: Option<&'a Node<Expression>>,
+    pub(super) step: Option<&'a Node<Expression>>,
+    pub(super) body: &'a Node<Statement>,
+    /// The body runs before the first test.
+    pub(super) body_first: bool,
+    /// Bound from a pragma.
+    pub(super) bound: Option<u64>,
+}
+
+/// All that a trial changes.
+pub(super) struct Saved {
+    memory: Memory,
+    blocks: usize,
+    frames: Vec<usize>,
+    mark: usize,
+    depth: usize,
+    at: super::Place,
+    budgets: usize,
+}
+
+impl<'a> Exec<'a> {
+    pub(super) fn saved(&self) -> Saved {
+        Saved {
+            memory: self.memory.clone(),
+            blocks: self.blocks.len(),
+            frames: self.frames.iter().map(|frame| frame.scopes.len()).collect(),
+            mark: self.nodes.mark(),
+            depth: self.depth,
+            at: self.at,
+            budgets: self.budgets.len(),
+        }
+    }
+
+    /// Begins a trial: its statements go to a block of their own.
+    pub(super) fn tried<T>(
+        &mut self,
+        run: &mut dyn FnMut(&mut Exec<'a>) -> Result<T, Error>,
+    ) -> (Result<T, Error>, Saved, Block) {
+        let saved = self.saved();
+        self.blocks.push(Block::new());
+        let result = run(self);
+        let block = match result.is_ok() {
+            true => self.blocks.pop().expect("it was pushed"),
+            false => Block::new(),
+        };
+        (result, saved, block)
+    }
+
+    /// Undoes a trial.
+    pub(super) fn restore(&mut self, saved: Saved) {
+        self.blocks.truncate(saved.blocks);
+        self.frames.truncate(saved.frames.len());
+        for (frame, scopes) in self.frames.iter_mut().zip(saved.frames) {
+            frame.scopes.truncate(scopes);
+        }
+        self.memory = saved.memory;
+        self.nodes.forget(saved.mark);
+        self.depth = saved.depth;
+        self.at = saved.at;
+        self.budgets.truncate(saved.budgets);
+    }
+
+    /// Counts a new value against the budgets of loops that are being written out.
+    pub(super) fn spend(&mut self) -> Result<(), Error> {
+        let used = self.nodes.len();
+        if let Some(level) = self.budgets.iter().position(|limit| used > *limit) {
+            self.exhausted = Some(level);
+            return self.fail("a loop is too long for being written out");
+        }
+        Ok(())
+    }
+
+    pub(super) fn repetition(
+        &mut self,
+        statement: &'a Node<Statement>,
+        out: &mut Vec<Outcome>,
+    ) -> Result<Condition, Error> {
+        let bound = self.bound_at(statement);
+        self.open();
+        let found = self.parts(statement, bound).and_then(|parts| self.looped(parts, out));
+        self.close();
+        found
+    }
+
+    fn parts(&mut self, statement: &'a Node<Statement>, bound: Option<u64>) -> Result<Repetition<'a>, Error> {
+        Ok(match &statement.node {
+            Statement::While(node) => Repetition {
+                condition: Some(&node.node.expression),
+                step: None,
+                body: &node.node.statement,
+                body_first: false,
+                bound,
+            },
+            Statement::DoWhile(node) => Repetition {
+                condition: Some(&node.node.expression),
+                step: None,
+                body: &node.node.statement,
+                body_first: true,
+                bound,
+            },
+            Statement::For(node) => {
+                match &node.node.initializer.node {
+                    ForInitializer::Empty | ForInitializer::StaticAssert(_) => {}
+                    ForInitializer::Expression(expression) => self.effect(expression)?,
+                    ForInitializer::Declaration(declaration) => self.declaration(&declaration.node)?,
+                }
+                Repetition {
+                    condition: node.node.condition.as_deref(),
+                    step: node.node.step.as_deref(),
+                    body: &node.node.statement,
+                    body_first: false,
+                    bound,
+                }
+            }
+            _ => return self.fail("this is no loop"),
+        })
+    }
+
+    /// The bound that a pragma gives a loop: the last pragma before it, with nothing but blanks between.
+    fn bound_at(&self, statement: &Node<Statement>) -> Option<u64> {
+        let unit = &self.units[self.unit()];
+        let start = statement.span.start;
+        let found = unit.bounds.iter().rev().find(|(offset, _)| *offset < start)?;
+        let between = unit.between(found.0, start);
+        between.then_some(found.1)
+    }
+
+    /// A loop's condition; one without always holds.
+    pub(super) fn goes_on(&mut self, parts: &Repetition<'a>) -> Result<Condition, Error> {
+        match parts.condition {
+            Some(condition) => self.condition(condition),
+            None => Ok(Condition::Known(true)),
+        }
+    }
+
+    fn looped(&mut self, parts: Repetition<'a>, out: &mut Vec<Outcome>) -> Result<Condition, Error> {
+        let limit = self.nodes.len() + SHORT;
+        match self.written_out(parts, Some(limit)) {
+            Ok((normal, outcomes)) => {
+                return self.absorbed(normal, outcomes, &|exit| *exit == Exit::Break, out);
+            }
+            Err(Some(error)) => return Err(error),
+            Err(None) => {}
+        }
+        let saved = self.saved();
+        self.blocks.push(Block::new());
+        let mut inner = Vec::new();
+        match self.rolled(parts, &mut inner) {
+            Ok(reached) => {
+                let block = self.blocks.pop().expect("it was pushed");
+                self.blocks.last_mut().expect("a block is open").extend(block);
+                out.extend(inner);
+                Ok(reached)
+            }
+            Err(error) if self.exhausted.is_some() => Err(error),
+            Err(reason) => {
+                self.restore(saved);
+                if parts.bound.is_some() {
+                    return Err(reason);
+                }
+                match self.written_out(parts, None) {
+                    Ok((normal, outcomes)) => {
+                        self.absorbed(normal, outcomes, &|exit| *exit == Exit::Break, out)
+                    }
+                    Err(Some(error)) => Err(error),
+                    Err(None) => Err(reason),
+                }
+            }
+        }
+    }
+
+    /// Executes all iterations. The error is `None` if there are too many, or too many values; nothing has changed then.
+    #[allow(clippy::type_complexity)]
+    fn written_out(
+        &mut self,
+        parts: Repetition<'a>,
+        limit: Option<usize>,
+    ) -> Result<(Condition, Vec<Outcome>), Option<Error>> {
+        let level = self.budgets.len();
+        let (result, saved, block) = self.tried(&mut |exec| {
+            exec.budgets.extend(limit);
+            let mut outcomes = Vec::new();
+            let normal = exec.iterations(parts, 0, parts.body_first, &mut outcomes)?;
+            Ok((normal, outcomes))
+        });
+        match result {
+            Ok(found) => {
+                self.budgets.truncate(level);
+                self.blocks.last_mut().expect("a block is open").extend(block);
+                Ok(found)
+            }
+            Err(_) if limit.is_some() && self.exhausted == Some(level) => {
+                self.exhausted = None;
+                self.restore(saved);
+                Err(None)
+            }
+            Err(error) => Err(Some(error)),
+        }
+    }
+
+    /// Executes iterations from here on. Ends are outcomes `Break`.
+    fn iterations(
+        &mut self,
+        parts: Repetition<'a>,
+        count: u64,
+        body_first: bool,
+        out: &mut Vec<Outcome>,
+    ) -> Result<Condition, Error> {
+        let (mut first, mut count) = (body_first, count);
+        loop {
+            if !first {
+                let at = self.at;
+                match self.goes_on(&parts)? {
+                    Condition::Known(false) => return self.ended(out),
+                    Condition::Known(true) => {}
+                    Condition::Node(id) => {
+                        if parts.bound.is_some_and(|bound| count >= bound) {
+                            return self.ended(out);
+                        }
+                        if count >= OPEN {
+                            self.at = at;
+                            return self.endless(parts);
+                        }
+                        return self.fork(
+                            id,
+                            &mut |exec, out| exec.iterations(parts, count, true, out),
+                            &mut |exec, out| exec.ended(out),
+                            out,
+                        );
+                    }
+                }
+            }
+            first = false;
+            let mut inner = Vec::new();
+            let normal = self.statement(parts.body, &mut inner)?;
+            let normal = self.absorbed(normal, inner, &|exit| *exit == Exit::Continue, out)?;
+            count += 1;
+            match normal {
+                Condition::Known(false) => return Ok(normal),
+                Condition::Known(true) => self.stepped(&parts)?,
+                Condition::Node(_) => {
+                    if count >= OPEN {
+                        return self.endless(parts);
+                    }
+                    return self.guarded(
+                        normal,
+                        &mut |exec, out| {
+                            exec.stepped(&parts)?;
+                            exec.iterations(parts, count, false, out)
+                        },
+                        out,
+                    );
+                }
+            }
+        }
+    }
+
+    pub(super) fn stepped(&mut self, parts: &Repetition<'a>) -> Result<(), Error> {
+        match parts.step {
+            Some(step) => self.effect(step),
+            None => Ok(()),
+        }
+    }
+
+    fn ended(&mut self, out: &mut Vec<Outcome>) -> Result<Condition, Error> {
+        out.push(Outcome { exit: Exit::Break, when: Condition::Known(true), memory: self.memory.clone() });
+        Ok(Condition::Known(false))
+    }
+
+    /// Gives a loop up whose end data decide: as if it had used up its budget, or for good if it has none.
+    fn endless(&mut self, parts: Repetition<'a>) -> Result<Condition, Error> {
+        let _ = parts;
+        if let Some(level) = self.budgets.len().checked_sub(1) {
+            self.exhausted = Some(level);
+        }
+        self.fail(
+            "data decide how often this loop runs, and no bound is known: write `#pragma takt loop_bound(N)` before it",
+        )
+    }
+}

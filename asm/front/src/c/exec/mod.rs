@@ -1,0 +1,229 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Executes C while translating it: what is known is computed, what depends on inputs becomes nodes.
+
+mod arithmetic;
+pub(super) mod call;
+mod convert;
+mod declare;
+mod expression;
+mod functions;
+mod initial;
+mod loops;
+mod operations;
+mod paths;
+pub(super) mod places;
+mod rolled;
+mod statement;
+mod typing;
+
+use super::ir::{Block, Id, Kind, Nodes, Place, Range, Statement};
+use super::types::{Signature, Structs, Type};
+use super::unit::Unit;
+use super::value::{Memory, Object};
+use crate::Error;
+use lang_c::ast::FunctionDefinition;
+use lang_c::span::{Node, Span};
+use std::collections::{HashMap, HashSet};
+
+/// Most nodes of a program.
+const MAX_NODES: usize = 400_000;
+/// Deepest nesting of statements, expressions and calls while executing.
+const MAX_DEPTH: usize = 220;
+/// Most statements and expressions that are executed in all.
+const MAX_STEPS: u64 = 60_000_000;
+
+/// Key of an object across translations: function or file, name, place.
+pub(super) type Key = (String, usize, usize);
+
+/// Findings of one translation that the next one starts from.
+#[derive(Clone, Default, PartialEq)]
+pub(super) struct Facts {
+    /// Objects that data index: they lie in memory.
+    pub(super) arrays: HashSet<Key>,
+    /// Scalars of states that the step writes.
+    pub(super) written: HashSet<(Key, usize)>,
+    /// Elements of what `float *x` points to.
+    pub(super) extents: HashMap<Key, usize>,
+    /// Functions with `static` variables that the step calls.
+    pub(super) called: HashSet<String>,
+}
+
+/// Meaning of a name.
+#[derive(Clone, Debug)]
+pub(super) enum Named {
+    Object(usize),
+    Constant(i64),
+    Type(Type),
+    Function(String, std::rc::Rc<Signature>),
+}
+
+#[derive(Default)]
+pub(super) struct Scope {
+    pub(super) names: HashMap<String, Named>,
+    pub(super) tags: HashMap<String, Type>,
+}
+
+/// A function under execution.
+struct Frame {
+    key: String,
+    unit: usize,
+    scopes: Vec<Scope>,
+    /// The object that takes the result.
+    result: Option<usize>,
+    signature: std::rc::Rc<Signature>,
+}
+
+pub(super) struct Defined<'a> {
+    pub(super) unit: usize,
+    pub(super) definition: &'a FunctionDefinition,
+}
+
+pub(super) struct Exec<'a> {
+    pub(super) units: &'a [Unit],
+    /// `double` is binary32.
+    pub(super) double_is_float: bool,
+    pub(super) facts: Facts,
+    /// Facts have grown: this translation is not the last.
+    pub(super) again: bool,
+    /// The step runs: writes to states are recorded.
+    pub(super) stepping: bool,
+    pub(super) nodes: Nodes,
+    pub(super) structs: Structs,
+    pub(super) objects: Vec<Object>,
+    pub(super) memory: Memory,
+    pub(super) functions: HashMap<String, Defined<'a>>,
+    /// File scopes.
+    pub(super) scopes: Vec<Scope>,
+    /// Objects with external linkage.
+    pub(super) globals: HashMap<String, usize>,
+    /// Objects of `static` variables in functions.
+    statics: HashMap<Key, usize>,
+    frames: Vec<Frame>,
+    pub(super) blocks: Vec<Block>,
+    pub(super) at: Place,
+    depth: usize,
+    steps: u64,
+    /// Operations to emit before an unrolled loop is given up, innermost last.
+    budgets: Vec<usize>,
+    /// Names of arrays in memory by their objects' keys.
+    arrays: HashMap<Key, usize>,
+    /// Functions whose `static` variables exist.
+    prepared: HashSet<String>,
+    /// The outermost budget that is used up.
+    exhausted: Option<usize>,
+}
+
+impl<'a> Exec<'a> {
+    pub(super) fn new(units: &'a [Unit], double_is_float: bool, facts: Facts) -> Exec<'a> {
+        Exec {
+            units,
+            double_is_float,
+            facts,
+            again: false,
+            stepping: false,
+            nodes: Nodes::default(),
+            structs: Structs::default(),
+            objects: Vec::new(),
+            memory: Memory::default(),
+            functions: HashMap::new(),
+            scopes: Vec::new(),
+            globals: HashMap::new(),
+            statics: HashMap::new(),
+            frames: Vec::new(),
+            blocks: vec![Block::new()],
+            at: Place::default(),
+            depth: 0,
+            steps: 0,
+            budgets: Vec::new(),
+            arrays: HashMap::new(),
+            prepared: HashSet::new(),
+            exhausted: None,
+        }
+    }
+
+    /// An error at the place under execution.
+    pub(super) fn fail<T>(&self, text: impl Into<String>) -> Result<T, Error> {
+        let unit = &self.units[self.at.unit];
+        let mut error = unit.error(self.at.offset, text);
+        let calls = self.frames.iter().skip(1).map(|frame| plain(&frame.key)).collect::<Vec<_>>();
+        if !calls.is_empty() {
+            error.text = format!("{} (called: {})", error.text, calls.join(", "));
+        }
+        Err(error)
+    }
+
+    /// Notes the place, for errors and comments.
+    fn go(&mut self, span: Span) {
+        if !span.is_none() {
+            self.at = Place { unit: self.unit(), offset: span.start };
+        }
+    }
+
+    /// The unit under execution.
+    fn unit(&self) -> usize {
+        self.frames.last().map_or(self.at.unit, |frame| frame.unit)
+    }
+
+    /// Enters a statement or expression.
+    fn enter<T>(&mut self, node: &Node<T>) -> Result<(), Error> {
+        self.go(node.span);
+        self.steps += 1;
+        if self.steps > MAX_STEPS {
+            return self.fail(format!(
+                "more than {MAX_STEPS} steps while translating: a loop counts too far for being executed here"
+            ));
+        }
+        if self.depth >= MAX_DEPTH {
+            return self.fail(format!(
+                "statements, expressions and loops nest deeper than {MAX_DEPTH} while translating: give a loop that data end \
+                 `#pragma takt loop_bound(N)`"
+            ));
+        }
+        Ok(())
+    }
+
+    /// Adds a statement to the block under construction.
+    pub(super) fn emit(&mut self, statement: Statement) {
+        let at = self.at;
+        self.blocks.last_mut().expect("a block is open").push((statement, at));
+    }
+
+    fn looked_up(&self, name: &str) -> Option<&Named> {
+        let own = self.frames.last().into_iter().flat_map(|frame| frame.scopes.iter().rev());
+        own.chain(self.scopes.get(self.unit())).find_map(|scope| scope.names.get(name))
+    }
+
+    fn tag(&self, name: &str) -> Option<&Type> {
+        let own = self.frames.last().into_iter().flat_map(|frame| frame.scopes.iter().rev());
+        own.chain(self.scopes.get(self.unit())).find_map(|scope| scope.tags.get(name))
+    }
+
+    /// The scope that takes declarations.
+    fn scope(&mut self) -> &mut Scope {
+        let unit = self.unit();
+        match self.frames.last_mut().and_then(|frame| frame.scopes.last_mut()) {
+            Some(scope) => scope,
+            None => &mut self.scopes[unit],
+        }
+    }
+
+    /// Labels a value with the name that C gives it.
+    pub(super) fn label(&mut self, id: Id, name: &str) {
+        let data = self.nodes.get_mut(id);
+        if data.label.is_none() && matches!(data.node, super::ir::Node::Op(..) | super::ir::Node::Load(..)) {
+            data.label = Some(name.to_owned());
+        }
+    }
+
+    /// A value that nothing computes, in a translation that is not the last.
+    pub(super) fn placeholder(&mut self, kind: Kind, range: Range) -> Id {
+        self.again = true;
+        let var = self.nodes.var("later", kind);
+        self.nodes.read(var, range)
+    }
+}
+
+/// Name of a function in its file.
+pub(super) fn plain(key: &str) -> &str {
+    key.split('@').next().unwrap_or(key)
+}

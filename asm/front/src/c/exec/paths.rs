@@ -1,0 +1,537 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Paths that data choose: both are executed, and what differs behind them becomes choices where both are short, otherwise a branch whose
+//! sides set variables.
+
+use super::Exec;
+use crate::Error;
+use crate::c::ir::{Block, Id, Kind, Node, Op, Statement};
+use crate::c::types::Type;
+use crate::c::value::{Condition, Exit, Memory, Outcome, Pointer, Value};
+use std::collections::HashMap;
+use std::rc::Rc;
+
+/// Operations of both sides, up to which both are computed and the results chosen.
+const CHOSEN: usize = 40;
+
+/// Runs one side; its outcomes are relative to the side's beginning.
+pub(super) type Side<'s, 'a> =
+    &'s mut dyn FnMut(&mut Exec<'a>, &mut Vec<Outcome>) -> Result<Condition, Error>;
+
+/// A side after its execution.
+struct Ran {
+    block: Block,
+    normal: Condition,
+    memory: Memory,
+    outcomes: Vec<Outcome>,
+}
+
+/// Variables that take values out of the sides of a branch.
+struct Exported {
+    /// First node of the sides.
+    first: usize,
+    sets: [Vec<(usize, Id)>; 2],
+    known: HashMap<[Option<Id>; 2], Id>,
+}
+
+/// Operations that a value costs.
+fn cost(op: Op) -> usize {
+    match op {
+        Op::Pow => 168,
+        Op::Fmod => 392,
+        Op::Tan | Op::Tanh | Op::Log1p | Op::Log => 50,
+        Op::Exp
+        | Op::Expm1
+        | Op::Asin
+        | Op::Erf
+        | Op::Round
+        | Op::Floor
+        | Op::Ceil
+        | Op::Rint
+        | Op::Trunc => 20,
+        Op::IntMul | Op::ToInt | Op::ToUnsigned | Op::UnsignedToFloat => 10,
+        _ => 1,
+    }
+}
+
+impl<'a> Exec<'a> {
+    fn side(&mut self, run: Side<'_, 'a>) -> Result<Ran, Error> {
+        self.blocks.push(Block::new());
+        let mut outcomes = Vec::new();
+        let at = self.at;
+        let normal = run(self, &mut outcomes);
+        self.at = at;
+        let block = self.blocks.pop().expect("it was pushed");
+        Ok(Ran { block, normal: normal?, memory: self.memory.clone(), outcomes })
+    }
+
+    /// Executes both sides of a condition; the result says when the end of either is reached, with the memory then.
+    pub(super) fn fork(
+        &mut self,
+        condition: Id,
+        then: Side<'_, 'a>,
+        other: Side<'_, 'a>,
+        out: &mut Vec<Outcome>,
+    ) -> Result<Condition, Error> {
+        let (before, mark, first) = (self.memory.clone(), self.nodes.mark(), self.nodes.len());
+        self.depth += 1;
+        let yes = self.side(then)?;
+        self.nodes.forget(mark);
+        self.memory = before.clone();
+        let no = self.side(other)?;
+        self.depth -= 1;
+        let short = |ran: &Ran| self.work(&ran.block);
+        match (short(&yes), short(&no)) {
+            (Some(a), Some(b)) if a + b <= CHOSEN => self.chosen(condition, yes, no, out),
+            _ => {
+                self.nodes.forget(mark);
+                self.branched(condition, &before, first, yes, no, out)
+            }
+        }
+    }
+
+    /// Executes what follows a condition, and nothing if it does not hold.
+    pub(super) fn guarded(
+        &mut self,
+        condition: Condition,
+        run: Side<'_, 'a>,
+        out: &mut Vec<Outcome>,
+    ) -> Result<Condition, Error> {
+        match condition {
+            Condition::Known(true) => run(self, out),
+            Condition::Known(false) => Ok(Condition::Known(false)),
+            Condition::Node(id) => self.fork(id, run, &mut |_, _| Ok(Condition::Known(false)), out),
+        }
+    }
+
+    /// Operations of a block; `None` if it has loops or branches.
+    fn work(&self, block: &Block) -> Option<usize> {
+        block.iter().try_fold(0, |sum, (statement, _)| match statement {
+            Statement::Def(id) => match self.nodes.node(*id) {
+                Node::Op(op, ..) => Some(sum + cost(op)),
+                _ => Some(sum + 1),
+            },
+            Statement::Store { .. } => Some(sum + 2),
+            Statement::Set(_) | Statement::If { .. } | Statement::For { .. } | Statement::Loop { .. } => None,
+        })
+    }
+
+    /// Computes both sides and chooses.
+    fn chosen(
+        &mut self,
+        condition: Id,
+        yes: Ran,
+        no: Ran,
+        out: &mut Vec<Outcome>,
+    ) -> Result<Condition, Error> {
+        let holds = Condition::Node(condition);
+        self.splice(yes.block, holds)?;
+        let fails = self.lazy_not(&no, holds)?;
+        self.splice(no.block, fails)?;
+        for (outcomes, side) in [(yes.outcomes, holds), (no.outcomes, fails)] {
+            for outcome in outcomes {
+                let when = self.and(side, outcome.when)?;
+                out.push(Outcome { when, ..outcome });
+            }
+        }
+        let known = Condition::Known;
+        match (yes.normal, no.normal) {
+            (Condition::Known(false), Condition::Known(false)) => Ok(known(false)),
+            (normal, Condition::Known(false)) => {
+                self.memory = yes.memory;
+                self.and(holds, normal)
+            }
+            (Condition::Known(false), normal) => {
+                self.memory = no.memory;
+                let fails = self.not(holds)?;
+                self.and(fails, normal)
+            }
+            (a, b) => {
+                self.memory = self.merged(condition, &yes.memory, &no.memory)?;
+                let (a, b) = (self.condition_id(a), self.condition_id(b));
+                let both = self.select(condition, a, b)?;
+                Ok(self.condition_of(both))
+            }
+        }
+    }
+
+    /// The opposite of a condition, computed only if the side needs it.
+    fn lazy_not(&mut self, side: &Ran, holds: Condition) -> Result<Condition, Error> {
+        let guards = side.block.iter().any(|(statement, _)| {
+            matches!(statement, Statement::Store { .. })
+                || matches!(statement, Statement::Def(id) if matches!(self.nodes.node(*id), Node::Load(..)))
+        });
+        if guards || !side.outcomes.is_empty() { self.not(holds) } else { Ok(Condition::Known(true)) }
+    }
+
+    /// Puts a side's statements into the block: stores write what was there, and indices are 0, if the condition does not hold.
+    fn splice(&mut self, block: Block, condition: Condition) -> Result<(), Error> {
+        let at = self.at;
+        for (statement, place) in block {
+            self.at = place;
+            let Condition::Node(guard) = condition else {
+                self.emit(statement);
+                continue;
+            };
+            match statement {
+                Statement::Def(id) => {
+                    if let Node::Load(array, index, serial) = self.nodes.node(id)
+                        && !self.stays_within(array, index)
+                    {
+                        let zero = self.nodes.int(0);
+                        let index = self.select(guard, index, zero)?;
+                        self.nodes.get_mut(id).node = Node::Load(array, index, serial);
+                    }
+                    self.emit(Statement::Def(id));
+                }
+                Statement::Store { array, index, value } => {
+                    let mut safe = index;
+                    if !self.stays_within(array, index) {
+                        let zero = self.nodes.int(0);
+                        safe = self.select(guard, index, zero)?;
+                    }
+                    let (kind, range) = (self.nodes.kind(value), crate::c::ir::FULL);
+                    let serial = self.nodes.serial();
+                    let old = self.put(Node::Load(array, safe, serial), kind, range)?;
+                    let value = self.select(guard, value, old)?;
+                    self.emit(Statement::Store { array, index: safe, value });
+                }
+                other => self.emit(other),
+            }
+        }
+        self.at = at;
+        Ok(())
+    }
+
+    fn stays_within(&self, array: usize, index: Id) -> bool {
+        let (low, high) = self.nodes.range(index);
+        low >= 0 && high < self.nodes.arrays[array].words.len() as i64
+    }
+
+    /// Memory that is one if the condition holds, and otherwise the other.
+    fn merged(&mut self, condition: Id, yes: &Memory, no: &Memory) -> Result<Memory, Error> {
+        let mut merged = if yes.0.len() > no.0.len() { yes.clone() } else { no.clone() };
+        for object in 0..yes.0.len().min(no.0.len()) {
+            if Rc::ptr_eq(&yes.0[object], &no.0[object]) {
+                continue;
+            }
+            for leaf in 0..yes.0[object].len().min(no.0[object].len()) {
+                let (a, b) = (yes.get(object, leaf).clone(), no.get(object, leaf).clone());
+                let value = if a == b { a } else { self.choice(object, leaf, condition, a, b)? };
+                merged.set(object, leaf, value);
+            }
+        }
+        Ok(merged)
+    }
+
+    fn choice(
+        &mut self,
+        object: usize,
+        leaf: usize,
+        condition: Id,
+        a: Value,
+        b: Value,
+    ) -> Result<Value, Error> {
+        match (a, b) {
+            (Value::Unset, other) | (other, Value::Unset) => Ok(other),
+            (a @ Value::Mixed(_), _) | (_, a @ Value::Mixed(_)) => Ok(a),
+            (Value::Pointer(a), Value::Pointer(b)) => match (self.words(&a), self.words(&b)) {
+                (Some(x), Some(y)) if a.object == b.object => {
+                    let dynamic = Some(self.select(condition, x, y)?);
+                    Ok(Value::Pointer(Pointer { object: a.object, offset: 0, dynamic }))
+                }
+                _ => Ok(MIXED_POINTER),
+            },
+            (a, b) => {
+                let ty = self.objects[object].leaves[leaf].ty.clone();
+                let (Some(a), Some(b)) = (self.register(&a, &ty), self.register(&b, &ty)) else {
+                    return Ok(mixed(&ty));
+                };
+                let id = self.select(condition, a, b)?;
+                let name = self.objects[object].leaf_name(leaf);
+                self.label(id, &name);
+                Ok(Value::Node(id))
+            }
+        }
+    }
+
+    /// A scalar as a node; `None` if no register holds its type.
+    pub(in crate::c) fn register(&mut self, value: &Value, ty: &Type) -> Option<Id> {
+        Some(match (value, ty) {
+            (Value::Node(id), _) => *id,
+            (Value::Int(value), Type::Int(integer)) if integer.bits <= 32 => {
+                self.nodes.int(*value as u32 as i32)
+            }
+            (Value::Real(value), Type::Float) => self.nodes.float(*value as f32),
+            _ => return None,
+        })
+    }
+
+    /// Scalars from the object's beginning to where a pointer points.
+    fn words(&mut self, pointer: &Pointer) -> Option<Id> {
+        let leaf = self.objects[pointer.object].leaf(pointer.offset)?;
+        let known = self.nodes.int(i32::try_from(leaf).ok()?);
+        match pointer.dynamic {
+            None => Some(known),
+            Some(dynamic) => self.op(Op::IntAdd, &[dynamic, known]).ok(),
+        }
+    }
+
+    /// Emits a branch, whose sides set variables for all that is needed behind it.
+    fn branched(
+        &mut self,
+        condition: Id,
+        before: &Memory,
+        first: usize,
+        yes: Ran,
+        no: Ran,
+        out: &mut Vec<Outcome>,
+    ) -> Result<Condition, Error> {
+        let mut exported = Exported { first, sets: [Vec::new(), Vec::new()], known: HashMap::new() };
+        let holds = Condition::Node(condition);
+        let normal = match (yes.normal, no.normal) {
+            (Condition::Known(false), Condition::Known(false)) => Condition::Known(false),
+            (Condition::Known(true), Condition::Known(true)) => Condition::Known(true),
+            (a, b) if [a, b] == [Condition::Known(true), Condition::Known(false)] => holds,
+            (a, b) if [a, b] == [Condition::Known(false), Condition::Known(true)] => self.not(holds)?,
+            (a, b) => {
+                let (a, b) = (self.condition_id(a), self.condition_id(b));
+                Condition::Node(self.exported(&mut exported, [Some(a), Some(b)], "reached")?)
+            }
+        };
+        let never = Condition::Known(false);
+        let memory = if no.normal == never {
+            self.memory_of(&mut exported, 0, before, yes.memory)?
+        } else if yes.normal == never {
+            self.memory_of(&mut exported, 1, before, no.memory)?
+        } else {
+            self.joint_memory(&mut exported, &yes.memory, &no.memory)?
+        };
+        let mut leaving = Vec::new();
+        for (side, outcomes) in [yes.outcomes, no.outcomes].into_iter().enumerate() {
+            for outcome in outcomes {
+                let when = match outcome.when {
+                    Condition::Known(true) if side == 0 => holds,
+                    Condition::Known(true) => self.not(holds)?,
+                    Condition::Known(false) => continue,
+                    Condition::Node(id) => {
+                        let mut ids = [None, None];
+                        ids[side] = Some(id);
+                        Condition::Node(self.exported(&mut exported, ids, "leaves")?)
+                    }
+                };
+                let memory = self.memory_of(&mut exported, side, before, outcome.memory)?;
+                leaving.push(Outcome { exit: outcome.exit, when, memory });
+            }
+        }
+        let (mut then, mut other) = (yes.block, no.block);
+        let [sets, other_sets] = exported.sets;
+        for (block, sets) in [(&mut then, sets), (&mut other, other_sets)] {
+            if !sets.is_empty() {
+                block.push((Statement::Set(sets), self.at));
+            }
+        }
+        self.emit(Statement::If { condition, then, other });
+        out.extend(leaving);
+        self.memory = memory;
+        Ok(normal)
+    }
+
+    /// A variable that either side sets; a side without a value sets zero.
+    fn exported(&mut self, exported: &mut Exported, ids: [Option<Id>; 2], name: &str) -> Result<Id, Error> {
+        if let [Some(a), Some(b)] = ids
+            && a == b
+            && !self.is_inside(exported.first, a)
+        {
+            return Ok(a);
+        }
+        if let Some(known) = exported.known.get(&ids) {
+            return Ok(*known);
+        }
+        let given: Vec<Id> = ids.into_iter().flatten().collect();
+        let kind = self.nodes.kind(given[0]);
+        let zero = if kind == Kind::Float { self.nodes.float(0.0) } else { self.nodes.int(0) };
+        let values = ids.map(|id| id.unwrap_or(zero));
+        let ranges = values.map(|id| self.nodes.range(id));
+        let range = (ranges[0].0.min(ranges[1].0), ranges[0].1.max(ranges[1].1));
+        let label = given.iter().find_map(|id| self.nodes.get(*id).label.clone());
+        let var = self.nodes.var(label.as_deref().unwrap_or(name), kind);
+        for (sets, value) in exported.sets.iter_mut().zip(values) {
+            sets.push((var, value));
+        }
+        let read = self.nodes.read(var, range);
+        exported.known.insert(ids, read);
+        Ok(read)
+    }
+
+    /// The node was computed in a side.
+    fn is_inside(&self, first: usize, id: Id) -> bool {
+        id.0 as usize >= first && !matches!(self.nodes.node(id), Node::Int(_) | Node::Float(_))
+    }
+
+    /// Memory at an exit of one side.
+    fn memory_of(
+        &mut self,
+        exported: &mut Exported,
+        side: usize,
+        before: &Memory,
+        mut memory: Memory,
+    ) -> Result<Memory, Error> {
+        for object in 0..memory.0.len() {
+            if before.0.get(object).is_some_and(|old| Rc::ptr_eq(old, &memory.0[object])) {
+                continue;
+            }
+            for leaf in 0..memory.0[object].len() {
+                let mut ids = [None, None];
+                let new = match memory.get(object, leaf) {
+                    Value::Node(id) if self.is_inside(exported.first, *id) => {
+                        ids[side] = Some(*id);
+                        let name = self.objects[object].leaf_name(leaf);
+                        Value::Node(self.exported(exported, ids, &name)?)
+                    }
+                    Value::Pointer(Pointer { object: to, offset, dynamic: Some(id) })
+                        if self.is_inside(exported.first, *id) =>
+                    {
+                        ids[side] = Some(*id);
+                        let (object, offset) = (*to, *offset);
+                        let dynamic = Some(self.exported(exported, ids, "at")?);
+                        Value::Pointer(Pointer { object, offset, dynamic })
+                    }
+                    _ => continue,
+                };
+                memory.set(object, leaf, new);
+            }
+        }
+        Ok(memory)
+    }
+
+    /// Memory behind both sides.
+    fn joint_memory(&mut self, exported: &mut Exported, yes: &Memory, no: &Memory) -> Result<Memory, Error> {
+        let shared = yes.0.len().min(no.0.len());
+        let longer = if yes.0.len() > no.0.len() { yes.clone() } else { no.clone() };
+        let mut memory = Exec::without_locals(longer, shared);
+        for object in 0..shared {
+            if Rc::ptr_eq(&yes.0[object], &no.0[object]) {
+                continue;
+            }
+            for leaf in 0..yes.0[object].len().min(no.0[object].len()) {
+                let (a, b) = (yes.get(object, leaf).clone(), no.get(object, leaf).clone());
+                let value = self.joint(exported, object, leaf, a, b)?;
+                memory.set(object, leaf, value);
+            }
+        }
+        Ok(memory)
+    }
+
+    /// Objects that only one side has are gone behind it: unset, so that no variable is made for them.
+    fn without_locals(mut memory: Memory, shared: usize) -> Memory {
+        for cells in memory.0.iter_mut().skip(shared) {
+            *cells = Rc::new(vec![Value::Unset; cells.len()]);
+        }
+        memory
+    }
+
+    fn joint(
+        &mut self,
+        exported: &mut Exported,
+        object: usize,
+        leaf: usize,
+        a: Value,
+        b: Value,
+    ) -> Result<Value, Error> {
+        let inside = |exec: &Self, value: &Value| match value {
+            Value::Node(id) | Value::Pointer(Pointer { dynamic: Some(id), .. }) => {
+                exec.is_inside(exported.first, *id)
+            }
+            _ => false,
+        };
+        let name = self.objects[object].leaf_name(leaf);
+        let (in_a, in_b) = (inside(self, &a), inside(self, &b));
+        match (a, b) {
+            (a, b) if a == b && !in_a => Ok(a),
+            (Value::Unset, Value::Node(id)) if in_b => {
+                Ok(Value::Node(self.exported(exported, [None, Some(id)], &name)?))
+            }
+            (Value::Node(id), Value::Unset) if in_a => {
+                Ok(Value::Node(self.exported(exported, [Some(id), None], &name)?))
+            }
+            (Value::Unset, Value::Pointer(_)) if in_b => Ok(MIXED_POINTER),
+            (Value::Pointer(_), Value::Unset) if in_a => Ok(MIXED_POINTER),
+            (Value::Unset, other) | (other, Value::Unset) => Ok(other),
+            (a @ Value::Mixed(_), _) | (_, a @ Value::Mixed(_)) => Ok(a),
+            (Value::Pointer(a), Value::Pointer(b)) => {
+                if a.object != b.object || a.offset != b.offset {
+                    return Ok(MIXED_POINTER);
+                }
+                let zero = self.nodes.int(0);
+                let ids = [Some(a.dynamic.unwrap_or(zero)), Some(b.dynamic.unwrap_or(zero))];
+                let dynamic = Some(self.exported(exported, ids, "at")?);
+                Ok(Value::Pointer(Pointer { dynamic, ..a }))
+            }
+            (a, b) => {
+                let ty = self.objects[object].leaves[leaf].ty.clone();
+                let (Some(a), Some(b)) = (self.register(&a, &ty), self.register(&b, &ty)) else {
+                    return Ok(mixed(&ty));
+                };
+                Ok(Value::Node(self.exported(exported, [Some(a), Some(b)], &name)?))
+            }
+        }
+    }
+
+    /// The memory of several outcomes, exactly one of which happens.
+    pub(super) fn joined(&mut self, mut outcomes: Vec<(Condition, Memory)>) -> Result<Option<Memory>, Error> {
+        outcomes.retain(|(when, _)| *when != Condition::Known(false));
+        let Some((_, mut memory)) = outcomes.pop() else { return Ok(None) };
+        for (when, other) in outcomes.into_iter().rev() {
+            memory = match when {
+                Condition::Known(_) => other,
+                Condition::Node(id) => self.merged(id, &other, &memory)?,
+            };
+        }
+        Ok(Some(memory))
+    }
+
+    /// Takes the exits that end here: they continue together with the normal end. Others go on to `out`.
+    pub(super) fn absorbed(
+        &mut self,
+        normal: Condition,
+        outcomes: Vec<Outcome>,
+        ends: &dyn Fn(&Exit) -> bool,
+        out: &mut Vec<Outcome>,
+    ) -> Result<Condition, Error> {
+        let (mut when, mut here, mut leaves) = (normal, vec![(normal, self.memory.clone())], false);
+        for outcome in outcomes {
+            if ends(&outcome.exit) {
+                here.push((outcome.when, outcome.memory));
+            } else if outcome.when != Condition::Known(false) {
+                leaves = true;
+                out.push(outcome);
+            }
+        }
+        if leaves {
+            for (condition, _) in here.iter().skip(1) {
+                when = self.or(when, *condition)?;
+            }
+        } else {
+            when = Condition::Known(true);
+        }
+        match self.joined(here)? {
+            Some(memory) => self.memory = memory,
+            None => when = Condition::Known(false),
+        }
+        Ok(when)
+    }
+}
+
+const MIXED_POINTER: Value =
+    Value::Mixed("a pointer whose object depends on data: use an index into one array");
+
+fn mixed(ty: &Type) -> Value {
+    match ty {
+        Type::Int(_) => Value::Mixed("a 64-bit integer that depends on data: only known ones are computed"),
+        Type::Double => Value::Mixed("a double that depends on data: give --double=float"),
+        Type::Function(_) | Type::Pointer(_) => {
+            Value::Mixed("a pointer that data choose: use `if` or `switch`")
+        }
+        _ => Value::Mixed("a value that no register holds"),
+    }
+}

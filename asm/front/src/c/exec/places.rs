@@ -1,0 +1,351 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Reads and writes of objects: scalars known or in registers, or words of arrays in memory where data index an object.
+
+use super::{Exec, Key};
+use crate::Error;
+use crate::c::ir::{Array, FULL, Id, Kind, Node, Op, Statement};
+use crate::c::types::{Integer, Leaf, Type};
+use crate::c::value::{Lvalue, Object, Origin, Pointer, Typed, Value};
+use std::rc::Rc;
+
+/// Most elements that a pointer of unknown extent has.
+const MAX_EXTENT: usize = 4096;
+
+/// Register that holds a scalar.
+pub(in crate::c) fn kind_of(ty: &Type) -> Kind {
+    if matches!(ty, Type::Float | Type::Double) { Kind::Float } else { Kind::Int }
+}
+
+impl Exec<'_> {
+    /// A new object whose scalars are unset.
+    pub(in crate::c) fn object(
+        &mut self,
+        name: &str,
+        ty: &Type,
+        origin: Origin,
+        constant: bool,
+        key: Key,
+    ) -> Result<usize, Error> {
+        let Some(leaves) = self.structs.leaves(ty) else {
+            return self.fail(format!(
+                "`{name}` is {}: its size is unknown, or it has more than {} scalars",
+                self.structs.shown(ty),
+                crate::c::types::MAX_LEAVES
+            ));
+        };
+        let index = self.objects.len();
+        let count = leaves.len();
+        self.objects.push(Object {
+            name: name.to_owned(),
+            ty: ty.clone(),
+            leaves: Rc::new(leaves),
+            origin,
+            constant,
+            key,
+            array: None,
+        });
+        self.memory.0.resize(index, Rc::new(Vec::new()));
+        self.memory.0.push(Rc::new(vec![Value::Unset; count]));
+        Ok(index)
+    }
+
+    /// Puts an object into data memory if data index it.
+    pub(in crate::c) fn settle(&mut self, index: usize) -> Result<(), Error> {
+        let object = &self.objects[index];
+        if !self.facts.arrays.contains(&object.key) {
+            return Ok(());
+        }
+        if let Some(array) = self.arrays.get(&object.key) {
+            self.objects[index].array = Some(*array);
+            return Ok(());
+        }
+        let mut kinds = object.leaves.iter().map(|leaf| kind_of(&leaf.ty));
+        let first = kinds.next().unwrap_or(Kind::Int);
+        let kind = kinds.all(|kind| kind == first).then_some(first);
+        let unfit = |leaf: &&Leaf| match &leaf.ty {
+            Type::Int(integer) => integer.bits > 32,
+            Type::Float => false,
+            _ => true,
+        };
+        if let Some(leaf) = object.leaves.iter().find(unfit) {
+            return self.fail(format!(
+                "data index `{}`, and its scalars {} lie in no memory: index only arrays of numbers of 32 bits by data",
+                object.name,
+                self.structs.shown(&leaf.ty)
+            ));
+        }
+        let (name, count, key) = (object.name.clone(), object.leaves.len(), object.key.clone());
+        self.nodes.arrays.push(Array { name, kind, words: vec![0; count] });
+        let array = self.nodes.arrays.len() - 1;
+        self.arrays.insert(key, array);
+        self.objects[index].array = Some(array);
+        Ok(())
+    }
+
+    /// The whole object.
+    pub(in crate::c) fn place_of(&self, object: usize) -> Lvalue {
+        let pointer = Pointer { object, offset: 0, dynamic: None };
+        Lvalue { pointer, ty: self.objects[object].ty.clone() }
+    }
+
+    /// The value at a place; an array becomes a pointer to its first element.
+    pub(in crate::c) fn load(&mut self, place: &Lvalue) -> Result<Typed, Error> {
+        let Lvalue { pointer, ty } = place;
+        match ty {
+            Type::Array(element, _) => {
+                Ok(Typed { ty: Type::Pointer(element.clone()), value: Value::Pointer(pointer.clone()) })
+            }
+            Type::Struct(_) => {
+                let Some(leaves) = self.structs.leaves(ty) else {
+                    return self.fail("this structure is incomplete");
+                };
+                let mut values = Vec::with_capacity(leaves.len());
+                for leaf in leaves {
+                    let at = Pointer { offset: pointer.offset + leaf.offset as i64, ..pointer.clone() };
+                    values.push(self.scalar(&at, &leaf.ty, true)?);
+                }
+                Ok(Typed { ty: ty.clone(), value: Value::Struct(Rc::new(values)) })
+            }
+            Type::Void | Type::Function(_) => self.fail("this has no value"),
+            scalar => {
+                let value = self.scalar(pointer, scalar, false)?;
+                Ok(Typed { ty: scalar.clone(), value })
+            }
+        }
+    }
+
+    pub(in crate::c) fn store(&mut self, place: &Lvalue, value: Typed) -> Result<(), Error> {
+        let Lvalue { pointer, ty } = place;
+        match (ty, value.value) {
+            (Type::Struct(_), Value::Struct(values)) => {
+                let Some(leaves) = self.structs.leaves(ty) else {
+                    return self.fail("this structure is incomplete");
+                };
+                for (leaf, value) in leaves.iter().zip(values.iter()) {
+                    if *value == Value::Unset {
+                        continue;
+                    }
+                    let at = Pointer { offset: pointer.offset + leaf.offset as i64, ..pointer.clone() };
+                    self.put_scalar(&at, &leaf.ty, value.clone())?;
+                }
+                Ok(())
+            }
+            (Type::Array(..) | Type::Function(_) | Type::Void | Type::Struct(_), _) => {
+                self.fail("this is not assigned as a whole")
+            }
+            (scalar, value) => self.put_scalar(pointer, scalar, value),
+        }
+    }
+
+    /// The scalar at a known place; the place of a pointer whose extent is unknown is made known.
+    fn leaf(&mut self, pointer: &Pointer) -> Result<Option<usize>, Error> {
+        let object = &self.objects[pointer.object];
+        if let Some(leaf) = object.leaf(pointer.offset) {
+            return Ok(Some(leaf));
+        }
+        let (name, key) = (object.name.clone(), object.key.clone());
+        if let (Some(extent), Some(first)) = (self.facts.extents.get(&key), object.leaves.first()) {
+            let element = self.structs.size(&first.ty).unwrap_or(4) * object.leaves.len() / (*extent).max(1);
+            let wanted =
+                usize::try_from(pointer.offset).map_or(usize::MAX, |offset| offset / element.max(1) + 1);
+            if wanted <= MAX_EXTENT && wanted > *extent {
+                self.facts.extents.insert(key, wanted);
+                self.again = true;
+                return Ok(None);
+            }
+        }
+        let union = object.leaves.iter().any(|leaf| {
+            leaf.offset as i64 <= pointer.offset
+                && pointer.offset < leaf.offset as i64 + self.structs.size(&leaf.ty).unwrap_or(0) as i64
+        });
+        if union {
+            return self
+                .fail(format!("this reads or writes a part of a scalar of `{name}`: use shifts and masks"));
+        }
+        self.fail(format!("this is outside of `{name}`"))
+    }
+
+    /// Demands that an object lies in memory, in the next translation.
+    fn demand(&mut self, object: usize) {
+        let key = self.objects[object].key.clone();
+        self.facts.arrays.insert(key);
+        self.again = true;
+    }
+
+    /// The word of an array at a place.
+    fn word(&mut self, pointer: &Pointer) -> Result<Id, Error> {
+        // The known part may lie outside, as in a[i - 1]: in whole elements of the object's last array.
+        let object = &self.objects[pointer.object];
+        let found = object.leaf(pointer.offset).map(|leaf| leaf as i64);
+        let stride = object.leaves.get(1).map_or(4, |leaf| leaf.offset as i64);
+        let uniform =
+            object.leaves.iter().enumerate().all(|(index, leaf)| leaf.offset as i64 == index as i64 * stride);
+        let leaf = match found {
+            Some(leaf) => leaf,
+            None if uniform && pointer.offset % stride == 0 => pointer.offset / stride,
+            None => {
+                let (size, count) =
+                    (self.structs.size(&object.ty).unwrap_or(0) as i64, object.leaves.len() as i64);
+                let outer = match &object.ty {
+                    Type::Array(element, Some(_)) => self.structs.size(element).map(|size| size as i64),
+                    _ => None,
+                };
+                let outer = outer.filter(|outer| *outer > 0 && size > 0);
+                let Some(outer) = outer else {
+                    return self.fail(format!("this is outside of `{}`", object.name));
+                };
+                let rows = pointer.offset.div_euclid(outer);
+                let within = object.leaf(pointer.offset.rem_euclid(outer));
+                let Some(within) = within else {
+                    return self.fail(format!("this is outside of `{}`", object.name));
+                };
+                rows * (count * outer / size) + within as i64
+            }
+        };
+        let known = self.nodes.int(leaf as i32);
+        match pointer.dynamic {
+            Some(dynamic) => self.op(Op::IntAdd, &[dynamic, known]),
+            None => Ok(known),
+        }
+    }
+
+    /// Reads a scalar; a part of a structure may be unset.
+    fn scalar(&mut self, pointer: &Pointer, ty: &Type, part: bool) -> Result<Value, Error> {
+        let object = pointer.object;
+        let is_known = self.objects[object].constant || !self.stepping;
+        if pointer.dynamic.is_none() && (self.objects[object].array.is_none() || is_known) {
+            let Some(leaf) = self.leaf(pointer)? else {
+                return Ok(Value::Node(self.placeholder(kind_of(ty), FULL)));
+            };
+            let own = self.objects[object].leaves[leaf].ty.clone();
+            let mut value = self.memory.get(object, leaf).clone();
+            if value == Value::Unset && !self.stepping && self.objects[object].origin == Origin::Global {
+                // Before the step, variables of the files begin as zeros.
+                value = if kind_of(&own) == Kind::Float { Value::Real(0.0) } else { Value::Int(0) };
+            }
+            let value = match part {
+                true => value,
+                false => {
+                    let name = self.objects[object].leaf_name(leaf);
+                    self.present(&value, &name)?
+                }
+            };
+            return self.punned(value, &own, ty);
+        }
+        let Some(array) = self.objects[object].array else {
+            self.demand(object);
+            return Ok(Value::Node(self.placeholder(kind_of(ty), FULL)));
+        };
+        if pointer.dynamic.is_none() && self.leaf(pointer)?.is_none() {
+            return Ok(Value::Node(self.placeholder(kind_of(ty), FULL)));
+        }
+        let index = self.word(pointer)?;
+        let own = self.word_type(pointer);
+        let range = match &own {
+            Type::Int(integer) if integer.bits < 32 => integer.limits(),
+            _ => FULL,
+        };
+        let serial = self.nodes.serial();
+        let id = self.put(Node::Load(array, index, serial), kind_of(&own), range)?;
+        self.punned(Value::Node(id), &own, ty)
+    }
+
+    /// The type of the scalar at a place in an array.
+    fn word_type(&self, pointer: &Pointer) -> Type {
+        let object = &self.objects[pointer.object];
+        let size = self.structs.size(&object.ty).unwrap_or(4).max(1) as i64;
+        let outer = match &object.ty {
+            Type::Array(element, _) => self.structs.size(element).map_or(size, |size| size.max(1) as i64),
+            _ => size,
+        };
+        let leaf = object.leaf(pointer.offset).or_else(|| object.leaf(pointer.offset.rem_euclid(outer)));
+        object.leaves[leaf.unwrap_or(0)].ty.clone()
+    }
+
+    /// The same bits read as another type, as a union's members are.
+    fn punned(&mut self, value: Value, own: &Type, ty: &Type) -> Result<Value, Error> {
+        if own == ty || value == Value::Unset {
+            return Ok(value);
+        }
+        match (own, ty, value) {
+            (Type::Int(a), Type::Int(b), value) if a.bits == b.bits => {
+                // Signedness alone differs.
+                Ok(match value {
+                    Value::Int(known) => Value::Int(b.wrap(known)),
+                    Value::Node(id) => Value::Node(self.wrapped(id, *b)?),
+                    other => other,
+                })
+            }
+            (Type::Pointer(_), Type::Pointer(_), value) => Ok(value),
+            (Type::Int(Integer { bits: 32, .. }), Type::Float, Value::Int(known)) => {
+                Ok(Value::Real(f64::from(f32::from_bits(known as u32))))
+            }
+            (Type::Int(Integer { bits: 32, .. }), Type::Float, Value::Node(id)) => {
+                Ok(Value::Node(self.op(Op::FloatOf, &[id])?))
+            }
+            (Type::Float, Type::Int(to @ Integer { bits: 32, .. }), Value::Real(known)) => {
+                Ok(Value::Int(to.wrap(i64::from((known as f32).to_bits()))))
+            }
+            (Type::Float, Type::Int(Integer { bits: 32, .. }), Value::Node(id)) => {
+                Ok(Value::Node(self.op(Op::BitsOf, &[id])?))
+            }
+            (own, ty, _) => {
+                let (own, ty) = (self.structs.shown(own), self.structs.shown(ty));
+                self.fail(format!("{own} is read as {ty}: only 32 bits are read as another type of 32 bits"))
+            }
+        }
+    }
+
+    fn put_scalar(&mut self, pointer: &Pointer, ty: &Type, value: Value) -> Result<(), Error> {
+        let object = pointer.object;
+        if self.objects[object].constant && self.stepping {
+            return self.fail(format!("`{}` is const", self.objects[object].name));
+        }
+        if pointer.dynamic.is_none() && (self.objects[object].array.is_none() || !self.stepping) {
+            let Some(leaf) = self.leaf(pointer)? else { return Ok(()) };
+            let own = self.objects[object].leaves[leaf].ty.clone();
+            let value = self.punned(value, ty, &own)?;
+            self.changes(object, leaf);
+            if let Value::Node(id) = value {
+                let name = self.objects[object].leaf_name(leaf);
+                self.label(id, &name);
+            }
+            self.memory.set(object, leaf, value);
+            return Ok(());
+        }
+        let Some(array) = self.objects[object].array else {
+            self.demand(object);
+            self.changes_all(object);
+            return Ok(());
+        };
+        if pointer.dynamic.is_none() && self.leaf(pointer)?.is_none() {
+            return Ok(());
+        }
+        let index = self.word(pointer)?;
+        let own = self.word_type(pointer);
+        let value = self.punned(value, ty, &own)?;
+        self.changes_all(object);
+        let Some(value) = self.register(&value, &own) else {
+            return self.fail("no register holds this value");
+        };
+        self.emit(Statement::Store { array, index, value });
+        Ok(())
+    }
+
+    /// Notes that the step writes a scalar that outlives it.
+    fn changes(&mut self, object: usize, leaf: usize) {
+        let found = &self.objects[object];
+        if self.stepping && !matches!(found.origin, Origin::Local | Origin::Parameter) {
+            let fact = (found.key.clone(), leaf);
+            if self.facts.written.insert(fact) {
+                self.again = true;
+            }
+        }
+    }
+
+    fn changes_all(&mut self, object: usize) {
+        for leaf in 0..self.objects[object].leaves.len() {
+            self.changes(object, leaf);
+        }
+    }
+}

@@ -1,0 +1,454 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Loops that stay loops: the body is executed once, with variables for all that it changes. Trials find out what that is.
+
+use super::Exec;
+use super::loops::Repetition;
+use crate::Error;
+use crate::c::ir::{FULL, Id, Kind, Node, Statement};
+use crate::c::types::{INT, Type};
+use crate::c::value::{Condition, Exit, Memory, Origin, Outcome, Pointer, Value};
+use lang_c::ast::{BinaryOperator, Expression, UnaryOperator};
+use lang_c::span::Node as Spanned;
+use std::collections::BTreeMap;
+use std::rc::Rc;
+
+/// Trials until all that a body changes is known.
+const TRIALS: usize = 16;
+/// Most iterations of a loop.
+const MOST: i64 = 65_535;
+
+/// A counter with known ends.
+#[derive(Clone, Copy, Debug)]
+struct Counter {
+    object: usize,
+    first: i64,
+    step: i64,
+    count: i64,
+    /// The loop's condition is nothing but the counter's.
+    alone: bool,
+}
+
+/// A scalar that the body changes: its variable, and the value before the loop.
+#[derive(Clone)]
+struct Carried {
+    var: usize,
+    before: Id,
+    /// Object of a pointer, whose place the variable holds.
+    pointer: Option<usize>,
+}
+
+type Cells = BTreeMap<(usize, usize), Carried>;
+
+impl<'a> Exec<'a> {
+    pub(super) fn rolled(
+        &mut self,
+        parts: Repetition<'a>,
+        out: &mut Vec<Outcome>,
+    ) -> Result<Condition, Error> {
+        let counter = self.counter(&parts)?;
+        if let Some(counter) = counter.filter(|counter| counter.alone && !parts.body_first) {
+            if counter.count <= 0 {
+                return Ok(Condition::Known(true));
+            }
+            let saved = self.saved();
+            self.blocks.push(Vec::new());
+            match self.counted(&parts, counter) {
+                Ok(true) => {
+                    let block = self.blocks.pop().expect("it was pushed");
+                    self.blocks.last_mut().expect("a block is open").extend(block);
+                    return Ok(Condition::Known(true));
+                }
+                Ok(false) => self.restore(saved),
+                Err(error) => return Err(error),
+            }
+        }
+        let bound = parts.bound.or(counter.map(|counter| counter.count.max(1) as u64));
+        let Some(bound) = bound else {
+            return self.fail(
+                "data decide how often this loop runs, and no bound is known: write `#pragma takt loop_bound(N)` before it",
+            );
+        };
+        if parts.body_first {
+            return self.repeated(&parts, bound, out);
+        }
+        match self.goes_on(&parts)? {
+            Condition::Known(false) => Ok(Condition::Known(true)),
+            Condition::Known(true) => self.repeated(&parts, bound, out),
+            Condition::Node(id) => self.fork(
+                id,
+                &mut |exec, out| exec.repeated(&parts, bound, out),
+                &mut |_, _| Ok(Condition::Known(true)),
+                out,
+            ),
+        }
+    }
+
+    /// The counter of a loop: a variable that the step advances and the condition compares with a known number.
+    fn counter(&mut self, parts: &Repetition<'a>) -> Result<Option<Counter>, Error> {
+        let (Some(condition), Some(step)) = (parts.condition, parts.step) else { return Ok(None) };
+        let Some((name, by)) = self.advance(step)? else { return Ok(None) };
+        let Some(super::Named::Object(object)) = self.looked_up(name).cloned() else { return Ok(None) };
+        let Type::Int(integer) = self.objects[object].ty else { return Ok(None) };
+        let Value::Int(first) = self.memory.get(object, 0).clone() else { return Ok(None) };
+        let Some((operator, end, alone)) = self.comparison(condition, name)? else { return Ok(None) };
+        let count = match operator {
+            BinaryOperator::Less if by > 0 => (end - first + by - 1).div_euclid(by),
+            BinaryOperator::LessOrEqual if by > 0 => (end - first + by).div_euclid(by),
+            BinaryOperator::Greater if by < 0 => (first - end - by - 1).div_euclid(-by),
+            BinaryOperator::GreaterOrEqual if by < 0 => (first - end - by).div_euclid(-by),
+            BinaryOperator::NotEquals if by != 0 && (end - first) % by == 0 => (end - first) / by,
+            _ => return Ok(None),
+        };
+        let count = count.max(0);
+        let last = first + count * by;
+        let (least, most) = integer.limits();
+        if count > MOST || last < least || last > most || last > i64::from(i32::MAX) {
+            return Ok(None);
+        }
+        Ok(Some(Counter { object, first, step: by, count, alone }))
+    }
+
+    /// The variable that a step advances, and by how much.
+    fn advance(&mut self, step: &'a Spanned<Expression>) -> Result<Option<(&'a str, i64)>, Error> {
+        let named = |expression: &'a Spanned<Expression>| match &expression.node {
+            Expression::Identifier(name) => Some(name.node.name.as_str()),
+            _ => None,
+        };
+        match &step.node {
+            Expression::UnaryOperator(unary) => {
+                let by = match unary.node.operator.node {
+                    UnaryOperator::PostIncrement | UnaryOperator::PreIncrement => 1,
+                    UnaryOperator::PostDecrement | UnaryOperator::PreDecrement => -1,
+                    _ => return Ok(None),
+                };
+                Ok(named(&unary.node.operand).map(|name| (name, by)))
+            }
+            Expression::BinaryOperator(binary) => {
+                let sign = match binary.node.operator.node {
+                    BinaryOperator::AssignPlus => 1,
+                    BinaryOperator::AssignMinus => -1,
+                    _ => return Ok(None),
+                };
+                let Some(name) = named(&binary.node.lhs) else { return Ok(None) };
+                let Expression::Constant(constant) = &binary.node.rhs.node else { return Ok(None) };
+                match self.constant_value(&constant.node)?.value {
+                    Value::Int(by) => Ok(Some((name, sign * by))),
+                    _ => Ok(None),
+                }
+            }
+            _ => Ok(None),
+        }
+    }
+
+    /// The comparison of a variable in a condition, possibly one of several that all must hold.
+    fn comparison(
+        &mut self,
+        condition: &'a Spanned<Expression>,
+        name: &str,
+    ) -> Result<Option<(BinaryOperator, i64, bool)>, Error> {
+        let Expression::BinaryOperator(binary) = &condition.node else { return Ok(None) };
+        let binary = &binary.node;
+        if binary.operator.node == BinaryOperator::LogicalAnd {
+            for side in [&binary.lhs, &binary.rhs] {
+                if let Some((operator, end, _)) = self.comparison(side, name)? {
+                    return Ok(Some((operator, end, false)));
+                }
+            }
+            return Ok(None);
+        }
+        let is_name = |side: &Spanned<Expression>| matches!(&side.node, Expression::Identifier(own) if own.node.name == name);
+        let turned = match binary.operator.node {
+            BinaryOperator::Less => BinaryOperator::Greater,
+            BinaryOperator::LessOrEqual => BinaryOperator::GreaterOrEqual,
+            BinaryOperator::Greater => BinaryOperator::Less,
+            BinaryOperator::GreaterOrEqual => BinaryOperator::LessOrEqual,
+            BinaryOperator::NotEquals => BinaryOperator::NotEquals,
+            _ => return Ok(None),
+        };
+        let (operator, end) = if is_name(&binary.lhs) {
+            (binary.operator.node.clone(), &binary.rhs)
+        } else if is_name(&binary.rhs) {
+            (turned, &binary.lhs)
+        } else {
+            return Ok(None);
+        };
+        match self.value(end)?.value {
+            Value::Int(end) => Ok(Some((operator, end, true))),
+            _ => Ok(None),
+        }
+    }
+
+    /// A counted loop; false if its body leaves it or changes the counter.
+    fn counted(&mut self, parts: &Repetition<'a>, counter: Counter) -> Result<bool, Error> {
+        let before = self.memory.clone();
+        let name = self.objects[counter.object].name.clone();
+        let last = counter.first + (counter.count - 1) * counter.step;
+        let range = (counter.first.min(last), counter.first.max(last));
+        let mut cells = Cells::new();
+        for _ in 0..TRIALS {
+            let mark = self.nodes.mark();
+            let saved = self.saved();
+            self.blocks.push(Vec::new());
+            self.enter_cells(&cells);
+            self.nodes.indices.push(name.clone());
+            let number = self.nodes.indices.len() - 1;
+            let (index, _) = self.nodes.add(Node::Index(number), Kind::Int, range);
+            self.memory.set(counter.object, 0, Value::Node(index));
+            let mut outcomes = Vec::new();
+            let normal = self.statement(parts.body, &mut outcomes)?;
+            let mut leaves = Vec::new();
+            let normal = self.absorbed(normal, outcomes, &|exit| *exit == Exit::Continue, &mut leaves)?;
+            let regular = normal == Condition::Known(true) && leaves.is_empty();
+            let kept = self.memory.get(counter.object, 0) == &Value::Node(index);
+            let same_end =
+                match parts.condition.map(|condition| self.comparison(condition, &name)).transpose()? {
+                    Some(Some((_, end, _))) => self.ends_alike(counter, end, parts)?,
+                    _ => false,
+                };
+            if !regular || !kept || !same_end {
+                self.restore(saved);
+                return Ok(false);
+            }
+            self.memory.set(counter.object, 0, before.get(counter.object, 0).clone());
+            if self.grow(&mut cells, &before)? {
+                self.restore(saved);
+                continue;
+            }
+            let body = self.close_body(&cells)?;
+            self.nodes.forget(mark);
+            self.begin_cells(&cells);
+            let (first, step) = (counter.first, counter.step);
+            self.emit(Statement::For { index: number, first, last, step, body });
+            self.leave_cells(&cells, before);
+            let end = counter.first + counter.count * counter.step;
+            self.memory.set(counter.object, 0, Value::Int(end));
+            return Ok(true);
+        }
+        self.fail("what this loop changes is not found out: split its body")
+    }
+
+    /// The loop's end is still what it was before the body.
+    fn ends_alike(&mut self, counter: Counter, end: i64, parts: &Repetition<'a>) -> Result<bool, Error> {
+        let saved = self.memory.clone();
+        self.memory.set(counter.object, 0, Value::Int(counter.first));
+        let again = self.counter(parts)?;
+        self.memory = saved;
+        let _ = end;
+        Ok(again.is_some_and(|again| again.count == counter.count))
+    }
+
+    /// A loop whose end data decide: the body runs, then the test.
+    fn repeated(
+        &mut self,
+        parts: &Repetition<'a>,
+        bound: u64,
+        out: &mut Vec<Outcome>,
+    ) -> Result<Condition, Error> {
+        let ty = Type::Int(INT);
+        let again = self.flag(&ty)?;
+        let left = self.flag(&ty)?;
+        self.memory.set(left, 0, Value::Int(0));
+        self.memory.set(again, 0, Value::Int(0));
+        let before = self.memory.clone();
+        let mut cells = Cells::new();
+        for _ in 0..TRIALS {
+            let mark = self.nodes.mark();
+            let saved = self.saved();
+            self.blocks.push(Vec::new());
+            self.enter_cells(&cells);
+            let mut outcomes = Vec::new();
+            let normal = self.statement(parts.body, &mut outcomes)?;
+            let mut leaves = Vec::new();
+            let normal = self.absorbed(normal, outcomes, &|exit| *exit == Exit::Continue, &mut leaves)?;
+            let next = self.either(
+                normal,
+                &mut |exec, _| {
+                    exec.stepped(parts)?;
+                    let condition = exec.goes_on(parts)?;
+                    let value = exec.value_of(condition);
+                    exec.memory.set(again, 0, value);
+                    Ok(Condition::Known(true))
+                },
+                &mut |exec, _| {
+                    exec.memory.set(again, 0, Value::Int(0));
+                    Ok(Condition::Known(true))
+                },
+                &mut Vec::new(),
+            )?;
+            let _ = next;
+            let mut exit = None;
+            let mut ends = Vec::new();
+            for mut outcome in leaves {
+                if outcome.exit != Exit::Break {
+                    if exit.as_ref().is_some_and(|known| *known != outcome.exit) {
+                        return self.fail("this loop is left in several ways: use `break` and a variable");
+                    }
+                    exit = Some(outcome.exit);
+                    outcome.memory.set(left, 0, Value::Int(1));
+                }
+                outcome.memory.set(again, 0, Value::Int(0));
+                ends.push((outcome.when, outcome.memory));
+            }
+            ends.push((normal, self.memory.clone()));
+            if let Some(memory) = self.joined(ends)? {
+                self.memory = memory;
+            }
+            let goes_on = self.memory.get(again, 0).clone();
+            self.memory.set(again, 0, Value::Int(0));
+            if self.grow(&mut cells, &before)? {
+                self.restore(saved);
+                continue;
+            }
+            let goes_on = match self.register(&goes_on, &ty) {
+                Some(id) => id,
+                None => return self.fail("the loop's condition is no number"),
+            };
+            let mut body = self.close_body(&cells)?;
+            self.nodes.forget(mark);
+            self.begin_cells(&cells);
+            // The test stands in a register that the writes at the end of the body do not change.
+            let at = self.at;
+            let var = self.nodes.var("again", Kind::Int);
+            let kept = self.nodes.read(var, (0, 1));
+            match body.last_mut() {
+                Some((Statement::Set(pairs), _)) => pairs.push((var, goes_on)),
+                _ => body.push((Statement::Set(vec![(var, goes_on)]), at)),
+            }
+            self.emit(Statement::Loop { bound, body, again: kept });
+            self.leave_cells(&cells, before);
+            let Some(exit) = exit else { return Ok(Condition::Known(true)) };
+            let flag = self.memory.get(left, 0).clone();
+            let when = match flag {
+                Value::Node(id) => self.is_not_zero(id)?,
+                Value::Int(known) => Condition::Known(known != 0),
+                _ => Condition::Known(false),
+            };
+            out.push(Outcome { exit, when, memory: self.memory.clone() });
+            return self.not(when);
+        }
+        self.fail("what this loop changes is not found out: split its body")
+    }
+
+    fn flag(&mut self, ty: &Type) -> Result<usize, Error> {
+        let key = ("flag".to_owned(), usize::MAX, self.unit());
+        self.object("flag", ty, Origin::Local, false, key)
+    }
+
+    /// Puts the variables into memory, as a body finds them.
+    fn enter_cells(&mut self, cells: &Cells) {
+        for ((object, leaf), carried) in cells {
+            let value = self.carried(*object, *leaf, carried);
+            self.memory.set(*object, *leaf, value);
+        }
+    }
+
+    fn carried(&mut self, object: usize, leaf: usize, carried: &Carried) -> Value {
+        let range = match &self.objects[object].leaves[leaf].ty {
+            Type::Int(integer) if integer.bits < 32 => integer.limits(),
+            _ => FULL,
+        };
+        let id = self.nodes.read(carried.var, range);
+        match carried.pointer {
+            Some(object) => Value::Pointer(Pointer { object, offset: 0, dynamic: Some(id) }),
+            None => Value::Node(id),
+        }
+    }
+
+    /// Adds what the body changed beyond the cells; false if there is nothing new.
+    fn grow(&mut self, cells: &mut Cells, before: &Memory) -> Result<bool, Error> {
+        let mut grown = false;
+        for object in 0..before.0.len() {
+            if Rc::ptr_eq(&before.0[object], &self.memory.0[object]) {
+                continue;
+            }
+            for leaf in 0..before.0[object].len() {
+                let (old, new) = (before.get(object, leaf).clone(), self.memory.get(object, leaf).clone());
+                if old == new || cells.contains_key(&(object, leaf)) {
+                    continue;
+                }
+                let carried = self.new_cell(object, leaf, &old, &new)?;
+                cells.insert((object, leaf), carried);
+                grown = true;
+            }
+        }
+        Ok(grown)
+    }
+
+    fn new_cell(&mut self, object: usize, leaf: usize, old: &Value, new: &Value) -> Result<Carried, Error> {
+        let name = self.objects[object].leaf_name(leaf);
+        if let (Value::Pointer(old), Value::Pointer(new)) = (old, new) {
+            if old.object != new.object {
+                return self.fail(format!(
+                    "`{name}` points to several objects in a loop that is too long for being written out"
+                ));
+            }
+            let before = self.scalars(old)?;
+            let var = self.nodes.var(&name, Kind::Int);
+            return Ok(Carried { var, before, pointer: Some(old.object) });
+        }
+        let ty = self.objects[object].leaves[leaf].ty.clone();
+        let zero = match ty {
+            Type::Float => Value::Real(0.0),
+            _ => Value::Int(0),
+        };
+        let old = if *old == Value::Unset { &zero } else { old };
+        let Some(before) = self.register(old, &ty) else {
+            return self.fail(format!(
+                "`{name}` changes in a loop that is too long for being written out, and no register holds {}",
+                self.structs.shown(&ty)
+            ));
+        };
+        let var = self.nodes.var(&name, super::places::kind_of(&ty));
+        Ok(Carried { var, before, pointer: None })
+    }
+
+    /// Ends the body with the writes of its variables.
+    fn close_body(&mut self, cells: &Cells) -> Result<crate::c::ir::Block, Error> {
+        let mut sets = Vec::new();
+        for ((object, leaf), carried) in cells {
+            let value = self.memory.get(*object, *leaf).clone();
+            let id =
+                match (&value, carried.pointer) {
+                    (Value::Pointer(pointer), Some(object)) if pointer.object == object => {
+                        self.scalars(pointer)?
+                    }
+                    (value, None) => {
+                        let ty = self.objects[*object].leaves[*leaf].ty.clone();
+                        match self.register(value, &ty) {
+                            Some(id) => id,
+                            None => return self.fail(
+                                "a value in a loop that is too long for being written out has no register",
+                            ),
+                        }
+                    }
+                    _ => {
+                        return self.fail(
+                            "a pointer in a loop that is too long for being written out has no known object",
+                        );
+                    }
+                };
+            sets.push((carried.var, id));
+        }
+        if !sets.is_empty() {
+            self.emit(Statement::Set(sets));
+        }
+        Ok(self.blocks.pop().expect("it was pushed"))
+    }
+
+    /// Sets the variables before the loop.
+    fn begin_cells(&mut self, cells: &Cells) {
+        let sets: Vec<(usize, Id)> = cells.values().map(|carried| (carried.var, carried.before)).collect();
+        if !sets.is_empty() {
+            self.emit(Statement::Set(sets));
+        }
+    }
+
+    /// Memory behind the loop.
+    fn leave_cells(&mut self, cells: &Cells, before: Memory) {
+        self.memory = before;
+        for ((object, leaf), carried) in cells {
+            let value = self.carried(*object, *leaf, carried);
+            self.memory.set(*object, *leaf, value);
+        }
+    }
+}

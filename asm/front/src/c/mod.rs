@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! C99: a step function and what it calls becomes a program, a period of which is one call.
+//!
+//! The C is executed while it is translated (`exec`): integers, pointers, sizes and counters that are known are computed; floats and what
+//! depends on inputs become nodes (`ir`), which `write` spells. Paths that data choose become choices or branches, loops are written out
+//! while they are short. The fate of the step's parameters and of variables that outlive it: `ports`.
+
+mod exec;
+mod ir;
+mod live;
+mod ports;
+mod preprocess;
+mod types;
+mod unit;
+mod value;
+mod write;
+
+pub use ports::Port;
+pub use preprocess::{HEADERS, Preprocessor};
+
+use crate::Error;
+use exec::{Exec, Facts};
+use unit::Unit;
+
+/// Most translations until nothing new is found out.
+const MAX_ROUNDS: usize = 64;
+/// Bytes of stack while translating: statements and expressions nest.
+const STACK: usize = 512 << 20;
+
+/// A preprocessed file.
+#[derive(Clone, Debug)]
+pub struct Source {
+    /// Name of the file, for messages.
+    pub name: String,
+    /// Preprocessed text with line markers.
+    pub text: String,
+}
+
+/// Options of a translation.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Name of the function that is a period.
+    pub step: String,
+    /// Name of the function that runs once, before the first period.
+    pub init: Option<String>,
+    /// Read `double` as `float`, and every number as binary32.
+    pub double_is_float: bool,
+}
+
+/// A program in the language, with its ports.
+#[derive(Clone, Debug)]
+pub struct Translation {
+    /// The source.
+    pub text: String,
+    /// Input ports.
+    pub inputs: Vec<Port>,
+    /// Output ports.
+    pub outputs: Vec<Port>,
+}
+
+/// Translates C.
+///
+/// # Errors
+/// If the text is no C that is read: with file, line, reason and remedy.
+pub fn translate(sources: &[Source], options: &Options) -> Result<Translation, Error> {
+    // Execution recurses with the nesting of the C: on a stack of its own.
+    std::thread::scope(|scope| {
+        let thread = std::thread::Builder::new()
+            .stack_size(STACK)
+            .spawn_scoped(scope, || translated(sources, options));
+        match thread {
+            Ok(thread) => thread
+                .join()
+                .unwrap_or_else(|_| Err(Error::plain("the translation failed: this is a defect, report it"))),
+            Err(error) => Err(Error::plain(format!("no thread for the translation: {error}"))),
+        }
+    })
+}
+
+fn translated(sources: &[Source], options: &Options) -> Result<Translation, Error> {
+    let mut units = Vec::new();
+    for source in sources {
+        units.push(Unit::read(&source.name, &source.text)?);
+    }
+    let mut facts = Facts::default();
+    for _ in 0..MAX_ROUNDS {
+        let mut exec = Exec::new(&units, options.double_is_float, facts);
+        match round(&mut exec, options) {
+            Err(error) if !exec.again => return Err(error),
+            Ok(Some(translation)) if !exec.again => return Ok(translation),
+            _ => facts = exec.facts,
+        }
+    }
+    Err(Error::plain(format!(
+        "after {MAX_ROUNDS} translations it is still not known which data index what: split the step"
+    )))
+}
+
+/// One translation with what the former ones found out.
+fn round(exec: &mut Exec<'_>, options: &Options) -> Result<Option<Translation>, Error> {
+    let before = exec.facts.clone();
+    for unit in 0..exec.units.len() {
+        exec.file(unit)?;
+    }
+    let (step, signature) = exec.entry(&options.step, "step")?;
+    let init = options.init.as_ref().map(|name| exec.entry(name, "init")).transpose()?;
+    exec.prepare_all()?;
+    let objects = exec.parameters(&signature, None)?;
+    if let Some((init, signature)) = init {
+        let own = exec.parameters(&signature, Some(&objects))?;
+        exec.bound(&init, &signature, &own)?;
+        exec.run(&init)?;
+    }
+    exec.bound(&step, &signature, &objects)?;
+    exec.here(&step);
+    let begun = exec.begin()?;
+    let result = exec.run(&step)?;
+    if exec.again && exec.facts != before {
+        return Ok(None);
+    }
+    let roles = exec.end(begun, result)?;
+    if exec.again {
+        return Ok(None);
+    }
+    write::program(exec, roles, options).map(Some)
+}

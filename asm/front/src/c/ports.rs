@@ -1,0 +1,646 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Ports and states: what becomes of parameters of the step, and of variables that outlive it.
+//!
+//! A scalar whose value from before the step is read and that the step does not write is an input; one that it only writes, an output. One
+//! that is both is a state, if it belongs to a structure or a variable of the files; of an array or number that a parameter points to, an
+//! input and an output. A scalar that some paths write and none reads is an output that keeps its value.
+
+use super::exec::Exec;
+use super::exec::call::adjusted;
+use super::exec::places::kind_of;
+use super::ir::{Block, FULL, Id, Kind, Node, Op, Statement};
+use super::live::Live;
+use super::types::{Signature, Type};
+use super::value::{Origin, Pointer, Typed, Value};
+use crate::Error;
+use crate::sink::Names;
+use std::collections::{HashMap, HashSet};
+use std::rc::Rc;
+
+/// Most ports of a program.
+const MAX_INPUTS: usize = 255;
+const MAX_OUTPUTS: usize = 32;
+
+/// A port of the program, and what it is in C.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Port {
+    /// Name in the program: `q[1]`.
+    pub name: String,
+    /// The scalar in C: `q[0]`, `in.speed`, `result`.
+    pub c: String,
+    /// A float; otherwise an integer.
+    pub float: bool,
+    /// Name and dimensions of the declaration.
+    pub(super) declared: (String, Vec<usize>),
+}
+
+/// A register that outlives the period.
+#[derive(Clone, Debug)]
+pub(super) struct State {
+    pub(super) name: String,
+    pub(super) kind: Kind,
+    pub(super) initial: u32,
+}
+
+/// Ports and states of a program.
+pub(super) struct Roles {
+    pub(super) inputs: Vec<Port>,
+    pub(super) outputs: Vec<Port>,
+    pub(super) states: Vec<State>,
+    /// Variables that ports and states hold: they have their names already.
+    pub(super) fixed: Vec<usize>,
+    pub(super) notes: Vec<String>,
+    pub(super) names: Names,
+}
+
+/// A scalar with a register from before the step.
+struct Start {
+    object: usize,
+    leaf: usize,
+    var: usize,
+    read: Id,
+    /// The same as its type has it: a port may hold more.
+    own: Id,
+    /// Bits that `--init` or the declaration gives; `None` if nothing does.
+    initial: Option<u32>,
+}
+
+/// The step ready to run: values from before it.
+pub(super) struct Begun {
+    starts: Vec<Start>,
+}
+
+/// Bits of a known scalar.
+fn bits(value: &Value) -> Option<u32> {
+    match value {
+        Value::Int(value) => Some(*value as u32),
+        Value::Real(value) => Some((*value as f32).to_bits()),
+        _ => None,
+    }
+}
+
+impl Exec<'_> {
+    /// The function of a name, in whichever file.
+    pub(super) fn entry(&self, name: &str, option: &str) -> Result<(String, Rc<Signature>), Error> {
+        let mut keys: Vec<&String> =
+            self.functions.keys().filter(|key| super::exec::plain(key) == name).collect();
+        keys.sort();
+        match keys.as_slice() {
+            [key] => {
+                let unit = self.functions[*key].unit;
+                match self.scopes[unit].names.get(name) {
+                    Some(super::exec::Named::Function(_, signature)) => {
+                        Ok(((*key).clone(), signature.clone()))
+                    }
+                    _ => Err(Error::plain(format!("--{option} {name}: this is no function"))),
+                }
+            }
+            [] => {
+                let mut known: Vec<&str> = self.functions.keys().map(|key| super::exec::plain(key)).collect();
+                known.sort_unstable();
+                known.truncate(20);
+                if known.is_empty() {
+                    return Err(Error::plain(format!("--{option} {name}: the files define no function")));
+                }
+                Err(Error::plain(format!(
+                    "--{option} {name}: the files define no such function (functions: {})",
+                    known.join(", ")
+                )))
+            }
+            _ => Err(Error::plain(format!(
+                "--{option} {name}: several files define it as `static`: rename one"
+            ))),
+        }
+    }
+
+    /// Objects that a function's parameters point to or are: by the parameters' names, and for --init those of the step.
+    pub(super) fn parameters(
+        &mut self,
+        signature: &Signature,
+        step: Option<&[(String, usize)]>,
+    ) -> Result<Vec<(String, usize)>, Error> {
+        let mut found = Vec::new();
+        for (index, (name, ty)) in signature.parameters.iter().enumerate() {
+            let name = if name.is_empty() { format!("p{}", index + 1) } else { name.clone() };
+            if let Some(step) = step {
+                let by_name = step.iter().find(|(own, object)| {
+                    *own == name && self.pointee_type(ty).is_some_and(|ty| self.is_same(*object, &ty))
+                });
+                let by_type: Vec<&(String, usize)> = step
+                    .iter()
+                    .filter(|(_, object)| self.pointee_type(ty).is_some_and(|ty| self.is_same(*object, &ty)))
+                    .collect();
+                let object = match (by_name, by_type.as_slice()) {
+                    (Some((_, object)), _) | (None, [(_, object)]) => *object,
+                    _ => {
+                        return Err(Error::plain(format!(
+                            "--init: its parameter `{name}` is no pointer to what a parameter of the step points to, by name or type"
+                        )));
+                    }
+                };
+                found.push((name, object));
+                continue;
+            }
+            let key = (format!("parameter {name}"), index, usize::MAX);
+            let object = match (ty, adjusted(ty)) {
+                (Type::Array(element, Some(count)), _) => {
+                    let ty = Type::Array(element.clone(), Some(*count));
+                    self.object(&name, &ty, Origin::Pointee, false, key)?
+                }
+                (_, Type::Pointer(to)) => {
+                    if matches!(*to, Type::Void | Type::Function(_)) {
+                        return self.fail(format!("`{name}` points to no data: a parameter of the step is a number, a structure, or a pointer to these"));
+                    }
+                    let extent = *self.facts.extents.entry(key.clone()).or_insert(1);
+                    let ty = if extent == 1 { (*to).clone() } else { Type::Array(to.clone(), Some(extent)) };
+                    self.object(&name, &ty, Origin::Pointee, false, key)?
+                }
+                (_, ty) => self.object(&name, &ty, Origin::Parameter, false, key)?,
+            };
+            found.push((name, object));
+        }
+        Ok(found)
+    }
+
+    fn pointee_type(&self, ty: &Type) -> Option<Type> {
+        match adjusted(ty) {
+            Type::Pointer(to) => Some((*to).clone()),
+            _ => None,
+        }
+    }
+
+    fn is_same(&self, object: usize, ty: &Type) -> bool {
+        let own = &self.objects[object];
+        own.origin == Origin::Pointee
+            && (own.ty == *ty || matches!(&own.ty, Type::Array(element, _) if **element == *ty))
+    }
+
+    /// Binds parameters in a new frame.
+    pub(super) fn bound(
+        &mut self,
+        key: &str,
+        signature: &Rc<Signature>,
+        objects: &[(String, usize)],
+    ) -> Result<(), Error> {
+        self.enter_function(key, signature)?;
+        for ((name, object), (_, ty)) in objects.iter().zip(&signature.parameters) {
+            if self.objects[*object].origin == Origin::Parameter {
+                self.bind(name, *object);
+                continue;
+            }
+            let ty = adjusted(ty);
+            let variable =
+                self.object(name, &ty, Origin::Local, false, (key.to_owned(), *object, usize::MAX - 1))?;
+            let pointer = Pointer { object: *object, offset: 0, dynamic: None };
+            let place = self.place_of(variable);
+            self.store(&place, Typed { ty, value: Value::Pointer(pointer) })?;
+            self.bind(name, variable);
+        }
+        Ok(())
+    }
+
+    /// Gives all that outlives the step its value from before it.
+    pub(super) fn begin(&mut self) -> Result<Begun, Error> {
+        self.stepping = true;
+        let mut starts = Vec::new();
+        for object in 0..self.objects.len() {
+            let found = self.objects[object].clone();
+            if found.origin == Origin::Local || found.constant && found.origin != Origin::Pointee {
+                self.table(object)?;
+                continue;
+            }
+            let is_struct = matches!(found.ty, Type::Struct(_));
+            let array = found.origin != Origin::Parameter && self.facts.arrays.contains(&found.key);
+            let written = |leaf| self.facts.written.contains(&(found.key.clone(), leaf));
+            let any = (0..found.leaves.len()).any(written);
+            if array && (any || found.origin == Origin::Static) {
+                let own = matches!(found.origin, Origin::Static | Origin::Global)
+                    || is_struct
+                    || self.has_struct(&found.ty);
+                let set = self.memory.0[object].iter().all(|value| *value != Value::Unset);
+                if own || set {
+                    // The array itself is the state.
+                    self.table(object)?;
+                    continue;
+                }
+            }
+            for leaf in 0..found.leaves.len() {
+                let value = self.memory.get(object, leaf).clone();
+                let changes = found.origin != Origin::Parameter
+                    && self.facts.written.contains(&(found.key.clone(), leaf));
+                if value != Value::Unset && !changes {
+                    continue;
+                }
+                self.start(object, leaf, &value, &mut starts)?;
+            }
+            if found.origin != Origin::Parameter {
+                self.settle(object)?;
+            }
+            if let Some(array) = self.objects[object].array {
+                self.fill(object, array)?;
+            }
+        }
+        Ok(Begun { starts })
+    }
+
+    fn has_struct(&self, ty: &Type) -> bool {
+        match ty {
+            Type::Array(element, _) => self.has_struct(element),
+            Type::Struct(_) => true,
+            _ => false,
+        }
+    }
+
+    /// An object in memory whose words the loader sets.
+    fn table(&mut self, object: usize) -> Result<(), Error> {
+        self.settle(object)?;
+        let Some(array) = self.objects[object].array else { return Ok(()) };
+        for leaf in 0..self.objects[object].leaves.len() {
+            let word = bits(self.memory.get(object, leaf)).unwrap_or(0);
+            self.nodes.arrays[array].words[leaf] = word;
+        }
+        Ok(())
+    }
+
+    /// Stores inputs into the array that data index.
+    fn fill(&mut self, object: usize, array: usize) -> Result<(), Error> {
+        for leaf in 0..self.objects[object].leaves.len() {
+            let (value, ty) =
+                (self.memory.get(object, leaf).clone(), self.objects[object].leaves[leaf].ty.clone());
+            match bits(&value) {
+                Some(word) => self.nodes.arrays[array].words[leaf] = word,
+                None => {
+                    let Some(value) = self.register(&value, &ty) else { continue };
+                    let index = self.nodes.int(leaf as i32);
+                    self.emit(Statement::Store { array, index, value });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn start(
+        &mut self,
+        object: usize,
+        leaf: usize,
+        value: &Value,
+        starts: &mut Vec<Start>,
+    ) -> Result<(), Error> {
+        let (ty, origin) = (self.objects[object].leaves[leaf].ty.clone(), self.objects[object].origin);
+        let unfit = match &ty {
+            Type::Int(integer) if integer.bits > 32 => {
+                Some("a 64-bit integer that outlives the step: 32 bits do")
+            }
+            Type::Double => Some("a double: give --double=float"),
+            Type::Pointer(_) => match value {
+                Value::Unset => return Ok(()),
+                _ => Some("a pointer that the step changes and that outlives it: keep an index"),
+            },
+            _ => None,
+        };
+        if let Some(reason) = unfit {
+            self.memory.set(object, leaf, Value::Mixed(reason));
+            return Ok(());
+        }
+        let changes = self.facts.written.contains(&(self.objects[object].key.clone(), leaf));
+        let kept = changes && (origin != Origin::Pointee || self.has_struct(&self.objects[object].ty));
+        let name = self.objects[object].leaf_name(leaf);
+        let var = self.nodes.var(&name, kind_of(&ty));
+        let mut range = FULL;
+        if let (Type::Int(integer), true) = (&ty, kept && origin != Origin::Parameter)
+            && integer.bits < 32
+        {
+            range = integer.limits();
+        }
+        let read = self.nodes.read(var, range);
+        let initial = bits(value).or((origin == Origin::Global && changes).then_some(0));
+        let mut own = read;
+        if let Type::Int(integer) = &ty {
+            // A port may hold more than its type: as a call would convert it.
+            own = self.wrapped(read, *integer)?;
+        }
+        self.memory.set(object, leaf, Value::Node(own));
+        starts.push(Start { object, leaf, var, read, own, initial });
+        Ok(())
+    }
+
+    /// Ends the step: decides about ports and states, and sets them.
+    pub(super) fn end(&mut self, begun: Begun, result: Option<usize>) -> Result<Roles, Error> {
+        let mut roles = Roles {
+            inputs: Vec::new(),
+            outputs: Vec::new(),
+            states: Vec::new(),
+            fixed: Vec::new(),
+            notes: Vec::new(),
+            names: Names::of_language(),
+        };
+        let mut finals = Vec::new();
+        for start in &begun.starts {
+            let after = self.after(start.object, start.leaf)?;
+            finals.push(after);
+        }
+        let results = self.results(result)?;
+        let mut roots: Vec<Id> = results.iter().map(|(_, id)| *id).collect();
+        for (start, after) in begun.starts.iter().zip(&finals) {
+            if self.objects[start.object].origin != Origin::Parameter
+                && let Some(id) = after
+                && *id != start.own
+            {
+                roots.push(*id);
+            }
+        }
+        let live = Live::of(&self.nodes, &self.blocks[0], &roots, &[]);
+        let mut sets = Vec::new();
+        let mut groups = Groups::default();
+        for (start, after) in begun.starts.iter().zip(&finals) {
+            let held = after.is_some_and(|after| self.is_held(start, after, &live, &finals));
+            self.role(start, *after, (&live, held), &mut roles, &mut groups, &mut sets);
+        }
+        for (leaf, id) in results {
+            let object = result.expect("it has scalars");
+            let var = groups.port(self, object, leaf, "", &mut roles, Way::Out);
+            sets.push((var, id));
+        }
+        for (way, count, most) in
+            [("inputs", roles.inputs.len(), MAX_INPUTS), ("outputs", roles.outputs.len(), MAX_OUTPUTS)]
+        {
+            if count > most {
+                return Err(Error::plain(format!(
+                    "the step has {count} {way}, and a program has {most} at most: keep what only the step uses in `static` variables"
+                )));
+            }
+        }
+        self.emit(Statement::Set(sets));
+        Ok(roles)
+    }
+
+    /// A scalar behind the step; `None` if it has no register then.
+    fn after(&mut self, object: usize, leaf: usize) -> Result<Option<Id>, Error> {
+        let ty = self.objects[object].leaves[leaf].ty.clone();
+        if let Some(array) = self.objects[object].array {
+            let written = self.facts.written.contains(&(self.objects[object].key.clone(), leaf));
+            if !written {
+                return Ok(None);
+            }
+            let (index, serial) = (self.nodes.int(leaf as i32), self.nodes.serial());
+            return self.put(Node::Load(array, index, serial), kind_of(&ty), FULL).map(Some);
+        }
+        let value = self.memory.get(object, leaf).clone();
+        if let Value::Mixed(reason) = value {
+            let name = self.objects[object].leaf_name(leaf);
+            return self.fail(format!("`{name}` is {reason}"));
+        }
+        Ok(self.register(&value, &ty))
+    }
+
+    fn results(&mut self, result: Option<usize>) -> Result<Vec<(usize, Id)>, Error> {
+        let Some(object) = result else { return Ok(Vec::new()) };
+        let mut found = Vec::new();
+        for leaf in 0..self.objects[object].leaves.len() {
+            if let Some(id) = self.after(object, leaf)? {
+                found.push((leaf, id));
+            }
+        }
+        Ok(found)
+    }
+
+    fn role(
+        &mut self,
+        start: &Start,
+        after: Option<Id>,
+        (live, held): (&Live, bool),
+        roles: &mut Roles,
+        groups: &mut Groups,
+        sets: &mut Vec<(usize, Id)>,
+    ) {
+        let object = self.objects[start.object].clone();
+        let name = object.leaf_name(start.leaf);
+        let read = live.nodes[start.read.0 as usize];
+        let written = after.filter(|id| object.origin != Origin::Parameter && *id != start.own);
+        let kept = object.origin != Origin::Pointee || self.has_struct(&object.ty) || start.initial.is_some();
+        match (read, written) {
+            (false, None) => {}
+            (true, None) if start.initial.is_none() => {
+                groups.input(self, start, roles);
+            }
+            (_, None) => self.state(start, &name, roles),
+            (false, Some(_)) if object.origin == Origin::Static => {
+                let base = match object.leaves[start.leaf].name.as_str() {
+                    "" => object.name.clone(),
+                    member => format!("{}.{member}", object.name),
+                };
+                let note = format!("{base} is written and read by nothing: it is left out");
+                if !roles.notes.contains(&note) {
+                    roles.notes.push(note);
+                }
+            }
+            (false, Some(id)) => {
+                let var = groups.port(self, start.object, start.leaf, "", roles, Way::Out);
+                sets.push((var, id));
+            }
+            (true, Some(id)) if object.origin != Origin::Static && held => {
+                let var = groups.port(self, start.object, start.leaf, "", roles, Way::Out);
+                self.state(start, &format!("{name}_held"), roles);
+                sets.extend([(start.var, id), (var, id)]);
+            }
+            (true, Some(id)) if kept => {
+                self.state(start, &name, roles);
+                sets.push((start.var, id));
+            }
+            (true, Some(id)) => {
+                groups.input(self, start, roles);
+                let var = groups.port(self, start.object, start.leaf, "_out", roles, Way::Out);
+                sets.push((var, id));
+            }
+        }
+    }
+
+    fn state(&mut self, start: &Start, name: &str, roles: &mut Roles) {
+        let name = roles.names.unique(name);
+        let kind = self.nodes.vars[start.var].kind;
+        self.nodes.vars[start.var].name.clone_from(&name);
+        roles.fixed.push(start.var);
+        roles.states.push(State { name, kind, initial: start.initial.unwrap_or(0) });
+    }
+
+    /// The value from before the step only reaches the same scalar behind it, by choices and branches.
+    fn is_held(&self, start: &Start, after: Id, live: &Live, finals: &[Option<Id>]) -> bool {
+        let mut uses = Uses::default();
+        uses.collect(&self.blocks[0]);
+        for index in (0..self.nodes.len()).filter(|index| live.nodes[*index]) {
+            let id = Id(index as u32);
+            for operand in self.nodes.operands(id) {
+                uses.users.entry(operand).or_default().push(id);
+            }
+            if let Node::Var(var, _) = self.nodes.node(id) {
+                uses.reads.entry(var).or_default().push(id);
+            }
+        }
+        if finals.iter().flatten().filter(|id| **id == after).count() > 1 {
+            return false;
+        }
+        let (mut stack, mut seen) = (vec![start.own], HashSet::new());
+        while let Some(id) = stack.pop() {
+            if !seen.insert(id) {
+                continue;
+            }
+            let elsewhere = id != after && finals.contains(&Some(id)) && id != start.own;
+            if uses.other.contains(&id) || elsewhere {
+                return false;
+            }
+            for user in uses.users.get(&id).into_iter().flatten() {
+                match self.nodes.node(*user) {
+                    Node::Op(Op::Select | Op::SelectFloat, [condition, ..], _) if condition != id => {
+                        stack.push(*user);
+                    }
+                    _ => return false,
+                }
+            }
+            for var in uses.sets.get(&id).into_iter().flatten() {
+                stack.extend(uses.reads.get(var).into_iter().flatten());
+            }
+        }
+        true
+    }
+}
+
+/// Uses of values: by operations, by writes of variables, and by others.
+#[derive(Default)]
+struct Uses {
+    users: HashMap<Id, Vec<Id>>,
+    sets: HashMap<Id, Vec<usize>>,
+    reads: HashMap<usize, Vec<Id>>,
+    other: HashSet<Id>,
+}
+
+impl Uses {
+    fn collect(&mut self, block: &Block) {
+        for (statement, _) in block {
+            match statement {
+                Statement::Def(_) => {}
+                Statement::Store { index, value, .. } => self.other.extend([*index, *value]),
+                Statement::Set(pairs) => {
+                    for (var, value) in pairs {
+                        self.sets.entry(*value).or_default().push(*var);
+                    }
+                }
+                Statement::If { condition, then, other } => {
+                    self.other.insert(*condition);
+                    self.collect(then);
+                    self.collect(other);
+                }
+                Statement::For { body, .. } => self.collect(body),
+                Statement::Loop { body, again, .. } => {
+                    self.other.insert(*again);
+                    self.collect(body);
+                }
+            }
+        }
+    }
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Way {
+    In,
+    Out,
+}
+
+/// Declarations of ports so far: object, name of the member, suffix, way, and the name in the program.
+#[derive(Default)]
+struct Groups(Vec<(usize, String, String, bool, String)>);
+
+impl Groups {
+    /// The variable of a port for a scalar.
+    fn port(
+        &mut self,
+        exec: &mut Exec<'_>,
+        object: usize,
+        leaf: usize,
+        suffix: &str,
+        roles: &mut Roles,
+        way: Way,
+    ) -> usize {
+        let kind = kind_of(&exec.objects[object].leaves[leaf].ty);
+        let var = exec.nodes.var("", kind);
+        self.declare(exec, (object, leaf), suffix, roles, way, var);
+        var
+    }
+
+    fn input(&mut self, exec: &mut Exec<'_>, start: &Start, roles: &mut Roles) {
+        self.declare(exec, (start.object, start.leaf), "", roles, Way::In, start.var);
+    }
+
+    fn declare(
+        &mut self,
+        exec: &mut Exec<'_>,
+        (object, leaf): (usize, usize),
+        suffix: &str,
+        roles: &mut Roles,
+        way: Way,
+        var: usize,
+    ) {
+        let found = exec.objects[object].clone();
+        let leaf = &found.leaves[leaf];
+        let base =
+            if leaf.name.is_empty() { found.name.clone() } else { format!("{}_{}", found.name, leaf.name) };
+        let is_input = way == Way::In;
+        let known = self.0.iter().find(|(own, name, end, input, _)| {
+            *own == object && *name == leaf.name && end == suffix && *input == is_input
+        });
+        let name = match known {
+            Some((.., name)) => name.clone(),
+            None => {
+                let name = roles.names.unique(&format!("{base}{suffix}"));
+                self.0.push((object, leaf.name.clone(), suffix.to_owned(), is_input, name.clone()));
+                name
+            }
+        };
+        let dims: Vec<usize> = leaf.indices.iter().map(|(_, count)| *count).collect();
+        let place: Vec<String> = leaf.indices.iter().map(|(index, _)| (index + 1).to_string()).collect();
+        let own = if place.is_empty() { name.clone() } else { format!("{name}[{}]", place.join(",")) };
+        let kind = exec.nodes.vars[var].kind;
+        exec.nodes.vars[var].name.clone_from(&own);
+        roles.fixed.push(var);
+        let c = exec.spelled(object, leaf);
+        let port = Port { name: own, c, float: kind == Kind::Float, declared: (name, dims) };
+        match way {
+            Way::In => roles.inputs.push(port),
+            Way::Out => roles.outputs.push(port),
+        }
+    }
+}
+
+impl Exec<'_> {
+    /// A scalar as C writes it.
+    fn spelled(&self, object: usize, leaf: &super::types::Leaf) -> String {
+        let found = &self.objects[object];
+        let (mut text, mut ty, mut rest) = (found.name.clone(), found.ty.clone(), leaf.offset);
+        let mut joint = if found.origin == Origin::Pointee { "->" } else { "." };
+        loop {
+            match ty.clone() {
+                Type::Array(element, _) => {
+                    let size = self.structs.size(&element).unwrap_or(1).max(1);
+                    text = format!("{text}[{}]", rest / size);
+                    rest %= size;
+                    ty = (*element).clone();
+                    joint = ".";
+                }
+                Type::Struct(index) => {
+                    let fields = &self.structs.0[index].fields;
+                    let Some(field) = fields.iter().rev().find(|field| field.offset <= rest) else {
+                        return text;
+                    };
+                    if let Some(name) = &field.name {
+                        text = format!("{text}{joint}{name}");
+                        joint = ".";
+                    }
+                    rest -= field.offset;
+                    ty = field.ty.clone();
+                }
+                _ => break,
+            }
+        }
+        let plain = text == found.name && found.origin == Origin::Pointee;
+        if plain { format!("*{text}") } else { text }
+    }
+}

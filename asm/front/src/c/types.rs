@@ -1,0 +1,252 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! C's types: sizes, the places of members, and the scalars that an object consists of. ILP32.
+
+use std::rc::Rc;
+
+/// An integer type.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) struct Integer {
+    pub(super) bits: u32,
+    pub(super) signed: bool,
+    pub(super) boolean: bool,
+}
+
+impl Integer {
+    pub(super) const fn new(bits: u32, signed: bool) -> Integer {
+        Integer { bits, signed, boolean: false }
+    }
+
+    /// The value modulo the type's range.
+    pub(super) fn wrap(self, value: i64) -> i64 {
+        if self.boolean {
+            return i64::from(value != 0);
+        }
+        match (self.bits, self.signed) {
+            (8, true) => i64::from(value as i8),
+            (8, false) => i64::from(value as u8),
+            (16, true) => i64::from(value as i16),
+            (16, false) => i64::from(value as u16),
+            (32, true) => i64::from(value as i32),
+            (32, false) => i64::from(value as u32),
+            _ => value,
+        }
+    }
+
+    /// After the integer promotions.
+    pub(super) fn promoted(self) -> Integer {
+        if self.bits < 32 { INT } else { self }
+    }
+
+    /// Least and greatest value.
+    pub(super) fn limits(self) -> (i64, i64) {
+        match (self.boolean, self.bits, self.signed) {
+            (true, ..) => (0, 1),
+            (_, 64, _) => (i64::MIN, i64::MAX),
+            (_, bits, true) => (-(1 << (bits - 1)), (1 << (bits - 1)) - 1),
+            (_, bits, false) => (0, (1 << bits) - 1),
+        }
+    }
+}
+
+pub(super) const INT: Integer = Integer::new(32, true);
+pub(super) const UNSIGNED: Integer = Integer::new(32, false);
+pub(super) const BOOL: Integer = Integer { bits: 8, signed: false, boolean: true };
+
+#[derive(Clone, PartialEq, Debug)]
+pub(super) enum Type {
+    Void,
+    Int(Integer),
+    Float,
+    Double,
+    Pointer(Rc<Type>),
+    /// Elements and their number; `None` while it is unknown.
+    Array(Rc<Type>, Option<usize>),
+    Struct(usize),
+    Function(Rc<Signature>),
+}
+
+#[derive(Clone, PartialEq, Debug)]
+pub(super) struct Signature {
+    pub(super) result: Type,
+    pub(super) parameters: Vec<(String, Type)>,
+}
+
+#[derive(Clone, Debug)]
+pub(super) struct Field {
+    /// `None` for an anonymous structure or union.
+    pub(super) name: Option<String>,
+    pub(super) ty: Type,
+    pub(super) offset: usize,
+}
+
+/// A structure or union.
+#[derive(Clone, Debug)]
+pub(super) struct Struct {
+    pub(super) name: String,
+    pub(super) union: bool,
+    pub(super) fields: Vec<Field>,
+    pub(super) size: usize,
+    pub(super) align: usize,
+    pub(super) complete: bool,
+}
+
+/// A scalar of an object.
+#[derive(Clone, Debug)]
+pub(super) struct Leaf {
+    pub(super) offset: usize,
+    pub(super) ty: Type,
+    /// Members on the way, joined by `_`.
+    pub(super) name: String,
+    /// All indices on the way, with the number of elements of each.
+    pub(super) indices: Vec<(usize, usize)>,
+}
+
+/// Most scalars of an object.
+pub(super) const MAX_LEAVES: usize = 65_536;
+
+/// All structures of a program.
+#[derive(Default)]
+pub(super) struct Structs(pub(super) Vec<Struct>);
+
+impl Structs {
+    /// Size in bytes; `None` if the type is incomplete.
+    pub(super) fn size(&self, ty: &Type) -> Option<usize> {
+        Some(match ty {
+            Type::Void | Type::Function(_) => return None,
+            Type::Int(integer) => integer.bits as usize / 8,
+            Type::Float | Type::Pointer(_) => 4,
+            Type::Double => 8,
+            Type::Array(element, count) => self.size(element)?.checked_mul((*count)?)?,
+            Type::Struct(index) => {
+                let found = &self.0[*index];
+                if !found.complete {
+                    return None;
+                }
+                found.size
+            }
+        })
+    }
+
+    pub(super) fn align(&self, ty: &Type) -> usize {
+        match ty {
+            Type::Array(element, _) => self.align(element),
+            Type::Struct(index) => self.0[*index].align,
+            // The ABI of 32-bit x86 aligns 64-bit values of a structure at 4.
+            Type::Void | Type::Function(_) => 1,
+            other => self.size(other).unwrap_or(1).min(4),
+        }
+    }
+
+    /// Sets members, their places, and the size.
+    pub(super) fn complete(&mut self, index: usize, members: Vec<(Option<String>, Type)>) {
+        let union = self.0[index].union;
+        let (mut offset, mut size, mut align, mut fields) = (0_usize, 0, 1, Vec::new());
+        for (name, ty) in members {
+            let own = self.align(&ty);
+            offset = if union { 0 } else { offset.next_multiple_of(own) };
+            let length = self.size(&ty).unwrap_or(0);
+            fields.push(Field { name, ty, offset });
+            offset = offset.saturating_add(length);
+            size = size.max(offset);
+            align = align.max(own);
+        }
+        let found = &mut self.0[index];
+        (found.fields, found.align, found.complete) = (fields, align, true);
+        found.size = size.next_multiple_of(align);
+    }
+
+    /// A member with its place, through anonymous structures.
+    pub(super) fn member(&self, index: usize, name: &str) -> Option<(usize, Type)> {
+        self.0[index].fields.iter().find_map(|field| match (&field.name, &field.ty) {
+            (Some(own), ty) if own == name => Some((field.offset, ty.clone())),
+            (None, Type::Struct(inner)) => {
+                self.member(*inner, name).map(|(offset, ty)| (field.offset + offset, ty))
+            }
+            _ => None,
+        })
+    }
+
+    /// Scalars of a type in the order of their places; `None` if there are more than [`MAX_LEAVES`] or its size is unknown. A union has
+    /// those of its largest member.
+    pub(super) fn leaves(&self, ty: &Type) -> Option<Vec<Leaf>> {
+        let mut leaves = Vec::new();
+        self.collect(ty, 0, "", &[], &mut leaves)?;
+        Some(leaves)
+    }
+
+    fn collect(
+        &self,
+        ty: &Type,
+        offset: usize,
+        name: &str,
+        indices: &[(usize, usize)],
+        leaves: &mut Vec<Leaf>,
+    ) -> Option<()> {
+        match ty {
+            Type::Array(element, count) => {
+                let size = self.size(element)?;
+                for index in 0..(*count)? {
+                    let mut inner = indices.to_vec();
+                    inner.push((index, (*count)?));
+                    self.collect(element, offset + index * size, name, &inner, leaves)?;
+                }
+                Some(())
+            }
+            Type::Struct(index) => {
+                let found = &self.0[*index];
+                let mut fields: Vec<&Field> = found.fields.iter().collect();
+                if found.union {
+                    let largest =
+                        fields.iter().copied().rev().max_by_key(|field| self.size(&field.ty).unwrap_or(0));
+                    fields = largest.into_iter().collect();
+                }
+                for field in fields {
+                    let inner = match (&field.name, name) {
+                        (None, _) => name.to_owned(),
+                        (Some(own), "") => own.clone(),
+                        (Some(own), name) => format!("{name}_{own}"),
+                    };
+                    self.collect(&field.ty, offset + field.offset, &inner, indices, leaves)?;
+                }
+                Some(())
+            }
+            Type::Void | Type::Function(_) => None,
+            scalar => {
+                leaves.push(Leaf {
+                    offset,
+                    ty: scalar.clone(),
+                    name: name.to_owned(),
+                    indices: indices.to_vec(),
+                });
+                (leaves.len() <= MAX_LEAVES).then_some(())
+            }
+        }
+    }
+
+    /// Spells a type for messages.
+    pub(super) fn shown(&self, ty: &Type) -> String {
+        match ty {
+            Type::Void => "void".to_owned(),
+            Type::Int(Integer { boolean: true, .. }) => "_Bool".to_owned(),
+            Type::Int(Integer { bits, signed, .. }) => {
+                let name = match bits {
+                    8 => "char",
+                    16 => "short",
+                    32 => "int",
+                    _ => "long long",
+                };
+                format!("{}{name}", if *signed { "" } else { "unsigned " })
+            }
+            Type::Float => "float".to_owned(),
+            Type::Double => "double".to_owned(),
+            Type::Pointer(to) => format!("{} *", self.shown(to)),
+            Type::Array(element, Some(count)) => format!("{}[{count}]", self.shown(element)),
+            Type::Array(element, None) => format!("{}[]", self.shown(element)),
+            Type::Struct(index) => {
+                let found = &self.0[*index];
+                format!("{} {}", if found.union { "union" } else { "struct" }, found.name)
+            }
+            Type::Function(_) => "a function".to_owned(),
+        }
+    }
+}

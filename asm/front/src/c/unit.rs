@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! A translation unit: preprocessed text, its tree, and the places of its lines in the files.
+
+use crate::Error;
+use lang_c::ast::TranslationUnit;
+use lang_c::driver::{Config, Flavor, parse_preprocessed};
+
+/// Deepest nesting of parentheses and braces: the parser recurses.
+const MAX_NESTING: usize = 200;
+
+/// Most bytes of preprocessed text.
+const MAX_TEXT: usize = 16 << 20;
+
+pub(super) struct Unit {
+    pub(super) tree: TranslationUnit,
+    /// Lines of the preprocessed text: offset, number of the file, line in that file.
+    lines: Vec<(usize, usize, usize)>,
+    pub(super) files: Vec<String>,
+    /// Bounds of loops with the offsets of their pragmas.
+    pub(super) bounds: Vec<(usize, u64)>,
+    /// Text, for lines whose file is not at hand.
+    text: String,
+}
+
+impl Unit {
+    /// Reads preprocessed text (`cpp` with its line markers); `name` is the file's name until the first marker.
+    pub(super) fn read(name: &str, text: &str) -> Result<Unit, Error> {
+        if text.len() > MAX_TEXT {
+            return Err(Error::plain(format!("{name}: more than {MAX_TEXT} bytes after preprocessing")));
+        }
+        let (mut files, mut lines, mut bounds) = (vec![name.to_owned()], Vec::new(), Vec::new());
+        let (mut file, mut line, mut offset, mut clean) = (0, 1, 0, String::with_capacity(text.len()));
+        for row in text.split_inclusive('\n') {
+            let plain = row.trim();
+            lines.push((offset, file, line));
+            line += 1;
+            if let Some(rest) = plain.strip_prefix('#') {
+                if let Some((number, name)) = marker(rest) {
+                    line = number;
+                    file = files.iter().position(|known| *known == name).unwrap_or_else(|| {
+                        files.push(name);
+                        files.len() - 1
+                    });
+                } else if let Some(rest) = rest.trim_start().strip_prefix("pragma") {
+                    pragma(rest, offset, &mut bounds).map_err(|text| Error {
+                        file: Some(files[file].clone()),
+                        line: Some(line - 1),
+                        text,
+                        place: None,
+                    })?;
+                }
+                // Blanks in place of directives, which the parser does not take everywhere.
+                clean.extend(
+                    row.chars().map(|c| if c == '\n' || c == '\r' { c } else { ' ' }).filter(char::is_ascii),
+                );
+                while clean.len() < offset + row.len() {
+                    clean.push(' ');
+                }
+            } else {
+                clean.push_str(row);
+            }
+            offset += row.len();
+        }
+        let unit = Unit { tree: TranslationUnit(Vec::new()), lines, files, bounds, text: clean.clone() };
+        unit.nesting()?;
+        let config = Config { cpp_command: String::new(), cpp_options: Vec::new(), flavor: Flavor::GnuC11 };
+        match parse_preprocessed(&config, clean) {
+            Ok(parse) => Ok(Unit { tree: parse.unit, ..unit }),
+            Err(error) => {
+                let found: String = unit.text[error.offset.min(unit.text.len())..]
+                    .trim_start()
+                    .chars()
+                    .take_while(|c| !c.is_whitespace())
+                    .take(24)
+                    .collect();
+                Err(unit.error(error.offset, format!("this is no C99 that `takt cc` reads, at `{found}`")))
+            }
+        }
+    }
+
+    /// Refuses nesting that would exhaust the parser's stack.
+    fn nesting(&self) -> Result<(), Error> {
+        let (mut depth, mut quoted, mut escaped) = (0_usize, None, false);
+        for (at, c) in self.text.bytes().enumerate() {
+            match (quoted, c) {
+                (Some(_), _) if escaped => escaped = false,
+                (Some(_), b'\\') => escaped = true,
+                (Some(quote), c) if c == quote || c == b'\n' => quoted = None,
+                (Some(_), _) => {}
+                (None, b'"' | b'\'') => quoted = Some(c),
+                (None, b'(' | b'[' | b'{') => depth += 1,
+                (None, b')' | b']' | b'}') => depth = depth.saturating_sub(1),
+                _ => {}
+            }
+            if depth > MAX_NESTING {
+                return Err(self.error(at, format!("brackets nest deeper than {MAX_NESTING}")));
+            }
+        }
+        Ok(())
+    }
+
+    /// File and line of a place in the text.
+    pub(super) fn line(&self, offset: usize) -> (&str, usize) {
+        let index = self.lines.partition_point(|(start, ..)| *start <= offset).saturating_sub(1);
+        match self.lines.get(index) {
+            Some((_, file, line)) => (&self.files[*file], *line),
+            None => (&self.files[0], 1),
+        }
+    }
+
+    /// Between a pragma's line and a place there are only blanks.
+    pub(super) fn between(&self, pragma: usize, place: usize) -> bool {
+        self.text.get(pragma..place).is_some_and(|text| text.trim().is_empty())
+    }
+
+    /// The line of the text that holds a place, without blanks around it.
+    pub(super) fn text_of(&self, offset: usize) -> &str {
+        let offset = offset.min(self.text.len());
+        let start = self.text[..offset].rfind('\n').map_or(0, |at| at + 1);
+        let end = self.text[offset..].find('\n').map_or(self.text.len(), |at| offset + at);
+        self.text[start..end].trim()
+    }
+
+    pub(super) fn error(&self, offset: usize, text: impl Into<String>) -> Error {
+        let (file, line) = self.line(offset);
+        Error { file: Some(file.to_owned()), line: Some(line), text: text.into(), place: None }
+    }
+}
+
+/// A line marker of the preprocessor: ` 12 "file.c" 1`.
+fn marker(rest: &str) -> Option<(usize, String)> {
+    let rest = rest.trim_start();
+    let rest = rest.strip_prefix("line").unwrap_or(rest).trim_start();
+    let end = rest.find(|c: char| !c.is_ascii_digit())?;
+    let number = rest[..end].parse().ok()?;
+    let name = rest[end..].trim_start().strip_prefix('"')?;
+    let mut file = String::new();
+    let mut characters = name.chars();
+    loop {
+        match characters.next()? {
+            '"' => return Some((number, file)),
+            '\\' => file.push(characters.next()?),
+            c => file.push(c),
+        }
+    }
+}
+
+/// `#pragma takt loop_bound(N)`; pragmas of others are passed over.
+fn pragma(rest: &str, offset: usize, bounds: &mut Vec<(usize, u64)>) -> Result<(), String> {
+    let Some(rest) = rest.trim().strip_prefix("takt") else { return Ok(()) };
+    let number = rest.trim().strip_prefix("loop_bound").map(str::trim);
+    let number = number.and_then(|rest| rest.strip_prefix('(')?.strip_suffix(')'));
+    match number.map(|number| number.trim().parse::<u64>()) {
+        Some(Ok(bound)) if (1..=65_535).contains(&bound) => {
+            bounds.push((offset, bound));
+            Ok(())
+        }
+        Some(_) => Err("`#pragma takt loop_bound(N)` takes a number from 1 to 65535".to_owned()),
+        None => Err("the only pragma for takt is `#pragma takt loop_bound(N)`".to_owned()),
+    }
+}

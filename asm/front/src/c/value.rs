@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Values while the C is executed: known, or a node; and the memory that holds them.
+
+use super::ir::Id;
+use super::types::{Leaf, Type};
+use std::rc::Rc;
+
+/// A pointer to a place in an object.
+#[derive(Clone, PartialEq, Debug)]
+pub(super) struct Pointer {
+    pub(super) object: usize,
+    /// Bytes from the object's beginning.
+    pub(super) offset: i64,
+    /// Scalars to add, if inputs decide about the place.
+    pub(super) dynamic: Option<Id>,
+}
+
+#[derive(Clone, Debug)]
+pub(super) enum Value {
+    /// Not written yet.
+    Unset,
+    Int(i64),
+    /// A known number: of type float it is a binary32 number.
+    Real(f64),
+    Node(Id),
+    Pointer(Pointer),
+    /// A function of this key.
+    Function(String),
+    /// Scalars of a structure.
+    Struct(Rc<Vec<Value>>),
+    /// A value that depends on data and that the language has no register for; the text says why.
+    Mixed(&'static str),
+}
+
+impl PartialEq for Value {
+    /// Numbers are the same if their bits are: zeros have signs.
+    fn eq(&self, other: &Value) -> bool {
+        match (self, other) {
+            (Value::Unset, Value::Unset) => true,
+            (Value::Int(a), Value::Int(b)) => a == b,
+            (Value::Real(a), Value::Real(b)) => a.to_bits() == b.to_bits(),
+            (Value::Node(a), Value::Node(b)) => a == b,
+            (Value::Pointer(a), Value::Pointer(b)) => a == b,
+            (Value::Function(a), Value::Function(b)) => a == b,
+            (Value::Struct(a), Value::Struct(b)) => a == b,
+            (Value::Mixed(a), Value::Mixed(b)) => a == b,
+            _ => false,
+        }
+    }
+}
+
+#[derive(Clone, Debug)]
+pub(super) struct Typed {
+    pub(super) ty: Type,
+    pub(super) value: Value,
+}
+
+/// A condition.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Condition {
+    Known(bool),
+    /// A node that is 0 or 1.
+    Node(Id),
+}
+
+/// An lvalue.
+#[derive(Clone, Debug)]
+pub(super) struct Lvalue {
+    pub(super) pointer: Pointer,
+    pub(super) ty: Type,
+}
+
+/// The origin of an object.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Origin {
+    Local,
+    /// File scope or `static`, initialised, with internal linkage or const.
+    Static,
+    /// File scope with external linkage.
+    Global,
+    /// The object behind a pointer parameter of the step function.
+    Pointee,
+    /// A parameter of the step that is passed by value.
+    Parameter,
+}
+
+/// An object: a variable, or what a parameter points to.
+#[derive(Clone, Debug)]
+pub(super) struct Object {
+    pub(super) name: String,
+    pub(super) ty: Type,
+    pub(super) leaves: Rc<Vec<Leaf>>,
+    pub(super) origin: Origin,
+    pub(super) constant: bool,
+    /// Name and place of its declaration, by which a second translation knows it again.
+    pub(super) key: (String, usize, usize),
+    /// The array in data memory that holds it.
+    pub(super) array: Option<usize>,
+}
+
+impl Object {
+    /// The scalar at a place.
+    pub(super) fn leaf(&self, offset: i64) -> Option<usize> {
+        let offset = usize::try_from(offset).ok()?;
+        self.leaves.binary_search_by_key(&offset, |leaf| leaf.offset).ok()
+    }
+
+    /// Name of a scalar: `q_2`, `state_angle`.
+    pub(super) fn leaf_name(&self, leaf: usize) -> String {
+        let leaf = &self.leaves[leaf];
+        let mut name = self.name.clone();
+        if !leaf.name.is_empty() {
+            name = format!("{name}_{}", leaf.name);
+        }
+        for (index, _) in &leaf.indices {
+            name = format!("{name}_{index}");
+        }
+        name
+    }
+}
+
+/// Values of all scalars, object by object; copies share what does not differ.
+#[derive(Clone, Default)]
+pub(super) struct Memory(pub(super) Vec<Rc<Vec<Value>>>);
+
+impl Memory {
+    pub(super) fn get(&self, object: usize, leaf: usize) -> &Value {
+        &self.0[object][leaf]
+    }
+
+    pub(super) fn set(&mut self, object: usize, leaf: usize, value: Value) {
+        Rc::make_mut(&mut self.0[object])[leaf] = value;
+    }
+}
+
+/// The way in which a statement ends.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub(super) enum Exit {
+    Break,
+    Continue,
+    Return,
+    Goto(String),
+}
+
+/// A way out of a block, with its condition and the memory then.
+pub(super) struct Outcome {
+    pub(super) exit: Exit,
+    pub(super) when: Condition,
+    pub(super) memory: Memory,
+}

@@ -1,0 +1,270 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Writes the program: declarations, and statements with the line of C beside the first of each.
+
+mod plan;
+mod text;
+
+use super::exec::Exec;
+use super::ir::{Block, Id, Kind, Node, Place, Statement};
+use super::live::Live;
+use super::ports::{Port, Roles};
+use super::{Options, Translation};
+use crate::Error;
+use crate::sink::Head;
+use plan::{Plan, plan};
+use std::fmt::Write as _;
+use text::{Speller, real};
+
+/// Column of comments.
+const COMMENT: usize = 56;
+/// Most characters of a comment.
+const COMMENT_LENGTH: usize = 72;
+
+/// The program of a step whose ports and states are known.
+pub(super) fn program(exec: &mut Exec<'_>, roles: Roles, options: &Options) -> Result<Translation, Error> {
+    let block = std::mem::take(&mut exec.blocks[0]);
+    let live = Live::of(&exec.nodes, &block, &[], &roles.fixed);
+    let block = live.pruned(block);
+    let mut names = roles.names.clone();
+    let mut arrays = std::mem::take(&mut exec.nodes.arrays);
+    for array in &mut arrays {
+        array.name = names.unique(&array.name);
+    }
+    exec.nodes.arrays = arrays;
+    let mut indices = std::mem::take(&mut exec.nodes.indices);
+    for index in &mut indices {
+        *index = names.unique(index);
+    }
+    exec.nodes.indices = indices;
+    let plan = plan(&exec.nodes, &block, &roles.fixed, names);
+    let mut writer = Writer {
+        exec,
+        speller: Speller { nodes: &exec.nodes, plan: &plan, library: Default::default() },
+        text: String::new(),
+        said: None,
+        labels: 0,
+        indent: 8,
+        arrays: vec![false; exec.nodes.arrays.len()],
+    };
+    writer.block(&block)?;
+    let (code, arrays) = (writer.text, writer.arrays);
+    let library = writer.speller.library.take();
+    let mut head = Head::default();
+    let files: Vec<&str> = exec.units.iter().map(|unit| base_name(&unit.files[0])).collect();
+    let init = options.init.as_ref().map(|init| format!(", begun by {init}")).unwrap_or_default();
+    head.comment(&format!(
+        "{} of {}{init}, by takt cc: a period is one call.",
+        options.step,
+        files.join(", ")
+    ));
+    for note in &roles.notes {
+        head.comment(note);
+    }
+    head.blank();
+    for file in library {
+        head.include(file);
+    }
+    head.lines(".ports  latched\n");
+    ports(&mut head, ".input ", &roles.inputs);
+    ports(&mut head, ".output", &roles.outputs);
+    for state in &roles.states {
+        let (ty, value) = match state.kind {
+            Kind::Float => ("", real(state.initial)),
+            Kind::Int => (":int", (state.initial as i32).to_string()),
+        };
+        head.lines(&format!(".state  {}{ty}\n.preset {} = {value}\n", state.name, state.name));
+    }
+    for (array, used) in exec.nodes.arrays.iter().zip(arrays) {
+        if used {
+            head.lines(&declared_array(array));
+        }
+    }
+    let registers: Vec<String> = plan
+        .registers
+        .iter()
+        .map(|(name, kind)| if *kind == Kind::Int { format!("{name}:int") } else { name.clone() })
+        .collect();
+    head.registers(&registers);
+    head.blank();
+    head.lines(".schedule on\n.once\n        wait    period\n");
+    head.lines(&format!(".period\nperiod:\n{code}        wait    period\n"));
+    Ok(Translation { text: head.into_text(), inputs: roles.inputs, outputs: roles.outputs })
+}
+
+fn base_name(path: &str) -> &str {
+    path.rsplit(['/', '\\']).next().unwrap_or(path)
+}
+
+/// Declares ports, each array once.
+fn ports(head: &mut Head, directive: &str, ports: &[Port]) {
+    let mut done: Vec<&str> = Vec::new();
+    for port in ports {
+        let (name, dims) = &port.declared;
+        if done.contains(&name.as_str()) {
+            continue;
+        }
+        done.push(name);
+        let sizes: Vec<String> = dims.iter().map(ToString::to_string).collect();
+        let sizes = if sizes.is_empty() { String::new() } else { format!("[{}]", sizes.join(",")) };
+        let ty = if port.float { "" } else { ":int" };
+        let mut line = format!("{directive} {name}{sizes}{ty}");
+        if port.c != *name {
+            line = format!("{line:<32}; {}", port.c);
+        }
+        head.lines(&format!("{}\n", line.trim_end()));
+    }
+}
+
+fn declared_array(array: &super::ir::Array) -> String {
+    let ty = match array.kind {
+        Some(Kind::Float) => "",
+        Some(Kind::Int) => ":int",
+        None => ":bits",
+    };
+    let mut line = format!(".array  {}[{}]{ty}", array.name, array.words.len());
+    if array.words.iter().any(|word| *word != 0) {
+        let values: Vec<String> = array
+            .words
+            .iter()
+            .map(
+                |word| if array.kind == Some(Kind::Float) { real(*word) } else { (*word as i32).to_string() },
+            )
+            .collect();
+        let _ = write!(line, " = {}", values.join(", "));
+    }
+    line + "\n"
+}
+
+struct Writer<'a, 'u> {
+    exec: &'a Exec<'u>,
+    speller: Speller<'a>,
+    text: String,
+    /// File and line of the last comment.
+    said: Option<(String, usize)>,
+    labels: usize,
+    indent: usize,
+    /// Arrays that the program uses.
+    arrays: Vec<bool>,
+}
+
+impl Writer<'_, '_> {
+    fn plan(&self) -> &Plan {
+        self.speller.plan
+    }
+
+    fn block(&mut self, block: &Block) -> Result<(), Error> {
+        for (statement, place) in block {
+            match statement {
+                Statement::Def(id) => {
+                    self.uses(*id);
+                    if !self.plan().inlined[id.0 as usize] {
+                        let name = self.plan().value(*id).unwrap_or("zero").to_owned();
+                        let expression = self.speller.expression(*id);
+                        self.line(&format!("{name} = {expression}"), *place);
+                    }
+                }
+                Statement::Store { array, index, value } => {
+                    self.arrays[*array] = true;
+                    let (to, value) = (self.speller.element(*array, *index), self.speller.operand(*value));
+                    self.line(&format!("{to} = {value}"), *place);
+                }
+                Statement::Set(pairs) => self.set(pairs, *place),
+                Statement::If { condition, then, other } => self.branch(*condition, then, other, *place)?,
+                Statement::For { index, first, last, step, body } => {
+                    let by = if *step == 1 { String::new() } else { format!(" step {step}") };
+                    let name = self.speller.nodes.indices[*index].clone();
+                    self.line(&format!(".for    {name}, {first}, {last}{by}"), *place);
+                    self.block(body)?;
+                    self.line(".endfor", *place);
+                }
+                Statement::Loop { bound, body, again } => {
+                    self.labels += 1;
+                    let label = format!("again{}", self.labels);
+                    self.line(&format!(".loop_bound {bound}"), *place);
+                    let _ = writeln!(self.text, "{label}:");
+                    self.block(body)?;
+                    let again = self.speller.operand(*again);
+                    self.line(&format!("bnz     {again}, {label}"), *place);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn uses(&mut self, id: Id) {
+        if let Node::Load(array, ..) = self.speller.nodes.node(id) {
+            self.arrays[array] = true;
+        }
+    }
+
+    fn branch(&mut self, condition: Id, then: &Block, other: &Block, place: Place) -> Result<(), Error> {
+        self.labels += 1;
+        let number = self.labels;
+        let condition = self.speller.operand(condition);
+        let (over, end) = (format!("else{number}"), format!("end{number}"));
+        if then.is_empty() {
+            self.line(&format!("bnz     {condition}, {end}"), place);
+            self.block(other)?;
+        } else {
+            let target = if other.is_empty() { &end } else { &over };
+            self.line(&format!("bz      {condition}, {target}"), place);
+            self.block(then)?;
+            if !other.is_empty() {
+                self.line(&format!("jmp     {end}"), place);
+                let _ = writeln!(self.text, "{over}:");
+                self.block(other)?;
+            }
+        }
+        let _ = writeln!(self.text, "{end}:");
+        Ok(())
+    }
+
+    /// Writes variables all at once: one after another where none needs what another has overwritten, otherwise in one equation.
+    fn set(&mut self, pairs: &[(usize, Id)], place: Place) {
+        let mut left: Vec<(String, String, Vec<String>)> = Vec::new();
+        for (var, value) in pairs {
+            let (name, text) = (self.plan().var(*var).to_owned(), self.speller.operand(*value));
+            if name == text {
+                continue;
+            }
+            let mut reads = Vec::new();
+            self.speller.reads(*value, &mut reads);
+            left.push((name, text, reads));
+        }
+        while !left.is_empty() {
+            let free = (0..left.len()).find(|index| {
+                let name = &left[*index].0;
+                left.iter().enumerate().all(|(other, (_, _, reads))| other == *index || !reads.contains(name))
+            });
+            match free {
+                Some(index) => {
+                    let (name, text, _) = left.remove(index);
+                    self.line(&format!("{name} = {text}"), place);
+                }
+                None => {
+                    let names: Vec<&str> = left.iter().map(|(name, ..)| name.as_str()).collect();
+                    let texts: Vec<&str> = left.iter().map(|(_, text, _)| text.as_str()).collect();
+                    let line = format!("{} = {}", names.join(", "), texts.join(", "));
+                    self.line(&line, place);
+                    left.clear();
+                }
+            }
+        }
+    }
+
+    /// A line, with the line of C beside it if that is another than before.
+    fn line(&mut self, code: &str, place: Place) {
+        let mut line = format!("{:1$}{code}", "", self.indent);
+        let unit = &self.exec.units[place.unit];
+        let (file, number) = unit.line(place.offset);
+        let now = (base_name(file).to_owned(), number);
+        if self.said.as_ref() != Some(&now) {
+            let text: String = unit.text_of(place.offset).chars().take(COMMENT_LENGTH).collect();
+            let pad = COMMENT.saturating_sub(line.chars().count());
+            let _ = write!(line, "{:pad$} ; {}:{number}: {text}", "", now.0);
+            self.said = Some(now);
+        }
+        self.text.push_str(line.trim_end());
+        self.text.push('\n');
+    }
+}

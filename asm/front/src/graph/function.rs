@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Functions: graphs with named inputs and outputs. Readers make functions, the sink writes them.
+
+use super::{Count, Delays, Graph, Id, depth, evaluate, optimise};
+
+/// A scalar input or output.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Port {
+    /// Name in the source; unique among the ports of a function.
+    pub name: String,
+    /// Meaning and unit, for a comment.
+    pub text: String,
+}
+
+/// Inputs or outputs that form one array.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Array {
+    /// Name of the array, without indices.
+    pub name: String,
+    /// Dimensions; empty for a number.
+    pub shape: Vec<usize>,
+    /// Index of the input or output of each element, the last dimension fastest; `None` for a structural zero. In a symmetric matrix,
+    /// elements above the diagonal share the index of their mirror image.
+    pub elements: Vec<Option<usize>>,
+}
+
+impl Array {
+    /// An array whose elements are the inputs or outputs from `first` on.
+    pub fn new(name: &str, first: usize, shape: &[usize]) -> Array {
+        let count = shape.iter().product::<usize>();
+        let elements = (first..first + count).map(Some).collect();
+        Array { name: name.to_owned(), shape: shape.to_vec(), elements }
+    }
+
+    /// Some elements share an input or output, as in a symmetric matrix.
+    pub fn is_symmetric(&self) -> bool {
+        let mut seen = std::collections::HashSet::new();
+        !self.elements.iter().flatten().all(|index| seen.insert(index))
+    }
+}
+
+/// Named outputs, computed by a graph from named inputs.
+pub struct Function {
+    /// Title of the source, in its first comment.
+    pub title: String,
+    /// Comment lines at the head of the source.
+    pub notes: Vec<String>,
+    /// Inputs; [`Graph::input`] takes an index into them.
+    pub inputs: Vec<Port>,
+    /// Outputs with their nodes.
+    pub outputs: Vec<(Port, Id)>,
+    /// Grouping of the inputs into arrays.
+    pub input_arrays: Vec<Array>,
+    /// Grouping of the outputs into arrays.
+    pub output_arrays: Vec<Array>,
+    /// Expressions of all outputs.
+    pub graph: Graph,
+}
+
+impl Function {
+    /// Nodes of the outputs, in order.
+    pub fn nodes(&self) -> Vec<Id> {
+        self.outputs.iter().map(|(_, id)| *id).collect()
+    }
+
+    /// Number of operations of all outputs.
+    pub fn count(&self) -> Count {
+        Count::of(&self.graph, &self.nodes())
+    }
+
+    /// Length of the critical path, in cycles.
+    pub fn depth(&self, delays: &Delays) -> u32 {
+        depth(&self.graph, &self.nodes(), delays)
+    }
+
+    /// Values of the outputs in binary64.
+    pub fn evaluate(&self, inputs: &[f64]) -> Vec<f64> {
+        evaluate(&self.graph, &self.nodes(), inputs)
+    }
+
+    /// An equal function with fewer operations, or a shorter critical path.
+    pub fn optimised(self, delays: &Delays) -> Function {
+        self.improved(delays, true)
+    }
+
+    pub(crate) fn improved(self, delays: &Delays, thorough: bool) -> Function {
+        let (graph, nodes) = optimise(&self.graph, &self.nodes(), delays, thorough);
+        let outputs = self.outputs.into_iter().zip(nodes).map(|((port, _), id)| (port, id)).collect();
+        Function { graph, outputs, ..self }
+    }
+}

@@ -1,0 +1,756 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! C through `takt cc` on t1, t3, t4 against gcc, construct by construct, bit for bit; and the messages about what is refused.
+
+use crate::common::gcc::{Program, compiled, difference, emulated, folder, translated};
+use rand_pcg::Pcg32;
+use rand_pcg::rand_core::{Rng, SeedableRng};
+use takt_isa::{T1, T3, T4};
+
+/// Periods of a case.
+const PERIODS: usize = 40;
+
+/// Inputs of all kinds: small and large numbers, halves, zeros of both signs.
+pub(crate) fn word(random: &mut Pcg32, float: bool) -> u32 {
+    if !float {
+        return match random.next_u32() % 4 {
+            0 => random.next_u32(),
+            1 => random.next_u32() % 7,
+            _ => (random.next_u32() % 401).wrapping_sub(200),
+        };
+    }
+    let size = (random.next_u32() % 2_000_001) as f32 - 1_000_000.0;
+    let value = match random.next_u32() % 8 {
+        0 => [0.0, -0.0, 1.0, -1.0, 0.5, 2.5, -3.5, 100.0][(random.next_u32() % 8) as usize],
+        1 => size,
+        2 => (size / 5e5).round(),
+        _ => size * 1e-5,
+    };
+    value.to_bits()
+}
+
+fn check(name: &str, code: &str) -> takt_front::c::Translation {
+    let folder = folder(name);
+    let program = Program::new(name, code);
+    let translation = translated(&program, &folder).unwrap_or_else(|error| panic!("{name}: {error}"));
+    let mut random = Pcg32::seed_from_u64(name.bytes().fold(7, |sum, byte| sum * 31 + u64::from(byte)));
+    let row = |_| translation.inputs.iter().map(|port| word(&mut random, port.float)).collect();
+    let inputs: Vec<Vec<u32>> = (0..PERIODS).map(row).collect();
+    let expected = compiled(&[(&program, &translation, &inputs)], &folder).remove(0);
+    assert!(!translation.outputs.is_empty(), "{name} has no outputs\n{}", translation.text);
+    for machine in [&T1, &T3, &T4] {
+        let found = emulated(&program, &translation, machine, &inputs);
+        if let Some(text) = difference(&program, &translation, &inputs, &expected, &found) {
+            panic!("{}: {text}", machine.name);
+        }
+    }
+    let _ = std::fs::remove_dir_all(folder);
+    translation
+}
+
+/// The message about a program that is refused.
+fn refused(name: &str, code: &str) -> String {
+    let folder = folder(name);
+    let mut program = Program::new(name, code);
+    program.double_is_float = false;
+    let message = translated(&program, &folder).expect_err("it is refused");
+    let _ = std::fs::remove_dir_all(folder);
+    message
+}
+
+#[test]
+fn computes_sums_in_their_order() {
+    check(
+        "computes_sums_in_their_order",
+        r#"float step(float a, float b) { return a*b + a/(b*b + 1.0f) - -a; }
+"#,
+    );
+}
+
+#[test]
+fn keeps_a_static_as_state() {
+    check(
+        "keeps_a_static_as_state",
+        r#"static float sum = 0.5f;
+float step(float x) { sum += 0.1f*x; return sum; }
+"#,
+    );
+}
+
+#[test]
+fn chooses_by_if() {
+    check(
+        "chooses_by_if",
+        r#"float step(float x, float y) {
+  float r;
+  if (x > y) { r = x - y; } else if (x < -1.0f) r = y*y; else r = 0.25f;
+  if (r > 2.0f) r = 2.0f;
+  return r; }
+"#,
+    );
+}
+
+#[test]
+fn returns_early() {
+    check(
+        "returns_early",
+        r#"static float limit(float x, float low, float high) { if (x < low) return low; if (x > high) return high; return x; }
+float step(float x) { if (x == 0.0f) return 7.0f; return limit(x*3.0f, -2.0f, 2.0f) + limit(x, -0.5f, 0.5f); }
+"#,
+    );
+}
+
+#[test]
+fn chooses_by_conditional() {
+    check(
+        "chooses_by_conditional",
+        r#"float step(float x, float y) { return x > 0.0f ? y : x < -1.0f ? y*x : 3.0f; }
+"#,
+    );
+}
+
+#[test]
+fn short_circuits() {
+    check(
+        "short_circuits",
+        r#"static int n;
+static int count(float x) { n++; return x > 0.0f; }
+int step(float x, float y) { int r = 0; if (count(x) && count(y)) r += 1; if (count(y) || count(x)) r += 2; if (!(x > y)) r += 4; return r*1000 + n; }
+"#,
+    );
+}
+
+#[test]
+fn reads_and_writes_structures() {
+    check(
+        "reads_and_writes_structures",
+        r#"struct pid { float kp, ki; float sum; float last; };
+void init(struct pid *p) { p->kp = 2.0f; p->ki = 0.01f; p->sum = 0; p->last = 0; }
+float step(struct pid *p, float e) { p->sum += p->ki*e; float d = e - p->last; p->last = e; return p->kp*e + p->sum + 0.1f*d; }
+"#,
+    );
+}
+
+#[test]
+fn passes_structures_by_value() {
+    check(
+        "passes_structures_by_value",
+        r#"typedef struct { float x, y, z; } vec;
+static vec add(vec a, vec b) { vec r = { a.x + b.x, a.y + b.y, a.z + b.z }; return r; }
+static vec scale(float s, vec a) { return (vec){ s*a.x, s*a.y, s*a.z }; }
+static float dot(vec a, vec b) { return a.x*b.x + a.y*b.y + a.z*b.z; }
+vec step(vec a, vec b) { vec c = add(scale(2.0f, a), b); if (dot(c, a) > 1.0f) c = scale(0.5f, c); return c; }
+"#,
+    );
+}
+
+#[test]
+fn writes_what_pointers_point_to() {
+    check(
+        "writes_what_pointers_point_to",
+        r#"#include <math.h>
+static void polar(float x, float y, float *r, float *s) { *r = sqrtf(x*x + y*y); *s = x + y; }
+void step(float x, float y, float *r, float *s) { float q; polar(x, y, r, &q); *s = q*2.0f; }
+"#,
+    );
+}
+
+#[test]
+fn swaps_in_place() {
+    check(
+        "swaps_in_place",
+        r#"void step(float *a, float *b) { float t = *a; *a = *b; *b = t; }
+"#,
+    );
+}
+
+#[test]
+fn sums_over_arrays() {
+    check(
+        "sums_over_arrays",
+        r#"static const float w[4] = { 0.5f, -1.0f, 2.0f, 0.25f };
+float step(const float x[4]) { float sum = 0; for (int i = 0; i < 4; i++) sum += w[i]*x[i]; return sum; }
+"#,
+    );
+}
+
+#[test]
+fn rotates_matrices() {
+    check(
+        "rotates_matrices",
+        r#"void step(const float a[9], float b[9]) {
+  float m[3][3];
+  for (int i = 0; i < 3; i++) for (int j = 0; j < 3; j++) m[i][j] = a[3*j + i];
+  for (int i = 0; i < 3; i++) for (int j = 0; j < 3; j++) { b[3*i + j] = 0; for (int k = 0; k < 3; k++) b[3*i + j] += m[i][k]*a[3*k + j]; } }
+"#,
+    );
+}
+
+#[test]
+fn indexes_tables_by_data() {
+    check(
+        "indexes_tables_by_data",
+        r#"static const float table[8] = { 1, 4, 9, 16, 25, 36, 49, 64 };
+static const short offsets[4] = { -5, 3, 100, -200 };
+float step(int n, float x) { return table[n & 7]*x + offsets[(n >> 3) & 3]; }
+"#,
+    );
+}
+
+#[test]
+fn keeps_a_ring() {
+    check(
+        "keeps_a_ring",
+        r#"static float ring[8]; static unsigned at;
+float step(float x) { float old = ring[at]; ring[at] = x; at = (at + 1) & 7; return old + ring[(at + 3) & 7]; }
+"#,
+    );
+}
+
+#[test]
+fn rolls_long_loops() {
+    check(
+        "rolls_long_loops",
+        r#"static float line[64];
+float step(float x) { for (int i = 63; i > 0; i--) line[i] = line[i-1]; line[0] = x; float s = 0; for (int i = 0; i < 64; i++) s += line[i]*(0.1f*i); return s; }
+"#,
+    );
+}
+
+#[test]
+fn keeps_values_over_loops() {
+    check(
+        "keeps_values_over_loops",
+        r#"float step(float x) { float a = x, b = 1.0f; int n = 0; for (int i = 0; i < 100; i++) { float t = a; a = b; b = t*0.5f + 0.25f; if (b > a) n++; x += a; } return x + n; }
+"#,
+    );
+}
+
+#[test]
+fn loops_to_a_bound() {
+    check(
+        "loops_to_a_bound",
+        r#"float step(float a) { float angle = a > 20.0f ? 20.0f : a;
+#pragma takt loop_bound(5)
+  while (angle > 3.0f) angle -= 6.0f;
+  return angle; }
+"#,
+    );
+}
+
+#[test]
+fn leaves_loops() {
+    check(
+        "leaves_loops",
+        r#"int step(const int x[12], int n) { int r = -1; for (int i = 0; i < 12; i++) { if (x[i] == 3) continue; if (x[i] > n) { r = i; break; } } return r; }
+"#,
+    );
+}
+
+#[test]
+fn returns_from_loops() {
+    check(
+        "returns_from_loops",
+        r#"static int find(const int *x, int n) { for (int i = 0; i < 40; i++) { if (x[i & 7] + i > n) return i; } return -1; }
+int step(const int x[8], int n) { return find(x, n)*2; }
+"#,
+    );
+}
+
+#[test]
+fn iterates_to_convergence() {
+    check(
+        "iterates_to_convergence",
+        r#"float step(float x) { float a = x > 0 ? x : -x, r = 1.0f; int n;
+  for (n = 0; n < 60; n++) { float next = 0.5f*(r + a/r); float d = next - r; r = next; if (d < 1e-6f && d > -1e-6f) break; }
+  return r + n; }
+"#,
+    );
+}
+
+#[test]
+fn switches() {
+    check(
+        "switches",
+        r#"enum mode { OFF, RAMP = 3, RUN };
+static enum mode mode; static int t;
+float step(int key, float x) { float y = 0;
+  switch (mode) { case OFF: if (key > 100) mode = RAMP; y = -1; break; case RAMP: t++; if (t > 3) { mode = RUN; t = 0; } y = x*0.5f; break; case RUN: y = x; if (key < -100) mode = OFF; break; }
+  switch (key & 7) { case 1: y += 1; case 2: y += 2; break; case 5: case 6: y = 10; break; default: y -= 0.5f; }
+  return y; }
+"#,
+    );
+}
+
+#[test]
+fn wraps_integers() {
+    check(
+        "wraps_integers",
+        r#"int step(int a, int b, unsigned c) { int r = a*7 - b; unsigned u = c*5u + 3u; short s = (short)(a + b); unsigned char k = (unsigned char)(a - b); signed char h = (signed char)b;
+  r ^= (int)(u >> 3); r += s*3 + k - h; r = r << 2 | (r & 3); return (r >> 5) + (u < c) + ~a; }
+"#,
+    );
+}
+
+#[test]
+fn multiplies_integers() {
+    check(
+        "multiplies_integers",
+        r#"int step(int a, int b, unsigned c) { short s = (short)a, t = (short)b; return a*b + s*t*3 + (int)(c*c); }
+"#,
+    );
+}
+
+#[test]
+fn divides_by_powers_of_two() {
+    check(
+        "divides_by_powers_of_two",
+        r#"int step(int a, unsigned b) { return a/8 + a%16 - a/-4 + (int)(b/32u) + (int)(b%64u); }
+"#,
+    );
+}
+
+#[test]
+fn converts() {
+    check(
+        "converts",
+        r#"int step(float x, int n, unsigned u) { int a = (int)x; unsigned char b = (unsigned char)(int)x; float f = (float)n + (float)u*0.5f; short s = (short)n; return a + b + (int)(f*1e-3f) + s + (x ? 1 : 0) + (_Bool)n; }
+"#,
+    );
+}
+
+#[test]
+fn puns_through_unions() {
+    check(
+        "puns_through_unions",
+        r#"union u { float f; unsigned i; };
+float step(float x) { union u v; v.f = x; v.i = (v.i & 0x7fffffffu) | 0x400000u; return v.f; }
+"#,
+    );
+}
+
+#[test]
+fn copies_memory() {
+    check(
+        "copies_memory",
+        r#"#include <string.h>
+struct s { float a[3]; int n; };
+static struct s keep;
+float step(const struct s *in) { struct s t; memcpy(&t, in, sizeof t); float r = keep.a[0] + keep.n; memcpy(&keep, &t, sizeof(keep)); memset(&t, 0, sizeof t); return r + t.a[1]; }
+"#,
+    );
+}
+
+#[test]
+fn walks_by_pointers() {
+    check(
+        "walks_by_pointers",
+        r#"static const float c[5] = { 1, 2, 3, 4, 5 };
+float step(const float x[5]) { const float *p = x, *q = c; float s = 0; while (p < x + 5) s += *p++ * *q++; float z[4]; float *w = z; *w++ = s; *w++ = s*2; *w = 1; z[3] = w[-1] + *w; return z[3] - (float)(w - z); }
+"#,
+    );
+}
+
+#[test]
+fn jumps_forward() {
+    check(
+        "jumps_forward",
+        r#"int step(int a, int b) { int r = 0; if (a > 5) goto out; r = b; if (b > 5) goto out; r += 100; out: return r + 1; }
+"#,
+    );
+}
+
+#[test]
+fn takes_least_and_greatest() {
+    check(
+        "takes_least_and_greatest",
+        r#"#include <math.h>
+float step(float a, float b) { return fminf(a, b)*3.0f + fmaxf(a, 1.5f) + fminf(-0.5f, b) + fabsf(a) + copysignf(2.0f, b); }
+"#,
+    );
+}
+
+#[test]
+fn rounds() {
+    check(
+        "rounds",
+        r#"#include <math.h>
+float step(float x) { return floorf(x) + 10.0f*ceilf(x) + 100.0f*truncf(x) + 1000.0f*roundf(x) + (float)lrintf(x) + fmodf(x, 0.7f); }
+"#,
+    );
+}
+
+#[test]
+fn knows_not_a_number() {
+    check(
+        "knows_not_a_number",
+        r#"#include <math.h>
+int step(float a, float b) { float q = a/b; return isnan(q) + 2*(isinf(q) != 0) + 4*(isfinite(q) != 0) + 8*(signbit(q) != 0) + 16*(q == q) + 32*(q < 1.0f); }
+"#,
+    );
+}
+
+#[test]
+fn computes_tables_while_translating() {
+    check(
+        "computes_tables_while_translating",
+        r#"#include <stdint.h>
+static uint32_t crc[16];
+static void fill(void) { for (uint32_t n = 0; n < 16; n++) { uint32_t c = n << 28; for (int k = 0; k < 4; k++) c = c & 0x80000000u ? c << 1 ^ 0x04c11db7u : c << 1; crc[n] = c; } }
+uint32_t step(uint32_t x) { fill(); uint32_t c = 0xffffffffu; for (int i = 28; i >= 0; i -= 4) c = c << 4 ^ crc[(c >> 28 ^ x >> i) & 15]; return c; }
+"#,
+    );
+}
+
+#[test]
+fn calls_through_known_pointers() {
+    check(
+        "calls_through_known_pointers",
+        r#"static float twice(float x) { return 2*x; }
+static float half(float x) { return 0.5f*x; }
+typedef float (*law)(float);
+static const law laws[2] = { twice, half };
+float step(float x) { float y = 0; for (int i = 0; i < 2; i++) y += laws[i](x); return y; }
+"#,
+    );
+}
+
+#[test]
+fn reads_double_as_float() {
+    check(
+        "reads_double_as_float",
+        r#"#include <math.h>
+double step(double x, float y) { double a = 0.1; return a*x + 1.0/3*y + sqrt(fabs(x)) + M_PI; }
+"#,
+    );
+}
+
+#[test]
+fn knows_64_bits() {
+    check(
+        "knows_64_bits",
+        r#"#include <stdint.h>
+static const int64_t order[3] = { 2, 0, 1 };
+float step(const float x[3]) { float s = 0; for (int64_t k = 0; k < 3; ++k) s = 2*s + x[order[k]]; return s; }
+"#,
+    );
+}
+
+#[test]
+fn writes_fields_on_some_paths() {
+    check(
+        "writes_fields_on_some_paths",
+        r#"struct out { float u; int mode; };
+void step(float x, struct out *out) { if (x > 0.0f) out->u = x; if (x > 1.0f) out->mode = 1; else if (x < -1.0f) out->mode = 2; }
+"#,
+    );
+}
+
+#[test]
+fn branches_over_long_sides() {
+    check(
+        "branches_over_long_sides",
+        r#"#include <math.h>
+static float state;
+float step(float x, int n) { float y = 0; if (n > 0) { float a = x; for (int i = 0; i < 12; i++) a = a*0.5f + sqrtf(fabsf(a) + i); state = a; y = a; } else { state = state*0.9f; for (int i = 0; i < 10; i++) y += state*x + i; if (x > 0) return y; } return y + state + 1; }
+"#,
+    );
+}
+
+#[test]
+fn nests_data_loops() {
+    check(
+        "nests_data_loops",
+        r#"int step(int n, int m) { int r = 0; n = n & 7; m = m & 7;
+  for (int i = 0; i < 8; i++) { if (i >= n) break; for (int j = 0; j < 9 && j < m; j++) { r += i*j + 1; if (r > 60) return -r; } } return r; }
+"#,
+    );
+}
+
+#[test]
+fn stores_under_conditions() {
+    check(
+        "stores_under_conditions",
+        r#"static float a[6];
+float step(int i, float x) { if (x > 0 && i >= 0 && i < 6) a[i] = x; if (i > 2) for (int k = 0; k < 6; k++) if (k == (i & 3)) a[k] += 1; float s = 0; for (int k = 0; k < 6; k++) s += a[k]; return s; }
+"#,
+    );
+}
+
+#[test]
+fn indexes_structures_by_data() {
+    check(
+        "indexes_structures_by_data",
+        r#"struct ch { float gain; int count; float z[2]; };
+static struct ch ch[4] = { { 1.0f, 0, { 0, 0 } }, { 2.0f }, { .gain = 0.5f, .z[1] = 3 }, { 4.0f, 2 } };
+float step(int n, float x) { struct ch *c = &ch[n & 3]; c->count++; c->z[1] = c->z[0]; c->z[0] = x; return c->gain*c->z[1] + c->count; }
+"#,
+    );
+}
+
+#[test]
+fn initialises() {
+    check(
+        "initialises",
+        r#"struct p { int a; struct { float x, y; } q[2]; char s[4]; };
+static const struct p p = { .q = { { 1, 2 }, [1].y = 5 }, .a = 3, .s = "ab" };
+static const int n[] = { [3] = 7, 8, [0] = 1 };
+int step(int x) { struct p r = p; r.q[0].x += x; return (int)(r.q[0].x + r.q[1].y) + p.s[1] + (int)(sizeof n/sizeof n[0]) + n[4] + r.s[3]; }
+"#,
+    );
+}
+
+#[test]
+fn counts_modes_in_small_integers() {
+    check(
+        "counts_modes_in_small_integers",
+        r#"typedef unsigned char u8; typedef unsigned short u16;
+static u8 n = 250; static u16 m = 65530; static signed char k = 120;
+int step(int x) { n++; m += 3; k = k + 1; n += x > 0; return n + 1000*(m & 7) + k; }
+"#,
+    );
+}
+
+#[test]
+fn evaluates_effects_in_order() {
+    check(
+        "evaluates_effects_in_order",
+        r#"int step(int a, int b) { int i = 0, r[4] = { 0 }; r[i++] = a; r[i++] = b; r[i] = i; int x = (i += 2, i*3); int y = a > b ? r[0]++ : --r[1]; return r[0] + 10*r[1] + 100*r[2] + x + y - (i--); }
+"#,
+    );
+}
+
+#[test]
+fn repeats_do_while() {
+    check(
+        "repeats_do_while",
+        r#"int step(unsigned x) { int n = 0; x &= 0xffff; 
+#pragma takt loop_bound(16)
+ do { n += x & 1; x >>= 1; } while (n < 20 && x); 
+ return n; }
+"#,
+    );
+}
+
+#[test]
+fn refuses_recursion() {
+    let message = refused(
+        "refuses_recursion",
+        r#"static int f(int n) { return n ? f(n - 1) : 0; }
+int step(int n) { return f(n); }
+"#,
+    );
+    for part in [":1:", "calls itself", "loop"] {
+        assert!(message.contains(part), "{message}");
+    }
+}
+
+#[test]
+fn refuses_a_double() {
+    let message = refused(
+        "refuses_a_double",
+        r#"float step(float x) {
+  double d = x;
+  return d; }
+"#,
+    );
+    for part in [":2:", "double", "--double=float"] {
+        assert!(message.contains(part), "{message}");
+    }
+}
+
+#[test]
+fn refuses_arithmetic_in_double() {
+    let message = refused(
+        "refuses_arithmetic_in_double",
+        r#"float step(float x) {
+  return 0.5*x; }
+"#,
+    );
+    for part in [":2:", "double", "1.5f"] {
+        assert!(message.contains(part), "{message}");
+    }
+}
+
+#[test]
+fn refuses_loops_without_bound() {
+    let message = refused(
+        "refuses_loops_without_bound",
+        r#"float step(float x) {
+  while (x > 1.0f)
+    x -= 1.0f;
+  return x; }
+"#,
+    );
+    assert!(message.contains("#pragma takt loop_bound"), "{message}");
+}
+
+#[test]
+fn refuses_unknown_calls() {
+    let message = refused(
+        "refuses_unknown_calls",
+        r#"float step(float x) {
+  return HAL_Read(3) + x; }
+"#,
+    );
+    for part in [":2:", "HAL_Read"] {
+        assert!(message.contains(part), "{message}");
+    }
+}
+
+#[test]
+fn refuses_division() {
+    let message = refused(
+        "refuses_division",
+        r#"int step(int a, int b) {
+  return a/b; }
+"#,
+    );
+    for part in [":2:", "divides no integers"] {
+        assert!(message.contains(part), "{message}");
+    }
+}
+
+#[test]
+fn refuses_malloc() {
+    let message = refused(
+        "refuses_malloc",
+        r#"#include <stdlib.h>
+int step(int a) {
+  int *p = malloc(4); *p = a; return *p; }
+"#,
+    );
+    for part in [":3:", "malloc"] {
+        assert!(message.contains(part), "{message}");
+    }
+}
+
+#[test]
+fn refuses_jumps_back() {
+    let message = refused(
+        "refuses_jumps_back",
+        r#"int step(int a) { again: a--; if (a > 0) goto again; return a; }
+"#,
+    );
+    assert!(message.contains("goto again"), "{message}");
+}
+
+#[test]
+fn refuses_chosen_functions() {
+    let message = refused(
+        "refuses_chosen_functions",
+        r#"static int f(int x) { return x; }
+static int g(int x) { return -x; }
+int step(int a) {
+  int (*h)(int) = a > 0 ? f : g;
+  return h(a); }
+"#,
+    );
+    assert!(message.contains("data"), "{message}");
+}
+
+#[test]
+fn refuses_indices_outside() {
+    let message = refused(
+        "refuses_indices_outside",
+        r#"int step(int a) {
+  int x[3] = { a };
+  return x[3]; }
+"#,
+    );
+    for part in [":3:", "outside"] {
+        assert!(message.contains(part), "{message}");
+    }
+}
+
+#[test]
+fn refuses_unset_values() {
+    let message = refused(
+        "refuses_unset_values",
+        r#"int step(int a) {
+  int x;
+  return x + a; }
+"#,
+    );
+    for part in [":3:", "before it is written"] {
+        assert!(message.contains(part), "{message}");
+    }
+}
+
+#[test]
+fn refuses_64_bits_of_data() {
+    let message = refused(
+        "refuses_64_bits_of_data",
+        r#"long long step(int a) {
+  long long x = a;
+  return x; }
+"#,
+    );
+    assert!(message.contains("64-bit"), "{message}");
+}
+
+#[test]
+fn refuses_null() {
+    let message = refused(
+        "refuses_null",
+        r#"int step(int a) {
+  int *p = 0;
+  return *p + a; }
+"#,
+    );
+    for part in [":3:", "null"] {
+        assert!(message.contains(part), "{message}");
+    }
+}
+
+#[test]
+fn tells_a_missing_header() {
+    let message = refused(
+        "tells_a_missing_header",
+        r#"#include <nowhere.h>
+int step(int a) { return a; }
+"#,
+    );
+    for part in ["nowhere.h", "math.h"] {
+        assert!(message.contains(part), "{message}");
+    }
+}
+
+#[test]
+fn tells_a_syntax_error() {
+    let message = refused(
+        "tells_a_syntax_error",
+        r#"int step(int a) {
+  return a +; }
+"#,
+    );
+    assert!(message.contains(":2:"), "{message}");
+}
+
+#[test]
+fn tells_a_missing_function() {
+    let message = refused(
+        "tells_a_missing_function",
+        r#"int stop(int a) { return a; }
+"#,
+    );
+    assert!(message.contains("stop"), "{message}");
+}
+
+#[test]
+fn tells_that_there_is_no_function() {
+    let message = refused("tells_that_there_is_no_function", "int kp;\n");
+    assert!(message.ends_with("the files define no function"), "{message}");
+}
+
+#[test]
+fn messages_of_the_preprocessor_are_the_users() {
+    let message = refused("messages_of_the_preprocessor_are_the_users", "#include \"nope.h\"\n");
+    assert!(!message.contains("redefined") && !message.contains("<command-line>"), "{message}");
+}
+
+#[test]
+fn a_folder_is_no_c_file() {
+    let preprocessor = takt_front::c::Preprocessor::new(&[]).expect("a folder");
+    let Err(error) = preprocessor.run(std::path::Path::new("/")) else { panic!("a folder is read") };
+    assert!(error.to_string().contains("a folder, not a C file"), "{error}");
+}

@@ -1,0 +1,217 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Integer products by constants as shifts and sums, and quotients and remainders by powers of two: the machine does not multiply
+//! or divide integers. A part of [`expression`](crate::resolve::expression).
+//!
+//! Quotients are truncated, as in C: -7/4 is -1, and -7 % 4 is -3.
+
+use crate::context::{AstPlace, ErrorReported};
+use crate::ir::RegisterId;
+use crate::ir::type_evidence::Kind;
+use crate::resolve::Resolver;
+use crate::resolve::term::{CurrentEquation, LineExpression, Term, TermForm};
+use takt_diagnostics::diag::Diagnostic;
+use takt_diagnostics::source::Span;
+use takt_isa::Type;
+use takt_syntax::ast::Operator;
+use takt_syntax::expr::{EvalError, Fault, Value};
+
+/// A part of a factor: the exponent of a power of two, and whether it is subtracted.
+type Digit = (u32, bool);
+
+/// A factor as sums and differences of powers of two, modulo 2³²: binary digits or the non-adjacent form, whichever takes fewer
+/// operations.
+fn digits(factor: i64) -> Vec<Digit> {
+    let binary = |factor: i64, negative: bool| -> Vec<Digit> {
+        let magnitude = factor.unsigned_abs();
+        (0..u32::BITS).filter(|bit| magnitude >> bit & 1 != 0).map(|bit| (bit, negative)).collect()
+    };
+    let plain = binary(factor, factor < 0);
+    let (mut rest, mut signed) = (i128::from(factor), Vec::new());
+    for bit in 0..u32::BITS {
+        if rest & 1 != 0 {
+            // In a run of ones, the last is subtracted.
+            let digit = 2 - (rest & 3);
+            signed.push((bit, digit < 0));
+            rest -= digit;
+        }
+        rest >>= 1;
+    }
+    // Operations: a shift for each digit but the units, a sum for each but the first, and a negation if all digits are negative.
+    let cost = |digits: &[Digit]| {
+        let shifts = digits.iter().filter(|(bit, _)| *bit > 0).count();
+        shifts + digits.len() + usize::from(digits.iter().all(|(_, negative)| *negative))
+    };
+    if cost(&signed) < cost(&plain) { signed } else { plain }
+}
+
+impl Resolver<'_> {
+    /// Computes a product, quotient or remainder of integers; `None` for operands of another kind.
+    pub(super) fn integers(
+        &mut self,
+        at: AstPlace,
+        line: &mut CurrentEquation,
+        symbol: &str,
+        terms: &[Term],
+        here: LineExpression,
+    ) -> Result<Option<Term>, ErrorReported> {
+        let operators = [Operator::Mul, Operator::Div, Operator::Rem];
+        let Some(operator) = operators.into_iter().find(|operator| operator.text() == symbol) else {
+            return Ok(None);
+        };
+        let [a, b] = terms else { return Ok(None) };
+        let is_int = |term: &Term| match term.form {
+            TermForm::Register(_, kind) => kind == Kind::Int,
+            TermForm::Constant(value, _) => value.integer().is_ok(),
+            TermForm::Chain(..) | TermForm::Counted(_) => false,
+        };
+        if !(is_int(a) && is_int(b)) {
+            return Ok(None);
+        }
+        match (operator, a.form, b.form) {
+            (Operator::Mul, TermForm::Register(register, _), TermForm::Constant(factor, _))
+            | (Operator::Mul, TermForm::Constant(factor, _), TermForm::Register(register, _)) => {
+                let span = if a.value().is_some() { a.span } else { b.span };
+                let factor = self.word_of(at, factor, span)?;
+                if factor == 0 {
+                    return Ok(Some(Term { form: TermForm::Constant(Value::Int(0), here.1), span: here.0 }));
+                }
+                let form =
+                    TermForm::Register(self.scaled(at, line, register, factor.into(), here.0)?, Kind::Int);
+                Ok(Some(Term { form, span: here.0 }))
+            }
+            (_, TermForm::Register(register, _), TermForm::Constant(divisor, _)) => {
+                let number = self.word_of(at, divisor, b.span)?;
+                if number == 0 {
+                    let fault = Fault::DivisionByZero;
+                    return Err(self.context.fault(at.scope, EvalError { span: b.span, fault }));
+                }
+                if !number.unsigned_abs().is_power_of_two() {
+                    return Err(self.no_quotient(at, operator, terms, here.0));
+                }
+                self.by_power(at, line, operator, register, number, here).map(Some)
+            }
+            (Operator::Mul, ..) => Err(self.no_product(at, terms, here.0)),
+            _ => Err(self.no_quotient(at, operator, terms, here.0)),
+        }
+    }
+
+    /// A constant as a signed word.
+    fn word_of(&mut self, at: AstPlace, value: Value, span: Span) -> Result<i32, ErrorReported> {
+        let bits =
+            value.bits(Type::I).map_err(|fault| self.context.fault(at.scope, EvalError { span, fault }))?;
+        Ok(bits.cast_signed())
+    }
+
+    /// Multiplies a register by a constant.
+    pub(super) fn scaled(
+        &mut self,
+        at: AstPlace,
+        line: &mut CurrentEquation,
+        register: RegisterId,
+        factor: i64,
+        span: Span,
+    ) -> Result<RegisterId, ErrorReported> {
+        let mut digits = digits(factor);
+        // Positive digits come first, so that there is a value to subtract from.
+        digits.sort_by_key(|(bit, negative)| (*negative, *bit));
+        let mut sum: Option<RegisterId> = None;
+        for (bit, negative) in digits {
+            let part = match bit {
+                0 => register,
+                bit => {
+                    let by = self.pooled(bit, span);
+                    self.integer_operation(at, line, Operator::Shl, [register, by], span)?
+                }
+            };
+            sum = Some(match (sum, negative) {
+                (None, false) => part,
+                (None, true) => {
+                    self.integer_operation(at, line, Operator::Sub, [RegisterId::ZERO, part], span)?
+                }
+                (Some(sum), false) => self.integer_operation(at, line, Operator::Add, [sum, part], span)?,
+                (Some(sum), true) => self.integer_operation(at, line, Operator::Sub, [sum, part], span)?,
+            });
+        }
+        Ok(sum.unwrap_or(RegisterId::ZERO))
+    }
+
+    /// A quotient or a remainder by a power of two or its negative, truncated. A sum without a branch moves a negative dividend to
+    /// the next multiple towards zero.
+    fn by_power(
+        &mut self,
+        at: AstPlace,
+        line: &mut CurrentEquation,
+        operator: Operator,
+        register: RegisterId,
+        divisor: i32,
+        (span, id): LineExpression,
+    ) -> Result<Term, ErrorReported> {
+        let power = divisor.unsigned_abs().trailing_zeros();
+        let term = |register| Term { form: TermForm::Register(register, Kind::Int), span };
+        if power == 0 && operator == Operator::Rem {
+            return Ok(Term { form: TermForm::Constant(Value::Int(0), id), span });
+        }
+        let mut quotient = register;
+        if power > 0 {
+            let (sign, shift) = (self.pooled(31, span), self.pooled(power, span));
+            let mask = self.pooled((1 << power) - 1, span);
+            let negative = self.integer_operation(at, line, Operator::Shr, [register, sign], span)?;
+            let bias = self.integer_operation(at, line, Operator::And, [negative, mask], span)?;
+            let biased = self.integer_operation(at, line, Operator::Add, [register, bias], span)?;
+            if operator == Operator::Rem {
+                let low = self.integer_operation(at, line, Operator::And, [biased, mask], span)?;
+                return self.integer_operation(at, line, Operator::Sub, [low, bias], span).map(term);
+            }
+            quotient = self.integer_operation(at, line, Operator::Shr, [biased, shift], span)?;
+        }
+        if divisor < 0 {
+            let zero = RegisterId::ZERO;
+            quotient = self.integer_operation(at, line, Operator::Sub, [zero, quotient], span)?;
+        }
+        Ok(term(quotient))
+    }
+
+    fn no_product(&mut self, at: AstPlace, terms: &[Term], span: Span) -> ErrorReported {
+        let text = |term: &Term| self.context.reports.sources.text(term.span).to_owned();
+        let (a, b) = (text(&terms[0]), text(&terms[1]));
+        let floats = format!("ftoi(itof({a})*itof({b}))");
+        let error = Diagnostic::error("equation", span, "a product of two integers: the machine has none")
+            .note("of an integer and a constant, `*` is shifts and sums")
+            .mend(format!("compute it in floats, which is exact up to 2^24: `{floats}`"), floats);
+        self.context.report(at.scope, error)
+    }
+
+    fn no_quotient(&mut self, at: AstPlace, operator: Operator, terms: &[Term], span: Span) -> ErrorReported {
+        let text = |term: &Term| self.context.reports.sources.text(term.span).to_owned();
+        let (a, b) = (text(&terms[0]), text(&terms[1]));
+        let as_float = |term: &Term, text: &str| match term.value() {
+            Some(_) => text.to_owned(),
+            None => format!("itof({text})"),
+        };
+        let (a, b) = (as_float(&terms[0], &a), as_float(&terms[1], &b));
+        let message = format!("`{}` of integers is by a constant that is a power of two", operator.text());
+        let help = match operator {
+            Operator::Rem => format!("for floats, `fmod({a}, {b})` of `<math.s>` computes remainders"),
+            _ => format!(
+                "`{a}/{b}` is the quotient as a float; `ftoi` rounds it, and `trunc` of `<math.s>` cuts it off"
+            ),
+        };
+        self.context.report(at.scope, Diagnostic::error("equation", span, message).help(help))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::digits;
+
+    #[test]
+    fn digits_add_up_to_the_factor() {
+        let all = (-2000..2000).chain([i64::from(i32::MIN), i64::from(i32::MAX), 0x5555_5555, -0x5555_5555]);
+        for factor in all {
+            let part = |(bit, negative): (u32, bool)| if negative { -(1i64 << bit) } else { 1 << bit };
+            let sum: i64 = digits(factor).into_iter().map(part).sum();
+            assert_eq!(sum as u32, factor as u32, "{factor}");
+            assert!(digits(factor).len() <= 16, "{factor}");
+        }
+    }
+}

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! A check ends: an image on which it would not is refused at the limit of steps.
+
+use crate::common::{build, check};
+use takt_asm::{MemoryLoader, Options};
+use takt_isa::{Instruction, Op, T3};
+use takt_verify::{MAX_STEPS, verify};
+
+/// A loop on numbers that are known, which a check follows as often as it runs.
+const SOURCE: &str = "\
+.input a
+.output y
+.once
+.reg n:int
+    li n, 10
+back:
+    isub n, n, 1
+    bnz n, back
+    wait p
+.period
+p:
+    mov y, a
+    wait p
+";
+
+#[test]
+fn an_image_that_never_ends_is_refused_at_the_limit() {
+    let options = Options { machine: &T3, ..Options::default() };
+    let (assembled, plain) = build("a.s", &MemoryLoader::of("a.s", SOURCE), &options).expect("it assembles");
+    assert!(check(&assembled, &plain).expect("it is its source").steps < MAX_STEPS / 1000);
+    let mut program = assembled.program.clone();
+    let counts = |instruction: &Instruction| matches!(instruction.op, Op::isub | Op::iadd);
+    let decoded =
+        program.addresses().flat_map(|at| program.bundle(at).expect("it is there").expect("it is legal"));
+    let (word, mut instruction) =
+        decoded.enumerate().find(|(_, instruction)| counts(instruction)).expect("it counts");
+    // Two numbers in turns, neither of them 0.
+    instruction.op = Op::ixor;
+    program.code[word] = instruction.encode().expect("it has an encoding");
+    let difference = verify(&program, &plain, &assembled.contractions).expect_err("it does something else");
+    let limit = format!("the checker's limit of {MAX_STEPS} steps is reached");
+    assert!(difference.what.starts_with(&limit), "{}", difference.what);
+    assert!(difference.place.is_some());
+}

@@ -1,0 +1,222 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Values with the operations that gave them, so that a value can be computed again where more is known about what it depends on.
+
+use super::value::Value;
+use std::ops::{Add, Div, Mul, Neg, Sub};
+use std::rc::Rc;
+use takt_isa::Instruction;
+use takt_isa::fp::{Bitwise, Real};
+
+/// Limit on the operations that lie one behind the other in the history of a value; the value beyond it has no history.
+const MAX_DEPTH: u32 = 200;
+
+/// Value of a register or data word, with its history.
+#[derive(Debug)]
+pub(super) struct Node {
+    pub(super) value: Value,
+    pub(super) made: Option<Made>,
+    /// Node that this one narrows under a condition.
+    origin: Option<Rc<Node>>,
+    /// Length of the history.
+    depth: u32,
+}
+
+/// Operation with its operands.
+#[derive(Clone, Debug)]
+pub(super) struct Made {
+    pub(super) word: u32,
+    pub(super) instruction: Instruction,
+    pub(super) operands: [Rc<Node>; 3],
+}
+
+impl Node {
+    /// Value without history.
+    pub(super) fn leaf(value: Value) -> Rc<Node> {
+        Rc::new(Node { value, made: None, origin: None, depth: 0 })
+    }
+
+    /// Length of the history.
+    pub(super) fn depth(&self) -> u32 {
+        self.depth
+    }
+
+    pub(super) fn new(value: Value, made: Made) -> Rc<Node> {
+        let depth = 1 + made.operands.iter().map(|operand| operand.depth).max().unwrap_or(0);
+        let known = matches!(&value, Value::Patterns(patterns) if patterns.len() == 1);
+        if depth > MAX_DEPTH || known {
+            return Node::leaf(value);
+        }
+        Rc::new(Node { value, made: Some(made), origin: None, depth })
+    }
+
+    /// Node that holds under a condition, in place of `self`.
+    pub(super) fn narrowed(self: &Rc<Node>, value: Value, made: Option<Made>) -> Rc<Node> {
+        let origin = Some(Rc::clone(self));
+        Rc::new(Node { value, made, origin, depth: self.depth })
+    }
+
+    /// Joins the nodes of a register on two paths that meet. What the same node became under their conditions is that node again.
+    pub(super) fn join(self: &Rc<Node>, other: &Rc<Node>) -> Rc<Node> {
+        if Rc::ptr_eq(self, other) {
+            return Rc::clone(self);
+        }
+        let origins = |node: &Rc<Node>| {
+            std::iter::successors(Some(Rc::clone(node)), |node| node.origin.clone()).collect::<Vec<_>>()
+        };
+        let (ours, theirs) = (origins(self), origins(other));
+        let common = ours.iter().find(|node| theirs.iter().any(|other| Rc::ptr_eq(node, other)));
+        common.map_or_else(|| Node::leaf(self.value.join(&other.value)), Rc::clone)
+    }
+}
+
+impl Drop for Node {
+    /// Origins may form a long chain, which must not be dropped by recursion.
+    fn drop(&mut self) {
+        let mut next = self.origin.take();
+        while let Some(node) = next {
+            next = Rc::into_inner(node).and_then(|mut node| node.origin.take());
+        }
+    }
+}
+
+/// Meaning of an instruction as an expression of its operands.
+#[derive(Clone, Debug)]
+pub(super) enum Meaning {
+    /// Source of the instruction, by its position.
+    Source(usize),
+    Neg(Box<Meaning>),
+    Abs(Box<Meaning>),
+    Sqrt(Box<Meaning>),
+    /// Bits of the operand as a signed integer.
+    Integer(Box<Meaning>),
+    Nearest(Box<Meaning>),
+    Add(Box<[Meaning; 2]>),
+    Mul(Box<[Meaning; 2]>),
+    Div(Box<[Meaning; 2]>),
+    Minimum(Box<[Meaning; 2]>),
+    Maximum(Box<[Meaning; 2]>),
+    Saturate(Box<[Meaning; 2]>),
+    Equal(Box<[Meaning; 2]>),
+    Less(Box<[Meaning; 2]>),
+    LessOrEqual(Box<[Meaning; 2]>),
+    Bitwise(Bitwise, Box<[Meaning; 2]>),
+    Choose(Box<[Meaning; 3]>),
+    /// Function that is not followed back to its operand.
+    Other,
+}
+
+impl Meaning {
+    pub(super) fn of(instruction: &Instruction) -> Option<Meaning> {
+        takt_isa::real(instruction.op, Meaning::Source(0), Meaning::Source(1), Meaning::Source(2))
+    }
+}
+
+impl Add for Meaning {
+    type Output = Meaning;
+
+    fn add(self, other: Meaning) -> Meaning {
+        Meaning::Add(Box::new([self, other]))
+    }
+}
+
+impl Sub for Meaning {
+    type Output = Meaning;
+
+    fn sub(self, other: Meaning) -> Meaning {
+        self + -other
+    }
+}
+
+impl Mul for Meaning {
+    type Output = Meaning;
+
+    fn mul(self, other: Meaning) -> Meaning {
+        Meaning::Mul(Box::new([self, other]))
+    }
+}
+
+impl Div for Meaning {
+    type Output = Meaning;
+
+    fn div(self, other: Meaning) -> Meaning {
+        Meaning::Div(Box::new([self, other]))
+    }
+}
+
+impl Neg for Meaning {
+    type Output = Meaning;
+
+    fn neg(self) -> Meaning {
+        Meaning::Neg(Box::new(self))
+    }
+}
+
+impl Real for Meaning {
+    fn sqrt(self) -> Meaning {
+        Meaning::Sqrt(Box::new(self))
+    }
+
+    fn sin(self) -> Meaning {
+        Meaning::Other
+    }
+
+    fn cos(self) -> Meaning {
+        Meaning::Other
+    }
+
+    fn atan2(self, _: Meaning) -> Meaning {
+        Meaning::Other
+    }
+
+    fn acos(self) -> Meaning {
+        Meaning::Other
+    }
+
+    fn abs(self) -> Meaning {
+        Meaning::Abs(Box::new(self))
+    }
+
+    fn sign(self) -> Meaning {
+        Meaning::Other
+    }
+
+    fn minimum(self, other: Meaning) -> Meaning {
+        Meaning::Minimum(Box::new([self, other]))
+    }
+
+    fn maximum(self, other: Meaning) -> Meaning {
+        Meaning::Maximum(Box::new([self, other]))
+    }
+
+    fn saturate(self, bound: Meaning) -> Meaning {
+        Meaning::Saturate(Box::new([self, bound]))
+    }
+
+    fn integer(self) -> Meaning {
+        Meaning::Integer(Box::new(self))
+    }
+
+    fn nearest(self) -> Meaning {
+        Meaning::Nearest(Box::new(self))
+    }
+
+    fn equal(self, other: Meaning) -> Meaning {
+        Meaning::Equal(Box::new([self, other]))
+    }
+
+    fn less(self, other: Meaning) -> Meaning {
+        Meaning::Less(Box::new([self, other]))
+    }
+
+    fn less_or_equal(self, other: Meaning) -> Meaning {
+        Meaning::LessOrEqual(Box::new([self, other]))
+    }
+
+    fn choose(self, yes: Meaning, no: Meaning) -> Meaning {
+        Meaning::Choose(Box::new([self, yes, no]))
+    }
+
+    fn bitwise(self, op: Bitwise, other: Meaning) -> Meaning {
+        Meaning::Bitwise(op, Box::new([self, other]))
+    }
+}

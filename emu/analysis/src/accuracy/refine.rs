@@ -1,0 +1,365 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Values under assumptions: operations are evaluated again where a condition of a branch or a selection narrows what they depend on, and
+//! results are evaluated case by case.
+
+use super::affine::Affine;
+use super::assume::{Context, Impossible, View, both};
+use super::enclose::Explorer;
+use super::interval::Interval;
+use super::node::{Made, Meaning, Node};
+use super::number::{Number, SIGN};
+use super::value::Value;
+use std::collections::{BTreeMap, HashMap, HashSet};
+use std::rc::Rc;
+use takt_isa::fp::Bitwise;
+
+/// Limit on selections whose conditions are assumed within each other.
+const MAX_NESTED: u32 = 3;
+/// Limit on the cases that are distinguished behind a result, as a power of two.
+const MAX_CASES: u32 = 6;
+/// Limit on the divisions of a range.
+const MAX_DIVISIONS: u32 = 128;
+/// Limit on the operations that are evaluated again for the cases of one result.
+const MAX_AGAIN: usize = 1 << 14;
+
+/// Assumptions with the nodes that were evaluated under them.
+pub(super) struct Scene {
+    context: Context,
+    /// Confined symbols: middle, radius, and the symbol that replaces each.
+    replaced: BTreeMap<u32, (f64, f64, u32)>,
+    /// Nodes by address, and what they are under the assumptions.
+    nodes: HashMap<*const Node, (Rc<Node>, Rc<Node>)>,
+}
+
+/// Question whose answers divide the runs into cases.
+#[derive(Clone)]
+enum Case {
+    /// The condition holds or not.
+    Condition(Rc<Node>),
+    /// The value lies below the number or above.
+    Cut(Rc<Node>, f64),
+}
+
+impl Explorer<'_> {
+    /// Scene of assumptions; `None` if no run makes them.
+    pub(super) fn scene(
+        &mut self,
+        assume: impl FnOnce(&mut Context) -> Result<(), Impossible>,
+    ) -> Option<Scene> {
+        let mut context = Context::default();
+        assume(&mut context).and_then(|()| context.confine()).ok()?;
+        let mut replaced = BTreeMap::new();
+        for (symbol, range) in &context.confined {
+            let new = self.symbol(self.symbols[*symbol as usize]);
+            replaced.insert(*symbol, (range.middle(), range.radius(), new));
+        }
+        Some(Scene { context, replaced, nodes: HashMap::new() })
+    }
+
+    /// Node under the assumptions of a scene.
+    pub(super) fn under(&mut self, node: &Rc<Node>, scene: &mut Scene) -> Rc<Node> {
+        if scene.context.is_empty() {
+            return Rc::clone(node);
+        }
+        let key = Rc::as_ptr(node);
+        if let Some((_, known)) = scene.nodes.get(&key) {
+            return Rc::clone(known);
+        }
+        let operands = node
+            .made
+            .as_ref()
+            .map(|made| [0, 1, 2].map(|place: usize| self.under(&made.operands[place], scene)));
+        let moved = node.made.as_ref().zip(operands).filter(|(made, operands)| {
+            made.operands.iter().zip(operands).any(|(old, new)| !Rc::ptr_eq(old, new))
+        });
+        let known = scene.context.current(node);
+        let narrowed = *known != node.value;
+        let replaced = replaced(known, &scene.replaced);
+        let value = replaced.clone().unwrap_or_else(|| known.clone());
+        let result = match moved {
+            Some((made, operands)) => {
+                let made = Made { operands, ..made.clone() };
+                let again = self.quietly(|explorer| explorer.apply(&made));
+                Node::narrowed(node, both(&value, again.value.clone()), again.made.clone())
+            }
+            None if narrowed || replaced.is_some() => Node::narrowed(node, value, node.made.clone()),
+            None => Rc::clone(node),
+        };
+        scene.nodes.insert(key, (Rc::clone(node), Rc::clone(&result)));
+        result
+    }
+
+    /// Evaluates without listing hazards or counting.
+    fn quietly<T>(&mut self, evaluate: impl FnOnce(&mut Self) -> T) -> T {
+        self.quiet += 1;
+        let operations = self.operations;
+        let result = evaluate(self);
+        self.operations = operations;
+        self.quiet -= 1;
+        result
+    }
+
+    /// Selection by a condition that is not decided: each operand under the condition that takes it.
+    pub(super) fn selected(&mut self, condition: &Rc<Node>, yes: &Rc<Node>, no: &Rc<Node>) -> Option<Value> {
+        if self.nested >= MAX_NESTED {
+            return None;
+        }
+        self.nested += 1;
+        let mut joined: Option<Value> = None;
+        for (taken, holds) in [(yes, true), (no, false)] {
+            if let Some(mut scene) = self.scene(|context| context.decide(condition, holds)) {
+                let node = self.under(taken, &mut scene);
+                let value = tightened(&node.value, &scene);
+                joined = Some(joined.map_or_else(|| value.clone(), |known| known.join(&value)));
+            }
+        }
+        self.nested -= 1;
+        joined
+    }
+
+    /// Value of a node, from the cases of the selections and limits that it depends on.
+    pub(super) fn by_cases(&mut self, node: &Rc<Node>) -> Value {
+        let mut seen = HashSet::new();
+        let mut questions = Vec::new();
+        cases(node, &mut seen, &mut questions);
+        let most = (MAX_AGAIN / seen.len().max(1)).max(1).ilog2().min(MAX_CASES);
+        if questions.is_empty() || most == 0 {
+            return node.value.clone();
+        }
+        let split = self.quietly(|explorer| explorer.split(node, most));
+        split.map_or_else(|| node.value.clone(), |value| both(&node.value, value))
+    }
+
+    /// Value of a node from parts of the range of the last value that all of it depends on: those parts are divided further in which the
+    /// result is largest, or errs most.
+    pub(super) fn in_parts(&mut self, node: &Rc<Node>) -> Value {
+        let Some(waist) = waist(node) else { return node.value.clone() };
+        let Ok(whole) = waist.value.float().map(|number| number.actual) else { return node.value.clone() };
+        let mut parts: Vec<(Interval, Option<Rc<Number>>)> = vec![(whole, node.value.float().ok())];
+        for turn in 0..MAX_DIVISIONS {
+            // A part without a bound comes first.
+            let size = |(_, number): &(Interval, Option<Rc<Number>>)| match number {
+                None => f64::INFINITY,
+                Some(number) if turn % 2 == 0 => number.actual.magnitude(),
+                Some(number) => number.error_range().magnitude(),
+            };
+            let divisible = parts.iter().enumerate().filter(|(_, (range, _))| middle(*range).is_some());
+            let Some((at, _)) = divisible.max_by(|(_, a), (_, b)| size(a).total_cmp(&size(b))) else { break };
+            let (range, _) = parts.swap_remove(at);
+            let Some(middle) = middle(range) else { break };
+            for part in [Interval::new(range.low, middle), Interval::new(middle, range.high)] {
+                let Some(mut scene) = self.scene(|context| context.pin(&waist, part)) else { continue };
+                self.parts = self.parts.saturating_sub(1);
+                let under = self.quietly(|explorer| explorer.under(node, &mut scene));
+                parts.push((part, under.value.float().ok()));
+            }
+            if self.parts == 0 {
+                break;
+            }
+        }
+        let values =
+            parts.into_iter().map(|(_, number)| number.map(Value::Float)).collect::<Option<Vec<_>>>();
+        let joined = values.and_then(|values| values.into_iter().reduce(|all, value| all.join(&value)));
+        joined.map_or_else(|| node.value.clone(), |value| both(&node.value, value))
+    }
+
+    /// Joins the values of all cases; `None` if no case is possible.
+    fn split(&mut self, node: &Rc<Node>, most: u32) -> Option<Value> {
+        let mut questions = Vec::new();
+        cases(node, &mut HashSet::new(), &mut questions);
+        let Some(question) = questions.first().filter(|_| most > 0) else { return Some(node.value.clone()) };
+        let mut joined: Option<Value> = None;
+        for answer in [false, true] {
+            let scene = self.scene(|context| match question {
+                Case::Condition(node) => context.decide(node, answer),
+                Case::Cut(node, at) if answer => {
+                    context.narrow(node, Interval::new(*at, f64::INFINITY), View::Float)
+                }
+                Case::Cut(node, at) => {
+                    context.narrow(node, Interval::new(f64::NEG_INFINITY, *at), View::Float)
+                }
+            });
+            let Some(mut scene) = scene else { continue };
+            let under = self.under(node, &mut scene);
+            // Without progress, another question would be no better.
+            if Rc::ptr_eq(&under, node) {
+                return Some(node.value.clone());
+            }
+            let Some(value) = self.split(&under, most - 1) else { continue };
+            let value = tightened(&value, &scene);
+            joined = Some(joined.map_or_else(|| value.clone(), |known| known.join(&value)));
+        }
+        joined
+    }
+}
+
+/// Nearest value through which alone a node depends on everything else; `None` if there is none or it is an operand that is used once.
+fn waist(node: &Rc<Node>) -> Option<Rc<Node>> {
+    let mut open = BTreeMap::from([((node.depth(), Rc::as_ptr(node)), Rc::clone(node))]);
+    let mut steps = 0;
+    while let Some((_, next)) = open.pop_last() {
+        if steps > 1 && open.is_empty() {
+            return Some(next);
+        }
+        steps += 1;
+        for operand in &next.made.as_ref()?.operands {
+            let known = matches!(&operand.value, Value::Patterns(patterns) if patterns.len() == 1);
+            if !known {
+                open.insert((operand.depth(), Rc::as_ptr(operand)), Rc::clone(operand));
+            }
+        }
+    }
+    None
+}
+
+/// Point that divides a range: zero, or in the middle of the exponents, or of the numbers.
+fn middle(range: Interval) -> Option<f64> {
+    let Interval { low, high } = range;
+    let size = |low: f64, high: f64| {
+        if low < high / 16.0 { (low * high).sqrt().max(high / 256.0) } else { low / 2.0 + high / 2.0 }
+    };
+    let middle = if low < 0.0 && high > 0.0 {
+        0.0
+    } else if low >= 0.0 {
+        size(low, high)
+    } else {
+        -size(-high, -low)
+    };
+    let middle = f64::from(middle as f32);
+    (low < middle && middle < high).then_some(middle)
+}
+
+/// Questions behind a node, the nearest first.
+fn cases(node: &Rc<Node>, seen: &mut HashSet<*const Node>, questions: &mut Vec<Case>) {
+    let mut next = vec![Rc::clone(node)];
+    let mut asked = HashSet::new();
+    while !next.is_empty() {
+        let mut behind = Vec::new();
+        for node in next {
+            if !seen.insert(Rc::as_ptr(&node)) {
+                continue;
+            }
+            let Some(made) = &node.made else { continue };
+            for case in Meaning::of(&made.instruction).iter().flat_map(|meaning| questions_of(meaning, made))
+            {
+                let key = match &case {
+                    Case::Condition(node) => (Rc::as_ptr(node), 0),
+                    Case::Cut(node, at) => (Rc::as_ptr(node), at.to_bits()),
+                };
+                if asked.insert(key) {
+                    questions.push(case);
+                }
+            }
+            behind.extend(made.operands.iter().cloned());
+        }
+        next = behind;
+    }
+}
+
+/// Questions that an operation leaves open.
+fn questions_of(meaning: &Meaning, made: &Made) -> Vec<Case> {
+    let node = |meaning: &Meaning| match meaning {
+        Meaning::Source(place) => Some(&made.operands[*place]),
+        _ => None,
+    };
+    let range = |node: &Rc<Node>| node.value.float().ok().map(|number| number.actual);
+    // A limit that is a number divides the values of the operand.
+    let cut = |node: &Rc<Node>, at: f64| {
+        let open = range(node).is_some_and(|range| range.low < at && at < range.high);
+        open.then(|| Case::Cut(Rc::clone(node), at))
+    };
+    let limit = |a: &Meaning, b: &Meaning| {
+        let (a, b) = (node(a)?, node(b)?);
+        let limit = range(b).filter(|range| range.low == range.high)?;
+        Some((Rc::clone(a), limit.low))
+    };
+    match meaning {
+        Meaning::Choose(of) => match node(&of[0]) {
+            Some(condition) if condition.value.tested() == (true, true) => {
+                vec![Case::Condition(Rc::clone(condition))]
+            }
+            _ => Vec::new(),
+        },
+        Meaning::Minimum(of) | Meaning::Maximum(of) => {
+            let limits = [limit(&of[0], &of[1]), limit(&of[1], &of[0])].into_iter().flatten();
+            limits.filter_map(|(node, at)| cut(&node, at)).collect()
+        }
+        Meaning::Saturate(of) => {
+            let limits = limit(&of[0], &of[1]).into_iter();
+            limits.flat_map(|(node, at)| [at, -at].map(|at| cut(&node, at))).flatten().collect()
+        }
+        Meaning::Abs(of) => node(of).and_then(|node| cut(node, 0.0)).into_iter().collect(),
+        Meaning::Bitwise(Bitwise::And, of) => {
+            let (Some(a), Some(b)) = (node(&of[0]), node(&of[1])) else { return Vec::new() };
+            let sign = |mask: &Rc<Node>| [SIGN, !SIGN].map(Value::bits).contains(&mask.value);
+            let of = [(a, b), (b, a)].into_iter().find(|(_, mask)| sign(mask));
+            of.and_then(|(node, _)| cut(node, 0.0)).into_iter().collect()
+        }
+        _ => Vec::new(),
+    }
+}
+
+/// Value with confined symbols replaced, if it has any.
+fn replaced(value: &Value, by: &BTreeMap<u32, (f64, f64, u32)>) -> Option<Value> {
+    if by.is_empty() {
+        return None;
+    }
+    let of = |number: &Rc<Number>| {
+        let (form, error) = (number.form.replaced(by), number.error.replaced(by));
+        if form.is_none() && error.is_none() {
+            return None;
+        }
+        let form = form.unwrap_or_else(|| number.form.clone());
+        let error = error.unwrap_or_else(|| number.error.clone());
+        let exact = number.exact.meet(form.range());
+        let actual = if error.is_zero() {
+            number.actual.meet(exact)
+        } else {
+            number.actual.meet(exact + error.range())
+        };
+        let exact = if error.is_zero() { actual } else { exact.meet(actual - error.range()) };
+        Some(Rc::new(Number { actual, exact, form, error, ..Number::clone(number) }))
+    };
+    match value {
+        Value::Float(number) => of(number).map(Value::Float),
+        Value::Integer(number) => of(number).map(Value::Integer),
+        _ => None,
+    }
+}
+
+/// Value with ranges that the constraints of a scene narrow: for a form `f` and a constraint `g` ≤ 0, f ≤ f - λ·g for each λ ≥ 0.
+fn tightened(value: &Value, scene: &Scene) -> Value {
+    let Value::Float(number) = value else { return value.clone() };
+    let (mut exact, mut error) = (number.exact, number.error_range());
+    for constraint in &scene.context.constraints {
+        let constraint = constraint.replaced(&scene.replaced).unwrap_or_else(|| constraint.clone());
+        exact = exact.meet(lagrange(&number.form, &constraint));
+        error = error.meet(lagrange(&number.error, &constraint));
+    }
+    let actual = number.actual.meet(exact + error);
+    let exact = if number.error.is_zero() { exact.meet(actual) } else { exact };
+    if actual == number.actual && exact == number.exact {
+        return value.clone();
+    }
+    Value::Float(Rc::new(Number { actual, exact, ..Number::clone(number) }))
+}
+
+/// Range of a form where a constraint is not positive.
+pub(super) fn lagrange(form: &Affine, constraint: &Affine) -> Interval {
+    let mut range = form.range();
+    // The best multipliers are those that remove a symbol.
+    for (symbol, by) in constraint.terms() {
+        let of = form.coefficient(symbol);
+        if of == 0.0 {
+            continue;
+        }
+        let factor = of / by;
+        let left = Affine::combine(form, 1.0, constraint, -factor).range();
+        if factor > 0.0 {
+            range.high = range.high.min(left.high)
+        } else {
+            range.low = range.low.max(left.low)
+        }
+    }
+    range
+}

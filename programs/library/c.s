@@ -1,0 +1,72 @@
+; Operations of C that the machine has no instruction for, as `takt cc` uses them. `.include <c.s>`.
+
+; ---- Bits ---------------------------------------------------------------------------------------------------------------------
+
+; The bits of a float as an integer, and the float of these bits.
+.macro  bits_of d:int, x:bits
+        mov     d:bits, x
+.endm
+.macro  float_of d:float, n:bits
+        mov     d:bits, n
+.endm
+
+; n shifted right by k bits, zeros shifted in.
+.macro  shift_right d:int, n:int, k:int
+        ishr    d, n, k
+.endm
+
+; 1 if a < b as unsigned integers, otherwise 0.
+.macro  below d:int, a:int, b:int
+        iltu    d, a, b
+.endm
+
+; ---- Conversions --------------------------------------------------------------------------------------------------------------
+
+; x truncated to an integer, as (int)x: the nearest integer, and one less in size if that is beyond x. Beyond ±2^31 the nearest end.
+.macro  to_int d:int, x:float
+.reg    n:int over:int
+        n = ftoi(x)
+        over = abs(itof(n)) > abs(x)
+        d = n < 0 ? n + over : n - over
+.endm
+
+; x truncated to an integer from 0 to 2^32 - 1, as (unsigned)x.
+.macro  to_unsigned d:int, x:float
+.reg    high:int part
+        high = x >= 2147483648.0
+        part = high ? x - 2147483648.0 : x
+        d = to_int(part) + (high << 31)
+.endm
+
+; n from 0 to 2^32 - 1 as a float: half of it, whose last bit stands for both that are lost, doubled.
+.macro  unsigned_to_float d:float, n:int
+.reg    half:int whole near
+        half = shift_right(n, 1) | (n & 1)
+        whole = itof(n)
+        near = itof(half)
+        d = n < 0 ? near + near : whole
+.endm
+
+; ---- Products -----------------------------------------------------------------------------------------------------------------
+
+; a·b of integers from -2^15 to 2^15 - 1. The parts of b have 8 bits, so that both products are exact in binary32.
+.macro  product_short d:int, a:int, b:int
+.reg    x low high
+        x = itof(a)
+        low = x*itof(b & 255)
+        high = x*itof(b >> 8)
+        d = ftoi(low) + (ftoi(high) << 8)
+.endm
+
+; a·b modulo 2^32. Parts of 11 bits, whose products and sums of two are exact in binary32.
+.macro  product d:int, a:int, b:int
+.reg    a0 a1 a2 b0 b1 b2 p0 p1 p2 q1
+        a0, a1, a2 = itof(a & 2047), itof((a >> 11) & 2047), itof(a >> 22)
+        b0, b1, b2 = itof(b & 2047), itof((b >> 11) & 2047), itof(b >> 22)
+        p0 = a0*b0
+        p1 = a0*b1 + a1*b0
+        p2 = a0*b2 + a2*b0
+        q1 = a1*b1
+        d = ftoi(p0) + (ftoi(p1) << 11) + ((ftoi(p2) + ftoi(q1)) << 22)
+.endm
+; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! The moment at which outputs of a simulated board become safe: the nets of the circuit that the driver looks at in every cycle, and
+//! the reason that they give, in words.
+
+use crate::application::Application;
+use crate::host::Status;
+use crate::interlock::{Figures, command, trip};
+use crate::sinks::sinks;
+use crate::top::{AROUND, TOP};
+use crate::wiring::Wiring;
+use std::fmt::Write as _;
+
+/// Words of a moment, as the driver sends it: the cycle of the run, the core, then what [`Watch::header`] lists, `drive` left out.
+pub(crate) const WORDS: usize = 10;
+
+/// The cores that are watched.
+#[derive(Debug)]
+pub(crate) struct Watch {
+    /// MHz of the clock.
+    clock: f64,
+    cores: Vec<Core>,
+    /// The wiring's trips: their names, and what is told of each.
+    trips: Vec<(String, String)>,
+}
+
+#[derive(Debug)]
+struct Core {
+    /// Name of the core, written before a reason; empty for a single program.
+    name: String,
+    /// The output ports at registers of peripherals, in the order in which they are scaled.
+    outputs: Vec<String>,
+}
+
+impl Watch {
+    pub(crate) fn new(wiring: &Wiring, application: &Application<'_>) -> Watch {
+        let cores = sinks(application, wiring).into_iter().zip(&application.description().cores);
+        let cores = cores.map(|(sinks, core)| Core {
+            name: if application.is_program() { String::new() } else { format!("core `{}`: ", core.name) },
+            outputs: sinks.into_iter().map(|sink| sink.written.port.clone()).collect(),
+        });
+        let trips = wiring.trips().enumerate().map(|(i, of)| (of.name.clone(), trip(Some(wiring), i)));
+        Watch { clock: wiring.clock, cores: cores.collect(), trips: trips.collect() }
+    }
+
+    /// The nets: modules, and those of their nets that Verilator is to keep.
+    fn nets(&self) -> Vec<(&'static str, String)> {
+        let mut nets = ["drives", "fault_kind", "fault_address", "period", "run", "enable"]
+            .map(|net| (AROUND, net.to_owned()))
+            .to_vec();
+        for core in 0..self.cores.len() {
+            nets.extend(["cause", "misses", "most_cycles"].map(|net| (AROUND, format!("{net}{core}"))));
+        }
+        let scaling = if self.is_program() { AROUND } else { "takt_output_latch" };
+        nets.push((scaling, "which3".to_owned()));
+        nets.extend(self.trips.iter().map(|(name, _)| (AROUND, format!("trip_{name}"))));
+        nets
+    }
+
+    fn is_program(&self) -> bool {
+        self.cores.iter().all(|core| core.name.is_empty())
+    }
+
+    /// Verilator's configuration, which keeps the nets.
+    pub(crate) fn configuration(&self) -> String {
+        let keep = |(module, net)| format!("public_flat_rd -module \"{module}\" -var \"{net}\"\n");
+        format!("`verilator_config\n{}", self.nets().into_iter().map(keep).collect::<String>())
+    }
+
+    /// The driver's access to them: of a core, `drive` and the words of a moment.
+    pub(crate) fn header(&self) -> String {
+        let net = |name: &str| format!("top->rootp->{TOP}__DOT__around__DOT__{name}");
+        let mut text = format!(
+            "#define CORES {}\nstatic void look(Vtop *top, unsigned core, uint32_t *words) {{\n    switch (core) {{\n",
+            self.cores.len()
+        );
+        for k in 0..self.cores.len() {
+            let which =
+                if self.is_program() { "which3".to_owned() } else { format!("latch{k}__DOT__which3") };
+            let words = [
+                format!("bits({}, {k}, 1)", net("drives")),
+                net(&format!("cause{k}")),
+                net(&format!("misses{k}")),
+                net(&format!("most_cycles{k}")),
+                format!(
+                    "bits({}, {}, 3) << 16 | bits({}, {}, 16)",
+                    net("fault_kind"),
+                    3 * k,
+                    net("fault_address"),
+                    16 * k
+                ),
+                net(&which),
+                net("period"),
+                format!("{} | {} << 1", net("run"), net("enable")),
+                self.trips(&net),
+            ];
+            let _ = writeln!(text, "    case {k}:");
+            for (i, word) in words.iter().enumerate() {
+                let _ = writeln!(text, "        words[{i}] = {word};");
+            }
+            let _ = writeln!(text, "        break;");
+        }
+        text + "    }\n}\n"
+    }
+
+    /// The trips as bits of a word.
+    fn trips(&self, net: &impl Fn(&str) -> String) -> String {
+        let bit = |(number, (name, _)): (usize, &(String, String))| {
+            format!("uint32_t({}) << {number}", net(&format!("trip_{name}")))
+        };
+        let bits: Vec<String> = self.trips.iter().enumerate().map(bit).collect();
+        if bits.is_empty() { "0".to_owned() } else { bits.join(" | ") }
+    }
+
+    /// The time and the reasons of a moment. `begun`: the cycles before the run.
+    pub(crate) fn text(&self, begun: u64, words: &[u32]) -> String {
+        let [cycle, core, cause, misses, most_cycles, fault, which, period, control, trips] = *words else {
+            return String::new();
+        };
+        let Some(Core { name, outputs }) = self.cores.get(core as usize) else { return String::new() };
+        let time = (begun + u64::from(cycle)) as f64 / self.clock / 1e3;
+        if trips != 0 {
+            let held = self.trips.iter().enumerate().filter(|(number, _)| trips >> number & 1 == 1);
+            let held: Vec<&str> = held.map(|(_, (_, text))| text.as_str()).collect();
+            return format!("{time:.3} ms: {}", held.join("; "));
+        }
+        let nan = outputs.get(which as usize).map(|port| format!("`{port}`")).into_iter().collect();
+        let figures = Figures { fault: Some(fault), misses, most_cycles, period, nan };
+        let mut reasons: Vec<String> =
+            Status(cause << 12).causes().map(|cause| figures.reason(cause)).collect();
+        if reasons.is_empty() {
+            reasons.push(command(control & 1 != 0, control & 2 != 0).to_owned());
+        }
+        format!("{time:.3} ms: the outputs become safe: {name}{}", reasons.join("; "))
+    }
+}

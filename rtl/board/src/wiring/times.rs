@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! The reader of what a peripheral has to do with carriers and trips, and of parameters by name.
+
+use super::{Peripheral, Reader, Starts};
+use crate::carrier::{self, Instant};
+use crate::document::Table;
+use crate::kind::{Kind, Parameter};
+
+/// The places of carriers that a peripheral has.
+#[derive(Default)]
+pub(super) struct Times {
+    pub(super) starts: Starts,
+    pub(super) latch: Option<Instant>,
+    pub(super) carrier: Option<usize>,
+}
+
+impl<'a> Reader<'a> {
+    /// The value of a parameter: a number, or one of its names.
+    pub(super) fn parameter(&self, table: &Table<'a>, parameter: &Parameter) -> u32 {
+        if parameter.names.is_empty() {
+            let given = table.signed(parameter.name, parameter.least, parameter.most);
+            return given.map_or(parameter.default, |at| at.value as u32);
+        }
+        let Some(given) = table.string(parameter.name) else { return parameter.default };
+        let value = parameter.names.iter().position(|name| *name == given.value);
+        if value.is_none() {
+            let names: Vec<String> = parameter.names.iter().map(|name| format!("\"{name}\"")).collect();
+            let text =
+                format!("`{}` is to be one of {}, not \"{}\"", parameter.name, names.join(", "), given.value);
+            self.document.mistake(&given.place, text);
+        }
+        value.unwrap_or_default() as u32
+    }
+
+    /// The places of carriers at which a peripheral starts, or captures, and the carrier that it is on.
+    pub(super) fn times(&self, kind: &Kind, table: &Table<'a>) -> Times {
+        let (document, carriers) = (self.document, &self.carriers.all);
+        let mut times = Times::default();
+        let has_latch = !kind.reads.is_empty() && !kind.strobes.start && !kind.strobes.trips;
+        if !kind.strobes.start && !has_latch && !kind.strobes.carrier {
+            return times;
+        }
+        if kind.strobes.carrier {
+            let given = table.need("carrier", table.string("carrier"));
+            times.carrier = given.and_then(|at| carrier::find(document, carriers, &at.value, &at));
+            return times;
+        }
+        let key = if kind.strobes.start { "starts" } else { "latch" };
+        let given = table.string(key);
+        let shift = table.number("shift", -1e6, 1e6);
+        let cycles = shift.as_ref().map_or(0.0, |at| (at.value * self.clock).round());
+        match given {
+            Some(at) if kind.strobes.start && at.value == "publish" => times.starts = Starts::Publish,
+            Some(at) if kind.strobes.start && at.value == "lead" => {}
+            Some(at) if kind.strobes.start && !at.value.contains('.') => document.mistake(
+                &at.place,
+                format!(
+                    "`starts` is to be \"lead\", \"publish\", or a place of a carrier as \"main.valley\", not \"{}\"",
+                    at.value
+                ),
+            ),
+            Some(at) => {
+                let instant = carrier::instant(document, carriers, &at, cycles);
+                match kind.strobes.start {
+                    true => times.starts = instant.map_or(Starts::Lead, Starts::At),
+                    false => times.latch = instant,
+                }
+                return times;
+            }
+            None => {}
+        }
+        if let Some(shift) = shift {
+            let text = format!("`shift` moves a place of a carrier, and `{key}` names no place");
+            document.mistake(&shift.place, text);
+        }
+        times
+    }
+
+    /// Finds names in `trips` that are no trips.
+    pub(super) fn check_trips(&self, peripherals: &[Peripheral]) {
+        let trips = peripherals.iter().filter(|peripheral| peripheral.kind.strobes.trips);
+        let names: Vec<&str> = trips.map(|trip| trip.name.as_str()).collect();
+        for at in self.trips.iter().filter(|at| !names.contains(&at.value.as_str())) {
+            let there = match names[..] {
+                [] => "the wiring has none: a peripheral of the kind \"trip\" is one".to_owned(),
+                _ => format!("there are {}", names.join(", ")),
+            };
+            self.document.mistake(&at.place, format!("`{}` is no trip; {there}", at.value));
+        }
+    }
+}

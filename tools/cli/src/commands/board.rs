@@ -1,0 +1,356 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! The command `takt board`: boards, their pins, and builds of a program or system for them.
+
+#[cfg(unix)]
+mod external_host;
+mod hal;
+#[cfg(unix)]
+mod pins;
+#[cfg(unix)]
+mod plant_at_pins;
+#[cfg(unix)]
+mod robot;
+mod sim;
+
+use crate::run::application;
+use crate::terminal::files::{self, Out};
+use crate::terminal::options::{OptionalMachine, SourceArguments};
+use crate::terminal::output::{self, Failure};
+use anyhow::{Context, Result, anyhow, bail, ensure};
+use clap::{Args, Subcommand};
+use serde_json::json;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use takt_board::tools::Venv;
+use takt_board::{Application, Board, Findings, Mistake, Wiring};
+
+/// List boards and their pins; check, build and simulate a program, or a system of several cores, on a board.
+#[derive(Args)]
+pub(crate) struct Boards {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    List(List),
+    Pins(Pins),
+    Check(Check),
+    Build(Build),
+    Sim(Box<sim::Sim>),
+    Hal(hal::Hal),
+}
+
+/// List the boards.
+#[derive(Args)]
+struct List {
+    /// Print them as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// List a board's pins by name, with the sites of the device; with --wiring, the peripheral at each.
+#[derive(Args)]
+struct Pins {
+    /// A name from `takt board list`, or a file of the same form (docs/board.md) [default: the one that the wiring names].
+    #[arg(required_unless_present = "wiring")]
+    board: Option<String>,
+    /// Wiring whose peripherals are at the pins.
+    #[arg(long, value_name = "TOML")]
+    wiring: Option<PathBuf>,
+    /// Print them as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Check that a wiring fits a board and a program, or a system.
+#[derive(Args)]
+struct Check {
+    #[command(flatten)]
+    target: Target,
+}
+
+/// Build the bitstream of a program, or of a system, on a board: synthesis, place and route, packing.
+///
+/// The tools are installed at the first time (400 MB), in the folder that TAKT_VENV names or in the user's cache.
+#[derive(Args)]
+#[command(after_help = BUILD)]
+struct Build {
+    #[command(flatten)]
+    target: Target,
+    /// Output folder; created if it does not exist.
+    #[arg(long, short, value_name = "DIR")]
+    output: PathBuf,
+    /// Seed of the placement; another one may reach a higher clock.
+    #[arg(long, default_value_t = 1)]
+    seed: u32,
+    /// Write the circuit and the pins only, without calling the tools.
+    #[arg(long)]
+    sources: bool,
+}
+
+const BUILD: &str = "\
+Example:
+  takt board build --wiring robot.toml --program robot.s -o out     on the board that robot.toml names
+  takt board build --board ulx3s-85f --wiring axis.toml --program system.toml -o out   several cores
+  openFPGALoader --board ulx3s out/takt.bit";
+
+/// Python environment with the tools: the folder `TAKT_VENV`, or one in the user's cache.
+pub(crate) fn tools_folder() -> Result<PathBuf> {
+    Ok(match std::env::var_os("TAKT_VENV") {
+        Some(folder) => PathBuf::from(folder),
+        None => takt_cache::folder()?.join("tools"),
+    })
+}
+
+/// A program or a system, a wiring and a board.
+#[derive(Args)]
+pub(crate) struct Target {
+    /// A name from `takt board list`, or a file of the same form (docs/board.md) [default: the one that the wiring names].
+    #[arg(long, required_unless_present = "wiring")]
+    pub(crate) board: Option<String>,
+    /// Which peripherals are at which pins, and which ports are their registers (docs/board.md). Without it there are none: the
+    /// host reads and writes ports, the clock is the board's own, and a period takes 100 µs.
+    #[arg(long, value_name = "TOML")]
+    pub(crate) wiring: Option<PathBuf>,
+    /// Source or image of the program; or a system of several cores, a `.toml` file.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) program: PathBuf,
+    #[command(flatten)]
+    pub(crate) machine: OptionalMachine,
+    #[command(flatten)]
+    pub(crate) source: SourceArguments,
+}
+
+/// Maximal size of a board file or a wiring in bytes.
+const LIMIT: usize = 1 << 20;
+
+/// Name and text of a file.
+fn text(path: &Path) -> Result<(String, String)> {
+    let name = files::input_name(path);
+    let text = String::from_utf8(files::read(path, LIMIT)?).map_err(|_| anyhow!("{name} is no text"))?;
+    Ok((name, text))
+}
+
+/// Unwraps a result; the error prints all mistakes.
+fn right<T>(result: Result<T, Vec<Mistake>>, color: bool) -> Result<T> {
+    result.map_err(|mistakes| {
+        mistakes.iter().for_each(|mistake| output::error(&mistake.to_string(), color));
+        Failure::Reported.into()
+    })
+}
+
+/// Board by name, or from a file.
+pub(crate) fn find(name: &str, color: bool) -> Result<Board> {
+    if let Some(board) = Board::from_name(name) {
+        return right(board, color);
+    }
+    let path = Path::new(name);
+    if !path.exists() {
+        let names: Vec<&str> = Board::names().collect();
+        bail!("there is no board `{name}`, and no file of that name; there are {}", names.join(", "));
+    }
+    let (file, text) = text(path)?;
+    right(Board::read(&file, &text), color)
+}
+
+impl Target {
+    /// Reads board, wiring and application, and checks that they match. For a simulation, missing every tick is no error.
+    pub(crate) fn read(
+        &self,
+        color: bool,
+        is_simulated: bool,
+    ) -> Result<(Board, Wiring, application::Application)> {
+        let mut reads: Vec<(&str, &Path)> = vec![("--program", &self.program)];
+        reads.extend(self.wiring.as_deref().map(|path| ("--wiring", path)));
+        files::check(&reads, &[])?;
+        let load = || application::Application::load(&self.program, &self.machine, &self.source, color);
+        let Some(path) = &self.wiring else {
+            let board = find(self.board.as_deref().context("a board: --board NAME")?, color)?;
+            let carried = load()?;
+            let wiring = Wiring::none(&board, carried.on_board());
+            let unfit = wiring.unfit(&carried.on_board());
+            ensure!(unfit.is_empty(), "{}", unfit.join("; "));
+            fits(&wiring, ("(no wiring)", ""), &carried, is_simulated, color)?;
+            return Ok((board, wiring, carried));
+        };
+        let (name, text) = text(path)?;
+        let (board, wiring) = placed(&name, &text, self.board.as_deref(), color)?;
+        let carried = load()?;
+        right(wiring.check(&name, &text, carried.on_board()), color)?;
+        fits(&wiring, (&name, &text), &carried, is_simulated, color)?;
+        Ok((board, wiring, carried))
+    }
+}
+
+/// Checks that the numbers of a wiring match each other and the application's periods. `name` and `text` are the wiring's file.
+fn fits(
+    wiring: &Wiring,
+    (name, text): (&str, &str),
+    carried: &application::Application,
+    is_simulated: bool,
+    color: bool,
+) -> Result<()> {
+    let bounds: Vec<_> =
+        carried.programs().iter().map(|loaded| takt_analysis::bound(&loaded.program).ok()).collect();
+    let Findings { mut mistakes, late, mut warnings } =
+        wiring.findings(name, text, carried.on_board(), &bounds);
+    if is_simulated {
+        warnings.extend(late)
+    } else {
+        mistakes.extend(late)
+    }
+    warnings.iter().for_each(|warning| output::warning(&warning.to_string(), color));
+    right(if mistakes.is_empty() { Ok(()) } else { Err(mistakes) }, color)
+}
+
+/// Parses a wiring, and finds its board by the given name, or else by the name in the wiring.
+fn placed(name: &str, text: &str, board: Option<&str>, color: bool) -> Result<(Board, Wiring)> {
+    let board = match board {
+        Some(board) => board.to_owned(),
+        None => right(Wiring::board(name, text), color)?.with_context(|| {
+            let names: Vec<&str> = Board::names().collect();
+            format!(
+                "{name} names no board: `--board NAME`, or a line `board = \"NAME\"` at its beginning; there are {}",
+                names.join(", ")
+            )
+        })?,
+    };
+    let board = find(&board, color)?;
+    let wiring = right(Wiring::read(name, text, &board), color)?;
+    Ok((board, wiring))
+}
+
+/// Wiring from a file with its board, as in [`placed`].
+pub(crate) fn wired(
+    path: &Path,
+    board: Option<&str>,
+    application: &Application<'_>,
+    color: bool,
+) -> Result<(Board, Wiring)> {
+    let (name, text) = text(path)?;
+    let (board, wiring) = placed(&name, &text, board, color)?;
+    right(wiring.check(&name, &text, application.clone()), color)?;
+    Ok((board, wiring))
+}
+
+pub(crate) fn run(arguments: &Boards, color: bool, out: &mut Out) -> Result<()> {
+    match &arguments.command {
+        Command::List(list) => self::list(list, color, out),
+        Command::Build(build) => self::build(build, color, out),
+        Command::Sim(sim) => sim::run(sim, color, out),
+        Command::Hal(hal) => hal::run(hal, color, out),
+        Command::Pins(pins) => self::pins(pins, color, out),
+        Command::Check(check) => {
+            let (board, wiring, carried) = check.target.read(color, false)?;
+            let ports = wiring
+                .peripherals
+                .iter()
+                .map(|p| p.reads.iter().flatten().count() + p.writes.iter().flatten().count());
+            writeln!(
+                out,
+                "{}, {}: {} peripherals, {} of the {}'s ports on pins, a period of {} cycles at {} MHz",
+                board.name,
+                carried.on_board().cores(),
+                wiring.peripherals.len(),
+                ports.sum::<usize>(),
+                carried.on_board().kind(),
+                wiring.period,
+                wiring.clock
+            )?;
+            Ok(())
+        }
+    }
+}
+
+fn list(arguments: &List, color: bool, out: &mut Out) -> Result<()> {
+    let boards = right(Board::builtin(), color)?;
+    if arguments.json {
+        let boards: Vec<_> = boards
+            .iter()
+            .map(|board| {
+                json!({
+                    "name": board.name, "text": board.text, "device": board.device.name, "package": board.package,
+                    "grade": board.grade, "mhz": board.clock.1, "pins": board.pins.len(), "source": board.source,
+                })
+            })
+            .collect();
+        return files::json(&boards, out);
+    }
+    for board in boards {
+        writeln!(
+            out,
+            "{:<14} {}-{} {}, {} MHz, {} pins\n{:<14} {}\n{:<14} from {}",
+            board.name,
+            board.device.name,
+            board.grade,
+            board.package,
+            board.clock.1,
+            board.pins.len(),
+            "",
+            board.text,
+            "",
+            // Each source gets a line, so that a terminal breaks none.
+            board.source.replace("; ", &format!(",\n{:<19} ", ""))
+        )?;
+    }
+    Ok(())
+}
+
+fn pins(arguments: &Pins, color: bool, out: &mut Out) -> Result<()> {
+    let named = arguments.board.as_deref();
+    let (board, wiring) = match &arguments.wiring {
+        None => (find(named.context("a board")?, color)?, None),
+        Some(path) => {
+            let (name, text) = text(path)?;
+            let (board, wiring) = placed(&name, &text, named, color)?;
+            (board, Some(wiring))
+        }
+    };
+    let used = |pin: &str| wiring.as_ref().and_then(|wiring| wiring.at(pin));
+    if arguments.json {
+        let pins =
+            board.pins.iter().map(|(pin, site)| json!({ "pin": pin, "site": site, "used": used(pin) }));
+        return files::json(&pins.collect::<Vec<_>>(), out);
+    }
+    for (pin, site) in &board.pins {
+        let line = format!("{pin:<8} {site:<5} {}", used(pin).unwrap_or_default());
+        writeln!(out, "{}", line.trim_end())?;
+    }
+    Ok(())
+}
+
+fn build(arguments: &Build, color: bool, out: &mut Out) -> Result<()> {
+    let (board, wiring, carried) = arguments.target.read(color, false)?;
+    let (application, folder) = (carried.on_board(), &arguments.output);
+    if arguments.sources {
+        let circuit = takt_board::build::write(&board, &wiring, application, folder)?;
+        writeln!(
+            out,
+            "{} files in {}; the top level is {}.v",
+            circuit.files.len() + 1,
+            folder.display(),
+            takt_board::top::TOP
+        )?;
+        return Ok(());
+    }
+    let step = |what: &str| output::message(&format!("{what} …"));
+    let packages = takt_board::build::packages(&board)?;
+    step("tools");
+    let venv = Venv::with(&tools_folder()?, &packages)?;
+    let options = takt_board::build::Options { seed: arguments.seed, netlist: false };
+    let report = takt_board::build::build(&venv, &board, &wiring, application, options, folder, &step)?;
+    writeln!(out, "{}: {} bytes, for {}", folder.join(report.bitstream).display(), report.bytes, board.text)?;
+    for (net, reached, needed) in &report.clocks {
+        writeln!(
+            out,
+            "clock {net}: {reached:.1} MHz, needed {needed:.1}: a margin of {:.1} %",
+            (reached / needed - 1.0) * 100.0
+        )?;
+    }
+    for (name, (used, there)) in &report.used {
+        writeln!(out, "{name:<16} {used:>7} of {there}")?;
+    }
+    writeln!(out, "programs: {} records of {} in block RAM", report.records, report.room)?;
+    Ok(())
+}

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! The command `takt cc`: translates a step function in C to a program.
+
+use crate::terminal::files::{self, OptionPath, Out};
+use crate::terminal::output::Failure;
+use crate::terminal::progress::DelayedActivity;
+use anyhow::{Result, anyhow};
+use clap::{Args, ValueEnum};
+use std::path::{Path, PathBuf};
+use takt_front::c::{Options, Preprocessor, translate};
+
+/// Turn a step function in C into a program: a period is one call.
+///
+/// The function's parameters become ports: what it reads is an input, what it writes an output; structures and variables that it reads and
+/// writes are states. The C is executed while it is translated: what is known is computed, and only what depends on inputs and states is
+/// left. docs/c.md says what is read and what is refused, with the remedy. Needs gcc or clang for `-E`.
+#[derive(Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct Cc {
+    /// C files; a name that is `static` belongs to its file.
+    #[arg(required = true, value_name = "FILE")]
+    files: Vec<PathBuf>,
+    /// The function that a period calls.
+    #[arg(long, value_name = "NAME")]
+    step: String,
+    /// The function that sets the states before the first period; it takes pointers to the same structures.
+    #[arg(long, value_name = "NAME")]
+    init: Option<String>,
+    /// Define a macro of the preprocessor.
+    #[arg(short = 'D', value_name = "NAME[=VALUE]")]
+    defines: Vec<String>,
+    /// Search a folder for included files.
+    #[arg(short = 'I', value_name = "DIR")]
+    includes: Vec<PathBuf>,
+    /// Read double as binary32, and numbers without `f` as well. Otherwise a double is an error with its place.
+    #[arg(long, value_name = "TYPE")]
+    double: Option<Double>,
+    /// Write the program here; `-` is standard output.
+    #[arg(long, short, value_name = "FILE", default_value = "-")]
+    output: PathBuf,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  takt cc pid.c --step pid_step --init pid_init -o pid.s
+  takt bound pid.s                                  what it makes is a program
+  takt cc foc.c math.c --step foc --double=float -I inc -DNDEBUG -o foc.s";
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Double {
+    Float,
+}
+
+pub(crate) fn run(arguments: &Cc, _: bool, _: &mut Out) -> Result<()> {
+    let inputs: Vec<OptionPath<'_>> = arguments.files.iter().map(|file| ("FILE", file.as_path())).collect();
+    files::check(&inputs, &[("--output", arguments.output.as_path())])?;
+    if arguments.files.iter().any(|file| files::is_dash(file)) {
+        return Err(Failure::Usage(
+            "C is read from files: its includes are looked for beside them".to_owned(),
+        )
+        .into());
+    }
+    let double_is_float = arguments.double == Some(Double::Float);
+    let mut options: Vec<String> = arguments.defines.iter().map(|define| format!("-D{define}")).collect();
+    options.extend(double_is_float.then(|| "-DTAKT_DOUBLE_IS_FLOAT=1".to_owned()));
+    options.extend(arguments.includes.iter().map(|folder| format!("-I{}", folder.display())));
+    let shown = |error: takt_front::Error| match (&error.file, error.line) {
+        (Some(file), _) => anyhow!(error.located_text(file)),
+        _ => anyhow!("{error}"),
+    };
+    let waiting =
+        DelayedActivity::new(format!("translating {}", files::input_name(Path::new(&arguments.files[0]))));
+    let preprocessor = Preprocessor::new(&options).map_err(shown)?;
+    let sources = arguments.files.iter().map(|file| preprocessor.run(file)).collect::<Result<Vec<_>, _>>();
+    let options = Options { step: arguments.step.clone(), init: arguments.init.clone(), double_is_float };
+    let translation = sources.and_then(|sources| translate(&sources, &options)).map_err(shown)?;
+    drop(waiting);
+    files::write(&arguments.output, translation.text.as_bytes())
+}

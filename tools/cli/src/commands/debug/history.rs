@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Command history across sessions, in the file `takt/history` of XDG's state folder.
+
+use rustyline::Config;
+use rustyline::history::{FileHistory, History};
+use std::env;
+use std::path::{Path, PathBuf};
+
+/// Maximal number of commands in the history.
+const COMMANDS: usize = 1000;
+
+/// Configuration of line editor and history.
+pub(super) fn config() -> Config {
+    Config::builder()
+        .auto_add_history(true)
+        .max_history_size(COMMANDS)
+        .and_then(|builder| builder.history_ignore_dups(true))
+        .map_or_else(|_| Config::default(), |builder| builder.build())
+}
+
+/// History of commands. A missing or unwritable file is no error.
+pub(super) struct CommandHistory {
+    pub(super) history: FileHistory,
+    pub(super) file: Option<PathBuf>,
+}
+
+impl CommandHistory {
+    /// History from earlier sessions.
+    pub(super) fn load() -> CommandHistory {
+        let mut history = FileHistory::with_config(&config());
+        let file = file();
+        if let Some(file) = &file {
+            let _ = history.load(file);
+        }
+        CommandHistory { history, file }
+    }
+
+    /// Adds a command to the history.
+    #[cfg(feature = "tui")]
+    pub(super) fn add(&mut self, line: &str) {
+        let _ = self.history.add(line);
+        append(&mut self.history, self.file.as_deref());
+    }
+
+    /// Command `distance` entries back; 1 is the last.
+    #[cfg(feature = "tui")]
+    pub(super) fn back(&self, distance: usize) -> Option<String> {
+        use rustyline::history::SearchDirection::Forward;
+        let index = self.history.len().checked_sub(distance)?;
+        self.history.get(index, Forward).ok()?.map(|found| found.entry.into_owned())
+    }
+}
+
+/// Writes new commands to the file at once, so that they survive any end of the session.
+pub(super) fn append(history: &mut FileHistory, file: Option<&Path>) {
+    if let Some(file) = file {
+        let _ = file.parent().map(std::fs::create_dir_all);
+        let _ = history.append(file);
+    }
+}
+
+fn file() -> Option<PathBuf> {
+    let absolute = |name| env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
+    let state = absolute("XDG_STATE_HOME").or_else(|| Some(absolute("HOME")?.join(".local/state")))?;
+    Some(state.join("takt/history"))
+}

@@ -1,0 +1,372 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! The commands `takt load` and `takt live`: a board at a serial port.
+
+mod comparison;
+mod fifo;
+mod status;
+
+use crate::commands::board;
+use crate::run::application;
+use crate::terminal::files::{self, Out};
+use crate::terminal::number;
+use crate::terminal::options::{OptionalMachine, SourceArguments};
+use crate::terminal::progress::progress;
+use anyhow::{Context, Result, anyhow, bail, ensure};
+use clap::{Args, Subcommand};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::time::{SystemTime, UNIX_EPOCH};
+use takt_board::endpoints::Fifo;
+use takt_board::protocol::{ENABLE, HOLD, LinkError, RESTART, RUN};
+use takt_board::serial::Serial;
+use takt_board::top::image;
+use takt_board::{Application, Host, Stream, Wiring};
+use takt_isa::Type;
+
+/// A board's serial port.
+#[derive(Args)]
+struct Port {
+    /// The serial port: /dev/ttyUSB0, or the path that `takt board sim` prints.
+    port: PathBuf,
+    /// Baud rate, as in the wiring file.
+    #[arg(long, default_value_t = number::BAUD)]
+    baud: u32,
+}
+
+impl Port {
+    fn open(&self) -> Result<Host<Serial>> {
+        open(&self.port, self.baud)
+    }
+}
+
+/// Connects to the board at a serial port.
+pub(crate) fn open(port: &Path, baud: u32) -> Result<Host<Serial>> {
+    let name = port.display();
+    let line = Serial::open(port, baud)
+        .with_context(|| format!("cannot open {name}: is the board plugged in, and may you use the port?"))?;
+    // Number of the first request: should differ from an earlier command's last request.
+    let now = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.subsec_micros());
+    Host::connect(line, now as u8).with_context(|| format!("{name} at {baud} baud"))
+}
+
+/// Load a program, or the programs of a system, into a board over its serial port, and start it.
+///
+/// The program that ran is stopped first, and outputs are safe. The loaded data is read back and compared. It stays until power-off.
+#[derive(Args)]
+pub(crate) struct LoadBoard {
+    #[command(flatten)]
+    port: Port,
+    /// Source or image; or a system, a `.toml` file, if the board carries its circuit.
+    program: PathBuf,
+    /// Load only; `takt live PORT start` starts it.
+    #[arg(long)]
+    stopped: bool,
+    #[command(flatten)]
+    machine: OptionalMachine,
+    #[command(flatten)]
+    source: SourceArguments,
+}
+
+pub(crate) fn load(arguments: &LoadBoard, color: bool, out: &mut Out) -> Result<()> {
+    files::check(&[("the program", &arguments.program)], &[])?;
+    let carried =
+        application::Application::load(&arguments.program, &arguments.machine, &arguments.source, color)?;
+    let records = image(carried.on_board())?.records;
+    let mut host = arguments.port.open()?;
+    host.fits(carried.on_board())?;
+    let bar = progress(records.len() as u64, "records", false);
+    let loaded = host.load_with(&records, |more| bar.inc(more as u64));
+    bar.finish_and_clear();
+    loaded?;
+    if !arguments.stopped {
+        host.set("control", RUN | ENABLE)?;
+    }
+    let state = if arguments.stopped { "stopped" } else { "started" };
+    writeln!(out, "{} records loaded and compared; {state}", records.len())?;
+    Ok(())
+}
+
+/// Monitor and control a running program, or system, on a board, over its serial port.
+#[derive(Args)]
+pub(crate) struct Live {
+    #[command(flatten)]
+    port: Port,
+    /// The program, or the system, that runs there, for its names. In a system, a name is `core.name`.
+    #[arg(long, value_name = "FILE")]
+    program: Option<PathBuf>,
+    /// The wiring that the board was built with: messages name the peripheral that drives a port.
+    #[arg(long, value_name = "TOML", requires = "program")]
+    wiring: Option<PathBuf>,
+    #[command(flatten)]
+    machine: OptionalMachine,
+    #[command(flatten)]
+    source: SourceArguments,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// State of the program, or of each core, and counters.
+    Status,
+    /// Start the program from its beginning; outputs drive.
+    Start,
+    /// Stop the program; outputs are safe.
+    Stop,
+    /// Hold at the end of a period: no more ticks.
+    Hold,
+    /// Run one period while the program is held.
+    Step,
+    /// Go on after `hold`.
+    Go,
+    /// Read ports, registers and data words; all ports unless named.
+    Read {
+        /// Ports, registers (`x`, `@m12`), elements of arrays as the source writes them (`M[2,3]`), all of one (`M`), data words
+        /// (`table[3]` behind a label, `[17]`, from 0).
+        names: Vec<String>,
+    },
+    /// Set input ports, between two periods.
+    Set {
+        /// `name=value`, each.
+        #[arg(required = true)]
+        values: Vec<String>,
+    },
+    /// Run the program from its beginning, a period at a time, alongside the emulator with the same inputs, and report the first output
+    /// that differs. Outputs stay safe unless --drive is given; afterwards the board is held.
+    Shadow {
+        /// `name=value`: input ports that the host sets, before the first period.
+        values: Vec<String>,
+        /// Periods to compare; of a system, base ticks.
+        #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..))]
+        periods: u32,
+        /// Let outputs drive. Periods then last as long as the serial line takes: connect nothing that depends on their timing.
+        #[arg(long)]
+        drive: bool,
+    },
+    /// Put an entry into a FIFO of a system, from the host.
+    Push {
+        /// The FIFO.
+        name: String,
+        /// `field=value`, for each field of an entry.
+        #[arg(required = true)]
+        values: Vec<String>,
+    },
+    /// Take an entry out of a FIFO of a system, to the host.
+    Pop {
+        /// The FIFO.
+        name: String,
+    },
+    /// Print ports, registers or data words every N periods, with the period's number.
+    Stream {
+        /// Ports, registers or data words, as for `read`: all of one kind, of one core, and within 15 consecutive numbers.
+        #[arg(required = true)]
+        names: Vec<String>,
+        /// Periods from one line to the next.
+        #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..4096))]
+        every: u32,
+        /// Lines to print.
+        #[arg(long, default_value_t = 100)]
+        count: u32,
+    },
+}
+
+/// Address and type of a port.
+pub(crate) fn find(application: &Application<'_>, name: &str) -> Result<(u16, Type)> {
+    let place = application.find(name).map_err(|text| anyhow!("{text}"))?;
+    Ok((place.read, place.ty))
+}
+
+pub(crate) fn value_text(bits: u32, ty: Type) -> String {
+    match ty {
+        Type::F => f32::from_bits(bits).to_string(),
+        Type::I => (bits as i32).to_string(),
+        Type::B => format!("{bits:#x}"),
+    }
+}
+
+fn bits(text: &str, ty: Type) -> Option<u32> {
+    match ty {
+        Type::F => text.parse::<f32>().ok().map(f32::to_bits),
+        Type::I => text.parse::<i32>().ok().map(|n| n as u32),
+        Type::B => {
+            text.strip_prefix("0x").map_or_else(|| text.parse().ok(), |hex| u32::from_str_radix(hex, 16).ok())
+        }
+    }
+}
+
+/// Parsed arguments of a command, checked before the serial port is opened.
+enum PreparedCommand {
+    Nothing,
+    /// Addresses and values, and the port name at each address.
+    Settings(Vec<(u16, u32)>, Vec<(u16, String)>),
+    /// Entry to push into a FIFO.
+    Entry(Fifo, Vec<u32>),
+    /// FIFO to pop an entry from.
+    Pop(Fifo),
+    Stream(Stream),
+}
+
+fn prepare(
+    command: &Command,
+    application: Option<&Application<'_>>,
+    wiring: Option<&Wiring>,
+) -> Result<PreparedCommand> {
+    let named = || application.context("ports have names in the program: --program FILE");
+    Ok(match command {
+        Command::Set { values } | Command::Shadow { values, .. } => {
+            if matches!(command, Command::Shadow { .. }) {
+                named()?;
+            }
+            let (mut settings, mut names) = (Vec::new(), Vec::new());
+            for value in values {
+                let (name, text) =
+                    value.split_once('=').with_context(|| format!("`{value}` is not `name=value`"))?;
+                let settable = named()?.settable(name);
+                let (address, ty) = settable.map_err(|text| anyhow!("{text}"))?;
+                let bits = bits(text, ty).with_context(|| format!("`{text}` is no value of `{name}`"))?;
+                if let Some(driver) = wiring.and_then(|wiring| wiring.driver(application?, address)) {
+                    bail!("`{name}` cannot be set: the wiring connects it to {driver}, which drives it");
+                }
+                settings.push((address, bits));
+                names.push((address, name.to_owned()));
+            }
+            settings.sort_unstable();
+            PreparedCommand::Settings(settings, names)
+        }
+        Command::Push { name, values } => {
+            let (fifo, entry) = fifo::entry(named()?, name, values)?;
+            PreparedCommand::Entry(fifo, entry)
+        }
+        Command::Pop { name } => PreparedCommand::Pop(fifo::of(named()?, name, true)?),
+        Command::Stream { names, .. } => {
+            let stream = Stream::of(named()?, names);
+            PreparedCommand::Stream(stream.map_err(|text| anyhow!("{text}"))?)
+        }
+        _ => PreparedCommand::Nothing,
+    })
+}
+
+pub(crate) fn live(arguments: &Live, color: bool, out: &mut Out) -> Result<()> {
+    let carried = arguments.program.as_deref();
+    let carried = carried
+        .map(|path| application::Application::load(path, &arguments.machine, &arguments.source, color))
+        .transpose()?;
+    let application = carried.as_ref().map(application::Application::on_board);
+    let wiring = match (&arguments.wiring, &application) {
+        (Some(path), Some(application)) => Some(board::wired(path, None, application, color)?.1),
+        _ => None,
+    };
+    let prepared = prepare(&arguments.command, application.as_ref(), wiring.as_ref())?;
+    let named = || application.as_ref().context("ports have names in the program: --program FILE");
+    let mut host = arguments.port.open()?;
+    if let Some(application) = &application {
+        host.fits(application.clone())?;
+    }
+    let control = host.register("control")?;
+    match &arguments.command {
+        Command::Status => status::print(&mut host, application.as_ref(), wiring.as_ref(), out)?,
+        Command::Start => host.set("control", RUN | ENABLE | RESTART)?,
+        Command::Stop => host.set("control", 0)?,
+        Command::Hold => host.set("control", control | HOLD)?,
+        Command::Go => host.set("control", control & !HOLD)?,
+        Command::Step => {
+            ensure!(control & HOLD != 0, "the program is not held: `takt live PORT hold` first");
+            host.set("step", 1)?;
+        }
+        Command::Read { names } => {
+            let application = named()?;
+            let each = |name: &String| application.elements(name).unwrap_or_else(|| vec![name.clone()]);
+            let names =
+                if names.is_empty() { application.names() } else { names.iter().flat_map(each).collect() };
+            let places = names.iter().map(|name| find(application, name)).collect::<Result<Vec<_>>>()?;
+            let addresses: Vec<u16> = places.iter().map(|(address, _)| *address).collect();
+            for ((name, (_, ty)), value) in names.iter().zip(places).zip(host.read_each(&addresses)?) {
+                writeln!(out, "{name} = {}", value_text(value, ty))?;
+            }
+        }
+        Command::Set { .. } => {
+            if let PreparedCommand::Settings(settings, names) = &prepared {
+                set(&mut host, settings, names)?;
+            }
+        }
+        Command::Shadow { periods, drive, .. } => {
+            let enable = if *drive { ENABLE } else { 0 };
+            // Hold the program from its start on, so that no period passes unseen.
+            host.set("control", RUN | HOLD | enable | RESTART)?;
+            if let PreparedCommand::Settings(settings, names) = &prepared {
+                set(&mut host, settings, names)?;
+            }
+            comparison::run(&mut host, named()?, *periods, out)?;
+        }
+        Command::Push { .. } => {
+            if let PreparedCommand::Entry(fifo, entry) = &prepared {
+                fifo::push(&mut host, named()?, fifo, entry)?;
+            }
+        }
+        Command::Pop { .. } => {
+            if let PreparedCommand::Pop(fifo) = &prepared {
+                fifo::pop(&mut host, fifo, out)?;
+            }
+        }
+        Command::Stream { every, count, .. } => {
+            if let PreparedCommand::Stream(stream) = &prepared {
+                streamed(&mut host, stream, *every, *count, color, out)?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Sets ports; the error names ports that the board refuses to set.
+fn set(host: &mut Host<Serial>, settings: &[(u16, u32)], names: &[(u16, String)]) -> Result<()> {
+    host.set_ports(settings).map_err(|error| {
+        let LinkError::ReadOnly { address, words } = error else { return error.into() };
+        let refused = names.iter().filter(|(at, _)| (address..).take(words).any(|refused| refused == *at));
+        let refused: Vec<String> = refused.map(|(_, name)| format!("`{name}`")).collect();
+        anyhow!(
+            "the board refuses to set {}: a peripheral of its wiring drives it (`--wiring FILE` says which)",
+            refused.join(" or ")
+        )
+    })
+}
+
+/// Prints the values of `count` stream frames.
+fn streamed(
+    host: &mut Host<Serial>,
+    stream: &Stream,
+    every: u32,
+    count: u32,
+    color: bool,
+    out: &mut Out,
+) -> Result<()> {
+    host.set("stream", stream.register(every))?;
+    let (mut printed, mut silent) = (0, 0);
+    while printed < count && silent < SILENCE {
+        let frame = host.streamed()?;
+        match frame.as_ref().and_then(|frame| stream.values(frame)) {
+            Some((period, values)) => {
+                let values = values.map(|(bits, ty)| value_text(bits, ty));
+                writeln!(out, "{period} {}", values.collect::<Vec<_>>().join(" "))?;
+                // A reader may wait for each line.
+                out.flush()?;
+                (printed, silent) = (printed + 1, 0);
+            }
+            None => silent += 1,
+        }
+    }
+    host.set("stream", 0)?;
+    if printed < count {
+        bail!("the stream ended after {printed} values: the program has no periods any more");
+    }
+    let lost = host.register("lost")?;
+    if lost > 0 {
+        crate::terminal::output::warning(
+            &format!("{lost} frames were lost since power-up: use a larger --every"),
+            color,
+        );
+    }
+    Ok(())
+}
+
+/// Time without a frame, in tenths of a second, after which the stream counts as ended.
+const SILENCE: u32 = 50;

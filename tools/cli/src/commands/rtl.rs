@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! The command `takt rtl`: Verilog of a machine or a system.
+
+use crate::run::load::{self, Load};
+use crate::run::ports;
+use crate::run::system;
+use crate::terminal::files::{self, Out};
+use crate::terminal::number;
+use crate::terminal::options::{OptionalMachine, SourceArguments};
+use crate::terminal::output;
+use anyhow::{Context, Result, bail};
+use clap::Args;
+use serde_json::json;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use takt_isa::MACHINES;
+use takt_isa::manual::memories_text;
+use takt_rtl::{Library, bench, export};
+
+/// Write the circuit of a machine, or of a system: a complete Verilog design.
+///
+/// Of a system the folder holds one top with all cores and links, their programs in a memory image that it reads at power-up
+/// (docs/system.md), and the lists of files.
+/// For a machine it holds a core and a test bench.
+///
+/// The folder of a machine holds the core and its parts, one module per file; `takt_<machine>.f`, the list of them for other tools; a top
+/// level for synthesis without a board; a test bench, which with --program runs that program on the rows of --inputs.
+#[derive(Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct Rtl {
+    /// A system, a `.toml` file; without it, a machine's circuit is written.
+    #[arg(value_name = "SYSTEM", conflicts_with_all = ["machine", "program", "inputs", "periods"])]
+    system: Option<PathBuf>,
+    /// Output folder; created if it does not exist.
+    #[arg(long, short, value_name = "DIR")]
+    output: PathBuf,
+    #[command(flatten)]
+    machine: OptionalMachine,
+    #[command(flatten)]
+    source: SourceArguments,
+    /// Source or image whose memory image the test bench loads; `-` is standard input.
+    #[arg(long, value_name = "FILE")]
+    program: Option<PathBuf>,
+    /// CSV with one named column for each input port and one row for each period of the test bench; `-` is standard input.
+    #[arg(long, value_name = "CSV", requires = "program")]
+    inputs: Option<PathBuf>,
+    /// Run at most this many periods in the test bench [default: one for each row; without --inputs, 3, with zeros].
+    #[arg(long, value_name = "N", value_parser = number::count, requires = "program", allow_hyphen_values = true)]
+    periods: Option<u64>,
+    /// Print top module and written files as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  takt rtl -o t3                                 the fast machine
+  takt rtl -o t1 --machine t1 --program prog.s --inputs in.csv   the small one, and what its test bench runs
+  takt rtl system.toml -o system                 several cores and their links (docs/system.md)
+  cd t1 && iverilog -g2005 -f takt_t1_bench.f -o bench && ./bench";
+
+/// Default number of periods without `--inputs`.
+const PERIODS: u64 = 3;
+
+pub(crate) fn run(arguments: &Rtl, color: bool, out: &mut Out) -> Result<()> {
+    let reads = [("--program", &arguments.program), ("--inputs", &arguments.inputs)];
+    let reads: Vec<_> = reads.into_iter().filter_map(|(name, path)| Some((name, path.as_deref()?))).collect();
+    files::check(&reads, &[])?;
+    if let Some(file) = &arguments.system {
+        if !load::is_system(file) {
+            let name = file.display();
+            let message = format!("{name} is no system (`.toml`); a program's core: --program {name}");
+            return Err(output::Failure::Usage(message).into());
+        }
+        return of_system(arguments, file, color, out);
+    }
+    let load = Load::new(arguments.machine.machine, color).with(&arguments.source);
+    let program = arguments.program.as_deref().map(|path| load.program(path)).transpose()?;
+    let machine = match (&program, arguments.machine.machine) {
+        (Some(program), _) => program.machine,
+        (None, machine) => machine.unwrap_or(MACHINES[0]),
+    };
+    let periods = match &program {
+        Some(program) => {
+            ports::rows(arguments.inputs.as_deref(), arguments.periods, PERIODS, &program.inputs)?
+        }
+        None => Vec::new(),
+    };
+    let stimuli = periods.iter().map(|inputs| inputs.len() + 1).sum::<usize>();
+    if stimuli > bench::STIMULI {
+        let most = bench::STIMULI / (periods[0].len() + 1);
+        bail!(
+            "{} periods are too many for the test bench, which takes at most {most}: use --periods {most}",
+            periods.len()
+        );
+    }
+    let latched = program.as_ref().map_or(0, takt_isa::Program::latched_inputs);
+    let design = export(machine, &Library::builtin())?.latching(latched)?;
+    let mut written = Vec::new();
+    for file in bench::folder(&design, program.as_ref(), &periods) {
+        write(&arguments.output, &file.name, &file.text)?;
+        written.push(file.name);
+    }
+    if arguments.json {
+        return files::json(&json!({ "machine": machine.name, "top": design.top, "files": written }), out);
+    }
+    let folder = arguments.output.display();
+    writeln!(out, "{} files in {folder}; the core is {}.v", written.len(), design.top)?;
+    writeln!(out, "memories: {}", memories_text(machine))?;
+    Ok(())
+}
+
+/// Writes the circuit of a system.
+fn of_system(arguments: &Rtl, file: &Path, color: bool, out: &mut Out) -> Result<()> {
+    let design = system::circuit(&system::load(file, &arguments.source, color)?, file)?;
+    let mut written = Vec::new();
+    for file in design.folder() {
+        write(&arguments.output, &file.name, &file.text)?;
+        written.push(file.name);
+    }
+    if arguments.json {
+        let cores = design.plan.description.cores.iter();
+        let cores: Vec<_> =
+            cores.map(|core| json!({ "name": core.name, "machine": core.program.machine.name })).collect();
+        return files::json(&json!({ "cores": cores, "top": design.top, "files": written }), out);
+    }
+    let folder = arguments.output.display();
+    writeln!(out, "{} files in {folder}; the system is {}.v", written.len(), design.top)?;
+    Ok(())
+}
+
+fn write(folder: &Path, name: &str, text: &str) -> Result<()> {
+    let path = folder.join(name);
+    let parent = path.parent().unwrap_or(folder);
+    std::fs::create_dir_all(parent)
+        .with_context(|| format!("cannot make the folder {}", parent.display()))?;
+    files::write(&path, text.as_bytes())
+}

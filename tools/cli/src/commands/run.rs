@@ -1,0 +1,295 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! The command `takt run`: a program or a system on the emulator, with inputs and outputs in CSV.
+
+use crate::run::application::{Application, refuse};
+use crate::run::batch;
+use crate::run::deny::{DenyArguments, Watch};
+use crate::run::load::is_system;
+use crate::run::loaded_program::LoadedProgram;
+use crate::run::memory;
+use crate::run::nan::NanWrites;
+use crate::run::outcome::{CoreOutcome, Execution, OutcomeOptions, RunOutcome};
+use crate::run::ports;
+use crate::run::system::LoadedSystem;
+use crate::run::system::observers::Observer;
+use crate::run::system::run::SystemRun;
+use crate::run::table_run::{TableApplication, Tables};
+use crate::run::trace::TraceArguments;
+use crate::terminal::files::{self, Out};
+use crate::terminal::number;
+use crate::terminal::options::{OptionalMachine, SourceArguments};
+use crate::terminal::output::{self, Failure};
+use anyhow::{Context, Result, bail};
+use clap::Args;
+use std::num::NonZeroU64;
+use std::path::{Path, PathBuf};
+use takt_analysis::period::PERIOD_LIMIT;
+use takt_debug::trace::Tracer;
+use takt_emu::{Emulator, Row, Stop};
+use takt_isa::program::Port;
+use takt_isa::timing::Cycle;
+use takt_isa::{Program, Type};
+use takt_system::CorePeriods;
+
+/// Run a program, counting cycles.
+///
+/// With --inputs, each row of the CSV is one period: its values are set on the input ports, the tick comes, and the program
+/// runs until its `wait`. Without, the input ports are 0, and the program runs for --periods periods, or else until it halts.
+///
+/// With `--inputs - --outputs -` each row is answered as it comes, before the next one is waited for, so that a simulator in any
+/// language closes the loop through two pipes (docs/plant.md).
+#[derive(Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct Run {
+    /// Source or image, `-` being standard input; or a system, a `.toml` file.
+    file: PathBuf,
+    #[command(flatten)]
+    machine: OptionalMachine,
+    #[command(flatten)]
+    source: SourceArguments,
+    /// CSV with one named column for each input port and one row for each period; other columns are ignored; `-` is standard input.
+    #[arg(long, value_name = "CSV")]
+    inputs: Option<PathBuf>,
+    /// Many runs of the program at once, on all cores: a folder with a CSV of inputs for each run, or one CSV with a column
+    /// `run`. --outputs gets that column too.
+    #[arg(
+        long,
+        value_name = "DIR|CSV",
+        conflicts_with_all = ["inputs", "periods", "trace", "deny", "stats"]
+    )]
+    batch: Option<PathBuf>,
+    /// Run at most this many periods.
+    #[arg(long, value_name = "N", value_parser = number::count, allow_hyphen_values = true)]
+    periods: Option<u64>,
+    /// Stop with an error after this many cycles, with --batch each run [default: 1000000000 in any one period].
+    #[arg(long, value_name = "N", value_parser = number::count, allow_hyphen_values = true)]
+    max_cycles: Option<u64>,
+    /// Cycles from tick to tick, up to 100000000 [default: the tick comes when the program is ready].
+    #[arg(long, value_name = "CYCLES", value_parser = number::tick, allow_hyphen_values = true)]
+    tick: Option<NonZeroU64>,
+    /// Also show these words of data memory, as they are when a period ends: all elements of an array, `P`, or one, `P[2,3]`, with indices
+    /// from 1; of a label all words up to the next one, `table`, or one, `table[3]`, from 0, as floating-point numbers. May be given
+    /// several times.
+    #[arg(long, value_name = "NAME", conflicts_with = "batch")]
+    memory: Vec<String>,
+    #[command(flatten)]
+    trace: TraceArguments,
+    #[command(flatten)]
+    deny: DenyArguments,
+    #[command(flatten)]
+    shown: OutcomeOptions,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  takt run prog.s                                 until it halts
+  takt run prog.s --inputs in.csv --stats         a period for each row; where did the cycles go?
+  takt run prog.takt --inputs in.csv --outputs -  outputs and cycles of every period
+  takt run prog.s --periods 3 --trace out.vcd     waveforms for GTKWave or Surfer
+  takt run prog.s --inputs in.csv --deny all      for CI: status 3 if a flag is raised, …
+  takt run prog.s --batch runs --outputs out.csv  a run for each CSV in the folder `runs`
+  takt run system.toml --inputs in.csv --stats    several cores: a base tick for each row (docs/system.md)";
+
+pub(crate) fn run(arguments: &Run, color: bool, out: &mut Out) -> Result<()> {
+    let mut reads = vec![("FILE", arguments.file.as_path())];
+    reads.extend(arguments.inputs.as_deref().map(|path| ("--inputs", path)));
+    // A folder cannot be overwritten by accident.
+    let batch = arguments.batch.as_deref();
+    reads.extend(batch.filter(|path| !path.is_dir()).map(|path| ("--batch", path)));
+    let mut writes = Vec::new();
+    writes.extend(arguments.shown.outputs.as_deref().map(|path| ("--outputs", path)));
+    writes.extend(arguments.trace.file_with_option());
+    if arguments.shown.json {
+        writes.push(("--json", Path::new("-")));
+    }
+    files::check(&reads, &writes)?;
+    if is_system(&arguments.file) {
+        let traced = arguments.deny.is_given() && arguments.trace.file_with_option().is_some();
+        refuse(&[
+            ("--tick", arguments.tick.is_some(), "the system's file has it"),
+            ("--batch", batch.is_some(), "the lanes of a batch are runs of one program"),
+            ("--memory", !arguments.memory.is_empty(), "a system shows its outputs; run the core's program"),
+            ("--deny and --trace", traced, "both take the cores' events; run it once with each"),
+        ])?;
+    }
+    if arguments.shown.outputs.is_some() && !arguments.has_rows() {
+        return Err(Failure::Usage(
+            "--outputs has a row for each period: give --inputs or --periods".to_owned(),
+        )
+        .into());
+    }
+    let application = Application::load(&arguments.file, &arguments.machine, &arguments.source, color)?;
+    if let (Some(inputs), Application::Program(loaded)) = (batch, &application) {
+        let Run { file, tick, max_cycles, shown, .. } = arguments;
+        let (tick, max_cycles) = (*tick, *max_cycles);
+        let (outputs, json) = (shown.outputs.as_deref(), shown.json);
+        let arguments = batch::Arguments { file, inputs, outputs, tick, max_cycles, json };
+        return batch::run(&arguments, loaded, color, out);
+    }
+    let mut trace = arguments.trace.create()?;
+    let (result, mut ran) = match &application {
+        Application::Program(loaded) => arguments.execute(arguments.of(loaded, trace.as_mut())?, color)?,
+        Application::System(system) => {
+            arguments.execute(arguments.of_system(system, trace.as_mut())?, color)?
+        }
+    };
+    trace.map_or(Ok(()), Out::finish)?;
+    let rows = match result.map_err(|error| application.located_error(error, color)) {
+        // A closed output needs no summary; denied events still count.
+        Err(error) if output::is_closed_pipe(&error) => return ran.verdict(),
+        result => result?,
+    };
+    ran.zeros &= arguments.inputs.is_none();
+    ran.warn(color);
+    ran.print(&arguments.file, &arguments.shown, rows, out)?;
+    ran.verdict()
+}
+
+impl Run {
+    fn has_rows(&self) -> bool {
+        self.inputs.is_some() || self.periods.is_some() || self.batch.is_some()
+    }
+
+    /// Executes the run; returns the number of rows, if any, and the outcome. A run error does not discard the rest.
+    fn execute<'a>(
+        &self,
+        mut run: impl Execution<'a>,
+        color: bool,
+    ) -> Result<(Result<Option<u64>>, RunOutcome<'a>)> {
+        let (inputs, outputs) = (self.inputs.as_deref(), self.shown.outputs.as_deref());
+        let result = match self.has_rows() {
+            true => Tables { inputs, outputs, most: self.periods }.drive(&mut run).map(Some),
+            false => run.run_to_halt().map(|()| None),
+        };
+        // A trace shows the events before a fault, so keep it.
+        Ok((result, run.end(&self.trace, color)?))
+    }
+
+    fn of<'a, 't>(
+        &self,
+        loaded: &'a LoadedProgram,
+        trace: Option<&'t mut Out>,
+    ) -> Result<ProgramRun<'a, 't>> {
+        let mut emulator = Emulator::new(&loaded.program)?;
+        emulator.set_tick_period(self.tick);
+        let tracer = trace.map(|file| self.trace.begin(&emulator, file)).transpose()?;
+        let (nans, watch, periods) = (NanWrites::default(), self.deny.watch(), NO_PERIODS);
+        let (program, max_cycles) = (&loaded.program, self.max_cycles);
+        let words =
+            self.memory.iter().map(|name| memory::words(loaded, name)).collect::<Result<Vec<_>>>()?.concat();
+        Ok(ProgramRun { program, words, emulator, max_cycles, tracer, nans, watch, periods, last: 0 })
+    }
+
+    fn of_system<'a, 't>(
+        &self,
+        system: &'a LoadedSystem,
+        trace: Option<&'t mut Out>,
+    ) -> Result<SystemRun<'a, 't>> {
+        let mut run = SystemRun::new(&system.description)?;
+        run.max_cycles = self.max_cycles;
+        run.tracer = trace.map(|file| self.trace.begin_system(&run.system, file)).transpose()?;
+        run.observer = Observer::watching(&mut run.system, self.deny.watch());
+        Ok(run)
+    }
+}
+
+const NO_PERIODS: CorePeriods = CorePeriods { count: 0, shortest: 0, longest: 0, skipped: 0 };
+
+/// A run of a program.
+struct ProgramRun<'a, 't> {
+    program: &'a Program,
+    /// Data words to show.
+    words: Vec<memory::Word>,
+    emulator: Emulator,
+    max_cycles: Option<u64>,
+    tracer: Option<Tracer<'t>>,
+    nans: NanWrites,
+    watch: Watch,
+    periods: CorePeriods,
+    /// Cycles of the last period.
+    last: Cycle,
+}
+
+impl ProgramRun<'_, '_> {
+    /// Last values of the output ports (`None` before the first write), and of the shown data words.
+    fn outputs(&self) -> impl Iterator<Item = (&str, Type, Option<u32>)> {
+        let ports = self.program.outputs.iter();
+        let ports = ports.map(|port| (port.name.as_str(), port.ty, self.emulator.output_bits(port.register)));
+        let memory = self.emulator.memory();
+        ports.chain(
+            self.words
+                .iter()
+                .map(|word| (word.title.as_str(), word.ty, memory.get(word.address as usize).copied())),
+        )
+    }
+
+    fn set_inputs(&mut self, row: &Row) -> Result<()> {
+        for &(register, bits) in row {
+            self.emulator.set_input_bits(register, bits)?;
+        }
+        Ok(())
+    }
+}
+
+impl TableApplication for ProgramRun<'_, '_> {
+    const ROWS: &'static str = "periods";
+
+    fn inputs(&self) -> Vec<Port> {
+        self.program.inputs.clone()
+    }
+
+    fn titles(&self) -> Vec<String> {
+        let names = self.outputs().map(|(name, ..)| name.to_owned());
+        names.chain(["cycles".to_owned()]).collect()
+    }
+
+    fn row(&mut self, row: &Row) -> Result<bool> {
+        self.set_inputs(row)?;
+        self.emulator.set_cycle_limit(self.max_cycles.unwrap_or(self.emulator.now() + PERIOD_LIMIT));
+        let report = self.watch.run_period(&mut self.emulator, self.tracer.as_mut(), None);
+        let report = report.with_context(|| format!("period {}", self.periods.count))?;
+        if self.tracer.as_ref().is_some_and(Tracer::has_failed) {
+            return Ok(false);
+        }
+        let periods = &mut self.periods;
+        periods.shortest =
+            if periods.count == 0 { report.cycles } else { periods.shortest.min(report.cycles) };
+        periods.longest = periods.longest.max(report.cycles);
+        periods.count += 1;
+        self.last = report.cycles;
+        self.nans.add(&report.nan_writes);
+        Ok(true)
+    }
+
+    fn values(&self) -> Vec<String> {
+        let values =
+            self.outputs().map(|(_, ty, bits)| bits.map_or(String::new(), |bits| ports::format(ty, bits)));
+        values.chain([self.last.to_string()]).collect()
+    }
+}
+
+impl<'a> Execution<'a> for ProgramRun<'a, '_> {
+    fn run_to_halt(&mut self) -> Result<()> {
+        let zeros: Row = self.program.inputs.iter().map(|port| (port.register, 0)).collect();
+        self.set_inputs(&zeros)?;
+        self.emulator.set_cycle_limit(self.max_cycles.unwrap_or(PERIOD_LIMIT));
+        let stop = self.watch.run(&mut self.emulator, self.tracer.as_mut());
+        self.nans.add(&self.emulator.take_nan_writes());
+        match stop? {
+            Stop::Idle => bail!("the program waits for the tick: give it periods with --inputs or --periods"),
+            _ => Ok(()),
+        }
+    }
+
+    fn end(mut self, trace: &TraceArguments, color: bool) -> Result<RunOutcome<'a>> {
+        if let Some(tracer) = self.tracer.take() {
+            trace.finish(tracer.finish(&self.emulator), self.emulator.now(), color)?;
+        }
+        let outputs = self.outputs().map(|(name, ty, bits)| (name.to_owned(), bits.map(|bits| (ty, bits))));
+        let outputs = outputs.collect();
+        let denials = self.watch.end(&self.emulator, "");
+        let core = CoreOutcome::new("", self.program, &self.emulator, self.periods, denials);
+        let (zeros, nans) = (!self.program.inputs.is_empty(), self.nans);
+        Ok(RunOutcome { cores: vec![core], outputs, zeros, nans, system: None })
+    }
+}

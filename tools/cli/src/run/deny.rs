@@ -1,0 +1,296 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! The option `--deny`: a run fails if a named event happens in it; each is reported at its first place.
+
+use crate::terminal::options::suggest;
+use crate::terminal::output::Failure;
+use anyhow::Result;
+use clap::Args;
+use serde_json::{Value, json};
+use takt_debug::trace::{ExtraObserver, Tracer};
+use takt_emu::{Emulator, Event, PeriodError, PeriodReport, Retire, Stop};
+use takt_isa::fp::{Flags, is_nan};
+use takt_isa::timing::Cycle;
+use takt_isa::{BundleAddress, Program, Register, SlotIndex, Type};
+
+/// An event that --deny can name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum DeniedEvent {
+    /// A tick before the `wait`, remembered or lost.
+    Missed,
+    /// An exception flag, even if cleared later.
+    Flag(Flags, &'static str),
+    /// A NaN on an output port.
+    Nan,
+}
+
+impl DeniedEvent {
+    fn all() -> Vec<DeniedEvent> {
+        let flags = Flags::NAMES.into_iter().map(|(flag, name)| DeniedEvent::Flag(flag, name));
+        [DeniedEvent::Missed].into_iter().chain(flags).chain([DeniedEvent::Nan]).collect()
+    }
+
+    fn name(self) -> &'static str {
+        match self {
+            DeniedEvent::Missed => "missed",
+            DeniedEvent::Flag(_, name) => name,
+            DeniedEvent::Nan => "nan",
+        }
+    }
+
+    fn text(self) -> String {
+        match self {
+            DeniedEvent::Missed => "deadline missed".to_owned(),
+            DeniedEvent::Flag(_, name) => format!("{name} raised"),
+            DeniedEvent::Nan => "NaN written to an output port".to_owned(),
+        }
+    }
+}
+
+/// Events named by one word of `--deny`.
+#[derive(Clone, Debug)]
+struct DenyRule(Vec<DeniedEvent>);
+
+fn denied(text: &str) -> Result<DenyRule, String> {
+    let all = DeniedEvent::all();
+    if text == "all" {
+        return Ok(DenyRule(all));
+    }
+    if let Some(what) = all.iter().find(|what| what.name() == text) {
+        return Ok(DenyRule(vec![*what]));
+    }
+    let names: Vec<&str> = all.iter().map(|what| what.name()).chain(["all"]).collect();
+    let near = suggest(text, names.iter().copied());
+    Err(format!("no event has this name{near} (events: {})", names.join(", ")))
+}
+
+#[derive(Args)]
+pub(crate) struct DenyArguments {
+    /// For CI: end with status 3 if any of these happens in the run, and say what, when first and how often: `missed` (a
+    /// deadline), the exception flags `invalid`, `divide-by-zero` and `overflow`, `nan` (on an output port), or `all`. (A
+    /// fault always ends a run, with status 1.)
+    #[arg(long, value_name = "WHAT,…", value_delimiter = ',', value_parser = denied)]
+    deny: Vec<DenyRule>,
+}
+
+/// First occurrence of an event.
+#[derive(Clone, Copy)]
+struct First {
+    /// Period, from 0; `None` in a run without periods.
+    period: Option<u64>,
+    cycle: Cycle,
+    /// Bundle of the event; for a missed deadline, the last bundle issued.
+    address: BundleAddress,
+    /// Operation of the event, if any: its slot and its destination.
+    operation: Option<(SlotIndex, Option<Register>)>,
+}
+
+/// Occurrences of a denied event.
+#[derive(Clone)]
+struct Finding {
+    what: DeniedEvent,
+    count: u64,
+    first: Option<First>,
+}
+
+/// Observer of a run for denied events. Without any, the run is not observed and keeps its full speed.
+#[derive(Clone)]
+pub(crate) struct Watch {
+    findings: Vec<Finding>,
+    /// Number of the present period.
+    period: Option<u64>,
+    /// Bundle that was issued last.
+    at: BundleAddress,
+    /// A core of a system has reached its first `wait`.
+    has_waited: bool,
+}
+
+impl DenyArguments {
+    /// Some event is denied.
+    pub(crate) fn is_given(&self) -> bool {
+        !self.deny.is_empty()
+    }
+
+    pub(crate) fn watch(&self) -> Watch {
+        let denied = |what: &DeniedEvent| self.deny.iter().any(|words| words.0.contains(what));
+        let findings = DeniedEvent::all().into_iter().filter(denied);
+        Watch { findings: findings.map(Finding::none).collect(), ..Watch::idle() }
+    }
+}
+
+impl Finding {
+    fn none(what: DeniedEvent) -> Finding {
+        Finding { what, count: 0, first: None }
+    }
+
+    /// Operation of the event, with its place.
+    fn place(&self, first: &First, program: &Program) -> String {
+        let place = location(program, first).map_or_else(String::new, |place| format!(" ({place})"));
+        let bundle = format!("bundle {}{place}", first.address);
+        let Some((slot, register)) = first.operation else { return format!("after {bundle}") };
+        let instructions = program.bundle(first.address).and_then(Result::ok).unwrap_or_default();
+        let mnemonic = instructions.get(slot.index()).map_or("?", |found| found.op.row().mnemonic);
+        match (self.what, register) {
+            (DeniedEvent::Nan, Some(register)) => {
+                format!("to {} by {mnemonic} in {bundle}", program.register_text(register))
+            }
+            _ => format!("by {mnemonic} in {bundle}"),
+        }
+    }
+
+    /// Message on an event; `core` names the core in a system.
+    fn message(&self, first: &First, program: &Program, core: &str) -> String {
+        let what = self.what.text();
+        let place = if core.is_empty() { String::new() } else { format!(" in {core}") };
+        let times = if self.count == 1 { "once,".to_owned() } else { format!("{} times, first", self.count) };
+        let period = first.period.map_or_else(String::new, |period| format!(" in period {period},"));
+        format!("denied: {what}{place} {times}{period} cycle {}, {}", first.cycle, self.place(first, program))
+    }
+}
+
+/// Source place `file:line`, with columns inside an equation: of the operation, otherwise of its bundle.
+fn location(program: &Program, first: &First) -> Option<String> {
+    let own = first.operation.and_then(|(slot, _)| program.operation_place(first.address, slot));
+    own.or_else(|| program.bundle_place(first.address))
+}
+
+impl Watch {
+    /// No event is denied: the run need not be observed.
+    pub(crate) fn denies_nothing(&self) -> bool {
+        self.findings.is_empty()
+    }
+
+    /// A watch without denied events.
+    pub(crate) fn idle() -> Watch {
+        Watch { findings: Vec::new(), period: None, at: BundleAddress::RESET, has_waited: false }
+    }
+
+    /// Runs a period as [`Emulator::run_period`] does, with unchanged inputs; `also` receives every event too. All commands with --deny run
+    /// their periods here.
+    pub(crate) fn run_period(
+        &mut self,
+        emulator: &mut Emulator,
+        trace: Option<&mut Tracer<'_>>,
+        mut also: ExtraObserver<'_>,
+    ) -> Result<PeriodReport, PeriodError> {
+        self.period = Some(self.period.map_or(0, |period| period + 1));
+        let heard = also.is_some() || !self.findings.is_empty();
+        let mut sink = |event: &Event| {
+            self.hear(event);
+            if let Some(also) = &mut also {
+                also(event);
+            }
+        };
+        match trace {
+            Some(trace) => trace.run_period(emulator, heard.then_some(&mut sink)),
+            None if heard => emulator.observed(&mut sink).run_period(&[]),
+            None => emulator.run_period(&[]),
+        }
+    }
+
+    /// Records an event of a core in a system, whose periods are counted by waits: the first ends the code that runs once.
+    pub(crate) fn hear_core(&mut self, event: &Event) {
+        self.period.get_or_insert(0);
+        self.hear(event);
+        if let Event::Wait { .. } = event {
+            self.period = self.period.map(|period| period + u64::from(self.has_waited));
+            self.has_waited = true;
+        }
+    }
+
+    /// Runs as [`Emulator::run`] does, under observation.
+    pub(crate) fn run(
+        &mut self,
+        emulator: &mut Emulator,
+        trace: Option<&mut Tracer<'_>>,
+    ) -> Result<Stop, PeriodError> {
+        let heard = !self.findings.is_empty();
+        let mut sink = |event: &Event| self.hear(event);
+        match trace {
+            Some(trace) => trace.run(emulator, heard.then_some(&mut sink)),
+            None if heard => Ok(emulator.observed(&mut sink).run()?),
+            None => Ok(emulator.run()?),
+        }
+    }
+
+    fn hear(&mut self, event: &Event) {
+        match event {
+            Event::Issue { address, .. } => self.at = *address,
+            Event::DeadlineMissed { cycle } | Event::TickLost { cycle } => {
+                self.note(*cycle, self.at, None, |what| what == DeniedEvent::Missed);
+            }
+            Event::Retire(retire) if !retire.flags.is_empty() => self.raised(retire),
+            Event::PortWrite(write) if write.nan => {
+                let operation = Some((write.slot, Some(write.register)));
+                self.note(write.cycle, write.address, operation, |what| what == DeniedEvent::Nan);
+            }
+            _ => {}
+        }
+    }
+
+    fn raised(&mut self, retire: &Retire) {
+        let raised = |what| matches!(what, DeniedEvent::Flag(flag, _) if retire.flags.contains(flag));
+        self.note(retire.cycle, retire.address, Some((retire.slot, retire.register)), raised);
+    }
+
+    fn note(
+        &mut self,
+        cycle: Cycle,
+        address: BundleAddress,
+        operation: Option<(SlotIndex, Option<Register>)>,
+        happened: impl Fn(DeniedEvent) -> bool,
+    ) {
+        for finding in self.findings.iter_mut().filter(|finding| happened(finding.what)) {
+            finding.count += 1;
+            finding.first.get_or_insert(First { period: self.period, cycle, address, operation });
+        }
+    }
+
+    /// Result of the watch, including operations that issued with the last `wait` and are still in flight; `core` names the core in a
+    /// system.
+    pub(crate) fn end(&self, emulator: &Emulator, core: &str) -> Denials {
+        let program = emulator.program();
+        let mut watch = self.clone();
+        let is_float =
+            |register| program.outputs.iter().any(|port| port.register == register && port.ty == Type::F);
+        for retire in emulator.in_flight() {
+            watch.raised(retire);
+            if is_nan(retire.value) && retire.register.is_some_and(is_float) {
+                let operation = Some((retire.slot, retire.register));
+                watch.note(retire.cycle, retire.address, operation, |what| what == DeniedEvent::Nan);
+            }
+        }
+        let found = || watch.findings.iter().filter_map(|finding| Some((finding, finding.first.as_ref()?)));
+        let json = |(finding, first): (&Finding, &First)| {
+            json!({
+                "what": finding.what.name(),
+                "count": finding.count,
+                "first": {
+                    "period": first.period,
+                    "cycle": first.cycle,
+                    "bundle": first.address,
+                    "place": location(program, first),
+                },
+            })
+        };
+        let message = |(finding, first): (&Finding, &First)| finding.message(first, program, core);
+        Denials { json: found().map(json).collect(), messages: found().map(message).collect() }
+    }
+}
+
+/// Denied events that occurred.
+pub(crate) struct Denials {
+    /// List of the events, for --json.
+    pub(crate) json: Value,
+    messages: Vec<String>,
+}
+
+impl Denials {
+    /// Verdict on a run, from the denials of all its cores.
+    ///
+    /// # Errors
+    /// If a denied event occurred.
+    pub(crate) fn verdict(cores: impl IntoIterator<Item = Denials>) -> Result<()> {
+        let messages: Vec<String> = cores.into_iter().flat_map(|denials| denials.messages).collect();
+        if messages.is_empty() { Ok(()) } else { Err(Failure::Denied(messages).into()) }
+    }
+}

@@ -1,0 +1,215 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Loading of programs from files, built-in names or standard input.
+
+use crate::run::cache::{self, CacheEntry, First};
+use crate::run::loaded_program::LoadedProgram;
+use crate::terminal::files;
+use crate::terminal::options::SourceArguments;
+use crate::terminal::output::{Failure, message};
+use crate::terminal::progress::DelayedActivity;
+use anyhow::{Context, Result, bail};
+use std::path::{Path, PathBuf};
+use takt_asm::diag::Diagnostics;
+use takt_asm::limits::IMAGE_BYTES;
+use takt_asm::names::DebugInfo;
+use takt_asm::plain::PlainProgram;
+use takt_asm::{
+    AssembledProgram, Contraction, FileLoader, Loader, MemoryLoader, Options, Schedule, Search, image,
+};
+use takt_isa::{MACHINES, Machine, Program};
+
+/// Loading options: presentation of diagnostics, and target machine.
+#[derive(Clone)]
+pub(crate) struct Load {
+    /// Machine given by the user.
+    pub(crate) machine: Option<&'static Machine>,
+    /// Messages on standard error are coloured.
+    pub(crate) color: bool,
+    /// Choice of the bundles to schedule.
+    pub(crate) schedule: Schedule,
+    /// Effort of the scheduler.
+    pub(crate) effort: u32,
+    /// Source options of the command line.
+    pub(crate) source: SourceArguments,
+}
+
+/// The file describes a system, not a program: its name ends in `.toml`, for every command.
+pub(crate) fn is_system(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"))
+}
+
+impl Load {
+    /// Options with the source's own scheduler settings.
+    pub(crate) fn new(machine: impl Into<Option<&'static Machine>>, color: bool) -> Load {
+        let Options { schedule, effort, .. } = Options::default();
+        Load { machine: machine.into(), color, schedule, effort, source: SourceArguments::default() }
+    }
+
+    /// Adds the source options of the command line.
+    pub(crate) fn with(mut self, source: &SourceArguments) -> Load {
+        self.source = source.clone();
+        self
+    }
+
+    fn options(&self) -> Options {
+        Options {
+            machine: self.machine.unwrap_or(MACHINES[0]),
+            schedule: self.schedule,
+            contract: self.source.contract.into(),
+            effort: self.effort,
+            levels: self.source.warnings.iter().copied().collect(),
+        }
+    }
+
+    /// Contents of a program file.
+    fn bytes(path: &Path) -> Result<Vec<u8>> {
+        if is_system(path) {
+            let name = files::input_name(path);
+            bail!(
+                "{name} is a system, but this command needs a single program; `takt run`, `bound`, `analyse`, `debug`, `rtl`, `cosim`, `board`, `live` and `load` accept systems"
+            );
+        }
+        files::read(path, IMAGE_BYTES)
+    }
+
+    /// Contents of a source file; an image is an error.
+    pub(crate) fn source(path: &Path) -> Result<Vec<u8>> {
+        let bytes = Load::bytes(path)?;
+        if image::is_image(&bytes) {
+            bail!("{} is an image already; `takt disasm` turns it into source", files::input_name(path));
+        }
+        Ok(bytes)
+    }
+
+    /// Program in a file: an image, or a source, which is assembled.
+    pub(crate) fn program(&self, path: &Path) -> Result<Program> {
+        Ok(self.with_source(path)?.program)
+    }
+
+    /// Loads a program as [`Load::program`] does, with its source if available.
+    pub(crate) fn with_source(&self, path: &Path) -> Result<LoadedProgram> {
+        let bytes = Load::bytes(path)?;
+        let name = files::input_name(path);
+        let loaded = if image::is_image(&bytes) {
+            let (program, debug) =
+                image::read_with(&bytes).with_context(|| format!("{name} is not an image that can run"))?;
+            let DebugInfo { sources, constants, names } = debug.unwrap_or_default();
+            LoadedProgram { program, constants, sources, names, spilled: Vec::new() }
+        } else {
+            let kept = self.assembled_program(path, bytes, false);
+            kept.map_err(|mistakes| Failure::Diagnostics(mistakes.render(self.color)))?.loaded
+        };
+        let program = &loaded.program;
+        self.is_for(program, &name)?;
+        if program.bundles() == 0 {
+            bail!("{name} has no instruction");
+        }
+        Ok(loaded)
+    }
+
+    /// Rejects a program for another machine than the user's.
+    fn is_for(&self, program: &Program, name: &str) -> Result<()> {
+        match self.machine.filter(|machine| **machine != *program.machine) {
+            Some(machine) => bail!("{name} is for {}, not for {}", program.machine.name, machine.name),
+            None => Ok(()),
+        }
+    }
+
+    /// Search path of sources: the project, the folders of the command line, and Takt's library.
+    fn sources<L: Loader>(&self, project: L) -> Search<L> {
+        let folders = self.source.folders.iter();
+        folders.fold(Search::new(project), Search::folder).library(takt_programs::LIBRARY)
+    }
+
+    /// Name and folder of a source file. Its includes are searched in that folder, then as in [`Load::sources`].
+    fn project(path: &Path) -> (String, FileLoader) {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+        let loader = FileLoader::new(folder.map_or(PathBuf::from("."), Path::to_owned));
+        let name = match path.file_name() {
+            Some(name) if !files::is_dash(path) => name.to_string_lossy().into_owned(),
+            _ => "<stdin>".to_owned(),
+        };
+        (name, loader)
+    }
+
+    /// Assembles a source read from a file.
+    pub(crate) fn assemble(&self, path: &Path, bytes: Vec<u8>) -> Result<AssembledProgram, Diagnostics> {
+        let (name, folder) = Load::project(path);
+        let _waiting = DelayedActivity::new(format!("assembling {}", files::input_name(path)));
+        takt_asm::assemble_bytes(&name, bytes, &self.sources(folder), &self.options())
+    }
+
+    /// Unscheduled program of a source read from a file, with the contractions in it.
+    pub(crate) fn plain(
+        &self,
+        path: &Path,
+        bytes: Vec<u8>,
+    ) -> Result<(PlainProgram, Vec<Contraction>), Diagnostics> {
+        let (name, folder) = Load::project(path);
+        let loader = self.sources(First { name: name.clone(), bytes, others: folder });
+        let plain = takt_asm::plain::plain(&name, &loader, &self.options())?;
+        let checked = takt_asm::check(&name, &loader, &self.options());
+        Ok((plain, checked.contractions().to_vec()))
+    }
+
+    /// Assembles the program for one of many machines, without messages.
+    pub(crate) fn assemble_quietly(
+        &self,
+        path: &Path,
+        bytes: Vec<u8>,
+    ) -> Result<AssembledProgram, Diagnostics> {
+        let (name, folder) = Load::project(path);
+        takt_asm::assemble_bytes(&name, bytes, &self.sources(folder), &self.options())
+    }
+
+    /// Names and texts of all files of a program on a machine.
+    pub(crate) fn texts(&self, path: &Path, bytes: Vec<u8>) -> Vec<(String, String)> {
+        let (name, others) = Load::project(path);
+        let first = First { name: name.clone(), bytes, others };
+        let checked = takt_asm::check(&name, &self.sources(first), &self.options());
+        let files = checked.sources().files();
+        files.iter().map(|file| (file.name.to_string(), file.text.to_string())).collect()
+    }
+
+    /// Assembled program, possibly from the cache. Shows warnings and waiting times unless `is_quiet`.
+    pub(crate) fn assembled_program(
+        &self,
+        path: &Path,
+        bytes: Vec<u8>,
+        is_quiet: bool,
+    ) -> Result<CacheEntry, Diagnostics> {
+        let (name, others) = Load::project(path);
+        let _waiting =
+            (!is_quiet).then(|| DelayedActivity::new(format!("assembling {}", files::input_name(path))));
+        let warn = |warnings: &Diagnostics| {
+            if !is_quiet {
+                message(&warnings.render(self.color));
+            }
+        };
+        let first = First { name: name.clone(), bytes, others };
+        cache::assembled(&name, &self.sources(first), &self.options(), warn)
+    }
+
+    /// Assembles a built-in program.
+    pub(crate) fn builtin(&self, path: &str) -> Result<LoadedProgram> {
+        let loader = self.sources(MemoryLoader::new(takt_programs::SOURCES));
+        let _waiting = DelayedActivity::new(format!("assembling {path}"));
+        let warn = |warnings: &Diagnostics| message(&warnings.render(self.color));
+        let kept = cache::assembled(path, &loader, &self.options(), warn);
+        let loaded = kept.map_err(|mistakes| Failure::Diagnostics(mistakes.render(self.color)))?.loaded;
+        self.is_for(&loaded.program, path)?;
+        Ok(loaded)
+    }
+
+    /// Prints warnings to standard error; converts errors.
+    pub(crate) fn finish(&self, result: Result<AssembledProgram, Diagnostics>) -> Result<AssembledProgram> {
+        match result {
+            Ok(assembled) => {
+                message(&assembled.warnings.render(self.color));
+                self.is_for(&assembled.program, &assembled.sources.files()[0].name)?;
+                Ok(assembled)
+            }
+            Err(diagnostics) => Err(Failure::Diagnostics(diagnostics.render(self.color)).into()),
+        }
+    }
+}

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! A loaded program with its debug information.
+
+use crate::run::spills::spilled;
+use takt_asm::AssembledProgram;
+use takt_asm::expr::Value;
+use takt_asm::names::{DebugInfo, Names};
+use takt_isa::Program;
+
+/// A program; if it was assembled here or its image has them, with constants, sources and names.
+pub(crate) struct LoadedProgram {
+    pub(crate) program: Program,
+    /// Named constants of the source.
+    pub(crate) constants: Vec<(String, Value)>,
+    /// Source texts, under the names that the program has for them.
+    pub(crate) sources: Vec<(String, String)>,
+    /// Meanings of names in the source.
+    pub(crate) names: Names,
+    /// Cost of spilled registers, as lines of text; empty for an image.
+    pub(crate) spilled: Vec<String>,
+}
+
+impl From<AssembledProgram> for LoadedProgram {
+    fn from(assembled: AssembledProgram) -> LoadedProgram {
+        let DebugInfo { sources, constants, names } = assembled.debug_info();
+        let spilled = spilled(&assembled);
+        LoadedProgram { program: assembled.program, constants, sources, names, spilled }
+    }
+}

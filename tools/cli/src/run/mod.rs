@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Programs and systems: loading, running from tables, and results of runs.
+
+pub(crate) mod account;
+pub(crate) mod application;
+pub(crate) mod batch;
+pub(crate) mod cache;
+pub(crate) mod controller;
+pub(crate) mod deny;
+pub(crate) mod fault;
+pub(crate) mod load;
+pub(crate) mod loaded_program;
+pub(crate) mod machine_mistake;
+pub(crate) mod memory;
+pub(crate) mod nan;
+pub(crate) mod outcome;
+pub(crate) mod ports;
+pub(crate) mod spills;
+pub(crate) mod synthesis;
+pub(crate) mod system;
+pub(crate) mod table_run;
+pub(crate) mod trace;
+pub(crate) mod workers;

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Observers of a system's cores: for `--deny`, or for replays of each core alone.
+
+use crate::run::deny::{Denials, Watch};
+use takt_system::{Recording, System};
+
+/// An observer; with `Idle`, a system keeps its full speed.
+#[derive(Default)]
+pub(crate) enum Observer {
+    #[default]
+    Idle,
+    /// Watches of each core, for `--deny`.
+    Watches(Vec<Watch>),
+    Recording(Recording),
+}
+
+impl Observer {
+    /// Watches each core for the events denied in `watch`.
+    pub(crate) fn watching(system: &mut System, watch: Watch) -> Observer {
+        if watch.denies_nothing() {
+            return Observer::Idle;
+        }
+        system.keep_core_events();
+        Observer::Watches(vec![watch; system.description().cores.len()])
+    }
+
+    /// Observes the part of the run since the last call.
+    pub(crate) fn observe(&mut self, system: &mut System) {
+        match self {
+            Observer::Idle => {}
+            Observer::Recording(recording) => recording.record(system),
+            Observer::Watches(watches) => {
+                system.take_input_events();
+                for (core, event) in system.take_core_events() {
+                    watches[core].hear_core(&event);
+                }
+            }
+        }
+    }
+
+    /// Denied events of each core.
+    pub(crate) fn denials(&self, system: &System) -> Vec<Denials> {
+        let idle = Watch::idle();
+        let end = |(number, core): (usize, &takt_system::Core)| {
+            let watch = match self {
+                Observer::Watches(watches) => &watches[number],
+                _ => &idle,
+            };
+            watch.end(system.core(number), &format!("core {}", core.name))
+        };
+        system.description().cores.iter().enumerate().map(end).collect()
+    }
+}

@@ -1,0 +1,219 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Work in units, on this computer or on the workers of a HyperQueue server. A unit is this command again, with a file that says what to
+//! do: it runs in a process of its own, wherever the same files are seen.
+
+use crate::terminal::files::{self, OptionPath};
+use anyhow::{Context, Result, bail};
+use clap::Args;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+use std::time::Duration;
+use takt_work::{Client, Cluster, Event, Failure, HYPERQUEUE, Place, Unit};
+
+/// Bytes of a unit's file.
+const UNIT_LIMIT: usize = 1 << 20;
+
+/// The computers that do the work.
+#[derive(Args)]
+pub(crate) struct WorkArguments {
+    /// Give the work to a HyperQueue server and workers, which are started for this command (docs/campaigns.md).
+    #[arg(long, conflicts_with = "hq_server")]
+    pub(crate) hq: bool,
+    /// Give the work to the HyperQueue server that runs with this folder.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) hq_server: Option<PathBuf>,
+    /// The unit that this process does, and the file of its result.
+    #[arg(long, hide = true, requires = "result")]
+    unit: Option<PathBuf>,
+    #[arg(long, hide = true, requires = "unit")]
+    result: Option<PathBuf>,
+}
+
+impl WorkArguments {
+    /// True if the work is for a HyperQueue server.
+    pub(crate) fn uses_server(&self) -> bool {
+        self.hq || self.hq_server.is_some()
+    }
+
+    /// Refuses what only one process can read.
+    pub(crate) fn check(&self, reads: &[OptionPath<'_>]) -> Result<()> {
+        if self.uses_server() && reads.iter().any(|(_, path)| files::is_dash(path)) {
+            bail!("units read programs from files, not from standard input");
+        }
+        Ok(())
+    }
+
+    /// The unit that this process does, if it is for a unit: the job, and the file of its result.
+    pub(crate) fn job<J: DeserializeOwned>(&self) -> Result<Option<(J, &Path)>> {
+        let (Some(file), Some(result)) = (&self.unit, &self.result) else { return Ok(None) };
+        let text = files::read(file, UNIT_LIMIT)?;
+        let job = serde_json::from_slice(&text);
+        let job = job.with_context(|| format!("{} is no unit of this command", file.display()))?;
+        Ok(Some((job, result)))
+    }
+}
+
+/// Writes a unit's result.
+pub(crate) fn write(result: &Path, value: &impl Serialize) -> Result<()> {
+    Ok(takt_work::write(result, &takt_cache::seal(serde_json::to_vec(value)?))?)
+}
+
+/// The place where units run, and a server that ends with it.
+pub(crate) struct Workers {
+    /// The command; units of one command are kept together.
+    command: &'static str,
+    place: Place,
+    cluster: Option<Cluster>,
+}
+
+impl Drop for Workers {
+    fn drop(&mut self) {
+        if let Some(cluster) = self.cluster.take() {
+            let folder = cluster.server().to_owned();
+            drop(cluster);
+            // If it stays, it is in nobody's way.
+            let _ = std::fs::remove_dir_all(folder);
+        }
+    }
+}
+
+impl Workers {
+    /// This computer's cores, or those of a HyperQueue server.
+    pub(crate) fn new(command: &'static str, arguments: &WorkArguments) -> Result<Workers> {
+        let cores = std::thread::available_parallelism().map_or(2, usize::from);
+        if !arguments.uses_server() {
+            return Ok(Workers { command, place: Place::Here(cores), cluster: None });
+        }
+        let fresh = folder(command)?.join(format!("server-{}", std::process::id()));
+        let server = arguments.hq_server.as_deref();
+        let (place, cluster) = Place::queue(Client::find(install)?, server, &fresh, cores)?;
+        Ok(Workers { command, place, cluster })
+    }
+
+    /// True if work is for other processes, rather than threads of this process.
+    pub(crate) fn uses_processes(&self) -> bool {
+        matches!(self.place, Place::Queue { .. })
+    }
+
+    /// The unit that does a job in `time`, or less; `result` has a name of its own, or else one by content: `key` is all that the result
+    /// depends on beside the job.
+    pub(crate) fn unit(
+        &self,
+        name: String,
+        key: &str,
+        job: &impl Serialize,
+        result: Option<PathBuf>,
+        time: Duration,
+    ) -> Result<Unit> {
+        let text = serde_json::to_string(job)?;
+        let mut hasher = DefaultHasher::new();
+        (key, &text).hash(&mut hasher);
+        let file = folder(self.command)?.join(format!("{:016x}.json", hasher.finish()));
+        takt_cache::copy(&file, text.as_bytes())
+            .with_context(|| format!("cannot write {}", file.display()))?;
+        let result = result.unwrap_or(file.with_extension("result"));
+        // A result that is damaged, or no result at all, is made anew.
+        if takt_cache::read(&result).is_none() {
+            takt_cache::discard(&result);
+        }
+        let own = std::env::current_exe().context("this program has no path")?;
+        let mut command = vec![own.display().to_string()];
+        // The programs and how they are assembled; paths are relative to the folder.
+        command.extend(std::env::args().skip(1));
+        command.extend(["--unit".to_owned(), file.display().to_string()]);
+        command.extend(["--result".to_owned(), result.display().to_string()]);
+        let folder = std::env::current_dir().context("there is no current folder")?;
+        Ok(Unit { name, command, folder, result, cpus: 1, time })
+    }
+
+    /// Runs units; those that failed.
+    pub(crate) fn run(
+        &self,
+        units: &[Unit],
+        stop: &AtomicBool,
+        done: &mut dyn FnMut(u64),
+    ) -> Result<Vec<Failure>> {
+        let mut before = 0;
+        Ok(takt_work::run(units, &self.place, stop, &mut |event| match event {
+            Event::Done(count) => {
+                done(count.saturating_sub(before));
+                before = count.max(before);
+            }
+            Event::Note(note) => crate::terminal::output::message(&format!("{note}\n")),
+        })?)
+    }
+
+    /// Runs units, and takes their results in the order of the units; they are not kept. Where a unit failed, an error; fewer results
+    /// after `stop`.
+    pub(crate) fn results<R: DeserializeOwned>(
+        &self,
+        units: &[Unit],
+        stop: &AtomicBool,
+        done: &mut dyn FnMut(u64),
+    ) -> Result<Vec<R>> {
+        let failures = self.run(units, stop, done)?;
+        if let Some(Failure { name, reason }) = failures.first() {
+            bail!(
+                "{} of {} units failed; the same command goes on from here. Unit {name}: {reason}",
+                failures.len(),
+                units.len()
+            );
+        }
+        let mut found = Vec::new();
+        for unit in units {
+            if !unit.is_done() {
+                break;
+            }
+            let text = takt_cache::read(&unit.result).with_context(|| damaged(unit))?;
+            let result = serde_json::from_slice(&text);
+            found.push(
+                result.with_context(|| {
+                    format!("{} is no result of a unit; delete it", unit.result.display())
+                })?,
+            );
+        }
+        for file in units.iter().flat_map(|unit| [unit.result.clone(), unit.result.with_extension("json")]) {
+            let _ = std::fs::remove_file(file);
+        }
+        Ok(found)
+    }
+}
+
+/// The message for a unit's result that is not what the unit wrote.
+pub(crate) fn damaged(unit: &Unit) -> String {
+    format!("{} is damaged and was removed; the same command makes it anew", unit.result.display())
+}
+
+/// The folder of a command's units and their results.
+fn folder(command: &str) -> Result<PathBuf> {
+    Ok(takt_cache::folder()?.join(command).join("units"))
+}
+
+/// Python with HyperQueue, where `PATH` has neither `hq` nor the package: in the folder of tools, installed there with a message.
+#[cfg(feature = "board")]
+fn install() -> Result<PathBuf> {
+    use takt_board::tools::Venv;
+    let folder = crate::commands::board::tools_folder()?;
+    let python = Venv::at(&folder).tool("python3");
+    if takt_work::has_package(&python) {
+        return Ok(python);
+    }
+    crate::terminal::output::message(&format!(
+        "HyperQueue is not on PATH, neither `hq` nor the package in python3; installing {HYPERQUEUE} in {}\n",
+        folder.display()
+    ));
+    let installed = Venv::with(&folder, &[HYPERQUEUE]);
+    installed.context("without a network: see docs/campaigns.md, `Without a network`")?;
+    Ok(python)
+}
+
+#[cfg(not(feature = "board"))]
+fn install() -> Result<PathBuf> {
+    bail!(
+        "HyperQueue is not on PATH, neither `hq` nor the package in python3, and this takt was built without `board`, which installs \
+         {HYPERQUEUE}; `cargo install --path tools/cli --all-features`"
+    )
+}

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Handling of Ctrl-C. A process can have a single handler; it executes the action set last.
+
+use anyhow::{Context, Result};
+use indicatif::ProgressBar;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+type Action = Box<dyn FnMut() + Send>;
+
+static ACTION: Mutex<Option<Action>> = Mutex::new(None);
+/// Progress bars, including finished ones.
+static BARS: Mutex<Vec<ProgressBar>> = Mutex::new(Vec::new());
+
+/// Exit status after Ctrl-C, by the shells' convention.
+pub(crate) const INTERRUPTED: i32 = 130;
+
+fn held<T>(what: &Mutex<T>) -> MutexGuard<'_, T> {
+    what.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Sets the action of Ctrl-C; the process then continues.
+pub(crate) fn on_interrupt(action: impl FnMut() + Send + 'static) -> Result<()> {
+    let before = held(&ACTION).replace(Box::new(action));
+    if before.is_some() {
+        return Ok(());
+    }
+    let heard = || held(&ACTION).iter_mut().for_each(|action| action());
+    ctrlc::set_handler(heard).context("cannot catch Ctrl-C")
+}
+
+/// Registers a progress bar. Unless a command handles Ctrl-C itself, it clears the bar before the process ends.
+pub(crate) fn takes_away(bar: &ProgressBar) {
+    let mut bars = held(&BARS);
+    bars.retain(|bar| !bar.is_finished());
+    bars.push(bar.clone());
+    drop(bars);
+    if held(&ACTION).is_none() {
+        // Without a handler, at worst a bar remains visible.
+        let _ = on_interrupt(end);
+    }
+}
+
+fn end() {
+    held(&BARS).iter().for_each(ProgressBar::finish_and_clear);
+    // End by the signal, as without a handler, so that a shell's loop ends, too.
+    #[cfg(unix)]
+    let _ = signal_hook::low_level::emulate_default_handler(signal_hook::consts::SIGINT);
+    std::process::exit(INTERRUPTED)
+}

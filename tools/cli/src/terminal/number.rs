@@ -1,0 +1,263 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Parser of numbers on the command line, with and without units, with uniform error messages.
+//!
+//! Numeric options allow a leading `-`, so that `--tick -5us` is reported as a wrong number, not as an unknown option.
+
+use std::num::NonZeroU64;
+use std::ops::RangeInclusive;
+use takt_emu::LONGEST_TICK;
+
+/// Default baud rate, if the wiring states none.
+pub(crate) const BAUD: u32 = 115_200;
+
+/// Splits a leading number from the rest of a text. Words such as `nan` and `inf` are not numbers.
+fn split(text: &str) -> (&str, &str) {
+    let text = text.trim();
+    let sign = usize::from(text.starts_with(['+', '-']));
+    let is_number = |end: usize| text[..end].parse::<f64>().is_ok();
+    let is_digit = |c: char| c.is_ascii_digit() || ".eE+-".contains(c);
+    // Longest numeric prefix: it includes the `e` of `5e3`, but not the `e` of `5em`.
+    let most = text.find(|c| !is_digit(c)).unwrap_or(text.len());
+    let end = (sign + 1..=most).rev().find(|&end| is_number(end)).unwrap_or(0);
+    (&text[..end], text[end..].trim_start())
+}
+
+/// Bound below which binary64 represents all integers exactly.
+const EXACT: f64 = 9_007_199_254_740_992.0;
+
+/// Parses an integer in a range.
+fn whole(text: &str, range: RangeInclusive<u64>) -> Result<u64, String> {
+    let (number, rest) = split(text);
+    if number.is_empty() {
+        return Err("not a whole number".to_owned());
+    }
+    if !rest.is_empty() {
+        return Err(format!("a whole number is wanted, without a unit; `{rest}` follows it"));
+    }
+    let (first, last) = (range.start(), range.end());
+    match number.parse::<u64>() {
+        Ok(count) if range.contains(&count) => Ok(count),
+        Ok(count) if count < *first => Err(format!("less than {first}")),
+        Ok(_) => Err(format!("more than {last}")),
+        Err(_) if number.starts_with('-') => Err(format!("less than {first}")),
+        Err(_) if number.contains(|c: char| !c.is_ascii_digit() && c != '+') => {
+            let digits = number.parse::<f64>().ok().filter(|value| value.fract() == 0.0 && *value < EXACT);
+            let digits = digits.map_or(String::new(), |value| format!(" (`{value}`)"));
+            Err(format!("not a whole number in digits{digits}"))
+        }
+        Err(_) => Err(format!("more than {last}")),
+    }
+}
+
+/// Parses a count of at least 1, for clap.
+pub(crate) fn count(text: &str) -> Result<u64, String> {
+    whole(text, 1..=u64::MAX)
+}
+
+/// Parses a natural number including 0, for clap.
+pub(crate) fn natural(text: &str) -> Result<u64, String> {
+    whole(text, 0..=u64::MAX)
+}
+
+/// Maximal number of robots in `takt track --monte-carlo`.
+const ROBOTS: u64 = 1_000_000;
+
+/// Parses a number of robots, for clap.
+pub(crate) fn robots(text: &str) -> Result<u64, String> {
+    whole(text, 1..=ROBOTS)
+}
+
+/// Parses cycles from tick to tick, for clap.
+pub(crate) fn tick(text: &str) -> Result<NonZeroU64, String> {
+    NonZeroU64::new(whole(text, 1..=LONGEST_TICK)?).ok_or_else(|| "less than 1".to_owned())
+}
+
+/// Units of a quantity, each as a multiple of the first.
+type Units = &'static [(&'static str, f64)];
+const FREQUENCY: Units = &[("MHz", 1.0), ("Hz", 1e-6), ("kHz", 1e-3), ("GHz", 1e3)];
+const TIME: Units = &[("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("µs", 1e-6), ("ns", 1e-9)];
+
+/// Parses a number with a unit, converted to the first of `units`; `bare` permits to omit that unit.
+fn quantity(text: &str, units: Units, bare: bool, range: RangeInclusive<f64>) -> Result<f64, String> {
+    let base = units[0].0;
+    let names = || units.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
+    let (number, unit) = split(text);
+    let value: f64 = number.parse().map_err(|_| "not a number".to_owned())?;
+    let scale = match units.iter().find(|(name, _)| *name == unit) {
+        Some((_, scale)) => *scale,
+        None if unit.is_empty() && bare => 1.0,
+        None if unit.is_empty() => return Err(format!("a unit is wanted: {}", names())),
+        None => return Err(format!("`{unit}` is not one of the units {}", names())),
+    };
+    let value = value * scale;
+    if value <= 0.0 {
+        Err("not more than 0".to_owned())
+    } else if !range.contains(&value) {
+        Err(format!("not between {} and {} {base}", range.start(), range.end()))
+    } else {
+        Ok(value)
+    }
+}
+
+/// Parses a clock in MHz or with another unit, for clap.
+pub(crate) fn clock(text: &str) -> Result<f64, String> {
+    quantity(text, FREQUENCY, true, 0.01..=100_000.0)
+}
+
+/// A duration in cycles, or in seconds, convertible to cycles at a clock.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Time {
+    Cycles(u64),
+    Seconds(f64),
+}
+
+/// Time in the largest unit in which it is at least one.
+fn with_unit(seconds: f64) -> String {
+    let (name, size) = TIME.iter().find(|(_, size)| seconds >= *size).unwrap_or(&TIME[TIME.len() - 1]);
+    let value = seconds / size;
+    // Rounds away the error of the division.
+    let value = format!("{value:.9}");
+    format!("{}{name}", value.trim_end_matches('0').trim_end_matches('.'))
+}
+
+/// Parses a time with a unit, or a number of cycles, for clap.
+pub(crate) fn time(text: &str) -> Result<Time, String> {
+    let (number, unit) = split(text);
+    if number.is_empty() {
+        return Err("neither a time (`100us`, `0.1ms`) nor a number of cycles".to_owned());
+    }
+    if unit.is_empty() {
+        count(text).map(Time::Cycles).map_err(|error| match number.parse::<f64>() {
+            Ok(seconds) if number.contains(['.', 'e', 'E']) && seconds > 0.0 => {
+                let units = TIME.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
+                format!(
+                    "neither a whole number of cycles nor a time with its unit ({units}): for seconds, write `{}`",
+                    with_unit(seconds)
+                )
+            }
+            _ => error,
+        })
+    } else {
+        quantity(text, TIME, false, 1e-9..=1e6).map(Time::Seconds)
+    }
+}
+
+impl Time {
+    /// Whole cycles at a clock in MHz. A time within rounding error of a whole number is rounded to it.
+    pub(crate) fn cycles(self, clock: f64) -> u64 {
+        match self {
+            Time::Cycles(cycles) => cycles,
+            Time::Seconds(seconds) => (seconds * clock * 1e6 + 1e-6).floor() as u64,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whole_numbers() {
+        assert_eq!(count("1"), Ok(1));
+        assert_eq!(count(" +7 "), Ok(7));
+        assert_eq!(count("18446744073709551615"), Ok(u64::MAX));
+        assert_eq!(natural("0"), Ok(0));
+        assert_eq!(tick("100000000").map(NonZeroU64::get), Ok(LONGEST_TICK));
+        for (text, reason) in [
+            ("", "not a whole number"),
+            ("nan", "not a whole number"),
+            ("--json", "not a whole number"),
+            ("-", "not a whole number"),
+            ("0", "less than 1"),
+            ("-1", "less than 1"),
+            ("-0.5", "less than 1"),
+            ("1.5", "not a whole number in digits"),
+            ("1e3", "not a whole number in digits (`1000`)"),
+            ("18446744073709551616", "more than 18446744073709551615"),
+            ("100us", "a whole number is wanted, without a unit; `us` follows it"),
+            ("-100us", "a whole number is wanted, without a unit; `us` follows it"),
+            ("0x10", "a whole number is wanted, without a unit; `x10` follows it"),
+            ("1 000", "a whole number is wanted, without a unit; `000` follows it"),
+        ] {
+            assert_eq!(count(text), Err(reason.to_owned()), "{text:?}");
+        }
+        assert_eq!(tick("100000001"), Err("more than 100000000".to_owned()));
+        assert_eq!(natural("-1"), Err("less than 0".to_owned()));
+    }
+
+    #[test]
+    fn clocks() {
+        for (text, mhz) in
+            [("125", 125.0), ("125MHz", 125.0), ("1.5 GHz", 1500.0), ("20kHz", 0.02), ("1e3", 1e3)]
+        {
+            assert_eq!(clock(text), Ok(mhz), "{text}");
+        }
+        let units = "MHz, Hz, kHz, GHz";
+        let range = "not between 0.01 and 100000 MHz";
+        for (text, reason) in [
+            ("", "not a number"),
+            ("fast", "not a number"),
+            ("nan", "not a number"),
+            ("infMHz", "not a number"),
+            ("MHz", "not a number"),
+            ("0", "not more than 0"),
+            ("-5", "not more than 0"),
+            ("-5MHz", "not more than 0"),
+            ("-0", "not more than 0"),
+            ("1Hz", range),
+            ("1e400", range),
+            ("1e-400", "not more than 0"),
+            ("1000GHz", range),
+            ("5mhz", &format!("`mhz` is not one of the units {units}")),
+            ("5 us", &format!("`us` is not one of the units {units}")),
+        ] {
+            assert_eq!(clock(text), Err(reason.to_owned()), "{text:?}");
+        }
+    }
+
+    #[test]
+    fn times() {
+        let cycles = |text| time(text).map(|time| time.cycles(125.0));
+        for (text, expected) in [
+            ("12500", 12500),
+            ("100us", 12500),
+            ("100 µs", 12500),
+            ("0.1ms", 12500),
+            ("1e-4s", 12500),
+            ("8ns", 1),
+        ] {
+            assert_eq!(cycles(text), Ok(expected), "{text}");
+        }
+        let neither = "neither a time (`100us`, `0.1ms`) nor a number of cycles";
+        for (text, reason) in [
+            ("", neither),
+            ("nan", neither),
+            ("infs", neither),
+            ("us", neither),
+            ("--json", neither),
+            ("-5us", "not more than 0"),
+            ("0us", "not more than 0"),
+            ("0", "less than 1"),
+            ("-5", "less than 1"),
+            ("-1e3", "less than 1"),
+            (
+                "1.5",
+                "neither a whole number of cycles nor a time with its unit (s, ms, us, µs, ns): for seconds, write `1.5s`",
+            ),
+            (
+                "1e-3",
+                "neither a whole number of cycles nor a time with its unit (s, ms, us, µs, ns): for seconds, write `1ms`",
+            ),
+            (
+                "0.0000125",
+                "neither a whole number of cycles nor a time with its unit (s, ms, us, µs, ns): for seconds, write `12.5us`",
+            ),
+            ("100kg", "`kg` is not one of the units s, ms, us, µs, ns"),
+            ("100MHz", "`MHz` is not one of the units s, ms, us, µs, ns"),
+            ("1e400s", "not between 0.000000001 and 1000000 s"),
+            ("0.1ns", "not between 0.000000001 and 1000000 s"),
+        ] {
+            assert_eq!(time(text).map(|_| ()), Err(reason.to_owned()), "{text:?}");
+        }
+    }
+}

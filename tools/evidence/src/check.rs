@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! The command `cargo evidence check`: parts of the evidence in CI, each repeated only after a change of its inputs.
+
+use crate::{clients, formal, linuxcnc, litex, routed};
+use anyhow::{Result, ensure};
+use takt_automation::check_cache::{self, Inputs, LINUXCNC, OPERANDS};
+use takt_automation::command::install;
+use takt_automation::progress;
+
+/// The checks to run.
+#[derive(clap::Args)]
+pub(crate) struct Arguments {
+    /// The checks by name, which then run even if they have passed with the same files; without names, formal, units, clients and litex.
+    names: Vec<String>,
+    /// Run all, those that take longer too: the placed and routed board, LinuxCNC.
+    #[arg(long, conflicts_with = "names")]
+    all: bool,
+}
+
+/// A check: name, inputs, and function.
+struct Share {
+    name: &'static str,
+    /// The check is part of every CI run.
+    is_short: bool,
+    /// The files and tools on which the outcome depends; `None` if these are unknown, so that the check always runs.
+    inputs: Option<fn() -> Result<Inputs>>,
+    run: fn() -> Result<()>,
+}
+
+const SHARES: [Share; 6] = [
+    Share {
+        name: "formal",
+        is_short: true,
+        inputs: Some(|| formal::inputs(&formal::Arguments::SHARE)),
+        run: || formal::formal(&formal::Arguments::SHARE),
+    },
+    Share { name: "units", is_short: true, inputs: Some(formal::unit_inputs), run: formal::unit_share },
+    Share { name: "clients", is_short: true, inputs: Some(clients::inputs), run: clients::test },
+    Share { name: "litex", is_short: true, inputs: Some(litex::inputs), run: litex::test },
+    Share { name: "routed", is_short: false, inputs: Some(routed::inputs), run: routed::test },
+    Share {
+        name: LINUXCNC,
+        is_short: false,
+        // The installed LinuxCNC may change unnoticed, so its check never counts as passed.
+        inputs: None,
+        run: || linuxcnc::linuxcnc(&linuxcnc::Arguments::default()),
+    },
+];
+
+/// Runs the requested checks.
+pub(crate) fn check(arguments: &Arguments) -> Result<()> {
+    for name in &arguments.names {
+        let names: Vec<&str> = SHARES.iter().map(|share| share.name).collect();
+        ensure!(names.contains(&name.as_str()), "there is no check `{name}`; there are {}", names.join(", "));
+    }
+    install()?;
+    for share in &SHARES {
+        let is_named = arguments.names.iter().any(|name| name == share.name);
+        if is_named || arguments.all || arguments.names.is_empty() && share.is_short {
+            match share.inputs {
+                Some(inputs) => check_cache::once(share.name, &inputs()?, is_named, share.run)?,
+                None => progress::step(share.name, share.run)?,
+            }
+        } else if arguments.names.is_empty() {
+            check_cache::leave_out(share.name, "takes longer");
+        }
+    }
+    if arguments.names.is_empty() {
+        check_cache::leave_out(OPERANDS, "takes longer");
+    }
+    print!("{}", check_cache::left_out());
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use takt_automation::check_cache::CHECKS;
+
+    #[test]
+    fn every_share_is_a_check_with_its_command() {
+        for share in &SHARES {
+            let command = format!("cargo evidence check {}", share.name);
+            assert!(CHECKS.iter().any(|check| check.name == share.name && check.command == command));
+        }
+    }
+
+    /// All files that a proof reads are covered by the hash that allows to skip it.
+    #[test]
+    fn the_keys_of_proofs_cover_the_files_that_they_read() {
+        let [formal, units] =
+            [&SHARES[0], &SHARES[1]].map(|share| share.inputs.expect("files are known")().expect("inputs"));
+        let folder = takt_automation::command::root().join("rtl/formal");
+        for entry in std::fs::read_dir(folder).expect("rtl/formal") {
+            let name = entry.expect("an entry").file_name().display().to_string();
+            let path = format!("rtl/formal/{name}");
+            // `mutants.py` is no proof: it plants faults for `cargo evidence mutants`.
+            if name != "mutants.py" && (name.ends_with(".py") || name.ends_with(".v")) {
+                assert!(formal.covers(&path) || units.covers(&path), "{path} is in no key");
+            }
+        }
+        for path in ["rtl/units/add.v", "rtl/tests/faults.rs", "rtl/formal/prove.py", "isa/src/fp/mod.rs"] {
+            assert!(units.covers(path), "{path}");
+        }
+    }
+}

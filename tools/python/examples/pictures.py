@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""Figures of matplotlib as small SVG files that are the same in every run.
+
+    python3 tools/python/examples/pictures.py FILE.svg ...       shrink files that matplotlib wrote
+"""
+
+from __future__ import annotations
+
+import io
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+#: Digits after the point of a coordinate in points: a twentieth of a point is less than a pixel shows.
+DIGITS = 1
+
+
+def number(text: str) -> str:
+    return f"{round(float(text), DIGITS) + 0.0:g}"
+
+
+def path(found: re.Match[str]) -> str:
+    """Path data with rounded coordinates; points that rounding makes equal are one, and the letter of repeated lines is left out."""
+    parts: list[str] = []
+    last = ""
+    for letter, numbers in re.findall(r"([A-Za-z])([^A-Za-z]*)", found[1]):
+        step = letter + " ".join(number(text) for text in numbers.split())
+        if letter == "L" and last in ("M", "L"):
+            step = " " + step[1:]
+            if parts[-1].lstrip("M ") == step[1:]:
+                continue
+        parts.append(step)
+        last = letter
+    return f'd="{"".join(parts)}"'
+
+
+def shrink(svg: str) -> str:
+    """The same picture: without description, comments and invisible digits, and with one line for each named group."""
+    svg = re.sub(r"<!--.*?-->|<metadata>.*?</metadata>|<!DOCTYPE.*?>", "", svg, flags=re.S)
+    svg = re.sub(r'\bd="([^"]*)"', path, svg)
+    svg = re.sub(r'\b([xy])="([-\d.e]+)"', lambda found: f'{found[1]}="{number(found[2])}"', svg)
+    svg = re.sub(r"translate\(([-\d.e]+)[ ,]+([-\d.e]+)\)", lambda found: f"translate({number(found[1])} {number(found[2])})", svg)
+    return re.sub(r">\s+<", "><", svg).replace("<g id=", "\n<g id=").strip() + "\n"
+
+
+def save(figure: Any, file: str | Path) -> None:
+    """Writes a figure as SVG."""
+    import matplotlib
+
+    text = io.StringIO()
+    with matplotlib.rc_context({"svg.hashsalt": "takt"}):
+        figure.savefig(text, format="svg", metadata={"Date": None})
+    Path(file).write_text(shrink(text.getvalue()))
+
+
+if __name__ == "__main__":
+    for name in sys.argv[1:]:
+        Path(name).write_text(shrink(Path(name).read_text()))

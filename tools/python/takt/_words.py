@@ -1,0 +1,42 @@
+"""Messages of the tools in Python's words: where they name an option or a command of the command line, the argument or method."""
+
+from __future__ import annotations
+
+import re
+
+#: An option, alone or with its command: quoted with a value or without, or bare. Other commands that are quoted stay whole.
+_OPTION = re.compile(
+    r"`(?:takt [a-z]+ )?--(?P<quoted>[a-z][a-z-]*)(?: (?P<value>[^\s`]+))?`"
+    r"|`takt live PORT (?P<method>[a-z]+)`"
+    r"|`takt [^`]*`"
+    r"|(?<![\w`-])--(?P<bare>[a-z][a-z-]*)"
+)
+
+#: A line of a source, as messages show it.
+_SOURCE = re.compile(r"\s*\d+ │")
+
+#: Options that are arguments of the same name.
+_ARGUMENTS = {"base", "contract", "effort", "exact", "floating", "include", "output", "range", "schedule", "tip"}
+#: Options and commands that Python has in another way.
+_OTHERS = {"deadline": "`program.bound()`", "status": "`board.status`"}
+
+
+def _argument(found: re.Match[str]) -> str:
+    name = found["quoted"] or found["bare"] or found["method"]
+    if name is None:
+        return found[0]
+    if name in _OTHERS:
+        return _OTHERS[name]
+    if found["method"]:
+        return f"`board.{name}()`"
+    if name.startswith("no-"):
+        return f'`without=["{name[3:]}"]`'
+    if name not in _ARGUMENTS:
+        return f"`--{name}` on the command line"
+    return f'`{name}="{found["value"]}"`' if found["value"] else f"`{name}=`"
+
+
+def in_python(text: str) -> str:
+    """A message with arguments (`tip=`) in the place of options (`--tip`). Lines of sources in it stay as they are."""
+    lines = text.split("\n")
+    return "\n".join(line if _SOURCE.match(line) else _OPTION.sub(_argument, line) for line in lines)
