@@ -20,6 +20,7 @@ pub mod parse;
 pub mod tokens;
 
 pub use expression::Expression;
+pub use lex::hex_real;
 
 use std::sync::Arc;
 use takt_diagnostics::diag::{Diagnostics, Sink};

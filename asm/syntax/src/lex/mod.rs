@@ -316,7 +316,11 @@ fn token(raw: Raw, text: &str, nesting: &mut usize, names: &mut Interner) -> Res
         Raw::Hexadecimal => Token::Int(radix(&text[2..], 16)?),
         Raw::Binary => Token::Int(radix(&text[2..], 2)?),
         Raw::Real => Token::Real(real(text)),
-        Raw::HexReal => Token::Real(hex_real(text).ok_or(TokenError::NotNumber)?),
+        Raw::HexReal => {
+            let (mantissa, exponent) = hex_real(&text[2..]).ok_or(TokenError::NotNumber)?;
+            // Subnormal numbers of more digits than they can hold round twice.
+            Token::Real(libm::scalbn(mantissa as f64, exponent))
+        }
         Raw::NotNumber => return Err(TokenError::NotNumber),
         Raw::Slashes => return Err(TokenError::Slashes),
         Raw::Text => Token::Text,
@@ -386,10 +390,10 @@ fn real(text: &str) -> f64 {
     parsed.unwrap_or(f64::NAN)
 }
 
-/// `0x1.8p-3`, exact where binary64 holds it, else rounded to it once: digits beyond 62 bits leave a sticky bit. (Subnormal
-/// numbers of more digits than they can hold round twice.)
-fn hex_real(text: &str) -> Option<f64> {
-    let text = text[2..].replace('_', "");
+/// `(mantissa, exponent)` of the number mantissa · 2^exponent that `1.8p-3` denotes, the digits behind `0x`. Digits beyond 62 bits
+/// leave a sticky bit, so that a conversion of the mantissa to binary32 or binary64 rounds once.
+pub fn hex_real(text: &str) -> Option<(u64, i32)> {
+    let text = text.replace('_', "");
     let (digits, exponent) = text.split_once(['p', 'P'])?;
     let (whole, fraction) = digits.split_once('.').unwrap_or((digits, ""));
     if whole.is_empty() && fraction.is_empty() {
@@ -411,11 +415,7 @@ fn hex_real(text: &str) -> Option<f64> {
             exponent += if i < whole.len() { 4 } else { 0 };
         }
     }
-    let mut value = mantissa as f64;
-    if mantissa != 0 {
-        value = libm::scalbn(value, exponent.clamp(-2_000, 2_000) as i32);
-    }
-    Some(value)
+    Some((mantissa, exponent.clamp(-2_000, 2_000) as i32))
 }
 
 #[cfg(test)]

@@ -7,9 +7,9 @@ use crate::c::ir::Op;
 use crate::c::types::{INT, Integer, Type, UNSIGNED};
 use crate::c::value::{Condition, Lvalue, Origin, Outcome, Pointer, Typed, Value};
 use lang_c::ast::{
-    BinaryOperator, BinaryOperatorExpression, ConditionalExpression, Constant, Expression, FloatFormat,
-    IntegerBase, IntegerSize, MemberExpression, MemberOperator, OffsetMember, OffsetOfExpression,
-    UnaryOperator, UnaryOperatorExpression,
+    BinaryOperator, BinaryOperatorExpression, ConditionalExpression, Constant, Expression, FloatBase,
+    FloatFormat, IntegerBase, IntegerSize, MemberExpression, MemberOperator, OffsetMember,
+    OffsetOfExpression, UnaryOperator, UnaryOperatorExpression,
 };
 use lang_c::span::Node;
 
@@ -210,20 +210,21 @@ impl<'a> Exec<'a> {
                 Ok(Typed { ty: Type::Int(ty), value: Value::Int(value as i64) })
             }
             Constant::Float(float) => {
+                let single = self.double_is_float || float.suffix.format == FloatFormat::Float;
+                // The text is rounded once.
                 let value = match float.base {
-                    lang_c::ast::FloatBase::Decimal => float.number.parse().ok(),
-                    lang_c::ast::FloatBase::Hexadecimal => hexadecimal(&float.number),
+                    FloatBase::Decimal if single => float.number.parse::<f32>().ok().map(f64::from),
+                    FloatBase::Decimal => float.number.parse().ok(),
+                    FloatBase::Hexadecimal => {
+                        takt_syntax::hex_real(&float.number).map(|(mantissa, exponent)| match single {
+                            true => f64::from(libm::scalbnf(mantissa as f32, exponent)),
+                            false => libm::scalbn(mantissa as f64, exponent),
+                        })
+                    }
                 };
                 let Some(value) = value else { return self.fail(format!("`{}` is no number", float.number)) };
-                let single = self.double_is_float || float.suffix.format == FloatFormat::Float;
-                Ok(match single {
-                    // The text is rounded once.
-                    true => {
-                        let rounded = float.number.parse::<f32>().unwrap_or(value as f32);
-                        Typed { ty: Type::Float, value: Value::Real(f64::from(rounded)) }
-                    }
-                    false => Typed { ty: Type::Double, value: Value::Real(value) },
-                })
+                let ty = if single { Type::Float } else { Type::Double };
+                Ok(Typed { ty, value: Value::Real(value) })
             }
             Constant::Character(text) => {
                 let inner = text.trim_start_matches('L');
@@ -555,18 +556,4 @@ impl<'a> Exec<'a> {
         )?;
         self.load(&place)
     }
-}
-
-/// A hexadecimal number of C: `1.8p-3` behind `0x`.
-fn hexadecimal(text: &str) -> Option<f64> {
-    let text = text.to_ascii_lowercase();
-    let (digits, exponent) = text.split_once('p')?;
-    let exponent: i32 = exponent.parse().ok()?;
-    let (whole, part) = digits.split_once('.').unwrap_or((digits, ""));
-    let mut value = 0.0_f64;
-    for digit in whole.chars().chain(part.chars()) {
-        value = value * 16.0 + f64::from(digit.to_digit(16)?);
-    }
-    let exponent = exponent - 4 * i32::try_from(part.len()).ok()?;
-    Some(value * 2.0_f64.powi(exponent))
 }
