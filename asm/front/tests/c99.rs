@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! C through `takt cc` on t1, t3, t4 against gcc, construct by construct, bit for bit; and the messages about what is refused.
 
-use crate::common::gcc::{Program, compiled, difference, emulated, folder, translated};
+use crate::common::gcc::{Program, folder, matches_gcc, translated};
 use rand_pcg::Pcg32;
 use rand_pcg::rand_core::{Rng, SeedableRng};
-use takt_isa::{T1, T3, T4};
 
 /// Periods of a case.
 const PERIODS: usize = 40;
@@ -29,22 +28,11 @@ pub(crate) fn word(random: &mut Pcg32, float: bool) -> u32 {
 }
 
 fn check(name: &str, code: &str) -> takt_front::c::Translation {
-    let folder = folder(name);
-    let program = Program::new(name, code);
-    let translation = translated(&program, &folder).unwrap_or_else(|error| panic!("{name}: {error}"));
-    let mut random = Pcg32::seed_from_u64(name.bytes().fold(7, |sum, byte| sum * 31 + u64::from(byte)));
-    let row = |_| translation.inputs.iter().map(|port| word(&mut random, port.float)).collect();
-    let inputs: Vec<Vec<u32>> = (0..PERIODS).map(row).collect();
-    let expected = compiled(&[(&program, &translation, &inputs)], &folder).remove(0);
-    assert!(!translation.outputs.is_empty(), "{name} has no outputs\n{}", translation.text);
-    for machine in [&T1, &T3, &T4] {
-        let found = emulated(&program, &translation, machine, &inputs);
-        if let Some(text) = difference(&program, &translation, &inputs, &expected, &found) {
-            panic!("{}: {text}", machine.name);
-        }
-    }
-    let _ = std::fs::remove_dir_all(folder);
-    translation
+    matches_gcc(&Program::new(name, code), |translation| {
+        let mut random = Pcg32::seed_from_u64(name.bytes().fold(7, |sum, byte| sum * 31 + u64::from(byte)));
+        let row = |_| translation.inputs.iter().map(|port| word(&mut random, port.float)).collect();
+        (0..PERIODS).map(row).collect()
+    })
 }
 
 /// The message about a program that is refused.
@@ -62,6 +50,20 @@ fn computes_sums_in_their_order() {
     check(
         "computes_sums_in_their_order",
         r#"float step(float a, float b) { return a*b + a/(b*b + 1.0f) - -a; }
+"#,
+    );
+}
+
+/// Numbers of more digits than binary32 or binary64 hold, beside a tie and a hair above and below one.
+#[test]
+fn hexadecimal_literals_round_once() {
+    check(
+        "hexadecimal_literals_round_once",
+        r#"float step(float x) {
+  const float a[6] = {0x1.8p-3f, 0x1.0000010000000001p0f, 0x1.000001p0f, 0x0.fffffefffffffffffffffffp4f, 0x.8p1f, 0x1.fffffefp127f};
+  float sum = x;
+  for (int i = 0; i < 6; i++) sum = a[i] - 2.0f*sum;
+  return sum; }
 "#,
     );
 }

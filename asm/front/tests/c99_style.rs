@@ -4,14 +4,14 @@
 #![allow(clippy::print_stdout)]
 
 use crate::c99::word;
-use crate::common::gcc::{Program, compiled, difference, emulated, folder, same, translated};
+use crate::common::gcc::{Program, compiled, emulated, folder, matches_gcc, same, translated};
 use crate::common::python;
 use rand_pcg::Pcg32;
 use rand_pcg::rand_core::SeedableRng;
 use std::path::Path;
 use std::process::Command;
 use takt_front::c::Translation;
-use takt_isa::{T1, T3, T4};
+use takt_isa::T3;
 
 const PERIODS: usize = 60;
 
@@ -28,20 +28,9 @@ fn read(file: &str) -> String {
 
 /// Translates a file, and compares all periods bit for bit on every machine.
 fn check(name: &str, double_is_float: bool) -> Translation {
-    let folder = folder(name);
     let mut program = Program::new(name, &read(&format!("{name}.c")));
     program.double_is_float = double_is_float;
-    let translation = translated(&program, &folder).unwrap_or_else(|error| panic!("{error}"));
-    let inputs = inputs(&translation, 3);
-    let expected = compiled(&[(&program, &translation, &inputs)], &folder).remove(0);
-    for machine in [&T1, &T3, &T4] {
-        let found = emulated(&program, &translation, machine, &inputs);
-        if let Some(text) = difference(&program, &translation, &inputs, &expected, &found) {
-            panic!("{}: {text}", machine.name);
-        }
-    }
-    let _ = std::fs::remove_dir_all(folder);
-    translation
+    matches_gcc(&program, |translation| inputs(translation, 3))
 }
 
 #[test]

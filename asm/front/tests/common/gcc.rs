@@ -8,7 +8,7 @@ use std::process::{Command, Stdio};
 use takt_asm::{MemoryLoader, Options as Assembling, Search};
 use takt_emu::{Emulator, Number};
 use takt_front::c::{Options, Preprocessor, Source, Translation, translate};
-use takt_isa::Machine;
+use takt_isa::{Machine, T1, T3, T4};
 
 /// A program in C.
 #[derive(Clone, Debug)]
@@ -47,6 +47,27 @@ pub(crate) fn translated(program: &Program, folder: &Path) -> Result<Translation
     let define = program.double_is_float.then(|| "-DTAKT_DOUBLE_IS_FLOAT=1".to_owned());
     let preprocessor = Preprocessor::new(&define.into_iter().collect::<Vec<_>>()).expect("a folder");
     translated_text(program, preprocessor.run(&path).map_err(|error| error.to_string())?)
+}
+
+/// Translates a program, and compares it on t1, t3 and t4 with gcc's, bit for bit in all periods. `inputs` makes their rows.
+pub(crate) fn matches_gcc(
+    program: &Program,
+    inputs: impl FnOnce(&Translation) -> Vec<Vec<u32>>,
+) -> Translation {
+    let folder = folder(&program.name);
+    let translation =
+        translated(program, &folder).unwrap_or_else(|error| panic!("{}: {error}", program.name));
+    assert!(!translation.outputs.is_empty(), "{} has no outputs\n{}", program.name, translation.text);
+    let inputs = inputs(&translation);
+    let expected = compiled(&[(program, &translation, &inputs)], &folder).remove(0);
+    for machine in [&T1, &T3, &T4] {
+        let found = emulated(program, &translation, machine, &inputs);
+        if let Some(text) = difference(program, &translation, &inputs, &expected, &found) {
+            panic!("{}: {text}", machine.name);
+        }
+    }
+    let _ = std::fs::remove_dir_all(folder);
+    translation
 }
 
 /// Translates preprocessed text.

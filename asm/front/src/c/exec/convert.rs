@@ -16,7 +16,7 @@ impl Exec<'_> {
         }
         match (&ty, to) {
             (_, Type::Void) => Ok(Value::Unset),
-            (Type::Int(from), Type::Int(to)) => self.narrowed(value, *from, *to),
+            (Type::Int(_), Type::Int(to)) => self.narrowed(value, *to),
             (Type::Int(from), Type::Float | Type::Double) => self.real_of(value, *from, to),
             (Type::Float | Type::Double, Type::Int(to)) => self.truncated(value, *to),
             (Type::Float, Type::Float) | (Type::Double, Type::Double) => Ok(value),
@@ -45,7 +45,7 @@ impl Exec<'_> {
         }
     }
 
-    fn narrowed(&mut self, value: Value, from: Integer, to: Integer) -> Result<Value, Error> {
+    fn narrowed(&mut self, value: Value, to: Integer) -> Result<Value, Error> {
         let id = match value {
             Value::Int(value) => return Ok(Value::Int(to.wrap(value))),
             Value::Node(id) => id,
@@ -58,7 +58,6 @@ impl Exec<'_> {
         if to.bits > 32 {
             return self.wide();
         }
-        let _ = from;
         Ok(Value::Node(self.wrapped(id, to)?))
     }
 

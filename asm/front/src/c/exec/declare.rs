@@ -92,9 +92,7 @@ impl<'a> Exec<'a> {
             || self.is_constant_pointer(&declarator.declarator.node);
         let in_file = self.frames.is_empty();
         match (&base.storage, in_file) {
-            (Some(StorageClassSpecifier::Static), false) => {
-                self.static_local(&name, &ty, constant, initializer, place)
-            }
+            (Some(StorageClassSpecifier::Static), false) => self.static_local(&name, place),
             (Some(StorageClassSpecifier::Extern), false) => {
                 let Some(object) = self.globals.get(&name).copied() else {
                     return self.fail(format!(
@@ -152,21 +150,13 @@ impl<'a> Exec<'a> {
         }
     }
 
-    fn static_local(
-        &mut self,
-        name: &str,
-        ty: &Type,
-        constant: bool,
-        initializer: Option<&'a Initializer>,
-        place: usize,
-    ) -> Result<(), Error> {
+    fn static_local(&mut self, name: &str, place: usize) -> Result<(), Error> {
         let function = self.frames.last().map_or_else(String::new, |frame| frame.key.clone());
         let key: Key = (function, place, self.unit());
         let Some(object) = self.statics.get(&key).copied() else {
             // All statics are made before the step runs: `statics` visits the functions.
             return self.fail(format!("`{name}` is static where no static is expected"));
         };
-        let _ = (ty, constant, initializer);
         self.scope().names.insert(name.to_owned(), Named::Object(object));
         Ok(())
     }

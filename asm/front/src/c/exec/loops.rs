@@ -237,7 +237,7 @@ impl<'a> Exec<'a> {
                         }
                         if count >= OPEN {
                             self.at = at;
-                            return self.endless(parts);
+                            return self.endless();
                         }
                         return self.fork(
                             id,
@@ -258,7 +258,7 @@ impl<'a> Exec<'a> {
                 Condition::Known(true) => self.stepped(&parts)?,
                 Condition::Node(_) => {
                     if count >= OPEN {
-                        return self.endless(parts);
+                        return self.endless();
                     }
                     return self.guarded(
                         normal,
@@ -286,8 +286,7 @@ impl<'a> Exec<'a> {
     }
 
     /// Gives a loop up whose end data decide: as if it had used up its budget, or for good if it has none.
-    fn endless(&mut self, parts: Repetition<'a>) -> Result<Condition, Error> {
-        let _ = parts;
+    fn endless(&mut self) -> Result<Condition, Error> {
         if let Some(level) = self.budgets.len().checked_sub(1) {
             self.exhausted = Some(level);
         }

@@ -202,7 +202,7 @@ impl<'a> Exec<'a> {
             let kept = self.memory.get(counter.object, 0) == &Value::Node(index);
             let same_end =
                 match parts.condition.map(|condition| self.comparison(condition, &name)).transpose()? {
-                    Some(Some((_, end, _))) => self.ends_alike(counter, end, parts)?,
+                    Some(Some(_)) => self.ends_alike(counter, parts)?,
                     _ => false,
                 };
             if !regular || !kept || !same_end {
@@ -228,12 +228,11 @@ impl<'a> Exec<'a> {
     }
 
     /// The loop's end is still what it was before the body.
-    fn ends_alike(&mut self, counter: Counter, end: i64, parts: &Repetition<'a>) -> Result<bool, Error> {
+    fn ends_alike(&mut self, counter: Counter, parts: &Repetition<'a>) -> Result<bool, Error> {
         let saved = self.memory.clone();
         self.memory.set(counter.object, 0, Value::Int(counter.first));
         let again = self.counter(parts)?;
         self.memory = saved;
-        let _ = end;
         Ok(again.is_some_and(|again| again.count == counter.count))
     }
 
@@ -260,7 +259,7 @@ impl<'a> Exec<'a> {
             let normal = self.statement(parts.body, &mut outcomes)?;
             let mut leaves = Vec::new();
             let normal = self.absorbed(normal, outcomes, &|exit| *exit == Exit::Continue, &mut leaves)?;
-            let next = self.either(
+            self.either(
                 normal,
                 &mut |exec, _| {
                     exec.stepped(parts)?;
@@ -275,7 +274,6 @@ impl<'a> Exec<'a> {
                 },
                 &mut Vec::new(),
             )?;
-            let _ = next;
             let mut exit = None;
             let mut ends = Vec::new();
             for mut outcome in leaves {

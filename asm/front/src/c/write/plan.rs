@@ -180,7 +180,7 @@ impl Planner<'_> {
                 _ => index,
             };
         }
-        for (index, (statement, _)) in block.iter().enumerate() {
+        for (statement, _) in block {
             if let Statement::Def(id) = statement {
                 let operands = self.nodes.operands(*id);
                 let sum: usize = operands.iter().map(|operand| self.length[operand.0 as usize].max(6)).sum();
@@ -190,7 +190,6 @@ impl Planner<'_> {
                     self.length[id.0 as usize] = 6;
                 }
             }
-            let _ = index;
         }
         for (index, (statement, _)) in block.iter().enumerate().rev() {
             let Statement::Def(id) = statement else { continue };

@@ -158,8 +158,7 @@ impl Speller<'_> {
                 let (yes, no) = (self.of(*yes).at_least(Binding::Or), self.of(*no).at_least(Binding::Or));
                 Text { text: format!("{condition} ? {yes} : {no}"), binding: Binding::Choice }
             }
-            (Form::Infix(operator, binding), [a, b]) if op == Op::IntMul && !self.is_known(*b) => {
-                let _ = (operator, binding);
+            (Form::Infix(..), [a, b]) if op == Op::IntMul && !self.is_known(*b) => {
                 self.library.borrow_mut().insert("c.s");
                 let small = |id: Id| self.nodes.range(id).0 >= -(1 << 15) && self.nodes.range(id).1 < 1 << 15;
                 let name = if small(*a) && small(*b) { "product_short" } else { "product" };
