@@ -377,7 +377,7 @@ mod tests {
     fn refused() {
         let message = |unit, source| parse(unit, source).unwrap_err();
         assert!(message(&ADD, "//@ op 1'b0 fadd").contains("no circuit for fsub"));
-        assert!(message(&ADD, "//@ op 1'b0 fadd\n//@ op 2'b01 fsub").contains("not as wide"));
+        assert!(message(&ADD, "//@ op 1'b0 fadd\n//@ op 2'b01 fsub").contains("differs in width"));
         assert!(message(&ADD, "//@ op 1'b0 fadd fsub fadd").contains("two codes"));
         assert!(message(&ADD, "//@ op 1'b0 fmul").contains("no instruction that the unit `add`"));
         assert!(message(&ADD, "//@ op 1'd0 fadd").contains("expected"));

@@ -725,10 +725,11 @@ fn explained(help: &str) -> BTreeMap<String, bool> {
     entries.map(entry).collect()
 }
 
-/// Options named in a text, without their values: `--gcode`, `-m`.
+/// Options named in a text, without their values: `--gcode`, `-m`, `-D` of `-DNDEBUG`.
 fn options(text: &str) -> Vec<&str> {
     let words = text.split(|c: char| !(c.is_ascii_alphanumeric() || c == '-'));
-    words.filter(|word| word.starts_with('-') && !word.trim_start_matches('-').is_empty()).collect()
+    let options = words.filter(|word| word.starts_with('-') && !word.trim_start_matches('-').is_empty());
+    options.map(|word| if word.starts_with("--") { word } else { &word[..2] }).collect()
 }
 
 /// Commands listed in a help text.

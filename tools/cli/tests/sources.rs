@@ -82,7 +82,7 @@ fn missing_file_lists_the_existing_ones() {
     folder.write("app/typo.s", ".include <maths.s>\n");
     let text = fails("asm app/typo.s --check", 1);
     assert!(
-        text.contains("there are <arrays.s>, <control.s>, <math.s>")
+        text.contains("there are <arrays.s>, <c.s>, <control.s>, <math.s>")
             && text.contains("did you mean `.include <math.s>`?"),
         "{text}"
     );
