@@ -2,7 +2,6 @@
 //! Text to tokens. Each kind of token has a regular expression; mnemonics are names like any other.
 
 mod range;
-#[allow(clippy::all, unused, reason = "generated")]
 mod raw;
 
 use crate::ast::Directive;

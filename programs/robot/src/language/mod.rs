@@ -9,7 +9,6 @@ pub mod code;
 mod expression;
 mod parse;
 pub mod table;
-#[allow(clippy::all, unused, reason = "generated")]
 mod tokens;
 pub mod tree;
 
