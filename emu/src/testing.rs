@@ -5,6 +5,8 @@
 //! that rare units occur as often as common ones. Instructions are taken from the specification's table; only the loop counter's decrement
 //! is named.
 
+use rand_xoshiro::SplitMix64;
+use rand_xoshiro::rand_core::{Rng as _, SeedableRng as _};
 use takt_isa::program::{LoopBound, Port, Section};
 use takt_isa::shape::WORD_BITS;
 use takt_isa::{
@@ -38,32 +40,28 @@ impl Options {
         Options { bundles: 40, control: true, wild: true, three: false, directed: false };
 }
 
-/// Small random number generator (SplitMix64).
+/// Random numbers for programs and operands, from SplitMix64.
 #[derive(Clone, Debug)]
-pub struct Random(u64);
+pub struct Random(SplitMix64);
 
 impl Random {
     /// Generator with this seed.
-    pub const fn new(seed: u64) -> Random {
-        Random(seed)
+    pub fn new(seed: u64) -> Random {
+        Random(SplitMix64::seed_from_u64(seed))
     }
 
     /// Next 64 random bits.
-    pub const fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
+    pub fn bits(&mut self) -> u64 {
+        self.0.next_u64()
     }
 
     /// Random number below `end`, which is not 0.
-    pub const fn below(&mut self, end: u32) -> u32 {
+    pub fn below(&mut self, end: u32) -> u32 {
         (((self.bits() >> 32) * end as u64) >> 32) as u32
     }
 
     /// Returns true once in `n` times.
-    pub const fn once_in(&mut self, n: u32) -> bool {
+    pub fn once_in(&mut self, n: u32) -> bool {
         self.below(n) == 0
     }
 

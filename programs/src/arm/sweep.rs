@@ -5,6 +5,8 @@ use super::{
     A1, CONFIGURATIONS, Configuration, Failure, GOOD, ON_AXIS, OUT_OF_REACH, Pose, WRIST_SINGULAR, forward,
     inverse, is_clear,
 };
+use rand_xoshiro::SplitMix64;
+use rand_xoshiro::rand_core::{Rng as _, SeedableRng as _};
 
 /// Result of a forward program.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -121,18 +123,10 @@ fn span(cycles: &mut Option<(u64, u64)>, period: u64) {
     *cycles = Some((shortest.min(period), longest.max(period)));
 }
 
-/// SplitMix64 generator of the sweep's inputs.
-struct Random(u64);
-
-impl Random {
-    /// Uniform random number in `-limit..limit`, as a binary32.
-    fn within(&mut self, limit: f64) -> f32 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        let unit = ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64;
-        ((2.0 * unit - 1.0) * limit) as f32
-    }
+/// Uniform random number in `-limit..limit`, as a binary32.
+fn within(random: &mut SplitMix64, limit: f64) -> f32 {
+    let unit = (random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
+    ((2.0 * unit - 1.0) * limit) as f32
 }
 
 impl Sweep {
@@ -217,11 +211,11 @@ pub fn sweep<A: Arm>(
     seed: u64,
     mut progress: impl FnMut(u64),
 ) -> Result<Sweep, A::Error> {
-    let mut random = Random(seed);
+    let mut random = SplitMix64::seed_from_u64(seed);
     let mut sweep = Sweep::default();
     for done in 0..count {
-        let joints = [(); 6].map(|()| random.within(180.0));
-        let tool = [(); 3].map(|()| random.within(2.0 * A1));
+        let joints = [(); 6].map(|()| within(&mut random, 180.0));
+        let tool = [(); 3].map(|()| within(&mut random, 2.0 * A1));
         sweep.add(arm, joints, tool)?;
         progress(done + 1);
     }

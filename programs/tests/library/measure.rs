@@ -2,6 +2,8 @@
 //! Errors in units in the last place, and the operands of their measurement.
 
 use super::batch::{Batch, LANES};
+use rand_xoshiro::SplitMix64;
+use rand_xoshiro::rand_core::{Rng as _, SeedableRng as _};
 use std::thread;
 use takt_emu::Emulator;
 use takt_isa::Program;
@@ -56,18 +58,6 @@ const NOTABLE: &[u32] = &[
 /// Notable operands of both signs.
 pub(crate) fn notable() -> impl Iterator<Item = u32> + Clone {
     NOTABLE.iter().flat_map(|&x| [x, x | 1 << 31])
-}
-
-/// SplitMix64 generator of operands.
-pub(crate) struct Random(pub(crate) u64);
-
-impl Random {
-    pub(crate) fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
 }
 
 /// Permits measurements over all operands: `TAKT_FULL=1`.
@@ -181,15 +171,15 @@ pub(crate) fn check_emulator(program: &Program, operands: usize) {
     assert_eq!(program.inputs.len(), operands);
     let mut batch = Batch::new(program);
     let mut emulator = Emulator::new(program).expect("it fits");
-    let mut random = Random(1);
-    let some: Vec<u32> = notable().chain((0..2000).map(|_| random.next() as u32)).collect();
-    let mut partner = Random(2);
+    let mut random = SplitMix64::seed_from_u64(1);
+    let some: Vec<u32> = notable().chain((0..2000).map(|_| random.next_u64() as u32)).collect();
+    let mut partner = SplitMix64::seed_from_u64(2);
     for chunk in some.chunks_exact(LANES) {
         let mut columns = vec![[0; LANES]; operands];
         columns[0].copy_from_slice(chunk);
         for column in &mut columns[1..] {
             let known: Vec<u32> = notable().collect();
-            *column = column.map(|_| match partner.next() {
+            *column = column.map(|_| match partner.next_u64() {
                 bits if bits & 1 == 0 => known[(bits >> 8) as usize % known.len()],
                 bits => (bits >> 32) as u32,
             });

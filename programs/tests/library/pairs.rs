@@ -2,8 +2,10 @@
 //! Macros of two operands: powers, over random pairs and all pairs of notable operands, and the remainder, which is exact.
 
 use super::batch::{Batch, LANES};
-use super::measure::{ErrorStatistics, Random, check_emulator, full, notable, parallel};
+use super::measure::{ErrorStatistics, check_emulator, full, notable, parallel};
 use super::one_use;
+use rand_xoshiro::SplitMix64;
+use rand_xoshiro::rand_core::{Rng as _, SeedableRng as _};
 use takt_isa::fp::{CANONICAL_NAN, Flags};
 use takt_isa::{MACHINES, T3};
 
@@ -23,7 +25,7 @@ fn is_signaling(x: u32) -> bool {
 }
 
 /// Generator of the pair with this index.
-type PairGenerator = fn(u64, &mut Random) -> [u32; 2];
+type PairGenerator = fn(u64, &mut SplitMix64) -> [u32; 2];
 
 /// Runs pairs through a program and records each result.
 fn measure(
@@ -37,7 +39,7 @@ fn measure(
     let pieces = parallel(count.div_ceil(CHUNK), |range| {
         let (mut batch, mut measured) = (batch.clone(), ErrorStatistics::default());
         let drawn = range.flat_map(|chunk| {
-            let mut random = Random(chunk);
+            let mut random = SplitMix64::seed_from_u64(chunk);
             (0..CHUNK).map(move |index| draw(index, &mut random))
         });
         let mut pairs = special.iter().copied().chain(drawn).peekable();
@@ -60,8 +62,8 @@ fn measure(
 
 /// Operands of a power by turns: random bits; a base of any size and an exponent that leads to a result of any size; a base near 1;
 /// integers and halves.
-fn draw_power(index: u64, random: &mut Random) -> [u32; 2] {
-    let bits = random.next();
+fn draw_power(index: u64, random: &mut SplitMix64) -> [u32; 2] {
+    let bits = random.next_u64();
     let (x, y) = (bits as u32, (bits >> 32) as u32);
     let towards = |x: f32| {
         let exponent = (y % 303_000) as f32 / 1000.0 - 151.0;
@@ -120,8 +122,8 @@ fn powers_are_within_the_documented_error() {
 }
 
 /// Operands of a remainder by turns: random bits; quotients up to 2^24; multiples and their neighbours; subnormals.
-fn draw_remainder(index: u64, random: &mut Random) -> [u32; 2] {
-    let bits = random.next();
+fn draw_remainder(index: u64, random: &mut SplitMix64) -> [u32; 2] {
+    let bits = random.next_u64();
     let (x, y) = (bits as u32, (bits >> 32) as u32);
     match index % 4 {
         0 => [x, y],

@@ -6,7 +6,9 @@ mod control;
 mod taclebench;
 
 use crate::common::check_table;
-use crate::library::measure::{Random, parallel};
+use crate::library::measure::parallel;
+use rand_xoshiro::SplitMix64;
+use rand_xoshiro::rand_core::{Rng as _, SeedableRng as _};
 use takt_asm::{MemoryLoader, Options, Search};
 use takt_emu::Emulator;
 use takt_isa::{Machine, T1, T3, T4};
@@ -406,12 +408,13 @@ fn judge(kernel: &Kernel, machine: &'static Machine, sources: &[(&str, &str)]) -
     let mut emulator = Emulator::new(&assembled.program).expect("it fits");
     let name = emulator.machine().name;
     assert_eq!(name.split(',').next(), Some(machine.name), "{file}");
-    let (mut random, mut kept, mut cycles) = (Random(7), Vec::new(), None);
+    let (mut random, mut kept, mut cycles) = (SplitMix64::seed_from_u64(7), Vec::new(), None);
     for period in 0..8 {
         let mut arrays: Arrays = kernel.lengths.iter().map(|length| vec![0.0; *length]).collect();
         for &which in kernel.filled {
             // Random binary32 numbers between -1 and 1.
-            arrays[which].fill_with(|| f64::from(((random.next() >> 40) as f32) / (1 << 23) as f32 - 1.0));
+            arrays[which]
+                .fill_with(|| f64::from(((random.next_u64() >> 40) as f32) / (1 << 23) as f32 - 1.0));
         }
         (kernel.prepare)(&mut arrays);
         let words = arrays.iter().flatten().map(|value| (*value as f32).to_bits());
