@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Subcommand `shadow` of `takt live`: compares a board's outputs with the emulator's on the same inputs, period by period.
 
-use crate::commands::live::{find, value_text};
+use crate::commands::live::value::{find, value_text};
 use crate::terminal::files::Out;
 use crate::terminal::progress::progress;
 use anyhow::{Context, Result, bail};

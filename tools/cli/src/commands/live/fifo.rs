@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Subcommands `push` and `pop` of `takt live`: entries of FIFOs between host and board.
 
-use super::{bits, value_text};
+use super::value::{bits, value_text};
 use crate::terminal::files::Out;
 use anyhow::{Context, Result, anyhow, bail};
 use std::io::Write;

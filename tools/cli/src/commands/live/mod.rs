@@ -4,8 +4,10 @@
 mod comparison;
 mod fifo;
 mod status;
+mod value;
 
 use crate::commands::board;
+use crate::commands::live::value::{bits, find, value_text};
 use crate::run::application;
 use crate::terminal::files::{self, Out};
 use crate::terminal::number;
@@ -21,7 +23,6 @@ use takt_board::protocol::{ENABLE, HOLD, LinkError, RESTART, RUN};
 use takt_board::serial::Serial;
 use takt_board::top::image;
 use takt_board::{Application, Host, Stream, Wiring};
-use takt_isa::Type;
 
 /// A board's serial port.
 #[derive(Args)]
@@ -168,30 +169,6 @@ enum Command {
         #[arg(long, default_value_t = 100)]
         count: u32,
     },
-}
-
-/// Address and type of a port.
-pub(crate) fn find(application: &Application<'_>, name: &str) -> Result<(u16, Type)> {
-    let place = application.find(name).map_err(|text| anyhow!("{text}"))?;
-    Ok((place.read, place.ty))
-}
-
-pub(crate) fn value_text(bits: u32, ty: Type) -> String {
-    match ty {
-        Type::F => f32::from_bits(bits).to_string(),
-        Type::I => (bits as i32).to_string(),
-        Type::B => format!("{bits:#x}"),
-    }
-}
-
-fn bits(text: &str, ty: Type) -> Option<u32> {
-    match ty {
-        Type::F => text.parse::<f32>().ok().map(f32::to_bits),
-        Type::I => text.parse::<i32>().ok().map(|n| n as u32),
-        Type::B => {
-            text.strip_prefix("0x").map_or_else(|| text.parse().ok(), |hex| u32::from_str_radix(hex, 16).ok())
-        }
-    }
 }
 
 /// Parsed arguments of a command, checked before the serial port is opened.
