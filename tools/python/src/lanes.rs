@@ -2,6 +2,7 @@
 //! Many closed loops at once: a batch, stepped from Python over arrays.
 
 use crate::failure::{self, Failure};
+use crate::program::Program;
 use crate::run::{UNWRITTEN, loaded, misses, output_state, port_error, shaped, writable};
 use numpy::{PyReadonlyArray, PyReadwriteArray};
 use pyo3::exceptions::PyValueError;
@@ -29,34 +30,6 @@ pub(crate) struct Lanes {
 }
 
 impl Lanes {
-    pub(crate) fn new(
-        program: Arc<takt_isa::Program>,
-        sources: Arc<Vec<(String, String)>>,
-        words: Vec<usize>,
-        runs: usize,
-        tick: Option<NonZeroU64>,
-        max_cycles: NonZeroU64,
-    ) -> PyResult<Lanes> {
-        let most = Batch::most_lanes(&program);
-        if !(1..=most).contains(&runs) {
-            return Err(PyValueError::new_err(format!("runs is {runs}: it is between 1 and {most}")));
-        }
-        let batch = loaded(Batch::new(&program, runs))?;
-        let mut lanes = Lanes {
-            program,
-            sources,
-            tick,
-            max_cycles: max_cycles.get(),
-            batch,
-            words,
-            failed: vec![false; runs],
-            failures: Vec::new(),
-            periods: 0,
-        };
-        lanes.set();
-        Ok(lanes)
-    }
-
     fn set(&mut self) {
         self.batch.set_tick_period(self.tick);
         self.batch.set_period_limit(self.max_cycles);
@@ -109,6 +82,36 @@ impl Lanes {
 
 #[pymethods]
 impl Lanes {
+    /// Machines with the program in their memories; `words` are addresses of data memory that are outputs, behind the ports.
+    #[new]
+    fn new(
+        program: &Program,
+        words: Vec<usize>,
+        runs: usize,
+        tick: Option<NonZeroU64>,
+        max_cycles: NonZeroU64,
+    ) -> PyResult<Lanes> {
+        let (program, sources) = (Arc::clone(&program.program), Arc::clone(&program.sources));
+        let most = Batch::most_lanes(&program);
+        if !(1..=most).contains(&runs) {
+            return Err(PyValueError::new_err(format!("runs is {runs}: it is between 1 and {most}")));
+        }
+        let batch = loaded(Batch::new(&program, runs))?;
+        let mut lanes = Lanes {
+            program,
+            sources,
+            tick,
+            max_cycles: max_cycles.get(),
+            batch,
+            words,
+            failed: vec![false; runs],
+            failures: Vec::new(),
+            periods: 0,
+        };
+        lanes.set();
+        Ok(lanes)
+    }
+
     /// Runs a period with the words of `inputs`, by port and run; fills `outputs`, likewise, and `cycles` and `missed`, by run. True if
     /// none has failed.
     fn step(

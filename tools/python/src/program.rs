@@ -1,13 +1,10 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Programs: from a source or an image, and what is known of them without running them.
 
-use crate::lanes::Lanes;
-use crate::sim::Sim;
 use pyo3::exceptions::PyValueError;
 use pyo3::import_exception;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
-use std::num::NonZeroU64;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
@@ -499,22 +496,5 @@ impl Program {
 
     fn __deepcopy__(slf: Py<Self>, _memo: &Bound<'_, PyAny>) -> Py<Self> {
         slf
-    }
-
-    /// A machine with the program in it.
-    #[pyo3(signature = (tick, max_cycles))]
-    fn sim(&self, tick: Option<NonZeroU64>, max_cycles: NonZeroU64) -> PyResult<Sim> {
-        Sim::new(self, tick, max_cycles)
-    }
-    /// So many machines with the program in them, which step together.
-    #[pyo3(signature = (words, runs, tick, max_cycles))]
-    fn lanes(
-        &self,
-        words: Vec<usize>,
-        runs: usize,
-        tick: Option<NonZeroU64>,
-        max_cycles: NonZeroU64,
-    ) -> PyResult<Lanes> {
-        Lanes::new(Arc::clone(&self.program), Arc::clone(&self.sources), words, runs, tick, max_cycles)
     }
 }

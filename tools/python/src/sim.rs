@@ -70,30 +70,6 @@ pub(crate) struct Sim {
 }
 
 impl Sim {
-    pub(crate) fn new(program: &Program, tick: Option<NonZeroU64>, max_cycles: NonZeroU64) -> PyResult<Sim> {
-        let mut emulator = loaded(Emulator::new(&program.program))?;
-        emulator.set_tick_period(tick);
-        let (inputs, outputs) = (&program.program.inputs, &program.program.outputs);
-        let named = |port: &Port| {
-            Python::attach(|py| (PyString::intern(py, &port.name).unbind(), port.register, port.ty))
-        };
-        Ok(Sim {
-            tick,
-            history: History::default(),
-            sources: Arc::clone(&program.sources),
-            max_cycles: max_cycles.get(),
-            given: vec![false; inputs.len()],
-            inputs: inputs.iter().enumerate().map(|(index, port)| (port.name.clone(), index)).collect(),
-            outputs: outputs.iter().map(named).collect(),
-            next: Vec::with_capacity(inputs.len()),
-            periods: 0,
-            cycles: 0,
-            missed: 0,
-            failure: None,
-            emulator,
-        })
-    }
-
     /// The value that Python gave, as the port's bits.
     fn bits(port: &Port, value: &Bound<'_, PyAny>, period: usize) -> PyResult<u32> {
         let wrong =
@@ -187,6 +163,32 @@ impl Sim {
 
 #[pymethods]
 impl Sim {
+    /// A machine with the program in its memory.
+    #[new]
+    fn new(program: &Program, tick: Option<NonZeroU64>, max_cycles: NonZeroU64) -> PyResult<Sim> {
+        let mut emulator = loaded(Emulator::new(&program.program))?;
+        emulator.set_tick_period(tick);
+        let (inputs, outputs) = (&program.program.inputs, &program.program.outputs);
+        let named = |port: &Port| {
+            Python::attach(|py| (PyString::intern(py, &port.name).unbind(), port.register, port.ty))
+        };
+        Ok(Sim {
+            tick,
+            history: History::default(),
+            sources: Arc::clone(&program.sources),
+            max_cycles: max_cycles.get(),
+            given: vec![false; inputs.len()],
+            inputs: inputs.iter().enumerate().map(|(index, port)| (port.name.clone(), index)).collect(),
+            outputs: outputs.iter().map(named).collect(),
+            next: Vec::with_capacity(inputs.len()),
+            periods: 0,
+            cycles: 0,
+            missed: 0,
+            failure: None,
+            emulator,
+        })
+    }
+
     /// Sets inputs and runs a period. `None` if it failed; then `failure` says how.
     fn step<'py>(
         &mut self,

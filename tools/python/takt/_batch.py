@@ -48,7 +48,7 @@ class Batch:
     def __init__(self, program: Program, runs: int, tick: int | None, max_cycles: int) -> None:
         self.program = program
         self.runs = count_of("runs", runs) or 1
-        self._core = program._core.lanes(list(program._data.values()), self.runs, tick, max_cycles)
+        self._core = _takt.Lanes(program._core, list(program._data.values()), self.runs, tick, max_cycles)
         self._inputs = np.zeros((len(program.inputs), self.runs), np.uint32)
         self._outputs = np.zeros((len(program.outputs) + len(program._data), self.runs), np.uint32)
         self._cycles = np.zeros(self.runs, np.uint64)

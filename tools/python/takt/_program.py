@@ -274,7 +274,7 @@ class Program:
             tick: Cycles from tick to tick, 100,000,000 at most; without it, the tick comes when the program is ready.
             max_cycles: A period that takes more is ended by a fault.
         """
-        return Sim(self, self._core.sim(*limits_of(tick, max_cycles, MAX_CYCLES)))
+        return Sim(self, _takt.Sim(self._core, *limits_of(tick, max_cycles, MAX_CYCLES)))
 
     def batch(self, runs: int, *, tick: int | None = None, max_cycles: int = MAX_CYCLES) -> Batch:
         """So many machines with the program in them, whose closed loops run together, computed in vectors and on all cores.

@@ -145,6 +145,6 @@ class Sim:
 
 def _restored(program: Program, tick: int | None, max_cycles: int, history: bytes) -> Sim:
     """A machine that was pickled."""
-    core = program._core.sim(tick, max_cycles)
+    core = _takt.Sim(program._core, tick, max_cycles)
     core.replay(history)
     return Sim(program, core)
