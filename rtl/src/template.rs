@@ -2,7 +2,9 @@
 //! Templates: hand-written Verilog with placeholders for machine-dependent parts.
 //!
 //! Verilog is made in two ways. A circuit whose structure follows from a row, or from a system's links, is built with [`crate::verilog`]. A
-//! module that differs only in numbers and names is a file `*.v.in` with placeholders `@NAME@`.
+//! module that differs only in numbers and names is a file `*.v.in` with placeholders `@NAME@`; lines for a placeholder are text, since
+//! the nets that they use are declared in the file, where a typed module could not check them. (The units' tables, `tables`, are words
+//! between two fixed lines.)
 
 use std::fmt::Display;
 
