@@ -3,7 +3,6 @@
 
 #[cfg(feature = "board")]
 mod board;
-mod history;
 mod prompt;
 #[cfg(feature = "tui")]
 mod screen;

@@ -1,18 +1,11 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Interactive prompt of `takt debug`.
 
-use super::history::{self, CommandHistory};
 use super::{execute, leave, running};
 use crate::terminal::files::Out;
 use crate::terminal::output;
-use anyhow::{Context, Result};
-use rustyline::completion::Completer;
-use rustyline::error::ReadlineError;
-use rustyline::highlight::Highlighter;
-use rustyline::hint::Hinter;
-use rustyline::history::FileHistory;
-use rustyline::validate::Validator;
-use rustyline::{Editor, Helper};
+use crate::terminal::prompt::{Input, Prompt};
+use anyhow::Result;
 use std::cell::RefCell;
 use std::io::{IsTerminal, Write};
 use std::rc::Rc;
@@ -23,45 +16,18 @@ use takt_debug::session::Control;
 /// Terminal sequence that clears the rest of the line.
 const CLEAR: &str = "\x1b[K";
 
-/// Completion over the prompt's session.
-struct Prompt(Rc<RefCell<Console>>);
-
-impl Helper for Prompt {}
-impl Highlighter for Prompt {}
-impl Validator for Prompt {}
-impl Hinter for Prompt {
-    type Hint = String;
-}
-
-impl Completer for Prompt {
-    type Candidate = String;
-
-    fn complete(
-        &self,
-        line: &str,
-        at: usize,
-        _: &rustyline::Context<'_>,
-    ) -> rustyline::Result<(usize, Vec<String>)> {
-        Ok(self.0.borrow().complete(&line[..at]))
-    }
-}
-
 /// Reads and executes commands until the end of input.
 pub(super) fn run(console: Console, control: &Arc<Control>, color: bool, out: &mut Out) -> Result<()> {
     let console = Rc::new(RefCell::new(console));
-    let CommandHistory { history, file } = CommandHistory::load();
-    let mut editor: Editor<Prompt, FileHistory> =
-        Editor::with_history(history::config(), history).context("cannot use the terminal")?;
-    editor.set_helper(Some(Prompt(Rc::clone(&console))));
+    let completed = Rc::clone(&console);
+    let mut prompt = Prompt::new("history", move |text: &str| completed.borrow().complete(text))?;
     while !console.borrow().quit {
         out.flush()?;
-        let line = match editor.readline("(takt) ") {
-            Ok(line) => line,
-            Err(ReadlineError::Interrupted) => continue,
-            Err(ReadlineError::Eof) => break,
-            Err(error) => return Err(error).context("cannot read the terminal"),
+        let line = match prompt.read("(takt) ")? {
+            Input::Line(line) => line,
+            Input::Interrupted => continue,
+            Input::End => break,
         };
-        history::append(editor.history_mut(), file.as_deref());
         let mut console = console.borrow_mut();
         let (mut shown, counts) = (false, console.counts());
         let answer = execute(&mut console, &line, control, || {

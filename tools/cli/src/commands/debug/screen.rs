@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Full-screen interface of `takt debug`: keys in, commands out; `takt_debug::view` draws.
 
-use super::history::CommandHistory;
 use super::{execute, running};
+use crate::terminal::history::CommandHistory;
 use anyhow::{Context, Result};
 use ratatui::DefaultTerminal;
 use ratatui::crossterm::event::{self, Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
@@ -57,7 +57,8 @@ struct Front<'c> {
 pub(super) fn run(console: &mut Console, control: &Control) -> Result<()> {
     let screen = Screen::new(console.panes());
     let terminal = Terminal(ratatui::try_init().context("cannot use the terminal")?);
-    let mut front = Front { console, control, terminal, screen, typing: None, past: CommandHistory::load() };
+    let mut front =
+        Front { console, control, terminal, screen, typing: None, past: CommandHistory::load("history") };
     while !front.console.quit {
         front.draw()?;
         match event::read().context("cannot read the terminal")? {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Command history across sessions, in the file `takt/history` of XDG's state folder.
+//! Command history across sessions, in a file of the folder `takt` in XDG's state folder.
 
 use rustyline::Config;
 use rustyline::history::{FileHistory, History};
@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 const COMMANDS: usize = 1000;
 
 /// Configuration of line editor and history.
-pub(super) fn config() -> Config {
+pub(crate) fn config() -> Config {
     Config::builder()
         .auto_add_history(true)
         .max_history_size(COMMANDS)
@@ -19,16 +19,16 @@ pub(super) fn config() -> Config {
 }
 
 /// History of commands. A missing or unwritable file is no error.
-pub(super) struct CommandHistory {
-    pub(super) history: FileHistory,
-    pub(super) file: Option<PathBuf>,
+pub(crate) struct CommandHistory {
+    pub(crate) history: FileHistory,
+    pub(crate) file: Option<PathBuf>,
 }
 
 impl CommandHistory {
-    /// History from earlier sessions.
-    pub(super) fn load() -> CommandHistory {
+    /// History from earlier sessions, in the file of this name.
+    pub(crate) fn load(name: &str) -> CommandHistory {
         let mut history = FileHistory::with_config(&config());
-        let file = file();
+        let file = file(name);
         if let Some(file) = &file {
             let _ = history.load(file);
         }
@@ -37,14 +37,14 @@ impl CommandHistory {
 
     /// Adds a command to the history.
     #[cfg(feature = "tui")]
-    pub(super) fn add(&mut self, line: &str) {
+    pub(crate) fn add(&mut self, line: &str) {
         let _ = self.history.add(line);
         append(&mut self.history, self.file.as_deref());
     }
 
     /// Command `distance` entries back; 1 is the last.
     #[cfg(feature = "tui")]
-    pub(super) fn back(&self, distance: usize) -> Option<String> {
+    pub(crate) fn back(&self, distance: usize) -> Option<String> {
         use rustyline::history::SearchDirection::Forward;
         let index = self.history.len().checked_sub(distance)?;
         self.history.get(index, Forward).ok()?.map(|found| found.entry.into_owned())
@@ -52,15 +52,15 @@ impl CommandHistory {
 }
 
 /// Writes new commands to the file at once, so that they survive any end of the session.
-pub(super) fn append(history: &mut FileHistory, file: Option<&Path>) {
+pub(crate) fn append(history: &mut FileHistory, file: Option<&Path>) {
     if let Some(file) = file {
         let _ = file.parent().map(std::fs::create_dir_all);
         let _ = history.append(file);
     }
 }
 
-fn file() -> Option<PathBuf> {
+fn file(name: &str) -> Option<PathBuf> {
     let absolute = |name| env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
     let state = absolute("XDG_STATE_HOME").or_else(|| Some(absolute("HOME")?.join(".local/state")))?;
-    Some(state.join("takt/history"))
+    Some(state.join("takt").join(name))
 }
