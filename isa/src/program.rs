@@ -44,7 +44,7 @@ pub struct Program {
     pub parts: Vec<(u32, Columns)>,
 }
 
-/// The cycles of a section, as a host needs them.
+/// Cycle counts of a section, for the host.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct SectionCycles {
     /// Label of the section's first bundle, or `once`.
@@ -85,7 +85,7 @@ pub struct Port {
 pub struct Symbol {
     /// Name in the source.
     pub name: String,
-    /// The memory into which it points.
+    /// The memory that the label's address belongs to.
     pub space: Space,
     /// Bundle or data-word address.
     pub address: u32,

@@ -36,7 +36,7 @@ pub struct Interpreter {
     pub(crate) in_period: bool,
     /// The steps of `.once` and of `.period`.
     pub(crate) steps: [Vec<Step>; 2],
-    /// Labels: true for one in `.period`, and the step that follows it.
+    /// Labels: whether the label stands in `.period`, and the step after it.
     pub(crate) labels: Vec<(bool, usize)>,
     pub(crate) cells: Vec<Cell>,
     pub(crate) memory: Vec<u32>,
@@ -56,7 +56,7 @@ impl Interpreter {
     /// Reads a program and writes it out.
     ///
     /// # Errors
-    /// If the text has a mistake, or says something that the interpreter does not know.
+    /// If the text has a mistake, or uses a feature that the interpreter lacks.
     pub fn new(text: &str) -> Result<Interpreter, Fault> {
         let (mut sources, mut sink, mut names) = (Sources::default(), Sink::default(), Interner::new());
         let file = sources.add("test.s", text.into()).ok_or("the text is too long")?;
@@ -106,7 +106,7 @@ impl Interpreter {
     /// Runs to the next `wait`, with the bits of all input ports, in at most `most` steps. Returns the steps taken.
     ///
     /// # Errors
-    /// Fails on unknown names, on reads of a register before its first write, and beyond the limit of steps.
+    /// If a name is unknown, a register is read before its first write, or the limit of steps is exceeded.
     pub fn period(&mut self, inputs: &[u32], most: u64) -> Result<u64, Fault> {
         for (cell, bits) in self.inputs.iter().zip(inputs) {
             self.cells[*cell].bits = Some(*bits);

@@ -151,7 +151,7 @@ pub struct Machine {
     pub data_depth: u32,
     /// Depth of the return stack, in addresses.
     pub stack_depth: u32,
-    /// Nesting depth of loops that the sequencer counts; 0 on a machine without.
+    /// Nesting depth of loops that the sequencer counts; 0 on a machine that counts none.
     pub loop_depth: u32,
     /// Cycles in which nothing issues after a taken branch, a call, a return, `wait` or reset, while the front end refills.
     pub refill: u32,

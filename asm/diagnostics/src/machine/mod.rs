@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The machine that a user asks for: by a name of the table or by a file with its row, and options behind either.
+//! Resolves the machine that a user names: a row of the table or a file with a row, either followed by options.
 
 mod file;
 
@@ -25,7 +25,7 @@ pub enum MachineMistake {
     File(Diagnostics),
 }
 
-/// The name of the file and the options behind it, if a machine is named by a file: `my.toml`, `my.toml,data=4096`.
+/// Splits the name of a machine's file from the options after it: `my.toml`, `my.toml,data=4096`. `None` for other names.
 pub fn machine_file(name: &str) -> Option<(&str, &str)> {
     const ENDING: &str = ".toml";
     let lower = name.to_ascii_lowercase();
@@ -39,7 +39,7 @@ pub fn machine_file(name: &str) -> Option<(&str, &str)> {
 /// The machine of a name, or of a file whose bytes `load` gives.
 ///
 /// # Errors
-/// If there is none, or the file has mistakes.
+/// If no machine has the name, or the file has mistakes.
 pub fn machine_from(
     name: &str,
     load: impl FnOnce(&str) -> Result<Vec<u8>, String>,
@@ -74,7 +74,7 @@ pub fn machine(name: &str) -> Result<&'static Machine, String> {
 /// The bytes of a machine's file on this disk.
 ///
 /// # Errors
-/// The reason why it cannot be read.
+/// The reason why the file cannot be read.
 pub fn load(file: &Path) -> Result<Vec<u8>, String> {
     let about = std::fs::metadata(file).map_err(|error| match error.kind() {
         std::io::ErrorKind::NotFound => "there is no such file".to_owned(),
@@ -87,7 +87,7 @@ pub fn load(file: &Path) -> Result<Vec<u8>, String> {
     }
 }
 
-/// The message of a file that is too long for a machine's.
+/// The message for a machine's file that is too long.
 fn too_long() -> String {
     format!("it has more than the {FILE_BYTES} bytes of a machine's file")
 }
