@@ -50,7 +50,7 @@ pub enum UnrollReason {
     NeedsIndex,
     /// The source asks for it by `unroll`.
     Asked,
-    /// The loop has few iterations, and no loop within.
+    /// The loop has few iterations, and contains no loop.
     Few,
 }
 

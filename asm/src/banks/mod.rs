@@ -40,7 +40,7 @@ pub struct Adjustment {
 pub enum Transfer {
     /// The loader sets the register to these bits; the operation is gone.
     Preset(u32),
-    /// An operation of the right slot, by name, gives the same bits.
+    /// An operation of the right slot, by name, computes the same bits again.
     Rematerialised(&'static str),
     /// The value is copied.
     Copy {

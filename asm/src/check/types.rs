@@ -261,7 +261,7 @@ impl<'i, V: AbstractValue> Types<'i, V> {
         self.ir.access(operation).map(|access| self.ir.arrays[access.array.0 as usize].ty)
     }
 
-    /// The type that one of an operation's sources is to have, and true if a macro's parameter asks for it.
+    /// The expected type of one of an operation's sources, and whether a macro's parameter demands it.
     #[inline]
     fn expected_type(&self, operation: &Operation, which: usize) -> (Type, bool) {
         match self.given.get(operation, OperandPosition::Source(which as u8)) {
@@ -423,7 +423,7 @@ fn convert(from: Type, to: Type) -> String {
     conversion(from, to).map_or(String::new(), |mnemonic| format!("convert it with `{mnemonic}`, "))
 }
 
-/// Adds to a warning where the value got its type.
+/// Adds the place where the value got its type to a warning.
 fn explained(warning: Diagnostic, ty: Type, origin: Option<Origin>) -> Diagnostic {
     let Some(Origin { what, span, .. }) = origin else { return warning };
     let is = words(ty);
@@ -511,8 +511,8 @@ fn wrong_source(
     context.report(ScopeId(operation.expansion), warning.help(help));
 }
 
-/// Reports that a macro's argument is of another type than the parameter asks for: an error, as the resolver reports it of types
-/// that are known where the macro is used.
+/// Reports an argument whose type differs from the one that the macro's parameter demands: an error, as in the resolver, which
+/// reports types that are known where the macro is used.
 fn wrong_argument(
     context: &mut Context,
     ir: &Ir,
@@ -542,7 +542,7 @@ fn comparison(row: &Row, ty: Type) -> Option<&'static str> {
     ROWS.iter().find(same).map(|row| row.mnemonic)
 }
 
-/// An operand without the type that it is taken as.
+/// The text of an operand without the type after its colon.
 fn bare(written: &str) -> &str {
     written.split_once(':').map_or(written, |(name, _)| name.trim_end())
 }
@@ -612,7 +612,7 @@ fn wrong_register(
     context.report(ScopeId(operation.expansion), explained(warning, ty, origin).help(help));
 }
 
-/// Adds the float that an integer's bits make.
+/// Adds a note with the float that an integer's bits encode.
 fn noted(warning: Diagnostic, value: Value) -> Diagnostic {
     match value {
         Value::Int(value) => {

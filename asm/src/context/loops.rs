@@ -11,10 +11,10 @@ use takt_syntax::ast::*;
 use takt_syntax::expr::{self, EvalError, Fault, Value};
 use takt_syntax::name::{NameId, NameRef};
 
-/// The most points of an iteration space that are tried one by one.
+/// Limit on the points of an iteration space that are enumerated.
 const POINTS: u32 = 1 << 18;
 
-/// A counted loop of [`Declared::loops`](crate::context::Declared::loops).
+/// A counted loop of [`Declarations::loops`](crate::context::Declarations::loops).
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 pub(crate) struct SourceLoopId(pub(crate) u32);
 
@@ -66,7 +66,7 @@ impl AffineInteger {
 #[derive(Clone, Debug)]
 pub(crate) struct Index {
     pub(crate) value: AffineInteger,
-    /// The loop, while the name is its index in the loop's body, and not in the iterations left over behind it.
+    /// The loop, while the name is its index in the loop's body; `None` in the iterations left over after it.
     pub(crate) of: Option<SourceLoopId>,
     /// The `.for` or the sum.
     pub(crate) span: Span,
@@ -284,7 +284,7 @@ impl Context {
     /// The least and the largest value of a function over all iterations of the loops around; `None` without any iteration.
     ///
     /// # Errors
-    /// If the iteration space has more points than are tried.
+    /// If the iteration space has more points than may be enumerated.
     pub(crate) fn extremes(
         &self,
         around: &[SourceLoopId],
@@ -307,8 +307,8 @@ struct Space<'c> {
 }
 
 impl Space<'_> {
-    /// The least and the largest value, given the iterations of the loops before `level`. Where the counts of inner loops depend on
-    /// an iteration, its values are tried one by one.
+    /// The least and the largest value, given the iterations of the loops before `level`. An iteration on which the counts of inner
+    /// loops depend is enumerated.
     fn extremes(
         &self,
         at: &mut Vec<i64>,

@@ -88,7 +88,7 @@ pub(crate) enum Raw {
     Mul,
     #[token("/")]
     Div,
-    // A comment elsewhere: with the rest of the line, which is then no further mistake.
+    // A comment in the syntax of other languages, to the end of its line, so that the rest of the line is no further mistake.
     #[regex(r"//[^\n]*", allow_greedy = true)]
     Slashes,
     #[token("%")]

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Every limit of the assembler, by name. The limits keep an unreasonable source from taking unreasonable time or memory:
-//! beyond each stands one clear error. No real program comes near one.
+//! Every limit of the assembler, by name. The limits keep an unreasonable source from taking unreasonable time or memory; a source
+//! that exceeds one gets a single clear error. No real program comes near one.
 
 pub use takt_diagnostics::limits::*;
 
@@ -28,9 +28,9 @@ pub const INCLUDE_DEPTH: usize = 32;
 pub const INCLUDES: usize = 1 << 16;
 /// Depth of macro uses within macros' bodies.
 pub const MACRO_DEPTH: usize = 64;
-/// `.rep` and `.if` within one another, in one file.
+/// Nesting depth of blocks (`.macro`, `.rep`, `.for`, `.if`) in one file.
 pub const BLOCK_DEPTH: usize = 64;
-/// Counted loops that run within one another, whatever the machine.
+/// Nesting depth of counted loops at run time, on every machine.
 pub const LOOP_DEPTH: usize = 4;
 /// Iterations of a counted loop.
 pub const LOOP_COUNT: u32 = 65_535;

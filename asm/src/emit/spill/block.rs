@@ -21,7 +21,7 @@ pub(super) enum SpillError {
     Values,
 }
 
-/// A value of the block that has a register for a time.
+/// A value of the block, live in a register from its write to its last use.
 struct Value {
     id: RegisterId,
     slot: SlotIndex,
