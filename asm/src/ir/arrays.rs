@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Arrays of data memory, counted loops, and the element that each access touches: a scheduler needs these to tell accesses
-//! apart.
+//! Arrays of data memory, counted loops, and the element that each access touches, by which the scheduler tells accesses apart.
 
 use crate::ir::{Ir, LabelId, Operation};
 use crate::loops::LoopCount;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The program between names and words: bundles of operations on virtual registers.
 //!
-//! [`resolve`](crate::resolve) makes it, a scheduler may rearrange it, [`allocate`](crate::emit::allocate) gives its registers
-//! addresses, and `emit` makes its words. Invariants at every stage:
+//! [`resolve`](crate::resolve) builds it, the scheduler may rearrange it, [`allocate`](crate::emit::allocate) gives its registers
+//! addresses, and `emit` encodes it. Invariants at every stage:
 //!
 //! * a bundle has at least one operation and no two that claim one slot; on a machine with one slot it has exactly one;
 //! * all operations of a bundle read before any writes; bundles execute in the order of [`Ir::bundles`], and
@@ -82,7 +82,7 @@ pub struct VirtualRegister {
     pub name: String,
     /// Role of the register.
     pub kind: RegisterKind,
-    /// Type as which debuggers show the bits.
+    /// Type by which debuggers show the bits.
     pub ty: Type,
     /// Address that the source gives the register.
     pub pinned: Option<Register>,
@@ -111,8 +111,8 @@ pub enum Constant {
     Raw(u32),
 }
 
-/// The source line that an operation is attributed to, and the part of it where the source says it (`.loc`), in eight bytes, as
-/// every operation has one. [`Ir::location`] and [`Ir::columns`] read it.
+/// The source line that an operation is attributed to, and the part of the line if `.loc` states it. Eight bytes, since every
+/// operation has one. [`Ir::location`] and [`Ir::columns`] read it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Attribution {
     /// Index of the file, or [`Attribution::NO_FILE`], or [`Attribution::PART`].
@@ -169,9 +169,9 @@ pub struct Operation {
 }
 
 impl Operation {
-    /// Value of [`Operation::written`] for an operation that no tree has: it computes a part of an equation, where its span is.
+    /// Value of [`Operation::written`] for an operation outside of every tree: it computes the part of an equation at its span.
     pub(crate) const COMPUTED: u32 = u32::MAX;
-    /// Least number of computed operations that have numbers of their own, because something is known of them.
+    /// Lowest number of computed operations that need distinct numbers, because type evidence refers to them.
     pub(crate) const FIRST_COMPUTED: u32 = 1 << 31;
 
     /// An operation without operands; it executes in the first of the slots unless another is chosen.
@@ -443,7 +443,7 @@ impl Ir {
         }
     }
 
-    /// Part of the source line, where the source says it (`.loc`).
+    /// Part of the source line, if `.loc` states it.
     #[inline]
     pub fn columns(&self, operation: &Operation) -> Option<Columns> {
         let Attribution { file, line } = operation.attribution;

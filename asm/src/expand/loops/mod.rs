@@ -19,20 +19,20 @@ use takt_diagnostics::source::{Lines, Span};
 use takt_syntax::ast::*;
 use takt_syntax::name::NameId;
 
-/// The longest innermost loop that is written out without `unroll`.
+/// Number of iterations up to which an innermost loop is written out without `unroll`.
 const SHORT: i64 = 4;
 
 /// Next action of a loop.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Pass {
-    /// A loop of [`Flat::loops`](crate::expand::Flat::loops) begins here.
+    /// A loop of [`ExpandedSource::loops`](crate::expand::ExpandedSource::loops) begins here.
     Begin(u32),
     /// The loop of this number ends here.
     End(u32),
     /// Body, with a value for the index.
     Value(i64),
     /// Body, with an index that is known up to the iterations of loops: an index into
-    /// [`Declared::indices`](crate::context::Declared::indices).
+    /// [`Declarations::indices`](crate::context::Declarations::indices).
     Index(u32),
 }
 
@@ -135,8 +135,8 @@ impl Expander<'_> {
         )
     }
 
-    /// Opens a loop over statements, given the opening statement, the first statement and the statement after the last. `needs` is
-    /// the place where the body needs the index when it is assembled, if any; with it, whether the loop is innermost.
+    /// Opens a loop over statements, given the opening statement, the first statement and the statement after the last. `needs` holds
+    /// the place, if any, where the body needs the index when it is assembled, and whether the loop is innermost.
     #[allow(clippy::too_many_arguments)]
     pub(crate) fn open_loop(
         &mut self,
@@ -192,7 +192,7 @@ impl Expander<'_> {
 
     fn note(&mut self, variable: NameId, count: LoopCount, form: LoopForm, span: Span) {
         let note = LoopNote { variable, count, form, span };
-        // A loop in a macro or in a loop that is written out is met again.
+        // A loop in a macro or in a written-out loop is expanded repeatedly.
         if !self.flat.loop_notes.contains(&note) {
             self.flat.loop_notes.push(note);
         }
@@ -464,7 +464,7 @@ impl Expander<'_> {
         id
     }
 
-    /// Begins the next pass of a loop. True if there is one with statements.
+    /// Begins the next pass of a loop; returns false if no pass with statements is left.
     pub(crate) fn pass(&mut self) -> bool {
         loop {
             let Some(frame) = self.frames.last_mut() else { return false };
@@ -501,7 +501,7 @@ impl Expander<'_> {
     }
 }
 
-/// Adds the place that needs the index when it is assembled.
+/// Adds the place that needs the index when it is assembled to an error.
 fn because(error: Diagnostic, needs: Option<Span>) -> Diagnostic {
     match needs {
         Some(span) => error.also(span, "the value is needed here"),

@@ -43,7 +43,7 @@ pub(super) fn register(machine: &Machine, address: u32) -> Option<Register> {
     Register::new(address as usize).filter(|register| machine.has_register(*register))
 }
 
-/// The error of a named register of an image that is no such register.
+/// The error for a named register whose address is not possible.
 pub(super) fn wrong_port(kind: &str, name: &str, address: u16, reason: &'static str) -> ImageError {
     ImageError::Register { what: format!("{kind} `{name}`"), address: address.into(), reason }
 }
