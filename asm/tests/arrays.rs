@@ -37,7 +37,7 @@ enum Statement {
     Assign(char, Vec<Affine>, Expr),
 }
 
-/// The indices that are known, and the arrays.
+/// Values of the known indices, and the arrays.
 struct Machine32 {
     indices: BTreeMap<char, i64>,
     arrays: BTreeMap<char, (Vec<i64>, Vec<f32>)>,
@@ -304,7 +304,7 @@ impl Generator<'_> {
         if step < 0 {
             std::mem::swap(&mut first, &mut last);
         }
-        // A step over a range whose length depends on an index would have to divide it.
+        // The number of steps in a range whose length depends on an index would need a division.
         if step.abs() != 1 {
             (first.1, last.1) = (Vec::new(), Vec::new());
         }
@@ -459,7 +459,7 @@ fn elements_are_operands_of_instructions() {
     // The words of an array by its label, counted from 0.
     check(" ld t, x+2\n mov y[1], t\n st y+3, t", "y", &[3., 0., 0., 3.]);
     check(" fadd y[1], x[1], x[2] || mov t, x[5]\n fadd y[2], t, t", "y", &[3., 10., 0., 0.]);
-    // On one side as on the other: `y[1]` is read before it is written.
+    // An element on both sides: `y[1]` is read before it is written.
     check(" y[1] = 7\n y[2], y[1] = y[1], x[2]", "y", &[2., 7., 0., 0.]);
 }
 

@@ -3,7 +3,7 @@
 //!
 //! [`expand::macros`](crate::expand) finds the types. A register, an element or a whole array is checked where the body first uses
 //! it: by then the writes above it are known. Types that are known only later, as of a register that is written below, are left to
-//! the type check ([`Given::Asked`]).
+//! the type check ([`TypeEvidence::Asked`]).
 
 use crate::context::{Argument, Binding, ErrorReported, ParameterType, words};
 use crate::ir::type_evidence::{Kind, OperandPosition, TypeEvidence};
@@ -34,7 +34,7 @@ impl Resolver<'_> {
         }
     }
 
-    /// Checks that the parameter which an instruction's operand names has the type that the instruction takes.
+    /// Checks that the parameter that an instruction's operand names has the type that the instruction takes.
     pub(super) fn check_operand(
         &mut self,
         row: &Row,

@@ -315,7 +315,7 @@ impl Resolver<'_> {
         Ok(TermForm::Register(register, Kind::Int))
     }
 
-    /// The affine function that an operator makes of functions of indices and integers; `None` if the result is not affine.
+    /// Applies an operator to functions of indices and to integers; `None` if the result is not affine.
     pub(super) fn counted_operation(
         &self,
         line: &mut CurrentEquation,

@@ -62,7 +62,7 @@ struct OpenLoop {
 struct ClosedLoop {
     /// Induction registers, which keep their last values.
     inductions: Vec<Induction>,
-    /// Register of the number of iterations, if it is not to be computed again.
+    /// Register of the number of iterations, if it is kept rather than computed again.
     number: Option<RegisterId>,
 }
 
@@ -252,7 +252,7 @@ impl Resolver<'_> {
         line: &mut CurrentEquation,
         id: LoopId,
     ) -> Result<(), ErrorReported> {
-        // A loop that could not begin is reported.
+        // A loop that could not begin has been reported.
         let Some(open) = self.nest.open.pop_if(|open| open.id == id) else { return Err(ErrorReported) };
         self.subexpressions.cut();
         let span = open.span;
@@ -482,7 +482,7 @@ impl Resolver<'_> {
             let known = self.nest.closed.get(&id).and_then(|closed| closed.inductions.iter().find(is_same));
             // The iterations left over share the loop's body, and so its registers.
             return known.map(|known| known.register).ok_or_else(|| {
-                // A loop that could not begin is reported.
+                // A loop that could not begin has been reported.
                 if self.context.reports.sink.errors > 0 {
                     return ErrorReported;
                 }

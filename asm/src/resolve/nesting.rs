@@ -75,7 +75,7 @@ fn check_jumps(context: &mut Context, ir: &Ir, made: usize) {
     }
 }
 
-/// Refuses loops that call themselves: counters are registers, shared by all uses of the loop. True if there is one.
+/// Refuses loops that call themselves: counters are registers, shared by all uses of the loop. Returns whether there is one.
 fn recurs(context: &mut Context, ir: &Ir, calls: &Calls<'_>) -> bool {
     let outermost = ir.loops.iter().filter(|counted| counted.parent.is_none());
     for counted in outermost {

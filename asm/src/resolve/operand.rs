@@ -336,7 +336,7 @@ impl Resolver<'_> {
         let (place, _, meaning) = self.meaning(at, operand)?;
         let array = match meaning {
             Some((_, Binding::Array(array))) => self.context.declared.arrays[array as usize].clone(),
-            // An index that is a running loop's needs an array.
+            // Only an array in data memory takes the index of a loop at run time.
             Some((id, Binding::None)) if self.varies(at, indices) => {
                 return Err(self.context.unknown(place.scope, id, name.span, NameRole::Array));
             }

@@ -79,6 +79,6 @@ impl CurrentEquation {
 #[derive(Clone, Debug)]
 pub(super) struct Chain {
     pub(super) is_product: bool,
-    /// Terms, each with true if it is subtracted; or factors.
+    /// Terms, each with a flag that is true if it is subtracted; or factors.
     pub(super) terms: Vec<(Term, bool)>,
 }

@@ -8,13 +8,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use takt_isa::timing::Reservation;
 use takt_isa::{Machine, SlotIndex, Slots};
 
-/// The most tail lengths that the bound of a resource tries as thresholds; of more, it takes an even sample.
+/// Limit on the tail lengths that the bound of a resource tries as thresholds; longer lists are sampled evenly.
 const TAILS: usize = 128;
 
-/// The most sets of slots, or of units, that are examined: far more than a machine's functions make.
+/// Limit on the sets of slots, or of units, that are examined: far more than a machine's functions make.
 const SETS: usize = 64;
 
-/// Lower bounds of a block's length, in cycles from its first issue to its last, both included. The largest counts.
+/// Lower bounds of a block's length, in cycles from its first issue to its last, both included. The largest is the bound.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Bound {
     /// Longest chain of dependent operations.

@@ -13,7 +13,7 @@ use takt_diagnostics::diag::{Diagnostic, Sink};
 use takt_diagnostics::source::Span;
 use takt_isa::SlotIndex;
 
-/// The most pairs of reads and writes that the orders of a run may give: far more than programs use.
+/// Limit on the pairs of reads and writes that the orders of a run produce: far more than programs need.
 const ORDER_EDGES: usize = 1 << 16;
 
 /// Places of a chain of operations that an error points at.
@@ -256,7 +256,7 @@ impl<'a> Demands<'a> {
         sink.push(error.note("operations wait for results, memory accesses, faults and other orders"));
     }
 
-    /// Lower bounds allow a write of the port by cycle `limit`; if not, the chain or the resource that prevents it is reported.
+    /// Checks that lower bounds allow a write of the port by cycle `limit`; otherwise reports the chain or the resource that prevents it.
     fn can_meet(
         &self,
         block: &Block,

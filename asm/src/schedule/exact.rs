@@ -309,7 +309,7 @@ mod tests {
     use takt_isa::SlotIndex;
     use takt_isa::timing::Reservation;
 
-    /// Exhaustive oracle: the tasks from the `placed`th on can all issue before `length`.
+    /// Exhaustive oracle: the tasks from index `placed` on can all issue before `length`.
     fn exists(problem: &Problem, length: u32, plan: &mut Vec<(u32, u8)>) -> bool {
         let placed = plan.len();
         let Some(task) = problem.tasks.get(placed) else { return true };
@@ -368,7 +368,7 @@ mod tests {
     }
 
     proptest! {
-        /// On problems that can be searched through: no schedule is shorter than the bound, and the bound is reached.
+        /// On problems small enough to search exhaustively: no schedule is shorter than the bound, and the bound is reached.
         #[test]
         fn finds_and_proves_the_shortest_schedule(problem in problem()) {
             let graph = Graph::new(&problem);

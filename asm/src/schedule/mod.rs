@@ -217,7 +217,7 @@ enum Wait {
 /// - Loads and stores that may touch the same word keep their order, except loads among loads.
 /// - A load or store whose address is not known may fault, and what was on the output ports before must be the same: outputs
 ///   written before it in the source issue before it, outputs written after it not before it.
-/// - Operations that redirect control come last; operations that drain come when all is written.
+/// - Operations that redirect control come last; operations that drain issue after all writebacks.
 struct Block {
     problem: Problem,
     /// The bundle of each task.
@@ -368,7 +368,7 @@ impl Block {
     }
 
     /// The bundles of a schedule: tasks that issue in one cycle become one bundle. A gap that only a demand causes is filled
-    /// with idle bundles, for the machine would not wait.
+    /// with idle bundles, since the machine would not wait.
     fn pack(&self, old: &[Bundle], plan: &Plan) -> Vec<Bundle> {
         let start = &plan.start;
         let mut by_cycle: BTreeMap<u32, Vec<usize>> = BTreeMap::new();

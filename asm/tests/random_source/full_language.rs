@@ -15,7 +15,7 @@ struct Source {
     text: String,
     /// Counters of labels, loops and the like: each makes a name.
     names: u32,
-    /// Loops around, whose indices lie between 1 and the number beside them.
+    /// Loops around; each index lies between 1 and the number next to it.
     indices: Vec<(String, u64)>,
     /// Statements that may still be made.
     left: u32,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Rows in which several slots host a function: f3's units, placed otherwise; and random ones.
+//! Rows in which several slots host a function: f3's units, distributed differently; and random rows.
 
 use std::sync::OnceLock;
 use takt_isa::spec::units::*;

@@ -493,7 +493,7 @@ fn selected(source: &Code, image: &Code) -> HashSet<u32> {
     (0..).zip(&source.bundles).filter(|(_, bundle)| gone(bundle)).map(|(at, _)| at).collect()
 }
 
-/// A difference, and true if the programs disagree on the decision itself.
+/// A difference, and whether the programs disagree on the decision itself.
 struct Mismatch {
     difference: Difference,
     at_decision: bool,

@@ -136,7 +136,7 @@ impl Rewriting<'_> {
         }
     }
 
-    /// Moves operations that share the bundle with `loop` before it. Returns `loop`.
+    /// Moves operations that share the bundle with `loop` before it. Returns the `loop` operation.
     fn enter(&mut self, entry: usize) -> Operation {
         self.moved.entry(entry as u32).or_insert(self.bundles.len() as u32);
         let last = self.ir.bundles[entry].clone();
