@@ -32,7 +32,7 @@ impl Integer {
         }
     }
 
-    /// After the integer promotions.
+    /// The type after the integer promotions.
     pub(super) fn promoted(self) -> Integer {
         if self.bits < 32 { INT } else { self }
     }
@@ -167,7 +167,7 @@ impl Structs {
     }
 
     /// Scalars of a type in the order of their places; `None` if there are more than [`MAX_LEAVES`] or its size is unknown. A union has
-    /// those of its largest member.
+    /// the scalars of its largest member.
     pub(super) fn leaves(&self, ty: &Type) -> Option<Vec<Leaf>> {
         let mut leaves = Vec::new();
         self.collect(ty, 0, "", &[], &mut leaves)?;

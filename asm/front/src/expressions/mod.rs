@@ -117,7 +117,7 @@ impl Argument {
 /// Reads a function from the JSON text of an instruction list.
 ///
 /// # Errors
-/// If the text is no instruction list, or an operation has no meaning here; with the line.
+/// If the text is not an instruction list, or an operation has no meaning here; with the line.
 pub fn read(source: &str, rewrites: Rewrites) -> Result<Function, Error> {
     if source.len() > MAX_BYTES {
         return Err(Error::plain(format!("the file is longer than {} MiB", MAX_BYTES >> 20)));

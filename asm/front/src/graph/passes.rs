@@ -184,7 +184,7 @@ impl Rebuild<'_> {
         self.map[id.index()].expect("operands come first")
     }
 
-    /// Strips a negation: true if there was one, and the node below.
+    /// Strips a negation: returns whether there was one, and the node below.
     fn unsigned(&self, id: Id) -> (bool, Id) {
         match self.new.node(id) {
             Node::Unary(Unary::Neg, a) => (true, a),

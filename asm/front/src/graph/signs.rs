@@ -6,7 +6,7 @@
 use super::{Binary, Graph, Id, Label, Node, Parity, Rewrites, Unary};
 use std::collections::HashSet;
 
-/// A node stripped of its negations, and true if their number is odd.
+/// A node stripped of its negations, and whether their number is odd.
 type Signed = (Id, bool);
 
 struct Signs<'a> {

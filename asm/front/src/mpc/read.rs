@@ -95,7 +95,7 @@ pub fn is_system(text: &str) -> bool {
 /// Reads a control problem; `stem` names a problem without a name, `files` gives the included files of numbers.
 ///
 /// # Errors
-/// If the text is no control problem, or its parts do not fit; with the key and its line.
+/// If the text is not a control problem, or its parts do not fit; with the key and its line.
 pub fn read(text: &str, stem: &str, files: Files<'_>) -> Result<System, Error> {
     if text.len() > MAX_BYTES {
         return Err(Error::plain(format!("the file is longer than {} MiB", MAX_BYTES >> 20)));

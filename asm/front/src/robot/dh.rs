@@ -74,7 +74,7 @@ fn number(text: &str) -> Option<f64> {
 /// Reads a robot from a table.
 ///
 /// # Errors
-/// If the text is no such table, with the line.
+/// If the text is not such a table, with the line.
 pub fn read(source: &str, name: &str, snap: f64) -> Result<Tree, Error> {
     let mut convention = None;
     let mut header: Option<Header<'_>> = None;

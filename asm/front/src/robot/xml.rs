@@ -18,7 +18,7 @@ pub const MAX_ATTRIBUTES: usize = 256;
 /// Parses a text within the limits.
 ///
 /// # Errors
-/// If the text is no XML or exceeds a limit, with the line if known.
+/// If the text is not XML or exceeds a limit, with the line if known.
 pub(super) fn parse(source: &str) -> Result<Document<'_>, Error> {
     if source.len() > MAX_BYTES {
         return Err(Error::plain(format!("the file is longer than {} MiB", MAX_BYTES >> 20)));

@@ -135,7 +135,7 @@ impl Terms<'_> {
     }
 }
 
-/// The node is a macro of `<math.s>`, no instruction.
+/// The node is a macro of `<math.s>` rather than an instruction.
 pub(crate) fn of_library(node: Node) -> bool {
     match node {
         Node::Unary(op, _) => matches!(

@@ -173,7 +173,7 @@ impl<'a> Exec<'a> {
         Ok(result)
     }
 
-    /// Goes to a function's beginning.
+    /// Sets the place for messages to the beginning of a function.
     pub(in crate::c) fn here(&mut self, key: &str) {
         let found = &self.functions[key];
         let (unit, span) = (found.unit, found.definition.declarator.span);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Paths that data choose: both are executed, and what differs behind them becomes choices where both are short, otherwise a branch whose
-//! sides set variables.
+//! Paths that depend on data: both are executed, and differing results become selections if both paths are short, otherwise a branch
+//! whose sides set variables.
 
 use super::Exec;
 use crate::Error;
@@ -10,7 +10,7 @@ use crate::c::value::{Condition, Exit, Memory, Outcome, Pointer, Value};
 use std::collections::HashMap;
 use std::rc::Rc;
 
-/// Operations of both sides, up to which both are computed and the results chosen.
+/// Limit on the operations of both sides, up to which both are computed and their results selected.
 const CHOSEN: usize = 40;
 
 /// Runs one side; its outcomes are relative to the side's beginning.
@@ -115,7 +115,7 @@ impl<'a> Exec<'a> {
         })
     }
 
-    /// Computes both sides and chooses.
+    /// Computes both sides unconditionally and selects between their results.
     fn chosen(
         &mut self,
         condition: Id,
@@ -207,7 +207,7 @@ impl<'a> Exec<'a> {
         low >= 0 && high < self.nodes.arrays[array].words.len() as i64
     }
 
-    /// Memory that is one if the condition holds, and otherwise the other.
+    /// Merges two memories: `yes` if the condition holds, otherwise `no`.
     fn merged(&mut self, condition: Id, yes: &Memory, no: &Memory) -> Result<Memory, Error> {
         let mut merged = if yes.0.len() > no.0.len() { yes.clone() } else { no.clone() };
         for object in 0..yes.0.len().min(no.0.len()) {
@@ -266,7 +266,7 @@ impl<'a> Exec<'a> {
         })
     }
 
-    /// Scalars from the object's beginning to where a pointer points.
+    /// Index of the scalar that a pointer refers to, as a node; `None` between members.
     fn words(&mut self, pointer: &Pointer) -> Option<Id> {
         let leaf = self.objects[pointer.object].leaf(pointer.offset)?;
         let known = self.nodes.int(i32::try_from(leaf).ok()?);
@@ -276,7 +276,7 @@ impl<'a> Exec<'a> {
         }
     }
 
-    /// Emits a branch, whose sides set variables for all that is needed behind it.
+    /// Emits a branch, whose sides set variables for all values needed after it.
     fn branched(
         &mut self,
         condition: Id,
@@ -404,7 +404,7 @@ impl<'a> Exec<'a> {
         Ok(memory)
     }
 
-    /// Memory behind both sides.
+    /// Memory after both sides.
     fn joint_memory(&mut self, exported: &mut Exported, yes: &Memory, no: &Memory) -> Result<Memory, Error> {
         let shared = yes.0.len().min(no.0.len());
         let longer = if yes.0.len() > no.0.len() { yes.clone() } else { no.clone() };
@@ -422,7 +422,7 @@ impl<'a> Exec<'a> {
         Ok(memory)
     }
 
-    /// Objects that only one side has are gone behind it: unset, so that no variable is made for them.
+    /// Unsets objects that exist in one side only: they end with the side, and need no variable.
     fn without_locals(mut memory: Memory, shared: usize) -> Memory {
         for cells in memory.0.iter_mut().skip(shared) {
             *cells = Rc::new(vec![Value::Unset; cells.len()]);

@@ -82,7 +82,7 @@ impl Exec<'_> {
         Ok(())
     }
 
-    /// The whole object.
+    /// A whole object as an lvalue.
     pub(in crate::c) fn place_of(&self, object: usize) -> Lvalue {
         let pointer = Pointer { object, offset: 0, dynamic: None };
         Lvalue { pointer, ty: self.objects[object].ty.clone() }
@@ -269,7 +269,7 @@ impl Exec<'_> {
         }
         match (own, ty, value) {
             (Type::Int(a), Type::Int(b), value) if a.bits == b.bits => {
-                // Signedness alone differs.
+                // Only the signedness differs.
                 Ok(match value {
                     Value::Int(known) => Value::Int(b.wrap(known)),
                     Value::Node(id) => Value::Node(self.wrapped(id, *b)?),

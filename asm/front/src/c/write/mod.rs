@@ -252,7 +252,7 @@ impl Writer<'_, '_> {
         }
     }
 
-    /// A line, with the line of C beside it if that is another than before.
+    /// Writes a line, with the line of C next to it if that differs from the last one.
     fn line(&mut self, code: &str, place: Place) {
         let mut line = format!("{:1$}{code}", "", self.indent);
         let unit = &self.exec.units[place.unit];
