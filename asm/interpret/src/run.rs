@@ -16,7 +16,7 @@ use takt_syntax::intern::Interner;
 /// The greatest depth of calls: every machine's return stack holds as many.
 const CALLS: usize = 16;
 
-/// A register and its present value, absent before the first write.
+/// A register and its current value, absent before the first write.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Cell {
     /// Type of all values; `None` if each value brings its own, kept in `now`.

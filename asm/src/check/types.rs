@@ -110,13 +110,13 @@ struct Types<'i, V> {
     entry: Vec<V>,
     /// The declaration gives the type of the register.
     declared: Vec<bool>,
-    /// The present value of each register, and the run that wrote it.
+    /// The current value of each register, and the run that wrote it.
     now: Vec<(u32, V)>,
     /// The tables of data memory, by label.
     tables: HashMap<LabelId, V>,
     /// By instruction: the sources whose bits become its result.
     passed: Vec<SmallVec<[usize; 2]>>,
-    /// Registers whose present type at the beginning of a run has been read.
+    /// Registers whose current type at the beginning of a run has been read.
     read: Vec<Cell<bool>>,
     /// A value has changed since it was read: the fixed point is not reached.
     changed: bool,
@@ -243,7 +243,7 @@ impl<'i, V: AbstractValue> Types<'i, V> {
         }
     }
 
-    /// The present value of a register.
+    /// The current value of a register.
     #[inline]
     fn present(&self, run: u32, register: RegisterId) -> V {
         let index = register.index();

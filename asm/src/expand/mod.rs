@@ -167,7 +167,7 @@ pub(crate) enum FrameKind {
     /// Index of a file, and the `.loc` that was in force where it is included.
     File(usize, u32),
     Macro,
-    /// A repetition: name, present and last value of the counter, first statement, and enclosing scope.
+    /// A repetition: name, current and last value of the counter, first statement, and enclosing scope.
     Rep {
         variable: NameId,
         value: i64,
@@ -195,7 +195,7 @@ pub(crate) struct Expander<'l> {
     pub(crate) loader: &'l dyn Loader,
     pub(crate) flat: ExpandedSource,
     pub(crate) frames: Vec<Frame>,
-    /// Counted loops at run time around the present statement, each with its place.
+    /// Counted loops at run time around the current statement, each with its place.
     pub(crate) nest: Vec<(u32, Span)>,
     pub(crate) section: Section,
     pub(crate) loc: u32,

@@ -46,7 +46,7 @@ impl Context {
         text.strip_prefix(':').map_or_else(|| text.to_owned(), |number| format!("slice.{number}"))
     }
 
-    /// The present value of an index that is a slice, the `number`-th of its element.
+    /// The current value of an index that is a slice, the `number`-th of its element.
     pub(crate) fn slice_index(
         &mut self,
         at: AstPlace,

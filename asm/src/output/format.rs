@@ -29,7 +29,7 @@ pub fn format(text: &str) -> String {
     let ast = parse::parse(&sources.files()[file].clone(), &mut names, &mut sink);
     let broken: BTreeSet<u32> = ast.broken.into_iter().collect();
     let mut out = String::with_capacity(text.len() + text.len() / 8);
-    // The present statement: whether it continues, and whether it could not be read.
+    // The current statement: whether it continues, and whether it could not be read.
     let (mut continues, mut keep) = (false, false);
     for ((number, line), tokens) in (1..).zip(text.split('\n')).zip(lines(text)) {
         let mut code = tokens.iter().filter(|token| token.kind != TokenKind::Comment);

@@ -66,7 +66,7 @@ struct ClosedLoop {
     number: Option<RegisterId>,
 }
 
-/// The counted loops around the present line.
+/// The counted loops around the current line.
 #[derive(Debug, Default)]
 pub(super) struct Nest {
     open: Vec<OpenLoop>,

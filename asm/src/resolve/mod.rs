@@ -215,9 +215,9 @@ pub(crate) struct Resolver<'c> {
     own_files: Vec<Option<u32>>,
     /// Number of labels that already have their position.
     label: usize,
-    /// The cast of the present operand, if the source has one.
+    /// The cast of the current operand, if the source has one.
     pub(crate) cast: Option<Type>,
-    /// The argument that the present operand stands for, if its parameter has a type.
+    /// The argument that the current operand stands for, if its parameter has a type.
     pub(crate) asked: Option<u32>,
     /// Arguments whose types are reported to be wrong, with the place.
     mistaken: HashSet<(u32, Span)>,
@@ -231,19 +231,19 @@ pub(crate) struct Resolver<'c> {
     pub(crate) tables: HashMap<LabelId, Kind>,
     /// Instructions by their form in equations.
     forms: Forms,
-    /// Type of the value last written to each register above the present line.
+    /// Type of the value last written to each register above the current line.
     kinds: Vec<Kind>,
     /// Subexpressions that are available.
     subexpressions: CommonSubexpressions,
-    /// Counted loops around the present line, and ended loops whose values are still needed.
+    /// Counted loops around the current line, and ended loops whose values are still needed.
     nest: Nest,
     /// Labels made by the assembler, numbered after the source's.
     made_labels: Vec<Label>,
     /// Elements of arrays in data memory that operands denote.
     words: Vec<Word>,
-    /// Elements that the present bundle writes, with the registers of their values.
+    /// Elements that the current bundle writes, with the registers of their values.
     stores: Vec<(Word, RegisterId, Span)>,
-    /// Attribution of the present line, and whether it is scheduled.
+    /// Attribution of the current line, and whether it is scheduled.
     line: (Attribution, bool),
     /// Number of turns of all sums so far.
     turns: usize,

@@ -407,7 +407,7 @@ impl Resolver<'_> {
         indices.iter().flatten().any(is_index)
     }
 
-    /// The present value of an index that is a slice of an array of registers, whose loop is written out.
+    /// The current value of an index that is a slice of an array of registers, whose loop is written out.
     fn slice_constant(
         &mut self,
         at: AstPlace,

@@ -11,7 +11,7 @@ use takt_diagnostics::source::Span;
 use takt_syntax::ast::ExprId;
 use takt_syntax::expr::Value;
 
-/// The present part of a line, and its expression.
+/// The current part of a line, and its expression.
 pub(super) type LineExpression = (Span, ExprId);
 
 /// The form of an operand in an equation.

@@ -415,7 +415,7 @@ impl Block {
 /// The most choices of slots that the scheduler examines for a bundle.
 const CHOICES: usize = 120;
 
-/// The choices of slots for the operations of a bundle, the present one first; without domains, only the present one.
+/// The choices of slots for the operations of a bundle, the current one first; without domains, only the current one.
 fn choices(ir: &Ir, bundle: &Bundle, domains: Option<&Domains>) -> Vec<Vec<Option<SlotIndex>>> {
     let present: Vec<Option<SlotIndex>> = bundle.operations.iter().map(|operation| operation.slot).collect();
     let Some(domains) = domains else { return vec![present] };

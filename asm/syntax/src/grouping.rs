@@ -91,7 +91,7 @@ impl Tree<'_> {
         }
         chain.reverse();
         let mut text = String::new();
-        // The start of the present comparison. The operands joined to the first one precede it.
+        // The start of the current comparison. The operands joined to the first one precede it.
         let mut from = infix.span.start;
         if let Some(joined) = self.joined(chain[0].operands[0]) {
             let (_, end) = self.join(joined, 1);

@@ -19,7 +19,7 @@ struct Source {
     indices: Vec<(String, u64)>,
     /// Statements that may still be made.
     left: u32,
-    /// The present code is a subroutine's, which may call no subroutine that calls.
+    /// The current code is a subroutine's, which may call no subroutine that calls.
     subroutine: bool,
 }
 

@@ -254,7 +254,7 @@ impl Machine {
         self.name.replace(self.row_name(), "").replace(',', " ")
     }
 
-    /// The machine of this row with the smallest memories that hold `bundles` and `words` and are no smaller than the present ones;
+    /// The machine of this row with the smallest memories that hold `bundles` and `words` and are no smaller than the current ones;
     /// `None` if no depth is large enough.
     pub fn holding(&'static self, bundles: u64, words: u64) -> Option<&'static Machine> {
         let depth = |of: u32, wanted: u64, most: u32| {

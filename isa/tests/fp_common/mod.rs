@@ -90,7 +90,7 @@ pub(crate) fn special_values() -> Vec<u32> {
         0x0100_0000,
         0x0100_0001,
         0x0b80_0000, // 2^-104
-        0x1f80_0000, // 2^-64, whose square is subnormal
+        0x1f80_0000, // 2^-64, whose square is subnormal-free, and 2^-65, …
         0x2000_0000, // 2^-63
         0x32ff_ffff,
         0x3300_0000, // 2^-25

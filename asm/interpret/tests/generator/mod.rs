@@ -41,9 +41,9 @@ struct Place {
 
 struct Generator {
     random: Pcg64,
-    /// Text of the present code.
+    /// Text of the current code.
     text: String,
-    /// Subroutines made so far, which the present code may call.
+    /// Subroutines made so far, which the current code may call.
     subroutines: Vec<Subroutine>,
     names: u64,
     nest: usize,
