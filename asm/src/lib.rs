@@ -161,7 +161,7 @@ impl AssembledProgram {
     }
 }
 
-/// Assembles a program whose first source is given, as from standard input or an editor; its includes are loaded.
+/// Assembles a program whose first source is given, for example from standard input or an editor; its includes are loaded.
 /// `name` is its path within the project.
 ///
 /// # Errors

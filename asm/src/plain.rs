@@ -88,7 +88,7 @@ pub struct PlainOperation {
     pub op: Op,
     /// Destination: an index into [`PlainProgram::registers`].
     pub dest: Option<u32>,
-    /// Registers that it reads, as many as the instruction has sources; the rest is zero.
+    /// Registers that the operation reads, as many as the instruction has sources; the rest is zero.
     pub sources: [u32; 3],
     /// Immediate, offset, or index of the target bundle.
     pub constant: u32,

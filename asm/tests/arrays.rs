@@ -176,7 +176,7 @@ fn source(statements: &[Statement], depth: usize, numbers: &mut Vec<i64>, text: 
 struct Generator<'r> {
     random: &'r mut Random,
     arrays: BTreeMap<char, Vec<i64>>,
-    /// The loops around: index, first, last (at run time, a greater declared maximum), step.
+    /// The enclosing loops: index, first, last (at run time, a greater declared maximum), step.
     around: Vec<(char, Affine, Affine, i64)>,
 }
 
@@ -185,7 +185,7 @@ impl Generator<'_> {
         self.random.below(n) as i64
     }
 
-    /// All values of an affine function over the loops around.
+    /// All values of an affine function over the enclosing loops.
     fn extremes(&self, function: &Affine) -> Option<(i64, i64)> {
         fn go(
             around: &[(char, Affine, Affine, i64)],
@@ -213,7 +213,7 @@ impl Generator<'_> {
         go(&self.around, &mut BTreeMap::new(), function)
     }
 
-    /// A subscript that lies in 1 to `size` over the loops around.
+    /// A subscript that lies in 1 to `size` over the enclosing loops.
     fn subscript(&mut self, size: i64) -> Affine {
         let indices: Vec<char> = self.around.iter().map(|around| around.0).collect();
         for _ in 0..4 {

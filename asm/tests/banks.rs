@@ -205,7 +205,7 @@ fn a_preset_may_come_before_its_register() {
 
 #[test]
 fn reused_initial_values_are_no_presets() {
-    // Control comes back to the beginning.
+    // Control returns to the beginning.
     let text = ".input x, n:int\n.output y\n.state s\n.once\nagain: mov s, zero\n wait period\n.period\nperiod: fadd s, s, x\n mov y, s\n bnz n, again\n wait period\n";
     let (_, assembled) = period(text);
     assert_eq!(

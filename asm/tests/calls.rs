@@ -142,7 +142,7 @@ fn loops_that_call_themselves_are_errors() {
     common::good(&text.replace(" .for m, 1, 8\n", "").replace(" .endfor\n", ""));
 }
 
-/// Two loops with a label of one name, and with declarations, however many of their iterations are written out.
+/// Two loops with a label of the same name, and with declarations, however many of their iterations are written out.
 #[test]
 fn labels_of_a_body_are_local_to_an_iteration() {
     let last = |count: i64| count * (count + 1) / 2;

@@ -18,7 +18,7 @@ fn cycles(folder: &str, name: &str, machine: &'static Machine, contract: Contrac
     period.map(|block| block.cycles).or(longest).expect("it has a scheduled block")
 }
 
-/// A test for each figure, so that a longer figure fails alone.
+/// A separate test for each figure, so that an increase fails only that test.
 macro_rules! no_longer {
     ($($name:ident: $folder:literal $file:literal $machine:ident $contract:ident $most:literal;)*) => {$(
         #[test]

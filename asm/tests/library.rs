@@ -284,7 +284,7 @@ fn reference(name: &str, x: f64, y: f64) -> Option<f64> {
     })
 }
 
-/// Left and right side of each line of a body: what an equation, an instruction or a macro writes, and what it reads.
+/// Left and right side of each line of a body: written and read operands of an equation, an instruction or a macro.
 fn sides(body: &str) -> impl Iterator<Item = (&str, &str)> {
     body.lines().filter_map(|line| {
         let code = line.split(';').next()?.trim();

@@ -16,7 +16,7 @@ fn assembled(source: &str, machine: &'static Machine, schedule: Schedule) -> Ass
     }
 }
 
-/// Memory and outputs where the program halts, and the cycle in which it does.
+/// Memory and outputs where the program halts, and the cycle of the halt.
 fn outcome(assembled: &AssembledProgram) -> (Vec<u32>, Vec<Option<u32>>, u64) {
     let mut emulator = Emulator::new(&assembled.program).expect("it fits");
     emulator.set_cycle_limit(1_000_000);

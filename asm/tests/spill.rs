@@ -214,7 +214,7 @@ fn output(assembled: &AssembledProgram) -> (Option<Number>, u64) {
     (emulator.output("y").unwrap(), cycles)
 }
 
-/// A full bank says what fills it, and points there.
+/// The message of a full bank names its contents, and points there.
 #[test]
 fn full_bank_error_names_its_contents() {
     let report = |text: &str, machine| assembled(text, machine).unwrap_err().render(false);

@@ -121,9 +121,10 @@ pub struct Section {
 pub struct LoopBound {
     /// The bundle that heads the loop.
     pub address: BundleAddress,
-    /// The most iterations of one run; at least 1.
+    /// Maximum number of iterations in one run; at least 1.
     pub most: u32,
-    /// The most iterations of all runs in one section, from reset or a tick to the next `wait`; at least 1. `None` if nothing is promised.
+    /// Maximum number of iterations over all runs in one section, from reset or a tick to the next `wait`; at least 1. `None` without a
+    /// promise.
     pub total: Option<u32>,
 }
 

@@ -100,7 +100,7 @@ pub enum LinkKind {
     },
     /// A queue of entries.
     Fifo {
-        /// Number of entries that it holds.
+        /// Number of entries that the queue holds.
         depth: u32,
         /// The sender's output port whose writes push an entry; `None` if the sender is the host.
         push: Option<Register>,

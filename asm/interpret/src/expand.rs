@@ -10,9 +10,9 @@ use takt_isa::Type;
 use takt_syntax::ast::*;
 use takt_syntax::name::{NameId, NameRef};
 
-/// The most steps of a written-out program.
+/// Limit on the steps of a written-out program.
 const STEPS: usize = 1 << 20;
-/// Macros within one another, at most.
+/// Limit on the nesting depth of macros.
 const DEPTH: usize = 64;
 
 /// Cells with the results of an equation's macro calls, by the node of each call.
@@ -25,7 +25,7 @@ pub(crate) enum Action {
     Bundle(usize, usize),
     /// An equation, by its index in the tree.
     Equation(usize),
-    /// The value of an expression goes to a cell, for a macro's argument.
+    /// Stores the value of an expression in a cell, for a macro's argument.
     Argument(ExprId, usize),
     /// Stores the number of iterations from a number to a register's value in a cell.
     Count(Expr, i64, usize),
@@ -224,7 +224,7 @@ impl Interpreter {
         self.names.intern(&text)
     }
 
-    /// Writes out a directive. Returns the statement to go on with.
+    /// Writes out a directive. Returns the statement to continue with.
     fn directive(&mut self, directive: usize, at: usize, scope: &Rc<Scope>) -> Result<usize, Fault> {
         let ast = Rc::clone(&self.ast);
         let owner = Scope::declaring(scope, false);

@@ -33,7 +33,7 @@ enum Number {
 enum Value {
     /// Value of constants alone: it takes the type that its use requires.
     Number(Number),
-    /// Bits, and the type that they have.
+    /// Bits, and their type.
     Bits(u32, Type),
 }
 

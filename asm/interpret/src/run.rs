@@ -123,7 +123,7 @@ impl Interpreter {
         Err(format!("no `wait` in {most} steps"))
     }
 
-    /// Runs a step; true for a `wait`.
+    /// Runs a step; returns whether it is a `wait`.
     fn step(&mut self, step: &Step) -> Result<bool, Fault> {
         let Step { action, scope, results } = step;
         let ast = Rc::clone(&self.ast);
@@ -168,7 +168,7 @@ impl Interpreter {
         if in_period { self.steps[0].len() + at } else { at }
     }
 
-    /// Executes the operations of a bundle: all read before any writes. True if one is a `wait`.
+    /// Executes the operations of a bundle: all read before any writes. Returns whether one is a `wait`.
     fn bundle_at(&mut self, first: usize, count: usize, scope: &Rc<Scope>) -> Result<bool, Fault> {
         let ast = Rc::clone(&self.ast);
         let mut writes = Vec::new();

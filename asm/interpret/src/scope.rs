@@ -70,7 +70,7 @@ impl Scope {
         self.names.borrow_mut().insert(name.to_owned(), meaning);
     }
 
-    /// The meaning of a name here.
+    /// The meaning of a name in this scope.
     pub(crate) fn find(&self, name: &str) -> Option<Meaning> {
         let own = self.names.borrow().get(name).cloned();
         own.or_else(|| self.around.as_ref()?.find(name))

@@ -14,7 +14,7 @@ use takt_emu::Emulator;
 use takt_interpret::Interpreter;
 use takt_isa::{F1, F3, Machine, T1, T3, T4};
 
-/// The most steps of a section: several times the generator's bound.
+/// Limit on the steps of a section: several times the generator's bound.
 const STEPS: u64 = 1 << 18;
 const PERIODS: u64 = 3;
 

@@ -97,7 +97,7 @@ pub(crate) struct BankConflict {
 pub(crate) struct BankAssignment {
     /// Home bank of each register that several slots write, by register index.
     pub(crate) of: Vec<Option<HomeBank>>,
-    /// Liveness of registers with a home bank: by run, true if the register is live after it.
+    /// Liveness of registers with a home bank: by run, whether the register is live after it.
     pub(crate) live: Vec<(RegisterId, Vec<bool>)>,
     pub(crate) conflicts: Vec<BankConflict>,
     /// Registers that the source writes in `.once`, if only to write them again before they are read.

@@ -314,7 +314,7 @@ fn leaves(context: &mut Context, operation: &Operation, end: u32) {
     context.report(ScopeId(operation.expansion), warning);
 }
 
-/// A period that never comes to a `wait` has no end.
+/// A period that never reaches a `wait` does not end.
 fn no_wait(context: &mut Context, ir: &Ir) {
     let ends = |operation: &Operation| matches!(operation.row().effect, Effect::Wait | Effect::Halt);
     let mut seen = vec![false; ir.bundles.len()];

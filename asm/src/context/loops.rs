@@ -22,11 +22,11 @@ pub(crate) struct SourceLoopId(pub(crate) u32);
 /// turn.
 #[derive(Clone, Debug)]
 pub(crate) struct SourceLoop {
-    /// Upper bound of the iterations, given the iterations of the loops around.
+    /// Upper bound of the iterations, given the iterations of the enclosing loops.
     pub(crate) most: Affine<SourceLoopId>,
 }
 
-/// An integer that the assembler knows up to the iteration numbers of the loops around.
+/// An integer that the assembler knows up to the iteration numbers of the enclosing loops.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct AffineInteger {
     /// The value as a function of the source's iterations.
@@ -68,7 +68,7 @@ pub(crate) struct Index {
     pub(crate) value: AffineInteger,
     /// The loop, while the name is its index in the loop's body; `None` in the iterations left over after it.
     pub(crate) of: Option<SourceLoopId>,
-    /// The `.for` or the sum.
+    /// Place of the `.for` or the sum.
     pub(crate) span: Span,
 }
 
@@ -88,7 +88,7 @@ impl Operand {
 }
 
 impl Context {
-    /// The value of an expression that may contain the indices of the loops around.
+    /// The value of an expression that may contain the indices of the enclosing loops.
     pub(crate) fn counted(&mut self, at: AstPlace, expr: Expr) -> Result<AffineInteger, ErrorReported> {
         let ast = std::rc::Rc::clone(&self.asts[at.ast as usize]);
         self.counted_nodes(at, &ast.nodes[expr.id.range()], expr.span, false)
@@ -281,7 +281,7 @@ impl Context {
         loops
     }
 
-    /// The least and the largest value of a function over all iterations of the loops around; `None` without any iteration.
+    /// The least and the largest value of a function over all iterations of the enclosing loops; `None` without any iteration.
     ///
     /// # Errors
     /// If the iteration space has more points than may be enumerated.

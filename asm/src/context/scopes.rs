@@ -194,7 +194,7 @@ impl Scopes {
         id
     }
 
-    /// The binding of a name in a scope, or in those around it.
+    /// The binding of a name in a scope, or in the enclosing scopes.
     #[inline(always)]
     pub(crate) fn lookup(&self, scope: ScopeId, name: NameId) -> Binding {
         if scope != ScopeId::ROOT
@@ -205,7 +205,7 @@ impl Scopes {
         self.globals.get(name.0 as usize).copied().unwrap_or(Binding::None)
     }
 
-    /// The binding of a name by an expansion, or by the expansions around it.
+    /// The binding of a name by an expansion, or by the enclosing expansions.
     fn expanded(&self, mut scope: ScopeId, name: NameId) -> Option<Binding> {
         while scope != ScopeId::ROOT {
             let here = self.scope(scope);

@@ -42,7 +42,7 @@ pub(crate) struct UnknownName {
 }
 
 impl Context {
-    /// Notes an unknown name. It is reported at the end, when every name that the source declares is known.
+    /// Records an unknown name. It is reported at the end, when every name that the source declares is known.
     pub(crate) fn unknown(
         &mut self,
         scope: ScopeId,

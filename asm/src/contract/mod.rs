@@ -47,7 +47,7 @@ type FusionCandidates = HashMap<OperationPosition, SmallVec<[(OperationPosition,
 struct RegisterState {
     /// Number of writes so far.
     version: u32,
-    /// Index of the product that it holds.
+    /// Index of the product that the register holds.
     product: Option<usize>,
 }
 

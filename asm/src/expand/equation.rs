@@ -45,7 +45,7 @@ impl Expander<'_> {
     pub(crate) fn equation(&mut self, at: AstPlace, statement: u32, equation: u32) {
         let ast = Rc::clone(&self.context.asts[at.ast as usize]);
         let equation = &ast.equations[equation as usize];
-        // Errors are reported already.
+        // Errors have been reported.
         if self.slice_loop(at, &ast, statement, equation) != Ok(false) {
             return;
         }
@@ -54,7 +54,7 @@ impl Expander<'_> {
             self.push(at, statement, Part::All, equation.span);
             return;
         }
-        // Errors are reported already.
+        // Errors have been reported.
         let Ok(steps) = self.steps(at, &ast, equation) else { return };
         let end = steps.len() as u32;
         let kind = FrameKind::Equation(steps.into(), statement);

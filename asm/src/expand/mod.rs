@@ -390,7 +390,7 @@ impl<'l> Expander<'l> {
             StatementKind::Directive(directive) => {
                 let ast = Rc::clone(&self.context.asts[at.ast as usize]);
                 self.context.again = self.is_again(at, &ast, &ast.directives[directive as usize]);
-                // Errors are reported already; the walk goes on.
+                // Errors have been reported; the walk goes on.
                 let _ = self.directive(at, &ast, directive, index);
                 self.context.again = false;
             }

@@ -62,11 +62,11 @@ pub struct Loop {
 pub struct ArrayAccess {
     /// Array that the access stays in.
     pub array: ArrayId,
-    /// The word, from the array's first one; `None` if it depends on more than the iterations of the loops around.
+    /// The word, from the array's first one; `None` if it depends on more than the iterations of the enclosing loops.
     pub word: Option<Affine>,
 }
 
-/// An affine function of iteration numbers, which count from 0 each time a loop is entered: of the loops around, unless said otherwise.
+/// An affine function of iteration numbers, which count from 0 each time a loop is entered: of the enclosing loops, unless said otherwise.
 #[derive(Clone, PartialEq, Eq, Hash, Debug)]
 pub struct Affine<L = LoopId> {
     /// The value where all iteration numbers are 0.

@@ -15,7 +15,7 @@ const LOOPS: u32 = 4;
 
 /// The control flow of a program.
 pub(crate) struct Flow {
-    /// By run: the runs that control may come from.
+    /// By run: its predecessors.
     sources: Vec<Vec<usize>>,
     /// Runs after which every register counts as read: control stops there, and a debugger can look at registers.
     ends: Vec<usize>,

@@ -329,9 +329,9 @@ impl Label {
 pub struct LoopBound {
     /// Index of the bundle that heads the loop.
     pub position: u32,
-    /// The most iterations each time that the loop is entered.
+    /// Maximum number of iterations each time the loop is entered.
     pub most: u32,
-    /// The most iterations in one section, from reset or a tick to the next `wait`; `None` if the source does not say.
+    /// Maximum number of iterations in one section, from reset or a tick to the next `wait`; `None` if the source does not state it.
     pub total: Option<u32>,
 }
 

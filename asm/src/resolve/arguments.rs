@@ -2,7 +2,7 @@
 //! Arguments of macros against the types that their parameters ask for. A part of [`operand`](crate::resolve::operand).
 //!
 //! [`expand::macros`](crate::expand) finds the types. A register, an element or a whole array is checked where the body first uses
-//! it: by then the writes above it are known. Types that are known only later, as of a register that is written below, are left to
+//! it: by then the writes above it are known. Types that are known only later, such as of a register written below, are left to
 //! the type check ([`TypeEvidence::Asked`]).
 
 use crate::context::{Argument, Binding, ErrorReported, ParameterType, words};
@@ -27,7 +27,7 @@ impl Resolver<'_> {
         self.parameter_type().map(|(_, _, ty)| ty)
     }
 
-    /// Notes the type that the parameter asks for, of an operand whose type the instruction leaves open.
+    /// Records the type that the parameter asks for, of an operand whose type the instruction leaves open.
     pub(super) fn note_parameter_type(&mut self, operation: &Operation, part: OperandPosition) {
         if let (Some(ty), None) = (self.type_of_parameter(), self.cast) {
             self.context.declared.given.insert(operation, part, TypeEvidence::Asked(ty));

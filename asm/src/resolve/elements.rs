@@ -268,7 +268,7 @@ impl Resolver<'_> {
     pub(super) fn store_results(&mut self, at: AstPlace) {
         for (word, value, span) in std::mem::take(&mut self.stores) {
             let mut line = CurrentEquation::new(self.line);
-            // Errors are reported already.
+            // Errors have been reported.
             let _ = self.store(at, &mut line, &word, value, span);
         }
     }

@@ -148,7 +148,7 @@ impl Resolver<'_> {
         }
     }
 
-    /// Notes the type of the value last written to a register.
+    /// Records the type of the value last written to a register.
     pub(super) fn set_kind(&mut self, id: RegisterId, kind: Kind) {
         if self.kinds.len() <= id.index() {
             self.kinds.resize(self.context.declared.registers.len().max(id.index() + 1), Kind::None);
@@ -199,7 +199,7 @@ impl Resolver<'_> {
         }
     }
 
-    /// Notes the type that a store leaves in its table, for the equations below.
+    /// Records the type that a store leaves in its table, for the equations below.
     pub(super) fn note_store(&mut self, operation: &Operation) {
         if operation.row().effect == Effect::Store
             && let Some((label, kind)) = self.table_kind(operation)

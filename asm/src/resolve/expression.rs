@@ -98,7 +98,7 @@ impl Computation<'_> {
         }
     }
 
-    /// Enters the chosen branch of a choice with a constant condition; false if no such choice has its first branch here.
+    /// Enters the chosen branch of a choice with a constant condition; returns false if no such choice has its first branch here.
     fn choose(&mut self, index: u32) -> bool {
         let Some(stretch) = self.stretches.last_mut() else { return false };
         if std::mem::replace(&mut stretch.chosen, false) {

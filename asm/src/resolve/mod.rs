@@ -45,7 +45,7 @@ use takt_isa::spec::instructions::Function;
 use takt_isa::{Effect, Machine, Op, ROWS, Register, Slots, Type};
 use takt_syntax::ast::*;
 
-/// The most cycles that a demand on ports can name: many times what a program memory holds.
+/// Limit on the cycles that a demand on ports can name: many times the length of a program.
 const MAX_CYCLES: u32 = 1 << 24;
 
 /// Resolves the expanded source. Lines with mistakes are left out and reported.
@@ -114,7 +114,7 @@ pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: Expanded
     resolver.presets();
     resolver.ranges();
     for timing in std::mem::take(&mut resolver.flat.timing) {
-        // Errors are reported already.
+        // Errors have been reported.
         if let Ok(demand) = resolver.demand(&timing) {
             resolver.ir.demands.push(demand);
         }
@@ -296,14 +296,14 @@ impl Resolver<'_> {
     fn item(&mut self, item: &Item) {
         let ast = Rc::clone(&self.context.asts[item.at.ast as usize]);
         if matches!(item.part, Part::Begin(_) | Part::End(_)) {
-            // Errors are reported already.
+            // Errors have been reported.
             let _ = self.loop_part(item, &ast);
             return;
         }
         let (first, count) = match ast.statements[item.statement as usize].kind {
             StatementKind::Bundle(first, count) => (first, u32::from(count)),
             StatementKind::Equation(equation) => {
-                // Errors are reported already.
+                // Errors have been reported.
                 let _ = self.equation(item, &ast, equation);
                 return;
             }
@@ -313,7 +313,7 @@ impl Resolver<'_> {
         if let [one] = written {
             let location = self.location(item, (one.span, one.line), 0, 1);
             self.line = (location, item.scheduled);
-            // Errors are reported already.
+            // Errors have been reported.
             if let Ok(operation) = self.operation(item.at, &ast, first, 1, location) {
                 let operations = SmallVec::from_buf([operation]);
                 self.push(Bundle { operations, explicit: false, scheduled: item.scheduled });
@@ -326,7 +326,7 @@ impl Resolver<'_> {
         for (index, (operation, number)) in written.iter().zip(first..).enumerate() {
             let location = self.location(item, (operation.span, operation.line), index, written.len());
             self.line = (location, item.scheduled);
-            // Errors are reported already; other operations may have errors of their own.
+            // Errors have been reported; other operations may have errors of their own.
             if let Ok(operation) = self.operation(item.at, &ast, number, written.len(), location) {
                 operations.push(operation);
             }
@@ -402,7 +402,7 @@ impl Resolver<'_> {
         self.ir.bundles.push(bundle);
     }
 
-    /// Notes the types that a bundle writes, for the equations below.
+    /// Records the types that a bundle writes, for the equations below.
     fn note_results(&mut self, bundle: &Bundle) {
         let is_opaque = bundle.is_opaque();
         for operation in &bundle.operations {
@@ -629,7 +629,7 @@ impl Resolver<'_> {
                 continue;
             };
             for name in registers {
-                // Errors are reported already.
+                // Errors have been reported.
                 let Ok((members, ty)) = self.range_registers(at, *name, *placed) else { continue };
                 let mut end = |end: &Expr| {
                     let value = self.context.value(at, end.id)?;

@@ -109,7 +109,7 @@ impl Resolver<'_> {
         Ok(())
     }
 
-    /// Notes the type that the source casts the last operand to.
+    /// Records the type that the source casts the last operand to.
     #[inline]
     fn note_cast(&mut self, operation: &Operation, part: OperandPosition) {
         if let Some(ty) = self.cast {
@@ -117,7 +117,7 @@ impl Resolver<'_> {
         }
     }
 
-    /// Notes the type of a constant where the instruction takes any bits.
+    /// Records the type of a constant where the instruction takes any bits.
     fn note_literal(&mut self, at: AstPlace, operand: Operand, operation: &Operation, part: OperandPosition) {
         let Ok(value) = self.operand_value(at, operand) else { return };
         let is_address = self.table_of(at, operand.kind).is_some();
@@ -757,7 +757,7 @@ impl Resolver<'_> {
                 (value, given.span, RegisterId::ZERO)
             }
         };
-        // If the data does not fit, its addresses are no errors of their own.
+        // If the data does not fit, its addresses are not reported as well.
         if self.is_full && self.table_of(place, given.kind).is_some() {
             return Err(ErrorReported);
         }

@@ -114,7 +114,7 @@ fn units_of<'p>(uses: impl Iterator<Item = &'p Reservation>) -> BTreeSet<usize> 
     uses.map(|usage| usage.unit.map(usize::from)).collect::<Option<BTreeSet<usize>>>().unwrap_or_default()
 }
 
-/// The given sets and the unions of overlapping ones, at most [`SETS`] in all.
+/// The given sets and the unions of overlapping ones, at most [`SETS`] in total.
 pub(super) fn unions(sets: impl Iterator<Item = BTreeSet<usize>>) -> Vec<BTreeSet<usize>> {
     let mut all: Vec<BTreeSet<usize>> = Vec::new();
     for set in sets.collect::<BTreeSet<_>>() {

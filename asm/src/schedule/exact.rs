@@ -49,7 +49,7 @@ enum Branch {
 enum Decision {
     /// A task issues in the first cycle of its window; else later.
     Cycle(usize),
-    /// A task takes a choice of slots; else another.
+    /// A task takes a choice of slots; the alternative is another choice.
     Slots(usize, u8),
 }
 
@@ -257,7 +257,7 @@ impl ExactSearch<'_, '_> {
             decision.apply(&mut windows);
             while let Err(stop) = self.propagation.narrow(&mut windows) {
                 let Stop::Empty { task } = stop else { return SearchOutcome::Unknown };
-                // A choice of slots is tried without looking ahead, so its failure is no dead end.
+                // A choice of slots is tried without looking ahead, so its failure does not count as a dead end.
                 if !matches!(decisions.last(), Some((_, Decision::Slots(..)))) {
                     self.weights[task] += 1;
                     left -= 1;

@@ -215,8 +215,8 @@ enum Wait {
 /// - A register is read before it is overwritten: in the same cycle at the latest, for a bundle reads before it writes.
 /// - Values for one register, ports included, are written in the source's order: the earlier is written back when the later issues.
 /// - Loads and stores that may touch the same word keep their order, except loads among loads.
-/// - A load or store whose address is not known may fault, and what was on the output ports before must be the same: outputs
-///   written before it in the source issue before it, outputs written after it not before it.
+/// - A load or store whose address is not known may fault, and the output ports must then show the same values as in source order:
+/// outputs written before it in the source issue before it, outputs written after it not before it.
 /// - Operations that redirect control come last; operations that drain issue after all writebacks.
 struct Block {
     problem: Problem,
@@ -412,7 +412,7 @@ impl Block {
     }
 }
 
-/// The most choices of slots that the scheduler examines for a bundle.
+/// Limit on the choices of slots that the scheduler examines for a bundle.
 const CHOICES: usize = 120;
 
 /// The choices of slots for the operations of a bundle, the current one first; without domains, only the current one.

@@ -36,7 +36,7 @@ pub(super) struct Solution {
 /// Cost of a schedule, compared lexicographically.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 struct Cost {
-    /// Cycles by which deadlines are missed, in all.
+    /// Total cycles by which deadlines are missed.
     tardy: u32,
     /// The length, but at least the allowed length.
     excess: u32,
@@ -53,7 +53,7 @@ const STRAY: u64 = 32;
 /// Edges that cost as much as placing a task: more than an operation has, except for loads and stores in great number.
 const EDGES: usize = 16;
 
-/// The most passes that improve one list schedule: far more than it takes to converge.
+/// Limit on the passes that improve one list schedule: far more than it takes to converge.
 const PASSES: u64 = 1000;
 
 impl Problem {
@@ -129,7 +129,7 @@ impl Search<'_> {
         self.best.as_ref().is_some_and(|(cost, _)| is_bound(cost))
     }
 
-    /// Builds a schedule from priorities (small first), and improves it forward and backward until two rounds bring nothing.
+    /// Builds a schedule from priorities (small first), and improves it forward and backward until two rounds yield no improvement.
     /// Late tasks issue in cycle `release` or later. Returns whether the budget lasts for more.
     fn descend(&mut self, (mut key, lean): (Vec<u64>, SlotPreference), release: u32) -> bool {
         let n = self.graph.problem.tasks.len();

@@ -265,7 +265,7 @@ struct Cardinality {
 }
 
 impl Cardinality {
-    /// Narrows the windows of a constraint's members. True if any changed.
+    /// Narrows the windows of a constraint's members. Returns whether any changed.
     fn narrow(&mut self, constraint: &mut Constraint, windows: &mut TimeWindows) -> Result<bool, Stop> {
         let Constraint { members, by_first, by_last, capacity } = constraint;
         let mut changed = false;

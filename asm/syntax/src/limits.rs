@@ -20,7 +20,7 @@ pub const EXPRESSION_NODES: usize = 1 << 16;
 pub const ARRAY_ELEMENTS: usize = 1 << 16;
 /// Indices of an array.
 pub const ARRAY_INDICES: usize = 8;
-/// Registers that a statement writes, as `a, b = …`.
+/// Registers that one statement writes, such as `a, b = …`.
 pub const EQUATION_TARGETS: usize = 64;
 /// Depth of `.include` within `.include`.
 pub const INCLUDE_DEPTH: usize = 32;
@@ -45,7 +45,7 @@ pub const OPERATIONS: usize = 4 << 20;
 pub const BUNDLE_OPERATIONS: usize = 64;
 /// Words of the expanded data memory, whatever the machine's.
 pub const DATA_WORDS: usize = 1 << 20;
-/// Characters of a name.
+/// Bytes of a name.
 pub const NAME_BYTES: usize = 255;
 /// Names that a program may use, including macros' locals and expanded name templates.
 pub const NAMES: usize = 1 << 24;

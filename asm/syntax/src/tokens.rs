@@ -20,7 +20,7 @@ pub enum TokenKind {
     TemplateEnd,
     /// A known directive, such as `.reg`.
     Directive,
-    /// A word with a leading point that is no directive.
+    /// A word with a leading point that is not a known directive.
     UnknownDirective,
     /// A number, integer or real.
     Number,

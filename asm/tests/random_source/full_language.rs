@@ -13,7 +13,7 @@ const OUTPUTS: [&str; 5] = ["o0", "o1", "u[1]", "u[2]", "f2"];
 struct Source {
     random: Random,
     text: String,
-    /// Counters of labels, loops and the like: each makes a name.
+    /// Number of names generated so far, for labels, loops and the like.
     names: u32,
     /// Loops around; each index lies between 1 and the number next to it.
     indices: Vec<(String, u64)>,

@@ -88,7 +88,7 @@ pub(crate) fn all() -> &'static [Machine] {
     ALL.get_or_init(|| ROWS.iter().map(|(name, slots)| row(name, slots)).collect())
 }
 
-/// The row of a name.
+/// The row with a name.
 pub(crate) fn named(name: &str) -> &'static Machine {
     all().iter().find(|machine| machine.name == name).expect("it is among the rows")
 }

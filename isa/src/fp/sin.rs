@@ -36,8 +36,7 @@ pub const SIN_LIMIT: u32 = 0x43c9_0fda;
 /// 2⁻¹²: below it the sine rounds to its argument, for x³/6 is less than a sixth of a unit in the last place, and the cosine to 1.
 pub const SIN_IDENTITY: u32 = 0x3980_0000;
 
-/// Largest error of [`sin`](sin()) over every argument that it accepts, in units in the last place of the exact result
-/// (rounded up).
+/// Largest error of [`sin`](sin()) over every accepted argument, in units in the last place of the exact result (rounded up).
 pub const SIN_MAX_ULP: f64 = 0.79499;
 /// Largest error of [`cos`], by the same measure as [`SIN_MAX_ULP`].
 pub const COS_MAX_ULP: f64 = 0.78306;

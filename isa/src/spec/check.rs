@@ -11,9 +11,9 @@ use crate::number::{Register, SlotIndex};
 use crate::shape::Field;
 use std::fmt;
 
-/// The most slots of a machine.
+/// Maximum number of slots of a machine.
 pub const MAX_SLOTS: usize = SlotIndex::COUNT;
-/// The most registers of a slot's bank: a destination is an index of this range.
+/// Maximum number of registers in a slot's bank: a destination is an index in this range.
 pub const MAX_BANK: u32 = Field::Dest.bits().max() + 1;
 /// The greatest depth of the program memory in bundles, limited by a branch's target field.
 pub const MAX_CODE: u32 = Field::Target.bits().max() + 1;

@@ -149,11 +149,11 @@ fn depth(option: &MachineOption, text: &str) -> Result<u32, MachineNameError> {
 }
 
 impl Machine {
-    /// Finds a machine by name: a row of the table or a fixture of the tests, perhaps with options, as `t3,data=32768`. Spaces
+    /// Finds a machine by name: a row of the table or a fixture of the tests, perhaps with options, such as `t3,data=32768`. Spaces
     /// around commas are ignored.
     ///
     /// # Errors
-    /// If there is no such machine or option, or a depth is not one that a circuit can have.
+    /// If there is no such machine or option, or a circuit cannot have a requested depth.
     pub fn from_name(name: &str) -> Result<&'static Machine, MachineNameError> {
         let mut parts = name.split(',').map(str::trim);
         let row = parts.next().unwrap_or_default();
@@ -175,7 +175,7 @@ impl Machine {
     /// The machine with options, each a name and a number.
     ///
     /// # Errors
-    /// If there is no such option, or a depth is not one that a circuit can have.
+    /// If there is no such option, or a circuit cannot have a requested depth.
     pub fn with_options<'a>(
         &'static self,
         options: impl IntoIterator<Item = (&'a str, &'a str)>,

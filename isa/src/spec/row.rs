@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Rows of machines made at run time, as from a file. They pass the checks of the table's rows ([`Machine::error`]), are
+//! Rows of machines made at run time, for example from a file. They pass the checks of the table's rows ([`Machine::error`]), are
 //! kept for as long as the process runs, and each exists once.
 
 use super::check::MachineError;
@@ -54,7 +54,7 @@ pub struct BankOwned {
 pub struct UnitOwned {
     /// Name in the table of units.
     pub name: &'static str,
-    /// Functions that it executes here, a subset of the table's.
+    /// Functions that the unit executes in this machine, a subset of the table's.
     pub functions: Vec<Function>,
     /// Cycles from issue to the earliest issue of a dependent operation.
     pub latency: u32,

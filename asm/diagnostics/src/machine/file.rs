@@ -21,10 +21,10 @@ use toml::Spanned;
 pub const FILE_BYTES: usize = 1 << 16;
 /// The longest name in a file, in bytes: names become parts of names in assembly and Verilog.
 const NAME_BYTES: usize = 40;
-/// The most units of a slot.
+/// Maximum number of units of a slot.
 const UNITS_OF_SLOT: usize = 32;
 
-/// The advice for a file that lacks something.
+/// Advice for a file with missing parts.
 const PATTERN: &str =
     "`takt machines t3 --toml` prints a file that has every key; docs/machines.md explains them";
 
@@ -204,7 +204,7 @@ fn mistake(file: &File, error: &RowError) -> Diagnostic {
     }
 }
 
-/// The place of a part of the row; among several of one name, the last.
+/// The place of a part of the row; among several with the same name, the last.
 fn find(file: &File, place: RowPlace<'_>) -> Range<usize> {
     let top = || file.name.span();
     let slot = |name: &str| file.slot.iter().rev().find(|slot| slot.name.get_ref() == name);

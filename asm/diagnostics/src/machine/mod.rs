@@ -36,7 +36,7 @@ pub fn machine_file(name: &str) -> Option<(&str, &str)> {
     Some((file.trim_start(), options.trim_start().trim_start_matches(',')))
 }
 
-/// The machine of a name, or of a file whose bytes `load` gives.
+/// The machine with a name, or from a file whose bytes `load` returns.
 ///
 /// # Errors
 /// If no machine has the name, or the file has mistakes.
@@ -63,7 +63,7 @@ pub fn machine_from(
     machine.with_option_list(options.split(',')).map_err(MachineMistake::Name)
 }
 
-/// The machine of a name or of a file on this disk, with options if it has any: `t3,data=32768`, `my.toml`.
+/// The machine with a name or from a file on this disk, with options if it has any: `t3,data=32768`, `my.toml`.
 ///
 /// # Errors
 /// The mistake in words, with the nearest known name and a list of all.

@@ -17,7 +17,7 @@ use crate::sink::Names;
 use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
 
-/// Most ports of a program.
+/// Maximum number of ports of a program.
 const MAX_INPUTS: usize = 255;
 const MAX_OUTPUTS: usize = 32;
 
@@ -80,7 +80,7 @@ fn bits(value: &Value) -> Option<u32> {
 }
 
 impl Exec<'_> {
-    /// The function of a name, in whichever file.
+    /// The function with a name, in any file.
     pub(super) fn entry(&self, name: &str, option: &str) -> Result<(String, Rc<Signature>), Error> {
         let mut keys: Vec<&String> =
             self.functions.keys().filter(|key| super::exec::plain(key) == name).collect();

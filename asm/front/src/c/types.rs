@@ -101,7 +101,7 @@ pub(super) struct Leaf {
     pub(super) indices: Vec<(usize, usize)>,
 }
 
-/// Most scalars of an object.
+/// Maximum number of scalars of an object.
 pub(super) const MAX_LEAVES: usize = 65_536;
 
 /// All structures of a program.

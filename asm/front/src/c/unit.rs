@@ -8,7 +8,7 @@ use lang_c::driver::{Config, Flavor, parse_preprocessed};
 /// Deepest nesting of parentheses and braces: the parser recurses.
 const MAX_NESTING: usize = 200;
 
-/// Most bytes of preprocessed text.
+/// Maximum length of preprocessed text, in bytes.
 const MAX_TEXT: usize = 16 << 20;
 
 pub(super) struct Unit {

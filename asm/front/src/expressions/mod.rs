@@ -16,7 +16,7 @@ use std::collections::HashMap;
 pub const FORMAT: &str = "takt-expressions 1";
 /// Longest file that is read, in bytes.
 pub const MAX_BYTES: usize = 64 << 20;
-/// Most scalars of an argument, and most scalar inputs of a function.
+/// Maximum number of scalars of an argument, and of scalar inputs of a function.
 pub const MAX_PORTS: usize = 65_536;
 /// Largest whole exponent of a power that is written as products.
 pub const MAX_POWER: f64 = 64.0;

@@ -11,7 +11,7 @@ use std::f64::consts::{PI, TAU};
 use takt_text::readers::{Row, Treatment, fate};
 use takt_text::table::{no_number, separator};
 
-/// Columns that a table must have; angles may be in degrees, as `alpha_deg`.
+/// Columns that a table must have; angles may be in degrees, as in `alpha_deg`.
 const NEEDED: [&str; 6] = ["joint", "kind", "a", "alpha", "d", "theta"];
 /// Suffix of a column of angles in degrees.
 const DEGREES: &str = "_deg";

@@ -126,9 +126,9 @@ pub fn read(text: &str, snap: f64, files: Files<'_>) -> Result<Tree, Error> {
 
 /// Standard gravity in robot models, m/s².
 pub const GRAVITY: f64 = 9.81;
-/// Most moving joints of a robot.
+/// Maximum number of moving joints of a robot.
 pub const MAX_JOINTS: usize = 128;
-/// Most links of a description, and most joints, fixed ones included.
+/// Maximum number of links of a description, and of joints, fixed ones included.
 pub const MAX_LINKS: usize = 4096;
 
 impl Robot {

@@ -9,7 +9,7 @@ use crate::{Error, Files};
 use std::collections::HashSet;
 use std::ops::Range;
 
-/// Most levels of nested includes.
+/// Maximum nesting depth of includes.
 const MAX_DEPTH: usize = 32;
 
 /// A text put together from several files, with the origin of each line.

@@ -41,7 +41,7 @@ pub(crate) struct Terms<'a> {
     pub(crate) inputs: &'a [Port],
     /// Names of values that have one.
     pub(crate) names: &'a HashMap<Id, String>,
-    /// Most levels of operations; deeper ones are spelled `…`.
+    /// Maximum number of levels of operations; deeper ones are spelled `…`.
     pub(crate) depth: usize,
     /// An absolute error suffices for `tanh` and `sigmoid`.
     pub(crate) quick: bool,

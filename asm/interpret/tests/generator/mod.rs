@@ -14,7 +14,7 @@ const SIZE: u64 = 160;
 const FLOATS: u64 = 6;
 const INTEGERS: u64 = 4;
 
-/// The name of an index, and the values that it may have.
+/// The name of an index, and the range of its values.
 type Index = (String, i64, i64);
 
 /// A subroutine that later code may call.
@@ -30,7 +30,7 @@ struct Subroutine {
 #[derive(Clone)]
 struct Place {
     indices: Vec<Index>,
-    /// Number of counted loops around the statement.
+    /// Number of counted loops that enclose the statement.
     nest: usize,
     /// Upper bounds of the statement's executions and of its copies.
     runs: u64,

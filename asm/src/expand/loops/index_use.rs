@@ -18,7 +18,7 @@ struct BodyNames {
     scope: ScopeId,
 }
 
-/// The most statements to examine for one loop.
+/// Limit on the statements that are examined for one loop.
 const LOOKED_AT: u32 = 1 << 14;
 
 impl Expander<'_> {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Counted loops: their bounds, and the choice of iterations to write out.
 //!
-//! A loop runs unless its body needs the index when it is assembled, for an array of registers or a name, or unless it is too
-//! short to be worth a loop. A loop that runs may have several iterations in one turn (`unroll`); the iterations left over follow,
+//! A loop remains at run time unless its body needs the index when it is assembled, for an array of registers or a name, or unless it
+//! is too short to be worth a loop. Such a loop may have several iterations in one turn (`unroll`); the iterations left over follow,
 //! straight or, if the count is not known, as a loop of their own.
 
 mod index_use;
@@ -39,7 +39,7 @@ pub(crate) enum Pass {
 /// The number of iterations of a loop that runs.
 #[derive(Clone, Debug)]
 pub(crate) enum Count {
-    /// A count that is known up to the iterations of the loops around.
+    /// A count that is known up to the iterations of the enclosing loops.
     Known(Affine),
     /// The value of a register plus an affine function.
     Register(Operand, Affine),
@@ -367,7 +367,7 @@ impl Expander<'_> {
         }
         let around = self.context.loops_around(at.scope);
         let bounds = self.context.extremes(&around, &range.count.source);
-        // If the loops around never run, no bound matters.
+        // If the enclosing loops never run, no bound matters.
         let bounds = bounds
             .map_err(|crate::context::loops::IterationLimitExceeded| self.too_many(at, span))?
             .unwrap_or([0, 0]);

@@ -4,7 +4,7 @@
 //! `docs/image.md` describes the format for authors of other readers. Writing is deterministic: equal programs give equal
 //! bytes. Reading trusts nothing: each defect is an [`ImageError`] of its own, nothing panics, and allocation is bounded by
 //! the size of the file. A program that was read is one that the assembler could have made, except that any word may stand
-//! in its code: the machine faults on words that are no instructions.
+//! in its code: the machine faults on words that encode no instruction.
 
 mod debug;
 mod meta;
@@ -111,7 +111,7 @@ pub enum ImageError {
         what: &'static str,
         /// Amount in the image.
         found: usize,
-        /// The most that the machine holds.
+        /// Capacity of the machine.
         limit: u32,
         /// Name of the machine.
         machine: &'static str,
@@ -137,7 +137,7 @@ pub enum ImageError {
     Label {
         /// Name of the label.
         name: String,
-        /// Bundle or data word that it points to.
+        /// Bundle or data word that the label points to.
         address: u32,
         /// Reason against the label.
         reason: &'static str,

@@ -72,7 +72,7 @@ pub(crate) struct LineTokens {
     pub(crate) compared: bool,
 }
 
-/// Reads a file's tokens, some thousand lines at a time.
+/// Reads a file's tokens, a few thousand lines at a time.
 pub(crate) struct Lexer<'s> {
     lexer: logos::Lexer<'s, Raw>,
     base: u32,
@@ -89,7 +89,7 @@ impl<'s> Lexer<'s> {
         Lexer { lexer, base, line: 1, done: false }
     }
 
-    /// Reads the tokens of the next lines, about as many tokens as asked for; false at the end.
+    /// Reads the tokens of the next lines, about as many tokens as asked for; returns false at the end.
     pub(crate) fn chunk(
         &mut self,
         size: usize,
@@ -162,7 +162,7 @@ impl<'s> Lexer<'s> {
                     })
                 }
                 Some(Err(())) => {
-                    // Unknown characters are one error of their line, however many there are.
+                    // The unknown characters of a line are one error, whatever their number.
                     if !std::mem::replace(&mut line.unknown, true) {
                         let text = self.lexer.slice();
                         sink.add(Severity::Error, "token", span, || {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Diagnostics for a range, as `1..3` of other languages, in place of a number.
+//! Diagnostics for a range in place of a number, such as `1..3` of other languages.
 
 use takt_diagnostics::diag::Diagnostic;
 use takt_diagnostics::source::Span;

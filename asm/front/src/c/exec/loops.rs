@@ -134,7 +134,7 @@ impl<'a> Exec<'a> {
         })
     }
 
-    /// The bound that a pragma gives a loop: the last pragma before it, with nothing but blanks between.
+    /// The bound that a pragma gives a loop: the last pragma before it, separated only by blanks.
     fn bound_at(&self, statement: &Node<Statement>) -> Option<u64> {
         let unit = &self.units[self.unit()];
         let start = statement.span.start;

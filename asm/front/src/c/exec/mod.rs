@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Executes C while translating it: what is known is computed, what depends on inputs becomes nodes.
+//! Executes C while translating it: known values are computed, values that depend on inputs become nodes.
 
 mod arithmetic;
 pub(super) mod call;
@@ -48,7 +48,7 @@ pub(super) struct Facts {
     pub(super) called: HashSet<String>,
 }
 
-/// Meaning of a name.
+/// Meaning of a name in a scope.
 #[derive(Clone, Debug)]
 pub(super) enum Named {
     Object(usize),
@@ -152,7 +152,7 @@ impl<'a> Exec<'a> {
         Err(error)
     }
 
-    /// Notes the place, for errors and comments.
+    /// Records the place, for errors and comments.
     fn go(&mut self, span: Span) {
         if !span.is_none() {
             self.at = Place { unit: self.unit(), offset: span.start };

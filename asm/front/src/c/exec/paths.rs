@@ -64,7 +64,7 @@ impl<'a> Exec<'a> {
         Ok(Ran { block, normal: normal?, memory: self.memory.clone(), outcomes })
     }
 
-    /// Executes both sides of a condition; the result says when the end of either is reached, with the memory then.
+    /// Executes both sides of a condition. Returns the condition for reaching the end of either side; the memory is then that state.
     pub(super) fn fork(
         &mut self,
         condition: Id,
@@ -89,7 +89,7 @@ impl<'a> Exec<'a> {
         }
     }
 
-    /// Executes what follows a condition, and nothing if it does not hold.
+    /// Executes statements under a condition; skips them if the condition does not hold.
     pub(super) fn guarded(
         &mut self,
         condition: Condition,
@@ -103,7 +103,7 @@ impl<'a> Exec<'a> {
         }
     }
 
-    /// Operations of a block; `None` if it has loops or branches.
+    /// Number of operations in a block; `None` if it has loops or branches.
     fn work(&self, block: &Block) -> Option<usize> {
         block.iter().try_fold(0, |sum, (statement, _)| match statement {
             Statement::Def(id) => match self.nodes.node(*id) {
@@ -163,7 +163,7 @@ impl<'a> Exec<'a> {
         if guards || !side.outcomes.is_empty() { self.not(holds) } else { Ok(Condition::Known(true)) }
     }
 
-    /// Puts a side's statements into the block: stores write what was there, and indices are 0, if the condition does not hold.
+    /// Puts a side's statements into the block. If the condition does not hold, stores write the old values, and indices are 0.
     fn splice(&mut self, block: Block, condition: Condition) -> Result<(), Error> {
         let at = self.at;
         for (statement, place) in block {

@@ -8,7 +8,7 @@ use crate::c::types::{Integer, Leaf, Type};
 use crate::c::value::{Lvalue, Object, Origin, Pointer, Typed, Value};
 use std::rc::Rc;
 
-/// Most elements that a pointer of unknown extent has.
+/// Maximum number of elements behind a pointer of unknown extent.
 const MAX_EXTENT: usize = 4096;
 
 /// Register that holds a scalar.
@@ -332,7 +332,7 @@ impl Exec<'_> {
         Ok(())
     }
 
-    /// Notes that the step writes a scalar that outlives it.
+    /// Records that the step writes a scalar that outlives it.
     fn changes(&mut self, object: usize, leaf: usize) {
         let found = &self.objects[object];
         if self.stepping && !matches!(found.origin, Origin::Local | Origin::Parameter) {

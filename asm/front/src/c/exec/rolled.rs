@@ -14,7 +14,7 @@ use std::rc::Rc;
 
 /// Limit on the trials that determine what a body changes.
 const TRIALS: usize = 16;
-/// Most iterations of a loop.
+/// Maximum number of iterations of a loop.
 const MOST: i64 = 65_535;
 
 /// A counter with known bounds.
@@ -24,7 +24,7 @@ struct Counter {
     first: i64,
     step: i64,
     count: i64,
-    /// The loop's condition is nothing but the counter's.
+    /// The counter alone decides the loop's condition.
     alone: bool,
 }
 
@@ -178,7 +178,7 @@ impl<'a> Exec<'a> {
         }
     }
 
-    /// A counted loop; false if its body leaves it or changes the counter.
+    /// Executes a counted loop; returns false if its body leaves the loop or changes the counter.
     fn counted(&mut self, parts: &Repetition<'a>, counter: Counter) -> Result<bool, Error> {
         let before = self.memory.clone();
         let name = self.objects[counter.object].name.clone();
@@ -352,7 +352,7 @@ impl<'a> Exec<'a> {
         }
     }
 
-    /// Adds what the body changed beyond the cells; false if there is nothing new.
+    /// Adds the body's changes beyond the cells; returns false if there are none.
     fn grow(&mut self, cells: &mut Cells, before: &Memory) -> Result<bool, Error> {
         let mut grown = false;
         for object in 0..before.0.len() {

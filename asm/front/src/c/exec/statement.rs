@@ -53,7 +53,7 @@ impl<'a> Exec<'a> {
         REACHED
     }
 
-    /// Continues at a label to which some paths jumped: the others execute what is between.
+    /// Continues at a label to which some paths jumped: the other paths execute the statements before it.
     fn landed(
         &mut self,
         reached: Condition,
@@ -216,7 +216,7 @@ impl<'a> Exec<'a> {
         out: &mut Vec<Outcome>,
     ) -> Result<Condition, Error> {
         for (index, arm) in arms.iter().enumerate().skip(from) {
-            // A default beside values is taken wherever no other value is.
+            // A default next to values is taken unless another value matches.
             if arm.values.is_empty() || arm.default {
                 continue;
             }
