@@ -469,7 +469,7 @@ fn subscripts_in_registers() {
     check(" li n, 3\n y[n] = x[n+4] - x[2*n-1]", "y", &[0., 0., 2., 0.]);
     check(" n = k[1]\n y[:] = A[n,:]\n n = k[2]\n y[n] = A[n,n+1]", "y", &[2., 10., 11., 12.]);
     check(" .for i, 1, 2 unroll 1\n  n = k[i]\n  y[i] = A[n,i]\n .endfor", "y", &[9., 2., 0., 0.]);
-    // The index as a number, in a loop that runs and in one that is written out.
+    // The index as a number, in a loop at run time and in a written-out loop.
     check(" .for i, 1, 4 unroll 1\n  y[i] = itof(2*i+1)\n .endfor", "y", &[3., 5., 7., 9.]);
     check(" .for i, 1, 4\n  y[i] = itof(2*i+1)\n .endfor", "y", &[3., 5., 7., 9.]);
 }

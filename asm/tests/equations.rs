@@ -372,7 +372,7 @@ fn count(operations: &[String], mnemonic: &str) -> usize {
 #[test]
 fn equal_parts_are_computed_once() {
     let once = |declarations: &str, lines: &str| count(&period(declarations, lines), "fmul");
-    // Within an equation; of ports, too.
+    // Shared within an equation, ports included.
     assert_eq!(once("", " a = x*y + x*y\n b = t"), 1);
     // In the equations of a run.
     assert_eq!(once("", " a = t*u + 1\n b = t*u - 1"), 1);

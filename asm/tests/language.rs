@@ -398,7 +398,7 @@ fn an_output_has_one_number() {
     };
     let ports = ".input x, y\n.output F, G, H\n.period\n";
     let all = [("x", 0), ("y", 1), ("F", 0), ("G", 1), ("H", 2)];
-    // Whichever slot writes it, and in whichever order.
+    // The number depends neither on the slot that writes the output nor on the order of writes.
     expect(&format!("{ports} fmul F, x, y\n fadd G, x, y\n mov H, x\n"), &all);
     expect(&format!("{ports} mov G, x\n fmul H, x, y\n fmul F, x, y\n"), &all);
     // Given numbers, as expressions too, and the rest around them.

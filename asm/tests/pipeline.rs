@@ -225,7 +225,7 @@ fn run_time_counts_are_pipelined_for_many_iterations() {
     }
 }
 
-/// Iterations take an interval each, also where accesses stand near to the advances of their pointers, whose results they would wait for.
+/// Each iteration takes one interval, even if accesses are close to the advances of their pointers, for whose results they would wait.
 #[test]
 fn an_iteration_takes_an_interval() {
     let bodies = [

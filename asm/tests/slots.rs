@@ -220,7 +220,7 @@ fn shipped_programs_give_the_same_bits_on_every_row() {
     }
 }
 
-/// The cycles of a shipped program on a row, at the default effort.
+/// Asserts an upper limit on the cycles of a shipped program on a row, at the default effort.
 #[track_caller]
 fn takes_no_more(row: &str, most: u32) {
     let (_, cycles) = shipped("hybrid", "tracking.s", rows::named(row), takt_asm::schedule::DEFAULT_EFFORT);

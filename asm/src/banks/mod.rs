@@ -100,7 +100,7 @@ pub(crate) struct BankAssignment {
     /// Liveness of registers with a home bank: by run, whether the register is live after it.
     pub(crate) live: Vec<(RegisterId, Vec<bool>)>,
     pub(crate) conflicts: Vec<BankConflict>,
-    /// Registers that the source writes in `.once`, if only to write them again before they are read.
+    /// Registers that the source writes in `.once`, even if it overwrites them before any read.
     pub(crate) set_once: HashSet<RegisterId>,
     /// Registers made for values: not reported if nothing reads them.
     pub(crate) quiet: HashSet<RegisterId>,
@@ -395,7 +395,7 @@ fn constant_register(ir: &mut Ir, bits: u32, span: Span) -> RegisterId {
     RegisterId::new(index)
 }
 
-/// The reason that a register has no home bank, and advice.
+/// The reason why a register has no home bank, and advice.
 fn conflict(ir: &Ir, flow: &Flow, register: RegisterId, writes: &[Write]) -> BankConflict {
     let found = ir.register(register);
     let because_of = |help: String, because| BankConflict { register, help, because };

@@ -85,8 +85,8 @@ impl AbstractValue for TracedKind {
     }
 }
 
-/// Passes after which types that are still being found count as unknown: each follows a value through one more register
-/// against the order of the program.
+/// Number of passes after which types that are still being found count as unknown: each pass follows a value through one more
+/// register against the order of the program.
 const PASSES: usize = 8;
 
 /// Warns of values that an operation reads as another type, or that go to a register of another type.
@@ -382,7 +382,7 @@ impl<'i, V: AbstractValue> Types<'i, V> {
                 }
             }
         }
-        // A choice between an integer and a float is neither.
+        // A choice between an integer and a float has neither type.
         let passed = &self.passed[operation.op as usize];
         let is =
             |kind| passed.iter().copied().find(|which| self.source(run, operation, *which).kind() == kind);

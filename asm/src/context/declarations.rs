@@ -57,7 +57,7 @@ pub(crate) struct Table {
     pub(crate) array: arrays::Array,
     /// Label of the first word, with the table's name.
     pub(crate) label: LabelId,
-    /// Some name of the source refers to the table.
+    /// The source refers to the table.
     pub(crate) used: bool,
 }
 

@@ -26,7 +26,7 @@ pub(crate) struct SourceLoop {
     pub(crate) most: Affine<SourceLoopId>,
 }
 
-/// An integer that the assembler knows up to the iteration numbers of the enclosing loops.
+/// An integer that the assembler knows as a function of the iteration numbers of the enclosing loops.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct AffineInteger {
     /// The value as a function of the source's iterations.
@@ -239,7 +239,7 @@ impl Context {
         }
     }
 
-    /// An expression names the index of a loop that runs.
+    /// An expression names the index of a loop at run time.
     pub(crate) fn names_index(&self, at: AstPlace, id: ExprId) -> bool {
         self.asts[at.ast as usize].nodes[id.range()].iter().any(|node| match node.kind {
             NodeKind::Name(name) => name.resolve().is_ok_and(|name| self.is_index(at.scope, name)),
@@ -247,7 +247,7 @@ impl Context {
         })
     }
 
-    /// A name is the index of a loop that runs, or the argument of a macro that depends on one.
+    /// A name is the index of a loop at run time, or an argument of a macro that depends on such an index.
     pub(crate) fn is_index(&self, scope: ScopeId, name: NameId) -> bool {
         let mut binding = self.lookup(scope, name);
         for _ in 0..crate::limits::EVALUATION_DEPTH {
@@ -265,7 +265,7 @@ impl Context {
         matches!(binding, Binding::Index(_))
     }
 
-    /// The loops around a scope, outer ones first.
+    /// The loops that enclose a scope, outer ones first.
     pub(crate) fn loops_around(&self, scope: ScopeId) -> Vec<SourceLoopId> {
         let mut loops = Vec::new();
         let mut scope = *self.scopes.scope(scope);

@@ -22,16 +22,16 @@ impl ScopeId {
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Scope {
-    /// The enclosing scope, in which a name is looked up that is not bound here.
+    /// The enclosing scope, where names that are not bound here are looked up.
     pub(crate) parent: ScopeId,
     /// The scope that takes declarations: the macro's use, or the root.
     pub(crate) owner: ScopeId,
     /// The scope that takes code labels: the owner, or within it an iteration of a counted loop as the assembler writes it.
     pub(crate) labels: ScopeId,
-    /// The expansion that this one stands in, for messages. Not the parent: a macro does not see its caller's names.
+    /// The expansion that contains this one, for messages; unlike the parent, since a macro does not see its caller's names.
     pub(crate) within: ScopeId,
     pub(crate) kind: ScopeKind,
-    /// The use of the macro, or the `.rep`.
+    /// Place of the macro's use, or of the `.rep`.
     pub(crate) site: Span,
     /// For a macro's use and an iteration: index of the latest entry in the list of near names, and number of such entries.
     latest: u32,
@@ -340,7 +340,7 @@ impl Scopes {
                 ScopeKind::Rep(name, value) => {
                     diagnostic.also(site, format!("with {} = {value}", self.text(name)))
                 }
-                // A loop that runs has no value to show: every iteration is the same.
+                // A loop at run time has no value to show: every iteration is the same.
                 ScopeKind::For(..) | ScopeKind::Root => diagnostic,
             };
             scope = within;

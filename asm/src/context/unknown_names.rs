@@ -19,7 +19,7 @@ use takt_syntax::name::NameId;
 pub(crate) enum NameRole {
     /// A register to write.
     Dest,
-    /// A register left of an equation's `=`.
+    /// A register on the left of an equation's `=`.
     Left,
     /// A register or constant to read.
     Source,

@@ -37,7 +37,7 @@ struct Decisions {
     done: Vec<u32>,
 }
 
-/// The sums of a run that are fused, each with its product, in source order.
+/// Chooses the sums of a run to fuse, each with its product, in source order.
 pub(super) fn choose(
     ir: &Ir,
     run: runs::Run,

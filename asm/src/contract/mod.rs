@@ -199,7 +199,7 @@ fn has_place(ir: &Ir, (bundle, number): OperationPosition, fusion: &Fusion) -> b
     // A branch that reads a result of its own bundle cannot wait for a copy.
     let branches =
         others().any(|other| other.redirects() && dest.is_some_and(|dest| other.reads().contains(&dest)));
-    // An operation whose slot the source names stays on it.
+    // An operation stays on the slot that the source names.
     let named =
         dest.is_some_and(|dest| operations[number].slots != banks::able(ir, dest, operations[number].op));
     !branches && !named && matching::is_possible(&slots)

@@ -121,7 +121,7 @@ impl<L: Loader> Search<L> {
         Search { project, places: Vec::new() }
     }
 
-    /// Adds a folder, searched after the present places for `"name"` and for `<name>`.
+    /// Adds a folder, searched after the existing places for `"name"` and for `<name>`.
     #[must_use]
     pub fn folder(mut self, folder: impl Into<PathBuf>) -> Search<L> {
         let folder = folder.into();
@@ -148,7 +148,7 @@ impl<L: Loader> Search<L> {
         self
     }
 
-    /// Adds a library in memory, each file a name and its text, searched after the present places for `<name>` only.
+    /// Adds a library in memory, each file a name and its text, searched after the existing places for `<name>` only.
     #[must_use]
     pub fn library<'s>(mut self, files: impl IntoIterator<Item = &'s (&'s str, &'s str)>) -> Search<L> {
         self.places.push(IncludePath(IncludePathKind::Library(MemoryLoader::new(files))));

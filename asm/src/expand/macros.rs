@@ -156,7 +156,7 @@ impl Expander<'_> {
         });
     }
 
-    /// The argument for a parameter of a type.
+    /// Builds the argument for a parameter of a given type.
     fn argument(
         &mut self,
         at: AstPlace,

@@ -93,7 +93,7 @@ impl Context {
 }
 
 impl Expander<'_> {
-    /// Opens the next loop of an equation between slices. False if all loops are open.
+    /// Opens the next loop of an equation between slices. Returns false if all loops are open.
     pub(crate) fn slice_loop(
         &mut self,
         at: AstPlace,

@@ -37,7 +37,7 @@ pub struct Array {
 }
 
 /// A counted loop. Its body is the bundles from `head` up to `end`, which control enters at `head` only and leaves at `end` only,
-/// but for calls.
+/// except for calls.
 #[derive(Clone, Copy, Debug)]
 pub struct Loop {
     /// Index of the first bundle of the body. Bundles before it compute the values that the loop needs once.
@@ -133,7 +133,7 @@ impl<L: Copy + Ord> Affine<L> {
 }
 
 impl Ir {
-    /// The array element that an operation accesses, if its address is such an element's.
+    /// The array element that an operation accesses; `None` for other addresses.
     pub fn access(&self, operation: &Operation) -> Option<&ArrayAccess> {
         operation.access.map(|AccessId(access)| &self.accesses[access as usize])
     }

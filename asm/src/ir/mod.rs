@@ -38,7 +38,7 @@ impl RegisterId {
     /// The register that always reads as zero: the first of every program.
     pub const ZERO: RegisterId = RegisterId(NonZeroU32::MIN);
 
-    /// The register of an index. Indices are below 2³² - 1.
+    /// The register with an index. Indices are below 2³² - 1.
     #[inline]
     pub const fn new(index: usize) -> RegisterId {
         match NonZeroU32::new(index as u32 + 1) {
@@ -86,7 +86,7 @@ pub struct VirtualRegister {
     pub ty: Type,
     /// Address that the source gives the register.
     pub pinned: Option<Register>,
-    /// Bits that the loader writes, if the source says so. A constant's bits are in its kind.
+    /// Bits that the loader writes, if the source has a preset. A constant's bits are in its kind.
     pub preset: Option<u32>,
     /// Place of the declaration, or of a constant's first use.
     pub span: Span,
@@ -157,7 +157,7 @@ pub struct Operation {
     pub(crate) attribution: Attribution,
     /// Place in the source.
     pub span: Span,
-    /// The use of a macro, or iteration of a repetition, that made the operation; 0 if it stands in the source itself.
+    /// The use of a macro, or iteration of a repetition, that made the operation; 0 if the source contains it directly.
     pub expansion: u32,
     /// The assembler made the operation, for the source's operation at the same place.
     pub made: bool,
@@ -401,9 +401,9 @@ pub struct Ir {
     pub latched: bool,
     /// Outputs with a number in the source, by number: `@ 3`, or the number of the named register.
     pub numbers: BTreeMap<u16, RegisterId>,
-    /// The scheduler may move some bundle.
+    /// The scheduler may move at least one bundle.
     pub scheduled: bool,
-    /// Several slots may execute some operation, or could before operations changed.
+    /// Several slots may execute at least one operation, or could before operations changed.
     pub(crate) has_choices: bool,
     /// Initial words of data memory.
     pub data: Vec<u32>,

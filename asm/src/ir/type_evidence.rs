@@ -101,7 +101,7 @@ impl TypeEvidence {
     pub(crate) fn literal(value: Value, is_address: bool, span: Span) -> TypeEvidence {
         let (kind, what) = match value {
             Value::Int(_) if is_address => (Kind::Int, TypeOrigin::Address),
-            // The pattern of an ordinary number, as `bits(0.5)` gives it, may be either.
+            // The bits of an ordinary number, such as `bits(0.5)`, may be of either type.
             Value::Int(int) => {
                 let bits = f32::from_bits(int as u32);
                 let kind = if bits.is_subnormal() || bits.is_nan() { Kind::Int } else { Kind::Any };

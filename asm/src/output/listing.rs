@@ -176,7 +176,7 @@ impl<'a> Lister<'a> {
 
     fn source(&self, location: Location) -> Option<String> {
         let (text, lines) = self.files.get(location.file as usize)?.as_ref()?;
-        // Replace tabs, which would break the alignment, and cut long lines, which may have a megabyte.
+        // Replace tabs, which would break the alignment, and cut long lines, which may be a megabyte long.
         let line = lines.text(text, location.line)?.trim().replace('\t', " ");
         Some(line.chars().take(160).collect())
     }

@@ -27,7 +27,7 @@ impl Resolver<'_> {
         self.parameter_type().map(|(_, _, ty)| ty)
     }
 
-    /// Records the type that the parameter asks for, of an operand whose type the instruction leaves open.
+    /// Records the type that the parameter demands for an operand whose type the instruction leaves open.
     pub(super) fn note_parameter_type(&mut self, operation: &Operation, part: OperandPosition) {
         if let (Some(ty), None) = (self.type_of_parameter(), self.cast) {
             self.context.declared.given.insert(operation, part, TypeEvidence::Asked(ty));

@@ -24,7 +24,7 @@ use takt_syntax::expr::Value;
 #[derive(Clone, Debug)]
 pub(super) struct Word {
     pub(super) array: ArrayId,
-    /// Index of the word, from the array's first.
+    /// Index of the word relative to the array's first word.
     place: AffineInteger,
     pub(super) span: Span,
 }

@@ -81,7 +81,7 @@ impl Computation<'_> {
         (self.node(index).span, ExprId { first: self.id.first + first, count: index - first + 1 })
     }
 
-    /// Value of the part that ends at a node.
+    /// A constant as the term of the part that ends at a node.
     fn constant(&self, value: Value, index: u32) -> Term {
         let (span, id) = self.place(index);
         Term { form: TermForm::Constant(value, id), span }

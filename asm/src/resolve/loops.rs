@@ -413,7 +413,7 @@ impl Resolver<'_> {
         self.subexpressions.write(dest);
     }
 
-    /// The machine's instruction for counted loops, if it counts one more loop within those around.
+    /// The machine's instruction for counted loops, if it can count one more loop within the enclosing ones.
     fn counting(&self) -> Option<(Op, Slots)> {
         let machine = self.ir.machine;
         let op = with_effect(Effect::Loop).filter(|_| self.nest.open.len() < machine.loop_depth as usize)?;

@@ -219,7 +219,7 @@ pub(crate) struct Resolver<'c> {
     pub(crate) cast: Option<Type>,
     /// The argument that the current operand stands for, if its parameter has a type.
     pub(crate) asked: Option<u32>,
-    /// Arguments whose types are reported to be wrong, with the place.
+    /// Arguments whose types have been reported as wrong, with the place.
     mistaken: HashSet<(u32, Span)>,
     /// Number of the latest computed operation with a number of its own; these count down.
     computed: u32,
@@ -227,7 +227,7 @@ pub(crate) struct Resolver<'c> {
     pub(crate) data_words: u32,
     /// The source declares more words than the machine has, which is reported.
     pub(crate) is_full: bool,
-    /// Types of tables, as far as the program is read.
+    /// Types of tables, from the part of the program read so far.
     pub(crate) tables: HashMap<LabelId, Kind>,
     /// Instructions by their form in equations.
     forms: Forms,

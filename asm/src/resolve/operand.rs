@@ -396,7 +396,7 @@ impl Resolver<'_> {
         Ok(RegisterId::new(first.index() + number as usize))
     }
 
-    /// An index is a slice, or mentions the index of a loop that runs.
+    /// An index is a slice, or mentions the index of a loop at run time.
     fn varies(&self, at: AstPlace, indices: &[Vec<Node>]) -> bool {
         let is_index = |node: &Node| match node.kind {
             NodeKind::Name(name) => {

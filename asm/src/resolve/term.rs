@@ -23,7 +23,7 @@ pub(super) enum TermForm {
     Register(RegisterId, Kind),
     /// A sum or a product that is still to be computed: its index in the line, and its type.
     Chain(usize, Kind),
-    /// An affine function of the indices of loops that run: its index in the line.
+    /// An affine function of the indices of loops at run time: its index in the line.
     Counted(usize),
 }
 

@@ -150,7 +150,7 @@ impl<'a> Demands<'a> {
         &self.ir.register(port).name
     }
 
-    /// Adds the demands to a problem. False, with a report, if one cannot be met.
+    /// Adds the demands to a problem. Returns false, after a report, if a demand cannot be met.
     pub(super) fn apply(&self, block: &mut Block, sink: &mut Sink) -> bool {
         self.order(block, sink) && {
             let mut possible = true;
@@ -388,7 +388,7 @@ fn later(cycles: u32) -> String {
     format!("allow cycle {cycles} or later, or compute less before it")
 }
 
-/// Topological sort of the tasks that otherwise keeps their order. False on a cycle.
+/// Topological sort of the tasks that otherwise keeps their order. Returns false on a cycle.
 fn sort(block: &mut Block) -> bool {
     let n = block.problem.tasks.len();
     let mut succs = vec![Vec::new(); n];

@@ -47,7 +47,7 @@ enum Branch {
 /// A decision of the search.
 #[derive(Clone, Copy)]
 enum Decision {
-    /// A task issues in the first cycle of its window; else later.
+    /// A task issues in the first cycle of its window; the alternative is a later cycle.
     Cycle(usize),
     /// A task takes a choice of slots; the alternative is another choice.
     Slots(usize, u8),
@@ -69,7 +69,7 @@ impl Decision {
     }
 }
 
-/// The end of a search for a schedule of one length.
+/// Outcome of the search for a schedule of one length.
 enum SearchOutcome {
     Schedule(Plan),
     /// No schedule has this length.

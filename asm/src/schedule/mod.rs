@@ -287,7 +287,7 @@ impl Block {
                     let varies = Some(operation).filter(|operation| task.varies(*operation));
                     edge(from, task.written(operation).unwrap_or(0), varies);
                 }
-                // The bundle itself wrote it.
+                // The value comes from the bundle itself.
                 (Wait::Written(_), None) => {}
                 (Wait::Cycles(distance), _) => edge(from, distance, None),
             };

@@ -60,7 +60,7 @@ pub(super) struct Edge {
     pub(super) to: usize,
     /// Cycles between the issues; the least, if it is a latency that depends on a choice.
     pub(super) distance: u32,
-    /// The operation of the earlier task whose latency the distance is, if that depends on the choice of its slot.
+    /// The operation of the earlier task whose latency is the distance, if the latency depends on the choice of its slot.
     pub(super) latency_of: Option<usize>,
     /// Only the source demands the order: the machine would not wait.
     pub(super) demanded: bool,

@@ -47,7 +47,7 @@ struct Cost {
 /// Share of its slack, in quarters, that a task may wait for its preferred slot. Rounds cycle through these.
 const QUARTERS: [u32; 4] = [0, 1, 2, 4];
 
-/// A task in this many gets a random preference instead of the best schedule's slots.
+/// One task in this many gets a random preference instead of the best schedule's slots.
 const STRAY: u64 = 32;
 
 /// Edges that cost as much as placing a task: more than an operation has, except for loads and stores in great number.
@@ -107,7 +107,7 @@ struct Search<'p> {
     /// Length up to which all schedules cost the same.
     allowed: u32,
     best: Option<(Cost, Plan)>,
-    /// Some task has a choice of slots. `lightest` is each task's choice with the least demand.
+    /// At least one task has a choice of slots. `lightest` is each task's choice with the least demand.
     has_choices: bool,
     lightest: Vec<u8>,
     /// The earliest cycle of each task.

@@ -117,7 +117,7 @@ pub(super) struct Propagation<'g, 'p> {
     graph: &'g Graph<'p>,
     constraints: Vec<Constraint>,
     cardinality: Cardinality,
-    /// Some distance depends on a choice of slots.
+    /// At least one distance depends on a choice of slots.
     varies: bool,
     /// Edges and members visited: the work so far, in steps.
     pub(super) work: u64,
@@ -199,7 +199,7 @@ fn constraints(problem: &Problem) -> Vec<Constraint> {
     slots.chain(ports).filter(|constraint| constraint.members.len() > 1).collect()
 }
 
-/// The operations that use a slot of a set, at the cycle after their issue that `offset` gives.
+/// The operations that use a slot of a set; `offset` gives the cycle of the use, counted from the issue.
 fn members(
     problem: &Problem,
     set: &BTreeSet<usize>,

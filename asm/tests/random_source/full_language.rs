@@ -9,7 +9,7 @@ const FLOATS: [&str; 6] = ["f0", "f1", "f2", "f3", "s0", "s1"];
 const INTEGERS: [&str; 4] = ["n0", "n1", "n2", "c0"];
 const OUTPUTS: [&str; 5] = ["o0", "o1", "u[1]", "u[2]", "f2"];
 
-/// A program in the making.
+/// A program under construction.
 struct Source {
     random: Random,
     text: String,

@@ -93,7 +93,7 @@ pub(super) enum Node {
     Load(usize, Id, u32),
 }
 
-/// Place in the C.
+/// Place in the C source.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(super) struct Place {
     pub(super) unit: usize,

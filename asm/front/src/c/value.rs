@@ -142,7 +142,7 @@ pub(super) enum Exit {
     Goto(String),
 }
 
-/// A way out of a block, with its condition and the memory then.
+/// An exit from a block, with its condition and the memory at that point.
 pub(super) struct Outcome {
     pub(super) exit: Exit,
     pub(super) when: Condition,

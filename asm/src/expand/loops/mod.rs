@@ -31,15 +31,15 @@ pub(crate) enum Pass {
     End(u32),
     /// Body, with a value for the index.
     Value(i64),
-    /// Body, with an index that is known up to the iterations of loops: an index into
+    /// Body, with an index that is a function of the iterations of loops: an index into
     /// [`Declarations::indices`](crate::context::Declarations::indices).
     Index(u32),
 }
 
-/// The number of iterations of a loop that runs.
+/// The number of iterations of a loop at run time.
 #[derive(Clone, Debug)]
 pub(crate) enum Count {
-    /// A count that is known up to the iterations of the enclosing loops.
+    /// A count that is a function of the iterations of the enclosing loops.
     Known(Affine),
     /// The value of a register plus an affine function.
     Register(Operand, Affine),
@@ -101,7 +101,7 @@ pub(crate) struct LoopOptions {
 pub(crate) struct Range {
     pub(crate) first: AffineInteger,
     pub(crate) step: i64,
-    /// Number of iterations; for a loop to the value of a register, the most.
+    /// Number of iterations; for a loop to the value of a register, the maximum.
     pub(crate) count: AffineInteger,
     pub(crate) register: Option<Operand>,
 }
@@ -308,7 +308,7 @@ impl Expander<'_> {
         self.context.error(at.scope, "range", span, "a range beyond 64 bits")
     }
 
-    /// Index of an iteration that is written out.
+    /// Value of the index in a written-out iteration.
     fn value(
         &mut self,
         at: AstPlace,
@@ -343,7 +343,7 @@ impl Expander<'_> {
         self.context.declared.indices.len() as u32 - 1
     }
 
-    /// Passes of a loop that runs.
+    /// Passes of a loop at run time.
     fn running(
         &mut self,
         at: AstPlace,

@@ -24,7 +24,7 @@ pub(super) struct LoopChoice {
 }
 
 impl LoopChoice {
-    /// `None` if the machine lacks an operation.
+    /// Finds the operations; `None` if the machine lacks one.
     pub(super) fn of(machine: &Machine) -> Option<LoopChoice> {
         let able = |op: &Op| !machine.hosts(op.row().function).is_empty();
         Some(LoopChoice {

@@ -439,7 +439,7 @@ impl Planner<'_> {
         self.names.insert(held, name);
     }
 
-    /// A register that is free from a place on, up to another.
+    /// A register that is free from `at` to `until`.
     fn free(&mut self, base: &str, kind: Kind, at: usize, until: usize) -> String {
         let base: String =
             base.chars().map(|c| if c.is_ascii_alphanumeric() || c == '_' { c } else { '_' }).collect();
