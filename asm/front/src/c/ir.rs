@@ -114,7 +114,7 @@ pub(super) struct Data {
     pub(super) label: Option<String>,
 }
 
-/// A register that changes.
+/// A variable: a register that is written more than once.
 #[derive(Clone, Debug)]
 pub(super) struct Var {
     pub(super) name: String,

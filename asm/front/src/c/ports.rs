@@ -113,7 +113,7 @@ impl Exec<'_> {
         }
     }
 
-    /// Objects that a function's parameters point to or are: by the parameters' names, and for --init those of the step.
+    /// Objects behind or of a function's parameters, by the parameters' names; for `--init`, the step's objects of the same name or type.
     pub(super) fn parameters(
         &mut self,
         signature: &Signature,
@@ -262,7 +262,7 @@ impl Exec<'_> {
         Ok(())
     }
 
-    /// Stores inputs into the array that data index.
+    /// Stores inputs into an array in memory.
     fn fill(&mut self, object: usize, array: usize) -> Result<(), Error> {
         for leaf in 0..self.objects[object].leaves.len() {
             let (value, ty) =
@@ -545,7 +545,7 @@ enum Way {
     Out,
 }
 
-/// Declarations of ports so far: object, name of the member, suffix, way, and the name in the program.
+/// Declarations of ports so far: object, name of the member, suffix, direction, and the name in the program.
 #[derive(Default)]
 struct Groups(Vec<(usize, String, String, bool, String)>);
 

@@ -68,7 +68,7 @@ impl Preprocessor {
             }
             command.args(["-std=c99", "-nostdinc", "-undef", "-D__TAKT__=1"]);
             if program == "clang" {
-                // Its `-undef` takes the standard's own macros away, too; gcc warns of another definition.
+                // `-undef` removes the standard's own macros, too; gcc warns of another definition.
                 command.args(["-D__STDC__=1", "-D__STDC_VERSION__=199901L"]);
             }
             command.args(&self.options).arg("-isystem").arg(&self.folder).arg(file);

@@ -95,9 +95,9 @@ pub(super) struct Struct {
 pub(super) struct Leaf {
     pub(super) offset: usize,
     pub(super) ty: Type,
-    /// Members on the way, joined by `_`.
+    /// Names of the members on the path, joined by `_`.
     pub(super) name: String,
-    /// All indices on the way, with the number of elements of each.
+    /// All indices on the path, with the number of elements of each.
     pub(super) indices: Vec<(usize, usize)>,
 }
 

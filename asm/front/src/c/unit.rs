@@ -5,7 +5,7 @@ use crate::Error;
 use lang_c::ast::TranslationUnit;
 use lang_c::driver::{Config, Flavor, parse_preprocessed};
 
-/// Deepest nesting of parentheses and braces: the parser recurses.
+/// Maximum nesting depth of parentheses and braces: the parser recurses.
 const MAX_NESTING: usize = 200;
 
 /// Maximum length of preprocessed text, in bytes.

@@ -14,7 +14,7 @@ use std::collections::HashMap;
 
 /// The format's name and version, the value of its field `format`.
 pub const FORMAT: &str = "takt-expressions 1";
-/// Longest file that is read, in bytes.
+/// Maximum length of a file, in bytes.
 pub const MAX_BYTES: usize = 64 << 20;
 /// Maximum number of scalars of an argument, and of scalar inputs of a function.
 pub const MAX_PORTS: usize = 65_536;

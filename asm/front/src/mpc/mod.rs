@@ -23,7 +23,7 @@ pub use write::{Source, source};
 
 /// Maximum number of states, and of inputs; products of matrices are unrolled.
 pub const MAX_STATES: usize = 32;
-/// Longest horizon, in states.
+/// Maximum length of the horizon, in states.
 pub const MAX_HORIZON: usize = 128;
 /// Maximum number of iterations per period.
 pub const MAX_ITERATIONS: usize = 10_000;

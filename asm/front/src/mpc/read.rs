@@ -14,7 +14,7 @@ use takt_text::readers::{Row, Treatment};
 
 /// Name and version of the format, in the field `format`.
 pub const FORMAT: &str = "takt-mpc 1";
-/// Longest file, in bytes.
+/// Maximum length of a file, in bytes.
 pub const MAX_BYTES: usize = 16 << 20;
 /// Tolerance of a weight's least eigenvalue, relative to the largest element.
 const ROUNDING: f64 = 1e-12;

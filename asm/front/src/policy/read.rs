@@ -13,7 +13,7 @@ use prost::Message;
 use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
 
-/// Longest file, in bytes.
+/// Maximum length of a file, in bytes.
 pub const MAX_BYTES: usize = 64 << 20;
 
 /// State of the reader.

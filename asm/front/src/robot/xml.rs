@@ -6,7 +6,7 @@ use crate::Error;
 use roxmltree::{Document, Node};
 use std::borrow::Cow;
 
-/// Longest description, in bytes.
+/// Maximum length of a description, in bytes.
 pub const MAX_BYTES: usize = 64 << 20;
 /// Maximum nesting depth of elements. (URDF has 6, MJCF one for each joint of a chain; the parser recurses into each.)
 pub const MAX_DEPTH: usize = 64;

@@ -12,7 +12,7 @@ use lang_c::ast::{
 use lang_c::span::Node;
 use std::rc::Rc;
 
-/// Deepest nesting of calls.
+/// Maximum nesting depth of calls.
 const MAX_CALLS: usize = 64;
 
 impl<'a> Exec<'a> {

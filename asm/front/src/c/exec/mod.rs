@@ -27,7 +27,7 @@ use std::collections::{HashMap, HashSet};
 
 /// Limit on the nodes of a program.
 const MAX_NODES: usize = 400_000;
-/// Deepest nesting of statements, expressions and calls while executing.
+/// Maximum nesting depth of statements, expressions and calls while executing.
 const MAX_DEPTH: usize = 220;
 /// Limit on the statements and expressions that are executed in total.
 const MAX_STEPS: u64 = 60_000_000;
@@ -38,7 +38,7 @@ pub(super) type Key = (String, usize, usize);
 /// Findings of one translation that the next one starts from.
 #[derive(Clone, Default, PartialEq)]
 pub(super) struct Facts {
-    /// Objects that data index: they lie in memory.
+    /// Objects with indices that depend on data: they lie in memory.
     pub(super) arrays: HashSet<Key>,
     /// Scalars of states that the step writes.
     pub(super) written: HashSet<(Key, usize)>,

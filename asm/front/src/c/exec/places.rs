@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Reads and writes of objects: scalars known or in registers, or words of arrays in memory where data index an object.
+//! Reads and writes of objects: scalars known or in registers, or words of an array in memory if an index depends on data.
 
 use super::{Exec, Key};
 use crate::Error;
@@ -49,7 +49,7 @@ impl Exec<'_> {
         Ok(index)
     }
 
-    /// Puts an object into data memory if data index it.
+    /// Puts an object into data memory if an index into it depends on data.
     pub(in crate::c) fn settle(&mut self, index: usize) -> Result<(), Error> {
         let object = &self.objects[index];
         if !self.facts.arrays.contains(&object.key) {
@@ -137,7 +137,7 @@ impl Exec<'_> {
         }
     }
 
-    /// The scalar at a known place; the place of a pointer whose extent is unknown is made known.
+    /// The scalar at a known place; `None` if the next translation must extend the object of a pointer.
     fn leaf(&mut self, pointer: &Pointer) -> Result<Option<usize>, Error> {
         let object = &self.objects[pointer.object];
         if let Some(leaf) = object.leaf(pointer.offset) {
