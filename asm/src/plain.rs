@@ -30,7 +30,7 @@ pub struct PlainProgram {
     pub data: Vec<u32>,
     /// Inputs are latched together at the tick.
     pub latched: bool,
-    /// Bounds of loops: the bundle that heads each, the most iterations each time that it is entered, and the most in a section.
+    /// Bounds of loops: the bundle that heads each, and the maximum number of iterations per entry of the loop and in a section.
     pub loop_bounds: Vec<(u32, u32, Option<u32>)>,
     /// Labels in source order: name, memory, and the bundle or data word that each stands before.
     pub labels: Vec<(String, Space, u32)>,

@@ -202,7 +202,7 @@ impl Sink {
         }
     }
 
-    /// Adds a diagnostic whose text is made already.
+    /// Adds a finished diagnostic.
     pub fn push(&mut self, diagnostic: Diagnostic) {
         self.add(diagnostic.severity, diagnostic.code, diagnostic.span(), || diagnostic);
     }

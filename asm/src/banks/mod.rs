@@ -79,7 +79,7 @@ impl std::fmt::Display for Transfer {
 pub(crate) struct HomeBank {
     /// The slot that writes the bank.
     pub(crate) slot: SlotIndex,
-    /// The operation of the slot that copies bits, if it has one.
+    /// The operation of the slot that copies bits, if there is one.
     pub(crate) copier: Option<Op>,
 }
 

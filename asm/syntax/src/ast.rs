@@ -199,7 +199,7 @@ pub struct Operation {
 pub struct Statement {
     /// Label before the content, if any.
     pub label: Option<Name>,
-    /// Content of the line behind the label.
+    /// Content of the line after the label.
     pub kind: StatementKind,
     /// Line number, from 1; the first number of a continued line.
     pub line: u32,
@@ -334,9 +334,9 @@ pub enum DirectiveKind {
     Rep {
         /// Index variable.
         variable: Name,
-        /// First value of the name.
+        /// First value of the index variable.
         first: Expr,
-        /// Last value of the name, included.
+        /// Last value of the index variable, included.
         last: Expr,
         /// Statement of the `.endr`.
         end: u32,
@@ -345,9 +345,9 @@ pub enum DirectiveKind {
     For {
         /// Index variable.
         variable: Name,
-        /// First value of the name.
+        /// First value of the index variable.
         first: Expr,
-        /// Last value of the name, included.
+        /// Last value of the index variable, included.
         last: Expr,
         /// `step`, `unroll` and `max`, each with its value.
         options: Vec<(Name, Expr)>,
@@ -379,7 +379,7 @@ pub enum DirectiveKind {
     Fast(Vec<Name>),
     /// `.ports` and `latched` or `direct`.
     Ports(Name),
-    /// `.loop_bound`, the most iterations per entry of the loop, and `total` with the most in a section.
+    /// `.loop_bound`, the maximum number of iterations per entry of the loop, and `total` with the maximum in a section.
     LoopBound(Expr, Option<(Name, Expr)>),
     /// `.range`, the registers, whether `@` stands before them, the least and the largest value.
     Range {

@@ -111,7 +111,7 @@ mod tests {
 
     #[test]
     fn known_names_are_distinct() {
-        // A name in two lists would shift the numbers of all names behind it.
+        // A name in two lists would shift the numbers of all names after it.
         let count = NameId::BUILTINS as usize + BUILTINS.len();
         assert_eq!(Interner::new().count(), count);
     }

@@ -17,9 +17,9 @@ use takt_isa::spec::row::{BankOwned, RowError, RowOwned, RowPlace, SlotOwned, Un
 use takt_isa::{Function, Machine, MachineReason, UNITS};
 use toml::Spanned;
 
-/// The longest file of a machine.
+/// Maximum length of a machine's file, in bytes.
 pub const FILE_BYTES: usize = 1 << 16;
-/// The longest name in a file, in bytes: names become parts of names in assembly and Verilog.
+/// Maximum length of a name in a file, in bytes: names become parts of names in assembly and Verilog.
 const NAME_BYTES: usize = 40;
 /// Maximum number of units of a slot.
 const UNITS_OF_SLOT: usize = 32;

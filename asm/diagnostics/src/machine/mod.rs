@@ -9,7 +9,7 @@ pub use file::{FILE_BYTES, about, read};
 use std::path::Path;
 use takt_isa::{Machine, MachineNameError};
 
-/// The reason that a machine is unknown, unread or wrong.
+/// The reason why a machine is unknown, unread or wrong.
 #[derive(Clone, Debug)]
 pub enum MachineMistake {
     /// No machine of the table, or no option, has this name.

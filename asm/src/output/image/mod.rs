@@ -20,7 +20,7 @@ use object::{Endianness, LittleEndian as LE};
 use takt_isa::program::{LoopBound, Space, Symbol};
 use takt_isa::{BundleAddress, MachineNameError, Program};
 
-/// The largest file that is read.
+/// Maximum length of a file, in bytes.
 pub const LIMIT: usize = limits::IMAGE_BYTES;
 /// `e_flags` of an image: `TAK` and the version of the container.
 pub const FLAGS: u32 = u32::from_be_bytes(*b"TAK\x01");
@@ -37,7 +37,7 @@ const TOTALS: &str = ".takt.totals";
 /// Section for debuggers; absent if the image is stripped.
 const DEBUG: &str = ".takt.debug";
 
-/// Reason that a file cannot be loaded as an image.
+/// Reason why a file cannot be loaded as an image.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum ImageError {
     /// The file does not begin like an ELF file.

@@ -9,7 +9,7 @@ use takt_isa::encode::WORD_MASK;
 use takt_isa::program::{LoopBound, Port, Space};
 use takt_isa::{BundleAddress, Machine, Program, Register};
 
-/// The longest name of a source file.
+/// Maximum length of a source file's name, in bytes.
 pub(super) const FILE_NAME: usize = 4096;
 
 /// Checks that no word has more than 48 bits.
@@ -35,7 +35,7 @@ pub(super) fn constants(words: &[u32], machine: &Machine) -> Result<Vec<(Registe
     Ok(constants)
 }
 
-/// The reason that an address names no register.
+/// The reason why an address names no register.
 pub(super) const NO_BANK: &str = "it is in no bank";
 
 /// The register that a machine has at an address of an image.
