@@ -249,7 +249,7 @@ fn compare_unpassed(
     }
 }
 
-/// Difference of two numbers, if the second is less.
+/// Difference of two numbers; `None` unless the second is less.
 fn less(number: u32, other: u32) -> Option<u32> {
     number.checked_sub(other).filter(|less| *less > 0)
 }

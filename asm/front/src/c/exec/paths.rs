@@ -64,7 +64,7 @@ impl<'a> Exec<'a> {
         Ok(Ran { block, normal: normal?, memory: self.memory.clone(), outcomes })
     }
 
-    /// Executes both sides of a condition. Returns the condition for reaching the end of either side; the memory is then that state.
+    /// Executes both sides of a condition. Returns the condition under which either end is reached; the memory is then that of this end.
     pub(super) fn fork(
         &mut self,
         condition: Id,
