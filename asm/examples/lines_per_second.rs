@@ -19,7 +19,7 @@ fn main() {
         let mut best = f64::INFINITY;
         let runs = (8_000_000 / lines).clamp(8, 200);
         let before = processor_seconds();
-        // The best of several: what else runs on the machine only adds.
+        // The best of several runs: other load on the machine only adds time.
         for _ in 0..runs {
             let start = Instant::now();
             let assembled = takt_asm::assemble("generated.s", &loader, &options);
@@ -45,7 +45,7 @@ fn main() {
     }
 }
 
-/// Processor time that this process has used, where the system tells: on a busy machine a fairer measure than the clock.
+/// CPU time of this process, where the system reports it: on a busy machine a fairer measure than elapsed time.
 fn processor_seconds() -> Option<f64> {
     let stat = std::fs::read_to_string("/proc/self/stat").ok()?;
     let fields: Vec<&str> = stat.rsplit_once(')')?.1.split_whitespace().collect();

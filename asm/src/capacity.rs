@@ -9,7 +9,7 @@ fn blocks(count: u64) -> String {
     format!("{count} block RAM{}", if count == 1 { "" } else { "s" })
 }
 
-/// The option with which the machine's program memory holds `bundles` bundles.
+/// Advice to set the option that makes the program memory hold `bundles` bundles.
 pub(crate) fn for_bundles(machine: &'static Machine, bundles: usize) -> String {
     match machine.holding(bundles as u64, machine.data_depth.into()) {
         Some(larger) => format!(
@@ -22,7 +22,7 @@ pub(crate) fn for_bundles(machine: &'static Machine, bundles: usize) -> String {
     }
 }
 
-/// The option with which the machine's data memory holds `words` words.
+/// Advice to set the option that makes the data memory hold `words` words.
 pub(crate) fn for_words(machine: &'static Machine, words: u64) -> String {
     match machine.holding(1, words) {
         Some(larger) => format!(

@@ -89,7 +89,7 @@ pub struct Symbol {
     pub of: Option<String>,
 }
 
-/// A place in the source that names a symbol; its declaration is one.
+/// A place in the source that names a symbol, its declaration included.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, PartialOrd, Ord)]
 pub struct Reference {
     /// Place of the name.
@@ -125,7 +125,7 @@ pub struct Index {
 }
 
 impl Index {
-    /// The references of the name at a place. An offset at the name's end counts.
+    /// The references at an offset, which may be the end of the name.
     pub fn at(&self, offset: u32) -> &[Reference] {
         // Names overlap only with names in their braces: the innermost begins last.
         let end = self.references.partition_point(|reference| reference.span.start <= offset);

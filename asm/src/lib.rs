@@ -94,7 +94,7 @@ pub enum Contract {
     /// Products under the source's `.contract on`.
     #[default]
     AsWritten,
-    /// All products that can be.
+    /// All products that can be fused.
     All,
     /// No products: two roundings each.
     None,
@@ -161,7 +161,7 @@ impl AssembledProgram {
     }
 }
 
-/// Assembles a program whose first source is given, as from standard input or an editor; its includes are loaded.
+/// Assembles a program whose first source is given, for example from standard input or an editor; its includes are loaded.
 /// `name` is its path within the project.
 ///
 /// # Errors
@@ -183,12 +183,12 @@ pub fn assemble(path: &str, loader: &dyn Loader, options: &Options) -> Result<As
     check_with(context::Context::new(options.machine), path, loader, options).finish()
 }
 
-/// A program that is read and checked, not yet scheduled: fast enough for an editor after each keystroke.
+/// Reads and checks a program whose first source is given, without scheduling it: fast enough for an editor after each keystroke.
 pub fn check_bytes(name: &str, bytes: Vec<u8>, loader: &dyn Loader, options: &Options) -> CheckedProgram {
     check(name, &expand::load::First::new(name, bytes, loader), options)
 }
 
-/// A program that is read and checked, not yet scheduled: what an editor can have after each keystroke.
+/// A program that is read and checked, but not yet scheduled.
 pub struct CheckedProgram {
     context: context::Context,
     ir: ir::Ir,
@@ -202,7 +202,7 @@ pub struct CheckedProgram {
     runs: Option<Vec<ir::runs::Run>>,
 }
 
-/// Reads and checks the program that begins with the source at `path`, and indexes its names. [`Checked::finish`] does the rest.
+/// Reads and checks the program that begins with the source at `path`, and indexes its names. [`CheckedProgram::finish`] does the rest.
 pub fn check(path: &str, loader: &dyn Loader, options: &Options) -> CheckedProgram {
     let mut context = context::Context::new(options.machine);
     context.notes = Some(context::Notes::default());
@@ -262,7 +262,7 @@ fn check_with(
 }
 
 impl CheckedProgram {
-    /// The target machine: the source's (`.machine`), else the machine of the options.
+    /// Declarations and references of the program, for editors.
     pub fn index(&self) -> &index::Index {
         &self.index
     }
@@ -277,12 +277,12 @@ impl CheckedProgram {
         self.assignment.as_ref().map_or(&[], |(_, contractions)| contractions)
     }
 
-    /// Key for caching a result: everything that the assembled program depends on. `build` names this build of the assembler.
+    /// Sources read so far: the first file and its includes.
     pub fn sources(&self) -> &Sources {
         &self.context.reports.sources
     }
 
-    /// All that the assembled program depends on, as the key of a result that is kept; `build` names this build of the assembler.
+    /// Key for caching the assembled program: everything that the result depends on. `build` names this build of the assembler.
     pub fn key(&self, build: &str, options: &Options) -> Vec<u8> {
         let mut key = format!("{build}\n{options:?}\n{:?}\n", self.machine()).into_bytes();
         for source in self.sources().files() {
@@ -292,7 +292,7 @@ impl CheckedProgram {
         key
     }
 
-    /// The errors and warnings so far. [`Checked::finish`] repeats these, and adds further ones if there is no error.
+    /// The errors and warnings so far. [`CheckedProgram::finish`] repeats these, and adds further ones if there is no error.
     pub fn diagnostics(&self) -> Diagnostics {
         let reports = &self.context.reports;
         reports.sink.clone().finish(Arc::new(reports.sources.clone()))

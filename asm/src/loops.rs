@@ -8,7 +8,7 @@ use std::fmt;
 pub enum LoopCount {
     /// A constant count, at least one.
     Exactly(u32),
-    /// Upper bound of a count that depends on a register, or on the iterations of the loops around. Code before the loop skips it
+    /// Upper bound of a count that depends on a register, or on the iterations of the enclosing loops. Code before the loop skips it
     /// if the count is zero.
     AtMost(u32),
 }
@@ -50,7 +50,7 @@ pub enum UnrollReason {
     NeedsIndex,
     /// The source asks for it by `unroll`.
     Asked,
-    /// The loop has few iterations, and no loop within.
+    /// The loop has few iterations, and contains no loop.
     Few,
 }
 

@@ -30,7 +30,7 @@ pub struct PlainProgram {
     pub data: Vec<u32>,
     /// Inputs are latched together at the tick.
     pub latched: bool,
-    /// Bounds of loops: the bundle that heads each, the most iterations each time that it is entered, and the most in a section.
+    /// Bounds of loops: the bundle that heads each, and the maximum number of iterations per entry of the loop and in a section.
     pub loop_bounds: Vec<(u32, u32, Option<u32>)>,
     /// Labels in source order: name, memory, and the bundle or data word that each stands before.
     pub labels: Vec<(String, Space, u32)>,
@@ -49,7 +49,7 @@ pub struct PlainRegister {
     pub name: String,
     /// Role of the register.
     pub kind: PlainKind,
-    /// Type as which debuggers show the bits.
+    /// Type by which debuggers show the bits.
     pub ty: Type,
     /// Address that the source gives the register.
     pub pinned: Option<Register>,
@@ -86,13 +86,13 @@ pub struct PlainBundle {
 pub struct PlainOperation {
     /// Instruction of the operation.
     pub op: Op,
-    /// Destination: an index into [`Plain::registers`].
+    /// Destination: an index into [`PlainProgram::registers`].
     pub dest: Option<u32>,
-    /// Registers that it reads, as many as the instruction has sources; the rest is zero.
+    /// Registers that the operation reads, as many as the instruction has sources; the rest is zero.
     pub sources: [u32; 3],
     /// Immediate, offset, or index of the target bundle.
     pub constant: u32,
-    /// Index into [`Plain::arrays`] of the accessed array.
+    /// Index into [`PlainProgram::arrays`] of the accessed array.
     pub array: Option<u32>,
     /// The operation is a raw word, given bit by bit, with unknown effect.
     pub raw: bool,

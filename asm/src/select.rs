@@ -16,7 +16,7 @@ use std::collections::{BTreeMap, HashSet};
 use takt_isa::program::{Location, Space};
 use takt_isa::{Effect, Op, Slots, Type};
 
-/// The most registers that a converted branch may write, and the most operations, selections included.
+/// Limits on the registers that a converted branch may write, and on the operations, selections included.
 const REGISTERS: usize = 2;
 const OPERATIONS: usize = 6;
 
@@ -73,7 +73,7 @@ pub(crate) fn select(ir: &mut Ir) -> Vec<Selection> {
         let end = bundles.len() as u32;
         ir.has_choices = true;
         ir.replace_bundles(bundles, |position| moved.get(&position).copied().unwrap_or(end));
-        // A label that nothing leads to any more would end a block.
+        // A label that is no longer the target of a branch would end a block.
         let left: HashSet<LabelId> =
             ir.operations().filter_map(|operation| operation.target()?.ok()).collect();
         for target in targets.into_iter().filter(|target| !left.contains(target)) {
@@ -93,13 +93,13 @@ struct SelectInstruction {
 }
 
 impl SelectInstruction {
-    /// `None` if the machine has no such instruction.
+    /// Finds the instruction; `None` if the machine has none.
     fn of(ir: &Ir) -> Option<SelectInstruction> {
         let (op, sources) = with_form(ir.machine, "?:", Type::B)?;
         Some(SelectInstruction { op, sources, slots: ir.machine.hosts(op.row().function) })
     }
 
-    /// The bundles that replace a branch at the end of a run, and the bundle that it leads to.
+    /// The bundles that replace a branch at the end of a run, and the target bundle.
     fn replace(&self, ir: &mut Ir, runs: &[Run], flow: &Flow, index: usize) -> Option<(usize, Vec<Bundle>)> {
         let (before, passed) = (runs[index], *runs.get(index + 1)?);
         let [branch] = ir.bundles[before.end - 1].operations[..] else { return None };

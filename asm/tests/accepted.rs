@@ -77,7 +77,7 @@ fn memories_for_verilog() {
             "constants_i.hex"
         ]
     );
-    // Each file, read back as `$readmemh` does, is the memory.
+    // Each file, read as `$readmemh` does, equals the memory.
     let words = |text: &str| -> Vec<u64> {
         text.split_whitespace().map(|word| u64::from_str_radix(word, 16).expect("hexadecimal")).collect()
     };

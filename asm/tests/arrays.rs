@@ -37,7 +37,7 @@ enum Statement {
     Assign(char, Vec<Affine>, Expr),
 }
 
-/// The indices that are known, and the arrays.
+/// Values of the known indices, and the arrays.
 struct Machine32 {
     indices: BTreeMap<char, i64>,
     arrays: BTreeMap<char, (Vec<i64>, Vec<f32>)>,
@@ -176,7 +176,7 @@ fn source(statements: &[Statement], depth: usize, numbers: &mut Vec<i64>, text: 
 struct Generator<'r> {
     random: &'r mut Random,
     arrays: BTreeMap<char, Vec<i64>>,
-    /// The loops around: index, first, last (at run time, a greater declared maximum), step.
+    /// The enclosing loops: index, first, last (at run time, a greater declared maximum), step.
     around: Vec<(char, Affine, Affine, i64)>,
 }
 
@@ -185,7 +185,7 @@ impl Generator<'_> {
         self.random.below(n) as i64
     }
 
-    /// All values of an affine function over the loops around.
+    /// All values of an affine function over the enclosing loops.
     fn extremes(&self, function: &Affine) -> Option<(i64, i64)> {
         fn go(
             around: &[(char, Affine, Affine, i64)],
@@ -213,7 +213,7 @@ impl Generator<'_> {
         go(&self.around, &mut BTreeMap::new(), function)
     }
 
-    /// A subscript that lies in 1 to `size` over the loops around.
+    /// A subscript that lies in 1 to `size` over the enclosing loops.
     fn subscript(&mut self, size: i64) -> Affine {
         let indices: Vec<char> = self.around.iter().map(|around| around.0).collect();
         for _ in 0..4 {
@@ -304,7 +304,7 @@ impl Generator<'_> {
         if step < 0 {
             std::mem::swap(&mut first, &mut last);
         }
-        // A step over a range whose length depends on an index would have to divide it.
+        // The number of steps in a range whose length depends on an index would need a division.
         if step.abs() != 1 {
             (first.1, last.1) = (Vec::new(), Vec::new());
         }
@@ -459,7 +459,7 @@ fn elements_are_operands_of_instructions() {
     // The words of an array by its label, counted from 0.
     check(" ld t, x+2\n mov y[1], t\n st y+3, t", "y", &[3., 0., 0., 3.]);
     check(" fadd y[1], x[1], x[2] || mov t, x[5]\n fadd y[2], t, t", "y", &[3., 10., 0., 0.]);
-    // On one side as on the other: `y[1]` is read before it is written.
+    // An element on both sides: `y[1]` is read before it is written.
     check(" y[1] = 7\n y[2], y[1] = y[1], x[2]", "y", &[2., 7., 0., 0.]);
 }
 
@@ -469,7 +469,7 @@ fn subscripts_in_registers() {
     check(" li n, 3\n y[n] = x[n+4] - x[2*n-1]", "y", &[0., 0., 2., 0.]);
     check(" n = k[1]\n y[:] = A[n,:]\n n = k[2]\n y[n] = A[n,n+1]", "y", &[2., 10., 11., 12.]);
     check(" .for i, 1, 2 unroll 1\n  n = k[i]\n  y[i] = A[n,i]\n .endfor", "y", &[9., 2., 0., 0.]);
-    // The index as a number, in a loop that runs and in one that is written out.
+    // The index as a number, in a loop at run time and in a written-out loop.
     check(" .for i, 1, 4 unroll 1\n  y[i] = itof(2*i+1)\n .endfor", "y", &[3., 5., 7., 9.]);
     check(" .for i, 1, 4\n  y[i] = itof(2*i+1)\n .endfor", "y", &[3., 5., 7., 9.]);
 }

@@ -205,7 +205,7 @@ fn a_preset_may_come_before_its_register() {
 
 #[test]
 fn reused_initial_values_are_no_presets() {
-    // Control comes back to the beginning.
+    // Control returns to the beginning.
     let text = ".input x, n:int\n.output y\n.state s\n.once\nagain: mov s, zero\n wait period\n.period\nperiod: fadd s, s, x\n mov y, s\n bnz n, again\n wait period\n";
     let (_, assembled) = period(text);
     assert_eq!(
@@ -275,7 +275,7 @@ fn dead_values_are_not_copied() {
 
 #[test]
 fn a_port_shows_every_value_in_order() {
-    // The quotient is there long after the sum, and would find a free slot then.
+    // The quotient is ready long after the sum, when a slot would be free.
     let text = format!(
         ".input x\n.output F\n.period\nperiod: fdiv F, x, 3.0\n fadd F, x, 1.0\n{} mov F, x\n fmul F, x, 2.0\n wait period\n",
         " nop\n".repeat(14)
@@ -300,7 +300,7 @@ fn suggested_fixes_assemble() {
     assert_eq!(help(&pinned), "leave its place to the assembler, or place it in bank x");
     good(&pinned.replace(" @ a3", ""));
     good(&pinned.replace("a3", "x3"));
-    // A branch that reads what its own bundle computes.
+    // A branch that reads a result of its own bundle.
     let branch = program(".state s", "fadd s, s, x || bz s, over\n ld s, [n]");
     assert_eq!(help(&branch), "write `bz` as a bundle of its own");
     good(&branch.replace("|| bz", "\n bz"));

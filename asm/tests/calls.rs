@@ -24,7 +24,7 @@ fn assembled(text: &str, machine: &'static Machine, schedule: Schedule) -> Assem
 /// The integer output `y` where a program that begins with `body` halts, on every machine, as written and scheduled.
 #[track_caller]
 fn gives(declared: &str, body: &str, subroutines: &str, expected: i32) {
-    // Subroutines stand behind their callers, and before them.
+    // Subroutines after their callers, and before them.
     for text in [
         format!("{declared}.output y:int\n.once\n{body} halt\n{subroutines}"),
         format!("{declared}.output y:int\n.once\n jmp begin\n{subroutines}begin:\n{body} halt\n"),
@@ -86,7 +86,7 @@ fn loop_count_is_the_registers_initial_value() {
     }
 }
 
-/// The number of registers that a program's loops have.
+/// The number of registers made for a program's loops.
 fn made(text: &str, machine: &'static Machine) -> usize {
     let program = assembled(text, machine, Schedule::None).program;
     let names: BTreeSet<&str> = program.registers.iter().map(|named| named.name.as_str()).collect();
@@ -124,7 +124,7 @@ fn nests_that_are_too_deep_by_calls_are_errors() {
     for machine in [&F1, &F3] {
         assembled(&text, machine, Schedule::AsWritten);
     }
-    // Written out, there is one loop less.
+    // If the loop is written out, the nest is one level less deep.
     assembled(&text.replace(".for l, 1, 2 unroll 1", ".for l, 1, 2"), &T3, Schedule::AsWritten);
     let shallow: &Machine = Box::leak(Box::new(Machine { name: "shallow", loop_depth: 2, ..T3 }));
     let two = " .for i, 1, 9\n .for h, 1, 9\n call clear\n .endfor\n .endfor\n halt\n";
@@ -138,11 +138,11 @@ fn loops_that_call_themselves_are_errors() {
                 sub:\n .for m, 1, 8\n call other\n .endfor\n ret\nother:\n c = c - 1\n bz c, end\n call sub\nend: ret\n";
     insta::assert_snapshot!(common::bad(text, &T3).render(false));
     common::bad(text, &F1);
-    // Recursion outside of loops is the program's own affair.
+    // Recursion outside of loops is allowed.
     common::good(&text.replace(" .for m, 1, 8\n", "").replace(" .endfor\n", ""));
 }
 
-/// Two loops with a label of one name, and with declarations, however many of their iterations are written out.
+/// Two loops with a label of the same name, and with declarations, however many of their iterations are written out.
 #[test]
 fn labels_of_a_body_are_local_to_an_iteration() {
     let last = |count: i64| count * (count + 1) / 2;
@@ -177,7 +177,7 @@ fn a_body_is_not_called() {
     let number = ".reg c:int\n.once\n call 4\n .for i, 1, 9\n c = 1\n c = 2\n .endfor\n halt\n";
     let mistakes = common::bad(number, &F3).render(false);
     assert!(mistakes.contains("this calls into the body of a counted loop"), "{mistakes}");
-    // A jump to a loop's first bundle is an error, too, and no further iteration.
+    // A jump to a loop's first bundle is an error, too, rather than a further iteration.
     let head = ".reg c:int\n.once\n c = 0\n .for i, 1, 9\n c = c + 1\n .endfor\n bz c, 2\n halt\n";
     let mistakes = common::bad(head, &T3).render(false);
     assert!(mistakes.contains("this leads into the body of a counted loop"), "{mistakes}");

@@ -33,7 +33,7 @@ fn two() -> &'static Machine {
 
 const HEAD: &str = ".input a, b, c, d\n.output F, G\n.reg t u v\n.state s\n.preset s = 1.0\n";
 
-/// Contraction makes of a period the program that one would write by hand.
+/// Asserts that contraction turns a period into the program that one would write by hand.
 #[track_caller]
 fn becomes(period: &str, by_hand: &str) {
     let whole = |contract: &str, body: &str| format!("{HEAD}{contract}\n.period\np:\n{body}\n wait p\n");
@@ -87,7 +87,7 @@ fn does_not_fuse_products_used_twice() {
     becomes(" mov t, a\n fmul t, t, b\n fadd t, t, c\n mov F, t", " mov t, a\n fma t, t, b, c\n mov F, t");
 }
 
-/// A chain that takes longer than everything else, and leaves time beside it.
+/// A chain longer than everything else, so that other operations have slack.
 const LONG: &str = "\n fsqrt v, d\n fsqrt G, v";
 
 #[track_caller]
@@ -100,7 +100,7 @@ fn becomes_beside(period: &str, by_hand: &str) {
 fn does_not_fuse_sums_that_wait_for_another_operand() {
     stays(" fsqrt u, c\n fmul t, a, b\n fadd F, t, u");
     becomes_beside(" fsqrt u, c\n fmul t, a, b\n fadd F, t, u", " fsqrt u, c\n fma F, a, b, u");
-    // But not where it waits for the product too.
+    // The sum waits for the product, too: it is fused.
     becomes(" fadd u, c, d\n fmul t, a, b\n fadd F, t, u", " fadd u, c, d\n fma F, a, b, u");
 }
 
@@ -250,7 +250,7 @@ fn source(seed: u64) -> String {
     text
 }
 
-/// The writes to ports over some periods; and true if every sum and product was an integer that binary32 holds.
+/// The writes to ports over some periods; and whether every sum and product was an integer that binary32 holds.
 fn run(assembled: &AssembledProgram, seed: u64) -> (Vec<Vec<u32>>, bool) {
     let random = &mut Random::new(seed + 5);
     let program = &assembled.program;

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The cycles of this repository's programs on the machines, measured: no change makes them longer unseen. No other test has a
-//! table of such figures; documents have theirs from `cargo xtask docs`.
+//! Upper limits on the cycles of this repository's programs on the machines, so that no change lengthens them unnoticed. No other
+//! test has a table of such figures; documents get theirs from `cargo xtask docs`.
 
 use crate::common;
 use std::path::Path;
 use takt_asm::{Contract, FileLoader, Options, Search};
 use takt_isa::{Machine, T1, T3, T4};
 
-/// Cycles of the block at the label `period`, or else of the longest.
+/// Cycles of the block at the label `period`, or else of the longest block.
 fn cycles(folder: &str, name: &str, machine: &'static Machine, contract: Contract) -> u32 {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../programs");
     let loader = Search::new(FileLoader::new(root.join(folder))).folder(root.join("library"));
@@ -18,7 +18,7 @@ fn cycles(folder: &str, name: &str, machine: &'static Machine, contract: Contrac
     period.map(|block| block.cycles).or(longest).expect("it has a scheduled block")
 }
 
-/// A test for each figure, so that a longer figure fails alone.
+/// A separate test for each figure, so that an increase fails only that test.
 macro_rules! no_longer {
     ($($name:ident: $folder:literal $file:literal $machine:ident $contract:ident $most:literal;)*) => {$(
         #[test]

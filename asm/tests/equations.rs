@@ -73,7 +73,7 @@ fn is_int(name: &str) -> bool {
     matches!(name, "n" | "k" | "j")
 }
 
-/// No value: a constant part has none, which the assembler reports.
+/// A constant part without a value, which the assembler reports.
 struct NoValue;
 
 fn bits(seen: ExpectedValue, ty: Type) -> Result<u32, NoValue> {
@@ -110,7 +110,7 @@ fn evaluate(tree: &Tree, registers: &Registers) -> Result<ExpectedValue, NoValue
     let constant = |operand: &ExpectedValue| matches!(operand, ExpectedValue::Constant(_));
     let folds = !matches!(tree, Name(_) | Choice(..) | Call("sat" | "sign" | "itof" | "ftoi", _));
     if folds && operands.iter().all(constant) {
-        // Computed from the operands' values: a decided choice drops its other alternative.
+        // Computed from the operands' values: a choice with a constant condition drops its other alternative.
         let written: Vec<String> = operands
             .iter()
             .map(|operand| match operand {
@@ -201,7 +201,7 @@ fn evaluate(tree: &Tree, registers: &Registers) -> Result<ExpectedValue, NoValue
     })
 }
 
-/// Trees from a stream of choices, which proptest makes and makes shorter.
+/// Trees from a stream of choices, which proptest generates and shrinks.
 struct Choices<'c>(std::slice::Iter<'c, u8>);
 
 impl Choices<'_> {
@@ -320,7 +320,7 @@ proptest! {
                 let ty = if is_int(target) { Type::I } else { Type::F };
                 let value = evaluate(tree, &expected).and_then(|seen| bits(seen, ty));
                 let Ok(value) = value else {
-                    // A constant part without a value: one error, and it says where.
+                    // A constant part without a value: exactly one error, at its place.
                     let report = bad(&source, &F3);
                     let mut errors = report.list.iter().filter(|d| d.severity == takt_asm::diag::Severity::Error);
                     prop_assert!(errors.all(|error| error.code == "expression"), "{source}{}", report.render(false));
@@ -372,7 +372,7 @@ fn count(operations: &[String], mnemonic: &str) -> usize {
 #[test]
 fn equal_parts_are_computed_once() {
     let once = |declarations: &str, lines: &str| count(&period(declarations, lines), "fmul");
-    // Within an equation; of ports, too.
+    // Shared within an equation, ports included.
     assert_eq!(once("", " a = x*y + x*y\n b = t"), 1);
     // In the equations of a run.
     assert_eq!(once("", " a = t*u + 1\n b = t*u - 1"), 1);
@@ -418,7 +418,7 @@ fn constants_are_folded_where_they_are_a_part() {
     assert_eq!(products(" a = 2*pi/3*x"), 1);
     // In the order written: (x·2)·π.
     assert_eq!(products(" a = x*2*pi"), 2);
-    // A division stays one.
+    // A division remains a division.
     assert_eq!((products(" a = x/3"), count(&period("", " a = x/3\n b = t"), "fdiv")), (0, 1));
 }
 
@@ -585,7 +585,7 @@ fn macros_are_functions() {
     }
 }
 
-/// A register that has its place is written by the slot whose bank it lies in, where several have the unit.
+/// A register with a given place is written by the slot of its bank, even if several slots have the unit.
 #[test]
 fn placed_registers_are_written_by_their_slot() {
     for machine in MACHINES {
@@ -649,7 +649,7 @@ fn loads_have_the_type_of_their_table() {
     good(&source("ld d, V[i]", "d*x").replace(".float 1.5, 2.5", ".float 1.5\n .word 2"));
     good(&source("st V[i], i\n ld d, V[i]", "itof(d)"));
     good(&source("ld d:int, V[i]", "itof(d)"));
-    // A part of a table does not end it.
+    // A label within a table does not end the table.
     good(&source("ld d, V[i]", "itof(d)").replace("2.5\n", "2.5\n_part: .word 1\n"));
 }
 

@@ -55,7 +55,7 @@ fn written_data_is_read_back() {
     assert!(!image::is_image(b".period"));
     assert_eq!(image::read(&bytes).as_ref(), Ok(&program));
     assert_eq!(bytes, image::write(&program).expect("an image holds it"), "equal programs give equal bytes");
-    // Wherever the bytes lie in memory.
+    // The image is read at any alignment in memory.
     let mut moved = vec![0];
     moved.extend(&bytes);
     assert_eq!(image::read(&moved[1..]).as_ref(), Ok(&program));
@@ -322,7 +322,7 @@ fn memories_that_overflow() {
     assert!(matches!(image::write(&program), Err(ImageError::MemorySize { .. })));
 }
 
-/// An image names its machine with the depths of its memories; the text that it is disassembled into, too.
+/// An image and its disassembly name the machine with the depths of its memories.
 #[test]
 fn memories_of_other_depths() {
     let text = "

@@ -70,8 +70,8 @@ fn suggests_the_include_of_a_library_macro() {
     assert!(text.contains("help: the library defines it: `.include <second.s>`"), "{text}");
 }
 
-/// A missing file is the only mistake that counts: names and macros that it would have declared are not asked for, and warnings of
-/// unused names stay away. Mistakes of syntax, and further missing files, stand beside it.
+/// A missing file stops errors that follow from it: names and macros that it would have declared are not reported as missing, and
+/// warnings of unused names are suppressed. Mistakes of syntax, and further missing files, are still reported.
 #[test]
 fn a_missing_file_stops_the_cascade() {
     let uses: String = (0..120).map(|i| format!(" twice y, K{i}\n fadd y{i}, x, K{i}\n")).collect();

@@ -39,7 +39,7 @@ fn value_takes_the_type_of_its_operand() {
     assert_eq!(constants(".input x\n.output b\n.period\n iand b, x, 2.0\n"), [2.0f32.to_bits()]);
     assert_eq!(constants(".input x\n.output b\n.period\n iand b, x, float(2)\n"), [2.0f32.to_bits()]);
     assert_eq!(constants(".input x\n.output b\n.period\n iand b, x, -1\n"), [u32::MAX]);
-    // 2^24 + 1 + 2^-30 in binary64 is halfway and a bit: through binary64 alone it would be lost.
+    // 2^24 + 1 + 2^-30 is just above halfway between binary32 numbers: rounding through binary64 first would lose the excess.
     let halfway = (1i64 << 54) + (1 << 30) + 1;
     let text = format!(".input x\n.output F\n.period\n fadd F, x, {halfway}\n");
     assert_eq!(constants(&text), [(halfway as f32).to_bits()]);
@@ -398,7 +398,7 @@ fn an_output_has_one_number() {
     };
     let ports = ".input x, y\n.output F, G, H\n.period\n";
     let all = [("x", 0), ("y", 1), ("F", 0), ("G", 1), ("H", 2)];
-    // Whichever slot writes it, and in whichever order.
+    // The number depends neither on the slot that writes the output nor on the order of writes.
     expect(&format!("{ports} fmul F, x, y\n fadd G, x, y\n mov H, x\n"), &all);
     expect(&format!("{ports} mov G, x\n fmul H, x, y\n fmul F, x, y\n"), &all);
     // Given numbers, as expressions too, and the rest around them.
@@ -430,7 +430,7 @@ fn ports_may_be_latched() {
 
 #[test]
 fn predefined_names_query_the_machine() {
-    // Machines differ in the instructions that they execute: the tables tell the differences.
+    // Machines differ in the instructions that they execute: the expected values come from the tables.
     let text = |mnemonic: &str| format!(".if has.{mnemonic}\n.data\n.word has.{mnemonic} + 1\n.endif\n");
     let mut answers = [0; 2];
     for machine in takt_isa::MACHINES {
@@ -444,7 +444,7 @@ fn predefined_names_query_the_machine() {
         }
     }
     assert!(answers.iter().all(|&count| count > 0), "some machine lacks something");
-    // A declaration of one's own comes first, as with `pi`.
+    // A declaration in the source takes precedence, as with `pi`.
     assert_eq!(good(".const has.fadd = 7\n.data\n.word has.fadd\n").program.data, [7]);
 }
 

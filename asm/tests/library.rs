@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Every macro of the library with every kind of argument: right in value, or an error that names the mend.
+//! Every macro of the library with every kind of argument: the right value, or an error with advice.
 //!
 //! The macros and the types of their parameters are read from the library itself, so that a new macro is covered at once. An
 //! argument of the right type gives the bits of a register of that type, in whatever form it is written; functions that Rust has too
@@ -32,7 +32,7 @@ struct Macro {
     body: String,
 }
 
-/// The number of indices behind a name in a body; 0 if it has none anywhere.
+/// The number of indices after a name in a body; 0 if it has none anywhere.
 fn rank(body: &str, name: &str) -> usize {
     let bytes = body.as_bytes();
     let is_name = |byte: u8| byte.is_ascii_alphanumeric() || byte == b'_' || byte == b'.';
@@ -47,7 +47,7 @@ fn rank(body: &str, name: &str) -> usize {
     ranks.next().unwrap_or(0)
 }
 
-/// The library's macros that are for use outside.
+/// The library's public macros.
 fn macros() -> Vec<Macro> {
     let mut all: Vec<Macro> = Vec::new();
     for entry in std::fs::read_dir(library()).expect("it is there") {
@@ -145,7 +145,7 @@ fn takes(parameter: &Parameter, kind: &str) -> bool {
     }
 }
 
-/// A program with these lines in its period, and something of every kind.
+/// A program with these lines in its period, and names for every kind of argument.
 fn program(file: &str, lines: &str) -> Result<AssembledProgram, Diagnostics> {
     let machine = Machine::from_name("t4").expect("there is one");
     let text = format!(
@@ -185,7 +185,7 @@ fn run(assembled: &AssembledProgram, x: f32, n: i32) -> u32 {
     emulator.register(output.register).expect("it is written")
 }
 
-/// The arguments of a use in which each is of its type: registers, arrays, numbers.
+/// Arguments for a use of a macro, each of its parameter's type: registers, arrays, numbers.
 fn typed(parameters: &[Parameter]) -> Vec<String> {
     let one = |(number, parameter): (usize, &Parameter)| match (parameter.ty.as_str(), parameter.rank) {
         ("float", 0) if number == 0 => "t".to_owned(),
@@ -201,7 +201,7 @@ fn typed(parameters: &[Parameter]) -> Vec<String> {
     parameters.iter().enumerate().map(|(number, parameter)| one((number, parameter))).collect()
 }
 
-/// Errors of a report about types: without consequences of sizes.
+/// The report has an error about types, rather than only about consequences such as sizes.
 fn about_types(report: &Diagnostics) -> bool {
     let codes =
         ["types", "arguments", "expression", "array", "not-a-value", "equation", "not-writable", "operand"];
@@ -284,7 +284,7 @@ fn reference(name: &str, x: f64, y: f64) -> Option<f64> {
     })
 }
 
-/// Left and right side of each line of a body: what an equation, an instruction or a macro writes, and what it reads.
+/// Left and right side of each line of a body: written and read operands of an equation, an instruction or a macro.
 fn sides(body: &str) -> impl Iterator<Item = (&str, &str)> {
     body.lines().filter_map(|line| {
         let code = line.split(';').next()?.trim();
@@ -332,7 +332,7 @@ fn functions_give_the_value_of_the_literal_as_written() {
         let numbers: Vec<String> = numbers.collect();
         for whole in [0i32, 1, 3, 10] {
             let value = whole as f32;
-            // The other arguments are a half, which a register has.
+            // The other arguments are the register `x`, which holds 0.5.
             let call = |number: usize, written: &str| {
                 let mut arguments: Vec<String> = vec!["x".to_owned(); takes];
                 arguments[number] = written.to_owned();

@@ -38,7 +38,7 @@ fn a_printed_row_is_the_machine_again() {
         assert_eq!(again, machine, "{}", machine.to_toml());
         assert!(std::ptr::eq(again, good(&machine.to_toml())));
     }
-    // Letters that TOML writes otherwise.
+    // Characters that TOML escapes.
     let odd = Machine { name: "odd", text: "a \"b\" \\ c\nπ\u{1}", ..F3 };
     assert_eq!(good(&odd.to_toml()).text, odd.text);
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Loads and stores whose addresses are known apart are not ordered: the same memory and registers come of it, in fewer cycles.
+//! Loads and stores at addresses known to differ are not ordered: the same memory and registers result, in fewer cycles.
 
 use crate::common;
 use crate::random_source::Random;
@@ -163,6 +163,6 @@ period: fsqrt a, x
     assert!(["0[i1]", "0[n]"].iter().all(|load| place(load) <= place("mov z, x")));
     assert!(["0[far]", "1[n]"].iter().all(|load| place("mov z, x") < place(load)));
     assert!(["0[far]", "1[n]"].iter().all(|load| place(load) <= place("mov y, x")));
-    // An address within the memory faults nobody: it need not wait for the ports.
+    // An access within the memory cannot fault, so it need not wait for the ports.
     assert!(place("0[zero]") < place("mov z, x"));
 }

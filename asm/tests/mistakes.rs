@@ -20,7 +20,7 @@ fn every_mistake_is_explained() {
         insta::assert_snapshot!(snapshot, text);
         // Colour changes nothing but the colour.
         assert_eq!(without_escapes(&report.render(true)), text, "{name}");
-        // Every error has a place, but for a file that cannot be read at all.
+        // Every error has a place, except for a file that cannot be read at all.
         for message in report.messages() {
             let place =
                 message.places.first().unwrap_or_else(|| panic!("{name}: no place: {}", message.message));

@@ -16,7 +16,7 @@ fn assembled(source: &str, machine: &'static Machine, schedule: Schedule) -> Ass
     }
 }
 
-/// Memory and outputs where the program halts, and the cycle in which it does.
+/// Memory and outputs where the program halts, and the cycle of the halt.
 fn outcome(assembled: &AssembledProgram) -> (Vec<u32>, Vec<Option<u32>>, u64) {
     let mut emulator = Emulator::new(&assembled.program).expect("it fits");
     emulator.set_cycle_limit(1_000_000);
@@ -42,7 +42,7 @@ fn operation_text((kind, d, a, b, c): (u8, u8, u8, u8, u8), steps: [i32; 2], tex
     };
 }
 
-/// Two loops over tables of 64 words with two pointers. Their count is a constant or, if it is not `known`, loaded. The code behind
+/// Two loops over tables of 64 words with two pointers. Their count is a constant or, if it is not `known`, loaded. The code after
 /// the first loop runs `again` times, from the label at its end.
 fn source(count: u32, known: bool, again: u8, steps: [i32; 2], body: &[(u8, u8, u8, u8, u8)]) -> String {
     let mut text = String::from(
@@ -53,7 +53,7 @@ fn source(count: u32, known: bool, again: u8, steps: [i32; 2], body: &[(u8, u8, 
         let _ = writeln!(text, "mov f{r}, {}.5", r + 1);
     }
     text.push_str("li i, 0\nli j, 3\nmov y, zero\nmov z, zero\n");
-    // The second loop begins right behind the first.
+    // The second loop begins right after the first.
     for (label, body) in [("done", body), ("end_of_all", &body[body.len() / 2..])] {
         let _ = match known {
             true => writeln!(text, "loop {count}, {label}"),
@@ -140,7 +140,7 @@ fn a_pointer_is_no_recurrence() {
     }
 }
 
-/// A value that a loop's body is the first to write, and the last that is read behind it.
+/// A value that a loop's body writes first, and that the code after the loop reads last.
 #[test]
 fn the_last_value_is_read_behind_the_loop() {
     let text = POINTER
@@ -225,7 +225,7 @@ fn run_time_counts_are_pipelined_for_many_iterations() {
     }
 }
 
-/// Iterations take an interval each, also where accesses stand near to the advances of their pointers, whose results they would wait for.
+/// Each iteration takes one interval, even if accesses are close to the advances of their pointers, for whose results they would wait.
 #[test]
 fn an_iteration_takes_an_interval() {
     let bodies = [

@@ -113,7 +113,7 @@ fn slots_that_share_functions_compute_the_same() {
             }
         }
     }
-    // Slots together do set bounds.
+    // Some bounds come from several slots together.
     assert!(
         shared > common::programs(programs as u64 / 2, 20) as usize,
         "{shared} blocks of {programs} programs"
@@ -158,7 +158,7 @@ fn predicted_cycles_equal_the_machines() {
     }
 }
 
-/// The shipped machines, and one whose choices of slots take different time.
+/// The shipped machines, and one in which the latency depends on the slot.
 fn machines() -> impl Iterator<Item = &'static Machine> {
     MACHINES.iter().copied().chain([rows::named("late_alu")])
 }
@@ -304,7 +304,7 @@ fn keeps_a_demanded_order_against_the_source() {
     }
 }
 
-/// A slot has all the loads and computes quickly; another slot has nothing to do, but takes longer. A deadline counts on the
+/// One slot hosts all loads and computes quickly; another slot has nothing to do, but takes longer. A deadline is met from the
 /// quick slot.
 #[test]
 fn a_port_is_written_from_the_quickest_slot() {
@@ -401,8 +401,8 @@ fn as_good_as_by_hand() {
     assert_eq!(sorted(values), sorted(expected));
 }
 
-/// Cycles of the periods of random sources, all together: after the first passes, and after a short search. No change makes them
-/// longer unseen.
+/// Cycles of the periods of random sources, in total: after the first passes, and after a short search. The upper limits keep changes
+/// from lengthening them unnoticed.
 #[test]
 fn short_searches_keep_their_results() {
     let most = [(0, 23_608), (1, 5561)];
@@ -437,7 +437,7 @@ fn adders() -> impl Iterator<Item = (&'static Machine, u32)> {
     single.filter_map(move |machine| Some((machine, machine.host(adder)?.1.latency + 1)))
 }
 
-/// The earlier of two deadlines of one port counts, in whatever order they stand.
+/// The earlier of two deadlines of one port counts, whatever their order.
 #[test]
 fn the_earlier_of_two_deadlines_counts() {
     for (machine, limit) in adders() {

@@ -13,7 +13,7 @@ fn assembled(source: &str, machine: &'static Machine, schedule: Schedule) -> Ass
     }
 }
 
-/// The outputs when the program halts, and the cycle in which it does.
+/// The outputs when the program halts, and the cycle of the halt.
 fn outcome(assembled: &AssembledProgram) -> (Vec<Option<u32>>, u64) {
     let mut emulator = Emulator::new(&assembled.program).expect("it fits");
     emulator.set_cycle_limit(1_000_000);
@@ -75,7 +75,7 @@ fn registers_may_change_places() {
     }
 }
 
-/// An operation whose effect can be seen, or that can fault, stays behind the branch.
+/// An operation whose effect can be seen, or that can fault, stays after the branch.
 #[test]
 fn observable_operations_stay_behind_a_branch() {
     let passed = [
@@ -95,7 +95,7 @@ fn observable_operations_stay_behind_a_branch() {
             ".input x\n.output y z\n.reg v n:int m:int w:int late\n.data\nd: .space 4\n.schedule on\n.once\n mov v, zero\n li n, 0\n li m, 1\n\
              wait period\n.period\nperiod: ilt w, m, n\n bz w, skip\n {operations}\nskip: mov late, v\n fadd z, v, late\n itof y, n\n wait period\n"
         );
-        // A value does not outlive its period: on the first way to its read, `late` has no value.
+        // A value does not outlive its period: on the first path to its read, `late` has no value.
         let assembled = assembled(&source, &takt_isa::T3, Schedule::AsWritten);
         assert_eq!(assembled.selections.len(), usize::from(is_selected), "{operations}");
     }

@@ -71,7 +71,7 @@ fn a_register_keeps_its_bank_whichever_bundle_decides() {
     );
 }
 
-/// The operations of bundles one after another. (In these bundles, an operation reads no result of the bundle but its own.)
+/// The operations of bundles one after another. (In these bundles, no operation reads the result of another.)
 fn serial(text: &str) -> String {
     text.replace(" || ", "\n ")
 }
@@ -98,7 +98,7 @@ fn the_source_names_a_slot() {
     let assembled =
         good(&period("fadd.aux a, x, y || fadd b, x, y || fmul c, x, y\n fabs t, x"), "second_adder");
     assert_eq!(bank(&assembled, "b"), 'a');
-    // A place names one, too.
+    // A register's place names a slot, too.
     for (place, bank_of_b) in [("x3", 'a'), ("a3", 'x')] {
         let text = period("fadd a, x, y || fadd b, x, y || fmul c, x, y\n fabs t, x");
         let text = text.replace(".reg a b c t", &format!(".reg a @ {place}\n.reg b c t"));
@@ -124,7 +124,7 @@ fn reports_slots_that_an_operation_cannot_have() {
     let labels: Vec<&str> = error.places.iter().map(|place| &*place.message).collect();
     assert_eq!(labels, ["`fabs` needs one of them", "so does `fadd`", "so does `fsub`"]);
 
-    // Two have places in one bank; the multiplication is in nobody's way.
+    // Two registers have places in one bank; the multiplication does not compete for their slot.
     let text = period("fmul c, x, y || fadd a, x, y || fadd b, x, y\n fabs t, x");
     let error = mistake(&text.replace(".reg a b c t", ".reg a @ a1\n.reg b @ a2\n.reg c t"), "second_adder");
     assert_eq!(&*error.message, "two operations of the bundle need slot `add`");
@@ -220,7 +220,7 @@ fn shipped_programs_give_the_same_bits_on_every_row() {
     }
 }
 
-/// The cycles of a shipped program on a row, with as much search as usual.
+/// Asserts an upper limit on the cycles of a shipped program on a row, at the default effort.
 #[track_caller]
 fn takes_no_more(row: &str, most: u32) {
     let (_, cycles) = shipped("hybrid", "tracking.s", rows::named(row), takt_asm::schedule::DEFAULT_EFFORT);
@@ -237,7 +237,7 @@ fn a_further_multiplier_saves_cycles() {
     takes_no_more("second_multiplier", 111);
 }
 
-/// A register that several runs write has one bank, whichever of them is scheduled first; one of a loop as well.
+/// A register that several runs write has one bank, whichever of them is scheduled first; so has a register of a loop.
 #[test]
 fn a_register_of_several_runs_has_one_bank() {
     let text = ".schedule on\n.input x\n.output o\n.reg n:int s r\n.once\n fadd s, x, 1.0\n wait start\n.period\n\

@@ -5,7 +5,7 @@ use takt_asm::{AssembledProgram, Diagnostics, MemoryLoader, Options, assemble};
 use takt_emu::{Emulator, Number};
 use takt_isa::{F3, Function, MACHINES, Machine};
 
-/// A chain of `values` values, all of them read again, the last first: in any order they are all needed at a time.
+/// A chain of `values` values, all read again in reverse order: any order of the operations needs them all at once.
 fn source(values: usize) -> String {
     let mut text = ".schedule on\n.input a, b\n.output y, z\n".to_owned();
     for i in 0..values {
@@ -214,7 +214,7 @@ fn output(assembled: &AssembledProgram) -> (Option<Number>, u64) {
     (emulator.output("y").unwrap(), cycles)
 }
 
-/// A full bank says what fills it, and points there.
+/// The message of a full bank names its contents, and points there.
 #[test]
 fn full_bank_error_names_its_contents() {
     let report = |text: &str, machine| assembled(text, machine).unwrap_err().render(false);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Values of every type in every place: right in value, or an error that names the mend, but never the bits of another type.
+//! Values of every type in every place: the right value, or an error with advice, but never the bits of another type.
 //!
 //! The operators and functions come from the instruction table; their expected values are Rust's arithmetic. Places are ports,
 //! registers, elements, presets, constants, words of data, alternatives, several targets of one equation, arguments of macros.
@@ -19,7 +19,7 @@ enum Operand {
 
 use Operand::{Float, Int, Number};
 
-/// Values of every kind: their bits as another type would be other numbers.
+/// Values of every kind, whose bits would be different numbers as another type.
 const OPERANDS: &[Operand] = &[
     Number("2.5", 2.5),
     Number("4.0", 4.0),
@@ -44,13 +44,13 @@ const HEAD: &str = "
 .array K[3]:int = 5, 6, 7
 ";
 
-/// Runs lines that are accepted without a word, and gives an output; an error otherwise.
+/// Runs lines that assemble without warnings, and returns an output; an error otherwise.
 fn run(declarations: &str, lines: &str, output: &str) -> Result<u32, String> {
     let text = format!(
         "{HEAD}{declarations}.once\n wait period\n.period\nperiod: t = -1.5\n k = -9\n{lines}\n wait period\n"
     );
     let assembled = assemble(&text, &F3).map_err(|report| report.render(false))?;
-    // A warning is no silence; not everything is used.
+    // Warnings count as errors, except for unused names.
     if assembled.warnings.list.iter().any(|warning| warning.code != "unused") {
         return Err(assembled.warnings.render(false));
     }
@@ -72,7 +72,7 @@ fn result(program: &Program, output: &str) -> u32 {
 /// A value of a known type.
 #[derive(Clone, Copy, PartialEq, Debug)]
 enum Value {
-    /// Value of constants only: it takes the type that it is asked for.
+    /// Value of constants only: it takes the type that its use requires.
     Open(f64),
     Single(f32),
     Word(i32),
@@ -194,7 +194,7 @@ fn evaluate(symbol: &str, operands: &[Operand]) -> Option<Value> {
             condition => condition.word()? != 0,
         };
         let chosen = values[if condition { 1 } else { 2 }];
-        // A decided choice drops its other alternative.
+        // A choice with a constant condition drops its other alternative.
         if let Value::Open(_) = values[0] {
             return Some(chosen);
         }
@@ -204,7 +204,7 @@ fn evaluate(symbol: &str, operands: &[Operand]) -> Option<Value> {
                 let all = typed.iter().all(|value| value.word().is_some());
                 chosen.word().filter(|_| all).map(Value::Word)
             }
-            // Two computed alternatives, with one that is no integer.
+            // Two computed alternatives, one of which is not an integer.
             _ if typed.iter().any(|value| value.word().is_none()) => chosen.single().map(Value::Single),
             _ => Some(chosen),
         };
@@ -296,7 +296,7 @@ fn operators_and_functions_are_right_between_all_types() {
     assert!(right > 500 && refused > 500, "{right} right, {refused} refused");
 }
 
-/// Places of a value: lines with `{v}` for it, the output that has it then, and its type.
+/// Places of a value: lines with `{v}` for it, the output that then holds it, and its type.
 const PLACES: &[(&str, &str, &str, Type)] = &[
     ("", " y = {v}", "y", Type::F),
     ("", " m = {v}", "m", Type::I),
@@ -523,7 +523,7 @@ fn warns_of_implicit_reinterpretation() {
     }
 }
 
-/// Each mistake about the types of arguments, with the words that it is found by.
+/// Each mistake about the types of arguments, with words that identify its message.
 #[test]
 fn mistakes_about_arguments_name_the_mend() {
     let macros = "

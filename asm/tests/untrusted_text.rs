@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Texts from outside: characters that a terminal would obey, and line ends of other systems.
+//! Texts from outside: control characters, and line ends of other systems.
 
 use crate::common::{bad, good};
 use takt_asm::{MemoryLoader, Options, assemble, disasm, format, image, listing, names, tokens};
@@ -89,7 +89,7 @@ fn lone_carriage_returns_end_lines() {
     }
     let old = lines.join("\r");
     assert_eq!(format::format(&old), format::format(&lines.join("\n")));
-    // Mixed, as an editor leaves it; and bytes that are no text are found in the right line.
+    // Mixed line ends, as an editor leaves them; and invalid bytes, which are reported in the right line.
     assert_eq!(good(&old.replacen('\r', "\n", 3)).program, unix.program);
     let mut bytes = old.clone().into_bytes();
     bytes[8] = 0xff;

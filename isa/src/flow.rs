@@ -26,8 +26,8 @@ pub enum Flow {
     Call(BundleAddress),
     /// At the address popped from the return stack.
     Return,
-    /// At the next bundle, which heads a loop: the bundles from there to before `end` repeat as often as the register
-    /// says.
+    /// At the next bundle, the head of a loop: the bundles from there to just before `end` execute as many times as the count
+    /// register says.
     Loop {
         /// The register that holds the count, as the bundle reads it.
         count: Register,

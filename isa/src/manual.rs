@@ -203,7 +203,7 @@ pub fn machines_text() -> String {
     out
 }
 
-/// Describes some machines as text.
+/// The given machines as text.
 pub fn machines_as_text(machines: &[&Machine]) -> String {
     let mut out = String::new();
     for machine in machines {
@@ -318,7 +318,7 @@ pub fn markdown() -> String {
     out
 }
 
-/// A capacity: its name, and its amount on a machine.
+/// A capacity: its name, and a function that formats the amount on a machine.
 type Capacity = (&'static str, fn(&Machine) -> String);
 
 /// The capacities of the machines as Markdown, for `docs/what-fits.md`. Memories are counted in blocks of a device; `devices` states the

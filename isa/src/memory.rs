@@ -5,7 +5,7 @@ use crate::shape::WORD_BITS;
 use crate::spec::instructions::{Function, ROWS, Row};
 use crate::spec::machines::{Machine, Slot};
 
-/// Words of a memory, and their width.
+/// Shape of a memory: number of words and their width.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shape {
     /// Number of words, the depth.
@@ -19,7 +19,7 @@ pub struct Shape {
 pub struct BlockRam {
     /// Alternative shapes: a block takes one at a time.
     pub shapes: &'static [Shape],
-    /// The bitstream sets the first contents.
+    /// The bitstream can set the initial contents.
     pub is_initial: bool,
 }
 
@@ -28,11 +28,11 @@ pub struct BlockRam {
 pub struct Memories {
     /// Block RAM of the device.
     pub block: BlockRam,
-    /// Memory in look-up tables, read in the cycle of its address; `None` if flip-flops hold such a memory.
+    /// Memory in look-up tables, read in the cycle of the address; `None` if such memories are made of flip-flops.
     pub logic: Option<Shape>,
 }
 
-/// Block RAM of 18 kbit, which most families of FPGAs have: the unit of counts without a device.
+/// Block RAM of 18 kbit, found in most families of FPGAs: the unit for counts that name no device.
 pub const KBIT_18: BlockRam = BlockRam {
     shapes: &[
         Shape { words: 512, bits: 36 },

@@ -16,7 +16,7 @@ macro_rules! below {
         pub struct $name($inner);
 
         impl $name {
-            /// The count of numbers: 0 to `COUNT` - 1.
+            /// Number of values: 0 to `COUNT` - 1.
             pub const COUNT: usize = $count;
 
             /// Checks and wraps a number; `None` if it is not below [`Self::COUNT`].

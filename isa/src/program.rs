@@ -44,7 +44,7 @@ pub struct Program {
     pub parts: Vec<(u32, Columns)>,
 }
 
-/// The cycles of a section, as a host needs them.
+/// Cycle counts of a section, for the host.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct SectionCycles {
     /// Label of the section's first bundle, or `once`.
@@ -85,7 +85,7 @@ pub struct Port {
 pub struct Symbol {
     /// Name in the source.
     pub name: String,
-    /// The memory into which it points.
+    /// The memory that the label's address belongs to.
     pub space: Space,
     /// Bundle or data-word address.
     pub address: u32,
@@ -121,9 +121,10 @@ pub struct Section {
 pub struct LoopBound {
     /// The bundle that heads the loop.
     pub address: BundleAddress,
-    /// The most iterations of one run; at least 1.
+    /// Maximum number of iterations in one run; at least 1.
     pub most: u32,
-    /// The most iterations of all runs in one section, from reset or a tick to the next `wait`; at least 1. `None` if nothing is promised.
+    /// Maximum number of iterations over all runs in one section, from reset or a tick to the next `wait`; at least 1. `None` without a
+    /// promise.
     pub total: Option<u32>,
 }
 

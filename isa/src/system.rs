@@ -35,7 +35,7 @@ pub struct Description {
 pub struct Core {
     /// Name of the core, unique in the system.
     pub name: String,
-    /// Path of the program as the file has it.
+    /// Path of the program as written in the file.
     pub path: String,
     /// Program that the core runs.
     pub program: Arc<Program>,
@@ -100,7 +100,7 @@ pub enum LinkKind {
     },
     /// A queue of entries.
     Fifo {
-        /// Number of entries that it holds.
+        /// Number of entries that the queue holds.
         depth: u32,
         /// The sender's output port whose writes push an entry; `None` if the sender is the host.
         push: Option<Register>,
@@ -225,7 +225,7 @@ impl Core {
 }
 
 impl Link {
-    /// Number of registers in the link, without the registers of gate and core.
+    /// Number of registers in the link, not counting those of gate and core.
     pub fn transit(&self) -> Cycle {
         self.latency - MIN_LATENCY
     }
@@ -245,7 +245,7 @@ impl Description {
         }
     }
 
-    /// The core of this name.
+    /// Index of the core with a name.
     pub fn core_named(&self, name: &str) -> Option<usize> {
         self.cores.iter().position(|core| core.name == name)
     }
@@ -325,7 +325,7 @@ impl Description {
                     LinkKind::Wire => name(names).clone(),
                     _ => format!("{}.{}", link.name, name(names)),
                 };
-                // A value of the host may be carried by several wires.
+                // Several wires may carry the same value of the host.
                 if !ports.iter().any(|port| port.name == name) {
                     ports.push(SystemPort { name, ty: names.ty, link: number, field });
                 }
@@ -346,7 +346,7 @@ impl Description {
         }
     }
 
-    /// The link of this name.
+    /// Index of the link with a name.
     pub fn link_named(&self, name: &str) -> Option<usize> {
         self.links.iter().position(|link| link.name == name)
     }

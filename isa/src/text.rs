@@ -50,8 +50,7 @@ pub fn in_script(json: &str) -> String {
     json.replace('<', "\\u003c")
 }
 
-/// Names of an array's elements, the last index counting fastest: `M[1,1]`, `M[1,2]`, …. A name for each element of `sizes`, whose
-/// indices count from 1.
+/// Names of an array's elements: `M[1,1]`, `M[1,2]`, …. Each index counts from 1 to its size, the last index fastest.
 pub fn element_names(name: &str, sizes: &[u32]) -> Vec<String> {
     let mut all = vec![String::new()];
     for size in sizes {

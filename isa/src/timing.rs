@@ -166,7 +166,7 @@ pub struct Reservation {
 }
 
 impl Reservation {
-    /// The table of an operation in a slot of a machine; `writes` is true if it writes a register.
+    /// The table of an operation in a slot of a machine; `writes` says whether the operation writes a register.
     pub fn new(machine: &Machine, slot: SlotIndex, function: Function, writes: bool) -> Reservation {
         let row = machine.slot(slot);
         let Some(unit) = row.unit_index(function) else {

@@ -93,7 +93,7 @@ fn random_triples_reach_every_case() {
         let magnitude = result.bits & !SIGN;
         let [x, y, z] = [a, b, c].map(|bits| f64::from(f32::from_bits(bits)));
         let finite = !is_nan(result.bits) && magnitude < 0x7f80_0000;
-        // Rounded to binary64 first, or the product to binary32 first, the sum would be another one.
+        // Double rounding through binary64, or a product rounded to binary32 first, would change the result.
         let twice = finite && ((x * y + z) as f32).to_bits() != result.bits;
         let unfused = finite
             && f32::from_bits(a) * f32::from_bits(b) + f32::from_bits(c) != f32::from_bits(result.bits);

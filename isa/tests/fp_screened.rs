@@ -11,7 +11,7 @@ fn operations() -> impl Iterator<Item = Op> {
     ROWS.iter().filter(|row| row.effect == Effect::Compute).map(|row| row.op)
 }
 
-/// Compares a value with the host's. True if it raised no flag.
+/// Compares a value with the host's; returns whether it raised no flag.
 fn compare(op: Op, a: u32, b: u32, c: u32) -> bool {
     let (found, expected) = (compute::<ScreenedFloat>(op, a, b, c), compute::<Host>(op, a, b, c));
     if found.flags == Flags::NONE {

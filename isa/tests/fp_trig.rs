@@ -77,14 +77,14 @@ fn wide(bits: u32) -> f64 {
     f64::from(f32::from_bits(bits))
 }
 
-/// A positive operand; the negative one is checked for odd symmetry.
+/// Measures the sine of a positive operand, and checks odd symmetry at the negative one.
 fn take_sin(measured: &mut ErrorStatistics, x: u32) {
     let result = sin(x);
     assert_eq!(sin(x | SIGN), Value::exact(result.bits ^ SIGN), "sin(−x) ≠ −sin(x) for {x:08x}");
     measured.take([x, 0], result, core_math::sin(wide(x)));
 }
 
-/// A positive operand; the negative one is checked for even symmetry.
+/// Measures the cosine of a positive operand, and checks even symmetry at the negative one.
 fn take_cos(measured: &mut ErrorStatistics, x: u32) {
     let result = cos(x);
     assert_eq!(cos(x | SIGN), result, "cos(−x) ≠ cos(x) for {x:08x}");
@@ -159,7 +159,7 @@ fn the_arccosine_is_within_the_documented_bound() {
     }
 }
 
-/// Angles all over the circle with operands of all sizes; small and large quotients; quotients near changes of the table's row
+/// Angles all around the circle with operands of all sizes; small and large quotients; quotients near changes of the table's row
 /// or of the octant.
 #[test]
 fn the_arctangent_is_within_the_documented_bound() {

@@ -38,7 +38,7 @@ pub struct Label {
 /// An error or a warning, as plain data.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Diagnostic {
-    /// The severity of a diagnostic.
+    /// Error or warning.
     pub severity: Severity,
     /// The kind of mistake, in a word or two: stable, for tools.
     pub code: &'static str,
@@ -161,7 +161,7 @@ const INDEPENDENT: [&str; 8] =
     ["block", "expression", "include-cycle", "limit", "load", "syntax", "token", "unknown-directive"];
 
 impl Sink {
-    /// A further diagnostic of this severity would be kept. If not, its text need not be made.
+    /// A further diagnostic of this severity would be kept. If not, the caller can skip composing its text.
     pub fn keeps(&self, severity: Severity) -> bool {
         match severity {
             Severity::Error => self.errors < limits::SHOWN,
@@ -180,7 +180,7 @@ impl Sink {
         if self.is_partial && !INDEPENDENT.contains(&code) {
             return;
         }
-        // The set is bounded like the list: beyond, repetitions are counted as mistakes of their own.
+        // The set is bounded like the list: beyond the bound, repetitions are counted as separate mistakes.
         if self.seen.contains(&(code, span)) {
             return;
         }
@@ -202,7 +202,7 @@ impl Sink {
         }
     }
 
-    /// Adds a diagnostic whose text is made already.
+    /// Adds a finished diagnostic.
     pub fn push(&mut self, diagnostic: Diagnostic) {
         self.add(diagnostic.severity, diagnostic.code, diagnostic.span(), || diagnostic);
     }
@@ -282,15 +282,15 @@ impl Diagnostics {
         self.list.is_empty() && self.more_errors + self.more_warnings == 0
     }
 
-    /// The text for a terminal: message, file, line, column, source line and caret of each diagnostic. Characters that a
-    /// terminal would obey are escaped, whether they stand in a source, in its name or in a message.
+    /// The text for a terminal: message, file, line, column, source line and caret of each diagnostic. Control characters in
+    /// sources, file names and messages are escaped.
     pub fn render(&self, colour: bool) -> String {
         let mut view = View::new(&self.sources);
         let config = term::Config { tab_width: 8, ..term::Config::default() };
         let mut out = Vec::new();
         for diagnostic in &self.list {
             let shown = view.focus(diagnostic);
-            // The view answers for every place that `focus` returns, and a vector takes all.
+            // Cannot fail: the view knows every place that `focus` returns, and writing to a vector succeeds.
             let _ = if colour {
                 let mut writer = term::termcolor::Ansi::new(&mut out);
                 let styles = term::Styles::default();
@@ -339,7 +339,7 @@ impl Diagnostics {
 
     /// The messages as a JSON array.
     pub fn to_json(&self) -> String {
-        // Strings and numbers only: nothing that JSON cannot hold.
+        // Cannot fail: the messages hold only strings and numbers.
         serde_json::to_string_pretty(&self.messages()).unwrap_or_default()
     }
 }
@@ -350,14 +350,14 @@ struct EscapedSource<'s> {
     text: Cow<'s, str>,
     /// The lines of the text that is shown.
     lines: Lines,
-    /// For each escaped character, the byte behind it, in the source and in the shown text.
+    /// Offset of the byte after each escaped character, in the source and in the shown text.
     moved: Vec<(usize, usize)>,
 }
 
 impl<'s> EscapedSource<'s> {
     fn of(source: &'s Source) -> EscapedSource<'s> {
         let (name, written) = (one_line(&source.name), source.text.as_str());
-        // A carriage return belongs to its line's end: no other is in a source.
+        // Carriage returns occur only in line breaks, since [`Source::text`] has no lone ones.
         let hidden = |c: char| is_hidden(c) && c != '\r';
         if !written.contains(hidden) {
             return EscapedSource {
@@ -379,14 +379,14 @@ impl<'s> EscapedSource<'s> {
         EscapedSource { name, lines: Lines::of(&text), text: text.into(), moved }
     }
 
-    /// The place at which a byte of the source is shown.
+    /// Maps an offset in the source to its offset in the shown text.
     fn place(&self, byte: usize) -> usize {
         let before = self.moved.partition_point(|(written, _)| *written <= byte);
         let (written, shown) = before.checked_sub(1).map_or((0, 0), |last| self.moved[last]);
         shown + (byte - written)
     }
 
-    /// The byte of the source that is shown at a place; within an escape, a byte of the escaped character.
+    /// Maps an offset in the shown text to its offset in the source; within an escape, to a byte of the escaped character.
     fn byte(&self, place: usize) -> usize {
         let before = self.moved.partition_point(|(_, shown)| *shown <= place);
         let (written, shown) = before.checked_sub(1).map_or((0, 0), |last| self.moved[last]);
@@ -395,13 +395,13 @@ impl<'s> EscapedSource<'s> {
     }
 }
 
-/// The sources as codespan-reporting reads them. From a long line only the part around the diagnostic at hand is visible, or
-/// else an error in a line of a megabyte would be a megabyte of text.
+/// The sources as codespan-reporting reads them. Of a long line, only the part around the current diagnostic is visible, so that
+/// an error in a line of a megabyte does not print a megabyte.
 struct View<'s> {
     sources: &'s Sources,
-    /// The lines of sources, as they are written.
+    /// Lines of the sources as written, before escapes.
     lines: HashMap<usize, Lines>,
-    /// The shown text of the sources that a diagnostic points into.
+    /// Shown text of the sources that a diagnostic points into.
     shown: HashMap<usize, EscapedSource<'s>>,
     /// Visible parts of cut lines: file, line index, and bytes of the shown text.
     windows: Vec<(usize, usize, Range<usize>)>,
@@ -442,7 +442,7 @@ impl<'s> View<'s> {
         let (start, mut end) = (clamp(span.start), clamp(span.end));
         let index = shown.lines.index(start as u32);
         let line = shown.lines.range(index)?;
-        // Diagnostics point within a line; a bundle that continues on further lines is shown by its first.
+        // Diagnostics point within one line; a bundle that continues on further lines is shown by its first.
         end = end.min(line.end).max(start);
         if line.len() <= limits::QUOTED_BYTES {
             return Some(start..end);

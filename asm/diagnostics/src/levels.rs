@@ -63,7 +63,7 @@ impl FromStr for LevelSetting {
     }
 }
 
-/// The level of each warning. A setting by name precedes a setting of all, and a later setting an earlier.
+/// The level of each warning. A setting by name overrides a setting of all warnings; otherwise the last setting wins.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Levels {
     all: Option<Level>,

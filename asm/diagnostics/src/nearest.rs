@@ -8,7 +8,7 @@ pub fn nearest<'n>(name: &str, candidates: impl IntoIterator<Item = &'n str>) ->
     let length = name.chars().count();
     let allowed = match length {
         0 => return None,
-        // Comparing takes the square of the length, and long names are seldom typed.
+        // Comparison takes quadratic time, and long names are seldom typed.
         length if length > limits::COMPARED_CHARACTERS => return None,
         1..=4 => 1,
         5..=8 => 2,

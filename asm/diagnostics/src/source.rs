@@ -7,8 +7,8 @@ use std::borrow::Cow;
 use std::fmt;
 use std::sync::Arc;
 
-/// The text with each lone carriage return, as on old Macs, turned into a line feed: every line then ends in a line feed,
-/// perhaps behind a carriage return. No byte moves, so that a place in one text is a place in the other.
+/// Replaces each lone carriage return, as on old Macs, with a line feed: every line then ends in a line feed, perhaps after a
+/// carriage return. No byte moves, so that offsets remain valid.
 pub fn line_feeds(text: &str) -> Cow<'_, str> {
     let mut lone = lone_returns(text).peekable();
     if lone.peek().is_none() {
@@ -25,7 +25,7 @@ pub fn line_feeds(text: &str) -> Cow<'_, str> {
     Cow::Owned(out)
 }
 
-/// The places of carriage returns that no line feed follows.
+/// Offsets of carriage returns without a line feed after them.
 fn lone_returns(text: &str) -> impl Iterator<Item = usize> + '_ {
     let bytes = text.as_bytes();
     text.match_indices('\r').map(|(at, _)| at).filter(|at| bytes.get(at + 1) != Some(&b'\n'))
@@ -93,7 +93,7 @@ impl Source {
     }
 }
 
-/// The source files of a program, in the order in which they were met.
+/// The source files of a program, in the order in which they were read.
 #[derive(Clone, Debug, Default)]
 pub struct Sources {
     files: Vec<Source>,
@@ -118,12 +118,12 @@ impl Sources {
         Some(self.files.len() - 1)
     }
 
-    /// The files, in the order in which they were met.
+    /// The files, in the order in which they were read.
     pub fn files(&self) -> &[Source] {
         &self.files
     }
 
-    /// The file that holds an offset.
+    /// Index of the file that holds an offset.
     pub fn file_of(&self, offset: u32) -> usize {
         self.files.partition_point(|file| file.base <= offset).saturating_sub(1)
     }

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The mistakes that the reader of TOML finds.
+//! Parse errors of TOML files as diagnostics.
 
 use crate::diag::Diagnostic;
 use crate::nearest;
 use crate::source::Span;
 
-/// An error of the reader of TOML at its place, with the key that was perhaps meant.
+/// A parse error of TOML at its place, with a suggestion for a misspelt key.
 pub fn toml_mistake(error: &toml::de::Error, text: &str) -> Diagnostic {
     let mut range = error.span().unwrap_or(0..text.len());
-    // A table that lacks a key is pointed at by its first line.
+    // An error of a table without a required key spans the table: point at its first line.
     let line = text[range.start..].find('\n').map_or(text.len(), |end| range.start + end);
     range.end = range.end.min(line).max(range.start);
     let message = error.message().trim().replace('\n', ": ");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! C through `takt cc` on t1, t3, t4 against gcc, construct by construct, bit for bit; and the messages about what is refused.
+//! C through `takt cc` on t1, t3, t4 against gcc, construct by construct, bit for bit; and the messages about refused programs.
 
 use crate::common::gcc::{Program, folder, matches_gcc, translated};
 use rand_pcg::Pcg32;
@@ -35,7 +35,7 @@ fn check(name: &str, code: &str) -> takt_front::c::Translation {
     })
 }
 
-/// The message about a program that is refused.
+/// The message about a refused program.
 fn refused(name: &str, code: &str) -> String {
     let folder = folder(name);
     let mut program = Program::new(name, code);
@@ -54,7 +54,7 @@ fn computes_sums_in_their_order() {
     );
 }
 
-/// Numbers of more digits than binary32 or binary64 hold, beside a tie and a hair above and below one.
+/// Numbers of more digits than binary32 or binary64 hold, at a tie and just above and below one.
 #[test]
 fn hexadecimal_literals_round_once() {
     check(

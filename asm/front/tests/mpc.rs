@@ -224,7 +224,7 @@ fn matrices_can_be_inputs() {
     }
 }
 
-/// Neither one iteration nor the shortest horizon leaves anything unused: [`Running::new`] refuses warnings.
+/// Neither one iteration nor the shortest horizon leaves anything unused: [`RunningController::new`] refuses warnings.
 #[test]
 fn one_iteration_has_no_warning() {
     for (problem, horizon) in [("mass", 2), ("mass", 3), ("quadrotor", 10)] {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Files as people have them: blemishes in ignored parts, encodings, spreadsheets, Python's JSON; and the tables of docs/readers.md.
+//! Files as found in practice: blemishes in ignored parts, encodings, spreadsheets, Python's JSON; and the tables of docs/readers.md.
 
 use std::path::Path;
 use takt_front::mpc::{self, penalty};

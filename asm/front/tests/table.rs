@@ -26,7 +26,7 @@ struct ProgramCost {
 }
 
 impl ProgramCost {
-    /// Value of an output that is no constant.
+    /// Value of an output that is not constant.
     fn output(&self, function: &Function, index: usize) -> f64 {
         let bits = match self.layout.word(function, index) {
             Some((array, word)) => {
@@ -231,8 +231,8 @@ fn documented_table_equals_the_measured_costs() {
             }
             let row = row(&mut reference, case, what, if full { 10_000 } else { 20 });
             let line = line(case, what, &row);
-            // Compares all columns but the errors, which depend on the number of states, and the processors' cycles under another release
-            // of LLVM.
+            // Compares all columns except for the errors, which depend on the number of states, and the processors' cycles under another
+            // release of LLVM.
             let depends = if same_models { 4 } else { 4 + PROCESSORS.len() };
             let fixed = line.rsplitn(depends, '|').last().expect("columns");
             assert!(table.contains(fixed), "docs/models.md has not: {line}\nTAKT_BLESS=1 rewrites it");

@@ -10,26 +10,26 @@ use takt_isa::Type;
 use takt_syntax::ast::*;
 use takt_syntax::name::{NameId, NameRef};
 
-/// The most steps of a written-out program.
+/// Limit on the steps of a written-out program.
 const STEPS: usize = 1 << 20;
-/// Macros within one another, at most.
+/// Limit on the nesting depth of macros.
 const DEPTH: usize = 64;
 
-/// Cells of the values of macros in an equation, by the node that calls each.
+/// Cells with the results of an equation's macro calls, by the node of each call.
 pub(crate) type Results = Rc<HashMap<u32, usize>>;
 
-/// A thing that the program does.
+/// An action of a step.
 #[derive(Clone, Debug)]
 pub(crate) enum Action {
     /// Operations that issue together: the first, and their number.
     Bundle(usize, usize),
     /// An equation, by its index in the tree.
     Equation(usize),
-    /// The value of an expression goes to a cell, for a macro's argument.
+    /// Stores the value of an expression in a cell, for a macro's argument.
     Argument(ExprId, usize),
-    /// The iterations from a number to a register's value go to a cell.
+    /// Stores the number of iterations from a number to a register's value in a cell.
     Count(Expr, i64, usize),
-    /// Skips to a label if a cell counts no more iterations than a number: the cell, the number, the label.
+    /// Skips to a label if a cell counts no more iterations than a number: cell, number, label.
     Skip(usize, i64, usize),
 }
 
@@ -217,14 +217,14 @@ impl Interpreter {
         self.push(Action::Equation(equation), scope, &Rc::new(results))
     }
 
-    /// A name for a cell, such as no source can write.
+    /// A hidden name for a cell, which no source can spell.
     fn hidden(&mut self, cell: usize, scope: &mut Rc<Scope>) -> NameId {
         let text = format!("={cell}");
         scope.bind(&text, Meaning::Cell(cell));
         self.names.intern(&text)
     }
 
-    /// Writes out a directive. Returns the statement to go on with.
+    /// Writes out a directive. Returns the statement to continue with.
     fn directive(&mut self, directive: usize, at: usize, scope: &Rc<Scope>) -> Result<usize, Fault> {
         let ast = Rc::clone(&self.ast);
         let owner = Scope::declaring(scope, false);
@@ -416,7 +416,7 @@ impl Interpreter {
     }
 }
 
-/// The arguments of a call: the first node of each, and the node behind its last.
+/// The arguments of a call: the first node of each, and the node after its last.
 pub(crate) fn arguments(nodes: &[Node], call: usize, count: usize) -> Vec<(usize, usize)> {
     let mut ranges = Vec::new();
     let mut end = call;

@@ -74,7 +74,7 @@ impl Interpreter {
         }
     }
 
-    /// The sum of a part for every value of a name, from the first to the last.
+    /// The sum of a term over every value of an index, in ascending order.
     fn sum(
         &self,
         nodes: &[Node],
@@ -214,7 +214,7 @@ impl Interpreter {
         Ok(lengths)
     }
 
-    /// The array of a name; with it, true if it lies in data memory.
+    /// The array with a name, and whether it lies in data memory.
     fn array(&self, name: NameRef, scope: &Rc<Scope>) -> Result<(Array, bool), Fault> {
         match self.meaning(name, scope)? {
             Meaning::Registers(array) => Ok((array, false)),

@@ -2,9 +2,9 @@
 //! An interpreter of the assembler's language: the oracle for the assembler's first half, from names and macros to operations.
 //!
 //! The interpreter shares with the assembler the tree of the text (`takt-syntax`) and the meaning of instructions (`takt_isa`), and
-//! nothing of `asm/src`. [`expand`](self) writes everything out, every iteration of every loop, so that nothing counts when the
-//! program runs: an index is a number. A loop to the value of a register is written out up to its `max`, and iterations beyond its
-//! count are passed over. Each name has one place of storage. Products are not fused, sums keep their order.
+//! nothing of `asm/src`. [`expand`](self) writes everything out, every iteration of every loop, so that no loop is left at run
+//! time: an index is a number. A loop to the value of a register is written out up to its `max`, and iterations beyond its
+//! count are skipped. Each name has one place of storage. Products are not fused, sums keep their order.
 //!
 //! The interpreter knows the part of the language that random programs are made of (`tests/generator`): one file, no explicit bundles
 //! with writes to memory, no data labels, no flags. Anything else is an error.
@@ -18,7 +18,7 @@ pub use run::Interpreter;
 
 use takt_isa::Type;
 
-/// The reason why a program is not interpreted, in words.
+/// The reason why a program cannot be interpreted, in words.
 pub type Fault = String;
 
 /// A number that is known before the program runs.
@@ -31,9 +31,9 @@ enum Number {
 /// A value of an expression.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Value {
-    /// Value of constants alone: it takes the type that it is asked for.
+    /// Value of constants alone: it takes the type that its use requires.
     Number(Number),
-    /// Bits, and the type that they have.
+    /// Bits, and their type.
     Bits(u32, Type),
 }
 

@@ -16,7 +16,7 @@ use takt_syntax::intern::Interner;
 /// The greatest depth of calls: every machine's return stack holds as many.
 const CALLS: usize = 16;
 
-/// A register and its present value, absent before the first write.
+/// A register and its current value, absent before the first write.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Cell {
     /// Type of all values; `None` if each value brings its own, kept in `now`.
@@ -36,7 +36,7 @@ pub struct Interpreter {
     pub(crate) in_period: bool,
     /// The steps of `.once` and of `.period`.
     pub(crate) steps: [Vec<Step>; 2],
-    /// Labels: true for one in `.period`, and the step that follows it.
+    /// Labels: whether the label stands in `.period`, and the step after it.
     pub(crate) labels: Vec<(bool, usize)>,
     pub(crate) cells: Vec<Cell>,
     pub(crate) memory: Vec<u32>,
@@ -56,7 +56,7 @@ impl Interpreter {
     /// Reads a program and writes it out.
     ///
     /// # Errors
-    /// If the text has a mistake, or says something that the interpreter does not know.
+    /// If the text has a mistake, or uses a feature that the interpreter lacks.
     pub fn new(text: &str) -> Result<Interpreter, Fault> {
         let (mut sources, mut sink, mut names) = (Sources::default(), Sink::default(), Interner::new());
         let file = sources.add("test.s", text.into()).ok_or("the text is too long")?;
@@ -106,7 +106,7 @@ impl Interpreter {
     /// Runs to the next `wait`, with the bits of all input ports, in at most `most` steps. Returns the steps taken.
     ///
     /// # Errors
-    /// Fails on unknown names, on reads of a register before its first write, and beyond the limit of steps.
+    /// If a name is unknown, a register is read before its first write, or the limit of steps is exceeded.
     pub fn period(&mut self, inputs: &[u32], most: u64) -> Result<u64, Fault> {
         for (cell, bits) in self.inputs.iter().zip(inputs) {
             self.cells[*cell].bits = Some(*bits);
@@ -123,7 +123,7 @@ impl Interpreter {
         Err(format!("no `wait` in {most} steps"))
     }
 
-    /// Runs a step; true for a `wait`.
+    /// Runs a step; returns whether it is a `wait`.
     fn step(&mut self, step: &Step) -> Result<bool, Fault> {
         let Step { action, scope, results } = step;
         let ast = Rc::clone(&self.ast);
@@ -168,7 +168,7 @@ impl Interpreter {
         if in_period { self.steps[0].len() + at } else { at }
     }
 
-    /// Executes the operations of a bundle: all read before any writes. True if one is a `wait`.
+    /// Executes the operations of a bundle: all read before any writes. Returns whether one is a `wait`.
     fn bundle_at(&mut self, first: usize, count: usize, scope: &Rc<Scope>) -> Result<bool, Fault> {
         let ast = Rc::clone(&self.ast);
         let mut writes = Vec::new();

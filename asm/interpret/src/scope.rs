@@ -8,7 +8,7 @@ use std::rc::Rc;
 use takt_isa::Type;
 use takt_syntax::ast::Operand;
 
-/// Elements in a row: the first cell or word, the sizes, the type.
+/// An array: first cell or word, sizes, type.
 #[derive(Clone, Debug)]
 pub(crate) struct Array {
     pub(crate) first: usize,
@@ -31,7 +31,7 @@ pub(crate) enum Meaning {
     Argument(Operand, Rc<Scope>),
 }
 
-/// Declarations that a scope takes.
+/// Kinds of declarations that a scope accepts.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum DeclarationFilter {
     /// Everything: the program, the use of a macro.
@@ -54,7 +54,7 @@ impl Scope {
         Rc::new(Scope { around: around.cloned(), takes, names: RefCell::default() })
     }
 
-    /// A scope within another, with a name that counts.
+    /// A nested scope that binds an index to a value.
     pub(crate) fn counting(
         around: &Rc<Scope>,
         takes: DeclarationFilter,
@@ -70,13 +70,13 @@ impl Scope {
         self.names.borrow_mut().insert(name.to_owned(), meaning);
     }
 
-    /// The meaning of a name here.
+    /// The meaning of a name in this scope.
     pub(crate) fn find(&self, name: &str) -> Option<Meaning> {
         let own = self.names.borrow().get(name).cloned();
         own.or_else(|| self.around.as_ref()?.find(name))
     }
 
-    /// The scope that declares names here; of labels, if `labels`.
+    /// The innermost scope that accepts declarations: of labels if `labels`, of other names if not.
     pub(crate) fn declaring(scope: &Rc<Scope>, labels: bool) -> Rc<Scope> {
         match (scope.takes, &scope.around) {
             (DeclarationFilter::All, _) | (_, None) => Rc::clone(scope),

@@ -14,11 +14,11 @@ use takt_emu::Emulator;
 use takt_interpret::Interpreter;
 use takt_isa::{F1, F3, Machine, T1, T3, T4};
 
-/// The most steps of a section: several times the generator's bound.
+/// Limit on the steps of a section: several times the generator's bound.
 const STEPS: u64 = 1 << 18;
 const PERIODS: u64 = 3;
 
-/// A number that the environment gives.
+/// A number from an environment variable.
 fn number(name: &str) -> Option<u64> {
     std::env::var(name).ok().map(|text| text.parse().unwrap_or_else(|_| panic!("{name}={text} is no number")))
 }
@@ -72,14 +72,14 @@ fn emulated(
     Some(states)
 }
 
-/// The states of the interpreter; with them, its steps.
+/// The interpreter's states after each period, and its steps.
 fn interpreted(text: &str, seed: u64) -> (Vec<State>, u64) {
     let fails = |fault: String| -> ! { panic!("seed {seed}: {fault}\n{text}") };
     let mut interpreter = Interpreter::new(text).unwrap_or_else(|fault| fails(fault));
     let (mut states, mut steps) = (Vec::new(), 0);
     for period in 0..PERIODS {
         let inputs = inputs(seed, period);
-        // The section that runs once comes before the first.
+        // The section that runs once precedes the first period.
         for _ in 0..1 + u64::from(period == 0) {
             steps += interpreter.period(&inputs, STEPS).unwrap_or_else(|fault| fails(fault));
         }

@@ -40,7 +40,7 @@ pub struct Adjustment {
 pub enum Transfer {
     /// The loader sets the register to these bits; the operation is gone.
     Preset(u32),
-    /// An operation of the right slot, by name, gives the same bits.
+    /// An operation of the right slot, by name, computes the same bits again.
     Rematerialised(&'static str),
     /// The value is copied.
     Copy {
@@ -79,7 +79,7 @@ impl std::fmt::Display for Transfer {
 pub(crate) struct HomeBank {
     /// The slot that writes the bank.
     pub(crate) slot: SlotIndex,
-    /// The operation of the slot that copies bits, if it has one.
+    /// The operation of the slot that copies bits, if there is one.
     pub(crate) copier: Option<Op>,
 }
 
@@ -97,10 +97,10 @@ pub(crate) struct BankConflict {
 pub(crate) struct BankAssignment {
     /// Home bank of each register that several slots write, by register index.
     pub(crate) of: Vec<Option<HomeBank>>,
-    /// Liveness of registers with a home bank: by run, true if the register is live after it.
+    /// Liveness of registers with a home bank: by run, whether the register is live after it.
     pub(crate) live: Vec<(RegisterId, Vec<bool>)>,
     pub(crate) conflicts: Vec<BankConflict>,
-    /// Registers that the source writes in `.once`, if only to write them again before they are read.
+    /// Registers that the source writes in `.once`, even if it overwrites them before any read.
     pub(crate) set_once: HashSet<RegisterId>,
     /// Registers made for values: not reported if nothing reads them.
     pub(crate) quiet: HashSet<RegisterId>,
@@ -395,7 +395,7 @@ fn constant_register(ir: &mut Ir, bits: u32, span: Span) -> RegisterId {
     RegisterId::new(index)
 }
 
-/// The reason that a register has no home bank, and advice.
+/// The reason why a register has no home bank, and advice.
 fn conflict(ir: &Ir, flow: &Flow, register: RegisterId, writes: &[Write]) -> BankConflict {
     let found = ir.register(register);
     let because_of = |help: String, because| BankConflict { register, help, because };

@@ -27,9 +27,9 @@ pub(crate) fn contested(ir: &Ir) -> Vec<bool> {
 /// Renaming of a register within a run.
 #[derive(Clone, Copy, Default)]
 struct Renaming {
-    /// Operations of the run that are still to write it.
+    /// Number of operations of the run that are still to write the register.
     left: u32,
-    /// Values that have got a register of their own.
+    /// Number of values with a register of their own so far.
     made: u32,
     /// Register of the current value, if renamed.
     current: Option<RegisterId>,

@@ -32,7 +32,7 @@ struct Use {
 
 /// Checks a resolved program whose registers have their banks.
 pub(crate) fn check(context: &mut Context, ir: &Ir, assignment: &BankAssignment) {
-    // Operations with mistakes are not in the program: registers that then seem unused need not be.
+    // Operations with mistakes are missing from the program, so registers may seem unused that are not.
     let complete = context.reports.sink.errors == 0;
     let mut uses = vec![Use::default(); ir.registers.len()];
     let mut opaque = false;
@@ -58,7 +58,7 @@ pub(crate) fn check(context: &mut Context, ir: &Ir, assignment: &BankAssignment)
                         reach(context, ir, operation, dest, slot);
                     }
                 }
-                // Report each slot too many only once.
+                // Report each excess slot only once.
                 Some((first, owner)) if owner != slot && found.conflicts & 1 << slot.index() == 0 => {
                     found.conflicts |= 1 << slot.index();
                     two_slots(
@@ -161,7 +161,7 @@ pub(crate) fn source_span(context: &Context, operation: &Operation, which: usize
     })
 }
 
-/// A register that two slots write lies in neither's bank.
+/// Reports a register that two slots write: it cannot lie in both banks.
 fn two_slots(
     context: &mut Context,
     ir: &Ir,
@@ -192,7 +192,7 @@ fn two_slots(
     context.report(ScopeId(operation.expansion), error);
 }
 
-/// A register with a place must be in the bank of the slot that writes it.
+/// Checks that a register with a place lies in the bank of the slot that writes it.
 fn reach(context: &mut Context, ir: &Ir, operation: &Operation, dest: RegisterId, slot: SlotIndex) {
     let register = ir.register(dest);
     let slot = ir.machine.slot(slot);
@@ -280,7 +280,7 @@ fn unwritten(context: &mut Context, ir: &Ir, register: &VirtualRegister, found: 
     context.report(ScopeId(operation.expansion), diagnostic);
 }
 
-/// A state must have a value before the first period.
+/// Checks that a state has a value before the first period.
 fn state(context: &mut Context, ir: &Ir, register: &VirtualRegister, found: &Use) {
     let set = found.once || register.preset.is_some() || found.written.is_none();
     let (RegisterKind::State, false, Some((place, which))) = (register.kind, set, found.read) else { return };
@@ -314,7 +314,7 @@ fn leaves(context: &mut Context, operation: &Operation, end: u32) {
     context.report(ScopeId(operation.expansion), warning);
 }
 
-/// A period that never comes to a `wait` has no end.
+/// Warns of a period that never reaches a `wait`.
 fn no_wait(context: &mut Context, ir: &Ir) {
     let ends = |operation: &Operation| matches!(operation.row().effect, Effect::Wait | Effect::Halt);
     let mut seen = vec![false; ir.bundles.len()];

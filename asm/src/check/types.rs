@@ -85,8 +85,8 @@ impl AbstractValue for TracedKind {
     }
 }
 
-/// Passes after which types that are still being found count as unknown: each follows a value through one more register
-/// against the order of the program.
+/// Number of passes after which types that are still being found count as unknown: each pass follows a value through one more
+/// register against the order of the program.
 const PASSES: usize = 8;
 
 /// Warns of values that an operation reads as another type, or that go to a register of another type.
@@ -110,13 +110,13 @@ struct Types<'i, V> {
     entry: Vec<V>,
     /// The declaration gives the type of the register.
     declared: Vec<bool>,
-    /// The present value of each register, and the run that wrote it.
+    /// The current value of each register, and the run that wrote it.
     now: Vec<(u32, V)>,
     /// The tables of data memory, by label.
     tables: HashMap<LabelId, V>,
     /// By instruction: the sources whose bits become its result.
     passed: Vec<SmallVec<[usize; 2]>>,
-    /// Registers whose present type at the beginning of a run has been read.
+    /// Registers whose current type at the beginning of a run has been read.
     read: Vec<Cell<bool>>,
     /// A value has changed since it was read: the fixed point is not reached.
     changed: bool,
@@ -243,7 +243,7 @@ impl<'i, V: AbstractValue> Types<'i, V> {
         }
     }
 
-    /// The present value of a register.
+    /// The current value of a register.
     #[inline]
     fn present(&self, run: u32, register: RegisterId) -> V {
         let index = register.index();
@@ -261,7 +261,7 @@ impl<'i, V: AbstractValue> Types<'i, V> {
         self.ir.access(operation).map(|access| self.ir.arrays[access.array.0 as usize].ty)
     }
 
-    /// The type that one of an operation's sources is to have, and true if a macro's parameter asks for it.
+    /// The expected type of one of an operation's sources, and whether a macro's parameter demands it.
     #[inline]
     fn expected_type(&self, operation: &Operation, which: usize) -> (Type, bool) {
         match self.given.get(operation, OperandPosition::Source(which as u8)) {
@@ -382,7 +382,7 @@ impl<'i, V: AbstractValue> Types<'i, V> {
                 }
             }
         }
-        // A choice between an integer and a float is neither.
+        // A choice between an integer and a float has neither type.
         let passed = &self.passed[operation.op as usize];
         let is =
             |kind| passed.iter().copied().find(|which| self.source(run, operation, *which).kind() == kind);
@@ -423,7 +423,7 @@ fn convert(from: Type, to: Type) -> String {
     conversion(from, to).map_or(String::new(), |mnemonic| format!("convert it with `{mnemonic}`, "))
 }
 
-/// Adds to a warning where the value got its type.
+/// Adds the place where the value got its type to a warning.
 fn explained(warning: Diagnostic, ty: Type, origin: Option<Origin>) -> Diagnostic {
     let Some(Origin { what, span, .. }) = origin else { return warning };
     let is = words(ty);
@@ -511,8 +511,8 @@ fn wrong_source(
     context.report(ScopeId(operation.expansion), warning.help(help));
 }
 
-/// Reports that a macro's argument is of another type than the parameter asks for: an error, as the resolver reports it of types
-/// that are known where the macro is used.
+/// Reports an argument whose type differs from the one that the macro's parameter demands: an error, as in the resolver, which
+/// reports types that are known where the macro is used.
 fn wrong_argument(
     context: &mut Context,
     ir: &Ir,
@@ -542,7 +542,7 @@ fn comparison(row: &Row, ty: Type) -> Option<&'static str> {
     ROWS.iter().find(same).map(|row| row.mnemonic)
 }
 
-/// An operand without the type that it is taken as.
+/// The text of an operand without the type after its colon.
 fn bare(written: &str) -> &str {
     written.split_once(':').map_or(written, |(name, _)| name.trim_end())
 }
@@ -612,7 +612,7 @@ fn wrong_register(
     context.report(ScopeId(operation.expansion), explained(warning, ty, origin).help(help));
 }
 
-/// Adds the float that an integer's bits make.
+/// Adds a note with the float that an integer's bits encode.
 fn noted(warning: Diagnostic, value: Value) -> Diagnostic {
     match value {
         Value::Int(value) => {

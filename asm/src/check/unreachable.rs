@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Code that nothing leads to: found by following control from the first bundle.
+//! Unreachable code, found by following control flow from the first bundle.
 
 use super::{ScopeId, target};
 use crate::context::Context;
@@ -10,7 +10,7 @@ use takt_diagnostics::diag::Diagnostic;
 use takt_isa::Effect;
 use takt_isa::program::Space;
 
-/// The bundles that control may come to next. A call counts as returning.
+/// The bundles to which control may pass next. A call counts as returning.
 pub(super) fn next(ir: &Ir, index: u32, bundle: &Bundle) -> impl Iterator<Item = u32> {
     let on = end(bundle).is_none().then_some(index + 1);
     on.into_iter().chain(bundle.operations.iter().filter_map(|operation| target(ir, operation)))
@@ -25,7 +25,7 @@ fn end(bundle: &Bundle) -> Option<&Operation> {
     bundle.operations.iter().find(ends)
 }
 
-/// Marks the bundles that control may come to from one.
+/// Marks the bundles that control may reach from a bundle.
 fn follow(ir: &Ir, from: u32, seen: &mut [bool]) {
     let mut reached = vec![from];
     while let Some(index) = reached.pop() {
@@ -36,7 +36,7 @@ fn follow(ir: &Ir, from: u32, seen: &mut [bool]) {
     }
 }
 
-/// Warns of code that nothing leads to, where each piece of it begins. A piece lies between two ends of the flow.
+/// Warns of unreachable code, once for each piece. A piece lies between two ends of the flow.
 pub(super) fn check(context: &mut Context, ir: &Ir) {
     let mut seen = vec![false; ir.bundles.len()];
     follow(ir, 0, &mut seen);
@@ -63,7 +63,7 @@ fn piece(context: &mut Context, ir: &Ir, dead: Range<usize>, labels: &[&Label]) 
     let Some(first) = ir.bundles[dead.clone()].iter().flat_map(|bundle| &bundle.operations).find(does) else {
         return;
     };
-    // An included file has more than every program needs, as with constants; and `_` says: on purpose.
+    // An included file may define more than the program needs; a leading `_` marks code as unused on purpose.
     let is_included = context.reports.sources.file_of(first.span.start) != 0;
     if labels.iter().any(|label| is_included || label.name.starts_with('_')) {
         return;

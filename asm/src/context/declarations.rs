@@ -57,7 +57,7 @@ pub(crate) struct Table {
     pub(crate) array: arrays::Array,
     /// Label of the first word, with the table's name.
     pub(crate) label: LabelId,
-    /// Some name of the source refers to the table.
+    /// The source refers to the table.
     pub(crate) used: bool,
 }
 
@@ -79,14 +79,14 @@ fn shape(sizes: &[u32]) -> String {
 pub(crate) struct Argument {
     pub(crate) operand: Operand,
     pub(crate) at: AstPlace,
-    /// Value, once computed: parameters passed on and on are computed once.
+    /// Value, once computed: a parameter that macros pass on repeatedly is computed once.
     pub(crate) value: Option<Value>,
-    /// The type that the parameter asks for; of parameters passed on and on, the first type asked for.
+    /// The type that the parameter demands; for a parameter passed on through several macros, the first type demanded.
     pub(crate) asked: Option<ParameterType>,
-    /// The use of the macro in which the argument is written, and true if this macro is a function in an equation.
+    /// The use of the macro in which the argument is written, and whether this macro is a function in an equation.
     pub(crate) scope: ScopeId,
     pub(crate) is_function: bool,
-    /// Number of the argument where it is first written; passing it on keeps the number.
+    /// Number of the argument at the place where it is first written; passing it on keeps the number.
     pub(crate) origin: u32,
 }
 
@@ -114,7 +114,7 @@ pub(crate) struct Declarations {
     pub(crate) loops: Vec<SourceLoop>,
     pub(crate) constants: Vec<NamedConstant>,
     pub(crate) arguments: Vec<Argument>,
-    /// Parameters of macros' uses that stand for registers, as far as operations use them; some several times.
+    /// Parameters bound to registers that operations use, by the macro's use; may contain duplicates.
     pub(crate) parameters: Vec<(ScopeId, NameId, RegisterId)>,
     /// Labels. While the source is read a code label's position counts the statements of its section.
     pub(crate) labels: Vec<Label>,

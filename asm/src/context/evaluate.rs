@@ -23,7 +23,7 @@ impl Context {
         Ok(name)
     }
 
-    /// The name that a reference spells, whatever it may mean there: a register's place, an instruction, a word as `on`.
+    /// The name that a reference spells, not noted for the index: perhaps a register's place, an instruction, or a word such as `on`.
     #[inline]
     pub(crate) fn spelled(
         &mut self,
@@ -37,7 +37,7 @@ impl Context {
         }
     }
 
-    /// Guards an evaluation within an evaluation.
+    /// Limits the depth of nested evaluations.
     fn nested<T>(
         &mut self,
         at: AstPlace,
@@ -196,7 +196,7 @@ impl Context {
             .map_err(|error| self.fault(at.scope, error))
     }
 
-    /// The value of an expression that is to be an integer.
+    /// The value of an expression that must be an integer.
     pub(crate) fn integer(&mut self, at: AstPlace, expr: Expr) -> Result<i64, ErrorReported> {
         let value = self.value(at, expr.id)?;
         value.integer().map_err(|fault| self.fault(at.scope, EvalError { span: expr.span, fault }))
@@ -258,7 +258,7 @@ impl Context {
             OperandKind::Name(name) => {
                 let name = self.name(at, name, operand.span)?;
                 let binding = self.lookup(at.scope, name);
-                // Name what the macro needs: the argument's name alone would not tell.
+                // Tell what the macro needs; the argument's name alone would not explain the error.
                 if matches!(binding, Binding::Register(_) | Binding::Array(_) | Binding::Word(_)) {
                     let (shown, kind) = (self.scopes.text(name).to_owned(), self.declared.kind_text(binding));
                     let message = format!("`{shown}` is {kind}, and the macro needs a number here");

@@ -11,10 +11,10 @@ use takt_syntax::ast::*;
 use takt_syntax::expr::{self, EvalError, Fault, Value};
 use takt_syntax::name::{NameId, NameRef};
 
-/// The most points of an iteration space that are tried one by one.
+/// Limit on the points of an iteration space that are enumerated.
 const POINTS: u32 = 1 << 18;
 
-/// A counted loop of [`Declared::loops`](crate::context::Declared::loops).
+/// A counted loop of [`Declarations::loops`](crate::context::Declarations::loops).
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 pub(crate) struct SourceLoopId(pub(crate) u32);
 
@@ -22,11 +22,11 @@ pub(crate) struct SourceLoopId(pub(crate) u32);
 /// turn.
 #[derive(Clone, Debug)]
 pub(crate) struct SourceLoop {
-    /// Upper bound of the iterations, given the iterations of the loops around.
+    /// Upper bound of the iterations, given the iterations of the enclosing loops.
     pub(crate) most: Affine<SourceLoopId>,
 }
 
-/// An integer that the assembler knows up to the iteration numbers of the loops around.
+/// An integer that the assembler knows as a function of the iteration numbers of the enclosing loops.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct AffineInteger {
     /// The value as a function of the source's iterations.
@@ -66,9 +66,9 @@ impl AffineInteger {
 #[derive(Clone, Debug)]
 pub(crate) struct Index {
     pub(crate) value: AffineInteger,
-    /// The loop, while the name is its index in the loop's body, and not in the iterations left over behind it.
+    /// The loop, while the name is its index in the loop's body; `None` in the iterations left over after it.
     pub(crate) of: Option<SourceLoopId>,
-    /// The `.for` or the sum.
+    /// Place of the `.for` or the sum.
     pub(crate) span: Span,
 }
 
@@ -88,7 +88,7 @@ impl Operand {
 }
 
 impl Context {
-    /// The value of an expression that may contain the indices of the loops around.
+    /// The value of an expression that may contain the indices of the enclosing loops.
     pub(crate) fn counted(&mut self, at: AstPlace, expr: Expr) -> Result<AffineInteger, ErrorReported> {
         let ast = std::rc::Rc::clone(&self.asts[at.ast as usize]);
         self.counted_nodes(at, &ast.nodes[expr.id.range()], expr.span, false)
@@ -239,7 +239,7 @@ impl Context {
         }
     }
 
-    /// An expression names the index of a loop that runs.
+    /// An expression names the index of a loop at run time.
     pub(crate) fn names_index(&self, at: AstPlace, id: ExprId) -> bool {
         self.asts[at.ast as usize].nodes[id.range()].iter().any(|node| match node.kind {
             NodeKind::Name(name) => name.resolve().is_ok_and(|name| self.is_index(at.scope, name)),
@@ -247,7 +247,7 @@ impl Context {
         })
     }
 
-    /// A name is the index of a loop that runs, or the argument of a macro that depends on one.
+    /// A name is the index of a loop at run time, or an argument of a macro that depends on such an index.
     pub(crate) fn is_index(&self, scope: ScopeId, name: NameId) -> bool {
         let mut binding = self.lookup(scope, name);
         for _ in 0..crate::limits::EVALUATION_DEPTH {
@@ -265,7 +265,7 @@ impl Context {
         matches!(binding, Binding::Index(_))
     }
 
-    /// The loops around a scope, outer ones first.
+    /// The loops that enclose a scope, outer ones first.
     pub(crate) fn loops_around(&self, scope: ScopeId) -> Vec<SourceLoopId> {
         let mut loops = Vec::new();
         let mut scope = *self.scopes.scope(scope);
@@ -281,10 +281,10 @@ impl Context {
         loops
     }
 
-    /// The least and the largest value of a function over all iterations of the loops around; `None` without any iteration.
+    /// The least and the largest value of a function over all iterations of the enclosing loops; `None` without any iteration.
     ///
     /// # Errors
-    /// If the iteration space has more points than are tried.
+    /// If the iteration space has more points than may be enumerated.
     pub(crate) fn extremes(
         &self,
         around: &[SourceLoopId],
@@ -307,8 +307,8 @@ struct Space<'c> {
 }
 
 impl Space<'_> {
-    /// The least and the largest value, given the iterations of the loops before `level`. Where the counts of inner loops depend on
-    /// an iteration, its values are tried one by one.
+    /// The least and the largest value, given the iterations of the loops before `level`. An iteration on which the counts of inner
+    /// loops depend is enumerated.
     fn extremes(
         &self,
         at: &mut Vec<i64>,

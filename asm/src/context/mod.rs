@@ -51,7 +51,7 @@ pub(crate) struct Context {
     pub(crate) reports: Reports,
     /// Names with their places, if an editor asks for them ([`index`](crate::index)).
     pub(crate) notes: Option<Notes>,
-    /// A declaration of a counted loop's body is met again, in another iteration that is written out: it is the same for all.
+    /// A written-out loop is past its first iteration: declarations in its body, equal in all iterations, exist already.
     pub(crate) again: bool,
     /// Nesting depth of arguments and templates under evaluation.
     depth: usize,
@@ -94,7 +94,7 @@ impl Context {
         }
     }
 
-    /// The binding of a name that may be made of parts, with arguments of macros replaced; [`Binding::None`] if unknown.
+    /// The binding of a name or a template, with arguments of macros replaced; [`Binding::None`] if unknown.
     pub(crate) fn bound(&self, at: AstPlace, name: NameRef) -> Binding {
         let mut binding = name.resolve().map_or(Binding::None, |name| self.lookup(at.scope, name));
         for _ in 0..crate::limits::EVALUATION_DEPTH {

@@ -22,16 +22,16 @@ impl ScopeId {
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Scope {
-    /// The enclosing scope, in which a name is looked up that is not bound here.
+    /// The enclosing scope, where names that are not bound here are looked up.
     pub(crate) parent: ScopeId,
     /// The scope that takes declarations: the macro's use, or the root.
     pub(crate) owner: ScopeId,
     /// The scope that takes code labels: the owner, or within it an iteration of a counted loop as the assembler writes it.
     pub(crate) labels: ScopeId,
-    /// The expansion that this one stands in, for messages. Not the parent: a macro does not see its caller's names.
+    /// The expansion that contains this one, for messages; unlike the parent, since a macro does not see its caller's names.
     pub(crate) within: ScopeId,
     pub(crate) kind: ScopeKind,
-    /// The use of the macro, or the `.rep`.
+    /// Place of the macro's use, or of the `.rep`.
     pub(crate) site: Span,
     /// For a macro's use and an iteration: index of the latest entry in the list of near names, and number of such entries.
     latest: u32,
@@ -56,7 +56,7 @@ pub(crate) enum ScopeKind {
     Macro(NameId, u32),
     /// Name and value of the counter.
     Rep(NameId, i64),
-    /// Name of the index variable, and its number in [`Declared::indices`](crate::context::Declared::indices).
+    /// Name of the index variable, and its number in [`Declarations::indices`](crate::context::Declarations::indices).
     For(NameId, u32),
 }
 
@@ -74,9 +74,9 @@ pub(crate) enum Binding {
     Argument(u32),
     /// Value of the counter of a repetition.
     Count(i64),
-    /// The index variable of a counted loop: an index into [`Declared::indices`](crate::context::Declared::indices).
+    /// The index variable of a counted loop: an index into [`Declarations::indices`](crate::context::Declarations::indices).
     Index(u32),
-    /// An array in data memory: an index into [`Declared::tables`](crate::context::Declared::tables).
+    /// An array in data memory: an index into [`Declarations::tables`](crate::context::Declarations::tables).
     Table(u32),
     /// An array element in data memory; an index into the elements seen so far.
     Word(u32),
@@ -94,7 +94,7 @@ pub(crate) struct MacroDefinition {
     /// First statement of the body.
     pub(crate) start: u32,
     pub(crate) uses: u32,
-    /// The types of its parameters.
+    /// Types of the parameters.
     pub(crate) types: Rc<Parameters>,
 }
 
@@ -187,14 +187,14 @@ impl Scopes {
         id
     }
 
-    /// A new scope for an iteration of a counted loop, or for all of them where one is written for all: it takes code labels.
+    /// A new scope for a written-out iteration of a counted loop, or for the body of a loop at run time. The scope takes code labels.
     pub(crate) fn open_iteration(&mut self, parent: ScopeId, kind: ScopeKind, site: Span) -> ScopeId {
         let id = self.open(parent, parent, kind, site);
         self.scopes[id.0 as usize].labels = id;
         id
     }
 
-    /// The binding of a name in a scope, or in those around it.
+    /// The binding of a name in a scope, or in the enclosing scopes.
     #[inline(always)]
     pub(crate) fn lookup(&self, scope: ScopeId, name: NameId) -> Binding {
         if scope != ScopeId::ROOT
@@ -205,7 +205,7 @@ impl Scopes {
         self.globals.get(name.0 as usize).copied().unwrap_or(Binding::None)
     }
 
-    /// The binding of a name by an expansion, or by the expansions around it.
+    /// The binding of a name by an expansion, or by the enclosing expansions.
     fn expanded(&self, mut scope: ScopeId, name: NameId) -> Option<Binding> {
         while scope != ScopeId::ROOT {
             let here = self.scope(scope);
@@ -290,7 +290,7 @@ impl Scopes {
         self.scope_name(scope).map_or_else(|| text.to_owned(), |scope| format!("{scope}.{text}"))
     }
 
-    /// The text of a code label, as the symbol map shows it; in a counted loop with a running number among labels of its name.
+    /// The text of a code label, as the symbol map shows it; a label in a counted loop gets a running number, which makes it unique.
     pub(crate) fn label_name(&mut self, scope: ScopeId, name: NameId) -> String {
         let text = self.full_name(scope, name);
         let Scope { owner, labels, .. } = *self.scope(scope);
@@ -308,10 +308,10 @@ impl Scopes {
         match self.scope(owner).kind {
             ScopeKind::Macro(of, number) => {
                 let of = self.text(of);
-                // Reserve for any number: each use has such a name.
+                // Reserve room for any number, since every use has such a name.
                 let mut name = String::with_capacity(of.len() + 11);
                 name.push_str(of);
-                // A string takes all that is written to it.
+                // Writing to a string cannot fail.
                 let _ = write!(name, ".{number}");
                 Some(name)
             }
@@ -325,7 +325,7 @@ impl Scopes {
         while scope != ScopeId::ROOT {
             let Scope { kind, site, within, .. } = *self.scope(scope);
             if diagnostic.labels.iter().any(|label| label.span == site) {
-                // A macro that uses itself.
+                // A macro that uses itself is shown once.
                 scope = within;
                 continue;
             }
@@ -340,7 +340,7 @@ impl Scopes {
                 ScopeKind::Rep(name, value) => {
                     diagnostic.also(site, format!("with {} = {value}", self.text(name)))
                 }
-                // A loop that runs has no value to show: every iteration is the same.
+                // A loop at run time has no value to show: every iteration is the same.
                 ScopeKind::For(..) | ScopeKind::Root => diagnostic,
             };
             scope = within;

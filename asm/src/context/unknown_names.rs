@@ -19,7 +19,7 @@ use takt_syntax::name::NameId;
 pub(crate) enum NameRole {
     /// A register to write.
     Dest,
-    /// A register left of an equation's `=`.
+    /// A register on the left of an equation's `=`.
     Left,
     /// A register or constant to read.
     Source,
@@ -42,7 +42,7 @@ pub(crate) struct UnknownName {
 }
 
 impl Context {
-    /// Notes an unknown name. It is reported at the end, when every name that the source declares is known.
+    /// Records an unknown name. It is reported at the end, when every name that the source declares is known.
     pub(crate) fn unknown(
         &mut self,
         scope: ScopeId,

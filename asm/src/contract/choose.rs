@@ -2,9 +2,9 @@
 //! Choice of the products to fuse, by critical-path lengths.
 //!
 //! Fusing saves an operation. It also saves time where the sum waits for the product; where the sum waits for the addend, or for
-//! another product, it costs the cycles by which a fused operation takes longer than a sum. So a product is fused if its sum
-//! becomes earlier or no later, were there slots for everything; any other product is fused if the run's longest chain stays as
-//! long as it then is, or no longer than the slots take for the run's products and sums alone.
+//! another product, it costs the cycles by which a fused operation takes longer than a sum. So a product is fused if, with unlimited
+//! slots, its sum becomes ready earlier or at the same time; any other product is fused if the run's longest chain does not grow, or
+//! does not exceed the cycles that the slots need for the run's products and sums alone.
 //!
 //! The body of a counted loop is executed again before it ends (software pipelining), so only chains from one iteration to
 //! the next count: there every product is fused unless that lengthens the initiation interval.
@@ -20,12 +20,12 @@ use takt_isa::{Function, Fusion, Op};
 struct Node {
     at: OperationPosition,
     op: Op,
-    /// Registers that it reads and that no earlier operation of the run writes.
+    /// Registers that the operation reads and that no earlier operation of the run writes.
     before: SmallVec<[RegisterId; 3]>,
     dest: Option<RegisterId>,
     /// By source: the operation of the run that computes it.
     from: SmallVec<[Option<usize>; 3]>,
-    /// Products that could be fused into this operation.
+    /// Products that are candidates for fusing into this operation.
     wishes: SmallVec<[(usize, Fusion); 2]>,
 }
 
@@ -37,7 +37,7 @@ struct Decisions {
     done: Vec<u32>,
 }
 
-/// The sums of a run that are fused, each with its product, in source order.
+/// Chooses the sums of a run to fuse, each with its product, in source order.
 pub(super) fn choose(
     ir: &Ir,
     run: runs::Run,
@@ -169,8 +169,8 @@ fn waits_for<'a>(
     nodes[product].from.iter().copied().flatten().chain(addend)
 }
 
-/// Decides in source order. `may_wait` allows a fused operation to be ready in a cycle although the sum alone would be ready
-/// sooner.
+/// Decides in source order. `may_wait` says whether the fused operation may be ready in a cycle in which the sum alone would have
+/// been ready for some time.
 fn decide(ir: &Ir, nodes: &[Node], may_wait: impl Fn(usize, u32) -> bool) -> Decisions {
     let mut decisions =
         Decisions { fused: Vec::with_capacity(nodes.len()), done: Vec::with_capacity(nodes.len()) };

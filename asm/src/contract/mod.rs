@@ -47,7 +47,7 @@ type FusionCandidates = HashMap<OperationPosition, SmallVec<[(OperationPosition,
 struct RegisterState {
     /// Number of writes so far.
     version: u32,
-    /// Index of the product that it holds.
+    /// Index of the product that the register holds.
     product: Option<usize>,
 }
 
@@ -196,10 +196,10 @@ fn has_place(ir: &Ir, (bundle, number): OperationPosition, fusion: &Fusion) -> b
     let mut slots: Vec<Slots> =
         others().filter(|other| other.slot.is_some()).map(|other| other.slots).collect();
     slots.push(dest.map_or_else(Slots::default, |dest| banks::able(ir, dest, fusion.fused)));
-    // A branch on what its own bundle computes cannot wait for a copy.
+    // A branch that reads a result of its own bundle cannot wait for a copy.
     let branches =
         others().any(|other| other.redirects() && dest.is_some_and(|dest| other.reads().contains(&dest)));
-    // An operation whose slot the source names stays on it.
+    // An operation stays on the slot that the source names.
     let named =
         dest.is_some_and(|dest| operations[number].slots != banks::able(ir, dest, operations[number].op));
     !branches && !named && matching::is_possible(&slots)
@@ -212,7 +212,7 @@ fn fuse(ir: &mut Ir, product: OperationPosition, sum: OperationPosition, fusion:
     let slots = second.dest.map_or_else(Slots::default, |dest| banks::able(ir, dest, fusion.fused));
     let [a, b, _] = first.sources;
     let sources = [a, b, second.sources[1 - fusion.source]];
-    // No operand of the tree is one of its own: messages point at the sum.
+    // The fused operation has no operands of its own in the syntax tree: messages point at the sum.
     let written = (u32::MAX, 0);
     ir.has_choices |= slots.len() > 1;
     ir.bundles[sum.0].operations[sum.1] = Operation {
@@ -225,7 +225,7 @@ fn fuse(ir: &mut Ir, product: OperationPosition, sum: OperationPosition, fusion:
         written,
         ..second
     };
-    // Taken out of its bundle once nothing counts on its place.
+    // The bundle keeps an idle operation for now, since indices of operations still count it.
     ir.bundles[product.0].operations[product.1] = Operation { made: true, ..first.idle() };
     Contraction {
         mnemonic: fusion.fused.row().mnemonic,

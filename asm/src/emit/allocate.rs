@@ -146,7 +146,7 @@ fn peaks(ranges: &[Option<(u32, u32)>], writer: &[Option<SlotIndex>], slots: usi
     changes.iter().map(most).collect()
 }
 
-/// Allocates every virtual register that is used. `why` tells why values without a register could not be spilled.
+/// Allocates every virtual register that is used. `why` explains why values without a register could not be spilled.
 pub(crate) fn allocate(ir: &Ir, runs: &[Run], why: Option<&str>, sink: &mut Sink) -> Allocation {
     let mut pressure = pressure(ir, runs, sink);
     let peaks = pressure.peaks();
@@ -453,7 +453,7 @@ fn report(ir: &Ir, pressure: &Pressure, peaks: &[Peak], why: Option<&str>, sink:
         let bank = slot.map_or(&machine.inputs, |slot| &machine.slot(slot).bank);
         let window = Window::of(bank, kind, machine.outputs_per_bank);
         let available = usize::from(window.end - window.first);
-        // Short-lived values count by their largest number at a time.
+        // Short-lived values count at their peak.
         let lasts = |index: usize| pressure.ranges[index].is_none();
         let inside = |address: &Option<Register>| {
             address.is_some_and(|address| (window.first..window.end).contains(&address.get()))

@@ -176,7 +176,7 @@ fn sections(ir: &Ir) -> Vec<Section> {
         .collect()
 }
 
-/// The bounds of loops. Two may have come to one place where the scheduler removed a block of idle bundles.
+/// The bounds of loops. Two may share a place where the scheduler removed a block of idle bundles.
 fn loop_bounds(ir: &Ir) -> Vec<LoopBound> {
     let mut bounds: BTreeMap<u32, (u32, Option<u32>)> = BTreeMap::new();
     for bound in ir.loop_bounds.iter().filter(|bound| (bound.position as usize) < ir.bundles.len()) {
@@ -206,8 +206,8 @@ fn ranges(ir: &Ir, allocation: &Allocation) -> Vec<Range> {
     ranges
 }
 
-/// Makes all names unique and short enough. The source's names are; names that the assembler makes, of a macro's locals and
-/// of values split from a name, may collide or be too long.
+/// Makes all names unique and short enough. Only names made by the assembler, of a macro's locals and of values split from a name,
+/// can collide or be too long.
 fn distinguish(program: &mut Program) {
     let count =
         program.inputs.len() + program.outputs.len() + program.registers.len() + program.symbols.len();
@@ -218,7 +218,7 @@ fn distinguish(program: &mut Program) {
     if all.len() == count {
         return;
     }
-    // Names with a point yield to names without, which only the source can have given.
+    // Names without a point come from the source and are kept; names with a point are changed.
     let mut taken: HashSet<String> =
         all.into_iter().filter(|name| !name.contains('.')).map(str::to_owned).collect();
     let Program { inputs, outputs, registers, symbols, .. } = program;

@@ -169,7 +169,7 @@ impl Expander<'_> {
         Ok(())
     }
 
-    /// The number of elements of an array, and its sizes. At most `most` elements are left of `in_all`.
+    /// Number of elements and sizes of an array. The array may have `most` elements, the rest of the limit `in_all` on all arrays.
     fn shape(
         &mut self,
         at: AstPlace,
@@ -374,7 +374,7 @@ impl Expander<'_> {
         Ok(())
     }
 
-    /// The word of a directive that switches `on` or `off`.
+    /// The setting of a directive that switches `on` or `off`.
     pub(crate) fn is_on(
         &mut self,
         at: AstPlace,
@@ -392,7 +392,7 @@ impl Expander<'_> {
         }
     }
 
-    /// `.fast`: the transformations that it allows from here on.
+    /// The transformations that a `.fast` allows from here on.
     pub(crate) fn allowed(&mut self, at: AstPlace, words: &[Name]) -> Result<Fast, ErrorReported> {
         let mut fast = Fast::default();
         for word in words {

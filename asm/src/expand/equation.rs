@@ -23,7 +23,7 @@ pub(crate) const SUM: &str = "sum";
 /// Registers that hold the results of macros, by the node that uses the macro.
 pub(crate) type Results = Rc<HashMap<u32, RegisterId>>;
 
-/// A part of an equation that is computed separately, for the sake of a macro's use.
+/// A separately computed part of an equation that uses macros.
 #[derive(Clone, Debug)]
 pub(crate) struct Piece {
     /// The argument of a macro, the register that it is computed into, and the requested type; `None` for the rest of the equation.
@@ -45,7 +45,7 @@ impl Expander<'_> {
     pub(crate) fn equation(&mut self, at: AstPlace, statement: u32, equation: u32) {
         let ast = Rc::clone(&self.context.asts[at.ast as usize]);
         let equation = &ast.equations[equation as usize];
-        // Errors are reported already.
+        // Errors have been reported.
         if self.slice_loop(at, &ast, statement, equation) != Ok(false) {
             return;
         }
@@ -54,7 +54,7 @@ impl Expander<'_> {
             self.push(at, statement, Part::All, equation.span);
             return;
         }
-        // Errors are reported already.
+        // Errors have been reported.
         let Ok(steps) = self.steps(at, &ast, equation) else { return };
         let end = steps.len() as u32;
         let kind = FrameKind::Equation(steps.into(), statement);
@@ -196,9 +196,9 @@ impl Expander<'_> {
         self.context.report(at.scope, error)
     }
 
-    /// A part of an expression is constant, as far as its names are declared yet.
+    /// A part of an expression is constant, judged by the names declared so far.
     fn is_constant(&self, at: AstPlace, nodes: &[Node]) -> bool {
-        // A name made of parts may mean anything.
+        // A template may stand for any name.
         let is_constant = |node: &Node| match node.kind {
             NodeKind::Name(name) => {
                 name.resolve().is_ok_and(|name| self.is_value(self.context.lookup(at.scope, name)))

@@ -20,7 +20,7 @@ pub(crate) struct FileId {
     pub(crate) path: String,
 }
 
-/// The reason that a file cannot be read.
+/// The reason why a file cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum FileError {
     #[error("{0}")]
@@ -134,7 +134,7 @@ impl Expander<'_> {
             self.limit(at.scope, span, format!("files are included more than {} times", limits::INCLUDES));
             return Err(ErrorReported);
         }
-        // Beside the including file, then in the places that take such names.
+        // Search beside the including file, then in the places that take such names.
         let beside = FileId { place: from.place, path: within.clone() };
         let path = if library { Some(within.clone()) } else { include_path("", path) };
         let places = self.loader.places().iter().enumerate();
@@ -193,14 +193,14 @@ impl Expander<'_> {
         Err(self.context.report(at.scope, error))
     }
 
-    /// Notes for the index the file of an `.include`.
+    /// Records the file of an `.include` for the index.
     fn note_include(&mut self, span: Span, file: usize) {
         if let Some(notes) = &mut self.context.notes {
             notes.includes.push((span, file));
         }
     }
 
-    /// The error for an `.include "path"` without a file in its place and the project.
+    /// The error for an `.include "path"` that finds no file, with advice.
     fn not_found(&self, (place, path): (Option<usize>, &str), span: Span) -> Diagnostic {
         let message = format!("`{path}` cannot be read: {}", LoadError::NotFound);
         let error = Diagnostic::error("load", span, message);
@@ -233,7 +233,7 @@ impl Expander<'_> {
         }
     }
 
-    /// The error for an `.include <path>` without a file.
+    /// The error for an `.include <path>` that finds no file.
     fn not_in_library(&self, path: &str, span: Span) -> Diagnostic {
         let error = Diagnostic::error("load", span, format!("there is no `<{path}>`"));
         let mut names: Vec<String> = self.loader.places().iter().flat_map(IncludePath::sources).collect();

@@ -7,7 +7,7 @@ use std::io::Read as _;
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
-/// The reason that a source cannot be loaded.
+/// The reason why a source cannot be loaded.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum LoadError {
     /// No source has that name.
@@ -27,12 +27,12 @@ pub enum LoadError {
     System(String),
 }
 
-/// Gives sources by their path within the project: relative, `/` between folders, without `.` and `..`.
+/// Provides sources by their path within the project: relative, `/` between folders, without `.` and `..`.
 pub trait Loader {
     /// The bytes of a source.
     ///
     /// # Errors
-    /// If it cannot be had.
+    /// If the source cannot be loaded.
     fn load(&self, path: &str) -> Result<Vec<u8>, LoadError>;
 
     /// The source as shared text, if the loader has it in memory; [`Loader::load`] returns equal bytes.
@@ -47,7 +47,7 @@ pub trait Loader {
         Vec::new()
     }
 
-    /// Folders can be added to the places: on a command line, not in a page.
+    /// The user can add folders to the search: on a command line, not in a web page.
     fn takes_folders(&self) -> bool {
         true
     }
@@ -75,7 +75,7 @@ impl IncludePath {
         matches!(self.0, IncludePathKind::Folder(..))
     }
 
-    /// Name of a file in diagnostics, listings and the debugger: unlike any path within the project.
+    /// Name of a file in diagnostics, listings and the debugger: distinct from every path within the project.
     pub(crate) fn name_of(&self, path: &str) -> String {
         match &self.0 {
             IncludePathKind::Folder(prefix, _) => format!("{prefix}{path}"),
@@ -83,7 +83,7 @@ impl IncludePath {
         }
     }
 
-    /// Names that can be requested; of a folder, its own sources.
+    /// Names that `.include` can request here; for a folder, its own sources.
     pub(crate) fn sources(&self) -> Vec<String> {
         match &self.0 {
             IncludePathKind::Folder(_, folder) => folder.names(""),
@@ -121,7 +121,7 @@ impl<L: Loader> Search<L> {
         Search { project, places: Vec::new() }
     }
 
-    /// Adds a folder, searched after the present places for `"name"` and for `<name>`.
+    /// Adds a folder, searched after the existing places for `"name"` and for `<name>`.
     #[must_use]
     pub fn folder(mut self, folder: impl Into<PathBuf>) -> Search<L> {
         let folder = folder.into();
@@ -148,7 +148,7 @@ impl<L: Loader> Search<L> {
         self
     }
 
-    /// Adds a library in memory, each file a name and its text, searched after the present places for `<name>` only.
+    /// Adds a library in memory, each file a name and its text, searched after the existing places for `<name>` only.
     #[must_use]
     pub fn library<'s>(mut self, files: impl IntoIterator<Item = &'s (&'s str, &'s str)>) -> Search<L> {
         self.places.push(IncludePath(IncludePathKind::Library(MemoryLoader::new(files))));
@@ -257,7 +257,7 @@ impl Loader for MemoryLoader {
     }
 }
 
-/// Loader of a first source in memory, and of all others by another loader.
+/// Loader that serves the first source from memory, and all others through another loader.
 pub(crate) struct First<'l> {
     name: &'l str,
     source: MemorySource,
@@ -304,7 +304,7 @@ pub struct FileLoader {
 pub type Open = Arc<BTreeMap<PathBuf, Arc<String>>>;
 
 impl FileLoader {
-    /// The loader of a folder. A missing folder shows only when a file is requested.
+    /// The loader of a folder. A missing folder is reported when a file is requested.
     pub fn new(root: impl Into<PathBuf>) -> FileLoader {
         FileLoader { root: root.into(), open: Open::default() }
     }

@@ -4,7 +4,7 @@
 //! A parameter has the type that the definition declares, `x:float`, or else the type that the instructions of the body ask for. A
 //! constant argument becomes a value of that type; a register of another type is an error, which the next stage finds
 //! ([`resolve::arguments`](crate::resolve)), because types of registers are known only there. If an instruction takes the bits of a
-//! parameter whose type nothing tells, a warning asks for the declaration.
+//! parameter whose type is unknown, a warning asks for the declaration.
 
 use crate::context::{
     Argument, ArgumentKind, AstPlace, Binding, ErrorReported, MacroDefinition, Open, ParameterType,
@@ -61,7 +61,7 @@ struct Body<'a> {
 }
 
 impl Body<'_> {
-    /// The parameter that an operand names, itself or an element of it.
+    /// The parameter that an operand names, directly or by an element.
     fn parameter(&self, operand: Operand) -> Option<usize> {
         let name = match operand.kind {
             OperandKind::Name(name) => name,
@@ -103,8 +103,8 @@ impl Expander<'_> {
         self.enter_macro(at, name, (operation.span, false), &given);
     }
 
-    /// Continues with a macro's body. There are as many operands as the macro has parameters. The flag beside the place of the use
-    /// is true for a function in an equation.
+    /// Continues with a macro's body. The number of operands equals the number of parameters. The flag next to the place of the use is
+    /// true for a function in an equation.
     pub(crate) fn enter_macro(
         &mut self,
         at: AstPlace,
@@ -156,7 +156,7 @@ impl Expander<'_> {
         });
     }
 
-    /// The argument for a parameter of a type.
+    /// Builds the argument for a parameter of a given type.
     fn argument(
         &mut self,
         at: AstPlace,
@@ -368,7 +368,7 @@ impl Expander<'_> {
         Ok(())
     }
 
-    /// Evidence for the types of parameters in a body's instructions and uses of macros. Equations give none: their values are
+    /// Evidence for the types of parameters in a body's instructions and uses of macros. Equations yield no evidence: their values are
     /// checked where they are computed.
     fn evidence(&self, at: AstPlace, parameters: &[NameId], (start, end): (u32, u32)) -> Vec<Evidence> {
         let ast = Rc::clone(&self.context.asts[at.ast as usize]);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Macros, repetitions, conditionals and includes: the source as one flat list of bundles, data and declarations.
 //!
-//! Statements are met in the order in which they take effect. Declarations are executed at once; bundles and data, which
-//! need every name to be known, are listed for [`resolve`](crate::resolve). The walk has a stack of its own, not the
+//! Statements are visited in the order in which they take effect. Declarations are executed at once; bundles and data, which
+//! need every name to be known, are listed for [`resolve`](crate::resolve). The walk has a stack of its own, separate from the
 //! thread's.
 
 mod declare;
@@ -39,13 +39,13 @@ use takt_syntax::name::NameId;
 pub(crate) struct Item {
     pub(crate) at: AstPlace,
     pub(crate) statement: u32,
-    /// Part of the statement that counts.
+    /// Part of the statement that the item stands for.
     pub(crate) part: Part,
-    /// The `.loc` in force: an index into [`Flat::locs`].
+    /// The `.loc` in force: an index into [`ExpandedSource::locs`].
     pub(crate) loc: u32,
     /// `.schedule on` is in force.
     pub(crate) scheduled: bool,
-    /// `.contract on` is in force; `None` if a file of the library excludes it for its macros.
+    /// `.contract on` is in force; `None` if a library file exempts its macros.
     pub(crate) contracted: Option<bool>,
     /// Transformations that `.fast` allows.
     pub(crate) fast: Fast,
@@ -56,15 +56,15 @@ pub(crate) struct Item {
 pub(crate) enum Part {
     /// The statement as a whole.
     All,
-    /// A piece of an equation that uses macros: an index into [`Flat::pieces`].
+    /// A piece of an equation that uses macros: an index into [`ExpandedSource::pieces`].
     Piece(u32),
-    /// The beginning of a `.for`'s loop: an index into [`Flat::loops`].
+    /// The beginning of a `.for`'s loop: an index into [`ExpandedSource::loops`].
     Begin(u32),
     /// The end of a `.for`'s loop.
     End(u32),
 }
 
-/// A line, and the columns of the part that counts, if not the whole line.
+/// A line, and the columns of the relevant part, unless that is the whole line.
 pub(crate) type SourcePlace = (Location, Option<Columns>);
 
 /// Transformations of equations that `.fast` allows although they change the rounding.
@@ -131,7 +131,7 @@ pub(crate) struct ExpandedSource {
     pub(crate) timing: Vec<Timing>,
     /// Each `.range`: its scope, and the directive.
     pub(crate) ranges: Vec<(AstPlace, u32)>,
-    /// The `.ports` directive: true if `latched`, and its place.
+    /// The `.ports` directive: whether it says `latched`, and its place.
     pub(crate) ports: Option<(bool, Span)>,
     /// The lines of each `.loc`; the first stands for no `.loc`.
     pub(crate) locs: Vec<Vec<Option<SourcePlace>>>,
@@ -167,7 +167,7 @@ pub(crate) enum FrameKind {
     /// Index of a file, and the `.loc` that was in force where it is included.
     File(usize, u32),
     Macro,
-    /// A repetition: name, present and last value of the counter, first statement, and enclosing scope.
+    /// A repetition: name, current and last value of the counter, first statement, and enclosing scope.
     Rep {
         variable: NameId,
         value: i64,
@@ -195,7 +195,7 @@ pub(crate) struct Expander<'l> {
     pub(crate) loader: &'l dyn Loader,
     pub(crate) flat: ExpandedSource,
     pub(crate) frames: Vec<Frame>,
-    /// Counted loops that run around the present statement, each with its place.
+    /// Counted loops at run time around the current statement, each with its place.
     pub(crate) nest: Vec<(u32, Span)>,
     pub(crate) section: Section,
     pub(crate) loc: u32,
@@ -390,7 +390,7 @@ impl<'l> Expander<'l> {
             StatementKind::Directive(directive) => {
                 let ast = Rc::clone(&self.context.asts[at.ast as usize]);
                 self.context.again = self.is_again(at, &ast, &ast.directives[directive as usize]);
-                // Errors are reported already; the walk goes on.
+                // Errors have been reported; the walk goes on.
                 let _ = self.directive(at, &ast, directive, index);
                 self.context.again = false;
             }
@@ -444,7 +444,7 @@ impl<'l> Expander<'l> {
         Ok(())
     }
 
-    /// The most iterations of a loop.
+    /// The value of a limit on a loop's iterations.
     fn iterations(&mut self, at: AstPlace, value: Expr) -> Result<u32, ErrorReported> {
         let number = self.context.integer(at, value)?;
         u32::try_from(number).ok().filter(|number| *number > 0).ok_or_else(|| {
@@ -462,7 +462,7 @@ impl<'l> Expander<'l> {
         let id = LabelId(self.context.declared.labels.len() as u32);
         let space = space_of(self.section);
         let binding = if self.section == Section::Data { Binding::Data(id) } else { Binding::Code(id) };
-        // A label whose name is made of a count is unique by that, and can be reached from everywhere.
+        // A label whose name is a template is unique through the template's values, and can be reached from everywhere.
         let Scope { owner, labels, .. } = *self.context.scopes.scope(at.scope);
         let is_local = self.section != Section::Data && label.name.resolve().is_ok();
         let scope = if is_local { labels } else { owner };
@@ -652,7 +652,7 @@ impl<'l> Expander<'l> {
         Ok(())
     }
 
-    /// Leaves words of data memory free.
+    /// Reserves words of data memory (`.space`).
     fn space(&mut self, at: AstPlace, words: Expr, span: Span) -> Result<(), ErrorReported> {
         self.data_section(at, span)?;
         let count = self.context.integer(at, words)?;

@@ -37,7 +37,7 @@ impl Table {
         }
     }
 
-    /// An array of these sizes holds the file's rows as its own.
+    /// The sizes match the file's numbers, and the last size its columns.
     pub(crate) fn fits(&self, sizes: &[u32]) -> bool {
         let words: usize = sizes.iter().map(|size| *size as usize).product();
         let last = sizes.last().map_or(0, |size| *size as usize);
@@ -67,12 +67,12 @@ fn number(cell: &str) -> Option<NodeKind> {
         return Some(NodeKind::Int(value));
     }
     let value = cell.parse::<f64>().ok()?;
-    // Accept infinity only where it is written.
+    // Accept infinity only if it is spelled out, not as the result of an overflow.
     let is_named = cell.contains(['n', 'N']);
     (value.is_finite() || is_named).then_some(NodeKind::Real(value))
 }
 
-/// The message and help for a cell that is no number.
+/// The message and help for a cell that is not a number.
 fn mistake(cell: &str) -> (String, &'static str) {
     let help = match cell {
         "" => "each row has a number in each column",
@@ -106,7 +106,7 @@ impl Expander<'_> {
         let source = self.context.reports.sources.files()[file].clone();
         let mut ast = Ast::default();
         let parsed = self.parse_numbers(&source, &mut ast, span);
-        // Trees and files are numbered alike.
+        // Trees and their files share one numbering.
         self.context.asts.push(Rc::new(ast));
         self.origins.push(id.clone());
         let (values, columns) = parsed?;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Equations between slices: a loop over their elements, for each index that is a slice.
 //!
-//! All values are those from before the equation. As elements are written one after the other, an array on both sides must be either
-//! the same elements, or moved along by a constant: then the loop runs in the direction in which an element is read before it is
-//! written.
+//! All values are read as they were before the equation. As elements are written one after the other, an array on both sides must
+//! have the same subscripts, or subscripts shifted by a constant: then the loop runs in the direction in which each element is read
+//! before it is written.
 
 use crate::context::loops::AffineInteger;
 use crate::context::{AstPlace, Binding, Context, ErrorReported};
@@ -46,7 +46,7 @@ impl Context {
         text.strip_prefix(':').map_or_else(|| text.to_owned(), |number| format!("slice.{number}"))
     }
 
-    /// The present value of an index that is a slice, the `number`-th of its element.
+    /// The current value of an index that is a slice, the `number`-th of its element.
     pub(crate) fn slice_index(
         &mut self,
         at: AstPlace,
@@ -93,7 +93,7 @@ impl Context {
 }
 
 impl Expander<'_> {
-    /// Opens the next loop of an equation between slices. False if all loops are open.
+    /// Opens the next loop of an equation between slices. Returns false if all loops are open.
     pub(crate) fn slice_loop(
         &mut self,
         at: AstPlace,
@@ -280,7 +280,7 @@ impl Expander<'_> {
         Ok(None)
     }
 
-    /// Elements must be written from the last to the first.
+    /// The loop must write elements from the last to the first.
     fn direction(&mut self, at: AstPlace, ast: &Ast, equation: &Equation) -> Result<bool, ErrorReported> {
         let mut ways: [Option<Span>; 2] = [None, None];
         for target in &equation.targets {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Arrays of data memory, counted loops, and the element that each access touches: a scheduler needs these to tell accesses
-//! apart.
+//! Arrays of data memory, counted loops, and the element that each access touches, by which the scheduler tells accesses apart.
 
 use crate::ir::{Ir, LabelId, Operation};
 use crate::loops::LoopCount;
@@ -38,7 +37,7 @@ pub struct Array {
 }
 
 /// A counted loop. Its body is the bundles from `head` up to `end`, which control enters at `head` only and leaves at `end` only,
-/// but for calls.
+/// except for calls.
 #[derive(Clone, Copy, Debug)]
 pub struct Loop {
     /// Index of the first bundle of the body. Bundles before it compute the values that the loop needs once.
@@ -63,11 +62,11 @@ pub struct Loop {
 pub struct ArrayAccess {
     /// Array that the access stays in.
     pub array: ArrayId,
-    /// The word, from the array's first one; `None` if it depends on more than the iterations of the loops around.
+    /// The word, from the array's first one; `None` if it depends on more than the iterations of the enclosing loops.
     pub word: Option<Affine>,
 }
 
-/// An affine function of iteration numbers, which count from 0 each time a loop is entered: of the loops around, unless said otherwise.
+/// An affine function of iteration numbers, which count from 0 each time a loop is entered: of the enclosing loops, unless said otherwise.
 #[derive(Clone, PartialEq, Eq, Hash, Debug)]
 pub struct Affine<L = LoopId> {
     /// The value where all iteration numbers are 0.
@@ -134,7 +133,7 @@ impl<L: Copy + Ord> Affine<L> {
 }
 
 impl Ir {
-    /// The array element that an operation accesses, if its address is such an element's.
+    /// The array element that an operation accesses; `None` for other addresses.
     pub fn access(&self, operation: &Operation) -> Option<&ArrayAccess> {
         operation.access.map(|AccessId(access)| &self.accesses[access as usize])
     }

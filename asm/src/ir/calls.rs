@@ -10,9 +10,9 @@ use takt_isa::Effect;
 /// The calls of a program whose labels have their positions.
 pub(crate) struct Calls<'r> {
     runs: &'r [Run],
-    /// Calls in ascending order: the bundle, and the run that it leads to.
+    /// Calls in ascending order: the bundle, and the run that it calls.
     calls: Vec<(usize, usize)>,
-    /// By run: the runs that control goes to from its end, apart from subroutines.
+    /// By run: its successors, apart from subroutines.
     next: Vec<Vec<usize>>,
 }
 
@@ -37,7 +37,7 @@ impl<'r> Calls<'r> {
                 let Some(&target) = starts.get(&target) else { continue };
                 match operation.row().effect {
                     Effect::Call => calls.push((run.end - 1, target)),
-                    // Control comes to the end of a loop's body by itself.
+                    // Execution reaches the end of a loop's body by falling through.
                     Effect::Loop => {}
                     _ => to.push(target),
                 }
@@ -59,13 +59,13 @@ impl<'r> Calls<'r> {
         &self.calls[first..end]
     }
 
-    /// The calls of a run: the bundle of each, and the run that it leads to.
+    /// The calls of a run: the bundle of each, and the run that it calls.
     pub(crate) fn of(&self, run: usize) -> impl Iterator<Item = (usize, usize)> {
         let Run { start, end, .. } = self.runs[run];
         self.from(&(start..end)).iter().copied()
     }
 
-    /// The runs that control goes to from the end of a run, apart from subroutines.
+    /// The successors of a run, apart from subroutines.
     pub(crate) fn after(&self, run: usize) -> impl Iterator<Item = usize> {
         self.next[run].iter().copied()
     }
@@ -83,7 +83,7 @@ impl<'r> Calls<'r> {
         ranges
     }
 
-    /// The chain of calls, given as their bundles, by which control may come from one stretch of bundles to another; `None` without
+    /// The chain of calls, given as their bundles, by which execution may pass from one stretch of bundles to another; `None` without
     /// such a chain.
     pub(crate) fn chain(&self, from: &Range<usize>, to: &Range<usize>) -> Option<Vec<usize>> {
         let reached = self.reached(from);
@@ -104,8 +104,8 @@ impl<'r> Calls<'r> {
         Some(chain)
     }
 
-    /// By run that calls from a stretch of bundles may lead to: the run that control came from, except for the first call, and the
-    /// call if control came by one.
+    /// By run that is reachable through the calls in a stretch of bundles: the predecessor on the path, except for the first call, and the
+    /// call if the path enters the run by one.
     #[allow(clippy::type_complexity)]
     fn reached(&self, stretch: &Range<usize>) -> Vec<Option<(Option<usize>, Option<usize>)>> {
         let mut reached = vec![None; self.runs.len()];

@@ -7,15 +7,15 @@ use crate::ir::{Ir, Operation, RegisterId};
 use std::collections::HashMap;
 use takt_isa::Effect;
 
-/// Estimated frequency of a bundle of the period relative to one of `.once`, and of one in a loop relative to one outside: guesses
-/// that only weigh copies.
+/// Estimated frequency of a bundle of the period relative to a bundle of `.once`, and of a bundle in a loop relative to a bundle
+/// outside: rough guesses, used only to weigh copies.
 const PERIOD: u64 = 64;
 const LOOP: u32 = 3;
 const LOOPS: u32 = 4;
 
 /// The control flow of a program.
 pub(crate) struct Flow {
-    /// By run: the runs that control may come from.
+    /// By run: its predecessors.
     sources: Vec<Vec<usize>>,
     /// Runs after which every register counts as read: control stops there, and a debugger can look at registers.
     ends: Vec<usize>,
@@ -136,7 +136,7 @@ fn once(ir: &Ir, jumps: &[(usize, usize, Effect)]) -> usize {
 fn weights(ir: &Ir, jumps: &[(usize, usize, Effect)]) -> Vec<u64> {
     let mut deeper = vec![0i64; ir.bundles.len() + 1];
     for &(at, to, effect) in jumps.iter().filter(|&&(at, to, _)| to <= at) {
-        // The period as a whole is no loop; a call of earlier code makes none either.
+        // Neither the period as a whole nor a call of earlier code is a loop.
         if matches!(effect, Effect::Jump | Effect::BranchZero | Effect::BranchNonzero | Effect::Loop) {
             deeper[to] += 1;
             deeper[at + 1] -= 1;

@@ -9,7 +9,7 @@ use takt_isa::{SlotIndex, Slots};
 pub(crate) struct Conflict {
     /// The operations, by index, ascending.
     pub(crate) operations: Vec<usize>,
-    /// Slots that can take any of them.
+    /// Slots that can take at least one of the operations.
     pub(crate) slots: Slots,
 }
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The program between names and words: bundles of operations on virtual registers.
 //!
-//! [`resolve`](crate::resolve) makes it, a scheduler may rearrange it, [`allocate`](crate::emit::allocate) gives its registers
-//! addresses, and `emit` makes its words. Invariants at every stage:
+//! [`resolve`](crate::resolve) builds it, the scheduler may rearrange it, [`allocate`](crate::emit::allocate) gives its registers
+//! addresses, and `emit` encodes it. Invariants at every stage:
 //!
 //! * a bundle has at least one operation and no two that claim one slot; on a machine with one slot it has exactly one;
 //! * all operations of a bundle read before any writes; bundles execute in the order of [`Ir::bundles`], and
@@ -38,7 +38,7 @@ impl RegisterId {
     /// The register that always reads as zero: the first of every program.
     pub const ZERO: RegisterId = RegisterId(NonZeroU32::MIN);
 
-    /// The register of an index. Indices are below 2³² - 1.
+    /// The register with an index. Indices are below 2³² - 1.
     #[inline]
     pub const fn new(index: usize) -> RegisterId {
         match NonZeroU32::new(index as u32 + 1) {
@@ -82,11 +82,11 @@ pub struct VirtualRegister {
     pub name: String,
     /// Role of the register.
     pub kind: RegisterKind,
-    /// Type as which debuggers show the bits.
+    /// Type by which debuggers show the bits.
     pub ty: Type,
     /// Address that the source gives the register.
     pub pinned: Option<Register>,
-    /// Bits that the loader writes, if the source says so. A constant's bits are in its kind.
+    /// Bits that the loader writes, if the source has a preset. A constant's bits are in its kind.
     pub preset: Option<u32>,
     /// Place of the declaration, or of a constant's first use.
     pub span: Span,
@@ -111,8 +111,8 @@ pub enum Constant {
     Raw(u32),
 }
 
-/// The source line that an operation is attributed to, and the part of it where the source says it (`.loc`), in eight bytes, as
-/// every operation has one. [`Ir::location`] and [`Ir::columns`] read it.
+/// The source line that an operation is attributed to, and the part of the line if `.loc` states it. Eight bytes, since every
+/// operation has one. [`Ir::location`] and [`Ir::columns`] read it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Attribution {
     /// Index of the file, or [`Attribution::NO_FILE`], or [`Attribution::PART`].
@@ -157,7 +157,7 @@ pub struct Operation {
     pub(crate) attribution: Attribution,
     /// Place in the source.
     pub span: Span,
-    /// The use of a macro, or iteration of a repetition, that made the operation; 0 if it stands in the source itself.
+    /// The use of a macro, or iteration of a repetition, that made the operation; 0 if the source contains it directly.
     pub expansion: u32,
     /// The assembler made the operation, for the source's operation at the same place.
     pub made: bool,
@@ -169,9 +169,9 @@ pub struct Operation {
 }
 
 impl Operation {
-    /// Value of [`Operation::written`] for an operation that no tree has: it computes a part of an equation, where its span is.
+    /// Value of [`Operation::written`] for an operation outside of every tree: it computes the part of an equation at its span.
     pub(crate) const COMPUTED: u32 = u32::MAX;
-    /// Least number of computed operations that have numbers of their own, because something is known of them.
+    /// Lowest number of computed operations that need distinct numbers, because type evidence refers to them.
     pub(crate) const FIRST_COMPUTED: u32 = 1 << 31;
 
     /// An operation without operands; it executes in the first of the slots unless another is chosen.
@@ -329,9 +329,9 @@ impl Label {
 pub struct LoopBound {
     /// Index of the bundle that heads the loop.
     pub position: u32,
-    /// The most iterations each time that the loop is entered.
+    /// Maximum number of iterations each time the loop is entered.
     pub most: u32,
-    /// The most iterations in one section, from reset or a tick to the next `wait`; `None` if the source does not say.
+    /// Maximum number of iterations in one section, from reset or a tick to the next `wait`; `None` if the source does not state it.
     pub total: Option<u32>,
 }
 
@@ -401,9 +401,9 @@ pub struct Ir {
     pub latched: bool,
     /// Outputs with a number in the source, by number: `@ 3`, or the number of the named register.
     pub numbers: BTreeMap<u16, RegisterId>,
-    /// The scheduler may move some bundle.
+    /// The scheduler may move at least one bundle.
     pub scheduled: bool,
-    /// Several slots may execute some operation, or could before operations changed.
+    /// Several slots may execute at least one operation, or could before operations changed.
     pub(crate) has_choices: bool,
     /// Initial words of data memory.
     pub data: Vec<u32>,
@@ -443,7 +443,7 @@ impl Ir {
         }
     }
 
-    /// Part of the source line, where the source says it (`.loc`).
+    /// Part of the source line, if `.loc` states it.
     #[inline]
     pub fn columns(&self, operation: &Operation) -> Option<Columns> {
         let Attribution { file, line } = operation.attribution;

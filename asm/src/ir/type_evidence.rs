@@ -37,7 +37,7 @@ impl Kind {
         }
     }
 
-    /// The type, or `other` for untyped bits: for bits that are taken as a value of a type.
+    /// The kind; `other` for untyped bits and for values not yet written.
     pub(crate) fn or(self, other: Kind) -> Kind {
         match self {
             Kind::None | Kind::Any if other != Kind::None => other,
@@ -97,11 +97,11 @@ pub(crate) enum TypeEvidence {
 }
 
 impl TypeEvidence {
-    /// Evidence from a constant where any bits are taken; `is_address` tells an address.
+    /// Evidence from a constant as an operand that takes any bits; `is_address` marks the address of a label.
     pub(crate) fn literal(value: Value, is_address: bool, span: Span) -> TypeEvidence {
         let (kind, what) = match value {
             Value::Int(_) if is_address => (Kind::Int, TypeOrigin::Address),
-            // The pattern of an ordinary number, as `bits(0.5)` gives it, may be either.
+            // The bits of an ordinary number, such as `bits(0.5)`, may be of either type.
             Value::Int(int) => {
                 let bits = f32::from_bits(int as u32);
                 let kind = if bits.is_subnormal() || bits.is_nan() { Kind::Int } else { Kind::Any };

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Disassembly: source text that assembles to the same program, bit for bit.
 //!
-//! Every register has its place (`@`), every operation its line (`.loc`). A word that the assembler would not put where it
-//! stands, because it is no instruction or stands in the wrong slot, is written bit by bit (`.raw`).
+//! Every register has its place (`@`), every operation its line (`.loc`). A word that the assembler would not put into its slot,
+//! because it encodes no instruction or stands in the wrong slot, is written bit by bit (`.raw`).
 
 use std::collections::HashMap;
 use std::fmt::Write as _;
@@ -76,7 +76,7 @@ impl<'p> Writer<'p> {
         }
     }
 
-    /// Writes a line of text; a `String` takes all.
+    /// Writes a line of text; writing to a `String` cannot fail.
     fn line(&mut self, line: std::fmt::Arguments<'_>) {
         let _ = self.text.write_fmt(line);
         self.text.push('\n');
@@ -211,7 +211,7 @@ impl<'p> Writer<'p> {
         format!(".raw {} 0x{word:012x}", self.program.machine.slot(slot).name)
     }
 
-    /// The text of a word, if the assembler would put this text's word into this slot.
+    /// The text of a word, if the assembler would put the text's word into this slot.
     fn operation(&self, word: u64, slot: SlotIndex) -> Option<String> {
         let machine = self.program.machine;
         let instruction = Instruction::decode(word).ok()?;
@@ -282,7 +282,7 @@ fn quoted(text: &str) -> String {
             '"' | '\\' => quoted.extend(['\\', c]),
             '\n' => quoted.push_str("\\n"),
             '\r' => quoted.push_str("\\r"),
-            // Characters in a file's name that a terminal would obey become visible.
+            // Escape characters that control a terminal, which a file's name may contain.
             c => push_visible(&mut quoted, c),
         }
     }

@@ -2,8 +2,8 @@
 //! `takt fmt`: lays out a source in the columns of the shipped programs.
 //!
 //! Only blanks change, and only between tokens: the assembler reads the same. Labels stand in the first column, instructions in
-//! [`CODE`], their operands in the second such column, comments behind code in [`COMMENT`] or, where the code is longer, behind
-//! it. Operands of directives and macros are tables as often as lists: their inner blanks remain. A bundle or directive that
+//! [`CODE`], their operands [`CODE`] columns further, comments after code in [`COMMENT`] or, where the code is longer, right after
+//! it. Operands of directives and macros are often tables rather than lists: their inner blanks remain. A bundle or directive that
 //! cannot be read is left unchanged, on all its lines.
 
 use std::collections::BTreeSet;
@@ -16,7 +16,7 @@ use takt_syntax::tokens::{Token, TokenKind, lines};
 
 /// Column of instructions, and distance from there to their operands.
 pub const CODE: usize = 8;
-/// Column of comments behind code.
+/// Column of comments after code.
 pub const COMMENT: usize = 40;
 
 /// Lays out a source. Laying it out again changes nothing.
@@ -29,7 +29,7 @@ pub fn format(text: &str) -> String {
     let ast = parse::parse(&sources.files()[file].clone(), &mut names, &mut sink);
     let broken: BTreeSet<u32> = ast.broken.into_iter().collect();
     let mut out = String::with_capacity(text.len() + text.len() / 8);
-    // The present statement: whether it continues, and whether it could not be read.
+    // The current statement: whether it continues, and whether it could not be read.
     let (mut continues, mut keep) = (false, false);
     for ((number, line), tokens) in (1..).zip(text.split('\n')).zip(lines(text)) {
         let mut code = tokens.iter().filter(|token| token.kind != TokenKind::Comment);

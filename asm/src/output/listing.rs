@@ -13,7 +13,7 @@ use takt_isa::{Instruction, Program, SlotIndex, Type};
 use takt_syntax::expr::Value;
 
 /// The listing of an assembled program: for each bundle its address, its words in the order of the slots, and the source lines that
-/// they come from. An operation that a macro, a repetition or the assembler made is disassembled, behind a `+`; so is an operation
+/// they come from. An operation made by a macro, a repetition or the assembler is disassembled, after a `+`; so is an operation
 /// that computes a part of an equation, with that part. A line begins with the slots of its operations that another slot could have
 /// taken.
 pub fn listing(assembled: &AssembledProgram) -> String {
@@ -48,7 +48,7 @@ impl<'a> Lister<'a> {
         Lister { program, assembled, files, filler, text: String::new() }
     }
 
-    /// Writes a line of text; a `String` takes all.
+    /// Writes a line of text; writing to a `String` cannot fail.
     fn line(&mut self, line: std::fmt::Arguments<'_>) {
         let start = self.text.len();
         let _ = self.text.write_fmt(line);
@@ -176,7 +176,7 @@ impl<'a> Lister<'a> {
 
     fn source(&self, location: Location) -> Option<String> {
         let (text, lines) = self.files.get(location.file as usize)?.as_ref()?;
-        // Tabs would lose the alignment; a listing is no place for a line of a megabyte.
+        // Replace tabs, which would break the alignment, and cut long lines, which may be a megabyte long.
         let line = lines.text(text, location.line)?.trim().replace('\t', " ");
         Some(line.chars().take(160).collect())
     }
@@ -255,7 +255,7 @@ pub struct SymbolMap {
 pub struct Label {
     /// Name of the label.
     pub name: String,
-    /// Memory that it points into.
+    /// Memory that the label points into.
     pub space: Space,
     /// Address of the bundle or data word.
     pub address: u32,
@@ -273,7 +273,7 @@ pub struct Register {
     /// Number of a port; `None` for other registers.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub number: Option<u16>,
-    /// Type as which debuggers show the bits.
+    /// Type by which debuggers show the bits.
     #[serde(rename = "type")]
     pub ty: Type,
 }

@@ -36,7 +36,7 @@ pub struct Names {
     pub positions: Vec<Option<Position>>,
     /// Uses of macros. The first stands for the code outside of macros.
     pub scopes: Vec<Scope>,
-    /// Values of names that stand for one register here and another there.
+    /// Values of names whose register differs from place to place.
     pub values: Vec<NamedValue>,
     /// Arrays in data memory.
     pub arrays: Vec<NamedArray>,
@@ -83,10 +83,10 @@ pub struct NamedValue {
     pub label: String,
     /// Register that holds the value.
     pub register: Register,
-    /// Type as which debuggers read the bits.
+    /// Type by which debuggers read the bits.
     pub ty: Type,
-    /// Range of source order in which the name means this value: above the first, up to the second. `None`: everywhere that it
-    /// means no other value.
+    /// Range of source order in which the name means this value: above the first, up to the second. `None`: wherever the name means
+    /// no other value.
     pub orders: Option<(u32, u32)>,
     /// Bundles of the first write and the last use, if the register may hold other values elsewhere.
     pub bundles: Option<(BundleAddress, BundleAddress)>,

@@ -13,7 +13,7 @@ use takt_syntax::ast::Operator;
 use takt_syntax::ast::*;
 use takt_syntax::name::NameRef;
 
-/// The most nodes of expressions, and of the arguments that they name, to search for a label.
+/// Limit on the nodes of expressions, and of the arguments that they name, that are searched for a label.
 const NODES: u32 = 1 << 12;
 
 /// The table into which an expression points.

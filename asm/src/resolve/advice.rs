@@ -97,7 +97,7 @@ impl Resolver<'_> {
     }
 }
 
-/// Adds the library file that defines the missing macro.
+/// Adds the library file that defines the missing macro to an error.
 pub(crate) fn from_library(error: Diagnostic, file: &str) -> Diagnostic {
     let line = format!(".include <{file}>");
     error.help(format!("the library defines it: `{line}`")).missing([line])

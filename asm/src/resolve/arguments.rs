@@ -2,8 +2,8 @@
 //! Arguments of macros against the types that their parameters ask for. A part of [`operand`](crate::resolve::operand).
 //!
 //! [`expand::macros`](crate::expand) finds the types. A register, an element or a whole array is checked where the body first uses
-//! it: by then the writes above it are known. Types that are known only later, as of a register that is written below, are left to
-//! the type check ([`Given::Asked`]).
+//! it: by then the writes above it are known. Types that are known only later, such as of a register written below, are left to
+//! the type check ([`TypeEvidence::Asked`]).
 
 use crate::context::{Argument, Binding, ErrorReported, ParameterType, words};
 use crate::ir::type_evidence::{Kind, OperandPosition, TypeEvidence};
@@ -15,26 +15,26 @@ use takt_isa::{Row, Type};
 use takt_syntax::expr::Value;
 
 impl Resolver<'_> {
-    /// The argument that the present operand stands for, and the type that its parameter asks for, if this is float or int.
+    /// The argument that the current operand stands for, and the type that its parameter asks for, if this is float or int.
     pub(super) fn parameter_type(&self) -> Option<(Argument, ParameterType, Type)> {
         let argument = self.context.declared.arguments[self.asked? as usize];
         let asked = argument.asked?;
         Some((argument, asked, asked.value()?))
     }
 
-    /// The type that the present operand's parameter asks for.
+    /// The type that the current operand's parameter asks for.
     pub(super) fn type_of_parameter(&self) -> Option<Type> {
         self.parameter_type().map(|(_, _, ty)| ty)
     }
 
-    /// Notes the type that the parameter asks for, of an operand whose type the instruction leaves open.
+    /// Records the type that the parameter demands for an operand whose type the instruction leaves open.
     pub(super) fn note_parameter_type(&mut self, operation: &Operation, part: OperandPosition) {
         if let (Some(ty), None) = (self.type_of_parameter(), self.cast) {
             self.context.declared.given.insert(operation, part, TypeEvidence::Asked(ty));
         }
     }
 
-    /// Checks that the parameter which an instruction's operand names has the type that the instruction takes.
+    /// Checks that the parameter that an instruction's operand names has the type that the instruction takes.
     pub(super) fn check_operand(
         &mut self,
         row: &Row,
@@ -62,7 +62,7 @@ impl Resolver<'_> {
         Err(self.context.report(scope, error.help(help)))
     }
 
-    /// Checks that the argument of the present operand has the type that the parameter asks for.
+    /// Checks that the argument of the current operand has the type that the parameter asks for.
     pub(super) fn check_argument(&mut self, kind: Kind) -> Result<(), ErrorReported> {
         let Some((argument, asked, wanted)) = self.parameter_type() else { return Ok(()) };
         let Some(ty) = kind.mistaken_for(wanted).filter(|_| self.cast.is_none()) else { return Ok(()) };
@@ -168,7 +168,7 @@ impl Resolver<'_> {
         (shown, text(asked.parameter), text(asked.of))
     }
 
-    /// A constant as a value of the type that the present operand's parameter asks for.
+    /// A constant as a value of the type that the current operand's parameter asks for.
     pub(super) fn value_of_parameter_type(
         &mut self,
         value: Value,

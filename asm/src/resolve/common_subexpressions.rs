@@ -67,7 +67,7 @@ impl CommonSubexpressions {
         self.writes.get(register.index()).copied().unwrap_or(0)
     }
 
-    /// The key of a subexpression, which may be valid in its equation only.
+    /// The key of a subexpression; with `own`, it is valid in its equation only.
     pub(crate) fn key(&self, op: Op, sources: [RegisterId; 3], own: bool) -> Key {
         let sources = sources.map(|register| (register, self.writes(register)));
         Key { op, sources, equation: if own { self.equation } else { 0 }, word: None }

@@ -24,7 +24,7 @@ use takt_syntax::expr::Value;
 #[derive(Clone, Debug)]
 pub(super) struct Word {
     pub(super) array: ArrayId,
-    /// Index of the word, from the array's first.
+    /// Index of the word relative to the array's first word.
     place: AffineInteger,
     pub(super) span: Span,
 }
@@ -268,7 +268,7 @@ impl Resolver<'_> {
     pub(super) fn store_results(&mut self, at: AstPlace) {
         for (word, value, span) in std::mem::take(&mut self.stores) {
             let mut line = CurrentEquation::new(self.line);
-            // Errors are reported already.
+            // Errors have been reported.
             let _ = self.store(at, &mut line, &word, value, span);
         }
     }
@@ -315,7 +315,7 @@ impl Resolver<'_> {
         Ok(TermForm::Register(register, Kind::Int))
     }
 
-    /// The affine function that an operator makes of functions of indices and integers; `None` if the result is not affine.
+    /// Applies an operator to functions of indices and to integers; `None` if the result is not affine.
     pub(super) fn counted_operation(
         &self,
         line: &mut CurrentEquation,

@@ -148,7 +148,7 @@ impl Resolver<'_> {
         }
     }
 
-    /// Notes the type of the value last written to a register.
+    /// Records the type of the value last written to a register.
     pub(super) fn set_kind(&mut self, id: RegisterId, kind: Kind) {
         if self.kinds.len() <= id.index() {
             self.kinds.resize(self.context.declared.registers.len().max(id.index() + 1), Kind::None);
@@ -199,7 +199,7 @@ impl Resolver<'_> {
         }
     }
 
-    /// Notes the type that a store leaves in its table, for the equations below.
+    /// Records the type that a store leaves in its table, for the equations below.
     pub(super) fn note_store(&mut self, operation: &Operation) {
         if operation.row().effect == Effect::Store
             && let Some((label, kind)) = self.table_kind(operation)
@@ -288,7 +288,7 @@ impl Resolver<'_> {
                     };
                     self.holding(at, value, expr, term.span, ty)?
                 }
-                // The caller has computed an expression's value.
+                // Does not occur: the caller has settled chains and functions of indices.
                 TermForm::Chain(..) | TermForm::Counted(_) => return Err(ErrorReported),
             };
             self.store(at, line, word, value, word.span)?;
@@ -366,7 +366,7 @@ impl Resolver<'_> {
     ) -> Result<RegisterId, ErrorReported> {
         let source = match term.form {
             TermForm::Register(register, _) => register,
-            // The caller has computed an expression's value.
+            // Does not occur: the caller has settled chains and functions of indices.
             TermForm::Chain(..) | TermForm::Counted(_) => return Err(ErrorReported),
             TermForm::Constant(value, expr) => self.holding(at, value, expr, term.span, ty)?,
         };
@@ -380,7 +380,7 @@ impl Resolver<'_> {
         Ok(register)
     }
 
-    /// Notes for the type check the type of the last operation's result, where its instruction leaves it open.
+    /// Records the type of the last operation's result for the type check, if its instruction leaves the type open.
     pub(super) fn note_computed(&mut self, kind: Kind) {
         let ty = match kind {
             Kind::Float => Type::F,

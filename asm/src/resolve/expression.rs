@@ -81,7 +81,7 @@ impl Computation<'_> {
         (self.node(index).span, ExprId { first: self.id.first + first, count: index - first + 1 })
     }
 
-    /// Value of the part that ends at a node.
+    /// A constant as the term of the part that ends at a node.
     fn constant(&self, value: Value, index: u32) -> Term {
         let (span, id) = self.place(index);
         Term { form: TermForm::Constant(value, id), span }
@@ -98,7 +98,7 @@ impl Computation<'_> {
         }
     }
 
-    /// Enters the chosen branch of a choice with a constant condition; false if no such choice has its first branch here.
+    /// Enters the chosen branch of a choice with a constant condition; returns false if no such choice has its first branch here.
     fn choose(&mut self, index: u32) -> bool {
         let Some(stretch) = self.stretches.last_mut() else { return false };
         if std::mem::replace(&mut stretch.chosen, false) {
@@ -209,7 +209,7 @@ impl Resolver<'_> {
         self.settled(at, line, value)
     }
 
-    /// Ends a stretch of nodes: of a sum, its turn is added, and the next begins.
+    /// Ends a stretch of nodes. For a sum, adds the term of this turn and begins the next turn.
     fn end_stretch(
         &mut self,
         line: &mut CurrentEquation,
@@ -248,7 +248,7 @@ impl Resolver<'_> {
         Ok(())
     }
 
-    /// Begins a sum, whose first node and call are given: in a counted loop, or a turn at a time.
+    /// Begins a sum, given its first node and its call: as a counted loop, or one turn at a time.
     fn start_sum(
         &mut self,
         at: AstPlace,
@@ -352,7 +352,7 @@ impl Resolver<'_> {
         Ok(run.constant(value, index))
     }
 
-    /// An operation on terms that are not all constant: of counted loops' variables, or of registers.
+    /// An operation on terms that are not all constant: on indices of counted loops, or on registers.
     fn operator_term(
         &mut self,
         at: AstPlace,
@@ -485,7 +485,7 @@ impl Resolver<'_> {
         self.apply(at, line, &text, terms, here, Kind::None)
     }
 
-    /// Computes a symbol between terms: by the instruction that has this form for the terms' types.
+    /// Applies an operator or function to terms: the instruction that has this form for the terms' types.
     pub(super) fn apply(
         &mut self,
         at: AstPlace,
@@ -505,7 +505,7 @@ impl Resolver<'_> {
         self.operate(at, line, symbol, &settled, here, wanted)
     }
 
-    /// Computes a symbol between settled terms, without the transformations of `.fast`.
+    /// Applies an operator or function to settled terms, without the transformations of `.fast`.
     pub(super) fn operate(
         &mut self,
         at: AstPlace,
@@ -579,7 +579,7 @@ impl Resolver<'_> {
                 TermForm::Constant(value, expr) => {
                     (self.holding(at, value, expr, term.span, ty)?, Kind::of(ty))
                 }
-                // The caller has computed an expression's value.
+                // Does not occur: the caller has settled chains and functions of indices.
                 TermForm::Chain(..) | TermForm::Counted(_) => return Err(ErrorReported),
             };
         }

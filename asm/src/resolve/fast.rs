@@ -13,7 +13,7 @@ use takt_syntax::ast::{ExprId, Operator};
 use takt_syntax::expr::{self, Value};
 
 impl Resolver<'_> {
-    /// The operand that a symbol computes where `.fast` allows a transformation; `None` if none applies.
+    /// Applies a symbol by a transformation that `.fast` allows; `None` if none applies.
     pub(super) fn fast(
         &mut self,
         at: AstPlace,

@@ -62,11 +62,11 @@ struct OpenLoop {
 struct ClosedLoop {
     /// Induction registers, which keep their last values.
     inductions: Vec<Induction>,
-    /// Register of the number of iterations, if it is not to be computed again.
+    /// Register of the number of iterations, if it is kept rather than computed again.
     number: Option<RegisterId>,
 }
 
-/// The counted loops around the present line.
+/// The counted loops around the current line.
 #[derive(Debug, Default)]
 pub(super) struct Nest {
     open: Vec<OpenLoop>,
@@ -252,7 +252,7 @@ impl Resolver<'_> {
         line: &mut CurrentEquation,
         id: LoopId,
     ) -> Result<(), ErrorReported> {
-        // A loop that could not begin is reported.
+        // A loop that could not begin has been reported.
         let Some(open) = self.nest.open.pop_if(|open| open.id == id) else { return Err(ErrorReported) };
         self.subexpressions.cut();
         let span = open.span;
@@ -413,7 +413,7 @@ impl Resolver<'_> {
         self.subexpressions.write(dest);
     }
 
-    /// The machine's instruction for counted loops, if it counts one more loop within those around.
+    /// The machine's instruction for counted loops, if it can count one more loop within the enclosing ones.
     fn counting(&self) -> Option<(Op, Slots)> {
         let machine = self.ir.machine;
         let op = with_effect(Effect::Loop).filter(|_| self.nest.open.len() < machine.loop_depth as usize)?;
@@ -482,7 +482,7 @@ impl Resolver<'_> {
             let known = self.nest.closed.get(&id).and_then(|closed| closed.inductions.iter().find(is_same));
             // The iterations left over share the loop's body, and so its registers.
             return known.map(|known| known.register).ok_or_else(|| {
-                // A loop that could not begin is reported.
+                // A loop that could not begin has been reported.
                 if self.context.reports.sink.errors > 0 {
                     return ErrorReported;
                 }

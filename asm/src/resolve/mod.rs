@@ -45,7 +45,7 @@ use takt_isa::spec::instructions::Function;
 use takt_isa::{Effect, Machine, Op, ROWS, Register, Slots, Type};
 use takt_syntax::ast::*;
 
-/// The most cycles that a demand on ports can name: many times what a program memory holds.
+/// Limit on the cycles that a demand on ports can name: many times the length of a program.
 const MAX_CYCLES: u32 = 1 << 24;
 
 /// Resolves the expanded source. Lines with mistakes are left out and reported.
@@ -114,7 +114,7 @@ pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: Expanded
     resolver.presets();
     resolver.ranges();
     for timing in std::mem::take(&mut resolver.flat.timing) {
-        // Errors are reported already.
+        // Errors have been reported.
         if let Ok(demand) = resolver.demand(&timing) {
             resolver.ir.demands.push(demand);
         }
@@ -215,11 +215,11 @@ pub(crate) struct Resolver<'c> {
     own_files: Vec<Option<u32>>,
     /// Number of labels that already have their position.
     label: usize,
-    /// The cast of the present operand, if the source has one.
+    /// The cast of the current operand, if the source has one.
     pub(crate) cast: Option<Type>,
-    /// The argument that the present operand stands for, if its parameter has a type.
+    /// The argument that the current operand stands for, if its parameter has a type.
     pub(crate) asked: Option<u32>,
-    /// Arguments whose types are reported to be wrong, with the place.
+    /// Arguments whose types have been reported as wrong, with the place.
     mistaken: HashSet<(u32, Span)>,
     /// Number of the latest computed operation with a number of its own; these count down.
     computed: u32,
@@ -227,23 +227,23 @@ pub(crate) struct Resolver<'c> {
     pub(crate) data_words: u32,
     /// The source declares more words than the machine has, which is reported.
     pub(crate) is_full: bool,
-    /// Types of tables, as far as the program is read.
+    /// Types of tables, from the part of the program read so far.
     pub(crate) tables: HashMap<LabelId, Kind>,
     /// Instructions by their form in equations.
     forms: Forms,
-    /// Type of the value last written to each register above the present line.
+    /// Type of the value last written to each register above the current line.
     kinds: Vec<Kind>,
     /// Subexpressions that are available.
     subexpressions: CommonSubexpressions,
-    /// Counted loops around the present line, and ended loops whose values are still needed.
+    /// Counted loops around the current line, and ended loops whose values are still needed.
     nest: Nest,
     /// Labels made by the assembler, numbered after the source's.
     made_labels: Vec<Label>,
     /// Elements of arrays in data memory that operands denote.
     words: Vec<Word>,
-    /// Elements that the present bundle writes, with the registers of their values.
+    /// Elements that the current bundle writes, with the registers of their values.
     stores: Vec<(Word, RegisterId, Span)>,
-    /// Attribution of the present line, and whether it is scheduled.
+    /// Attribution of the current line, and whether it is scheduled.
     line: (Attribution, bool),
     /// Number of turns of all sums so far.
     turns: usize,
@@ -296,14 +296,14 @@ impl Resolver<'_> {
     fn item(&mut self, item: &Item) {
         let ast = Rc::clone(&self.context.asts[item.at.ast as usize]);
         if matches!(item.part, Part::Begin(_) | Part::End(_)) {
-            // Errors are reported already.
+            // Errors have been reported.
             let _ = self.loop_part(item, &ast);
             return;
         }
         let (first, count) = match ast.statements[item.statement as usize].kind {
             StatementKind::Bundle(first, count) => (first, u32::from(count)),
             StatementKind::Equation(equation) => {
-                // Errors are reported already.
+                // Errors have been reported.
                 let _ = self.equation(item, &ast, equation);
                 return;
             }
@@ -313,7 +313,7 @@ impl Resolver<'_> {
         if let [one] = written {
             let location = self.location(item, (one.span, one.line), 0, 1);
             self.line = (location, item.scheduled);
-            // Errors are reported already.
+            // Errors have been reported.
             if let Ok(operation) = self.operation(item.at, &ast, first, 1, location) {
                 let operations = SmallVec::from_buf([operation]);
                 self.push(Bundle { operations, explicit: false, scheduled: item.scheduled });
@@ -326,7 +326,7 @@ impl Resolver<'_> {
         for (index, (operation, number)) in written.iter().zip(first..).enumerate() {
             let location = self.location(item, (operation.span, operation.line), index, written.len());
             self.line = (location, item.scheduled);
-            // Errors are reported already; other operations may have errors of their own.
+            // Errors have been reported; other operations may have errors of their own.
             if let Ok(operation) = self.operation(item.at, &ast, number, written.len(), location) {
                 operations.push(operation);
             }
@@ -402,7 +402,7 @@ impl Resolver<'_> {
         self.ir.bundles.push(bundle);
     }
 
-    /// Notes the types that a bundle writes, for the equations below.
+    /// Records the types that a bundle writes, for the equations below.
     fn note_results(&mut self, bundle: &Bundle) {
         let is_opaque = bundle.is_opaque();
         for operation in &bundle.operations {
@@ -629,7 +629,7 @@ impl Resolver<'_> {
                 continue;
             };
             for name in registers {
-                // Errors are reported already.
+                // Errors have been reported.
                 let Ok((members, ty)) = self.range_registers(at, *name, *placed) else { continue };
                 let mut end = |end: &Expr| {
                     let value = self.context.value(at, end.id)?;

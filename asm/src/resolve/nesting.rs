@@ -75,7 +75,7 @@ fn check_jumps(context: &mut Context, ir: &Ir, made: usize) {
     }
 }
 
-/// Refuses loops that call themselves: counters are registers, shared by all uses of the loop. True if there is one.
+/// Reports loops that call themselves: counters are registers, shared by all uses of the loop. Returns whether there are any.
 fn recurs(context: &mut Context, ir: &Ir, calls: &Calls<'_>) -> bool {
     let outermost = ir.loops.iter().filter(|counted| counted.parent.is_none());
     for counted in outermost {
@@ -113,7 +113,7 @@ struct Hardware<'a> {
     operation: &'a Operation,
 }
 
-/// Refuses loops beyond the sequencer's loop depth, counting the loops around them and around the calls that lead there.
+/// Reports loops beyond the sequencer's loop depth, which includes enclosing loops and those of callers.
 fn check_depth(context: &mut Context, ir: &Ir, runs: &[Run], calls: &Calls<'_>) {
     let loops = hardware(ir);
     let Some(depth) = Some(ir.machine.loop_depth as usize).filter(|_| !loops.is_empty()) else { return };
@@ -126,8 +126,8 @@ fn check_depth(context: &mut Context, ir: &Ir, runs: &[Run], calls: &Calls<'_>) 
     for at in 1..around.len() {
         around[at] += around[at - 1];
     }
-    // By run: the most loops around the calls that lead there, and the last of these calls. Counts saturate at one too many, so that
-    // recursion comes to an end.
+    // By run: the largest number of loops around the calls that lead there, and the last of these calls. Counts saturate at one too many,
+    // so that recursion comes to an end.
     let mut callers: Vec<(usize, Option<usize>)> = vec![(0, None); runs.len()];
     let mut left: Vec<usize> = (0..runs.len()).collect();
     while let Some(run) = left.pop() {

@@ -109,7 +109,7 @@ impl Resolver<'_> {
         Ok(())
     }
 
-    /// Notes the type that the source casts the last operand to.
+    /// Records the type that the source casts the last operand to.
     #[inline]
     fn note_cast(&mut self, operation: &Operation, part: OperandPosition) {
         if let Some(ty) = self.cast {
@@ -117,7 +117,7 @@ impl Resolver<'_> {
         }
     }
 
-    /// Notes the type of a constant where the instruction takes any bits.
+    /// Records the type of a constant where the instruction takes any bits.
     fn note_literal(&mut self, at: AstPlace, operand: Operand, operation: &Operation, part: OperandPosition) {
         let Ok(value) = self.operand_value(at, operand) else { return };
         let is_address = self.table_of(at, operand.kind).is_some();
@@ -336,7 +336,7 @@ impl Resolver<'_> {
         let (place, _, meaning) = self.meaning(at, operand)?;
         let array = match meaning {
             Some((_, Binding::Array(array))) => self.context.declared.arrays[array as usize].clone(),
-            // An index that is a running loop's needs an array.
+            // Only an array in data memory takes the index of a loop at run time.
             Some((id, Binding::None)) if self.varies(at, indices) => {
                 return Err(self.context.unknown(place.scope, id, name.span, NameRole::Array));
             }
@@ -396,7 +396,7 @@ impl Resolver<'_> {
         Ok(RegisterId::new(first.index() + number as usize))
     }
 
-    /// An index is a slice, or mentions the index of a loop that runs.
+    /// An index is a slice, or mentions the index of a loop at run time.
     fn varies(&self, at: AstPlace, indices: &[Vec<Node>]) -> bool {
         let is_index = |node: &Node| match node.kind {
             NodeKind::Name(name) => {
@@ -407,7 +407,7 @@ impl Resolver<'_> {
         indices.iter().flatten().any(is_index)
     }
 
-    /// The present value of an index that is a slice of an array of registers, whose loop is written out.
+    /// The current value of an index that is a slice of an array of registers, whose loop is written out.
     fn slice_constant(
         &mut self,
         at: AstPlace,
@@ -757,7 +757,7 @@ impl Resolver<'_> {
                 (value, given.span, RegisterId::ZERO)
             }
         };
-        // If the data does not fit, its addresses are no errors of their own.
+        // If the data does not fit, its addresses are not reported as well.
         if self.is_full && self.table_of(place, given.kind).is_some() {
             return Err(ErrorReported);
         }

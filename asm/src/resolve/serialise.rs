@@ -6,7 +6,7 @@ use takt_diagnostics::diag::Diagnostic;
 use takt_isa::Machine;
 use takt_isa::spec::instructions::Effect;
 
-/// Builds the diagnostic if it is to be reported.
+/// Builds a diagnostic on demand.
 pub(crate) type Explain<'o> = Box<dyn FnOnce(&[VirtualRegister], &Machine) -> Diagnostic + 'o>;
 
 /// The error of a bundle with two operations that write one register.

@@ -82,7 +82,7 @@ pub(super) fn share(ir: &mut Ir, made: &[RegisterId]) {
     }
 }
 
-/// Live ranges of registers, by their beginnings.
+/// Live ranges of registers, in the order of their starts.
 fn lives(ir: &Ir, made: &[RegisterId]) -> Vec<LiveRange> {
     let mut bundles: HashMap<RegisterId, Range<usize>> = HashMap::new();
     let mut is_made = vec![false; ir.registers.len()];

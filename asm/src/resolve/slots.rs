@@ -32,7 +32,7 @@ impl Resolver<'_> {
         Err(self.context.report(at.scope, error))
     }
 
-    /// The instruction and the slot of a mnemonic that names its slot, as `fadd.aux`.
+    /// The instruction and the slot of a mnemonic that names its slot, such as `fadd.aux`.
     pub(super) fn pinned(
         &mut self,
         at: AstPlace,

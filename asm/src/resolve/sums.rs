@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Sums as loops: their bounds depend on the index of a loop that runs. A part of [`expression`](crate::resolve::expression).
+//! Sums as loops: their bounds depend on the index of a loop at run time. A part of [`expression`](crate::resolve::expression).
 
 use crate::context::loops::{AffineInteger, Index, IterationLimitExceeded, SourceLoop, SourceLoopId};
 use crate::context::{AstPlace, ErrorReported, ScopeKind};

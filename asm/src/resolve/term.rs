@@ -11,7 +11,7 @@ use takt_diagnostics::source::Span;
 use takt_syntax::ast::ExprId;
 use takt_syntax::expr::Value;
 
-/// The present part of a line, and its expression.
+/// The current part of a line, and its expression.
 pub(super) type LineExpression = (Span, ExprId);
 
 /// The form of an operand in an equation.
@@ -23,7 +23,7 @@ pub(super) enum TermForm {
     Register(RegisterId, Kind),
     /// A sum or a product that is still to be computed: its index in the line, and its type.
     Chain(usize, Kind),
-    /// An affine function of the indices of loops that run: its index in the line.
+    /// An affine function of the indices of loops at run time: its index in the line.
     Counted(usize),
 }
 
@@ -79,6 +79,6 @@ impl CurrentEquation {
 #[derive(Clone, Debug)]
 pub(super) struct Chain {
     pub(super) is_product: bool,
-    /// Terms, each with true if it is subtracted; or factors.
+    /// Terms, each with a flag that is true if it is subtracted; or factors.
     pub(super) terms: Vec<(Term, bool)>,
 }

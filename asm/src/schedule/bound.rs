@@ -8,13 +8,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use takt_isa::timing::Reservation;
 use takt_isa::{Machine, SlotIndex, Slots};
 
-/// The most tail lengths that the bound of a resource tries as thresholds; of more, it takes an even sample.
+/// Limit on the tail lengths that the bound of a resource tries as thresholds; longer lists are sampled evenly.
 const TAILS: usize = 128;
 
-/// The most sets of slots, or of units, that are examined: far more than a machine's functions make.
+/// Limit on the sets of slots, or of units, that are examined: far more than a machine's functions make.
 const SETS: usize = 64;
 
-/// Lower bounds of a block's length, in cycles from its first issue to its last, both included. The largest counts.
+/// Lower bounds of a block's length, in cycles from its first issue to its last, both included. The largest is the bound.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Bound {
     /// Longest chain of dependent operations.
@@ -114,7 +114,7 @@ fn units_of<'p>(uses: impl Iterator<Item = &'p Reservation>) -> BTreeSet<usize> 
     uses.map(|usage| usage.unit.map(usize::from)).collect::<Option<BTreeSet<usize>>>().unwrap_or_default()
 }
 
-/// The given sets and the unions of overlapping ones, at most [`SETS`] in all.
+/// The given sets and the unions of overlapping ones, at most [`SETS`] in total.
 pub(super) fn unions(sets: impl Iterator<Item = BTreeSet<usize>>) -> Vec<BTreeSet<usize>> {
     let mut all: Vec<BTreeSet<usize>> = Vec::new();
     for set in sets.collect::<BTreeSet<_>>() {

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Budgets of the scheduler's searches, counted in steps. The clock plays no part: a program is scheduled alike everywhere.
+//! Budgets of the scheduler's searches, counted in steps rather than time, so that every computer finds the same schedule.
 //!
 //! A step is the visit of an edge, of a member of a constraint or of a cell of a reservation table, a nanosecond or two; placing a
 //! task is [`PLACING`] of them. Each search has a budget of its own, which grows with the effort, and draws it from a pool that all
-//! blocks, or all loops, of a program share, in all schedules that are tried for it. So one block may search as long as the effort
-//! says, and a program of any number of them takes a limited number of steps.
+//! blocks, or all loops, of a program share, in all schedules that are tried for it. So a single block may search as long as the
+//! effort allows, and a program with any number of blocks takes a limited number of steps.
 
 /// Steps that a unit of effort buys each search of a block, and the search for a loop's schedule.
 pub(super) const STEPS: u64 = 8_000_000;
 
-/// Steps for which the placing of a task in a list schedule counts.
+/// Steps charged for placing a task in a list schedule.
 pub(super) const PLACING: u64 = 40;
 
 /// Searches of a block: for list schedules, exact, and for late tasks.

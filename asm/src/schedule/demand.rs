@@ -13,7 +13,7 @@ use takt_diagnostics::diag::{Diagnostic, Sink};
 use takt_diagnostics::source::Span;
 use takt_isa::SlotIndex;
 
-/// The most pairs of reads and writes that the orders of a run may give: far more than programs use.
+/// Limit on the pairs of reads and writes that the orders of a run produce: far more than programs need.
 const ORDER_EDGES: usize = 1 << 16;
 
 /// Places of a chain of operations that an error points at.
@@ -150,7 +150,7 @@ impl<'a> Demands<'a> {
         &self.ir.register(port).name
     }
 
-    /// Adds the demands to a problem. False, with a report, if one cannot be met.
+    /// Adds the demands to a problem. Returns false, after a report, if a demand cannot be met.
     pub(super) fn apply(&self, block: &mut Block, sink: &mut Sink) -> bool {
         self.order(block, sink) && {
             let mut possible = true;
@@ -256,7 +256,7 @@ impl<'a> Demands<'a> {
         sink.push(error.note("operations wait for results, memory accesses, faults and other orders"));
     }
 
-    /// Lower bounds allow a write of the port by cycle `limit`; if not, the chain or the resource that prevents it is reported.
+    /// Checks that lower bounds allow a write of the port by cycle `limit`; otherwise reports the chain or the resource that prevents it.
     fn can_meet(
         &self,
         block: &Block,
@@ -388,7 +388,7 @@ fn later(cycles: u32) -> String {
     format!("allow cycle {cycles} or later, or compute less before it")
 }
 
-/// Topological sort of the tasks that otherwise keeps their order. False on a cycle.
+/// Topological sort of the tasks that otherwise keeps their order. Returns false on a cycle.
 fn sort(block: &mut Block) -> bool {
     let n = block.problem.tasks.len();
     let mut succs = vec![Vec::new(); n];

@@ -11,7 +11,7 @@ use takt_isa::{SlotIndex, Slots};
 /// free first.
 const FEW: usize = 32;
 
-/// For each register that several operations write, the slots that all of them may have.
+/// For each register that several operations write, the slots that suit all of them.
 pub(super) struct Domains {
     of: HashMap<RegisterId, Slots>,
 }

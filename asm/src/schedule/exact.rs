@@ -47,9 +47,9 @@ enum Branch {
 /// A decision of the search.
 #[derive(Clone, Copy)]
 enum Decision {
-    /// A task issues in the first cycle of its window; else later.
+    /// A task issues in the first cycle of its window; the alternative is a later cycle.
     Cycle(usize),
-    /// A task takes a choice of slots; else another.
+    /// A task takes a choice of slots; the alternative is another choice.
     Slots(usize, u8),
 }
 
@@ -69,7 +69,7 @@ impl Decision {
     }
 }
 
-/// The end of a search for a schedule of one length.
+/// Outcome of the search for a schedule of one length.
 enum SearchOutcome {
     Schedule(Plan),
     /// No schedule has this length.
@@ -257,7 +257,7 @@ impl ExactSearch<'_, '_> {
             decision.apply(&mut windows);
             while let Err(stop) = self.propagation.narrow(&mut windows) {
                 let Stop::Empty { task } = stop else { return SearchOutcome::Unknown };
-                // A choice of slots is tried without looking ahead, so its failure is no dead end.
+                // A choice of slots is tried without looking ahead, so its failure does not count as a dead end.
                 if !matches!(decisions.last(), Some((_, Decision::Slots(..)))) {
                     self.weights[task] += 1;
                     left -= 1;
@@ -309,7 +309,7 @@ mod tests {
     use takt_isa::SlotIndex;
     use takt_isa::timing::Reservation;
 
-    /// Exhaustive oracle: the tasks from the `placed`th on can all issue before `length`.
+    /// Exhaustive oracle: the tasks from index `placed` on can all issue before `length`.
     fn exists(problem: &Problem, length: u32, plan: &mut Vec<(u32, u8)>) -> bool {
         let placed = plan.len();
         let Some(task) = problem.tasks.get(placed) else { return true };
@@ -368,7 +368,7 @@ mod tests {
     }
 
     proptest! {
-        /// On problems that can be searched through: no schedule is shorter than the bound, and the bound is reached.
+        /// On problems small enough to search exhaustively: no schedule is shorter than the bound, and the bound is reached.
         #[test]
         fn finds_and_proves_the_shortest_schedule(problem in problem()) {
             let graph = Graph::new(&problem);

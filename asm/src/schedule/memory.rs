@@ -3,7 +3,7 @@
 //!
 //! An address is an offset plus the value of a register: a value number, and the sum of the constants added since. Two addresses
 //! with the same value number, or with constant values, are the same or different for certain. Elements of arrays are told apart by
-//! their array, and by their word if it is affine in the iterations of the loops around. Any other two may alias.
+//! their array, and by their word if it is affine in the iterations of the enclosing loops. Any other two may alias.
 
 use crate::ir::arrays::{Affine, ArrayAccess, LoopId};
 use crate::ir::{Constant, Ir, Operation, RegisterId, RegisterKind};
@@ -58,7 +58,7 @@ pub(super) struct Access {
 }
 
 impl Access {
-    /// Two accesses may touch the same word in one iteration of the loops around.
+    /// Two accesses may touch the same word in one iteration of the enclosing loops.
     fn may_be(&self, other: &Access) -> bool {
         let apart = match (&self.element, &other.element) {
             (Some(a), Some(b)) if a.array != b.array => true,
@@ -190,7 +190,7 @@ impl<'a> Memory<'a> {
 }
 
 impl Memory<'_> {
-    /// Notes the values of registers at the start of a loop's second iteration.
+    /// Records the values of registers at the start of a loop's second iteration.
     pub(super) fn start_iteration(&mut self, of: Option<LoopId>) {
         self.starts.clone_from(&self.values);
         self.second = of;

@@ -215,9 +215,9 @@ enum Wait {
 /// - A register is read before it is overwritten: in the same cycle at the latest, for a bundle reads before it writes.
 /// - Values for one register, ports included, are written in the source's order: the earlier is written back when the later issues.
 /// - Loads and stores that may touch the same word keep their order, except loads among loads.
-/// - A load or store whose address is not known may fault, and what was on the output ports before must be the same: outputs
-///   written before it in the source issue before it, outputs written after it not before it.
-/// - Operations that redirect control come last; operations that drain come when all is written.
+/// - A load or store whose address is not known may fault, and the output ports must then show the same values as in source order:
+/// outputs written before it in the source issue before it, outputs written after it not before it.
+/// - Operations that redirect control come last; operations that drain issue after all writebacks.
 struct Block {
     problem: Problem,
     /// The bundle of each task.
@@ -287,7 +287,7 @@ impl Block {
                     let varies = Some(operation).filter(|operation| task.varies(*operation));
                     edge(from, task.written(operation).unwrap_or(0), varies);
                 }
-                // The bundle itself wrote it.
+                // The value comes from the bundle itself.
                 (Wait::Written(_), None) => {}
                 (Wait::Cycles(distance), _) => edge(from, distance, None),
             };
@@ -368,7 +368,7 @@ impl Block {
     }
 
     /// The bundles of a schedule: tasks that issue in one cycle become one bundle. A gap that only a demand causes is filled
-    /// with idle bundles, for the machine would not wait.
+    /// with idle bundles, since the machine would not wait.
     fn pack(&self, old: &[Bundle], plan: &Plan) -> Vec<Bundle> {
         let start = &plan.start;
         let mut by_cycle: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
@@ -412,10 +412,10 @@ impl Block {
     }
 }
 
-/// The most choices of slots that the scheduler examines for a bundle.
+/// Limit on the choices of slots that the scheduler examines for a bundle.
 const CHOICES: usize = 120;
 
-/// The choices of slots for the operations of a bundle, the present one first; without domains, only the present one.
+/// The choices of slots for the operations of a bundle, the current one first; without domains, only the current one.
 fn choices(ir: &Ir, bundle: &Bundle, domains: Option<&Domains>) -> Vec<Vec<Option<SlotIndex>>> {
     let present: Vec<Option<SlotIndex>> = bundle.operations.iter().map(|operation| operation.slot).collect();
     let Some(domains) = domains else { return vec![present] };

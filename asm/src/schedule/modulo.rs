@@ -5,7 +5,7 @@
 //! Operations are placed in the order of their height, the longest path to the end of the iteration. An operation that finds
 //! no place displaces others, which are placed again. The interval is the least for which this succeeds.
 //!
-//! An operation that waits for nothing of its iteration, as a load by an induction register, can be placed as late as the readers of
+//! An operation that waits for no other of its iteration, such as a load by an induction register, can be placed as late as the readers of
 //! its value allow, after them (as in swing modulo scheduling, Llosa 1996): its value then takes a register for a few cycles, not for
 //! an interval.
 
@@ -21,7 +21,7 @@ use takt_isa::timing::{Reservation, Resource};
 /// Placements to try per interval, as a multiple of the number of tasks.
 const PLACEMENTS: usize = 12;
 
-/// The most schedules that are compared.
+/// Limit on the number of schedules that are compared.
 const ATTEMPTS: usize = 4;
 
 /// Precedence in a loop: `to` of the iteration that begins `iterations` later issues after `from`, by the edge's distance.
@@ -240,7 +240,7 @@ struct Placement<'p> {
     /// By task: edges to others, and from others.
     onwards: Vec<Vec<LoopEdge>>,
     before: Vec<Vec<LoopEdge>>,
-    /// By task: the accesses that it advances, or the task that advances it: the other task, the latency, and true if this task
+    /// By task: the accesses that it advances, or the task that advances it: the other task, the latency, and whether this task
     /// is the access.
     advanced: Vec<Vec<(usize, u32, bool)>>,
     /// By task and choice: the rows of the table that it takes, each with the cycles after its issue; `None` if it takes a row twice,

@@ -7,15 +7,15 @@ use takt_isa::timing::Reservation;
 /// Operations that issue in one cycle: a single operation, or an explicit bundle.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Task {
-    /// The number of its operations.
+    /// Number of operations in the task.
     pub(super) operations: usize,
     /// Reservations of the operations, once for each choice of slots.
     pub(super) uses: Vec<Reservation>,
-    /// Cycles from its issue to its last write of an output port, if it writes one.
+    /// Cycles from the task's issue to its last write of an output port, if there is one.
     pub(super) output: Option<u32>,
-    /// The last cycle in which it may issue.
+    /// The last cycle in which the task may issue; `None` without a deadline.
     pub(super) latest: Option<u32>,
-    /// Issue as late as the length of the schedule allows (`.late`).
+    /// The task issues as late as the length of the schedule allows (`.late`).
     pub(super) late: bool,
 }
 
@@ -42,7 +42,7 @@ impl Task {
         self.operation(index).map(|usage| usage.slot).collect()
     }
 
-    /// Cycles from its issue to the write of an operation's result, on the quickest of its slots.
+    /// Cycles from the task's issue to the writeback of an operation, on the quickest of its slots.
     pub(super) fn written(&self, index: usize) -> Option<u32> {
         self.operation(index).filter_map(|usage| usage.writeback).min()
     }
@@ -60,7 +60,7 @@ pub(super) struct Edge {
     pub(super) to: usize,
     /// Cycles between the issues; the least, if it is a latency that depends on a choice.
     pub(super) distance: u32,
-    /// The operation of the earlier task whose latency the distance is, if that depends on the choice of its slot.
+    /// The operation of the earlier task whose latency is the distance, if the latency depends on the choice of its slot.
     pub(super) latency_of: Option<usize>,
     /// Only the source demands the order: the machine would not wait.
     pub(super) demanded: bool,
@@ -80,8 +80,8 @@ pub(super) struct Problem {
 }
 
 impl Problem {
-    /// The subproblem of the tasks that `keep` selects, and a final task: the moment in which all kept tasks with a delay from
-    /// `ends` have passed it. Also returns each kept task's index in this problem.
+    /// The subproblem of the tasks that `keep` selects, and a final task, which issues once every kept task with a delay in `ends` has
+    /// passed it. Also returns each kept task's index in this problem.
     pub(super) fn subproblem(
         &self,
         keep: &[bool],

@@ -18,7 +18,7 @@ pub(super) enum Direction {
 /// Offset of write ports, which are held after the issue: it keeps their indices positive in a backward pass.
 const PORT_OFFSET: usize = takt_isa::spec::units::MAX_LATENCY as usize;
 
-/// Cells that are cleared in the time of a visit.
+/// Cells that are cleared in the time of one visit.
 const CLEARED: usize = 8;
 
 /// The cycles in which each resource is taken: slots, write ports, units.
@@ -51,7 +51,7 @@ impl Row {
         (0..).zip(&mut self.0).for_each(|(cycle, next)| *next = cycle);
     }
 
-    /// The first free cycle from one on, with path compression.
+    /// The first free cycle at or after `cycle`, with path compression.
     #[inline]
     fn free_from(&mut self, cycle: usize) -> usize {
         let mut free = cycle;
@@ -121,7 +121,7 @@ impl Reservations {
         })
     }
 
-    /// The first cycle from one on in which operations fit.
+    /// The first cycle at or after a cycle in which operations fit.
     pub(super) fn first_fit(
         &mut self,
         operations: &[Reservation],
@@ -170,7 +170,7 @@ mod tests {
     }
 
     proptest! {
-        /// The first fit is the cycle that trying each of them finds, however the table was filled.
+        /// The first fit equals the cycle found by trying one cycle after another, however the table was filled.
         #[test]
         fn the_first_fit_is_the_first(
             tasks in prop::collection::vec((prop::collection::vec(reservation(), 1..3), 0..20usize), 1..60),

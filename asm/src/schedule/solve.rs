@@ -36,7 +36,7 @@ pub(super) struct Solution {
 /// Cost of a schedule, compared lexicographically.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 struct Cost {
-    /// Cycles by which deadlines are missed, in all.
+    /// Total cycles by which deadlines are missed.
     tardy: u32,
     /// The length, but at least the allowed length.
     excess: u32,
@@ -47,13 +47,13 @@ struct Cost {
 /// Share of its slack, in quarters, that a task may wait for its preferred slot. Rounds cycle through these.
 const QUARTERS: [u32; 4] = [0, 1, 2, 4];
 
-/// A task in this many gets a random preference instead of the best schedule's slots.
+/// One task in this many gets a random preference instead of the best schedule's slots.
 const STRAY: u64 = 32;
 
 /// Edges that cost as much as placing a task: more than an operation has, except for loads and stores in great number.
 const EDGES: usize = 16;
 
-/// The most passes that improve one list schedule: far more than it takes to converge.
+/// Limit on the passes that improve one list schedule: far more than it takes to converge.
 const PASSES: u64 = 1000;
 
 impl Problem {
@@ -107,7 +107,7 @@ struct Search<'p> {
     /// Length up to which all schedules cost the same.
     allowed: u32,
     best: Option<(Cost, Plan)>,
-    /// Some task has a choice of slots. `lightest` is each task's choice with the least demand.
+    /// At least one task has a choice of slots. `lightest` is each task's choice with the least demand.
     has_choices: bool,
     lightest: Vec<u8>,
     /// The earliest cycle of each task.
@@ -129,7 +129,7 @@ impl Search<'_> {
         self.best.as_ref().is_some_and(|(cost, _)| is_bound(cost))
     }
 
-    /// Builds a schedule from priorities (small first), and improves it forward and backward until two rounds bring nothing.
+    /// Builds a schedule from priorities (small first), and improves it forward and backward until two rounds yield no improvement.
     /// Late tasks issue in cycle `release` or later. Returns whether the budget lasts for more.
     fn descend(&mut self, (mut key, lean): (Vec<u64>, SlotPreference), release: u32) -> bool {
         let n = self.graph.problem.tasks.len();

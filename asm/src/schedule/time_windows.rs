@@ -2,12 +2,12 @@
 //! Time windows of tasks for one length of the schedule, narrowed by constraint propagation.
 //!
 //! A window reaches from the first cycle in which a task may issue to the last. Propagators narrow it until they reach a fixed
-//! point. One follows the precedence edges. The others are cardinality constraints: of the tasks that need a slot, or whose
-//! results need a bank's write port, one at most has a cycle there, and of those that can choose among several slots as many as
-//! there are. Where tasks fill an interval of cycles (a Hall interval), no other can lie there: bounds consistency of the
+//! point. One follows the precedence edges. The others are cardinality constraints: in a cycle, at most one of the tasks that need a
+//! slot, or a bank's write port, can take it, and of the tasks that can choose among several slots at most as many as there are
+//! slots. Where tasks fill an interval of cycles (a Hall interval), no other can lie there: bounds consistency of the
 //! all-different constraint (López-Ortiz, Quimper, Tromp, van Beek, IJCAI 2003), and with a capacity that of the global
-//! cardinality constraint (Quimper, van Beek, López-Ortiz, Golynski, Sadjad, CP 2003). Propagation removes nothing that is in a
-//! schedule of that length: an empty window proves that there is none.
+//! cardinality constraint (Quimper, van Beek, López-Ortiz, Golynski, Sadjad, CP 2003). Propagation keeps every cycle that occurs in
+//! a schedule of that length: an empty window proves that no such schedule exists.
 
 use super::bound::unions;
 use super::graph::{Arc, Graph};
@@ -23,7 +23,7 @@ type Choices = u128;
 pub(super) struct TimeWindows {
     pub(super) first: Vec<i32>,
     pub(super) last: Vec<i32>,
-    /// Empty if no task of the problem has a choice.
+    /// By task; empty if no task of the problem has a choice.
     choices: Vec<Choices>,
 }
 
@@ -32,12 +32,12 @@ pub(super) struct TimeWindows {
 pub(super) enum Stop {
     /// Conflict: no schedule is left. The task has an empty window, or belongs to tasks that have too few cycles together.
     Empty { task: usize },
-    /// The allowed work is done. The windows stay as far narrowed as they are.
+    /// The allowed work is done; the windows stay partly narrowed.
     Spent,
 }
 
 impl TimeWindows {
-    /// The windows of a schedule of `length` cycles, and with `deadlines` of one that also meets these.
+    /// The initial windows of a schedule of `length` cycles; with `deadlines`, of a schedule that also meets these.
     pub(super) fn new(problem: &Problem, length: u32, deadlines: bool) -> TimeWindows {
         let end = length as i32 - 1;
         let latest = problem.tasks.iter().map(|task| task.latest.filter(|_| deadlines));
@@ -117,11 +117,11 @@ pub(super) struct Propagation<'g, 'p> {
     graph: &'g Graph<'p>,
     constraints: Vec<Constraint>,
     cardinality: Cardinality,
-    /// Some distance depends on a choice of slots.
+    /// At least one distance depends on a choice of slots.
     varies: bool,
     /// Edges and members visited: the work so far, in steps.
     pub(super) work: u64,
-    /// The work at which it stops.
+    /// Limit on `work`, at which propagation stops.
     pub(super) allowed: u64,
 }
 
@@ -199,7 +199,7 @@ fn constraints(problem: &Problem) -> Vec<Constraint> {
     slots.chain(ports).filter(|constraint| constraint.members.len() > 1).collect()
 }
 
-/// The operations that use a slot of a set, at the cycle after their issue that `offset` gives.
+/// The operations that use a slot of a set; `offset` gives the cycle of the use, counted from the issue.
 fn members(
     problem: &Problem,
     set: &BTreeSet<usize>,
@@ -265,7 +265,7 @@ struct Cardinality {
 }
 
 impl Cardinality {
-    /// Narrows the windows of a constraint's members. True if any changed.
+    /// Narrows the windows of a constraint's members. Returns whether any changed.
     fn narrow(&mut self, constraint: &mut Constraint, windows: &mut TimeWindows) -> Result<bool, Stop> {
         let Constraint { members, by_first, by_last, capacity } = constraint;
         let mut changed = false;

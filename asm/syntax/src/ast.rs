@@ -161,7 +161,7 @@ pub struct Equation {
     pub span: Span,
 }
 
-/// `register:type`: its bits are taken as another type.
+/// `register:type`: the register's bits, read as another type.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Cast {
     /// The operand before the colon.
@@ -199,7 +199,7 @@ pub struct Operation {
 pub struct Statement {
     /// Label before the content, if any.
     pub label: Option<Name>,
-    /// Content of the line behind the label.
+    /// Content of the line after the label.
     pub kind: StatementKind,
     /// Line number, from 1; the first number of a continued line.
     pub line: u32,
@@ -238,9 +238,9 @@ pub struct Declaration {
     pub name: Name,
     /// Sizes of an array in each direction: index of the first in [`Ast::sizes`], and their number, 0 for a single register.
     pub sizes: (u32, u32),
-    /// The type after its colon.
+    /// Type after the colon, if any.
     pub ty: Option<Name>,
-    /// The operand of its `@`: the name of a register, or the number of a port.
+    /// Operand of `@`: the name of a register, or the number of a port.
     pub place: Option<Expr>,
 }
 
@@ -258,7 +258,7 @@ pub enum ArrayValues {
 pub struct Parameter {
     /// Name of the parameter.
     pub name: Name,
-    /// The type after its colon.
+    /// Type after the colon, if any.
     pub ty: Option<Name>,
 }
 
@@ -289,7 +289,7 @@ impl Section {
 pub struct DirectiveLine {
     /// Directive with its operands.
     pub kind: DirectiveKind,
-    /// The directive's place and, where it has operands, theirs.
+    /// Source range of the directive with its operands.
     pub span: Span,
 }
 
@@ -332,22 +332,22 @@ pub enum DirectiveKind {
     },
     /// `.rep` and the statement of its `.endr`.
     Rep {
-        /// The name that counts.
+        /// Index variable.
         variable: Name,
-        /// First value of the name.
+        /// First value of the index variable.
         first: Expr,
-        /// Last value of the name, included.
+        /// Last value of the index variable, included.
         last: Expr,
         /// Statement of the `.endr`.
         end: u32,
     },
     /// `.for` and the statement of its `.endfor`.
     For {
-        /// The name that counts.
+        /// Index variable.
         variable: Name,
-        /// First value of the name.
+        /// First value of the index variable.
         first: Expr,
-        /// Last value of the name, included.
+        /// Last value of the index variable, included.
         last: Expr,
         /// `step`, `unroll` and `max`, each with its value.
         options: Vec<(Name, Expr)>,
@@ -379,7 +379,7 @@ pub enum DirectiveKind {
     Fast(Vec<Name>),
     /// `.ports` and `latched` or `direct`.
     Ports(Name),
-    /// `.loop_bound`, the most iterations each time that the loop is entered, and `total` with the most of a section.
+    /// `.loop_bound`, the maximum number of iterations per entry of the loop, and `total` with the maximum in a section.
     LoopBound(Expr, Option<(Name, Expr)>),
     /// `.range`, the registers, whether `@` stands before them, the least and the largest value.
     Range {
@@ -396,7 +396,7 @@ pub enum DirectiveKind {
     Deadline(Vec<Name>, Expr),
     /// `.order` and the ports.
     Order(Vec<Name>),
-    /// `.late`, the ports, and the cycles that it may cost.
+    /// `.late`, the ports, and the cycles by which the schedule may grow for them.
     Late(Vec<Name>, Option<Expr>),
 }
 
@@ -505,7 +505,7 @@ pub struct Ast {
     pub templates: Vec<Template>,
     /// Directives, in the order of the lines.
     pub directives: Vec<DirectiveLine>,
-    /// Names that an unreadable line may have declared: the use of such a name is no further error.
+    /// Names that an unreadable line may have declared: their use is not reported again.
     pub doubtful: BTreeSet<NameId>,
     /// Lines, from 1, that could not be read.
     pub broken: Vec<u32>,
@@ -566,7 +566,7 @@ impl Operator {
         }
     }
 
-    /// Precedence of prefix operators: less than powers.
+    /// Precedence of prefix operators: below powers.
     pub const PREFIX: u16 = 7;
 
     /// Precedence as a binary operator, from 1; 0 for an operator that is only a prefix.

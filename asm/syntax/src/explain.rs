@@ -11,7 +11,7 @@ use takt_diagnostics::nearest;
 use takt_diagnostics::source::Span;
 use takt_isa::ROWS;
 
-/// An error of the grammar as a user reads it.
+/// Renders an error of the grammar as a diagnostic.
 pub(crate) fn describe<'s>(
     error: &ExpectedItems,
     tokens: &[(Token, Span)],
@@ -21,7 +21,7 @@ pub(crate) fn describe<'s>(
     let at = tokens.iter().position(|token| token.1.start >= span.start).unwrap_or(tokens.len() - 1);
     let found = tokens[at].0;
     if found == Token::Newline {
-        // Behind the last token, where something is missing, rather than under the line break or its comment.
+        // Point after the last token, where the missing part belongs, rather than at the line break or a comment.
         let last = tokens[..at].last().map_or(span, |token| token.1);
         span = Span::new(last.end, last.end);
     } else {
@@ -32,7 +32,7 @@ pub(crate) fn describe<'s>(
         _ => format!("`{}`", text(span)),
     };
     let mut expected = error.texts();
-    // After a name a call, an index or a type might always follow: no news where something else is missing.
+    // A call, an index or a type may follow any name: listing these would hide the missing part.
     if expected.len() > 1 {
         expected.retain(|expected| !["`(`", "`[`", "`:`"].contains(&expected.as_str()));
     }

@@ -62,12 +62,12 @@ macro_rules! functions {
                 match self { $(Function::$variant => $name,)* }
             }
 
-            /// The number of its arguments; 0 stands for one or more.
+            /// Number of arguments; 0 stands for one or more.
             pub const fn arguments(self) -> usize {
                 match self { $(Function::$variant => $arguments,)* }
             }
 
-            /// A description of its result.
+            /// Description of the result.
             pub const fn text(self) -> &'static str {
                 match self { $(Function::$variant => $text,)* }
             }
@@ -97,7 +97,7 @@ functions! {
     Bits "bits" 1 "The binary32 pattern, as an integer, of the value rounded to binary32.";
 }
 
-/// The reason that an expression has no value.
+/// The reason why an expression has no value.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
 pub enum Fault {
     /// A division or remainder by zero.
@@ -117,7 +117,7 @@ pub enum Fault {
     NeedsInteger {
         /// Name of the operator or function.
         operator: &'static str,
-        /// Operand that is no integer.
+        /// Operand that is not an integer.
         value: f64,
     },
     /// A shift by less than 0 or more than 63.
@@ -134,9 +134,9 @@ pub enum Fault {
     Arguments {
         /// Name of the function.
         name: &'static str,
-        /// The number that it takes; 0 for one or more.
+        /// Expected number of arguments; 0 stands for one or more.
         takes: usize,
-        /// The number that it was given.
+        /// Number of arguments in the call.
         found: usize,
     },
     /// A value beyond binary32.
@@ -145,7 +145,7 @@ pub enum Fault {
     /// A value beyond 32 bits.
     #[error("{0} does not fit 32 bits: an integer is -2147483648 to 4294967295")]
     IntegerRange(i64),
-    /// A real number where an integer goes.
+    /// A real number where an integer is expected.
     #[error("{0} is not an integer")]
     NotInteger(f64),
     /// An element of an array, known only when the program runs.
@@ -161,7 +161,7 @@ pub enum Fault {
 pub struct EvalError {
     /// Source range of the part.
     pub span: Span,
-    /// The reason that it has no value.
+    /// Reason why the part has no value.
     pub fault: Fault,
 }
 
@@ -170,19 +170,19 @@ pub trait Names {
     /// The value of a name.
     ///
     /// # Errors
-    /// [`Fault::Reported`] if the implementation has reported the reason that there is no value, or another fault to be reported.
+    /// [`Fault::Reported`] if the implementation has reported the reason, or another fault, which the caller reports.
     fn value(&mut self, name: NameRef, span: Span) -> Result<Value, EvalError>;
     /// The function of a name.
     ///
     /// # Errors
-    /// If there is no value.
+    /// If no function has the name.
     fn function(&mut self, name: crate::name::NameId, span: Span) -> Result<Function, EvalError>;
 }
 
 /// The value of an expression, given as the nodes of its tree.
 ///
 /// # Errors
-/// The first part without a value.
+/// Returns the first part without a value.
 pub fn evaluate(nodes: &[Node], id: ExprId, names: &mut dyn Names) -> Result<Value, EvalError> {
     let nodes = &nodes[id.range()];
     // Most expressions are one literal or one name.
@@ -285,7 +285,7 @@ impl Value {
     /// The number as a literal of a type: a real number for floats, an integer for integers, unchanged for bits.
     ///
     /// # Errors
-    /// If it is no integer, and one is asked for.
+    /// If the type is an integer and the value is not.
     pub fn of_type(self, ty: Type) -> Result<Value, Fault> {
         Ok(match ty {
             Type::F => Value::Real(self.real()),
@@ -297,7 +297,7 @@ impl Value {
     /// The value as an integer; a real number without a fraction counts.
     ///
     /// # Errors
-    /// If it is no integer, or beyond 64 bits.
+    /// If the value is not an integer, or beyond 64 bits.
     pub fn integer(self) -> Result<i64, Fault> {
         match self {
             Value::Int(value) => Ok(value),
@@ -308,7 +308,7 @@ impl Value {
     /// The bits of the value in an operand of a type, rounded once.
     ///
     /// # Errors
-    /// If the type does not hold it.
+    /// If the value is out of the type's range.
     pub fn bits(self, ty: Type) -> Result<u32, Fault> {
         match (ty, self) {
             // A 64-bit integer rounds to binary32 in one step, not through binary64.
@@ -344,7 +344,7 @@ fn whole(value: f64) -> Option<i64> {
     .then_some(value as i64)
 }
 
-/// Refuses a result that is not a number, or infinite, though no operand was.
+/// Rejects a NaN or an infinity that does not come from an operand.
 fn checked(name: &'static str, result: f64, operands: &[f64]) -> Result<Value, Fault> {
     if result.is_nan() && !operands.iter().any(|operand| operand.is_nan()) {
         return Err(Fault::NotANumber(name));

@@ -23,7 +23,7 @@ impl Expression {
     /// Parses an expression, which is one line.
     ///
     /// # Errors
-    /// If the text is no expression.
+    /// If the text is not an expression.
     pub fn parse(text: &str) -> Result<Expression, Diagnostics> {
         let (mut sink, mut names, mut sources) = (Sink::default(), Interner::new(), Sources::default());
         let parsed = match sources.add("expression", text.into()) {

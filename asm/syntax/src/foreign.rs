@@ -8,7 +8,7 @@ use takt_diagnostics::source::Span;
 
 type Tokens<'t> = &'t [(Token, Span)];
 
-/// The form here of a statement of another language, given its first word and the text after it.
+/// Translates a statement of another language into this language, given its first word and the text after it.
 pub fn statement(word: &str, rest: &str) -> Option<String> {
     let rest = rest.trim().trim_end_matches([':', '{']).trim_end();
     let condition = if rest.is_empty() { "c" } else { rest };
@@ -43,7 +43,7 @@ pub fn statement(word: &str, rest: &str) -> Option<String> {
     })
 }
 
-/// A diagnostic with the form here of a line that another language has and the grammar rejects. `at` is the token where the
+/// Diagnostic for a rejected line in another language's syntax, with the equivalent in this language. `at` is the token where the
 /// grammar stopped.
 pub(crate) fn describe<'s>(
     tokens: Tokens<'_>,
@@ -87,7 +87,7 @@ impl<'s> ForeignLine<'_, '_, 's> {
         }
     }
 
-    /// The place and the text of some tokens.
+    /// Place and text of a range of tokens.
     fn part(&self, range: std::ops::Range<usize>) -> (Span, &'s str) {
         let Some(tokens) = self.tokens.get(range).filter(|tokens| !tokens.is_empty()) else {
             return (Span::default(), "");
@@ -100,7 +100,7 @@ impl<'s> ForeignLine<'_, '_, 's> {
         self.part(0..self.tokens.len())
     }
 
-    /// A token and the next stand together, without a blank.
+    /// No blank separates the token from the next.
     fn touch(&self, index: usize) -> bool {
         matches!(self.tokens.get(index..index + 2), Some([first, second]) if first.1.end == second.1.start)
     }
@@ -270,7 +270,7 @@ impl<'s> ForeignLine<'_, '_, 's> {
             match token {
                 Token::Open | Token::BracketOpen => depth += 1,
                 Token::Close | Token::BracketClose => depth = depth.checked_sub(1)?,
-                // A join within parentheses is left to the author.
+                // No correction for a join within parentheses.
                 _ if joins(index).is_some() => return None,
                 Token::Operator(operator) if depth == 0 => compares |= operator.compares(),
                 Token::Comma | Token::Question | Token::Assign if depth == 0 => return None,

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Comparisons that stand beside `&`, `|` or another comparison without parentheses. Languages differ in the precedence of
-//! these operators: a reader may take such a line otherwise than the assembler does.
+//! Comparisons next to `&`, `|` or another comparison without parentheses. Languages differ in the precedence of these operators:
+//! a reader may group such a line differently from the assembler.
 
 use crate::ast::{Node, NodeKind, Operator};
 use crate::expr::{operands, parts};
@@ -9,7 +9,7 @@ use crate::limits;
 use takt_diagnostics::diag::{Diagnostic, Severity, Sink};
 use takt_diagnostics::source::{Source, Span};
 
-/// Warns of such comparisons in the line whose parts begin at a mark.
+/// Warns of comparisons without parentheses in the line whose nodes begin at `mark`.
 pub(crate) fn check(builder: &Builder<'_>, mark: Mark, source: &Source, sink: &mut Sink) {
     let ast = &builder.ast;
     expression(&ast.nodes[mark.nodes as usize..], source, sink);
@@ -82,8 +82,8 @@ impl Tree<'_> {
         (at, at + symbol.len() as u32)
     }
 
-    /// The conditions that a chain of comparisons was probably meant as: `a == b & c < d` as `(a == b) & (c < d)`, `a < b < c`
-    /// as `(a < b) & (b < c)`.
+    /// The conditions that a chain of comparisons was probably meant to express: `(a == b) & (c < d)` for `a == b & c < d`,
+    /// `(a < b) & (b < c)` for `a < b < c`.
     fn as_meant(&self, infix: Infix) -> String {
         let mut chain = vec![infix];
         while let Some(inner) = chain.last().and_then(|last| self.compared(last.operands[0])) {
@@ -91,7 +91,7 @@ impl Tree<'_> {
         }
         chain.reverse();
         let mut text = String::new();
-        // The start of the present comparison. The operands joined to the first one precede it.
+        // The start of the current comparison. The operands joined to the first one precede it.
         let mut from = infix.span.start;
         if let Some(joined) = self.joined(chain[0].operands[0]) {
             let (_, end) = self.join(joined, 1);

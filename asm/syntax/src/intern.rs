@@ -36,12 +36,12 @@ impl Interner {
         Interner { names: known.map(Box::from).collect() }
     }
 
-    /// The name's number, if it has one.
+    /// The number of a name; `None` if the interner does not know the name.
     pub fn find(&self, name: &str) -> Option<NameId> {
         self.names.get_index_of(name).map(|index| NameId(index as u32))
     }
 
-    /// The name's number, new if the name is.
+    /// The number of a name, which is added if it is new.
     #[inline]
     pub fn intern(&mut self, name: &str) -> NameId {
         self.find(name).unwrap_or_else(|| NameId(self.names.insert_full(name.into()).0 as u32))
@@ -111,7 +111,7 @@ mod tests {
 
     #[test]
     fn known_names_are_distinct() {
-        // A name in two lists would shift the numbers of all names behind it.
+        // A name in two lists would shift the numbers of all names after it.
         let count = NameId::BUILTINS as usize + BUILTINS.len();
         assert_eq!(Interner::new().count(), count);
     }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Every limit of the assembler, by name. The limits keep an unreasonable source from taking unreasonable time or memory:
-//! beyond each stands one clear error. No real program comes near one.
+//! Every limit of the assembler, by name. The limits keep an unreasonable source from taking unreasonable time or memory; a source
+//! that exceeds one gets a single clear error. No real program comes near one.
 
 pub use takt_diagnostics::limits::*;
 
@@ -20,7 +20,7 @@ pub const EXPRESSION_NODES: usize = 1 << 16;
 pub const ARRAY_ELEMENTS: usize = 1 << 16;
 /// Indices of an array.
 pub const ARRAY_INDICES: usize = 8;
-/// Registers that a statement writes, as `a, b = …`.
+/// Registers that one statement writes, such as `a, b = …`.
 pub const EQUATION_TARGETS: usize = 64;
 /// Depth of `.include` within `.include`.
 pub const INCLUDE_DEPTH: usize = 32;
@@ -28,9 +28,9 @@ pub const INCLUDE_DEPTH: usize = 32;
 pub const INCLUDES: usize = 1 << 16;
 /// Depth of macro uses within macros' bodies.
 pub const MACRO_DEPTH: usize = 64;
-/// `.rep` and `.if` within one another, in one file.
+/// Nesting depth of blocks (`.macro`, `.rep`, `.for`, `.if`) in one file.
 pub const BLOCK_DEPTH: usize = 64;
-/// Counted loops that run within one another, whatever the machine.
+/// Nesting depth of counted loops at run time, on every machine.
 pub const LOOP_DEPTH: usize = 4;
 /// Iterations of a counted loop.
 pub const LOOP_COUNT: u32 = 65_535;
@@ -45,7 +45,7 @@ pub const OPERATIONS: usize = 4 << 20;
 pub const BUNDLE_OPERATIONS: usize = 64;
 /// Words of the expanded data memory, whatever the machine's.
 pub const DATA_WORDS: usize = 1 << 20;
-/// Characters of a name.
+/// Bytes of a name.
 pub const NAME_BYTES: usize = 255;
 /// Names that a program may use, including macros' locals and expanded name templates.
 pub const NAMES: usize = 1 << 24;

@@ -22,7 +22,7 @@ use takt_diagnostics::source::{Source, Span};
 /// Tokens read at a time: enough that building the parser does not count, few enough to stay in the cache.
 const CHUNK: usize = 1 << 14;
 
-/// Bytes of an average line in most sources, at the least.
+/// Average length of a line in bytes, on the low side.
 const LINE: usize = 24;
 
 /// Reads a source file.
@@ -33,7 +33,7 @@ pub fn parse(source: &Source, names: &mut Interner, sink: &mut Sink) -> Ast {
 /// Reads a source file, with or without the grammar's shortcut.
 fn parse_with(source: &Source, names: &mut Interner, sink: &mut Sink, shortcut: bool) -> Ast {
     let mut ast = Ast::default();
-    // Room for the statements of a text of common lines: memory that is not written to costs nothing.
+    // Reserve room for the statements of a source of typical lines: memory that is not written to costs nothing.
     let lines = source.text.len() / LINE + 1;
     ast.statements.reserve(lines);
     ast.operations.reserve(lines);
@@ -50,8 +50,8 @@ fn parse_with(source: &Source, names: &mut Interner, sink: &mut Sink, shortcut: 
 
 /// Parses an expression alone: its nodes, or `None` with errors in the sink.
 pub fn parse_expression(source: &Source, names: &mut Interner, sink: &mut Sink) -> Option<(Ast, ExprId)> {
-    // An expression is read as the value of a constant. The directive before it has an empty span, by which messages know
-    // that nobody wrote it.
+    // The expression is parsed as the value of a constant, after a directive with an empty span, by which messages recognise that the
+    // source has no such directive.
     let mut ast = Ast::default();
     let mut lexer = Lexer::new(&source.text, source.base);
     let mut chunk = Chunk::default();
@@ -223,7 +223,7 @@ fn broken(tokens: &[(Token, Span)], line: &LineTokens, ast: &mut Ast) {
     ast.statements.push(Statement { label, kind, line: line.number });
 }
 
-/// Reports an operand that nests deeper, or is longer, than the assembler reads; true if there is one.
+/// Reports an operand that exceeds the limits of nesting or length; returns whether there is one.
 fn nests_too_deeply(tokens: &[(Token, Span)], sink: &mut Sink) -> bool {
     // For each open bracket, and for the operand as a whole, the prefix operators and powers that await their operand, and
     // the choices that await their last alternative.
@@ -304,7 +304,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { cases: 3000, ..ProptestConfig::default() })]
 
-        /// The shortcut for common lines reads what the grammar proper reads.
+        /// The shortcut for common lines yields the same tree and errors as the grammar.
         #[test]
         fn the_shortcut_changes_nothing(
             pieces in prop::collection::vec(
@@ -324,7 +324,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { cases: 3000, ..ProptestConfig::default() })]
 
-        /// The shortcut reads expressions, most of them well formed, as the grammar does.
+        /// For expressions, most of them well formed, the shortcut yields the same tree and errors as the grammar.
         #[test]
         fn the_shortcut_computes_the_same(
             parts in prop::collection::vec(

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The tokens of a source, as an editor colours them and [`format`](crate::format) lays them out. Comments are among them.
+//! Tokens of a source, comments included, as an editor colours them and [`format`](crate::format) lays them out.
 
 use crate::ast::Directive;
 use crate::lex::Raw;
@@ -10,21 +10,21 @@ use takt_diagnostics::source::line_feeds;
 /// The kind of a token.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub enum TokenKind {
-    /// A name: of an instruction, a macro, a register, anything.
+    /// A name of any kind: instruction, macro, register, ….
     Name,
-    /// The beginning of a name with `{}`, up to a brace and with it.
+    /// The beginning of a name with `{}`, up to and including the first `{`.
     TemplateBegin,
-    /// The text between two braced parts, and both braces.
+    /// The text between two braced parts, including both braces.
     TemplateMiddle,
     /// The end of a name with `{}`, from the last brace on.
     TemplateEnd,
     /// A known directive, such as `.reg`.
     Directive,
-    /// A word with a leading point that is no directive.
+    /// A word with a leading point that is not a known directive.
     UnknownDirective,
     /// A number, integer or real.
     Number,
-    /// A text in `"`.
+    /// A text in double quotes.
     Text,
     /// `||`, between the operations of a bundle.
     Bars,
@@ -40,7 +40,7 @@ pub enum TokenKind {
     Operator,
     /// A comment, from `;` to the end of its line.
     Comment,
-    /// A token that the assembler refuses.
+    /// A token that the assembler rejects.
     Bad,
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The scheduler keeps to its effort on every row and program: by its steps, which are counted, not by the clock.
+//! The scheduler stays within its effort for every row and program, measured in steps rather than time.
 
 use crate::common;
 use crate::random_source::{Random, source, source_with_loops};

@@ -9,17 +9,17 @@ const FLOATS: [&str; 6] = ["f0", "f1", "f2", "f3", "s0", "s1"];
 const INTEGERS: [&str; 4] = ["n0", "n1", "n2", "c0"];
 const OUTPUTS: [&str; 5] = ["o0", "o1", "u[1]", "u[2]", "f2"];
 
-/// A program in the making.
+/// A program under construction.
 struct Source {
     random: Random,
     text: String,
-    /// Counters of labels, loops and the like: each makes a name.
+    /// Number of names generated so far, for labels, loops and the like.
     names: u32,
-    /// Loops around, whose indices lie between 1 and the number beside them.
+    /// Loops around; each index lies between 1 and the number next to it.
     indices: Vec<(String, u64)>,
     /// Statements that may still be made.
     left: u32,
-    /// The present code is a subroutine's, which may call no subroutine that calls.
+    /// The current code is a subroutine's, which may call no subroutine that calls.
     subroutine: bool,
 }
 

@@ -64,7 +64,7 @@ fn counted_loop(random: &mut Random, number: u64, operand: &dyn Fn(&mut Random) 
     text
 }
 
-/// A source of some hundred operations: arithmetic with reuse of names, loads and stores, ports, flags, bundles, branches.
+/// A source of a few hundred operations: arithmetic with reuse of names, loads and stores, ports, flags, bundles, branches.
 pub(crate) fn source(seed: u64) -> String {
     source_with(seed, false)
 }

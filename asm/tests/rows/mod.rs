@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Rows in which several slots host a function: f3's units, placed otherwise; and random ones.
+//! Rows in which several slots host a function: f3's units, distributed differently; and random rows.
 
 use std::sync::OnceLock;
 use takt_isa::spec::units::*;
@@ -88,7 +88,7 @@ pub(crate) fn all() -> &'static [Machine] {
     ALL.get_or_init(|| ROWS.iter().map(|(name, slots)| row(name, slots)).collect())
 }
 
-/// The row of a name.
+/// The row with a name.
 pub(crate) fn named(name: &str) -> &'static Machine {
     all().iter().find(|machine| machine.name == name).expect("it is among the rows")
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Text of a file's bytes, in the encodings that other programs write.
 
-/// Bytes that tell an encoding.
+/// Byte order mark of UTF-8.
 const UTF8_MARK: &[u8] = b"\xef\xbb\xbf";
 /// The characters of Windows-1252 at 0x80 to 0x9f, where Latin-1 has control characters.
 const WINDOWS: &str = "€\u{81}‚ƒ„…†‡ˆ‰Š‹Œ\u{8d}Ž\u{8f}\u{90}‘’“”•–—˜™š›œ\u{9d}žŸ";
@@ -15,10 +15,10 @@ pub struct DecodedText {
     pub note: Option<String>,
 }
 
-/// Decodes UTF-8 and UTF-16 with or without their mark, and Latin-1 where an XML declaration names it or nothing else fits.
+/// Decodes UTF-8 and UTF-16, with or without a byte order mark, and Latin-1 if an XML declaration names it or nothing else fits.
 ///
 /// # Errors
-/// If it is no text.
+/// If the bytes are not text.
 pub fn decode(bytes: Vec<u8>) -> Result<DecodedText, String> {
     let known = |text: String| Ok(DecodedText { text, note: None });
     match bytes[..] {

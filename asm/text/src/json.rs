@@ -5,13 +5,13 @@ use crate::Mistake;
 use serde::de::DeserializeOwned;
 use std::borrow::Cow;
 
-/// The numbers that Python's `json.dumps` writes although JSON has none of them, the longest first.
+/// Numbers that Python's `json.dumps` writes although JSON lacks them, the longest first.
 const PYTHONS: [&str; 3] = ["-Infinity", "Infinity", "NaN"];
 
-/// A value of a JSON text. Python's `Infinity` and `NaN` come as texts of these letters, which `number` reads.
+/// Parses a JSON text. Python's `Infinity` and `NaN` arrive as strings, which [`number`] reads.
 ///
 /// # Errors
-/// If it is no JSON or no such value, with the line.
+/// If the text is not JSON or not a value of the type, with the line.
 pub fn from_json<T: DeserializeOwned>(text: &str) -> Result<T, Mistake> {
     let text = quoted(text.trim_start_matches('\u{feff}'));
     serde_json::from_str(&text).map_err(|error| {
@@ -26,7 +26,7 @@ pub fn from_json<T: DeserializeOwned>(text: &str) -> Result<T, Mistake> {
     })
 }
 
-/// The text seems to be an object whose `format` begins with `format`, though it may be no JSON otherwise.
+/// The text looks like an object whose `format` begins with `format`, even if it is not valid JSON.
 pub fn names_format(text: &str, format: &str) -> bool {
     let mut rest = text;
     while let Some(at) = rest.find("\"format\"") {
@@ -42,13 +42,13 @@ pub fn names_format(text: &str, format: &str) -> bool {
 /// The number in a JSON value, infinities and NaN included: as Python writes them, or a text such as `"inf"`.
 ///
 /// # Errors
-/// If it is something else.
+/// If the value is not a number.
 pub fn number(value: &serde_json::Value) -> Result<f64, String> {
     match value {
         serde_json::Value::Number(number) => {
             number.as_f64().ok_or_else(|| format!("`{number}` is no number"))
         }
-        // Rust reads the names of infinities and NaN in every spelling of Python, and numbers in quotes are a mistake.
+        // Rust's parser accepts all of Python's spellings of infinities and NaN; finite numbers in quotes are rejected.
         serde_json::Value::String(text) => match text.parse::<f64>() {
             Ok(value)
                 if !value.is_finite()
@@ -64,7 +64,7 @@ pub fn number(value: &serde_json::Value) -> Result<f64, String> {
     }
 }
 
-/// A value in a message.
+/// Description of a value for messages.
 fn shown(value: &serde_json::Value) -> &'static str {
     match value {
         serde_json::Value::Null => "`null`",
@@ -75,7 +75,7 @@ fn shown(value: &serde_json::Value) -> &'static str {
     }
 }
 
-/// The text with Python's numbers in quotes; lines stay.
+/// The text with Python's numbers in quotes; line numbers do not change.
 fn quoted(text: &str) -> Cow<'_, str> {
     if !PYTHONS.iter().any(|name| text.contains(name)) {
         return Cow::Borrowed(text);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Texts from outside that are no sources: their encodings, tables of numbers, JSON as Python writes it, and tables of the
-//! treatment of a format's parts. A crate of its own, so that a change here compiles neither assembler nor diagnostics again.
+//! Readers of external text other than sources: encodings, tables of numbers, JSON as Python writes it; and tables that state how
+//! a reader treats each part of a format. A separate crate, so that a change here recompiles neither assembler nor diagnostics.
 
 pub mod encoding;
 pub mod json;

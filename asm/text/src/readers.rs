@@ -11,7 +11,7 @@ pub enum Treatment {
     Computes,
     /// The part changes no result, or a note states the omission.
     PassesOver,
-    /// An error names it.
+    /// The reader rejects the part with an error.
     Refuses,
 }
 
@@ -25,7 +25,7 @@ impl fmt::Display for Treatment {
     }
 }
 
-/// Parts of a format with one fate.
+/// Parts of a format that are treated alike.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Row {
     /// The element, key or command that the parts belong to; empty if they stand for themselves.
@@ -38,7 +38,7 @@ pub struct Row {
     pub text: &'static str,
 }
 
-/// The fate of a part, by name.
+/// Treatment of a part, by name; `None` if no row lists the part.
 pub fn fate(rows: &[Row], of: &str, part: &str) -> Option<Treatment> {
     let found = rows.iter().filter(|row| row.of == of);
     found.filter(|row| row.parts.split_ascii_whitespace().any(|name| name == part)).map(|row| row.fate).next()

@@ -1,26 +1,26 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Tables of numbers as spreadsheets, MATLAB and NumPy write them.
 //!
-//! A comma between digits parts columns in one file and is the decimal mark in another. The other separators of the file
-//! tell which; a file that leaves it open is refused, so that no number is read as two.
+//! A comma between digits separates columns in some files and is the decimal mark in others. The other separators of the file
+//! decide; an ambiguous file is rejected, so that no number is read as two.
 
 use crate::Mistake;
 
-/// The separators of a table with a header: each line has the header's.
+/// Separators of a table with a header: every line uses the same one as the header.
 const SEPARATORS: [char; 3] = [',', ';', '\t'];
 
-/// The mend of a comma that may be a decimal mark.
+/// Advice on a comma that may be a decimal mark.
 const POINT: &str = "numbers have a decimal point, as 0.5";
 
 /// The separator of a table, by its header.
 pub fn separator(header: &str) -> char {
     let count = |separator: &char| header.matches(*separator).count();
-    // Among equally frequent separators, the first.
+    // Among equally frequent separators, the first wins.
     let most = SEPARATORS.iter().rev().max_by_key(|separator| count(separator));
     most.copied().unwrap_or(',')
 }
 
-/// The reason why a text is no number: the decimal mark, if that is it.
+/// The reason why a text is not a number; names a decimal comma as the cause.
 pub fn no_number(text: &str) -> String {
     let digits = |text: &str| text.bytes().any(|byte| byte.is_ascii_digit());
     match text.split_once(',') {
@@ -47,11 +47,11 @@ impl Gap {
     }
 }
 
-/// Rows of numbers without a header, a line for each row: commas, semicolons or blanks are between numbers, the same in all of the
-/// file; comments begin with `#` or `%`. At most `most` rows.
+/// Reads rows of numbers without a header, one row per line, at most `most` rows. Commas, semicolons or blanks separate numbers, the
+/// same throughout the file; comments begin with `#` or `%`.
 ///
 /// # Errors
-/// If a cell is no finite number, or a comma could be a decimal mark.
+/// If a cell is not a finite number, or a comma could be a decimal mark.
 pub fn numbers(text: &str, most: usize) -> Result<Vec<Vec<f64>>, Mistake> {
     let mut rows = Vec::new();
     let mut gaps: Option<Gap> = None;
@@ -100,7 +100,7 @@ fn cells(line: &str) -> (Vec<&str>, Vec<Gap>) {
     (line.split(parts).filter(|cell| !cell.is_empty()).collect(), gaps)
 }
 
-/// A finite number. Behind a comma, several digits that begin with 0 are the remains of a number with a decimal comma.
+/// A finite number. After a comma, several digits with a leading 0 are the rest of a number with a decimal comma.
 fn number(cell: &str, commas: bool) -> Result<f64, String> {
     let digits = cell.len() > 1 && cell.bytes().all(|byte| byte.is_ascii_digit());
     if commas && digits && cell.starts_with('0') {

@@ -28,7 +28,7 @@ pub(crate) struct Layout {
     pub(crate) bounds: HashMap<u32, Bound>,
 }
 
-/// Most iterations of a loop per run, and per section.
+/// Maximum number of iterations of a loop per run, and per section.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Bound {
     pub(crate) most: u32,

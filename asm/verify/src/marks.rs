@@ -111,7 +111,7 @@ impl ComparedLoops {
     }
 
     /// Compares the starts of counted loops: count and bound. The count and bound of a pipelined loop are less by the iterations that its
-    /// prologue begins; beside it the image has the loop as written, for smaller counts.
+    /// prologue begins; the image also has the loop as written, for smaller counts.
     fn compare_starts(
         &mut self,
         terms: &Terms,
@@ -249,7 +249,7 @@ fn compare_unpassed(
     }
 }
 
-/// Difference of two numbers, if the second is less.
+/// Difference of two numbers; `None` unless the second is less.
 fn less(number: u32, other: u32) -> Option<u32> {
     number.checked_sub(other).filter(|less| *less > 0)
 }

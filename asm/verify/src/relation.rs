@@ -26,7 +26,7 @@ const ARRIVING: u32 = u32::MAX;
 
 type Place = (u32, Vec<u32>, Vec<(u32, u32)>);
 
-/// Most nested cases of a visit.
+/// Limit on the nested cases of a visit.
 const MAX_CASES: usize = 24;
 
 /// A cut: positions of both programs.
@@ -174,7 +174,7 @@ impl<'a> Relation<'a> {
                 let result = self.go_on(source, image, (said, done));
                 return result.map_err(|difference| Mismatch { difference, at_decision: false });
             }
-            // An image that runs past the source's decision has effects that the source has not come to.
+            // An image that runs past the source's decision has effects that the source has not reached.
             Err(difference) => {
                 let at_decision = decides && !agree && !self.compared.is_mistaken;
                 Mismatch { difference, at_decision }
@@ -493,7 +493,7 @@ fn selected(source: &Code, image: &Code) -> HashSet<u32> {
     (0..).zip(&source.bundles).filter(|(_, bundle)| gone(bundle)).map(|(at, _)| at).collect()
 }
 
-/// A difference, and true if the programs disagree on the decision itself.
+/// A difference, and whether the programs disagree on the decision itself.
 struct Mismatch {
     difference: Difference,
     at_decision: bool,

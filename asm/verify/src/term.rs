@@ -7,8 +7,8 @@ use takt_isa::fp::{Flags, Host};
 use takt_isa::program::Location;
 use takt_isa::{Op, ROWS, Type, compute};
 
-/// Limit on the steps of a check: bundles executed, cells compared at cuts, and terms made or found again. A check does nothing else that
-/// takes long, so that the limit bounds its time and its memory.
+/// Limit on the steps of a check: bundles executed, cells compared at cuts, and terms made or found again. Nothing else in a check takes
+/// long, so that the limit bounds its time and its memory.
 pub const MAX_STEPS: u64 = 30_000_000;
 /// Number of copied cells that count as one step.
 pub(crate) const COPIES: u64 = 8;
@@ -92,7 +92,7 @@ impl Terms {
         self.in_case(term)
     }
 
-    /// Term of a node regardless of assumptions: a case that leads to a cut makes none of its unknowns known.
+    /// Term of a node regardless of assumptions: an assumption on the way to a cut must not make unknowns at the cut known.
     pub(crate) fn in_any_case(&mut self, node: Node) -> Term {
         self.steps += 1;
         let next = Term(self.nodes.len() as u32);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Images with a field changed outside their code: each is refused, and the message names the field.
+//! Images with one changed field outside their code: each is rejected, and the message names the field.
 
 #![allow(clippy::print_stdout)]
 
@@ -452,7 +452,7 @@ fn every_changed_field_is_refused_by_name() {
     assert!(refused.len() == CHANGES.len() || mutants < 1000, "{refused:?}");
 }
 
-/// The run knows the count although the assembler does not, so that it takes one copy of the pipelined loop only; both have bounds.
+/// The count is known at run time but not to the assembler, so only one copy of the pipelined loop runs; both copies have bounds.
 #[test]
 fn bounds_of_both_copies_of_a_loop_are_compared() {
     for count in [2, 8] {
@@ -480,7 +480,7 @@ fn bounds_of_both_copies_of_a_loop_are_compared() {
     }
 }
 
-/// A loop without a bound right before another one with the same.
+/// Two adjacent loops with bounds of their own: an image without one of the bounds is rejected.
 #[test]
 fn a_bound_does_not_stand_for_the_loop_before() {
     let source = ".schedule on\n.input m:int\n.output y\n.state a b\n.preset a = 1\n.preset b = 1\n.reg n:int k:int\n.once\n wait p\n.period\n\

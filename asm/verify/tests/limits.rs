@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A check ends: an image on which it would not is refused at the limit of steps.
+//! Termination of the check: an image that would keep it running is rejected at the limit of steps.
 
 use crate::common::{build, check};
 use takt_asm::{MemoryLoader, Options};
 use takt_isa::{Instruction, Op, T3};
 use takt_verify::{MAX_STEPS, verify};
 
-/// A loop on numbers that are known, which a check follows as often as it runs.
+/// A loop on known numbers, which the check follows iteration by iteration.
 const SOURCE: &str = "\
 .input a
 .output y
@@ -34,7 +34,7 @@ fn an_image_that_never_ends_is_refused_at_the_limit() {
         program.addresses().flat_map(|at| program.bundle(at).expect("it is there").expect("it is legal"));
     let (word, mut instruction) =
         decoded.enumerate().find(|(_, instruction)| counts(instruction)).expect("it counts");
-    // Two numbers in turns, neither of them 0.
+    // The register alternates between two nonzero numbers, so that the loop never ends.
     instruction.op = Op::ixor;
     program.code[word] = instruction.encode().expect("it has an encoding");
     let difference = verify(&program, &plain, &assembled.contractions).expect_err("it does something else");

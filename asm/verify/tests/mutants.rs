@@ -17,7 +17,7 @@ use takt_verify::verify;
 const PERIODS: usize = 6;
 const RUNS: u64 = 8;
 
-/// Number of mutants: `TAKT_MUTANTS`, by default 200. `TAKT_SEED` draws others.
+/// Number of mutants: `TAKT_MUTANTS`, by default 200. `TAKT_SEED` selects others.
 fn mutants() -> u64 {
     number("TAKT_MUTANTS").unwrap_or(200)
 }
@@ -72,7 +72,7 @@ fn mutate(program: &mut Program, random: &mut Random) -> String {
     }
 }
 
-/// Observable behaviour of a run on inputs from a seed: values of each declared output in order, memory and flags; and true after a fault.
+/// Observable behaviour of a run on inputs from a seed: values of each declared output in order, memory and flags; and whether it failed.
 fn observe(program: &Program, plain: &PlainProgram, seed: u64) -> (Vec<String>, bool) {
     let Ok(mut emulator) = Emulator::new(program) else { return (vec!["not loaded".to_owned()], true) };
     emulator.set_cycle_limit(2_000_000);

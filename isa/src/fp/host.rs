@@ -110,7 +110,7 @@ const fn unordered(signaling: bool) -> Value {
     Value::new(0, if signaling { Flags::INVALID } else { Flags::NONE })
 }
 
-/// The integer nearest to a binary32, ties to even, and true if it fits an `i32`. (If not, the integer is meaningless.)
+/// The integer nearest to a binary32, ties to even, and whether it fits an `i32`. (If not, the integer is meaningless.)
 #[inline(always)]
 pub(super) fn to_integer(a: u32) -> (u32, bool) {
     // In binary64 the sum with 1.5·2⁵² is rounded at the units' place, ties to even, and its low word is the integer

@@ -17,9 +17,9 @@ pub enum Bitwise {
     Xor,
     /// The first operand, shifted left by the low five bits of the second.
     Left,
-    /// The first operand, shifted right by the same bits; zeros enter.
+    /// The first operand, shifted right by the low five bits of the second; zeros are shifted in.
     Right,
-    /// The first operand, shifted right by the same bits; its sign enters.
+    /// The first operand, shifted right by the low five bits of the second; copies of the sign bit are shifted in.
     RightSigned,
     /// Equality, as 1 or 0.
     Equal,
@@ -35,7 +35,7 @@ pub enum Bitwise {
 pub trait Real:
     Clone + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
 {
-    /// Square root; negative operands have none.
+    /// Square root, undefined for negative operands.
     #[must_use]
     fn sqrt(self) -> Self;
     /// The sine, in radians.
@@ -65,10 +65,10 @@ pub trait Real:
     /// Self limited to the interval ±|`bound`|.
     #[must_use]
     fn saturate(self, bound: Self) -> Self;
-    /// The number that the operand's bits stand for as a signed integer.
+    /// Bits of the operand, read as a signed integer.
     #[must_use]
     fn integer(self) -> Self;
-    /// The nearest integer, to even, within 32 bits: a decision.
+    /// Rounding to the nearest integer, ties to even, within 32 bits: a decision.
     #[must_use]
     fn nearest(self) -> Self;
     /// Equality of the two: a decision.
@@ -83,7 +83,7 @@ pub trait Real:
     /// `yes` if any of self's bits is set, else `no`.
     #[must_use]
     fn choose(self, yes: Self, no: Self) -> Self;
-    /// The result of an operation on the bits of self and another.
+    /// Result of a bitwise operation on `self` and `other`.
     #[must_use]
     fn bitwise(self, op: Bitwise, other: Self) -> Self;
 }

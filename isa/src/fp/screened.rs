@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Branch-free host arithmetic, for loops that the compiler is to vectorise.
+//! Branch-free host arithmetic, which lets the compiler vectorise loops over it.
 
 use super::host::{is_special, round_to_odd};
 use super::{Arithmetic, Flags, Value, is_nan};

@@ -12,15 +12,15 @@
 //! |---|---|---|
 //! | k = ⌊\|x\|·163/256 + 1/2⌋: k·π/2 is at most 0.865 from \|x\| | 15 bits of \|x\| | |
 //! | r = \|x\| + table of −k·π/2, modulo 2 | 28-bit sum, 29 more bits from the table | |
-//! | n = \|r\| normalised; of k = 0 the operand's own significand | 28 | |
+//! | n = \|r\| normalised; for k = 0 the operand's own significand | 28 | |
 //! | V = c0 + c1·h + c2·h² in segments of 2⁻⁹, h from the middle of the segment; c2·h² is a table too | h 18, c1 18 | 1 |
 //! | n − n·V, for a cosine 1 − V | n 25, V 24, without the product of the low parts (8 × 6 and 7 × 8 bits in logic) | 1 |
 //! | round to nearest, pack | 24 | |
 //!
-//! In the range that is accepted no binary32 comes closer to a multiple of π/2 than 2⁻²⁷·⁸ (252.89821), so that 28 bits of r
+//! In the accepted range no binary32 comes closer to a multiple of π/2 than 2⁻²⁷·⁸ (252.89821), so that 28 bits of r
 //! are significant even there.
 //!
-//! Below 2⁻¹² the sine rounds to its argument and the cosine to 1, which bypasses all this; subnormals are among them.
+//! Below 2⁻¹² the sine rounds to its argument and the cosine to 1, which bypasses all this; subnormals take this path, too.
 //!
 //! # Accuracy
 //!
@@ -36,8 +36,7 @@ pub const SIN_LIMIT: u32 = 0x43c9_0fda;
 /// 2⁻¹²: below it the sine rounds to its argument, for x³/6 is less than a sixth of a unit in the last place, and the cosine to 1.
 pub const SIN_IDENTITY: u32 = 0x3980_0000;
 
-/// Largest error of [`sin`](sin()) over every argument that it accepts, in units in the last place of the exact result
-/// (rounded up).
+/// Largest error of [`sin`](sin()) over every accepted argument, in units in the last place of the exact result (rounded up).
 pub const SIN_MAX_ULP: f64 = 0.79499;
 /// Largest error of [`cos`], by the same measure as [`SIN_MAX_ULP`].
 pub const COS_MAX_ULP: f64 = 0.78306;
@@ -61,7 +60,7 @@ pub const fn sin(x: u32) -> Value {
     Value::exact(wave(magnitude, 0) ^ x & SIGN)
 }
 
-/// The cosine of `x` in radians, for |`x`| up to [`SIN_LIMIT`]; beyond, and for a NaN, as [`sin`](sin()).
+/// The cosine of `x` in radians, for |`x`| up to [`SIN_LIMIT`]. Larger arguments and NaN give the same results as in [`sin`](sin()).
 #[must_use]
 pub const fn cos(x: u32) -> Value {
     let magnitude = x & !SIGN;
@@ -83,7 +82,7 @@ const fn wave(x: u32, quadrants: u32) -> u32 {
     let fixed = significand << 12 >> (135 - exponent);
     let k = ((fixed >> 21) * 163 + (1 << 13)) >> 14;
     let r = (fixed << (FRACTION - 27)).wrapping_add(QUARTERS[k as usize]) & ((1 << (FRACTION + 1)) - 1);
-    // A one's complement is off by 2⁻⁵⁶, and needs no carry.
+    // One's complement instead of two's: off by 2⁻⁵⁶, but without a carry chain.
     let negative = r >> FRACTION & 1;
     let r = (r ^ negative.wrapping_neg()) & ((1 << FRACTION) - 1);
 

@@ -11,16 +11,16 @@ use crate::number::{Register, SlotIndex};
 use crate::shape::Field;
 use std::fmt;
 
-/// The most slots of a machine.
+/// Maximum number of slots of a machine.
 pub const MAX_SLOTS: usize = SlotIndex::COUNT;
-/// The most registers of a slot's bank: a destination is an index of this range.
+/// Maximum number of registers in a slot's bank: a destination is an index in this range.
 pub const MAX_BANK: u32 = Field::Dest.bits().max() + 1;
 /// The greatest depth of the program memory in bundles, limited by a branch's target field.
 pub const MAX_CODE: u32 = Field::Target.bits().max() + 1;
 /// The greatest depth of the data memory in words, limited by the offset field.
 pub const MAX_DATA: u32 = Field::Offset.bits().max() + 1;
 
-/// The most loops inside one another that a machine counts.
+/// Greatest nesting depth of loops that a machine counts.
 pub const MAX_LOOPS: u32 = 8;
 
 /// The last address of the register space.
@@ -41,9 +41,9 @@ pub struct MachineError {
 pub enum MachineReason {
     /// No slot, or more than [`MAX_SLOTS`].
     Slots { count: u32 },
-    /// A name that is no lower-case word: it becomes part of names in assembly and Verilog.
+    /// A name that is not a lower-case word: names become parts of names in assembly and Verilog.
     Name { what: &'static str, name: &'static str },
-    /// The name of a bank has a digit: it stands before the register's number.
+    /// The name of a bank contains a digit, which would run into the register's number.
     BankName { bank: &'static str },
     /// Two slots, or two banks, share a name.
     Twice { what: &'static str, name: &'static str },
@@ -77,14 +77,14 @@ pub enum MachineReason {
     TwoUnits { slot: &'static str, unit: &'static str, other: &'static str, function: Function },
     /// No slot hosts the sequencer.
     NoSequencer,
-    /// The sequencer counts loops and has no place for a count, or the other way round, or places for more than [`MAX_LOOPS`].
+    /// The sequencer counts loops but the row reserves no counts, or the reverse, or more counts than [`MAX_LOOPS`].
     LoopDepth { counts: bool, depth: u32 },
     /// Two slots host a function that only one may.
     TwoSlots { function: Function, slot: &'static str, other: &'static str },
     /// More slots load than the data memory has ports.
     Ports { slot: &'static str },
-    /// A slot that loads comes after the storing slot. A bundle's operations act in the order of the slots, and its loads must
-    /// read the words from before its store.
+    /// A slot that loads comes after the storing slot. A bundle's operations act in the order of the slots, and its loads must not
+    /// see its own store.
     LoadAfterStore { slot: &'static str, store: &'static str },
 }
 
@@ -142,7 +142,7 @@ impl Message {
         let text = self.bytes.split_at(self.length).0;
         match std::str::from_utf8(text) {
             Ok(text) => text,
-            // This happens only if a non-ASCII name was cut off.
+            // Reached only if truncation splits a non-ASCII character of a name.
             Err(_) => "the row is no machine",
         }
     }
@@ -310,7 +310,7 @@ const fn offers(unit: &Unit, function: Function) -> bool {
     false
 }
 
-/// Some instruction that the unit executes writes a register.
+/// The unit executes an instruction that writes a register.
 const fn writes(unit: &Unit) -> bool {
     let mut i = 0;
     while i < ROWS.len() {
@@ -518,7 +518,7 @@ impl Machine {
         None
     }
 
-    /// The error of the slots that load, if there is one.
+    /// [`MachineReason::Ports`] or [`MachineReason::LoadAfterStore`], if a slot with loads violates one of them.
     const fn load_error(&self) -> Option<MachineReason> {
         let Some(first) = self.host_from(Function::Load, 0) else { return None };
         let second = self.host_from(Function::Load, first + 1);
@@ -538,7 +538,7 @@ impl Machine {
         }
     }
 
-    /// The error of two slots that host a function, if there are two.
+    /// [`MachineReason::TwoSlots`], if two slots host the function.
     const fn shared(&self, function: Function) -> Option<MachineReason> {
         let Some(first) = self.host_from(function, 0) else { return None };
         let Some(second) = self.host_from(function, first + 1) else { return None };

@@ -3,7 +3,7 @@
 //!
 //! The name `t3,code=4096,data=32768` is the machine t3 with 4,096 bundles of program memory and 32,768 words of data memory.
 //! Names are canonical: options stand in the order of [`OPTIONS`], and an option that states the row's own depth is left out.
-//! Two machines of one name are the same, and each exists once, for as long as the process runs.
+//! Equal names denote the same machine: each is made once and lives as long as the process.
 
 use super::check::{MAX_CODE, MAX_DATA};
 use super::machines::{MACHINES, Machine};
@@ -41,7 +41,7 @@ pub static OPTIONS: [MachineOption; 2] = [
     },
 ];
 
-/// The reason why a text is no machine's name.
+/// The reason why a text does not name a machine.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum MachineNameError {
     /// No row of the table has this name.
@@ -56,7 +56,7 @@ pub enum MachineNameError {
         /// Name of the option.
         option: &'static str,
     },
-    /// An option's value is no number.
+    /// An option's value is not a number.
     #[error("`{option}={value}`: `{value}` is no number")]
     Number {
         /// Name of the option.
@@ -64,7 +64,7 @@ pub enum MachineNameError {
         /// Text given as the value.
         value: String,
     },
-    /// A depth is no power of two, or out of range.
+    /// A depth is not a power of two, or out of range.
     #[error(
         "`{option}={value}`: a depth is a power of two from 2 to {most}{}",
         match .next { Some(next) => format!("; the next is {next}"), None => String::new() }
@@ -72,7 +72,7 @@ pub enum MachineNameError {
     Depth {
         /// Name of the option.
         option: &'static str,
-        /// Depth that was asked for.
+        /// The requested depth.
         value: u64,
         /// The greatest depth possible.
         most: u32,
@@ -129,7 +129,7 @@ fn depth(option: &MachineOption, text: &str) -> Result<u32, MachineNameError> {
     if text.is_empty() {
         return Err(MachineNameError::NoNumber { option: name });
     }
-    // A number beyond 64 bits is out of range like the greatest of them.
+    // A number beyond 64 bits saturates: it is out of range in any case.
     let value = match text.bytes().all(|byte| byte.is_ascii_digit()) {
         true => text.parse().unwrap_or(u64::MAX),
         false => return Err(MachineNameError::Number { option: name, value: text.to_owned() }),
@@ -149,11 +149,11 @@ fn depth(option: &MachineOption, text: &str) -> Result<u32, MachineNameError> {
 }
 
 impl Machine {
-    /// The machine of a name: a row's, fixtures of the tests included, perhaps with options, as `t3,data=32768`. Spaces
+    /// Finds a machine by name: a row of the table or a fixture of the tests, perhaps with options, such as `t3,data=32768`. Spaces
     /// around commas are ignored.
     ///
     /// # Errors
-    /// If there is no such machine or option, or a depth is not one that a circuit can have.
+    /// If there is no such machine or option, or a circuit cannot have a requested depth.
     pub fn from_name(name: &str) -> Result<&'static Machine, MachineNameError> {
         let mut parts = name.split(',').map(str::trim);
         let row = parts.next().unwrap_or_default();
@@ -175,7 +175,7 @@ impl Machine {
     /// The machine with options, each a name and a number.
     ///
     /// # Errors
-    /// If there is no such option, or a depth is not one that a circuit can have.
+    /// If there is no such option, or a circuit cannot have a requested depth.
     pub fn with_options<'a>(
         &'static self,
         options: impl IntoIterator<Item = (&'a str, &'a str)>,
@@ -192,7 +192,7 @@ impl Machine {
         Ok(self.configured(set))
     }
 
-    /// The machine with other, valid depths, by the index of their option; `None` keeps a depth.
+    /// The machine with other depths, indexed like [`OPTIONS`] and already checked; `None` keeps a depth.
     fn configured(&'static self, depths: [Option<u32>; OPTIONS.len()]) -> &'static Machine {
         let row = self.row();
         let (mut machine, mut name) = (*self, row.name.to_owned());
@@ -254,7 +254,7 @@ impl Machine {
         self.name.replace(self.row_name(), "").replace(',', " ")
     }
 
-    /// The machine of this row with the least memories that hold `bundles` and `words`, and are no smaller than its own;
+    /// The machine of this row with the smallest memories that hold `bundles` and `words` and are no smaller than the current ones;
     /// `None` if no depth is large enough.
     pub fn holding(&'static self, bundles: u64, words: u64) -> Option<&'static Machine> {
         let depth = |of: u32, wanted: u64, most: u32| {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The fixtures: two machines for tests, whose rows never change.
 //!
-//! Snapshots, messages and tests that state slots, listings or cycles are about these rows, so that a machine of the table
-//! can be rearranged without them. Fixtures are machines like any other, valid for every tool and found by their names, but
-//! no list of machines has them: a user never meets one.
+//! Snapshots, messages and tests that state slots, listings or cycles use these rows, so that rearranging a machine of the table
+//! does not change them. Fixtures are machines like any other, valid for every tool and found by their names, but they appear in
+//! no list of machines: users never meet them.
 
 use super::instructions::Function;
 use super::machines::{Bank, Machine, Slot};
@@ -18,7 +18,7 @@ const INPUTS: Bank = Bank { name: "i", base: 768, depth: 256 };
 /// A sequencer without loops.
 const BRANCHES: Unit = Unit { functions: &[Function::Control], ..SEQUENCER };
 
-/// The fixture with three slots, fully pipelined but for arctangent and arccosine.
+/// The fixture with three slots, fully pipelined except for arctangent and arccosine.
 pub static F3: Machine = Machine {
     name: "f3",
     text: "For tests: three slots.",

@@ -41,7 +41,7 @@ static FUSIONS: LazyLock<Vec<Fusion>> = LazyLock::new(|| {
     fusions
 });
 
-/// Results agree on operands for which no step rounds.
+/// `fused` and the two separate instructions give equal results, on operands for which no step rounds.
 fn does_both(product: &Row, sum: &Row, source: usize, fused: &Row) -> bool {
     const EXACT: [f32; 7] = [3.0, -5.0, 0.25, 0.0, -0.0, f32::INFINITY, 15.0];
     let value = |row: &Row, [a, b, c]: [u32; 3]| compute::<fp::Host>(row.op, a, b, c);

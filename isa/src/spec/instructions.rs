@@ -273,7 +273,7 @@ const fn name(variant: &'static str) -> &'static str {
 
 /// The error of rounding to nearest, in ulps.
 const ROUNDED: f64 = 0.5;
-/// The error of a result that is exact.
+/// The error of an exact result.
 const EXACT: f64 = 0.0;
 
 macro_rules! effect {
@@ -360,7 +360,7 @@ macro_rules! instructions {
         }
 
         /// Applies [`compute`] to many operands, into `results`, with a loop for each instruction that the compiler vectorises if
-        /// `A` has no branches ([`fp::Screened`]). Returns true if any of the values has a flag set.
+        /// `A` has no branches ([`fp::ScreenedFloat`]). Returns whether any of the values has a flag set.
         #[inline(always)]
         #[allow(unused_variables)]
         pub fn compute_lanes<A: Arithmetic, const L: usize>(
@@ -471,7 +471,7 @@ impl Op {
         OPCODES.get(opcode as usize).copied().flatten()
     }
 
-    /// The instruction of this name.
+    /// The instruction with a mnemonic.
     pub fn from_mnemonic(mnemonic: &str) -> Option<Op> {
         ROWS.iter().find(|row| row.mnemonic == mnemonic).map(|row| row.op)
     }

@@ -135,7 +135,7 @@ impl FromIterator<SlotIndex> for Slots {
 /// A row of the table of machines.
 #[derive(Clone, Copy, Debug, serde::Serialize)]
 pub struct Machine {
-    /// Name of the row, then the options that differ from it, as `t3,data=32768`.
+    /// Name of the row, then the options that differ from it, such as `t3,data=32768`.
     pub name: &'static str,
     /// Purpose, for lists of machines.
     pub text: &'static str,
@@ -151,7 +151,7 @@ pub struct Machine {
     pub data_depth: u32,
     /// Depth of the return stack, in addresses.
     pub stack_depth: u32,
-    /// Nesting depth of loops that the sequencer counts; 0 on a machine without.
+    /// Nesting depth of loops that the sequencer counts; 0 on a machine that counts none.
     pub loop_depth: u32,
     /// Cycles in which nothing issues after a taken branch, a call, a return, `wait` or reset, while the front end refills.
     pub refill: u32,
@@ -253,7 +253,7 @@ T4 = Machine {
 }
 
 impl Machine {
-    /// The most bundles of a program. A target cannot state the address after the last bundle of the deepest program memory,
+    /// Maximum number of bundles in a program. A target cannot state the address after the last bundle of the deepest program memory,
     /// which therefore stays unwritten: execution that reaches it stops there.
     pub const fn most_bundles(&self) -> u32 {
         if self.code_depth < MAX_CODE { self.code_depth } else { MAX_CODE - 1 }

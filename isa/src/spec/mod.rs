@@ -5,7 +5,7 @@
 //! - [`units`]: one row per circuit: what it computes, latency, initiation interval, pipeline cuts, RTL module;
 //! - [`machines`]: one row per machine: its issue slots, the units each slot hosts, its register banks and memories.
 //!
-//! [`row`] makes machines from rows made at run time, as from files, with the same checks. [`check`] validates rows of machines,
+//! [`row`] makes machines from rows made at run time, such as from files, with the same checks. [`check`] validates rows of machines,
 //! [`configuration`] finds machines by name and gives them other memories, [`fusion`] finds the fused multiply-add instructions,
 //! [`fixture`] has the machines of the tests.
 //!

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Rows of machines made at run time, as from a file. They pass the checks of the table's rows ([`Machine::error`]), are
+//! Rows of machines made at run time, for example from a file. They pass the checks of the table's rows ([`Machine::error`]), are
 //! kept for as long as the process runs, and each exists once.
 
 use super::check::MachineError;
@@ -11,7 +11,7 @@ use std::collections::HashMap;
 use std::fmt::Write as _;
 use std::sync::{LazyLock, Mutex, PoisonError};
 
-/// The most rows of a process beside the table's, invalid ones included: each takes some 2 KB until the end.
+/// Limit on the rows that a process may add to the table's, invalid ones included: each occupies about 2 KB until it exits.
 pub const MOST_ROWS: usize = 16_384;
 
 /// A machine's row that owns its texts; the fields are [`Machine`]'s.
@@ -54,7 +54,7 @@ pub struct BankOwned {
 pub struct UnitOwned {
     /// Name in the table of units.
     pub name: &'static str,
-    /// Functions that it executes here, a subset of the table's.
+    /// Functions that the unit executes in this machine, a subset of the table's.
     pub functions: Vec<Function>,
     /// Cycles from issue to the earliest issue of a dependent operation.
     pub latency: u32,
@@ -62,7 +62,7 @@ pub struct UnitOwned {
     pub interval: u32,
 }
 
-/// The reason why a row makes no machine.
+/// The reason why a row does not make a machine.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum RowError {
     /// The row is invalid, by a check that the table's rows pass.
@@ -114,7 +114,7 @@ impl UnitOwned {
     }
 
     fn leaked(&self) -> Unit {
-        // Readers make every `UnitOwned` from a row; one without a row keeps a name that no circuit has.
+        // Readers derive every `UnitOwned` from a row; a unit without a row keeps its name, for which no circuit exists.
         let row = UNITS.iter().find(|unit| unit.name == self.name).unwrap_or(&UNITS[0]);
         let functions = match row.functions == self.functions {
             true => row.functions,
@@ -190,7 +190,7 @@ impl RowOwned {
         }))
     }
 
-    /// The machine of the row: the table's, if it has this row, or else a machine that is kept from here on.
+    /// The machine of the row: the table's, if this row is in the table, or else one that lives as long as the process.
     ///
     /// # Errors
     /// If the row is invalid, or has the name of another machine of the table.
@@ -218,13 +218,13 @@ impl RowOwned {
 }
 
 impl Machine {
-    /// A machine of the table, or a fixture, whatever its memories: every tool finds it by its name. A file's machine is not
-    /// built in.
+    /// The machine is a row of the table or a fixture, with any memories, so that every tool finds it by name. A file's machine is
+    /// not built in.
     pub fn is_builtin(&self) -> bool {
         builtin(self.row_name()).is_some()
     }
 
-    /// The row as a file for `-m` (TOML), memories as they are.
+    /// The row as a TOML file for `-m`, with this machine's depths of memories.
     pub fn to_toml(&self) -> String {
         let mut out = String::new();
         let _ = writeln!(out, "name = \"{}\"", self.identifier());

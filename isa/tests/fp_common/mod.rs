@@ -311,12 +311,12 @@ impl Triples {
             0 => pairs.random.bits(),
             1 | 2 => pairs.special(),
             3 => pairs.finite(),
-            // Any distance at which both matter, and a little more.
+            // Any distance at which both operands affect the result, and a little more.
             4 | 5 | 13 | 14 => {
                 let exponent = at + pairs.random.between(-52, 28);
                 pairs.with_exponent(a, exponent).1
             }
-            // Cancellation: the product but for its last places, which binary32 does not hold, or but for a binade.
+            // Cancellation of the product, except for its last places, which binary32 does not hold, or for a difference of one binade.
             6..=8 => (bits ^ SIGN).wrapping_add_signed(pairs.random.between(-3, 3)),
             9 => {
                 let exponent = at + pairs.random.between(-2, 2);

@@ -17,14 +17,14 @@ use takt_isa::spec::row::{BankOwned, RowError, RowOwned, RowPlace, SlotOwned, Un
 use takt_isa::{Function, Machine, MachineReason, UNITS};
 use toml::Spanned;
 
-/// The longest file of a machine.
+/// Maximum length of a machine's file, in bytes.
 pub const FILE_BYTES: usize = 1 << 16;
-/// The longest name in a file, in bytes: names become parts of names in assembly and Verilog.
+/// Maximum length of a name in a file, in bytes: names become parts of names in assembly and Verilog.
 const NAME_BYTES: usize = 40;
-/// The most units of a slot.
+/// Maximum number of units of a slot.
 const UNITS_OF_SLOT: usize = 32;
 
-/// The advice for a file that lacks something.
+/// Advice for a file with missing parts.
 const PATTERN: &str =
     "`takt machines t3 --toml` prints a file that has every key; docs/machines.md explains them";
 
@@ -101,7 +101,7 @@ impl<'de> Deserialize<'de> for Entry {
     }
 }
 
-/// Name and text of files, by the names of their machines.
+/// Name and text of each machine's file, by the machine's name.
 type Files = HashMap<&'static str, [Arc<str>; 2]>;
 
 /// The files of the machines that were read, for messages of later stages.
@@ -120,7 +120,7 @@ fn diagnostics(name: &str, text: &str, list: Vec<Diagnostic>) -> Diagnostics {
 /// Reads a machine's row. A row that was read before gives the same machine.
 ///
 /// # Errors
-/// The mistakes in the file, all that can be told at once.
+/// All mistakes that one pass over the file finds.
 pub fn read(name: &str, text: &str) -> Result<&'static Machine, Diagnostics> {
     if text.len() > FILE_BYTES {
         return Err(diagnostics(name, text, vec![Diagnostic::placeless("limit", too_long())]));
@@ -141,8 +141,8 @@ pub fn read(name: &str, text: &str) -> Result<&'static Machine, Diagnostics> {
     }
 }
 
-/// A message about a part of a machine that was read from a file, options left out, at its place there; `None` for other
-/// machines.
+/// A message at the place of a part of a machine, in the file from which the machine was read; `None` for other machines. Options
+/// in the machine's name are ignored.
 pub fn about(machine: &str, place: RowPlace<'_>, message: &str, help: &str) -> Option<Diagnostics> {
     let [name, text] = {
         let files = FILES.lock().unwrap_or_else(PoisonError::into_inner);
@@ -204,7 +204,7 @@ fn mistake(file: &File, error: &RowError) -> Diagnostic {
     }
 }
 
-/// The place of a part of the row; among several of one name, the last.
+/// The place of a part of the row; among several with the same name, the last.
 fn find(file: &File, place: RowPlace<'_>) -> Range<usize> {
     let top = || file.name.span();
     let slot = |name: &str| file.slot.iter().rev().find(|slot| slot.name.get_ref() == name);

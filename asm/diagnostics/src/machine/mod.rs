@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The machine that a user asks for: by a name of the table or by a file with its row, and options behind either.
+//! Resolves the machine that a user names: a row of the table or a file with a row, either followed by options.
 
 mod file;
 
@@ -9,7 +9,7 @@ pub use file::{FILE_BYTES, about, read};
 use std::path::Path;
 use takt_isa::{Machine, MachineNameError};
 
-/// The reason that a machine is unknown, unread or wrong.
+/// The reason why a machine is unknown, unread or wrong.
 #[derive(Clone, Debug)]
 pub enum MachineMistake {
     /// No machine of the table, or no option, has this name.
@@ -25,7 +25,7 @@ pub enum MachineMistake {
     File(Diagnostics),
 }
 
-/// The name of the file and the options behind it, if a machine is named by a file: `my.toml`, `my.toml,data=4096`.
+/// Splits the name of a machine's file from the options after it: `my.toml`, `my.toml,data=4096`. `None` for other names.
 pub fn machine_file(name: &str) -> Option<(&str, &str)> {
     const ENDING: &str = ".toml";
     let lower = name.to_ascii_lowercase();
@@ -36,10 +36,10 @@ pub fn machine_file(name: &str) -> Option<(&str, &str)> {
     Some((file.trim_start(), options.trim_start().trim_start_matches(',')))
 }
 
-/// The machine of a name, or of a file whose bytes `load` gives.
+/// The machine with a name, or from a file whose bytes `load` returns.
 ///
 /// # Errors
-/// If there is none, or the file has mistakes.
+/// If no machine has the name, or the file has mistakes.
 pub fn machine_from(
     name: &str,
     load: impl FnOnce(&str) -> Result<Vec<u8>, String>,
@@ -63,7 +63,7 @@ pub fn machine_from(
     machine.with_option_list(options.split(',')).map_err(MachineMistake::Name)
 }
 
-/// The machine of a name or of a file on this disk, with options if it has any: `t3,data=32768`, `my.toml`.
+/// The machine with a name or from a file on this disk, with options if it has any: `t3,data=32768`, `my.toml`.
 ///
 /// # Errors
 /// The mistake in words, with the nearest known name and a list of all.
@@ -74,7 +74,7 @@ pub fn machine(name: &str) -> Result<&'static Machine, String> {
 /// The bytes of a machine's file on this disk.
 ///
 /// # Errors
-/// The reason why it cannot be read.
+/// The reason why the file cannot be read.
 pub fn load(file: &Path) -> Result<Vec<u8>, String> {
     let about = std::fs::metadata(file).map_err(|error| match error.kind() {
         std::io::ErrorKind::NotFound => "there is no such file".to_owned(),
@@ -87,7 +87,7 @@ pub fn load(file: &Path) -> Result<Vec<u8>, String> {
     }
 }
 
-/// The message of a file that is too long for a machine's.
+/// The message for a machine's file that is too long.
 fn too_long() -> String {
     format!("it has more than the {FILE_BYTES} bytes of a machine's file")
 }

@@ -6,7 +6,7 @@
 
 use std::collections::HashMap;
 
-/// A node.
+/// Index of a node.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, PartialOrd, Ord)]
 pub(super) struct Id(pub(super) u32);
 
@@ -19,14 +19,14 @@ pub(super) enum Kind {
 
 macro_rules! operations {
     ($($(#[doc = $text:literal])? $name:ident $result:ident;)*) => {
-        /// An operation; its operands are of the types that its spelling says.
+        /// An operation; its name implies the types of its operands.
         #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
         pub(super) enum Op {
             $($(#[doc = $text])? $name,)*
         }
 
         impl Op {
-            /// Type of the result; a choice has that of its alternatives.
+            /// Type of the result; a choice has the type of its alternatives.
             pub(super) fn kind(self) -> Kind {
                 match self {
                     $(Op::$name => Kind::$result,)*
@@ -78,7 +78,7 @@ operations! {
     SelectFloat Float;
 }
 
-/// A value.
+/// A value of 32 bits.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub(super) enum Node {
     Int(i32),
@@ -93,7 +93,7 @@ pub(super) enum Node {
     Load(usize, Id, u32),
 }
 
-/// Place in the C.
+/// Place in the C source.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(super) struct Place {
     pub(super) unit: usize,
@@ -114,7 +114,7 @@ pub(super) struct Data {
     pub(super) label: Option<String>,
 }
 
-/// A register that changes.
+/// A variable: a register that is written more than once.
 #[derive(Clone, Debug)]
 pub(super) struct Var {
     pub(super) name: String,
@@ -169,7 +169,7 @@ pub(super) type Block = Vec<(Statement, Place)>;
 pub(super) struct Nodes {
     list: Vec<Data>,
     known: HashMap<Node, Id>,
-    /// Nodes in the order in which `known` got them, to forget those of a branch behind it.
+    /// Nodes in the order of their insertion into `known`, so that the nodes of a branch can be forgotten after it.
     log: Vec<Node>,
     pub(super) vars: Vec<Var>,
     pub(super) arrays: Vec<Array>,
@@ -253,7 +253,7 @@ impl Nodes {
         self.log.len()
     }
 
-    /// Computes again, where it is needed again, what was computed since the mark: a branch may have passed over it. Constants stay.
+    /// Forgets the nodes since a mark, so that later uses compute them again: a branch may have skipped them. Constants stay.
     pub(super) fn forget(&mut self, mark: usize) {
         let since = self.log.split_off(mark);
         for node in since {

@@ -19,7 +19,7 @@ impl Live {
         for root in roots {
             live.mark(nodes, *root);
         }
-        // A loop's variables may need what comes later in its body: until nothing changes.
+        // Fixpoint: a loop's variables may need values from later in its body.
         while live.block(nodes, block).1 {}
         live
     }
@@ -75,7 +75,7 @@ impl Live {
         (effect, changed)
     }
 
-    /// The block without what nothing needs.
+    /// The block without dead values and statements.
     pub(super) fn pruned(&self, block: Block) -> Block {
         let mut kept = Block::new();
         for (statement, place) in block {

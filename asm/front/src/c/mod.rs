@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! C99: a step function and what it calls becomes a program, a period of which is one call.
+//! C99: a step function and its callees become a program; each period is one call.
 //!
-//! The C is executed while it is translated (`exec`): integers, pointers, sizes and counters that are known are computed; floats and what
-//! depends on inputs become nodes (`ir`), which `write` spells. Paths that data choose become choices or branches, loops are written out
-//! while they are short. The fate of the step's parameters and of variables that outlive it: `ports`.
+//! The C is executed while it is translated (`exec`): known integers, pointers, sizes and counters are computed; floats and values that
+//! depend on inputs become nodes (`ir`), which `write` spells. Paths that depend on data become choices or branches; loops are written
+//! out while they are short. `ports` decides the roles of the step's parameters and of variables that outlive it.
 
 mod exec;
 mod ir;
@@ -22,7 +22,7 @@ use crate::Error;
 use exec::{Exec, Facts};
 use unit::Unit;
 
-/// Most translations until nothing new is found out.
+/// Limit on the translations until their facts no longer grow.
 const MAX_ROUNDS: usize = 64;
 /// Bytes of stack while translating: statements and expressions nest.
 const STACK: usize = 512 << 20;
@@ -61,7 +61,7 @@ pub struct Translation {
 /// Translates C.
 ///
 /// # Errors
-/// If the text is no C that is read: with file, line, reason and remedy.
+/// If the text is not supported C: with file, line, reason and remedy.
 pub fn translate(sources: &[Source], options: &Options) -> Result<Translation, Error> {
     // Execution recurses with the nesting of the C: on a stack of its own.
     std::thread::scope(|scope| {
@@ -96,7 +96,7 @@ fn translated(sources: &[Source], options: &Options) -> Result<Translation, Erro
     )))
 }
 
-/// One translation with what the former ones found out.
+/// One translation, with the facts of the earlier ones.
 fn round(exec: &mut Exec<'_>, options: &Options) -> Result<Option<Translation>, Error> {
     let before = exec.facts.clone();
     for unit in 0..exec.units.len() {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Ports and states: what becomes of parameters of the step, and of variables that outlive it.
+//! Ports and states: roles of the step's parameters, and of variables that outlive it.
 //!
-//! A scalar whose value from before the step is read and that the step does not write is an input; one that it only writes, an output. One
-//! that is both is a state, if it belongs to a structure or a variable of the files; of an array or number that a parameter points to, an
-//! input and an output. A scalar that some paths write and none reads is an output that keeps its value.
+//! A scalar whose value from before the step is read and that the step does not write is an input; a scalar that the step only writes,
+//! an output. A scalar with both is a state, if it belongs to a structure or a variable of the files; in an array or number that a
+//! parameter points to, an input and an output. A scalar that some paths write and none reads is an output that keeps its value.
 
 use super::exec::Exec;
 use super::exec::call::adjusted;
@@ -17,11 +17,11 @@ use crate::sink::Names;
 use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
 
-/// Most ports of a program.
+/// Maximum number of ports of a program.
 const MAX_INPUTS: usize = 255;
 const MAX_OUTPUTS: usize = 32;
 
-/// A port of the program, and what it is in C.
+/// A port of the program, and the scalar in C that it carries.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Port {
     /// Name in the program: `q[1]`.
@@ -59,13 +59,13 @@ struct Start {
     leaf: usize,
     var: usize,
     read: Id,
-    /// The same as its type has it: a port may hold more.
+    /// The value wrapped to the scalar's type: a port may hold more.
     own: Id,
     /// Bits that `--init` or the declaration gives; `None` if nothing does.
     initial: Option<u32>,
 }
 
-/// The step ready to run: values from before it.
+/// State of the step before it runs: values from before it.
 pub(super) struct Begun {
     starts: Vec<Start>,
 }
@@ -80,7 +80,7 @@ fn bits(value: &Value) -> Option<u32> {
 }
 
 impl Exec<'_> {
-    /// The function of a name, in whichever file.
+    /// The function with a name, in any file.
     pub(super) fn entry(&self, name: &str, option: &str) -> Result<(String, Rc<Signature>), Error> {
         let mut keys: Vec<&String> =
             self.functions.keys().filter(|key| super::exec::plain(key) == name).collect();
@@ -113,7 +113,7 @@ impl Exec<'_> {
         }
     }
 
-    /// Objects that a function's parameters point to or are: by the parameters' names, and for --init those of the step.
+    /// Objects behind or of a function's parameters, by the parameters' names; for `--init`, the step's objects of the same name or type.
     pub(super) fn parameters(
         &mut self,
         signature: &Signature,
@@ -199,7 +199,7 @@ impl Exec<'_> {
         Ok(())
     }
 
-    /// Gives all that outlives the step its value from before it.
+    /// Gives each object that outlives the step its value from before the step.
     pub(super) fn begin(&mut self) -> Result<Begun, Error> {
         self.stepping = true;
         let mut starts = Vec::new();
@@ -262,7 +262,7 @@ impl Exec<'_> {
         Ok(())
     }
 
-    /// Stores inputs into the array that data index.
+    /// Stores inputs into an array in memory.
     fn fill(&mut self, object: usize, array: usize) -> Result<(), Error> {
         for leaf in 0..self.objects[object].leaves.len() {
             let (value, ty) =
@@ -316,7 +316,7 @@ impl Exec<'_> {
         let initial = bits(value).or((origin == Origin::Global && changes).then_some(0));
         let mut own = read;
         if let Type::Int(integer) = &ty {
-            // A port may hold more than its type: as a call would convert it.
+            // A port may hold more than its type: convert as a call would.
             own = self.wrapped(read, *integer)?;
         }
         self.memory.set(object, leaf, Value::Node(own));
@@ -374,7 +374,7 @@ impl Exec<'_> {
         Ok(roles)
     }
 
-    /// A scalar behind the step; `None` if it has no register then.
+    /// A scalar after the step; `None` if it has no register then.
     fn after(&mut self, object: usize, leaf: usize) -> Result<Option<Id>, Error> {
         let ty = self.objects[object].leaves[leaf].ty.clone();
         if let Some(array) = self.objects[object].array {
@@ -463,7 +463,7 @@ impl Exec<'_> {
         roles.states.push(State { name, kind, initial: start.initial.unwrap_or(0) });
     }
 
-    /// The value from before the step only reaches the same scalar behind it, by choices and branches.
+    /// The value from before the step only reaches the same scalar after it, through choices and branches.
     fn is_held(&self, start: &Start, after: Id, live: &Live, finals: &[Option<Id>]) -> bool {
         let mut uses = Uses::default();
         uses.collect(&self.blocks[0]);
@@ -545,7 +545,7 @@ enum Way {
     Out,
 }
 
-/// Declarations of ports so far: object, name of the member, suffix, way, and the name in the program.
+/// Declarations of ports so far: object, name of the member, suffix, direction, and the name in the program.
 #[derive(Default)]
 struct Groups(Vec<(usize, String, String, bool, String)>);
 

@@ -6,7 +6,7 @@ use crate::Error;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Headers of C's library, as far as there is something to translate: name and text.
+/// Headers of the supported part of C's library: name and text.
 pub const HEADERS: &[(&str, &str)] = &[
     ("float.h", include_str!("headers/float.h")),
     ("limits.h", include_str!("headers/limits.h")),
@@ -21,7 +21,7 @@ pub const HEADERS: &[(&str, &str)] = &[
 /// Programs that are tried, in order.
 const PROGRAMS: [&str; 3] = ["gcc", "cpp", "clang"];
 
-/// A call of the preprocessor, with the headers in a folder that lives as long.
+/// A call of the preprocessor, with the headers in a folder of the same lifetime.
 pub struct Preprocessor {
     folder: PathBuf,
     options: Vec<String>,
@@ -50,7 +50,7 @@ impl Preprocessor {
     /// Preprocesses a file.
     ///
     /// # Errors
-    /// If there is no preprocessor, or with its messages.
+    /// If no preprocessor is found or it fails, with its messages.
     pub fn run(&self, file: &Path) -> Result<Source, Error> {
         let name = file.display().to_string();
         let wrong = match std::fs::metadata(file) {
@@ -68,7 +68,7 @@ impl Preprocessor {
             }
             command.args(["-std=c99", "-nostdinc", "-undef", "-D__TAKT__=1"]);
             if program == "clang" {
-                // Its `-undef` takes the standard's own macros away, too; gcc warns of another definition.
+                // `-undef` removes the standard's own macros, too; gcc warns of another definition.
                 command.args(["-D__STDC__=1", "-D__STDC_VERSION__=199901L"]);
             }
             command.args(&self.options).arg("-isystem").arg(&self.folder).arg(file);
@@ -90,7 +90,7 @@ impl Preprocessor {
         )))
     }
 
-    /// The preprocessor's messages, with the headers that there are if one is missing.
+    /// The preprocessor's messages; if a header is missing, with a list of the available ones.
     fn explained(&self, messages: &str) -> String {
         let folder = self.folder.display().to_string();
         let text = messages.replace(&folder, "takt");

@@ -32,7 +32,7 @@ impl Integer {
         }
     }
 
-    /// After the integer promotions.
+    /// The type after the integer promotions.
     pub(super) fn promoted(self) -> Integer {
         if self.bits < 32 { INT } else { self }
     }
@@ -95,13 +95,13 @@ pub(super) struct Struct {
 pub(super) struct Leaf {
     pub(super) offset: usize,
     pub(super) ty: Type,
-    /// Members on the way, joined by `_`.
+    /// Names of the members on the path, joined by `_`.
     pub(super) name: String,
-    /// All indices on the way, with the number of elements of each.
+    /// All indices on the path, with the number of elements of each.
     pub(super) indices: Vec<(usize, usize)>,
 }
 
-/// Most scalars of an object.
+/// Maximum number of scalars of an object.
 pub(super) const MAX_LEAVES: usize = 65_536;
 
 /// All structures of a program.
@@ -167,7 +167,7 @@ impl Structs {
     }
 
     /// Scalars of a type in the order of their places; `None` if there are more than [`MAX_LEAVES`] or its size is unknown. A union has
-    /// those of its largest member.
+    /// the scalars of its largest member.
     pub(super) fn leaves(&self, ty: &Type) -> Option<Vec<Leaf>> {
         let mut leaves = Vec::new();
         self.collect(ty, 0, "", &[], &mut leaves)?;

@@ -5,10 +5,10 @@ use crate::Error;
 use lang_c::ast::TranslationUnit;
 use lang_c::driver::{Config, Flavor, parse_preprocessed};
 
-/// Deepest nesting of parentheses and braces: the parser recurses.
+/// Maximum nesting depth of parentheses and braces: the parser recurses.
 const MAX_NESTING: usize = 200;
 
-/// Most bytes of preprocessed text.
+/// Maximum length of preprocessed text, in bytes.
 const MAX_TEXT: usize = 16 << 20;
 
 pub(super) struct Unit {
@@ -18,7 +18,7 @@ pub(super) struct Unit {
     pub(super) files: Vec<String>,
     /// Bounds of loops with the offsets of their pragmas.
     pub(super) bounds: Vec<(usize, u64)>,
-    /// Text, for lines whose file is not at hand.
+    /// Preprocessed text, for lines of files that are not available.
     text: String,
 }
 
@@ -108,7 +108,7 @@ impl Unit {
         }
     }
 
-    /// Between a pragma's line and a place there are only blanks.
+    /// Only blanks stand between a pragma's line and a place.
     pub(super) fn between(&self, pragma: usize, place: usize) -> bool {
         self.text.get(pragma..place).is_some_and(|text| text.trim().is_empty())
     }
@@ -145,7 +145,7 @@ fn marker(rest: &str) -> Option<(usize, String)> {
     }
 }
 
-/// `#pragma takt loop_bound(N)`; pragmas of others are passed over.
+/// `#pragma takt loop_bound(N)`; other pragmas are ignored.
 fn pragma(rest: &str, offset: usize, bounds: &mut Vec<(usize, u64)>) -> Result<(), String> {
     let Some(rest) = rest.trim().strip_prefix("takt") else { return Ok(()) };
     let number = rest.trim().strip_prefix("loop_bound").map(str::trim);

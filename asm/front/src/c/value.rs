@@ -11,7 +11,7 @@ pub(super) struct Pointer {
     pub(super) object: usize,
     /// Bytes from the object's beginning.
     pub(super) offset: i64,
-    /// Scalars to add, if inputs decide about the place.
+    /// Number of scalars to add, if the place depends on inputs.
     pub(super) dynamic: Option<Id>,
 }
 
@@ -24,16 +24,16 @@ pub(super) enum Value {
     Real(f64),
     Node(Id),
     Pointer(Pointer),
-    /// A function of this key.
+    /// A function, by its key.
     Function(String),
     /// Scalars of a structure.
     Struct(Rc<Vec<Value>>),
-    /// A value that depends on data and that the language has no register for; the text says why.
+    /// A value that depends on data and for which the language has no register; the text gives the reason.
     Mixed(&'static str),
 }
 
 impl PartialEq for Value {
-    /// Numbers are the same if their bits are: zeros have signs.
+    /// Numbers are equal if their bits are: zeros have signs.
     fn eq(&self, other: &Value) -> bool {
         match (self, other) {
             (Value::Unset, Value::Unset) => true,
@@ -84,7 +84,7 @@ pub(super) enum Origin {
     Parameter,
 }
 
-/// An object: a variable, or what a parameter points to.
+/// An object: a variable, or the target of a parameter.
 #[derive(Clone, Debug)]
 pub(super) struct Object {
     pub(super) name: String,
@@ -92,9 +92,9 @@ pub(super) struct Object {
     pub(super) leaves: Rc<Vec<Leaf>>,
     pub(super) origin: Origin,
     pub(super) constant: bool,
-    /// Name and place of its declaration, by which a second translation knows it again.
+    /// Name and place of the declaration, by which a later translation recognises the object.
     pub(super) key: (String, usize, usize),
-    /// The array in data memory that holds it.
+    /// The array in data memory that holds the object, if any.
     pub(super) array: Option<usize>,
 }
 
@@ -119,7 +119,7 @@ impl Object {
     }
 }
 
-/// Values of all scalars, object by object; copies share what does not differ.
+/// Values of all scalars, object by object; copies share unchanged objects.
 #[derive(Clone, Default)]
 pub(super) struct Memory(pub(super) Vec<Rc<Vec<Value>>>);
 
@@ -133,7 +133,7 @@ impl Memory {
     }
 }
 
-/// The way in which a statement ends.
+/// The way in which control leaves a statement.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(super) enum Exit {
     Break,
@@ -142,7 +142,7 @@ pub(super) enum Exit {
     Goto(String),
 }
 
-/// A way out of a block, with its condition and the memory then.
+/// An exit from a block, with its condition and the memory at that point.
 pub(super) struct Outcome {
     pub(super) exit: Exit,
     pub(super) when: Condition,

@@ -14,9 +14,9 @@ use std::collections::HashMap;
 
 /// The format's name and version, the value of its field `format`.
 pub const FORMAT: &str = "takt-expressions 1";
-/// Longest file that is read, in bytes.
+/// Maximum length of a file, in bytes.
 pub const MAX_BYTES: usize = 64 << 20;
-/// Most scalars of an argument, and most scalar inputs of a function.
+/// Maximum number of scalars of an argument, and of scalar inputs of a function.
 pub const MAX_PORTS: usize = 65_536;
 /// Largest whole exponent of a power that is written as products.
 pub const MAX_POWER: f64 = 64.0;
@@ -117,7 +117,7 @@ impl Argument {
 /// Reads a function from the JSON text of an instruction list.
 ///
 /// # Errors
-/// If the text is no instruction list, or an operation has no meaning here; with the line.
+/// If the text is not an instruction list, or an operation has no meaning here; with the line.
 pub fn read(source: &str, rewrites: Rewrites) -> Result<Function, Error> {
     if source.len() > MAX_BYTES {
         return Err(Error::plain(format!("the file is longer than {} MiB", MAX_BYTES >> 20)));

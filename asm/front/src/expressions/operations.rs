@@ -11,7 +11,7 @@ type Meaning = for<'g> fn(&[Expr<'g>]) -> Expr<'g>;
 pub struct Operation {
     /// Spellings: CasADi's in small letters, SymPy's, or C's.
     pub names: &'static [&'static str],
-    /// Fewest and most operands.
+    /// Minimum and maximum number of operands.
     pub operands: (usize, usize),
     /// Resulting operations, as the documents print them.
     pub becomes: &'static str,

@@ -23,7 +23,7 @@ pub use passes::{Delays, depth, optimise};
 use std::cell::RefCell;
 use std::collections::HashMap;
 
-/// Name of a node: its place in the graph.
+/// Index of a node in its graph.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Debug)]
 pub struct Id(u32);
 
@@ -117,7 +117,7 @@ pub enum Binary {
 }
 
 impl Binary {
-    /// The result is a condition, no number.
+    /// The result is a condition, not a number.
     pub fn compares(self) -> bool {
         matches!(self, Binary::Less | Binary::LessEqual | Binary::Equal | Binary::NotEqual)
     }
@@ -146,7 +146,7 @@ pub enum Node {
 }
 
 impl Node {
-    /// Operands in order: none of a leaf, up to three.
+    /// Operands in order: none for a leaf, up to three.
     pub fn operands(self) -> impl Iterator<Item = Id> {
         let (a, b, c) = match self {
             Node::Constant(_) | Node::Input(_) => (None, None, None),
@@ -163,16 +163,16 @@ impl Node {
     }
 }
 
-/// The rewrites that are allowed. All of them are exact over the reals; one that changes how a result is rounded says so.
+/// The allowed rewrites. All of them are exact over the reals; those that change the rounding of a result say so.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Rewrites {
     /// Operations on constants are carried out, in binary64.
     pub fold: bool,
     /// `x + 0`, `x - x`, `1*x`, `0*x`, `-(-x)`, `x/1`, a choice between equals.
     pub identities: bool,
-    /// Equal subexpressions are one.
+    /// Equal subexpressions are merged.
     pub share: bool,
-    /// `x` and `-x`, `a - b` and `b - a` are one; signs move to where they cost nothing.
+    /// `x` and `-x`, and `a - b` and `b - a`, share a node; signs move to where they cost nothing.
     pub signs: bool,
     /// Division by a constant becomes a product, constants of nested products are combined, `1/(1 + exp(-x))` becomes `sigmoid(x)`.
     /// Changes rounding.
@@ -197,7 +197,7 @@ impl Rewrites {
         balance: true,
         scale: true,
     };
-    /// Rewrites that keep the rounding of every operation: for finite values, the result is the same to the bit but for the sign of a zero.
+    /// Rewrites that keep the rounding of every operation: finite results stay the same to the bit, except for the sign of a zero.
     pub const EXACT: Rewrites =
         Rewrites { strength: false, factor: false, balance: false, scale: false, ..Rewrites::ALL };
 

@@ -82,8 +82,8 @@ fn extend(graph: &Graph, ready: &mut Vec<u32>, delays: &Delays) {
     }
 }
 
-/// Most rounds of rebuilding sums: factoring may bring up new common factors. Rounds end when the cost no longer falls, nearly always after
-/// two.
+/// Limit on the rounds of rebuilding sums: factoring may bring up new common factors. Rounds end when the cost no longer falls, nearly
+/// always after two.
 const ROUNDS: usize = 6;
 
 /// Rebuilds the graph of `outputs` with fewer operations or a shorter critical path; returns it with the new outputs. Without `thorough`
@@ -184,7 +184,7 @@ impl Rebuild<'_> {
         self.map[id.index()].expect("operands come first")
     }
 
-    /// Strips a negation: true if there was one, and the node below.
+    /// Strips a negation: returns whether there was one, and the node below.
     fn unsigned(&self, id: Id) -> (bool, Id) {
         match self.new.node(id) {
             Node::Unary(Unary::Neg, a) => (true, a),

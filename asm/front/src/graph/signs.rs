@@ -6,7 +6,7 @@
 use super::{Binary, Graph, Id, Label, Node, Parity, Rewrites, Unary};
 use std::collections::HashSet;
 
-/// A node stripped of its negations, and true if their number is odd.
+/// A node stripped of its negations, and whether their number is odd.
 type Signed = (Id, bool);
 
 struct Signs<'a> {
@@ -27,7 +27,7 @@ pub(super) fn settle(graph: &Graph, outputs: &[Id], thorough: bool) -> (Graph, V
     signs.rebuilt()
 }
 
-/// Sweeps that may turn a difference although the number of negations stays, to leave a plateau.
+/// Number of sweeps that may turn a difference without reducing the negations, to leave a plateau.
 const SWEEPS: usize = 12;
 
 /// State of the local search for few negations.
@@ -67,7 +67,7 @@ impl SearchState {
 
 impl Signs<'_> {
     /// Turns single differences, then pairs, where that leaves fewer negations. In between, `sweeps` sweeps also accept an equal number,
-    /// and are undone if they lead to no smaller one. Visits `effort` nodes in all.
+    /// and are undone if they do not reduce it. Visits `effort` nodes in total.
     fn search(&mut self, effort: usize, sweeps: usize) {
         let choices: Vec<usize> =
             self.live.iter().rev().filter(|id| self.may_turn(**id)).map(|id| id.index()).collect();

@@ -223,7 +223,7 @@ impl Graph {
         self.raw(Node::Select(condition, yes, no))
     }
 
-    /// Recognises the comparison of `a` with zero where `a` is 1 or 0 by a condition: returns the condition, and true if it makes 1.
+    /// Recognises the comparison of `a` with zero where a condition makes `a` 1 or 0: returns the condition, and whether it makes 1.
     fn truth(&self, a: Id, b: Id) -> Option<(Id, bool)> {
         let Node::Select(inner, yes, no) = self.node(a) else { return None };
         let values = (self.value(yes)?, self.value(no)?);

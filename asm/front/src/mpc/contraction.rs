@@ -11,9 +11,9 @@
 use super::{Controller, System};
 use nalgebra::{DMatrix, DVector};
 
-/// Most work: corners times the cube of the dimension of v.
+/// Limit on the work: corners times the cube of the dimension of v.
 const MAX_WORK: f64 = 1e9;
-/// Most inputs of a plan; each doubles the number of corners.
+/// Maximum number of inputs of a plan; each doubles the number of corners.
 const MAX_INPUTS: usize = 16;
 
 /// A proven rate of convergence, and bounds on residuals over the range of states that the system names.

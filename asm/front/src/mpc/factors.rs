@@ -6,7 +6,7 @@ use crate::Error;
 use nalgebra::linalg::Schur;
 use nalgebra::{Complex, DMatrix};
 
-/// Most steps of the Riccati recursion, which converges linearly.
+/// Maximum number of steps of the Riccati recursion, which converges linearly.
 const MAX_STEPS: usize = 100_000;
 /// Relative change per step below which the recursion has converged.
 const CONVERGED: f64 = 1e-13;
@@ -14,7 +14,7 @@ const CONVERGED: f64 = 1e-13;
 const SINGULAR: f64 = 1e-10;
 /// Magnitude from which on an eigenvalue counts as unstable.
 const UNSTABLE: f64 = 1.0 + 1e-9;
-/// Most steps of the QR algorithm.
+/// Maximum number of steps of the QR algorithm.
 const MAX_QR: usize = 100_000;
 
 /// The factors that TinyMPC caches, with the penalty in the weights.

@@ -21,16 +21,16 @@ pub use reference::{Controller, Outcome, Reference, WarmStart};
 pub use search::{Extreme, MAX_RESTARTS, Search, search};
 pub use write::{Source, source};
 
-/// Most states and inputs; products of matrices are unrolled.
+/// Maximum number of states, and of inputs; products of matrices are unrolled.
 pub const MAX_STATES: usize = 32;
-/// Longest horizon, in states.
+/// Maximum length of the horizon, in states.
 pub const MAX_HORIZON: usize = 128;
-/// Most iterations per period.
+/// Maximum number of iterations per period.
 pub const MAX_ITERATIONS: usize = 10_000;
 
-/// Most states if the matrices are inputs: their products and the recursion are unrolled.
+/// Maximum number of states if the matrices are inputs: their products and the recursion are unrolled.
 pub const MAX_RELINEARISED: usize = 8;
-/// Most steps of the Riccati recursion per period.
+/// Maximum number of steps of the Riccati recursion per period.
 pub const MAX_RICCATI: usize = 100;
 
 /// References among the controller's inputs.

@@ -14,7 +14,7 @@ use takt_text::readers::{Row, Treatment};
 
 /// Name and version of the format, in the field `format`.
 pub const FORMAT: &str = "takt-mpc 1";
-/// Longest file, in bytes.
+/// Maximum length of a file, in bytes.
 pub const MAX_BYTES: usize = 16 << 20;
 /// Tolerance of a weight's least eigenvalue, relative to the largest element.
 const ROUNDING: f64 = 1e-12;
@@ -95,7 +95,7 @@ pub fn is_system(text: &str) -> bool {
 /// Reads a control problem; `stem` names a problem without a name, `files` gives the included files of numbers.
 ///
 /// # Errors
-/// If the text is no control problem, or its parts do not fit; with the key and its line.
+/// If the text is not a control problem, or its parts do not fit; with the key and its line.
 pub fn read(text: &str, stem: &str, files: Files<'_>) -> Result<System, Error> {
     if text.len() > MAX_BYTES {
         return Err(Error::plain(format!("the file is longer than {} MiB", MAX_BYTES >> 20)));

@@ -18,7 +18,7 @@ pub struct Search {
     pub periods: usize,
 }
 
-/// Most restarts of a search.
+/// Maximum number of restarts of a search.
 pub const MAX_RESTARTS: usize = 1_000_000;
 /// Number of times that a coordinate search halves its step.
 const HALVINGS: usize = 6;
@@ -26,7 +26,7 @@ const HALVINGS: usize = 6;
 /// Largest value found of one quantity, with its state.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Extreme {
-    /// Short name of the quantity, as `primal`.
+    /// Short name of the quantity, such as `primal`.
     pub name: &'static str,
     /// Description of the quantity.
     pub text: &'static str,

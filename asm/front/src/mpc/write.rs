@@ -104,7 +104,7 @@ struct Writer<'a> {
 /// Stands for an entry known only at run time: neither 0 nor 1, so that its product is written out.
 const UNKNOWN: f64 = 2.0;
 
-/// Sum of the products of a row, as `A[2,1]*e[1]`, without products by zero; `turned` reads a column instead.
+/// Sum of the products of a row, such as `A[2,1]*e[1]`, without products by zero; `turned` reads a column instead.
 fn row(name: &str, matrix: &DMatrix<f64>, i: usize, turned: bool, by: &str) -> Option<String> {
     let count = if turned { matrix.nrows() } else { matrix.ncols() };
     let entry = |j: usize| if turned { matrix[(j, i)] } else { matrix[(i, j)] };

@@ -11,7 +11,7 @@ type Meaning = for<'g> fn(&[Expr<'g>], &[f64]) -> Expr<'g>;
 pub struct Function {
     /// Operator name in ONNX.
     pub name: &'static str,
-    /// Fewest and most operands.
+    /// Minimum and maximum number of operands.
     pub operands: (usize, usize),
     /// Numeric attributes with their default values.
     pub parameters: &'static [(&'static str, f64)],

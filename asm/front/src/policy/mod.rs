@@ -22,7 +22,7 @@ pub use write::{Source, source};
 use crate::graph::{Expr, Graph, Id, evaluate};
 use functions::REWRITES;
 
-/// Most weights of a layer, or elements of an array: more than any machine has data words.
+/// Maximum number of weights of a layer, or of elements of an array: more than any machine has data words.
 pub const MAX_NUMBERS: usize = 1 << 16;
 
 /// Operand of an elementwise step.

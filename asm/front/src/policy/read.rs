@@ -13,7 +13,7 @@ use prost::Message;
 use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
 
-/// Longest file, in bytes.
+/// Maximum length of a file, in bytes.
 pub const MAX_BYTES: usize = 64 << 20;
 
 /// State of the reader.
@@ -29,7 +29,7 @@ pub(super) struct Reader<'a> {
 /// `files` reads files in the model's folder.
 ///
 /// # Errors
-/// If the file is no ONNX model, or its graph has an unsupported operator: with the node's name and operator.
+/// If the file is not an ONNX model, or its graph has an unsupported operator: with the node's name and operator.
 pub fn read(bytes: &[u8], name: &str, output: Option<&str>, files: Files<'_>) -> Result<Network, Error> {
     let model =
         Model::decode(bytes).map_err(|error| Error::plain(format!("this is no model of ONNX: {error}")))?;

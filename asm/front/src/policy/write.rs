@@ -13,7 +13,7 @@ use std::collections::HashMap;
 use std::fmt::Write;
 use takt_isa::Machine;
 
-/// Most elements of a vector that are in registers at a time: half of a bank; the other half holds products.
+/// Maximum number of a vector's elements in registers at a time: half of a bank; the other half holds products.
 const COLUMNS: usize = 128;
 
 /// Unrolling factor of loops that call macros: a macro's chain leaves most cycles idle.

@@ -11,7 +11,7 @@ use std::f64::consts::{PI, TAU};
 use takt_text::readers::{Row, Treatment, fate};
 use takt_text::table::{no_number, separator};
 
-/// Columns that a table must have; angles may be in degrees, as `alpha_deg`.
+/// Columns that a table must have; angles may be in degrees, as in `alpha_deg`.
 const NEEDED: [&str; 6] = ["joint", "kind", "a", "alpha", "d", "theta"];
 /// Suffix of a column of angles in degrees.
 const DEGREES: &str = "_deg";
@@ -74,7 +74,7 @@ fn number(text: &str) -> Option<f64> {
 /// Reads a robot from a table.
 ///
 /// # Errors
-/// If the text is no such table, with the line.
+/// If the text is not such a table, with the line.
 pub fn read(source: &str, name: &str, snap: f64) -> Result<Tree, Error> {
     let mut convention = None;
     let mut header: Option<Header<'_>> = None;

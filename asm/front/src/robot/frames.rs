@@ -11,7 +11,7 @@ use super::{Kind, Robot};
 pub struct Link {
     /// Name of the joint in the description.
     pub name: String,
-    /// The motion that it allows.
+    /// Motion that the joint allows.
     pub kind: Kind,
     /// Parent joint; `None` on the base.
     pub parent: Option<usize>,

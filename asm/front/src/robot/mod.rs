@@ -47,7 +47,7 @@ impl Kind {
     }
 }
 
-/// A joint's rotor and passive forces, as MuJoCo has them.
+/// A joint's rotor and passive forces, as in MuJoCo's models.
 #[derive(Clone, Copy, PartialEq, Default, Debug)]
 pub struct PassiveForces {
     /// Rotor inertia of the motor, seen through the gear, kg m² (kg for a sliding joint).
@@ -67,7 +67,7 @@ pub struct PassiveForces {
 pub struct Joint {
     /// Name in the description; ports are named after it.
     pub name: String,
-    /// The motion that it allows.
+    /// Motion that the joint allows.
     pub kind: Kind,
     /// Parent joint, with a smaller index; `None` on the base.
     pub parent: Option<usize>,
@@ -126,9 +126,9 @@ pub fn read(text: &str, snap: f64, files: Files<'_>) -> Result<Tree, Error> {
 
 /// Standard gravity in robot models, m/s².
 pub const GRAVITY: f64 = 9.81;
-/// Most moving joints of a robot.
+/// Maximum number of moving joints of a robot.
 pub const MAX_JOINTS: usize = 128;
-/// Most links of a description, and most joints, fixed ones included.
+/// Maximum number of links of a description, and of joints, fixed ones included.
 pub const MAX_LINKS: usize = 4096;
 
 impl Robot {

@@ -11,8 +11,8 @@ pub(super) enum Excess {
     Attributes(usize),
 }
 
-/// Finds the first place with more than `deep` nested elements, or more than `wide` attributes. `None` also if the text before is no XML:
-/// the parser's message is better.
+/// Finds the first place with more than `deep` nested elements, or more than `wide` attributes. `None` also if the text before is not
+/// XML: the parser's message is better.
 pub(super) fn excess(source: &str, deep: usize, wide: usize) -> Option<Excess> {
     let (mut rest, mut depth) = (source, 0_usize);
     while let Some(at) = rest.find('<') {
@@ -74,7 +74,7 @@ mod tests {
         let expected = [Some(Excess::Depth(2)), Some(Excess::Depth(4)), None];
         assert_eq!([1, 2, 3].map(|deep| excess(text, deep, 2)), expected);
         assert_eq!(excess(text, 3, 1), Some(Excess::Attributes(2)));
-        // An unterminated comment is the parser's business.
+        // Unterminated markup is left to the parser.
         for text in ["<a", "<a b='>", "<!-- <a>", "<a><![CDATA[", "<?", "<!", "</a", "no XML", "</a></a>"] {
             assert_eq!(excess(text, 1, 1), None, "{text}");
         }

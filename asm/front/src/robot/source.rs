@@ -3,14 +3,13 @@
 //!
 //! MuJoCo replaces each `include` by the elements of the included file before it reads anything. A file is looked for beside the main file,
 //! then beside the including file, and may be included once.
-//! main file, then beside the file that names it, and may be included once.
 
 use super::xml::{self, MAX_BYTES};
 use crate::{Error, Files};
 use std::collections::HashSet;
 use std::ops::Range;
 
-/// Most levels of nested includes.
+/// Maximum nesting depth of includes.
 const MAX_DEPTH: usize = 32;
 
 /// A text put together from several files, with the origin of each line.
@@ -27,7 +26,7 @@ impl Source {
     /// Expands the includes of a text.
     ///
     /// # Errors
-    /// If a file is missing, no XML, or included twice.
+    /// If a file is missing, is not XML, or is included twice.
     pub(super) fn of(text: &str, files: Files<'_>) -> Result<Source, Error> {
         let mut source = Source { text: String::new(), files: vec![String::new()], lines: Vec::new() };
         let text = xml::without_declaration(text);

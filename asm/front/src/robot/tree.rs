@@ -26,7 +26,7 @@ pub enum ElementKind {
 pub struct Element {
     /// Name of the joint, unique in the description.
     pub name: String,
-    /// Motion that it allows.
+    /// Motion that the joint allows.
     pub kind: ElementKind,
     /// Name of the parent link.
     pub parent: String,
@@ -174,7 +174,7 @@ impl Tree {
     /// to the tip, or beyond it, are held at 0. Gravity acts as on the root.
     ///
     /// # Errors
-    /// If a link is unknown, the base does not carry the tip, the links are no tree, or nothing moves.
+    /// If a link is unknown, the base does not carry the tip, the links do not form a tree, or nothing moves.
     pub fn robot(&self, base: Option<&str>, tip: Option<&str>) -> Result<Robot, Error> {
         let carriers = self.carriers()?;
         let mut roots =

@@ -69,7 +69,7 @@ const STRICT: [&str; 7] = ["inertial", "origin", "axis", "mass", "inertia", "par
 /// Reads a robot in URDF. Angles within `snap` of a multiple of π/2 are rounded to it.
 ///
 /// # Errors
-/// If the text is no URDF, or has parts that the equations cannot express, with the line of the joint or link.
+/// If the text is not URDF, or has parts that the equations cannot express, with the line of the joint or link.
 pub fn read(text: &str, snap: f64) -> Result<Tree, Error> {
     let source = Source::of(text, &no_files)?;
     from_xml(&xml::parse(&source.text)?, snap)

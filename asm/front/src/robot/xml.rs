@@ -6,19 +6,19 @@ use crate::Error;
 use roxmltree::{Document, Node};
 use std::borrow::Cow;
 
-/// Longest description, in bytes.
+/// Maximum length of a description, in bytes.
 pub const MAX_BYTES: usize = 64 << 20;
-/// Most levels of nested elements. (URDF has 6, MJCF one for each joint of a chain; the parser recurses into each.)
+/// Maximum nesting depth of elements. (URDF has 6, MJCF one for each joint of a chain; the parser recurses into each.)
 pub const MAX_DEPTH: usize = 64;
-/// Most elements, and texts between them.
+/// Maximum number of elements, and of texts between them.
 pub const MAX_NODES: u32 = 1 << 20;
-/// Most attributes of an element: the parser compares each with all others. (MJCF has elements of 40.)
+/// Maximum number of attributes of an element: the parser compares each with all others. (MJCF has elements of 40.)
 pub const MAX_ATTRIBUTES: usize = 256;
 
 /// Parses a text within the limits.
 ///
 /// # Errors
-/// If the text is no XML or exceeds a limit, with the line if known.
+/// If the text is not XML or exceeds a limit, with the line if known.
 pub(super) fn parse(source: &str) -> Result<Document<'_>, Error> {
     if source.len() > MAX_BYTES {
         return Err(Error::plain(format!("the file is longer than {} MiB", MAX_BYTES >> 20)));

@@ -41,7 +41,7 @@ pub(crate) struct Terms<'a> {
     pub(crate) inputs: &'a [Port],
     /// Names of values that have one.
     pub(crate) names: &'a HashMap<Id, String>,
-    /// Most levels of operations; deeper ones are spelled `…`.
+    /// Maximum number of levels of operations; deeper ones are spelled `…`.
     pub(crate) depth: usize,
     /// An absolute error suffices for `tanh` and `sigmoid`.
     pub(crate) quick: bool,
@@ -135,7 +135,7 @@ impl Terms<'_> {
     }
 }
 
-/// The node is a macro of `<math.s>`, no instruction.
+/// The node is a macro of `<math.s>` rather than an instruction.
 pub(crate) fn of_library(node: Node) -> bool {
     match node {
         Node::Unary(op, _) => matches!(

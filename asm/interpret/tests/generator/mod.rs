@@ -14,7 +14,7 @@ const SIZE: u64 = 160;
 const FLOATS: u64 = 6;
 const INTEGERS: u64 = 4;
 
-/// The name of an index, and the values that it may have.
+/// The name of an index, and the range of its values.
 type Index = (String, i64, i64);
 
 /// A subroutine that later code may call.
@@ -26,13 +26,13 @@ struct Subroutine {
     cost: u64,
 }
 
-/// Place of a statement.
+/// Context of a statement.
 #[derive(Clone)]
 struct Place {
     indices: Vec<Index>,
-    /// Number of counted loops around the statement.
+    /// Number of counted loops that enclose the statement.
     nest: usize,
-    /// Executions of the statement, and copies of it, at most.
+    /// Upper bounds of the statement's executions and of its copies.
     runs: u64,
     copies: u64,
     /// Nesting of loops and branches, by which the next index is named.
@@ -41,9 +41,9 @@ struct Place {
 
 struct Generator {
     random: Pcg64,
-    /// Text of the present code.
+    /// Text of the current code.
     text: String,
-    /// Subroutines made so far, which the present code may call.
+    /// Subroutines made so far, which the current code may call.
     subroutines: Vec<Subroutine>,
     names: u64,
     nest: usize,
@@ -352,7 +352,7 @@ impl Generator {
         let _ = writeln!(self.text, "{label}:");
     }
 
-    /// A loop of a label and a branch, with a counter of its own.
+    /// A while loop: a label, a branch, and a counter of its own.
     fn while_loop(&mut self, place: &Place) {
         let (label, counter) = (self.name("W"), self.name("w"));
         let _ = writeln!(self.text, ".reg {counter}:int\n {counter} = 3\n .loop_bound 3\n{label}:");

@@ -13,7 +13,7 @@ use crate::schedule;
 use smallvec::smallvec;
 use takt_isa::{Effect, Op, ROWS, SlotIndex};
 
-/// Reason that spilling fails.
+/// Reason why spilling fails.
 pub(super) enum SpillError {
     /// Too few data words: at least this many are needed.
     Words(usize),
@@ -21,13 +21,13 @@ pub(super) enum SpillError {
     Values,
 }
 
-/// A value of the block that has a register for a time.
+/// A value of the block, live in a register from its write to its last use.
 struct Value {
     id: RegisterId,
     slot: SlotIndex,
-    /// Bundle that writes it, counted from the block's first.
+    /// Bundle that writes the value, counted from the block's first.
     first: usize,
-    /// Bundles that read it, ascending.
+    /// Bundles that read the value, ascending.
     uses: Vec<usize>,
     /// The value may be spilled.
     spillable: bool,
@@ -36,7 +36,7 @@ struct Value {
 }
 
 impl Value {
-    /// The bundle after which its register is free.
+    /// The bundle after which the value's register is free.
     fn end(&self) -> usize {
         self.uses.last().copied().unwrap_or(0).max(self.first + usize::from(self.uses.is_empty()))
     }

@@ -91,7 +91,7 @@ impl AllocatableProgram {
     }
 }
 
-/// Programs to try with one pipelined loop less each, before all loops are left as written.
+/// Number of programs to try, each with one pipelined loop fewer, before leaving all loops as written.
 const LOOPS_LESS: usize = 5;
 
 /// Leaves pipelined loops as they are written, beginning with the loop that saves the fewest cycles per bundle, until the program
@@ -125,7 +125,7 @@ pub(crate) fn reduce_loops(ir: &mut Ir, report: &mut Report, source: Option<&Ir>
 /// Reduces the register pressure of a scheduled program to the available registers. `source` is the program before scheduling.
 ///
 /// # Errors
-/// If some values get no register, with the reason. The program is then in its present order or in source order, whichever lacks
+/// If some values get no register, with the reason. The program is then in its current order or in source order, whichever lacks
 /// fewer registers.
 pub(crate) fn reduce_pressure(
     ir: &mut Ir,
@@ -247,7 +247,7 @@ fn by_memory(
         let (new, values) = spilled.map_err(|short| match short {
             block::SpillError::Words(needed) => {
                 let free = ir.machine.data_depth - declared.min(ir.machine.data_depth);
-                // More than the memory has: some words beyond the declared ones are in use, too.
+                // Ask for more than the current memory: words beyond the declared ones hold spilled values, too.
                 let words = u64::from(declared.max(ir.machine.data_depth)) + needed as u64;
                 let mend = capacity::for_words(ir.machine, words);
                 format!("{needed} data words are needed for values that find no register, and {free} of {name} are free ({mend})")

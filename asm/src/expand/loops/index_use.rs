@@ -18,12 +18,11 @@ struct BodyNames {
     scope: ScopeId,
 }
 
-/// The most statements to examine for one loop.
+/// Limit on the statements that are examined for one loop.
 const LOOKED_AT: u32 = 1 << 14;
 
 impl Expander<'_> {
-    /// A directive of a counted loop's body was met before, in another iteration that is written out, and has the same effect
-    /// in all of them.
+    /// The directive was expanded before, in an earlier iteration of a written-out loop, and has the same effect in every iteration.
     pub(crate) fn is_again(&self, at: AstPlace, ast: &Ast, directive: &DirectiveLine) -> bool {
         let own = self.frames.iter().rev().take_while(|frame| !matches!(frame.kind, FrameKind::Macro));
         let later = |frame: &Frame| match &frame.kind {
@@ -194,8 +193,8 @@ impl Expander<'_> {
         self.macro_needs(name, &roles.collect::<Vec<_>>(), budget, depth).then_some(span)
     }
 
-    /// A macro's body needs, when it is assembled, an argument that depends on the index. `roles` tell of each argument
-    /// whether it depends on the index, and whether it is an array of registers.
+    /// A macro's body needs, when it is assembled, an argument that depends on the index. `roles` states for each argument whether it
+    /// depends on the index, and whether it is an array of registers.
     fn macro_needs(&self, name: NameId, roles: &[(bool, bool)], budget: &mut u32, depth: usize) -> bool {
         let Some(definition) = self.context.scopes.macros.get(&name) else { return false };
         if depth >= limits::MACRO_DEPTH || !roles.iter().any(|role| role.0) {
@@ -339,7 +338,7 @@ impl Expander<'_> {
         None
     }
 
-    /// A name is made of the index.
+    /// The text of a template depends on the index.
     fn mentions_name(&self, ast: &Ast, name: takt_syntax::name::NameRef, known: &BodyNames) -> bool {
         match name.resolve() {
             Ok(_) => false,

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Counted loops: their bounds, and the choice of iterations to write out.
 //!
-//! A loop runs unless its body needs the index when it is assembled, for an array of registers or a name, or unless it is too
-//! short to be worth a loop. A loop that runs may have several iterations in one turn (`unroll`); the iterations left over follow,
+//! A loop remains at run time unless its body needs the index when it is assembled, for an array of registers or a name, or unless it
+//! is too short to be worth a loop. Such a loop may have several iterations in one turn (`unroll`); the iterations left over follow,
 //! straight or, if the count is not known, as a loop of their own.
 
 mod index_use;
@@ -19,27 +19,27 @@ use takt_diagnostics::source::{Lines, Span};
 use takt_syntax::ast::*;
 use takt_syntax::name::NameId;
 
-/// The longest innermost loop that is written out without `unroll`.
+/// Number of iterations up to which an innermost loop is written out without `unroll`.
 const SHORT: i64 = 4;
 
 /// Next action of a loop.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Pass {
-    /// A loop of [`Flat::loops`](crate::expand::Flat::loops) begins here.
+    /// A loop of [`ExpandedSource::loops`](crate::expand::ExpandedSource::loops) begins here.
     Begin(u32),
     /// The loop of this number ends here.
     End(u32),
     /// Body, with a value for the index.
     Value(i64),
-    /// Body, with an index that is known up to the iterations of loops: an index into
-    /// [`Declared::indices`](crate::context::Declared::indices).
+    /// Body, with an index that is a function of the iterations of loops: an index into
+    /// [`Declarations::indices`](crate::context::Declarations::indices).
     Index(u32),
 }
 
-/// The number of iterations of a loop that runs.
+/// The number of iterations of a loop at run time.
 #[derive(Clone, Debug)]
 pub(crate) enum Count {
-    /// A count that is known up to the iterations of the loops around.
+    /// A count that is a function of the iterations of the enclosing loops.
     Known(Affine),
     /// The value of a register plus an affine function.
     Register(Operand, Affine),
@@ -101,7 +101,7 @@ pub(crate) struct LoopOptions {
 pub(crate) struct Range {
     pub(crate) first: AffineInteger,
     pub(crate) step: i64,
-    /// Number of iterations; for a loop to the value of a register, the most.
+    /// Number of iterations; for a loop to the value of a register, the maximum.
     pub(crate) count: AffineInteger,
     pub(crate) register: Option<Operand>,
 }
@@ -135,8 +135,8 @@ impl Expander<'_> {
         )
     }
 
-    /// Opens a loop over statements, given the opening statement, the first statement and the statement after the last. `needs` is
-    /// the place where the body needs the index when it is assembled, if any; with it, whether the loop is innermost.
+    /// Opens a loop over statements, given the opening statement, the first statement and the statement after the last. `needs` holds
+    /// the place, if any, where the body needs the index when it is assembled, and whether the loop is innermost.
     #[allow(clippy::too_many_arguments)]
     pub(crate) fn open_loop(
         &mut self,
@@ -192,7 +192,7 @@ impl Expander<'_> {
 
     fn note(&mut self, variable: NameId, count: LoopCount, form: LoopForm, span: Span) {
         let note = LoopNote { variable, count, form, span };
-        // A loop in a macro or in a loop that is written out is met again.
+        // A loop in a macro or in a written-out loop is expanded repeatedly.
         if !self.flat.loop_notes.contains(&note) {
             self.flat.loop_notes.push(note);
         }
@@ -308,7 +308,7 @@ impl Expander<'_> {
         self.context.error(at.scope, "range", span, "a range beyond 64 bits")
     }
 
-    /// Index of an iteration that is written out.
+    /// Value of the index in a written-out iteration.
     fn value(
         &mut self,
         at: AstPlace,
@@ -343,7 +343,7 @@ impl Expander<'_> {
         self.context.declared.indices.len() as u32 - 1
     }
 
-    /// Passes of a loop that runs.
+    /// Passes of a loop at run time.
     fn running(
         &mut self,
         at: AstPlace,
@@ -367,7 +367,7 @@ impl Expander<'_> {
         }
         let around = self.context.loops_around(at.scope);
         let bounds = self.context.extremes(&around, &range.count.source);
-        // If the loops around never run, no bound matters.
+        // If the enclosing loops never run, no bound matters.
         let bounds = bounds
             .map_err(|crate::context::loops::IterationLimitExceeded| self.too_many(at, span))?
             .unwrap_or([0, 0]);
@@ -464,7 +464,7 @@ impl Expander<'_> {
         id
     }
 
-    /// Begins the next pass of a loop. True if there is one with statements.
+    /// Begins the next pass of a loop; returns false if no pass with statements is left.
     pub(crate) fn pass(&mut self) -> bool {
         loop {
             let Some(frame) = self.frames.last_mut() else { return false };
@@ -501,7 +501,7 @@ impl Expander<'_> {
     }
 }
 
-/// Adds the place that needs the index when it is assembled.
+/// Adds the place that needs the index when it is assembled to an error.
 fn because(error: Diagnostic, needs: Option<Span>) -> Diagnostic {
     match needs {
         Some(span) => error.also(span, "the value is needed here"),

@@ -75,7 +75,7 @@ struct NameRecord {
     bundles: Option<(BundleAddress, BundleAddress)>,
 }
 
-/// The reason that a value's register is refused.
+/// The reason why a value's register is refused.
 const MISPLACED: &str = "it lies outside the registers of its kind";
 
 pub(super) fn to_json(info: &DebugInfo) -> serde_json::Result<Vec<u8>> {

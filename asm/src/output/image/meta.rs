@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The metadata of an image: what ELF has no place for, as JSON.
+//! The metadata of an image, as JSON: everything that ELF has no place for.
 
 use super::validate::{NO_BANK, wrong_port};
 use super::{ImageError, VERSION};

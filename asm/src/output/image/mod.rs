@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A program as a file, and back: an ELF container that `readelf` and debuggers' readers know their way in.
+//! Images: a program as an ELF file, which `readelf` and debuggers can read, and back.
 //!
 //! `docs/image.md` describes the format for authors of other readers. Writing is deterministic: equal programs give equal
 //! bytes. Reading trusts nothing: each defect is an [`ImageError`] of its own, nothing panics, and allocation is bounded by
 //! the size of the file. A program that was read is one that the assembler could have made, except that any word may stand
-//! in its code: the machine faults on words that are no instructions.
+//! in its code: the machine faults on words that encode no instruction.
 
 mod debug;
 mod meta;
@@ -20,7 +20,7 @@ use object::{Endianness, LittleEndian as LE};
 use takt_isa::program::{LoopBound, Space, Symbol};
 use takt_isa::{BundleAddress, MachineNameError, Program};
 
-/// The largest file that is read.
+/// Maximum length of a file, in bytes.
 pub const LIMIT: usize = limits::IMAGE_BYTES;
 /// `e_flags` of an image: `TAK` and the version of the container.
 pub const FLAGS: u32 = u32::from_be_bytes(*b"TAK\x01");
@@ -37,7 +37,7 @@ const TOTALS: &str = ".takt.totals";
 /// Section for debuggers; absent if the image is stripped.
 const DEBUG: &str = ".takt.debug";
 
-/// Reason that a file cannot be loaded as an image.
+/// Reason why a file cannot be loaded as an image.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum ImageError {
     /// The file does not begin like an ELF file.
@@ -64,7 +64,7 @@ pub enum ImageError {
     /// A section is missing.
     #[error("the image has no section `{0}`")]
     MissingSection(&'static str),
-    /// A section stands there twice.
+    /// A section occurs twice.
     #[error("the image has two sections `{0}`")]
     RepeatedSection(&'static str),
     /// A section's size is not a whole number of its elements.
@@ -111,7 +111,7 @@ pub enum ImageError {
         what: &'static str,
         /// Amount in the image.
         found: usize,
-        /// The most that the machine holds.
+        /// Capacity of the machine.
         limit: u32,
         /// Name of the machine.
         machine: &'static str,
@@ -126,10 +126,10 @@ pub enum ImageError {
         /// Reason against the address.
         reason: &'static str,
     },
-    /// A name is not one that a source could have.
+    /// A name that no source could declare.
     #[error("`{0}` is not a name")]
     Name(String),
-    /// Two things have one name.
+    /// A name is used twice.
     #[error("two things are named `{0}`")]
     RepeatedName(String),
     /// A label points outside of its memory, or labels are not in order.
@@ -137,7 +137,7 @@ pub enum ImageError {
     Label {
         /// Name of the label.
         name: String,
-        /// Bundle or data word that it points to.
+        /// Bundle or data word that the label points to.
         address: u32,
         /// Reason against the label.
         reason: &'static str,
@@ -148,7 +148,7 @@ pub enum ImageError {
         /// Bundles of the program.
         bundles: u32,
     },
-    /// A bound of a loop is of no bundle, is 0, or is out of order.
+    /// A loop bound refers to no bundle, is 0, or is out of order.
     #[error("the bound of the loop at bundle {address}: {reason}")]
     Loop {
         /// Bundle that heads the loop.
@@ -156,7 +156,7 @@ pub enum ImageError {
         /// Reason against the bound.
         reason: &'static str,
     },
-    /// A range is of no register, is empty, or is out of order.
+    /// A range refers to no register, is empty, or is out of order.
     #[error("the range of register {register}: {reason}")]
     Range {
         /// Address of the register.
@@ -180,7 +180,7 @@ pub fn is_image(bytes: &[u8]) -> bool {
     bytes.starts_with(&elf::ELFMAG)
 }
 
-/// The image of a program, without what only a debugger reads.
+/// The image of a program, without debugging information.
 ///
 /// # Errors
 /// As [`write_with`].
@@ -188,7 +188,7 @@ pub fn write(program: &Program) -> Result<Vec<u8>, ImageError> {
     write_with(program, None)
 }
 
-/// The image of a program with debugging information beyond the program.
+/// The image of a program, with debugging information if given.
 ///
 /// # Errors
 /// If [`read`] would refuse the image, with the same error; or if its sizes go beyond 32 bits.
@@ -344,7 +344,7 @@ fn write_symbols(
 /// The program of an image.
 ///
 /// # Errors
-/// The first defect that is found.
+/// Returns the first defect in the file.
 pub fn read(bytes: &[u8]) -> Result<Program, ImageError> {
     Ok(read_with(bytes)?.0)
 }
@@ -352,7 +352,7 @@ pub fn read(bytes: &[u8]) -> Result<Program, ImageError> {
 /// The program of an image, and its debugging information unless it is stripped.
 ///
 /// # Errors
-/// The first defect that is found.
+/// Returns the first defect in the file.
 pub fn read_with(bytes: &[u8]) -> Result<(Program, Option<DebugInfo>), ImageError> {
     if !is_image(bytes) {
         return Err(ImageError::NotElf);

@@ -9,7 +9,7 @@ use takt_isa::encode::WORD_MASK;
 use takt_isa::program::{LoopBound, Port, Space};
 use takt_isa::{BundleAddress, Machine, Program, Register};
 
-/// The longest name of a source file.
+/// Maximum length of a source file's name, in bytes.
 pub(super) const FILE_NAME: usize = 4096;
 
 /// Checks that no word has more than 48 bits.
@@ -35,7 +35,7 @@ pub(super) fn constants(words: &[u32], machine: &Machine) -> Result<Vec<(Registe
     Ok(constants)
 }
 
-/// The reason that an address names no register.
+/// The reason why an address names no register.
 pub(super) const NO_BANK: &str = "it is in no bank";
 
 /// The register that a machine has at an address of an image.
@@ -43,7 +43,7 @@ pub(super) fn register(machine: &Machine, address: u32) -> Option<Register> {
     Register::new(address as usize).filter(|register| machine.has_register(*register))
 }
 
-/// The error of a named register of an image that is no such register.
+/// The error for a named register whose address is not possible.
 pub(super) fn wrong_port(kind: &str, name: &str, address: u16, reason: &'static str) -> ImageError {
     ImageError::Register { what: format!("{kind} `{name}`"), address: address.into(), reason }
 }

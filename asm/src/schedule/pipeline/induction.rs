@@ -7,7 +7,7 @@ use std::collections::HashMap;
 use takt_isa::Effect;
 use takt_isa::shape::Field;
 
-/// The most advances of an induction register that an access may be ahead or behind.
+/// Limit on the advances of an induction register by which an access may be ahead or behind.
 const AHEAD: i64 = 8;
 
 /// A load or store whose address is an induction register and an offset.

@@ -55,7 +55,7 @@ pub struct LoopReport {
     pub interval: u32,
     /// The lower bounds of the interval.
     pub bound: IntervalBound,
-    /// Cycles saved by all entries of the loop while the loops around it run once.
+    /// Cycles saved by all entries of the loop while the enclosing loops run once.
     pub(crate) saved: u64,
     /// Approximate number of bundles that the pipelined loop takes.
     pub(crate) bundles: u64,
@@ -293,7 +293,7 @@ fn problem(
     Iteration { problem: LoopProblem { tasks, edges, advanced }, origins, inductions }
 }
 
-/// The most times that a loop is entered while the loops around it run once.
+/// Maximum number of times that a loop is entered while the enclosing loops run once.
 fn entries(ir: &Ir, of: Option<LoopId>) -> u64 {
     let parent = |of: LoopId| ir.loops[of.0 as usize].parent;
     let around = std::iter::successors(of.and_then(parent), |of| parent(*of));

@@ -40,7 +40,7 @@ impl Parts<'_> {
     }
 
     /// The offset of a task's access by an induction register, in the kernel (`turn` is `None`), or in an iteration before or after it,
-    /// when not all advances have begun or some have ended; `None` if the task is no such access.
+    /// when not all advances have begun or some have ended; `None` for other tasks.
     fn offset(&self, task: usize, turn: Option<PeeledIteration>) -> Option<i64> {
         let induction = self.inductions.iter().find(|induction| induction.access == task)?;
         let start = |task: usize| i64::from(self.schedule.start[task]);

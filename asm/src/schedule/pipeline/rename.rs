@@ -110,7 +110,7 @@ pub(super) fn localise(
     rename_values(ir, values, epilogue, &mut HashMap::new());
 }
 
-/// Gives each value that is written in straight-line bundles a register of its own. `now` maps each value to its present register; the
+/// Gives each value that is written in straight-line bundles a register of its own. `now` maps each value to its current register; the
 /// result is the bundle of its last write.
 fn rename_values(
     ir: &mut Ir,

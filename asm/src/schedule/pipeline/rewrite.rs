@@ -24,7 +24,7 @@ pub(super) struct LoopChoice {
 }
 
 impl LoopChoice {
-    /// `None` if the machine lacks an operation.
+    /// Finds the operations; `None` if the machine lacks one.
     pub(super) fn of(machine: &Machine) -> Option<LoopChoice> {
         let able = |op: &Op| !machine.hosts(op.row().function).is_empty();
         Some(LoopChoice {
@@ -136,7 +136,7 @@ impl Rewriting<'_> {
         }
     }
 
-    /// Moves operations that share the bundle with `loop` before it. Returns `loop`.
+    /// Moves operations that share the bundle with `loop` before it. Returns the `loop` operation.
     fn enter(&mut self, entry: usize) -> Operation {
         self.moved.entry(entry as u32).or_insert(self.bundles.len() as u32);
         let last = self.ir.bundles[entry].clone();

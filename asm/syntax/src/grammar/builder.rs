@@ -9,10 +9,9 @@ use chumsky::input::{Checkpoint, Cursor};
 use chumsky::inspector::Inspector;
 use takt_diagnostics::source::Span;
 
-/// Builder of the syntax tree, to which the grammar's rules write.
 pub(crate) struct Builder<'a> {
     pub(crate) ast: Ast,
-    /// The text of the file, and where it begins in the space of all files.
+    /// Text of the file, and its offset in the space of all files.
     pub(crate) text: &'a str,
     pub(crate) base: u32,
     pub(crate) line: u32,
@@ -143,7 +142,7 @@ impl Builder<'_> {
     }
 }
 
-/// The character that four hexadecimal digits at a text's beginning stand for.
+/// The character whose code is given by the first four hexadecimal digits of a text.
 fn code(text: &str) -> Option<char> {
     let digits = text.get(..4).filter(|digits| digits.bytes().all(|byte| byte.is_ascii_hexdigit()))?;
     char::from_u32(u32::from_str_radix(digits, 16).ok()?)

@@ -75,7 +75,7 @@ whats! {
 // Every kind and every directive has a bit of its own.
 const _: () = assert!(ExpectedItem::ALL.len() + Directive::ALL.len() <= 128);
 
-/// The furthest place that a parser of a line came to, and the tokens that it would have taken there.
+/// The furthest place that the parser reached in a line, and the tokens that it expected there.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ExpectedItems {
     span: Span,
@@ -83,7 +83,7 @@ pub(crate) struct ExpectedItems {
 }
 
 impl ExpectedItems {
-    /// The furthest place that the parser came to.
+    /// The furthest place that the parser reached.
     pub(crate) fn span(&self) -> Span {
         self.span
     }

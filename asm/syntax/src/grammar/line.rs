@@ -49,7 +49,7 @@ pub(crate) fn line<'t, 'a: 't>() -> Rule<'t, 'a, ParsedLine> {
         match base {
             None => builder.expression_operand(first, span),
             Some(base) => {
-                // The base, if an expression, put its nodes behind the offset's.
+                // A base that is an expression has appended its nodes after the offset's.
                 let count = match base.kind {
                     OperandKind::Expr(base) => base.first - first,
                     _ => builder.ast.nodes.len() as u32 - first,

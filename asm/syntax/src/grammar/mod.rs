@@ -39,10 +39,10 @@ pub(crate) struct ParsedLine {
 #[derive(Clone, Debug)]
 pub(crate) enum Body {
     Empty,
-    /// Number of operations, which are the last of the list.
+    /// Number of operations, at the end of the list.
     Bundle(u32),
     Directive(DirectiveKind, Span),
-    /// An equation, the last of the list.
+    /// An equation, at the end of the list.
     Equation,
 }
 
@@ -51,8 +51,8 @@ type Extra<'a> = extra::Full<ExpectedItems, Builder<'a>, ()>;
 /// A rule of the grammar: a boxed parser, whose type does not grow into the types of rules that use it.
 type Rule<'t, 'a, O> = Boxed<'t, 't, Tokens<'t>, O, Extra<'a>>;
 
-/// Makes a rule of a parser. The filter is for the compiler's sake: behind it a parser is compiled once, to give its output,
-/// and not a second time to check only.
+/// Makes a rule of a parser. The filter saves compile time: behind it, chumsky instantiates a parser once, in the mode that yields
+/// output, and not again in the mode that only checks.
 fn rule<'t, 'a: 't, O: 't>(parser: impl Parser<'t, Tokens<'t>, O, Extra<'a>> + 't) -> Rule<'t, 'a, O> {
     parser.filter(|_| true).boxed()
 }

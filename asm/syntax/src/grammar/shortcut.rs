@@ -12,8 +12,8 @@ use crate::lex::Token;
 use crate::name::NameRef;
 use takt_diagnostics::source::Span;
 
-/// Parses a common line: an optional label, then operations whose operands are names, numbers, `offset[name]` with one of
-/// each, or expressions of names and numbers. `None` leaves any other line to the grammar, after a rewind of the builder.
+/// Parses a common line: an optional label, then operations whose operands are names, numbers, `offset[name]` with a name or a
+/// number as offset, or expressions of these. `None` leaves any other line to the grammar, after a rewind of the builder.
 pub(crate) fn common_line(tokens: &[(Token, Span)], builder: &mut Builder<'_>) -> Option<ParsedLine> {
     let mut rest = tokens;
     let mut label = None;
@@ -37,7 +37,7 @@ pub(crate) fn common_line(tokens: &[(Token, Span)], builder: &mut Builder<'_>) -
     }
 }
 
-/// The operands of [`common_line`]: the token that ends them, `||` or the end of the line, and the tokens behind it.
+/// The operands of [`common_line`]: the token that ends them, `||` or the end of the line, and the tokens after it.
 #[inline(always)]
 fn common_operands<'t>(
     mut rest: &'t [(Token, Span)],
@@ -111,8 +111,8 @@ fn common_operands<'t>(
     }
 }
 
-/// An expression of names, numbers, operators and parentheses whose operators bind at least as tightly as `least`: the
-/// tokens behind it, and its place. Nesting is bounded before a line is parsed.
+/// Parses an expression of names, numbers, operators and parentheses whose operators bind at least as tightly as `least`; returns the
+/// tokens after it, and its place. Nesting is bounded before a line is parsed.
 fn common_expression<'t>(
     tokens: &'t [(Token, Span)],
     least: u16,

@@ -27,7 +27,7 @@ pub(crate) enum Token {
     /// The text after the last brace.
     End(NameId),
     Directive(Directive),
-    /// A name that begins with a point and is no directive.
+    /// A name with a leading point that is not a directive.
     NotDirective,
     Int(i64),
     Real(f64),
@@ -51,7 +51,7 @@ pub(crate) enum Token {
 #[derive(Default)]
 pub(crate) struct Chunk {
     pub(crate) tokens: Vec<(Token, Span)>,
-    /// For each line that has tokens: the end of its tokens in `tokens`, its number, and the reasons against parsing it.
+    /// For each line with tokens: the end of its tokens in `tokens`, its number, and reasons against parsing it.
     pub(crate) lines: Vec<LineTokens>,
 }
 
@@ -71,7 +71,7 @@ pub(crate) struct LineTokens {
     pub(crate) compared: bool,
 }
 
-/// Reads a file's tokens, some thousand lines at a time.
+/// Reads a file's tokens, a few thousand lines at a time.
 pub(crate) struct Lexer<'s> {
     lexer: logos::Lexer<'s, Raw>,
     base: u32,
@@ -88,7 +88,7 @@ impl<'s> Lexer<'s> {
         Lexer { lexer, base, line: 1, done: false }
     }
 
-    /// Reads the tokens of the next lines, about as many tokens as asked for; false at the end.
+    /// Reads the tokens of the next lines, about as many tokens as asked for; returns false at the end.
     pub(crate) fn chunk(
         &mut self,
         size: usize,
@@ -161,7 +161,7 @@ impl<'s> Lexer<'s> {
                     })
                 }
                 Some(Err(())) => {
-                    // Unknown characters are one error of their line, however many there are.
+                    // The unknown characters of a line are one error, whatever their number.
                     if !std::mem::replace(&mut line.unknown, true) {
                         let text = self.lexer.slice();
                         sink.add(Severity::Error, "token", span, || {
@@ -286,7 +286,7 @@ impl TokenError {
     }
 }
 
-/// The message for a range where a number is read, given the line's tokens before it.
+/// Diagnostic for a range such as `1..3` in place of a number, given the line's tokens before it.
 fn range_before(before: &[(Token, Span)], names: &Interner, text: &str, span: Span) -> Option<Diagnostic> {
     let name = |(token, span): &(Token, Span)| match token {
         Token::Name(name) => Some((names.text(*name), *span)),
@@ -317,7 +317,7 @@ fn token(raw: Raw, text: &str, nesting: &mut usize, names: &mut Interner) -> Res
         Raw::Real => Token::Real(real(text)),
         Raw::HexReal => {
             let (mantissa, exponent) = hex_real(&text[2..]).ok_or(TokenError::NotNumber)?;
-            // Subnormal numbers of more digits than they can hold round twice.
+            // Subnormal numbers with more digits than their significand holds are rounded twice.
             Token::Real(libm::scalbn(mantissa as f64, exponent))
         }
         Raw::NotNumber => return Err(TokenError::NotNumber),
@@ -389,7 +389,7 @@ fn real(text: &str) -> f64 {
     parsed.unwrap_or(f64::NAN)
 }
 
-/// `(mantissa, exponent)` of the number mantissa · 2^exponent that `1.8p-3` denotes, the digits behind `0x`. Digits beyond 62 bits
+/// `(mantissa, exponent)` of the number mantissa · 2^exponent that `1.8p-3` denotes, the digits after `0x`. Digits beyond 62 bits
 /// leave a sticky bit, so that a conversion of the mantissa to binary32 or binary64 rounds once.
 pub fn hex_real(text: &str) -> Option<(u64, i32)> {
     let text = text.replace('_', "");

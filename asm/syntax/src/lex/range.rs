@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Diagnostics for a range, as `1..3` of other languages, where a number is read.
+//! Diagnostics for a range in place of a number, such as `1..3` of other languages.
 
 use takt_diagnostics::diag::Diagnostic;
 use takt_diagnostics::source::Span;
 
-/// A range, as `1..3`, where a number is read: `before` are the tokens before it on its line, as names or none.
+/// Diagnostic for a range in place of a number; `before` holds the tokens before it on its line, with the text of names.
 pub(super) fn describe(before: &[Option<(&str, Span)>], text: &str, span: Span) -> Option<Diagnostic> {
     let (first, last) = text.split_once("..")?;
     let end = |text: &str| {

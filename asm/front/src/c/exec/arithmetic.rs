@@ -149,7 +149,7 @@ impl Exec<'_> {
         Ok(Value::Node(id))
     }
 
-    /// A quotient or a rest: by a power of two.
+    /// Quotient or remainder of integers; the divisor must be a power of two.
     fn divided(&mut self, operator: &B, ty: Integer, a: Id, by: Option<i64>) -> Result<Id, Error> {
         if by == Some(0) {
             return self.fail("this divides by zero");
@@ -328,7 +328,7 @@ impl Exec<'_> {
         })
     }
 
-    /// Scalars before a place of an object, as a node.
+    /// Index of the scalar that a pointer refers to, as a node; one past the last is allowed.
     pub(super) fn scalars(&mut self, pointer: &Pointer) -> Result<Id, Error> {
         let object = &self.objects[pointer.object];
         let end = object.leaves.last().map_or(0, |leaf| leaf.offset as i64 + 1);
@@ -367,7 +367,7 @@ impl Exec<'_> {
         self.moved(pointer, index, *operator == B::Minus)
     }
 
-    /// A pointer so many elements further.
+    /// Moves a pointer by a number of elements, backwards if `back`.
     pub(super) fn moved(&mut self, pointer: Typed, index: Typed, back: bool) -> Result<Typed, Error> {
         let Type::Pointer(to) = pointer.ty.clone() else { return self.fail("this is no pointer") };
         let size = self.size_of(&to)? as i64;

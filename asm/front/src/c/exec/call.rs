@@ -12,7 +12,7 @@ use lang_c::ast::{
 use lang_c::span::Node;
 use std::rc::Rc;
 
-/// Deepest nesting of calls.
+/// Maximum nesting depth of calls.
 const MAX_CALLS: usize = 64;
 
 impl<'a> Exec<'a> {
@@ -173,7 +173,7 @@ impl<'a> Exec<'a> {
         Ok(result)
     }
 
-    /// Goes to a function's beginning.
+    /// Sets the place for messages to the beginning of a function.
     pub(in crate::c) fn here(&mut self, key: &str) {
         let found = &self.functions[key];
         let (unit, span) = (found.unit, found.definition.declarator.span);

@@ -8,7 +8,7 @@ use crate::c::types::{INT, Integer, Type, UNSIGNED};
 use crate::c::value::{Condition, Typed, Value};
 
 impl Exec<'_> {
-    /// The value as another type.
+    /// Converts a value to another type.
     pub(super) fn converted(&mut self, from: Typed, to: &Type) -> Result<Value, Error> {
         let Typed { ty, value } = from;
         if let Value::Mixed(reason) = value {
@@ -61,7 +61,7 @@ impl Exec<'_> {
         Ok(Value::Node(self.wrapped(id, to)?))
     }
 
-    /// The low bits of a node, as the type has them.
+    /// Wraps a node into the range of an integer type.
     pub(in crate::c) fn wrapped(&mut self, id: Id, to: Integer) -> Result<Id, Error> {
         let (low, high) = self.nodes.range(id);
         let (least, most) = to.limits();
@@ -140,7 +140,7 @@ impl Exec<'_> {
         Ok(Value::Node(self.wrapped(whole, to)?))
     }
 
-    /// After the integer promotions.
+    /// Applies the integer promotions.
     pub(super) fn promoted(&mut self, from: Typed) -> Result<Typed, Error> {
         match from.ty {
             Type::Int(integer) => Ok(Typed { ty: Type::Int(integer.promoted()), value: from.value }),
@@ -165,7 +165,7 @@ impl Exec<'_> {
         }
     }
 
-    /// A scalar as a condition.
+    /// Converts a scalar to a condition.
     pub(super) fn truth(&mut self, from: &Typed) -> Result<Condition, Error> {
         Ok(match &from.value {
             Value::Int(value) => Condition::Known(*value != 0),
@@ -199,7 +199,7 @@ impl Exec<'_> {
         Ok(self.condition_of(not))
     }
 
-    /// A condition as an `int`.
+    /// Converts a condition to an `int`.
     pub(super) fn value_of(&self, condition: Condition) -> Value {
         match condition {
             Condition::Known(known) => Value::Int(i64::from(known)),

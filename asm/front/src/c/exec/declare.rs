@@ -154,7 +154,7 @@ impl<'a> Exec<'a> {
         let function = self.frames.last().map_or_else(String::new, |frame| frame.key.clone());
         let key: Key = (function, place, self.unit());
         let Some(object) = self.statics.get(&key).copied() else {
-            // All statics are made before the step runs: `statics` visits the functions.
+            // All statics are made before the step runs: `statics` visits its functions.
             return self.fail(format!("`{name}` is static where no static is expected"));
         };
         self.scope().names.insert(name.to_owned(), Named::Object(object));
@@ -237,7 +237,7 @@ impl<'a> Exec<'a> {
         Ok(())
     }
 
-    /// Zeros in all scalars of an object that are not set.
+    /// Sets all unset scalars of an object to zero.
     pub(in crate::c) fn zeros(&mut self, object: usize) {
         let leaves = self.objects[object].leaves.clone();
         for (index, leaf) in leaves.iter().enumerate() {
@@ -392,7 +392,7 @@ impl<'a> Exec<'a> {
             self.scope().names.insert(name, Named::Constant(next));
             next += 1;
         }
-        // gcc: unsigned if no constant is negative.
+        // As in gcc: unsigned if no constant is negative.
         let ty = Type::Int(if least < 0 { INT } else { UNSIGNED });
         match &node.identifier {
             Some(tag) if node.enumerators.is_empty() => Ok(self.tag(&tag.node.name).cloned().unwrap_or(ty)),

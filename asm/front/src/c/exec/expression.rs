@@ -172,7 +172,7 @@ impl<'a> Exec<'a> {
         Ok(Typed { ty: Type::Int(UNSIGNED), value: Value::Int(sum) })
     }
 
-    /// Evaluates for the effects alone.
+    /// Evaluates an expression for its side effects.
     pub(super) fn effect(&mut self, expression: &'a Node<Expression>) -> Result<(), Error> {
         self.value(expression).map(|_| ())
     }
@@ -211,7 +211,7 @@ impl<'a> Exec<'a> {
             }
             Constant::Float(float) => {
                 let single = self.double_is_float || float.suffix.format == FloatFormat::Float;
-                // The text is rounded once.
+                // The literal is rounded once.
                 let value = match float.base {
                     FloatBase::Decimal if single => float.number.parse::<f32>().ok().map(f64::from),
                     FloatBase::Decimal => float.number.parse().ok(),

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Functions of C's library: operations of the machine, macros of `<math.s>` and `<c.s>`, or what is done while translating.
+//! Functions of C's library: operations of the machine, macros of `<math.s>` and `<c.s>`, or computations during translation.
 
 use super::Exec;
 use crate::Error;
@@ -111,7 +111,7 @@ impl<'a> Exec<'a> {
         })
     }
 
-    /// Refuses a function of doubles, unless these are floats.
+    /// Refuses a function of doubles, unless `double` is read as `float`.
     fn single(&self, name: &str) -> Result<(), Error> {
         match self.double_is_float || name.ends_with('f') {
             true => Ok(()),
@@ -125,7 +125,7 @@ impl<'a> Exec<'a> {
         self.converted(value, &FLOAT)
     }
 
-    /// A function of one number.
+    /// Applies a function of one number; a known operand is computed during translation.
     fn applied(&mut self, op: Op, function: fn(f64) -> f64, x: &Value) -> Result<Value, Error> {
         match x {
             Value::Real(x) => Ok(Value::Real(f64::from(function(*x) as f32))),
@@ -180,7 +180,7 @@ impl<'a> Exec<'a> {
         let (Some(a), Some(b)) = (a, b) else { return self.fail("this is no number") };
         match (x, y) {
             (Value::Real(x), Value::Real(y)) => Ok(Value::Real(f64::from(function(*x, *y) as f32))),
-            // Correctly rounded, as few operations as there are.
+            // A square as one product: correctly rounded, and the shortest.
             (_, Value::Real(2.0)) if *op == Op::Pow => Ok(Value::Node(self.op(Op::Mul, &[a, a])?)),
             _ => Ok(Value::Node(self.op(*op, &[a, b])?)),
         }
@@ -195,7 +195,7 @@ impl<'a> Exec<'a> {
         let (Some(a), Some(b)) = (self.register(&x, &FLOAT), self.register(&y, &FLOAT)) else {
             return self.fail("this is no number");
         };
-        // The comparison chooses b where a is a NaN; a known b is none.
+        // The comparison chooses b where a is a NaN; a known b is not a NaN.
         let condition =
             if least { self.op(Op::LessEqual, &[a, b])? } else { self.op(Op::LessEqual, &[b, a])? };
         let chosen = self.select(condition, a, b)?;
@@ -266,7 +266,7 @@ impl<'a> Exec<'a> {
         Ok(Typed { ty, value: Value::Node(self.select(negative, opposite, x)?) })
     }
 
-    /// Scalars of an object that a number of bytes covers.
+    /// Scalars within the first `bytes` bytes of a pointer's target: offset and type of each.
     fn covered(&self, pointer: &Pointer, bytes: i64) -> Result<Vec<(i64, Type)>, Error> {
         let object = &self.objects[pointer.object];
         let inside = |offset: i64| (pointer.offset..pointer.offset + bytes).contains(&offset);

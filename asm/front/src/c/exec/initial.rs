@@ -10,7 +10,7 @@ use lang_c::span::Node;
 use std::rc::Rc;
 
 impl<'a> Exec<'a> {
-    /// Gives an object its initial value; what a list leaves out is zero.
+    /// Gives an object its initial value; members without an initialiser are zero.
     pub(super) fn initialised(&mut self, object: usize, initializer: &'a Initializer) -> Result<(), Error> {
         let place = self.place_of(object);
         self.initial(&place, initializer)
@@ -60,7 +60,7 @@ impl<'a> Exec<'a> {
         self.list(place, items, &mut 0, true)
     }
 
-    /// Zeros at a place.
+    /// Sets all scalars at a place to zero.
     pub(super) fn cleared(&mut self, place: &Lvalue) -> Result<(), Error> {
         let Some(leaves) = self.structs.leaves(&place.ty) else { return self.fail("this has no known size") };
         for leaf in leaves {
@@ -75,7 +75,7 @@ impl<'a> Exec<'a> {
         Ok(())
     }
 
-    /// Members of an array or structure: their number and the one at an index.
+    /// Number of members of an array or structure.
     fn members(&self, ty: &Type) -> usize {
         match ty {
             Type::Array(_, count) => count.unwrap_or(0),
@@ -155,7 +155,7 @@ impl<'a> Exec<'a> {
         let mut inner = *at;
         let designated = !items[*at].node.designation.is_empty();
         if designated {
-            // The first item is taken here, whatever designates it.
+            // The first member takes the item, whatever its designator.
             let first = self.part(part, 0)?;
             self.item_of(&first, items, at)?;
             return Ok(());

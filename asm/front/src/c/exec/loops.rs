@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Loops: executed iteration by iteration, and so written out, while that stays short; otherwise they stay loops (`rolled.rs`).
+//! Loops: executed iteration by iteration, and so written out, while the result stays short; otherwise kept as loops (`rolled.rs`).
 
 use super::Exec;
 use crate::Error;
@@ -8,9 +8,9 @@ use crate::c::value::{Condition, Exit, Memory, Outcome};
 use lang_c::ast::{Expression, ForInitializer, Statement};
 use lang_c::span::Node;
 
-/// Most values that a loop which is written out computes, before it is tried as a loop.
+/// Limit on the values that a written-out loop computes, before it is tried as a loop.
 const SHORT: usize = 320;
-/// Most iterations, entered under conditions, of a loop that is written out.
+/// Limit on the iterations of a written-out loop that are entered under conditions.
 const OPEN: u64 = 24;
 
 /// A loop of any kind.
@@ -25,7 +25,7 @@ pub(super) struct Repetition<'a> {
     pub(super) bound: Option<u64>,
 }
 
-/// All that a trial changes.
+/// State that a trial may change, saved before it.
 pub(super) struct Saved {
     memory: Memory,
     blocks: usize,
@@ -134,7 +134,7 @@ impl<'a> Exec<'a> {
         })
     }
 
-    /// The bound that a pragma gives a loop: the last pragma before it, with nothing but blanks between.
+    /// The bound that a pragma gives a loop: the last pragma before it, separated only by blanks.
     fn bound_at(&self, statement: &Node<Statement>) -> Option<u64> {
         let unit = &self.units[self.unit()];
         let start = statement.span.start;
@@ -143,7 +143,7 @@ impl<'a> Exec<'a> {
         between.then_some(found.1)
     }
 
-    /// A loop's condition; one without always holds.
+    /// Evaluates a loop's condition; a loop without a condition always continues.
     pub(super) fn goes_on(&mut self, parts: &Repetition<'a>) -> Result<Condition, Error> {
         match parts.condition {
             Some(condition) => self.condition(condition),
@@ -216,7 +216,7 @@ impl<'a> Exec<'a> {
         }
     }
 
-    /// Executes iterations from here on. Ends are outcomes `Break`.
+    /// Executes iterations from here on. Exits from the loop become outcomes `Break`.
     fn iterations(
         &mut self,
         parts: Repetition<'a>,
@@ -285,7 +285,7 @@ impl<'a> Exec<'a> {
         Ok(Condition::Known(false))
     }
 
-    /// Gives a loop up whose end data decide: as if it had used up its budget, or for good if it has none.
+    /// Gives up a loop whose number of iterations depends on data: spends the budget around it, if any, and fails.
     fn endless(&mut self) -> Result<Condition, Error> {
         if let Some(level) = self.budgets.len().checked_sub(1) {
             self.exhausted = Some(level);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Executes C while translating it: what is known is computed, what depends on inputs becomes nodes.
+//! Executes C while translating it: known values are computed, values that depend on inputs become nodes.
 
 mod arithmetic;
 pub(super) mod call;
@@ -25,11 +25,11 @@ use lang_c::ast::FunctionDefinition;
 use lang_c::span::{Node, Span};
 use std::collections::{HashMap, HashSet};
 
-/// Most nodes of a program.
+/// Limit on the nodes of a program.
 const MAX_NODES: usize = 400_000;
-/// Deepest nesting of statements, expressions and calls while executing.
+/// Maximum nesting depth of statements, expressions and calls while executing.
 const MAX_DEPTH: usize = 220;
-/// Most statements and expressions that are executed in all.
+/// Limit on the statements and expressions that are executed in total.
 const MAX_STEPS: u64 = 60_000_000;
 
 /// Key of an object across translations: function or file, name, place.
@@ -38,17 +38,17 @@ pub(super) type Key = (String, usize, usize);
 /// Findings of one translation that the next one starts from.
 #[derive(Clone, Default, PartialEq)]
 pub(super) struct Facts {
-    /// Objects that data index: they lie in memory.
+    /// Objects with indices that depend on data: they lie in memory.
     pub(super) arrays: HashSet<Key>,
     /// Scalars of states that the step writes.
     pub(super) written: HashSet<(Key, usize)>,
-    /// Elements of what `float *x` points to.
+    /// Number of elements behind a pointer such as `float *x`.
     pub(super) extents: HashMap<Key, usize>,
     /// Functions with `static` variables that the step calls.
     pub(super) called: HashSet<String>,
 }
 
-/// Meaning of a name.
+/// Meaning of a name in a scope.
 #[derive(Clone, Debug)]
 pub(super) enum Named {
     Object(usize),
@@ -105,7 +105,7 @@ pub(super) struct Exec<'a> {
     steps: u64,
     /// Operations to emit before an unrolled loop is given up, innermost last.
     budgets: Vec<usize>,
-    /// Names of arrays in memory by their objects' keys.
+    /// Indices of arrays in memory, by their objects' keys.
     arrays: HashMap<Key, usize>,
     /// Functions whose `static` variables exist.
     prepared: HashSet<String>,
@@ -152,7 +152,7 @@ impl<'a> Exec<'a> {
         Err(error)
     }
 
-    /// Notes the place, for errors and comments.
+    /// Records the place, for errors and comments.
     fn go(&mut self, span: Span) {
         if !span.is_none() {
             self.at = Place { unit: self.unit(), offset: span.start };

@@ -57,7 +57,7 @@ fn range_of(op: Op, ranges: &[Range]) -> Range {
 }
 
 impl Exec<'_> {
-    /// An operation, unless a simpler node is the same.
+    /// Adds an operation, or returns a simpler node of equal value.
     pub(super) fn op(&mut self, op: Op, operands: &[Id]) -> Result<Id, Error> {
         if let Some(simple) = self.simplified(op, operands) {
             return Ok(simple);
@@ -70,7 +70,7 @@ impl Exec<'_> {
         self.put(node, op.kind(), range)
     }
 
-    /// A node with a place in the block.
+    /// Adds a node, with a place in the block.
     pub(in crate::c) fn put(&mut self, node: Node, kind: Kind, range: Range) -> Result<Id, Error> {
         let (id, new) = self.nodes.add(node, kind, range);
         if new {
@@ -138,7 +138,7 @@ impl Exec<'_> {
         }
     }
 
-    /// A choice; `condition` is 0 or 1.
+    /// Selects `yes` or `no`; `condition` is 0 or 1.
     pub(super) fn select(&mut self, condition: Id, yes: Id, no: Id) -> Result<Id, Error> {
         if yes == no {
             return Ok(yes);

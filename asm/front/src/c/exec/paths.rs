@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Paths that data choose: both are executed, and what differs behind them becomes choices where both are short, otherwise a branch whose
-//! sides set variables.
+//! Paths that depend on data: both are executed, and differing results become selections if both paths are short, otherwise a branch
+//! whose sides set variables.
 
 use super::Exec;
 use crate::Error;
@@ -10,7 +10,7 @@ use crate::c::value::{Condition, Exit, Memory, Outcome, Pointer, Value};
 use std::collections::HashMap;
 use std::rc::Rc;
 
-/// Operations of both sides, up to which both are computed and the results chosen.
+/// Limit on the operations of both sides, up to which both are computed and their results selected.
 const CHOSEN: usize = 40;
 
 /// Runs one side; its outcomes are relative to the side's beginning.
@@ -64,7 +64,7 @@ impl<'a> Exec<'a> {
         Ok(Ran { block, normal: normal?, memory: self.memory.clone(), outcomes })
     }
 
-    /// Executes both sides of a condition; the result says when the end of either is reached, with the memory then.
+    /// Executes both sides of a condition. Returns the condition under which either end is reached; the memory is then that of this end.
     pub(super) fn fork(
         &mut self,
         condition: Id,
@@ -89,7 +89,7 @@ impl<'a> Exec<'a> {
         }
     }
 
-    /// Executes what follows a condition, and nothing if it does not hold.
+    /// Executes statements under a condition; skips them if the condition does not hold.
     pub(super) fn guarded(
         &mut self,
         condition: Condition,
@@ -103,7 +103,7 @@ impl<'a> Exec<'a> {
         }
     }
 
-    /// Operations of a block; `None` if it has loops or branches.
+    /// Number of operations in a block; `None` if it has loops or branches.
     fn work(&self, block: &Block) -> Option<usize> {
         block.iter().try_fold(0, |sum, (statement, _)| match statement {
             Statement::Def(id) => match self.nodes.node(*id) {
@@ -115,7 +115,7 @@ impl<'a> Exec<'a> {
         })
     }
 
-    /// Computes both sides and chooses.
+    /// Computes both sides unconditionally and selects between their results.
     fn chosen(
         &mut self,
         condition: Id,
@@ -163,7 +163,7 @@ impl<'a> Exec<'a> {
         if guards || !side.outcomes.is_empty() { self.not(holds) } else { Ok(Condition::Known(true)) }
     }
 
-    /// Puts a side's statements into the block: stores write what was there, and indices are 0, if the condition does not hold.
+    /// Puts a side's statements into the block. If the condition does not hold, stores write the old values, and indices are 0.
     fn splice(&mut self, block: Block, condition: Condition) -> Result<(), Error> {
         let at = self.at;
         for (statement, place) in block {
@@ -207,7 +207,7 @@ impl<'a> Exec<'a> {
         low >= 0 && high < self.nodes.arrays[array].words.len() as i64
     }
 
-    /// Memory that is one if the condition holds, and otherwise the other.
+    /// Merges two memories: `yes` if the condition holds, otherwise `no`.
     fn merged(&mut self, condition: Id, yes: &Memory, no: &Memory) -> Result<Memory, Error> {
         let mut merged = if yes.0.len() > no.0.len() { yes.clone() } else { no.clone() };
         for object in 0..yes.0.len().min(no.0.len()) {
@@ -266,7 +266,7 @@ impl<'a> Exec<'a> {
         })
     }
 
-    /// Scalars from the object's beginning to where a pointer points.
+    /// Index of the scalar that a pointer refers to, as a node; `None` between members.
     fn words(&mut self, pointer: &Pointer) -> Option<Id> {
         let leaf = self.objects[pointer.object].leaf(pointer.offset)?;
         let known = self.nodes.int(i32::try_from(leaf).ok()?);
@@ -276,7 +276,7 @@ impl<'a> Exec<'a> {
         }
     }
 
-    /// Emits a branch, whose sides set variables for all that is needed behind it.
+    /// Emits a branch, whose sides set variables for all values needed after it.
     fn branched(
         &mut self,
         condition: Id,
@@ -404,7 +404,7 @@ impl<'a> Exec<'a> {
         Ok(memory)
     }
 
-    /// Memory behind both sides.
+    /// Memory after both sides.
     fn joint_memory(&mut self, exported: &mut Exported, yes: &Memory, no: &Memory) -> Result<Memory, Error> {
         let shared = yes.0.len().min(no.0.len());
         let longer = if yes.0.len() > no.0.len() { yes.clone() } else { no.clone() };
@@ -422,7 +422,7 @@ impl<'a> Exec<'a> {
         Ok(memory)
     }
 
-    /// Objects that only one side has are gone behind it: unset, so that no variable is made for them.
+    /// Unsets objects that exist in one side only: they end with the side, and need no variable.
     fn without_locals(mut memory: Memory, shared: usize) -> Memory {
         for cells in memory.0.iter_mut().skip(shared) {
             *cells = Rc::new(vec![Value::Unset; cells.len()]);

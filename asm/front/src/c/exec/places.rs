@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Reads and writes of objects: scalars known or in registers, or words of arrays in memory where data index an object.
+//! Reads and writes of objects: scalars known or in registers, or words of an array in memory if an index depends on data.
 
 use super::{Exec, Key};
 use crate::Error;
@@ -8,7 +8,7 @@ use crate::c::types::{Integer, Leaf, Type};
 use crate::c::value::{Lvalue, Object, Origin, Pointer, Typed, Value};
 use std::rc::Rc;
 
-/// Most elements that a pointer of unknown extent has.
+/// Maximum number of elements behind a pointer of unknown extent.
 const MAX_EXTENT: usize = 4096;
 
 /// Register that holds a scalar.
@@ -49,7 +49,7 @@ impl Exec<'_> {
         Ok(index)
     }
 
-    /// Puts an object into data memory if data index it.
+    /// Puts an object into data memory if an index into it depends on data.
     pub(in crate::c) fn settle(&mut self, index: usize) -> Result<(), Error> {
         let object = &self.objects[index];
         if !self.facts.arrays.contains(&object.key) {
@@ -82,7 +82,7 @@ impl Exec<'_> {
         Ok(())
     }
 
-    /// The whole object.
+    /// A whole object as an lvalue.
     pub(in crate::c) fn place_of(&self, object: usize) -> Lvalue {
         let pointer = Pointer { object, offset: 0, dynamic: None };
         Lvalue { pointer, ty: self.objects[object].ty.clone() }
@@ -137,7 +137,7 @@ impl Exec<'_> {
         }
     }
 
-    /// The scalar at a known place; the place of a pointer whose extent is unknown is made known.
+    /// The scalar at a known place; `None` if the next translation must extend the object of a pointer.
     fn leaf(&mut self, pointer: &Pointer) -> Result<Option<usize>, Error> {
         let object = &self.objects[pointer.object];
         if let Some(leaf) = object.leaf(pointer.offset) {
@@ -269,7 +269,7 @@ impl Exec<'_> {
         }
         match (own, ty, value) {
             (Type::Int(a), Type::Int(b), value) if a.bits == b.bits => {
-                // Signedness alone differs.
+                // Only the signedness differs.
                 Ok(match value {
                     Value::Int(known) => Value::Int(b.wrap(known)),
                     Value::Node(id) => Value::Node(self.wrapped(id, *b)?),
@@ -332,7 +332,7 @@ impl Exec<'_> {
         Ok(())
     }
 
-    /// Notes that the step writes a scalar that outlives it.
+    /// Records that the step writes a scalar that outlives it.
     fn changes(&mut self, object: usize, leaf: usize) {
         let found = &self.objects[object];
         if self.stepping && !matches!(found.origin, Origin::Local | Origin::Parameter) {

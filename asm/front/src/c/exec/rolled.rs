@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Loops that stay loops: the body is executed once, with variables for all that it changes. Trials find out what that is.
+//! Loops that stay loops: the body is executed once, with variables for everything that it changes, which trials determine.
 
 use super::Exec;
 use super::loops::Repetition;
@@ -12,19 +12,19 @@ use lang_c::span::Node as Spanned;
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
-/// Trials until all that a body changes is known.
+/// Limit on the trials that determine what a body changes.
 const TRIALS: usize = 16;
-/// Most iterations of a loop.
+/// Maximum number of iterations of a loop.
 const MOST: i64 = 65_535;
 
-/// A counter with known ends.
+/// A counter with known bounds.
 #[derive(Clone, Copy, Debug)]
 struct Counter {
     object: usize,
     first: i64,
     step: i64,
     count: i64,
-    /// The loop's condition is nothing but the counter's.
+    /// The counter alone decides the loop's condition.
     alone: bool,
 }
 
@@ -108,7 +108,7 @@ impl<'a> Exec<'a> {
         Ok(Some(Counter { object, first, step: by, count, alone }))
     }
 
-    /// The variable that a step advances, and by how much.
+    /// The variable that a step advances, and its increment.
     fn advance(&mut self, step: &'a Spanned<Expression>) -> Result<Option<(&'a str, i64)>, Error> {
         let named = |expression: &'a Spanned<Expression>| match &expression.node {
             Expression::Identifier(name) => Some(name.node.name.as_str()),
@@ -178,7 +178,7 @@ impl<'a> Exec<'a> {
         }
     }
 
-    /// A counted loop; false if its body leaves it or changes the counter.
+    /// Executes a counted loop; returns false if its body leaves the loop or changes the counter.
     fn counted(&mut self, parts: &Repetition<'a>, counter: Counter) -> Result<bool, Error> {
         let before = self.memory.clone();
         let name = self.objects[counter.object].name.clone();
@@ -227,7 +227,7 @@ impl<'a> Exec<'a> {
         self.fail("what this loop changes is not found out: split its body")
     }
 
-    /// The loop's end is still what it was before the body.
+    /// The loop has the same number of iterations after the body as before it.
     fn ends_alike(&mut self, counter: Counter, parts: &Repetition<'a>) -> Result<bool, Error> {
         let saved = self.memory.clone();
         self.memory.set(counter.object, 0, Value::Int(counter.first));
@@ -236,7 +236,7 @@ impl<'a> Exec<'a> {
         Ok(again.is_some_and(|again| again.count == counter.count))
     }
 
-    /// A loop whose end data decide: the body runs, then the test.
+    /// A loop that ends depending on data: the body runs, then the test.
     fn repeated(
         &mut self,
         parts: &Repetition<'a>,
@@ -352,7 +352,7 @@ impl<'a> Exec<'a> {
         }
     }
 
-    /// Adds what the body changed beyond the cells; false if there is nothing new.
+    /// Adds the body's changes beyond the cells; returns false if there are none.
     fn grow(&mut self, cells: &mut Cells, before: &Memory) -> Result<bool, Error> {
         let mut grown = false;
         for object in 0..before.0.len() {
@@ -441,7 +441,7 @@ impl<'a> Exec<'a> {
         }
     }
 
-    /// Memory behind the loop.
+    /// Memory after the loop.
     fn leave_cells(&mut self, cells: &Cells, before: Memory) {
         self.memory = before;
         for ((object, leaf), carried) in cells {

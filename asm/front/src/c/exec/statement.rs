@@ -24,7 +24,7 @@ enum Item<'a> {
 }
 
 impl<'a> Exec<'a> {
-    /// Executes the items of a block; behind one whose end is reached only if a condition holds, the rest depends on it.
+    /// Executes the items of a block. After an item whose end is reached only under a condition, the rest depends on it.
     pub(super) fn items(
         &mut self,
         items: &'a [Node<BlockItem>],
@@ -53,7 +53,7 @@ impl<'a> Exec<'a> {
         REACHED
     }
 
-    /// Continues at a label to which some paths jumped: the others execute what is between.
+    /// Continues at a label to which some paths jumped: the other paths execute the statements before it.
     fn landed(
         &mut self,
         reached: Condition,
@@ -68,7 +68,7 @@ impl<'a> Exec<'a> {
         let lands = |exit: &Exit| matches!(exit, Exit::Goto(name) if *name == label);
         let mut leaving = Vec::new();
         let met = self.absorbed(normal, inner, &lands, &mut leaving)?;
-        // Jumps to labels further on are still on their way: they land behind.
+        // Jumps to labels further on have not landed yet.
         let further = leaving.iter().any(|outcome| match &outcome.exit {
             Exit::Goto(label) => behind.iter().any(|item| label_of(item) == Some(label)),
             _ => false,
@@ -216,7 +216,7 @@ impl<'a> Exec<'a> {
         out: &mut Vec<Outcome>,
     ) -> Result<Condition, Error> {
         for (index, arm) in arms.iter().enumerate().skip(from) {
-            // A default beside values is taken wherever no other value is.
+            // A default next to values is taken unless another value matches.
             if arm.values.is_empty() || arm.default {
                 continue;
             }
@@ -298,7 +298,7 @@ fn label_of(item: &Node<BlockItem>) -> Option<&String> {
     }
 }
 
-/// Splits labels from the statement behind them.
+/// Splits labels from the statement after them.
 fn arm(item: &Node<BlockItem>) -> Arm<'_> {
     let (mut values, mut default, mut found) = (Vec::new(), false, Item::Block(item));
     let mut next = match &item.node {

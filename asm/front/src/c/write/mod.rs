@@ -17,7 +17,7 @@ use text::{Speller, real};
 
 /// Column of comments.
 const COMMENT: usize = 56;
-/// Most characters of a comment.
+/// Maximum length of a comment, in characters.
 const COMMENT_LENGTH: usize = 72;
 
 /// The program of a step whose ports and states are known.
@@ -219,7 +219,7 @@ impl Writer<'_, '_> {
         Ok(())
     }
 
-    /// Writes variables all at once: one after another where none needs what another has overwritten, otherwise in one equation.
+    /// Writes variables all at once: one after another where none reads a variable overwritten before, otherwise in one equation.
     fn set(&mut self, pairs: &[(usize, Id)], place: Place) {
         let mut left: Vec<(String, String, Vec<String>)> = Vec::new();
         for (var, value) in pairs {
@@ -252,7 +252,7 @@ impl Writer<'_, '_> {
         }
     }
 
-    /// A line, with the line of C beside it if that is another than before.
+    /// Writes a line, with the line of C next to it if that differs from the last one.
     fn line(&mut self, code: &str, place: Place) {
         let mut line = format!("{:1$}{code}", "", self.indent);
         let unit = &self.exec.units[place.unit];

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Plans the program's text: which values stand inside the expression that uses them, and which register holds each other one.
+//! Plans the program's text: which values stand inside the expression that uses them, and which registers hold the others.
 //!
-//! Registers have the names of C's variables. A name is used again for a variable's next value as soon as nothing needs the one before.
+//! Registers have the names of C's variables. A name is used again for a variable's next value as soon as nothing needs the previous one.
 
 use crate::c::ir::{Block, Id, Kind, Node, Nodes, Op, Statement};
 use crate::sink::Names;
@@ -10,7 +10,7 @@ use std::collections::{HashMap, HashSet};
 /// Length from which an expression gets a register of its own.
 const LONG: usize = 88;
 
-/// Something that a register holds.
+/// Contents of a register.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 enum Held {
     Value(Id),
@@ -56,7 +56,7 @@ struct Planner<'n> {
     subscript: Vec<bool>,
     /// The value stands in several subscripts.
     shared: Vec<bool>,
-    /// Indices of stores, and what is stored or set.
+    /// Indices of stores, and values that are stored or assigned.
     indices: HashSet<Id>,
     stored: HashSet<Id>,
     /// Estimated length of the text.
@@ -172,7 +172,7 @@ impl Planner<'_> {
                 _ => {}
             }
         }
-        // The first statement behind each index that may write memory.
+        // The first statement after each index that may write memory.
         let mut writes = vec![usize::MAX; block.len() + 1];
         for (index, (statement, _)) in block.iter().enumerate().rev() {
             writes[index] = match statement {
@@ -197,7 +197,7 @@ impl Planner<'_> {
         }
     }
 
-    /// A subscript that is a register and a number: a load takes the number for nothing, however often it is used.
+    /// A subscript that is a register and a number: a load adds the number at no cost, however often the subscript is used.
     fn is_offset(&self, id: Id) -> bool {
         let Node::Op(Op::IntAdd, [_, by, _], _) = self.nodes.node(id) else { return false };
         let in_subscript = |user: &User| match user {
@@ -400,7 +400,7 @@ impl Planner<'_> {
         self.names.insert(Held::Value(id), name);
     }
 
-    /// The variable is read behind a place, up to where it is set.
+    /// The variable is read after a place, up to where it is set.
     fn is_read_between(&self, var: usize, at: usize, set: usize) -> bool {
         let name = self.names.get(&Held::Var(var));
         let read = |held: &Held, places: &Vec<usize>| {
@@ -409,7 +409,7 @@ impl Planner<'_> {
         self.reads.iter().any(|(held, places)| read(held, places))
     }
 
-    /// The set is in the same block as what begins there, not behind the end of a loop.
+    /// The set lies in every loop that contains `begin`.
     fn is_in_reach(&self, set: usize, begin: usize) -> bool {
         self.loops.iter().all(|(start, end)| !(begin > *start && begin <= *end) || set <= *end)
     }
@@ -439,7 +439,7 @@ impl Planner<'_> {
         self.names.insert(held, name);
     }
 
-    /// A register that is free at a place, until then.
+    /// A register that is free from `at` to `until`.
     fn free(&mut self, base: &str, kind: Kind, at: usize, until: usize) -> String {
         let base: String =
             base.chars().map(|c| if c.is_ascii_alphanumeric() || c == '_' { c } else { '_' }).collect();

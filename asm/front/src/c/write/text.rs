@@ -185,7 +185,7 @@ impl Speller<'_> {
     fn infix(&self, operator: &str, binding: Binding, a: Id, b: Id) -> Text {
         let above = match binding {
             Binding::Choice => Binding::Comparison,
-            // Beside comparisons and `&`, `|`, the reader gets parentheses.
+            // Readers get parentheses next to comparisons, `&` and `|`.
             Binding::Comparison | Binding::Or | Binding::And | Binding::Shift => Binding::Sum,
             Binding::Sum => Binding::Product,
             _ => Binding::Sign,

@@ -25,8 +25,8 @@ pub struct Options<'a> {
     pub kd: f64,
 }
 
-/// Most joints, quarter-turn variants and units that the search tries; robots with more joints are compared before optimisation, to save
-/// time.
+/// Limit on the joints, quarter-turn variants and units that the search tries; robots with more joints are compared before optimisation,
+/// to save time.
 const TRIED: usize = 16;
 
 /// A variant of the equations.
@@ -460,8 +460,8 @@ fn with_rotors<'g>(robot: &Robot, mut matrix: mass::Matrix<'g>) -> mass::Matrix<
     matrix
 }
 
-/// Pose of the tip in the frame of its joint. If the tip's rotation about the joint's axis is no quarter turn, the joint's offset absorbs
-/// it.
+/// Pose of the tip in the frame of its joint. If the tip's rotation about the joint's axis is not a multiple of a quarter turn, the
+/// joint's offset absorbs it.
 fn aligned(links: &mut [Link], joint: usize, pose: &Pose) -> Pose {
     let tip = links[joint].own.then(pose);
     let tip =

@@ -18,8 +18,8 @@ struct Item<'a, 'i> {
     class: usize,
 }
 
-/// Surroundings of a body: the link that carries it, the frame around it relative to that link, the class of defaults, and true if a joint
-/// carries it.
+/// Surroundings of a body: the link that carries it, the frame around it relative to that link, the class of defaults, and whether a
+/// joint carries it.
 #[derive(Clone, Copy)]
 struct Scope<'s> {
     link: &'s str,

@@ -32,7 +32,7 @@ const REMEDY: &str = "MuJoCo writes a model without it: mujoco.mj_saveLastXML";
 struct Compiler {
     /// Unit of angles, rad.
     angle: f64,
-    /// Euler angles: axis of each, 0 to 2, and true for extrinsic rotations.
+    /// Euler angles: axis of each, 0 to 2, and whether the rotation is extrinsic.
     euler: [(usize, bool); 3],
     /// Bodies take mass and inertia from their shapes: always, never, or (`None`) where nothing is stated.
     from_shapes: Option<bool>,
