@@ -397,7 +397,7 @@ impl Emulator {
         self.drop_blocks();
     }
 
-    /// Takes the writes to watched output ports whose writeback was since the last call, by cycle.
+    /// Takes the writes to watched output ports since the last call, in order of writeback.
     pub fn take_port_writes(&mut self) -> Vec<PortWrite> {
         let mut writes = std::mem::take(&mut self.state.port_writes);
         writes.sort_by_key(|write| (write.cycle, write.slot));
@@ -420,7 +420,7 @@ impl Emulator {
         if let Some(issue) = self.planned {
             return issue.cycle == self.now;
         }
-        // The block gives the same issue as the stepper, without planning it again in every cycle.
+        // The block gives the same cycle of issue as the stepper, without planning it again in every cycle.
         let block = self.block_at_next(Extent::Whole).map(|id| &self.cache.blocks[id as usize]);
         block.is_some_and(|block| delivered + Cycle::from(block.first) == self.now)
     }

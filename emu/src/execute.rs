@@ -96,9 +96,8 @@ pub(crate) fn flow_fault(
     }
 }
 
-/// Issues the operations of a bundle that [`check`] has passed; [`Emulator::follow`](crate::Emulator) does its control flow.
-/// Results are added to `state.pending`; operations that write no register complete at once and are passed to `retired`, in
-/// slot order.
+/// Issues the operations of a bundle that [`check`] has passed; [`Emulator::follow`](crate::Emulator) handles its control flow. Results
+/// are added to `state.pending`; operations that write no register complete at once and are passed to `retired`, in slot order.
 pub(crate) fn issue(
     decoded: &DecodedBundle,
     state: &mut State,
