@@ -43,7 +43,7 @@ fn compare(seed: u64, program: &Program, met: &mut EventCounts) {
     // Also limit the total number of cycles in some runs.
     let most = if random.once_in(3) { u64::from(500 + random.below(5000)) } else { u64::MAX };
     batch.set_cycle_limit(most);
-    // Average number of lanes per deviating input value.
+    // An input differs in one lane of `rarity`, on average.
     let rarity = 1 + random.below(2 * lanes as u32);
     let mut was_apart = 0;
     for period in 0..PERIODS {
