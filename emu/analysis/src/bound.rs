@@ -337,7 +337,7 @@ fn add<K: Ord>(costs: &mut BTreeMap<K, Cost>, key: K, cost: Cost) {
     costs.entry(key).and_modify(|known| *known = known.or(cost)).or_insert(cost);
 }
 
-/// Limits the states of a place: beyond [`MAX_VALUES`], drops the register values, which leaves one state for each timing state.
+/// Limits the states at one bundle: beyond [`MAX_VALUES`], drops the register values, which leaves one state for each timing state.
 fn widened(states: BTreeMap<State, Cost>) -> BTreeMap<State, Cost> {
     if states.len() <= MAX_VALUES {
         return states;

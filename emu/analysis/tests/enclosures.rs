@@ -304,7 +304,7 @@ fn source(random: &mut Random, machine: &'static Machine) -> String {
     let keeps = random.once_in(2);
     let state = match random.below(4) {
         0 => format!(" mov s0:float, {}\n", states[0]),
-        // A filter, which keeps its range over all periods or does not.
+        // A filter, which may or may not keep its range over all periods.
         2 => " fsub s0, s0, x0\n fmul s0, s0, -0.875\n".to_owned(),
         1 => " fmul s0, s0, 0.5\n".to_owned(),
         _ => String::new(),

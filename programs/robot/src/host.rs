@@ -89,11 +89,11 @@ pub trait Robot {
     /// Advances by one tick.
     ///
     /// # Errors
-    /// If the cores cannot go on; the text says why.
+    /// If the cores cannot continue; the text gives the reason.
     fn tick(&mut self, inputs: &Inputs) -> Result<(), String>;
     /// Number of words that can be sent now.
     fn room(&self) -> usize;
-    /// Sends a word, for which [`Robot::room`] has room.
+    /// Sends a word; the caller checks [`Robot::room`] first.
     fn send(&mut self, word: u32);
     /// Fields of the reports that have arrived.
     fn reports(&mut self) -> Vec<[u32; 4]>;
@@ -162,7 +162,7 @@ pub enum Problem {
 }
 
 impl Problem {
-    /// Number of its cause; 0 without a cause.
+    /// Number of the error's cause; 0 without a cause.
     pub fn cause(&self) -> u32 {
         match self {
             Problem::Refused(report) | Problem::Stopped(report) => report.cause.map_or(0, Cause::number),
@@ -427,7 +427,7 @@ impl<R: Robot> Host<R> {
         let fault = if self.faults.is_empty() { None } else { Some(self.faults.remove(0)) };
         match fault {
             Some(LinkFault::Corrupt) => {
-                // Any bit does: the checksum covers all.
+                // Any bit will do: the checksum covers all of them.
                 let word = words.len() - 2;
                 words[word] ^= 1 << 13;
             }

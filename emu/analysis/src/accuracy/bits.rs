@@ -5,9 +5,9 @@
 //! Integers have no error: the run's value counts as exact, like any decision. Their affine form keeps the correlation with other
 //! values. Sums wrap modulo 2³², as in the machine; a range that wraps only in part becomes the range of all integers.
 //!
-//! Four operations on the bits of a float keep its error, here as in [`Shadow`](super::Shadow): adding or subtracting a multiple of
-//! 2²³ scales the float by a power of two, and masks of the sign bit clear, set or flip the sign. If an operand carries an error and
-//! it is unknown if the other one makes the operation one of these, the result has no enclosure as a float.
+//! Four operations on the bits of a float keep its error, here as in [`Shadow`](super::Shadow): adding or subtracting a multiple of 2²³
+//! scales the float by a power of two, and masks of the sign bit clear, set or flip the sign. If an operand carries an error, and the
+//! other may or may not make the operation one of these, the result has no enclosure as a float.
 
 use super::affine::Affine;
 use super::interval::Interval;

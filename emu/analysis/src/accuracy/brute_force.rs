@@ -302,7 +302,7 @@ fn bits_are_narrow() {
     assert!(cut.form.sub(&float.form).range().low > -1e-9, "{cut:?}");
 }
 
-/// Word in the set of an abstract value.
+/// Member of an abstract value: a concrete word.
 #[derive(Clone, Copy, Debug)]
 struct Member {
     bits: u32,

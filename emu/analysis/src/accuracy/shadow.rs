@@ -68,7 +68,7 @@ pub struct OperationAccuracy {
     pub absorbed: u64,
 }
 
-/// Decision of the run that binary64 would have made otherwise.
+/// Decision of the run that binary64 would have made differently.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Decision {
     /// Times that the decision differed.
@@ -77,7 +77,7 @@ pub struct Decision {
     pub period: u64,
 }
 
-/// A point at which the comparison with binary64 was lost and began anew.
+/// Operation at which the comparison with binary64 was lost and started afresh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LostComparison {
     /// Times that it was lost.
@@ -100,7 +100,7 @@ struct Cell {
 
 /// Shadow execution: the program in binary64, beside a run.
 ///
-/// Loads, stores, jumps and integer operations follow the run. Decisions that binary64 would have made otherwise are counted
+/// Loads, stores, jumps and integer operations follow the run. Decisions that binary64 would have made differently are counted
 /// ([`Shadow::decisions`]).
 #[derive(Clone)]
 pub struct Shadow {
@@ -415,7 +415,7 @@ impl Shadow {
         &self.operations
     }
 
-    /// Decisions that binary64 would have made otherwise, by word.
+    /// Decisions that binary64 would have made differently, by word.
     pub fn decisions(&self) -> &BTreeMap<u32, Decision> {
         &self.decisions
     }

@@ -73,8 +73,8 @@ impl System {
         }
     }
 
-    /// Pushes the host's values into a FIFO. Returns false if the FIFO overflows, as far as the host can know: entries under way count,
-    /// pops that the host has not seen yet do not.
+    /// Pushes the host's values into a FIFO. Returns false if the FIFO overflows, as far as the host can know: entries under way count as
+    /// present, and pops before the entry arrives are not foreseen.
     ///
     /// # Errors
     /// If the link is not a FIFO from the host.

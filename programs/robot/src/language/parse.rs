@@ -148,7 +148,7 @@ impl<'t> Parser<'t> {
         Ok(Name { text, span })
     }
 
-    /// Takes a quoted text; returns its inside.
+    /// Takes a quoted text; returns it without the quotes.
     fn quoted(&mut self, what: &str) -> Outcome<Name> {
         let span = self.expect(Token::Text, what)?;
         let text = self.text(span).trim_matches('"').to_owned();
