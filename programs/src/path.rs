@@ -50,7 +50,7 @@ pub struct Arc {
 }
 
 impl Arc {
-    /// Sweeps below this count as a full turn: the two directions differ by rounding only.
+    /// Sweeps below this count as a full turn: start and end then differ in direction by rounding only.
     const SAME_DIRECTION: f64 = 1e-9;
 
     /// Arc about `centre` from one point to another (all m); a full circle if the two coincide.

@@ -36,7 +36,7 @@ pub fn standard() -> Result<Description, String> {
 /// Reason why there is no controller.
 #[derive(Debug, thiserror::Error)]
 pub enum ControllerError {
-    /// A port or link of the host that the system lacks.
+    /// The system lacks a port or link that the host needs.
     #[error("the system is no robot controller: {0}")]
     Host(#[from] HostError),
     /// A core's memories cannot hold its program.

@@ -51,7 +51,7 @@ pub struct Block {
     pub periods: u32,
 }
 
-/// Reason why a move fits no block.
+/// Reason why a move does not fit a block.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum BlockError {
     /// A coordinate out of range.

@@ -8,7 +8,7 @@ use takt_isa::fp::{Flags, Host};
 use takt_isa::spec::check::MAX_SLOTS;
 use takt_isa::{Effect, Program, ROWS, Register, compute};
 
-/// Operands at once: as many as the first-level cache holds with some dozens of registers.
+/// Operands per run: as many as the first-level cache holds for a few dozen registers.
 pub(crate) const LANES: usize = 128;
 
 type Column = [u32; LANES];

@@ -177,7 +177,7 @@ impl Shadow {
         }
     }
 
-    /// Counts values as exact at the start of each period, so that errors are made within one period: static bounds are stated in this way.
+    /// Counts values as exact at the start of each period, so that each error arises within one period, as static bounds assume.
     #[must_use]
     pub fn each_period_afresh(self) -> Shadow {
         Shadow { afresh: true, ..self }
