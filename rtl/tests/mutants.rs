@@ -39,7 +39,7 @@ fn units() {
                 }
             }
         }
-        // Nobody will ask for this netlist's program again.
+        // This netlist's program will not be needed again.
         let _ = fs::remove_file(program);
     }
 }

@@ -29,7 +29,7 @@ fn units(number: usize, units: &[Unit]) -> Machine {
     slot(number, |slot| slot.units = leak(units))
 }
 
-/// The machine with a sequencer that counts loops.
+/// Adds counted loops to a machine's sequencer.
 fn counting(machine: Machine) -> Machine {
     Machine { loop_depth: 1, ..machine }
 }
@@ -121,7 +121,7 @@ fn every_reason() {
     }
 }
 
-/// A row that is no machine has no circuit, either.
+/// An invalid row has no circuit, either.
 #[test]
 fn no_machine() {
     let machine = Box::leak(Box::new(Machine { slots: &[], ..F3 }));
@@ -129,7 +129,7 @@ fn no_machine() {
     assert_eq!(error.to_string(), "machine `f3`: 0 slots; a machine has 1 to 8");
 }
 
-/// A slot cannot have a name that the core has already.
+/// A slot must not have a name that the core already uses.
 #[test]
 fn names_that_clash() {
     for name in ["m_mul", "r"] {

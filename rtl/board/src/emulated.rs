@@ -210,7 +210,7 @@ impl EmulatedBoard {
         self.stop = level;
     }
 
-    /// True while the outputs drive.
+    /// The outputs drive.
     pub fn drives(&self) -> bool {
         self.control & (RUN | ENABLE) == RUN | ENABLE && self.begun && self.causes == 0
     }
