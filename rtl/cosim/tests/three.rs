@@ -13,8 +13,8 @@ use takt_robot::plant::Plant;
 use takt_rtl::{Library, export_system};
 use takt_system::HostAction;
 
-/// The controller takes and answers packets, plans a motion, begins it, and the servo follows. `TAKT_FULL=1` runs a longer part of the
-/// demonstration.
+/// The controller accepts and answers packets, plans a motion and begins it, and the servo follows. `TAKT_FULL=1` runs a longer part of
+/// the demonstration.
 #[test]
 fn the_controller_is_its_emulator() {
     let description = standard().unwrap_or_else(|error| panic!("{error}"));
