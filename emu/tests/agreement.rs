@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Blocks, compiled or not, and stepper do the same: random programs, run both ways in the same chunks, agree in all that can be seen.
+//! Compiled blocks, interpreted blocks and the stepper agree in all observable state: random programs run in both modes, in the same
+//! chunks.
 
 use crate::common::machines;
 use std::num::NonZeroU64;

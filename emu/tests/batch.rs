@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A batch does in each lane what an emulator of its own would do: random programs, random inputs, everything compared.
+//! Each lane of a batch behaves like an emulator of its own: random programs and inputs, with all state compared.
 
 use crate::common::{assert_lane, machines};
 use std::num::NonZeroU64;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Compiled blocks do what the stepper does: every operation, with the operands that make arithmetic special, and programs
-//! whose values stay numbers long enough for the code to be used. (`agreement.rs` has everything else.)
+//! Compiled blocks agree with the stepper: every operation, with the operands that are special cases of arithmetic, and programs whose
+//! values stay finite long enough for compiled code to be used. (`agreement.rs` covers everything else.)
 //!
-//! Without the feature `jit` the same programs run, and agree, uncompiled.
+//! Without the feature `jit`, the same programs run uncompiled.
 
 use crate::common::{assert_lane, machines, program};
 use std::fmt::Write as _;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The examples in `docs/timing.md` are what the emulator does. `TAKT_BLESS=1 cargo test -p takt-emu --test suite document::`
-//! rewrites them.
+//! The emulator reproduces the examples in `docs/timing.md`. `TAKT_BLESS=1 cargo test -p takt-emu --test suite document::` rewrites them.
 
 use crate::common::{input, program};
 use std::fmt::Write as _;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Every fault: where the machine stops, what it says, and that nothing of the faulting bundle has happened.
+//! Every fault: its address, its message, and that the faulting bundle has had no effect.
 
 use crate::common::{at, input, latency, program};
 use takt_emu::{Emulator, Event, Fault, FaultKind, LoadError, Status, Step, Stop};

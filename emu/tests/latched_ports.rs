@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Latched ports: what the host sets and sees, and when.
+//! Latched ports: when the program sees the host's inputs, and when the host sees the program's outputs.
 
 use crate::common::{latency, program};
 use std::num::NonZeroU64;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A machine placed where another one stands between two periods goes on as that one does.
+//! A machine restored to the state of another one between two periods continues like the original.
 
 use std::collections::BTreeMap;
 use takt_emu::testing::{Options, Random, input_ports, random_program};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A run cut into slices at any cycle is the same run, and `upcoming` tells the truth: debuggers and traces rest on it.
+//! Slicing a run at arbitrary cycles does not change it, and `upcoming` predicts correctly: debuggers and traces rely on both.
 
 use takt_emu::testing::{Options, Random, input_ports, random_program};
 use takt_emu::{Emulator, PeriodError, Step};

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The rules of `docs/timing.md`, each on a program of a few bundles, with the cycles worked out by hand. Latencies,
-//! intervals and refills are the table's, by unit; all other numbers are the rules'.
+//! Rules of `docs/timing.md`, each on a program of a few bundles, with the cycles worked out by hand. Latencies, intervals and refills
+//! are taken from the machine's table, by unit; all other numbers follow from the rules.
 //!
-//! Every program is run both ways, as blocks and by the stepper.
+//! Every program is run in both modes, as blocks and with the stepper.
 
 use crate::common;
 use crate::common::{at, latency, program, unit};

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Rows that are machines but have no circuit: the test sees every reason, by the message that names machine, slot, unit and value. Every
-//! machine of the table has a circuit.
+//! Valid machines without a circuit: every reason, reported with machine, slot, unit and value. Every machine of the table has a circuit.
 
 use takt_isa::spec::fixture::FIXTURES;
 use takt_isa::spec::units::*;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Falsifier of `takt accuracy`: random programs over all operations, runs that look for values at the ends of ranges, and a comparison of
-//! every statement of an [`Enclosure`] with the run.
+//! Falsifier of `takt accuracy`: random programs over all operations, with inputs at the ends of their ranges; every statement of an
+//! [`Enclosure`] is compared with the run.
 //!
 //! Campaign: `TAKT_PROGRAMS=10000 cargo test --release -p takt-analysis --test suite enclosures::`; `TAKT_SEED` moves its seeds.
 #![allow(clippy::print_stdout)]

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Bounds that ranges, conditions and relations between values make tight: programs as authors of controllers write them, each compared
-//! with its runs.
+//! Bounds that ranges, conditions and relations between values make tight: typical controller programs, each compared with its runs.
 
 use crate::accuracy::{HEAD, check, source};
 use takt_analysis::accuracy::{Enclosure, Interval, Problem, enclose, ulp};

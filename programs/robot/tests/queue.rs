@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Queue of the kinematic core, filled to its end by the host, on the three cores.
+//! Queue of the kinematic core, filled to capacity by the host, on the three cores.
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;

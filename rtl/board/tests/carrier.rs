@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Three half bridges on a small carrier: every duty after every other, given out in every cycle of a period, and interruptions in every
+//! Three half bridges on a small carrier: every duty after every other, written in every cycle of a period, and interruptions in every
 //! cycle, against rules about whole waveforms that share no code with circuit and model.
 
 use crate::harness::{Part, compare};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Numbers of a wiring that are each in range, but do not fit each other: the report names each number's place, its figures and a mend.
+//! Numbers of a wiring that are each in range, but do not fit each other: the report gives each number's place and figures, and a fix.
 
 use takt_asm::{MemoryLoader, Options, assemble};
 use takt_board::{Board, Findings, Mistake, Wiring};

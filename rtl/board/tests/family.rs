@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A family that exists in no shop: other memories, no memory in look-up tables, no PLL, no tools. A board with it exports and simulates
-//! like any other, and what it lacks is said before a tool is started.
+//! Fictitious family: other memories, no memory in look-up tables, no PLL, no tools. A board with it exports and simulates like any
+//! other, and missing features are reported before a tool starts.
 
 use std::fmt::Write as _;
 use std::path::Path;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Latencies from pin to pin over several cores, measured in a complete board: links of every kind, ticks that differ, a period under way.
+//! Latencies from pin to pin over several cores, measured in a complete board: links of every kind, different ticks, a period under way.
 
 use crate::harness::board::{STRETCH, Ticks};
 use std::path::Path;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The core behind its AXI4-Lite slave: what it does over the Wishbone slave, parts of words, accesses at once, and faults planted in the
-//! slave.
+//! Core behind its AXI4-Lite slave: the Wishbone slave's jobs, partial words, simultaneous accesses, and faults planted in the slave.
 
 use crate::bus::{AXI, Bus, Fault, Job, counts_and_faults, is_same, register, restart, survivors, tracking};
 use std::fmt::Write as _;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The three-processor controller as a circuit, in lockstep with the emulator: host and encoders act as at the beginning of a motion.
+//! Three-processor controller as a circuit, in lockstep with the emulator, with host and encoders as at the beginning of a motion.
 #![allow(clippy::print_stdout)]
 
 use std::path::PathBuf;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The core behind its Wishbone slave: loaded, run, read and started again over the bus, and faults planted in the slave.
+//! Core behind its Wishbone slave: loaded, run, read and restarted over the bus, and faults planted in the slave.
 
 use crate::bus::{Fault, Job, WISHBONE, counts_and_faults, restart, survivors, tracking};
 use takt_isa::{T1, T3};
