@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Generator of random programs from a seed, for tests of the emulator, and of the circuit against it.
 //!
-//! Programs use few registers, so that hazards are frequent: nearly every bundle stalls. A unit is drawn first, then one of its
-//! instructions, so that rare units occur as often as common ones. Instructions are taken from the specification's table; only the loop
+//! Programs use few registers, so hazards are frequent: nearly every bundle stalls. A unit is drawn first, then one of its
+//! instructions, so rare units occur as often as common ones. Instructions are taken from the specification's table; only the loop
 //! counter's decrement is named.
 
 use takt_isa::program::{LoopBound, Port, Section};

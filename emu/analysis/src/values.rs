@@ -2,7 +2,7 @@
 //! Constant propagation along each path, for the registers from which loop counts are computed.
 //!
 //! The count of a triangular loop is a function of the iterations around it. Its registers begin with constants and are advanced by
-//! constants, so that every entry of the loop has a known count, and its bound is exact. The registers followed are the backward slice of
+//! constants, so every entry of the loop has a known count, and its bound is exact. The registers followed are the backward slice of
 //! the counts, and of the branches on the same registers.
 
 use crate::graph::Graph;

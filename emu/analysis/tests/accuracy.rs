@@ -569,7 +569,7 @@ fn each_iteration_is_a_place_of_its_own() {
 
 #[test]
 fn an_error_of_one_sign_moves_the_range_to_its_side() {
-    // The sum is 1 in the run and larger exactly, so that the difference's range begins at 0 in the run.
+    // The sum is 1 in the run and larger exactly, so the difference's range begins at 0 in the run.
     let (low, high) =
         range(&format!("{ONE_INPUT}.range x = 0.9, 1\n"), " mov f, 1.0\n fadd f, f, 5.9e-8\n fsub y, f, x\n");
     assert!(low <= 0.0 && high >= f64::from(1.0 - 0.9f32), "{low} {high}");

@@ -186,7 +186,7 @@ fn straight_programs_take_exactly_their_bounds() {
     random_programs(options, 300, |seed, program, bounds, measured| {
         for &one in measured {
             let exact = check(bounds, one, program.machine.refill);
-            // The bundle of the `wait` may leave results in flight, so that the period's cycles may depend on when the tick comes.
+            // The bundle of the `wait` may leave results in flight, so the period's cycles may depend on when the tick comes.
             let section = section(bounds, one);
             if one.entered == SectionEntry::Reset {
                 assert!(exact, "seed {seed}");

@@ -246,7 +246,7 @@ p:
         wait    p
 ";
     both_ways(text, |enclosure, about| {
-        // Within the limit, e is (v - s)/0.8, so that s shrinks; beyond, it is fed back.
+        // Within the limit, e is (v - s)/0.8, so s shrinks; beyond, it is fed back.
         assert_eq!(left(enclosure), [], "{about}");
     });
 }

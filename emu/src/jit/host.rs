@@ -229,7 +229,7 @@ impl Host {
 mod tests {
     use super::*;
 
-    /// Host instructions are distinct: no two are equivalent, and each is an operation of the machine, so that none is taken for another.
+    /// Host instructions are distinct: no two are equivalent, and each is an operation of the machine, so none is taken for another.
     #[test]
     fn operations_are_told_apart() {
         for host in ALL {

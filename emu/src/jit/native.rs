@@ -57,7 +57,7 @@ impl NativeBlock {
         let target = target()?;
         let mut context = Context::for_function(function);
         let compiled = context.compile(target, &mut ControlPlane::default()).ok()?;
-        // Calls are by address, so that no relocations are needed.
+        // Calls are by address, so no relocations are needed.
         if !compiled.buffer.relocs().is_empty() {
             return None;
         }

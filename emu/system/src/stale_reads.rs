@@ -163,7 +163,7 @@ impl Seek<'_> {
         lines.iter().flatten().max_by_key(|line| line.line).copied()
     }
 
-    /// The source reads before the pop. Lines of a macro defined above the stretch say nothing about the order, so that reads on such lines
+    /// The source reads before the pop. Lines of a macro defined above the stretch say nothing about the order, so reads on such lines
     /// do not count.
     fn stands_before(&self, read: &Access, pop: &Access, above: Option<Location>) -> bool {
         let (Some(read), Some(pop)) = (read.line, pop.line) else { return false };

@@ -106,7 +106,7 @@ pub trait Robot {
 pub enum LinkFault {
     /// A bit of the next packet is inverted.
     Corrupt,
-    /// The next packet is lost, so that its successor is out of order.
+    /// The next packet is lost, so its successor is out of order.
     Order,
     /// The next packet is delayed in its middle.
     Late,

@@ -33,7 +33,7 @@ pub const OUT_OF_REACH: u32 = 1;
 pub const WRIST_SINGULAR: u32 = 2;
 /// `status` of the inverse: the wrist's centre lies on joint 1's axis.
 pub const ON_AXIS: u32 = 3;
-/// `status` of the forward kinematics: the tool points nearly up or down, so that roll and yaw are ill-conditioned.
+/// `status` of the forward kinematics: the tool points nearly up or down, so roll and yaw are ill-conditioned.
 pub const STEEP: u32 = 1;
 /// `status` of the forward kinematics: an input is out of range, NaN or infinite.
 pub const NO_ANGLE: u32 = 2;

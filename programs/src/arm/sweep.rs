@@ -196,7 +196,7 @@ fn index(configuration: Configuration) -> usize {
     configuration.iter().rev().fold(0, |index, &bit| 2 * index + usize::from(bit))
 }
 
-/// A pose moved by 0.01 mm along an axis does not have this failure, so that the pose is at the limit of reach or singularity.
+/// A pose moved by 0.01 mm along an axis does not have this failure, so the pose is at the limit of reach or singularity.
 fn is_just_beyond(pose: &Pose<f32>, tool: [f64; 3], configuration: Configuration, failure: Failure) -> bool {
     let pose = wide(pose);
     [-0.01, 0.01].iter().any(|step| {

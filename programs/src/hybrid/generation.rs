@@ -134,7 +134,7 @@ fn words(pose: &Pose, line: usize) -> Result<[i32; 5], BlockError> {
     ])
 }
 
-/// Nearest integer in a unit. Half the range is allowed, so that the difference of two integers fits, too.
+/// Nearest integer in a unit. Half the range is allowed, so the difference of two integers fits, too.
 fn integer(value: f64, unit: f64, line: usize) -> Result<i32, BlockError> {
     let rounded = (value / unit).round();
     let fits = rounded.abs() <= f64::from(i32::MAX / 2);

@@ -90,7 +90,7 @@ pub(crate) fn scenario(off: EncoderError, seed: u64) -> Vec<Inputs> {
         let reference =
             Reference { velocity: [vx, vy, vz], angular_velocity: [omega_alpha, omega_gamma], ..rest }
                 .convert();
-        // The error changes its sign with the direction, so that only `Far` saturates.
+        // The error changes its sign with the direction, so only `Far` saturates.
         let sign = if direction % 2 == 0 { 1 } else { -1 };
         for _ in 0..periods {
             let counts = std::array::from_fn(|i| at_rest[i] + sign * off.counts(i, &mut random));

@@ -50,7 +50,7 @@ ports = { level = "third.p" }
 "#;
 
 /// System whose first core has every base tick; the second has every second base tick, and latched ports; the third has every third base
-/// tick. The third core's period is longer than two base ticks and reads its input first and last, so that a value can arrive while the
+/// tick. The third core's period is longer than two base ticks and reads its input first and last, so a value can arrive while the
 /// period is under way. Ways over the FIFO have no bound.
 const SYSTEM: &str = r#"
 tick = 1000
@@ -391,7 +391,7 @@ fn each_peripheral_keeps_its_stated_latency() {
     }
 
     // The modulator takes a stream's value on as stated. A value of ones alone shows that at once, with the next bit; the first bit of a
-    // small value comes any time later, so that the pin has no stated bound.
+    // small value comes any time later, so the pin has no stated bound.
     for stream in ["full", "faint"] {
         let out = way.outputs.iter().find(|output| output.peripheral == stream).expect("a stream");
         assert_eq!(out.answer, Answer::Density);

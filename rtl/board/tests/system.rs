@@ -177,7 +177,7 @@ fn pins_follow_as_the_bound_says(host: &mut Host<Simulation>, description: &Desc
         ticks.measured(sim, before, |sim| sim.turns.push(turn), "lamp_out")
     });
     assert_eq!(found, (total.best, total.worst));
-    // Base ticks are a whole number of the PWM's periods apart, so that values always come at the same place of a period.
+    // Base ticks are a whole number of the PWM's periods apart, so values always come at the same place of a period.
     let (fixed, pwm) =
         (Part::sum("", motor.inputs[0].parts.iter().chain(&motor.between)), motor.total().expect("an edge"));
     let (least, most) =

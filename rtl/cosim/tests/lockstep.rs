@@ -93,7 +93,7 @@ fn changed_words() {
         let mut simulation = model(machine).start(&[]).unwrap_or_else(|error| panic!("{error}"));
         let (mut coverage, mut refused) = (random::Coverage::default(), 0);
         let programs = random::words(machine);
-        // Each instruction has 49 programs, which is not a multiple of 5, so that the sample covers every bit.
+        // Each instruction has 49 programs, which is not a multiple of 5, so the sample covers every bit.
         for program in programs.iter().step_by(if is_full { 1 } else { 5 }) {
             simulation = random::run_directed(program, simulation, &mut coverage)
                 .unwrap_or_else(|error| panic!("{}: {:x?}: {error}", machine.name, program.code));

@@ -94,7 +94,7 @@ impl Interval {
         Interval::new(self.low.min(other.low), self.high.max(other.high))
     }
 
-    /// Intersection of two intervals that enclose the same value, so that it is not empty; if rounding leaves nothing, returns `self`.
+    /// Intersection of two intervals that enclose the same value, so it is not empty; if rounding leaves nothing, returns `self`.
     pub(super) fn meet(self, other: Interval) -> Interval {
         let both = Interval::new(self.low.max(other.low), self.high.min(other.high));
         if both.low <= both.high { both } else { self }

@@ -280,11 +280,11 @@ pub(super) fn to_float(number: &Number) -> Result<Number, Problem> {
 pub enum Problem {
     /// The divisor may be zero.
     DivisionByZero,
-    /// The operand may lie where the function has no value, so that the result may be a NaN.
+    /// The operand may lie where the function has no value, so the result may be a NaN.
     Domain,
     /// The result may be too large for binary32.
     Overflow,
-    /// The result may not fit a 32-bit integer, so that the conversion saturates and is invalid.
+    /// The result may not fit a 32-bit integer, so the conversion saturates and is invalid.
     Conversion,
     /// An operand may have the bit pattern of an infinity or a NaN.
     NotFinite,

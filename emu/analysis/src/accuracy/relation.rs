@@ -124,7 +124,7 @@ fn has_square(sum: &Rc<Node>, component: &Rc<Node>, depth: u32) -> bool {
     }
 }
 
-/// Quotient or root whose operand has very different magnitudes, so that the middle of its range says little.
+/// Quotient or root whose operand has very different magnitudes, so the middle of its range says little.
 pub(super) fn is_steep(meaning: &Meaning, operands: &[Rc<Node>; 3]) -> bool {
     let range = |meaning: &Meaning| {
         let node = source(meaning, operands)?;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Errors relative to the value, so that a quotient's error is small where the quotient is, however small the divisor.
+//! Errors relative to the value, so a quotient's error is small where the quotient is, however small the divisor.
 
 use super::interval::Interval;
 use super::number::Number;

@@ -248,7 +248,7 @@ impl Shadow {
     pub fn issued(&mut self, emulator: &Emulator, address: BundleAddress) {
         let program = Rc::clone(&self.program);
         let Some(Ok(instructions)) = program.bundle(address) else { return };
-        // The interlocks ensure that a bundle reads the results of all earlier ones, so that results can be written at once.
+        // The interlocks ensure that a bundle reads the results of all earlier ones, so results can be written at once.
         let mut written = Vec::new();
         let machine = program.machine;
         for ((number, slot), instruction) in machine.numbered_slots().zip(&instructions) {

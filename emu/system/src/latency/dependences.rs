@@ -49,7 +49,7 @@ impl LinkDependences {
                 OutputEvent::Written | OutputEvent::AtWait => None,
             });
             let by: BTreeSet<(Register, Register)> = by.flatten().collect();
-            // A program that cannot be followed has no bounds either, so that the error is reported there.
+            // A program that cannot be followed has no bounds either, so the error is reported there.
             let dependence = Dependence::new(&description.cores[number].program, &by);
             let dependence = dependence.unwrap_or_else(|_| Dependence::unknown());
             let mut dependents: BTreeMap<Register, Dependents<'_>> = BTreeMap::new();

@@ -249,7 +249,7 @@ impl System {
             for port in &core.program.inputs {
                 let mailbox = mailboxes.iter().find(|mailbox| mailbox.register == port.register);
                 let initial = mailbox.map_or(0, |mailbox| description.initial(mailbox.source));
-                // The port belongs to the program, so that setting it cannot fail.
+                // The port belongs to the program, so setting it cannot fail.
                 let _ = emulator.set_input_bits(port.register, initial);
             }
             emulator.set_watched(watched(&description, number));

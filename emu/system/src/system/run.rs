@@ -150,7 +150,7 @@ impl System {
         let inputs = &mut self.inputs;
         gate.run((now + 1).saturating_sub(delay), |cycle, mailbox, value| {
             let register = mailboxes[mailbox].register;
-            // The register is an input port, so that setting it cannot fail.
+            // The register is an input port, so setting it cannot fail.
             let _ = emulator.set_input_bits(register, value);
             if let Some(inputs) = inputs {
                 inputs.push(InputEvent { cycle, core, register, value });
