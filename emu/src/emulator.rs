@@ -276,7 +276,7 @@ impl Emulator {
     /// Loads a program and resets the machine.
     ///
     /// # Errors
-    /// If the machine's memories cannot hold the program. Illegal words are no error here; executing one is a fault.
+    /// If the machine's memories cannot hold the program. Illegal words are not an error here; executing one is a fault.
     pub fn new(program: &Program) -> Result<Emulator, LoadError> {
         let code = Code::new(program)?;
         Ok(Emulator {

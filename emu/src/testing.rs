@@ -641,7 +641,7 @@ impl Generator {
         }
     }
 
-    /// Breaks a loop: changes its end, its count's register, or puts an operation that redirects at its end.
+    /// Breaks a loop: changes its end or its count's register, or places an operation that redirects at its end.
     fn unloop(&mut self, target: u32) {
         if self.loops.is_empty() {
             return;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Reader of unit headers: the facts that the generator and the tests need in order to instantiate `rtl/units/<unit>.v`.
 //!
-//! A unit selects among its operations by an operation code of its own, as short as suits it. The header of its Verilog file is
-//! the only place that states the code of each instruction:
+//! A unit selects among its operations by its own operation code, which is as short as possible. The header of its Verilog file is the
+//! only place that states the code of each instruction:
 //!
 //! ```text
 //! //@ op 1'b0 fadd

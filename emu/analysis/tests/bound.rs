@@ -418,7 +418,7 @@ fn total_bounds_a_nest_by_the_sum_of_its_rows() {
                         emulator.set_input_bits(port.register, bits).unwrap();
                     }
                 };
-                // Each period starts the count anew.
+                // Each period restarts the count.
                 let measured = measure(&mut emulator, 3, set);
                 for one in &measured {
                     check(if sum <= total { &bounds } else { &without }, *one, machine.refill);

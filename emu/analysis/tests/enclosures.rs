@@ -192,7 +192,7 @@ impl Writer<'_> {
         name
     }
 
-    /// Decision by a comparison: a selection of values that depend on what is compared, or a branch around operations.
+    /// Decision by a comparison: a selection of values that depend on the compared ones, or a branch around operations.
     fn decision(&mut self) {
         let flag = self.condition();
         if self.random.once_in(2) {
@@ -322,7 +322,7 @@ fn source(random: &mut Random, machine: &'static Machine) -> String {
         writeln!(text, ".reg {temporaries}").unwrap();
     }
     let enter = match writer.random.below(3) {
-        // Gives the first period code of its own.
+        // Gives the first period its own code.
         0 => " wait q\nq: mov s0, 0.25\n.period\np:\n".to_owned(),
         _ => " wait p\n.period\np:\n".to_owned(),
     };

@@ -122,7 +122,7 @@ fn rejects_contradictory_demands() {
     assert_eq!(bench.until(REFUSED, jog).cause, 6);
     let jog = bench.send(3, &[vec![3], bits(&[0.0; 6])].concat());
     assert_eq!(bench.until(REFUSED, jog).cause, 3);
-    // Refusals are no errors: the next motion runs.
+    // Refusals are not errors: the next motion runs.
     let mut near = HOME;
     near[5] += 0.01;
     let sequence = bench.motion(MOVE, near, good);

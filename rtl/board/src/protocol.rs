@@ -15,8 +15,8 @@ pub const VERSION: u32 = 2;
 pub const INPUTS: u16 = 0x1000;
 /// Address of output port 0.
 pub const OUTPUTS: u16 = 0x2000;
-/// Addresses that each core has for its board registers, its input ports and its output ports: core *n*'s begin *n* times as many addresses
-/// further on.
+/// Number of addresses that each core has for its board registers, its input ports and its output ports. The addresses of core *n* are
+/// *n* times this number higher than those of core 0.
 pub const CORE: u16 = 0x100;
 /// Address of the first value of a link that the host drives.
 pub const DRIVEN: u16 = 0x3000;
@@ -354,7 +354,7 @@ pub trait Line {
     /// If the line is gone.
     fn send(&mut self, bytes: &[u8]) -> std::io::Result<()>;
 
-    /// Receives the bytes that have come, after waiting a little for them; to receive no byte is no error.
+    /// Receives the bytes that have come, after waiting a little for them; receiving no byte is not an error.
     ///
     /// # Errors
     /// If the line is gone.

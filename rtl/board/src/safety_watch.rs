@@ -10,7 +10,7 @@ use crate::top::{AROUND, TOP};
 use crate::wiring::Wiring;
 use std::fmt::Write as _;
 
-/// Words of a moment, as the driver sends it: the cycle of the run, the core, then what [`Watch::header`] lists, `drive` left out.
+/// Words of a moment, as the driver sends it: the cycle of the run, the core, then the words of [`Watch::header`] without `drive`.
 pub(crate) const WORDS: usize = 10;
 
 /// The cores that are watched.

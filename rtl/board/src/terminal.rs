@@ -43,7 +43,7 @@ impl Terminal {
         &self.path
     }
 
-    /// Receives the bytes that the host has sent; to receive no byte is no error.
+    /// Receives the bytes that the host has sent; receiving no byte is not an error.
     ///
     /// # Errors
     /// Fails if the line is gone.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A core behind a bus slave, in Icarus Verilog: loaded, run, read and started again over the bus. A script says what a master does, the
+//! Core behind a bus slave, in Icarus Verilog: loaded, run, read and restarted over the bus. A script defines the master's actions, the
 //! same for every bus.
 #![allow(clippy::print_stdout)]
 

@@ -108,7 +108,7 @@ impl Drop for Folder {
     }
 }
 
-/// A unit that runs in a process of its own.
+/// Unit that is simulated in its own process.
 pub(crate) struct Simulation {
     pub(crate) circuit: Circuit,
     program: PathBuf,

@@ -10,7 +10,7 @@ use std::rc::Rc;
 const MAX_DEPTH: u32 = 24;
 /// Least norm whose square root is known to be no less than a component: smaller squares may lose digits to underflow.
 const LEAST_NORM: f64 = 1.0 / (1u64 << 60) as f64;
-/// Largest norm whose inverse is no subnormal number.
+/// Largest norm whose inverse is not a subnormal number.
 const LARGEST_NORM: f64 = (1u128 << 100) as f64;
 /// Ratio of a divisor's magnitudes, or a root's, from which its range is divided into parts.
 const STEEP: f64 = 64.0;

@@ -93,7 +93,7 @@ impl Relative {
         }
     }
 
-    /// Minimum of two numbers: what is not taken may err by a share of itself, which is larger.
+    /// Minimum of two numbers. The operand not taken may err by a share of itself, and it is the larger one.
     pub(super) fn minimum(a: &Number, b: &Number) -> Option<Relative> {
         let most = Relative::join(a, b);
         let positive = a.exact.low.min(b.exact.low) >= 0.0;

@@ -14,7 +14,7 @@ pub(super) enum Motion {
 pub(super) enum Effect {
     /// Selects a motion mode.
     Moves(Motion),
-    /// Selects a mode in which the reader always is.
+    /// Selects a mode that the reader always uses.
     Agrees,
     /// Cancels the selected motion mode.
     Cancels,

@@ -244,7 +244,7 @@ impl SystemLockstep {
         let (found, _) = self.simulation.run(now + REPORT_DELAY, &[])?;
         self.events.found.extend(found);
         self.simulated = now + REPORT_DELAY;
-        // Faults that the circuit does not detect are no events, and its behaviour in that cycle is undefined.
+        // Faults that the circuit does not detect are not events, and its behaviour in that cycle is undefined.
         let end = match self.system.fault() {
             Some(fault) if circuit_stops(&fault.fault) => fault.fault.cycle + 1,
             Some(fault) => fault.fault.cycle,
