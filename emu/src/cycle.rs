@@ -55,7 +55,7 @@ impl Emulator {
         Ok(Step::Issued { cycle: now, address })
     }
 
-    /// Latches the inputs, if that is due before the next cycle.
+    /// Latches the inputs, if latching is due before the next cycle.
     pub(crate) fn begin_cycle(&mut self) {
         if self.state.latches.as_ref().is_some_and(|latches| latches.take) {
             self.state.take_inputs();

@@ -88,7 +88,7 @@ fn outputs_are_published_at_the_wait() {
     });
 }
 
-/// The tick that came too early takes its inputs in the cycle after the `wait` that ends the period before.
+/// After an early tick, the inputs are latched in the cycle after the `wait` that ends the previous period.
 #[test]
 fn a_remembered_tick_takes_inputs_after_the_wait() {
     both(|emulator| {

@@ -167,7 +167,7 @@ p:
 
 #[test]
 fn dead_zones_and_guards_decide_what_is_computed() {
-    // A dead zone: the sign tells which side, the magnitude how much.
+    // A dead zone: the sign gives the side, the magnitude the amount.
     let dead = ".reg m\n m = max(abs(x) - 0.5, 0)\n y = x < 0 ? -m : m\n";
     let (range, error, hazards) = of_period("x = -2, 2", dead);
     assert!(range.magnitude() <= 1.5 && error < 1e-6 && hazards.is_empty(), "{range:?} {error:e}");

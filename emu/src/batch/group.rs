@@ -287,7 +287,7 @@ impl Group {
         GroupContinuation::More
     }
 
-    /// Latches the inputs if that is due before the next cycle.
+    /// Latches the inputs, if latching is due before the next cycle.
     fn take_inputs(&mut self) {
         if self.lead.state.latches.as_ref().is_some_and(|latches| latches.take) {
             self.lanes.take_inputs(&mut self.lead.state);

@@ -157,7 +157,7 @@ impl Lanes {
         }
     }
 
-    /// Latches the inputs, if that is due for `state`.
+    /// Latches the inputs, if latching is due for `state`.
     pub(crate) fn take_inputs(&mut self, state: &mut State) {
         let (Some(latches), Some(rows)) = (&mut state.latches, &self.latches) else { return };
         latches.take = false;

@@ -170,7 +170,7 @@ impl Problem {
         }
     }
 
-    /// A program can catch the error and go on.
+    /// A program can catch the error and continue.
     pub fn can_be_caught(&self) -> bool {
         matches!(self, Problem::Refused(_) | Problem::Stopped(_) | Problem::Late(_))
     }
@@ -322,7 +322,7 @@ impl<R: Robot> Host<R> {
     /// Advances by one tick of 100 µs.
     ///
     /// # Errors
-    /// If the cores cannot go on.
+    /// If the cores cannot continue.
     pub fn tick(&mut self) -> Result<(), Problem> {
         self.happen();
         if self.ready && self.out.is_empty() && self.ticks >= self.last_sent + NOP_TICKS {

@@ -56,7 +56,7 @@ fn stop_ends_waiting_statements() {
     host.wait_until(within, || "it does not stand".to_owned(), &|| false, |host| Ok(host.stands()))
         .unwrap_or_else(|problem| panic!("{problem}"));
     assert_eq!(host.unanswered(), 0);
-    // Operation goes on after the stop.
+    // Operation continues after the stop.
     let news = host.take_news();
     assert!(news.iter().any(
         |(_, news)| matches!(news, HostEvent::Report(report) if report.cause == Some(Cause::QueueFull))

@@ -19,7 +19,7 @@ use takt_programs::hybrid::{Inputs, Reference};
 pub(crate) enum EncoderError {
     /// Less than `ec`: a boost ends at `Tc/2`.
     Below,
-    /// More than `ec`: a boost goes on to `Tc`.
+    /// More than `ec`: a boost lasts until `Tc`.
     Above,
     /// Randomly less or more than `ec` in every period.
     Mixed,

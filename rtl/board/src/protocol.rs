@@ -479,7 +479,7 @@ mod tests {
             receiver.put(&[byte]);
             assert!(receiver.frame().is_none(), "what noise seems to begin waits for its end");
         }
-        // A pause tells the receiver that the bytes are noise.
+        // After a pause, the receiver treats the bytes as noise.
         receiver.give_up();
         while let Some(frame) = receiver.frame() {
             found.push((frame.number, frame.words));

@@ -166,7 +166,7 @@ struct Checker<'m> {
 /// Port at a link's end.
 struct EndPort {
     name: String,
-    /// Core's port; `None` at the host, whose ports have names alone.
+    /// Core's port; `None` at the host, whose ports only have names.
     port: Option<Port>,
 }
 

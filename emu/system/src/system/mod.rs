@@ -3,8 +3,8 @@
 //!
 //! Reads of linked inputs are the only places at which a core sees others, and no value arrives earlier than
 //! [`MIN_LATENCY`](crate::MIN_LATENCY) cycles after it was sent. So a core runs to the next bundle that reads such an input with an unknown
-//! value (or to a tick that takes a snapshot), and goes on once every sender has come within the link's latency of that cycle. The core
-//! that is farthest behind can always go on.
+//! value (or to a tick that takes a snapshot), and continues once every sender has come within the link's latency of that cycle. The core
+//! that is farthest behind can always continue.
 
 mod host;
 mod links;

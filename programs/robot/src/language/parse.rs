@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Parser from tokens to the tree. It skips a line with a mistake and goes on with the next.
+//! Parser from tokens to the tree. It skips a line with a mistake and continues with the next.
 
 use super::table;
 use super::tokens::Token;
