@@ -40,7 +40,7 @@ struct Edge {
 /// Extent of a block with respect to breakpoints.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Extent {
-    /// Across breakpoints, while runs do not pause. After a bundle that enables breakpoints again ([`Decoded::acts`]), up to the next
+    /// Across breakpoints, while runs do not pause. After a bundle that enables breakpoints again ([`DecodedBundle::acts`]), up to the next
     /// breakpoint.
     Whole,
     /// Up to the first breakpoint.
@@ -103,7 +103,7 @@ pub(crate) struct Block {
     pub(crate) last: u32,
     /// Issue offset of the last bundle with a breakpoint; `None` without breakpoints.
     pub(crate) pause: Option<u32>,
-    /// A bundle enables breakpoints again ([`Decoded::acts`]).
+    /// A bundle enables breakpoints again ([`DecodedBundle::acts`]).
     pub(crate) acts: bool,
     /// Control flow of the last bundle; [`Flow::Next`] if the code was cut, or the next bundle is illegal. The results of the last bundle
     /// are late, so a branch's register still has its old value when the micros have run.

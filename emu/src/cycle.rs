@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Stepper: cycle-by-cycle execution, with the scoreboard of `takt_isa::timing`. It is slow and handles every case; blocks (`fast`) are the
-//! fast path.
+//! Stepper: cycle-by-cycle execution, with the scoreboard of `takt_isa::timing`. It is slow and handles every case; blocks (`fast_path`)
+//! are the fast path.
 //!
 //! Each cycle has three steps, in this order: the machine sees the tick; results are written back; the next bundle issues or is
 //! charged a stall.

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Public interface of the emulator: a machine loaded with a program.
 //!
-//! Further methods of [`Emulator`] are in `cycle` (the stepper), `fast` (execution of blocks), `io` (ports, ticks, periods) and
+//! Further methods of [`Emulator`] are in `cycle` (the stepper), `fast_path` (execution of blocks), `io` (ports, ticks, periods) and
 //! `restore` (saved states), which is why these modules and this one import one another.
 
 use crate::block::{Cache, Extent};

@@ -411,7 +411,7 @@ impl EmulatedBoard {
             self.silent = 0;
             self.set.clear();
             self.values.fill(0);
-            // `Emulated::new` has checked that the program fits.
+            // `EmulatedBoard::new` has checked that the program fits.
             self.system = starts.then(|| System::new(&self.description).ok()).flatten();
         }
         if starts {
