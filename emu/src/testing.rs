@@ -100,8 +100,8 @@ impl Random {
         }
     }
 
-    /// Operand with few ones or few zeros, and an exponent from a range of 3 or of 61: sums of two such operands tie, cancel, or are decided
-    /// by bits far below their last place.
+    /// Operand with few ones or few zeros, and an exponent from a range of 3 or of 61: sums of two such operands tie, cancel, or are
+    /// decided by bits far below their last place.
     pub fn addend(&mut self) -> u32 {
         let (bits, place, other) = (self.bits() as u32, self.below(23), self.below(23));
         let fraction = match self.below(4) {

@@ -22,7 +22,7 @@ const WIRING: &str = include_str!("top/wiring.toml");
 /// Cycles of a period, as in the wiring.
 const PERIOD: u32 = 2000;
 
-/// A proportional controller with a set point that the host sets; `force` is a quarter of the difference, and the lamp is lit at odd counts.
+/// A proportional controller with a set point from the host; `force` is a quarter of the difference, and the lamp is lit at odd counts.
 const PROGRAM: &str = include_str!("top/loop.s");
 
 /// More work than a period has cycles for.
