@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Measures the operations that the emulator does in a second: on a period like the tracking step's, about 320 operations in a straight
-//! line, both ways of execution.
+//! Measures the emulator's speed in operations per second, with blocks and with the stepper. The program's period is straight-line code
+//! of about 320 operations, with the mix of the tracking step.
 //!
 //! `cargo run --release -p takt-emu --example speed`
 #![allow(clippy::print_stdout)]
@@ -32,7 +32,7 @@ fn main() {
         // The first period compiles.
         emulator.run_period(&[("x", 1.0f32.into())]).expect("the program waits");
         let before = emulator.statistics();
-        // Others use the processor too: the best of some rounds counts.
+        // Other processes share the host: the best of several rounds counts.
         let mut seconds = f64::INFINITY;
         for _ in 0..ROUNDS {
             let start = Instant::now();
@@ -55,13 +55,13 @@ fn main() {
     }
 }
 
-/// A period of operations on numbers near one, three to a bundle where they meet.
+/// Period of operations on numbers near one, up to three in a bundle.
 fn period() -> Program {
     let mut random = Random::new(1);
     let mut queues: Vec<Vec<Op>> = vec![Vec::new(); T3.slots.len()];
     for (function, count) in MIX {
         let (slot, _) = T3.host(function).expect("t3 has every unit");
-        // Floating-point rows, without those whose result is no number near one.
+        // Floating-point operations whose results stay near one.
         let rows: Vec<Op> = ROWS
             .iter()
             .filter(|row| {
@@ -95,7 +95,7 @@ fn period() -> Program {
     let mut index = 0;
     while queues.iter().any(|queue| !queue.is_empty()) {
         for queue in &mut queues {
-            // Some bundles have an empty place, as scheduled code has.
+            // Leave some slots empty, as in scheduled code.
             let Some(op) = (if random.once_in(4) { None } else { queue.pop() }) else {
                 code.push(nop);
                 continue;

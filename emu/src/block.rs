@@ -40,7 +40,7 @@ struct Edge {
 /// Extent of a block with respect to breakpoints.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Extent {
-    /// Across breakpoints, while runs do not pause. After a bundle that enables breakpoints again ([`Decoded::acts`]), up to the next
+    /// Across breakpoints, while runs do not pause. After a bundle that enables breakpoints again ([`DecodedBundle::acts`]), up to the next
     /// breakpoint.
     Whole,
     /// Up to the first breakpoint.
@@ -103,10 +103,10 @@ pub(crate) struct Block {
     pub(crate) last: u32,
     /// Issue offset of the last bundle with a breakpoint; `None` without breakpoints.
     pub(crate) pause: Option<u32>,
-    /// A bundle enables breakpoints again ([`Decoded::acts`]).
+    /// A bundle enables breakpoints again ([`DecodedBundle::acts`]).
     pub(crate) acts: bool,
     /// Control flow of the last bundle; [`Flow::Next`] if the code was cut, or the next bundle is illegal. The results of the last bundle
-    /// are late, so that a branch's register still has its old value when the micros have run.
+    /// are late, so a branch's register still has its old value when the micros have run.
     pub(crate) flow: Flow,
     /// A loop may end with the last bundle.
     pub(crate) ends_loop: bool,
@@ -224,7 +224,7 @@ impl Cache {
         entry: BundleAddress,
         at: Cycle,
     ) -> Option<u32> {
-        // Beyond the longest latency nothing is in flight, so that all greater distances are equivalent.
+        // Beyond the longest latency nothing is in flight, so all greater distances are equivalent.
         let distance = (at - last).min(Cycle::from(MAX_LATENCY)) as u8;
         let edges = &self.blocks[id as usize].edges;
         let known = edges
@@ -308,7 +308,7 @@ fn compile(of: BlockSource<'_>, entry: BundleAddress, recent: &Ages) -> Option<B
     };
     let mut acts = false;
     while let Some(decoded) = code.legal(address).filter(|_| !ends(address, placed.len(), acts)) {
-        // A loop's count is checked before its block runs, so that the block must not compute it.
+        // A loop's count is checked before its block runs, so the block must not compute it.
         let counts =
             |register| placed.iter().any(|earlier: &BlockBundle<'_>| earlier.decoded.writes(register));
         if matches!(decoded.flow, Flow::Loop { count, .. } if counts(count)) {

@@ -154,7 +154,7 @@ impl Code {
     }
 }
 
-/// Checks that the machine's memories can hold the program. Illegal words are no error here: executing one is a fault.
+/// Checks that the machine's memories can hold the program. Illegal words are not an error here: executing one is a fault.
 fn check(program: &Program) -> Result<(), LoadError> {
     let machine = program.machine;
     let (name, slots) = (machine.name, machine.slots.len());

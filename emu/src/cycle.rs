@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Stepper: cycle-by-cycle execution, with the scoreboard of `takt_isa::timing`. It is slow and handles every case; blocks (`fast`) are the
-//! fast path.
+//! Stepper: cycle-by-cycle execution, with the scoreboard of `takt_isa::timing`. It is slow and handles every case; blocks (`fast_path`)
+//! are the fast path.
 //!
 //! Each cycle has three steps, in this order: the machine sees the tick; results are written back; the next bundle issues or is
 //! charged a stall.
@@ -55,7 +55,7 @@ impl Emulator {
         Ok(Step::Issued { cycle: now, address })
     }
 
-    /// Latches the inputs, if that is due before the next cycle.
+    /// Latches the inputs, if latching is due before the next cycle.
     pub(crate) fn begin_cycle(&mut self) {
         if self.state.latches.as_ref().is_some_and(|latches| latches.take) {
             self.state.take_inputs();

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Public interface of the emulator: a machine loaded with a program.
 //!
-//! Further methods of [`Emulator`] are in `cycle` (the stepper), `fast` (execution of blocks), `io` (ports, ticks, periods) and
+//! Further methods of [`Emulator`] are in `cycle` (the stepper), `fast_path` (execution of blocks), `io` (ports, ticks, periods) and
 //! `restore` (saved states), which is why these modules and this one import one another.
 
 use crate::block::{Cache, Extent};
@@ -127,7 +127,7 @@ impl PredictedIssue {
         if cycle < self.delivered {
             return Some(Cause::Branch { from: self.from });
         }
-        // Rules once met stay met, so that each cause holds for consecutive cycles.
+        // Rules once met stay met, so each cause holds for consecutive cycles.
         let mut end = self.delivered;
         self.issue.stalls().iter().find_map(|&(cause, cycles)| {
             end += Cycle::from(cycles);
@@ -176,7 +176,7 @@ pub struct Emulator {
     /// Iterations so far of each loop with a bound.
     pub(crate) turns: Vec<IterationCounts>,
     pub(crate) recent: Recent,
-    /// Scoreboard after the last issue; `None` if blocks have run since, so that it must be rebuilt.
+    /// Scoreboard after the last issue; `None` if blocks have run since, so it must be rebuilt.
     pub(crate) scoreboard: Option<Box<Scoreboard>>,
     /// Planned issue of the next bundle; set only while the bundle stalls for a cause other than the front end.
     pub(crate) planned: Option<Issue>,
@@ -276,7 +276,7 @@ impl Emulator {
     /// Loads a program and resets the machine.
     ///
     /// # Errors
-    /// If the machine's memories cannot hold the program. Illegal words are no error here; executing one is a fault.
+    /// If the machine's memories cannot hold the program. Illegal words are not an error here; executing one is a fault.
     pub fn new(program: &Program) -> Result<Emulator, LoadError> {
         let code = Code::new(program)?;
         Ok(Emulator {
@@ -366,7 +366,7 @@ impl Emulator {
         self.pause_from = 0;
         if !self.pauses.iter().eq(&bundles) {
             self.pauses = bundles.into_iter().collect();
-            // Blocks end before breakpoints, so that older blocks are invalid.
+            // Blocks end before breakpoints, so older blocks are invalid.
             self.drop_blocks();
         }
     }
@@ -397,7 +397,7 @@ impl Emulator {
         self.drop_blocks();
     }
 
-    /// Takes the writes to watched output ports whose writeback was since the last call, by cycle.
+    /// Takes the writes to watched output ports since the last call, in order of writeback.
     pub fn take_port_writes(&mut self) -> Vec<PortWrite> {
         let mut writes = std::mem::take(&mut self.state.port_writes);
         writes.sort_by_key(|write| (write.cycle, write.slot));
@@ -420,7 +420,7 @@ impl Emulator {
         if let Some(issue) = self.planned {
             return issue.cycle == self.now;
         }
-        // The block gives the same issue as the stepper, without planning it again in every cycle.
+        // The block gives the same cycle of issue as the stepper, without planning it again in every cycle.
         let block = self.block_at_next(Extent::Whole).map(|id| &self.cache.blocks[id as usize]);
         block.is_some_and(|block| delivered + Cycle::from(block.first) == self.now)
     }
@@ -708,7 +708,7 @@ impl ObservedEmulator<'_> {
     /// Runs like [`Emulator::step_cycle`], observed.
     ///
     /// # Errors
-    /// Those of [`Emulator::step_cycle`].
+    /// The errors of [`Emulator::step_cycle`].
     pub fn step_cycle(&mut self) -> Result<Step, Fault> {
         self.emulator.cycle(&mut Some(self.sink))
     }
@@ -716,7 +716,7 @@ impl ObservedEmulator<'_> {
     /// Runs like [`Emulator::step_bundle`], observed.
     ///
     /// # Errors
-    /// Those of [`Emulator::step_bundle`].
+    /// The errors of [`Emulator::step_bundle`].
     pub fn step_bundle(&mut self) -> Result<Stop, Fault> {
         self.drive(Goal { bundle: true, ..self.emulator.goal() })
     }
@@ -724,7 +724,7 @@ impl ObservedEmulator<'_> {
     /// Runs like [`Emulator::run_until`], observed.
     ///
     /// # Errors
-    /// Those of [`Emulator::run_until`].
+    /// The errors of [`Emulator::run_until`].
     pub fn run_until(&mut self, cycle: Cycle) -> Result<Stop, Fault> {
         self.drive(Goal { until: cycle, ..self.emulator.goal() })
     }
@@ -732,7 +732,7 @@ impl ObservedEmulator<'_> {
     /// Runs like [`Emulator::run_to_wait`], observed.
     ///
     /// # Errors
-    /// Those of [`Emulator::run_to_wait`].
+    /// The errors of [`Emulator::run_to_wait`].
     pub fn run_to_wait(&mut self) -> Result<Stop, Fault> {
         self.drive(Goal { wait: true, ..self.emulator.goal() })
     }
@@ -740,7 +740,7 @@ impl ObservedEmulator<'_> {
     /// Runs like [`Emulator::run_to_wait_until`], observed.
     ///
     /// # Errors
-    /// Those of [`Emulator::run_to_wait_until`].
+    /// The errors of [`Emulator::run_to_wait_until`].
     pub fn run_to_wait_until(&mut self, cycle: Cycle) -> Result<Stop, Fault> {
         self.drive(Goal { until: cycle, wait: true, ..self.emulator.goal() })
     }
@@ -748,7 +748,7 @@ impl ObservedEmulator<'_> {
     /// Runs like [`Emulator::run`], observed.
     ///
     /// # Errors
-    /// Those of [`Emulator::run`].
+    /// The errors of [`Emulator::run`].
     pub fn run(&mut self) -> Result<Stop, Fault> {
         self.drive(self.emulator.goal())
     }
@@ -756,7 +756,7 @@ impl ObservedEmulator<'_> {
     /// Runs like [`Emulator::run_period`], observed.
     ///
     /// # Errors
-    /// Those of [`Emulator::run_period`].
+    /// The errors of [`Emulator::run_period`].
     pub fn run_period(
         &mut self,
         inputs: &[(&str, crate::Number)],
@@ -772,7 +772,7 @@ impl ObservedEmulator<'_> {
     /// Runs like [`Emulator::run_period_until`], observed.
     ///
     /// # Errors
-    /// Those of [`Emulator::run_period_until`].
+    /// The errors of [`Emulator::run_period_until`].
     pub fn run_period_until(&mut self, cycle: Cycle) -> Result<Option<PeriodReport>, crate::PeriodError> {
         self.emulator.period(cycle, &mut Some(self.sink))
     }

@@ -10,7 +10,7 @@ use takt_isa::timing::Cycle;
 use takt_isa::{BundleAddress, Effect, Flow, Machine, SlotIndex, compute};
 
 /// Effective address of a load or store, in words: the sum of an unsigned offset and a signed base. The memory is far smaller than 2^31
-/// words, so that the sum modulo 2^32 lies in it exactly if the true sum does.
+/// words, so the sum modulo 2^32 lies in it exactly if the true sum does.
 #[inline(always)]
 pub(crate) fn data_address(offset: u32, base: u32) -> usize {
     offset.wrapping_add(base) as usize
@@ -48,7 +48,7 @@ fn check_operation(
             let outside = data_address(operation.constant, base) >= state.memory.len();
             outside.then_some(FaultKind::DataAddress { address, depth, store })
         }
-        // A bundle has at most one operation with control flow, so that the bundle's flow is this operation's.
+        // A bundle has at most one operation with control flow, so the bundle's flow is this operation's.
         Effect::Call
         | Effect::Return
         | Effect::Loop
@@ -96,9 +96,8 @@ pub(crate) fn flow_fault(
     }
 }
 
-/// Issues the operations of a bundle that [`check`] has passed; [`Emulator::follow`](crate::Emulator) does its control flow.
-/// Results are added to `state.pending`; operations that write no register complete at once and are passed to `retired`, in
-/// slot order.
+/// Issues the operations of a bundle that [`check`] has passed; [`Emulator::follow`](crate::Emulator) handles its control flow. Results
+/// are added to `state.pending`; operations that write no register complete at once and are passed to `retired`, in slot order.
 pub(crate) fn issue(
     decoded: &DecodedBundle,
     state: &mut State,
@@ -106,7 +105,7 @@ pub(crate) fn issue(
     cycle: Cycle,
     mut retired: impl FnMut(Retire),
 ) {
-    // Results are written back later, so that operations can be executed one after another and still all read the old values. For the same
+    // Results are written back later, so operations can be executed one after another and still all read the old values. For the same
     // reason, flags are cleared only after the last operation.
     let mut flags = state.flags;
     for operation in &decoded.operations {

@@ -21,7 +21,7 @@ pub const LONGEST_TICK: Cycle = 100_000_000;
 /// Schedule of future ticks, and counts of past ones.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Ticks {
-    /// Single ticks that the host has scheduled, ascending: a queue.
+    /// Queue of single ticks that the host has scheduled, ascending.
     asked: VecDeque<Cycle>,
     /// Interval of regular ticks, in cycles.
     every: Option<NonZeroU64>,
@@ -123,7 +123,7 @@ impl Period {
 pub struct PeriodReport {
     /// Cycle of the tick that started the period.
     pub tick: Cycle,
-    /// Cycle after which cycles count: of the tick or, if the tick came before the previous `wait` (a missed deadline), of that `wait`.
+    /// Cycle from which the period is counted: its tick or, if the tick came before the previous `wait` (a missed deadline), that `wait`.
     pub start: Cycle,
     /// Cycle in which the period's `wait` issued.
     pub wait: Cycle,
@@ -207,7 +207,7 @@ impl Number {
 /// Reason why a port cannot be set or read.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PortError {
-    /// A name without a port in the program.
+    /// The program has no port with this name.
     #[error("the program has no {kind} port {name}")]
     Unknown {
         /// Name in the request.
@@ -215,7 +215,7 @@ pub enum PortError {
         /// Direction of the port: `input` or `output`.
         kind: &'static str,
     },
-    /// A value of another type than the port's.
+    /// The value's type is not the port's.
     #[error("port {name} carries {} values", match .ty { Type::F => "binary32", Type::I => "integer", Type::B => "32-bit" })]
     Type {
         /// Name of the port.
@@ -231,7 +231,7 @@ pub enum PortError {
         /// Number of the batch's lanes.
         lanes: usize,
     },
-    /// An address without an input port of the machine.
+    /// The machine has no input port at this address.
     #[error("register address {register} is no input port")]
     NoInput {
         /// Address in the request.
@@ -291,14 +291,14 @@ impl Emulator {
     /// in the next cycle at the earliest. Before the first cycle, the section that runs once reads it.
     ///
     /// # Errors
-    /// If the program has no such port, or one of another type.
+    /// If the program has no such port, or the port has another type.
     pub fn set_input(&mut self, name: &str, value: Number) -> Result<(), PortError> {
         let register = input_for(&self.program, name, [value])?;
         self.state.set_input(register, value.bits());
         Ok(())
     }
 
-    /// Sets an input port by its register address, which is faster and also works for ports without a name.
+    /// Sets an input port by its register address, which is faster than by name and also works for unnamed ports.
     ///
     /// # Errors
     /// If the machine has no such port.

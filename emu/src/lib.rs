@@ -19,9 +19,9 @@
 //! ```
 //!
 //! Two modes of execution agree in all observable state. The *stepper* (`cycle`) executes cycle by cycle, by the rules of
-//! [`takt_isa::timing`], which `docs/timing.md` states in prose. *Blocks* (`block`, `fast`) are a translation cache: since timing does not
-//! depend on data, straight-line code is timed once, and from then on only its arithmetic is executed. Special cases (a fault, the cycle
-//! limit, an observer) are left to the stepper. `tests/agreement.rs` compares the two.
+//! [`takt_isa::timing`], which `docs/timing.md` states in prose. *Blocks* (`block`, `fast_path`) are a translation cache: since timing
+//! does not depend on data, straight-line code is timed once, and from then on only its arithmetic is executed. Special cases (a fault,
+//! the cycle limit, an observer) are left to the stepper. `tests/agreement.rs` compares the two.
 //!
 //! The modes handle instructions by their effects; no instruction is named.
 

@@ -8,7 +8,7 @@ use takt_isa::spec::units::MAX_LATENCY;
 use takt_isa::timing::Cycle;
 use takt_isa::{BundleAddress, Machine, Program, Register, SlotIndex};
 
-/// Words of the register array: the register space, followed by temporary words for blocks (`block`).
+/// Number of words in the register array: the register space, followed by temporary words for blocks (`block`).
 pub(crate) const WORDS: usize = 2 * Register::COUNT;
 /// First scratch word. There is one for each slot, for bundles that exchange registers.
 const SCRATCH: u16 = Register::COUNT as u16;
@@ -268,7 +268,7 @@ impl State {
         }
     }
 
-    /// Writes back one result. Returns the write to an output port, if it is one.
+    /// Writes back one result. Returns the port write if the register is an output port.
     pub(crate) fn write_back(&mut self, pending: &PendingResult) -> Option<PortWrite> {
         let Retire { cycle, slot, address, value, flags, .. } = pending.retire;
         self.set(pending.register, value);

@@ -127,7 +127,7 @@ pub(crate) struct Emitter {
     pub(crate) checks: Vec<Check>,
     /// Registers that micros write.
     pub(crate) writes: RegisterSet,
-    /// A load or store may leave the memory.
+    /// A load or store may address a word outside the data memory.
     pub(crate) can_fault: bool,
 }
 

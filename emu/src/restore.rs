@@ -31,9 +31,9 @@ pub enum Position {
 }
 
 impl Emulator {
-    /// Resets the machine and sets it to a known state, from which cycles count.
+    /// Resets the machine and sets it to a known state; cycles count from there.
     ///
-    /// Returns false, and leaves the machine reset, if the state is that of waiting at a bundle without a `wait`.
+    /// Returns false, and leaves the machine reset, if the state is [`Position::Wait`] at a bundle without a `wait`.
     pub fn restore(&mut self, saved: &MachineState) -> bool {
         self.reset();
         let state = &mut self.state;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Generator of random programs from a seed, for tests of the emulator, and of the circuit against it.
 //!
-//! Programs use few registers, so that hazards are frequent: nearly every bundle stalls. A unit is drawn before an instruction of it, so
-//! that rare units occur as often as common ones. Instructions are taken from the specification's table; only the loop counter's decrement
-//! is named.
+//! Programs use few registers, so hazards are frequent: nearly every bundle stalls. A unit is drawn first, then one of its
+//! instructions, so rare units occur as often as common ones. Instructions are taken from the specification's table; only the loop
+//! counter's decrement is named.
 
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng as _, SeedableRng as _};
@@ -21,8 +21,8 @@ pub struct Options {
     pub bundles: u32,
     /// Contains branches, loops and calls; otherwise the period is a straight line.
     pub control: bool,
-    /// May contain what no sane program does: illegal words, jumps and addresses anywhere, unwritten registers, unbalanced calls. Such a
-    /// program may fault, or never wait.
+    /// May contain code that no sane program has: illegal words, jumps and addresses anywhere, unwritten registers, unbalanced calls.
+    /// Such a program may fault, or never wait.
     pub wild: bool,
     /// Prefers instructions with three sources: some machines have one among dozens.
     pub three: bool,
@@ -60,7 +60,7 @@ impl Random {
         (((self.bits() >> 32) * end as u64) >> 32) as u32
     }
 
-    /// Returns true once in `n` times.
+    /// Returns true with a probability of 1 in `n`.
     pub fn once_in(&mut self, n: u32) -> bool {
         self.below(n) == 0
     }
@@ -98,8 +98,8 @@ impl Random {
         }
     }
 
-    /// Operand with few ones or few zeros, and an exponent from a range of 3 or of 61: sums of two such operands tie, cancel, or are decided
-    /// by bits far below their last place.
+    /// Operand with few ones or few zeros, and an exponent from a range of 3 or of 61: sums of two such operands tie, cancel, or are
+    /// decided by bits far below their last place.
     pub fn addend(&mut self) -> u32 {
         let (bits, place, other) = (self.bits() as u32, self.below(23), self.below(23));
         let fraction = match self.below(4) {
@@ -122,10 +122,10 @@ const OWN_DATA: u32 = 64;
 pub const INPUTS: usize = 4;
 /// Registers at the start of the first slot's bank that hold word addresses and are never written.
 const BASES: usize = 4;
-/// Registers after these that hold iterations of loops and are never written.
+/// Registers after the bases that hold iteration counts of loops and are never written.
 const COUNTS: usize = 4;
 
-/// Chains of calls: least bundles of a program with a chain, number of programs per chain, most bundles of each subroutine.
+/// Chains of calls: minimum bundles of a program with a chain, average number of programs per chain, maximum bundles of each subroutine.
 const LONG: u32 = 20;
 const CHAINS: u32 = 6;
 const LEVEL: u32 = 4;
@@ -337,7 +337,7 @@ impl Generator {
         }
     }
 
-    /// Draws the length of a chain of calls, if there is to be one: often as deep as the return stack, in a wild program beyond.
+    /// Draws the length of a chain of calls; `None` for no chain. Many chains are as deep as the return stack, in wild programs deeper.
     fn deep(&mut self) -> Option<u32> {
         let Options { bundles, control, wild, .. } = self.options;
         if !self.options.directed || !control || bundles < LONG || !self.random.once_in(CHAINS) {
@@ -417,7 +417,7 @@ impl Generator {
         self.bundles.push(bundle);
     }
 
-    /// Draws the iterations of a loop, at most `most`, and fewer inside of loops with many.
+    /// Draws the iterations of a loop: at most `most`, fewer if the loops around it have many.
     fn rounds(&mut self, most: u32) -> u32 {
         let left = (TURNS / self.around.turns.max(1)).clamp(1, most);
         1 + self.random.below(left)
@@ -639,7 +639,7 @@ impl Generator {
         }
     }
 
-    /// Breaks a loop: changes its end, its count's register, or puts an operation that redirects at its end.
+    /// Breaks a loop: changes its end or its count's register, or places an operation that redirects at its end.
     fn unloop(&mut self, target: u32) {
         if self.loops.is_empty() {
             return;
@@ -744,7 +744,7 @@ fn is_large(machine: &Machine) -> bool {
     machine.data_depth > 1024
 }
 
-/// Word of an instruction. Instructions made here fit; one that does not would be unwritten memory, and fault.
+/// Encodes an instruction. Generated instructions fit; any other would become 0, the word of unwritten memory, which faults.
 fn word(instruction: &Instruction) -> u64 {
     instruction.encode().unwrap_or(0)
 }

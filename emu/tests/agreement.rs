@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Blocks, compiled or not, and stepper do the same: random programs, run both ways in the same chunks, agree in all that can be seen.
+//! Compiled blocks, interpreted blocks and the stepper agree in all observable state: random programs run in both modes, in the same
+//! chunks.
 
 use crate::common::machines;
 use std::num::NonZeroU64;
@@ -8,13 +9,13 @@ use takt_emu::{Emulator, Event, Fault, PeriodError, PeriodReport, Status, Stop};
 use takt_isa::timing::Cause;
 use takt_isa::{BundleAddress, Effect, MACHINES, Program, ROWS, Register, Row};
 
-/// Programs of each kind and machine.
+/// Number of programs of each kind for each machine.
 const PROGRAMS: u64 = 1500;
 
-/// Of so many programs one is compiled: the compiler takes longer than all else here.
+/// One in this many programs is compiled: compilation takes longer than everything else here.
 const COMPILED: u32 = 5;
 
-/// Everything that can be seen from outside must be equal.
+/// Asserts that all externally observable state is equal.
 fn assert_same(seed: u64, fast: &mut Emulator, step: &mut Emulator) {
     let now = step.now();
     let context = |what: &str| format!("seed {seed}: {what} in cycle {now}");
@@ -53,7 +54,7 @@ fn assert_same(seed: u64, fast: &mut Emulator, step: &mut Emulator) {
     assert_eq!(fast.take_port_writes(), step.take_port_writes(), "{}", context("watched ports"));
 }
 
-/// The two emulators of a program, with random inputs. One input in some programs stays unset.
+/// Two emulators of a program, with equal random inputs. In some wild programs an input stays unset.
 fn pair(program: &Program, random: &mut Random, wild: bool) -> [Emulator; 2] {
     let mut fast = Emulator::new(program).unwrap();
     for input in input_ports(program.machine) {
@@ -61,10 +62,10 @@ fn pair(program: &Program, random: &mut Random, wild: bool) -> [Emulator; 2] {
             fast.set_input_bits(input, random.word()).unwrap();
         }
     }
-    // Some output ports are watched.
+    // Watch about half of the output ports.
     let outputs = program.outputs.iter().map(|port| port.register);
     fast.set_watched(outputs.filter(|_| random.once_in(2)).collect::<Vec<_>>());
-    // Some are compiled, where that can be, at once or when they have run.
+    // Compile some programs, if the host can, at once or after a few runs.
     let compiled = random.once_in(COMPILED).then(|| u64::from(random.below(3)));
     fast.set_compile_after(compiled);
     let mut step = fast.clone();
@@ -72,12 +73,12 @@ fn pair(program: &Program, random: &mut Random, wild: bool) -> [Emulator; 2] {
     [fast, step]
 }
 
-/// Of the programs every third has latched ports.
+/// Gives every third program latched ports.
 fn latched(seed: u64, program: Program) -> Program {
     Program { latched: seed % 3 == 2, ..program }
 }
 
-/// Runs both in random chunks, with ticks at random times.
+/// Runs both emulators in random chunks, with ticks at random times.
 fn compare_runs(seed: u64, program: &Program, wild: bool) -> Result<Stop, Fault> {
     let mut random = Random::new(!seed);
     let [mut fast, mut step] = pair(program, &mut random, wild);
@@ -164,7 +165,7 @@ fn wild_programs_agree() {
             *kinds.entry(outcome).or_insert(0) += 1;
         }
     }
-    // Every kind of fault must have come up, and not once only.
+    // Every kind of fault must have occurred several times.
     for kind in [
         "halt",
         "IllegalWord",
@@ -183,7 +184,7 @@ fn wild_programs_agree() {
     }
 }
 
-/// A run pauses wherever a bundle that it is to pause at is about to issue, and nowhere else.
+/// A run pauses wherever a bundle with a breakpoint is about to issue, and nowhere else.
 #[test]
 fn pauses_are_complete() {
     let mut paused = 0;
@@ -219,7 +220,7 @@ fn pauses_are_complete() {
     assert!(paused > 1000, "{paused}");
 }
 
-/// Programs of any words at all: mostly instructions with any fields, in any slot.
+/// Programs of arbitrary words: mostly instructions with random fields, in any slot.
 #[test]
 fn any_words_agree() {
     for machine in MACHINES {
@@ -232,7 +233,7 @@ fn any_words_agree() {
             program.data.truncate(random.below(machine.data_depth) as usize);
             for word in &mut program.code {
                 let row = &ROWS[random.below(ROWS.len() as u32) as usize];
-                // Targets and destinations that exist, now and then.
+                // Make some targets and destinations valid.
                 let bits = random.bits()
                     & if random.once_in(2) { !0 } else { !0xffc0 }
                     & if random.once_in(4) { !0 } else { !(0x100 << 32) };
@@ -242,13 +243,13 @@ fn any_words_agree() {
                     _ => *word = bits & row.shape.mask() & !(0x7f << 41) | u64::from(row.opcode) << 41,
                 }
             }
-            // They fault soon; that they do not panic, and fault alike, is the point.
+            // Most programs fault soon; the modes must fault alike, without a panic.
             let _ = compare_runs(seed, &program, true);
         }
     }
 }
 
-/// Period after period, with inputs that change and deadlines that are missed.
+/// Successive periods, with changing inputs and missed deadlines.
 #[test]
 fn periods_agree() {
     for machine in MACHINES {
@@ -278,7 +279,7 @@ fn periods_agree() {
     }
 }
 
-/// With an observer nothing changes, and what it hears adds up.
+/// An observer does not change the run, and its events are consistent with the statistics.
 #[test]
 fn observed_runs_agree() {
     for machine in MACHINES {
@@ -342,8 +343,7 @@ fn cycle(event: &Event) -> u64 {
     }
 }
 
-/// The generator is worth its name: every instruction runs, and every cause of a stall comes up on every machine that can
-/// have it.
+/// Random programs cover every instruction, and on every machine every cause of stalls that it can have.
 #[test]
 fn random_programs_cover_the_machine() {
     for machine in MACHINES {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A batch does in each lane what an emulator of its own would do: random programs, random inputs, everything compared.
+//! Each lane of a batch behaves like an emulator of its own: random programs and inputs, with all state compared.
 
 use crate::common::{assert_lane, machines};
 use std::num::NonZeroU64;
@@ -8,17 +8,17 @@ use takt_emu::{Batch, Emulator};
 use takt_isa::fp::Flags;
 use takt_isa::{MACHINES, Program};
 
-/// Programs of each kind and machine.
+/// Number of programs of each kind for each machine.
 const PROGRAMS: u64 = 120;
 const PERIODS: u32 = 8;
 
-/// The events that were met in a run.
+/// Counts of the events in the compared runs.
 #[derive(Default)]
 struct EventCounts {
-    /// Periods of lanes, and those of them that were run apart.
+    /// Periods, summed over lanes; `apart` counts those that a lane ran outside of the group.
     periods: u64,
     apart: u64,
-    /// Lanes that ran together again after they had been apart.
+    /// Lanes that rejoined the group after running apart.
     joined: u64,
     faults: u64,
     nan_writes: u64,
@@ -29,7 +29,7 @@ struct EventCounts {
 /// Runs a program with random inputs in a batch and in an emulator for each lane.
 fn compare(seed: u64, program: &Program, met: &mut EventCounts) {
     let mut random = Random::new(!seed);
-    // A group that is full and one that is not.
+    // One full group and one partial group.
     let lanes = Batch::WIDTH + 1 + random.below(4) as usize;
     let mut batch = Batch::new(program, lanes).unwrap();
     let mut singles: Vec<Emulator> = (0..lanes).map(|_| Emulator::new(program).unwrap()).collect();
@@ -40,10 +40,10 @@ fn compare(seed: u64, program: &Program, met: &mut EventCounts) {
     }
     let limit = u64::from(200 + random.below(3000));
     batch.set_period_limit(limit);
-    // In some, a limit of all cycles, too.
+    // Also limit the total number of cycles in some runs.
     let most = if random.once_in(3) { u64::from(500 + random.below(5000)) } else { u64::MAX };
     batch.set_cycle_limit(most);
-    // The number of lanes that differ in an input.
+    // An input differs in one lane of `rarity`, on average.
     let rarity = 1 + random.below(2 * lanes as u32);
     let mut was_apart = 0;
     for period in 0..PERIODS {
@@ -89,7 +89,7 @@ fn compare_all(options: Options) -> EventCounts {
             compare(seed, &Program { latched: seed % 3 == 2, ..program }, &mut met);
         }
     }
-    // Otherwise the comparison says nothing.
+    // The comparison is meaningful only if lanes run both together and apart.
     let together = met.periods - met.apart;
     assert!(met.apart > met.periods / 50 && together > met.periods / 20, "{} of {}", met.apart, met.periods);
     let EventCounts { joined, nan_writes, flags, .. } = met;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Compiled blocks do what the stepper does: every operation, with the operands that make arithmetic special, and programs
-//! whose values stay numbers long enough for the code to be used. (`agreement.rs` has everything else.)
+//! Compiled blocks agree with the stepper: every operation, with the operands that are special cases of arithmetic, and programs whose
+//! values stay finite long enough for compiled code to be used. (`agreement.rs` covers everything else.)
 //!
-//! Without the feature `jit` the same programs run, and agree, uncompiled.
+//! Without the feature `jit`, the same programs run uncompiled.
 
 use crate::common::{assert_lane, machines, program};
 use std::fmt::Write as _;
@@ -10,11 +10,11 @@ use takt_emu::testing::{Options, Random, input_ports, random_program};
 use takt_emu::{Batch, CompiledRuns, Emulator};
 use takt_isa::{Effect, MACHINES, Machine, ROWS, Register};
 
-/// Operands of each kind for each operation.
+/// Number of periods with operands of each kind, for each operation.
 const PERIODS: u32 = 1500;
 const PROGRAMS: u64 = 150;
 
-/// A word that is nearly always an ordinary number.
+/// Random word that is nearly always an ordinary number.
 fn tame(random: &mut Random) -> u32 {
     match random.below(40) {
         0 => random.word(),
@@ -26,7 +26,7 @@ fn tame(random: &mut Random) -> u32 {
     }
 }
 
-/// An ordinary number.
+/// Random ordinary number: positive, with a moderate exponent.
 fn calm(random: &mut Random) -> u32 {
     (120 + random.below(14)) << 23 | random.bits() as u32 & 0x007f_ffff
 }
@@ -45,7 +45,7 @@ fn assert_same(context: &str, fast: &mut Emulator, step: &mut Emulator) {
     assert_eq!(fast.take_port_writes(), step.take_port_writes(), "{context}: watched ports");
 }
 
-/// Runs a program period by period, compiled from the first and by the stepper, with inputs drawn by `draw`.
+/// Runs a program period by period, compiled from the first period on and with the stepper, with inputs drawn by `draw`.
 fn compare(
     context: &str,
     program: &takt_isa::Program,
@@ -76,11 +76,11 @@ fn compare(
     fast.compiled_runs()
 }
 
-/// Runs a program period by period in the lanes of a batch, compiled from the first, and each in an interpreter of its own. In
-/// half of the periods no lane has inputs that are out of the ordinary.
+/// Runs a program period by period in the lanes of a batch, compiled from the first period on, and in an interpreter for each lane. In
+/// about half of the periods all inputs of all lanes are ordinary numbers.
 fn compare_lanes(context: &str, program: &takt_isa::Program, seed: u64, periods: u32) -> CompiledRuns {
     let mut random = Random::new(seed);
-    // A group that is full and one that is not.
+    // One full group and one partial group.
     let mut batch = Batch::new(program, Batch::WIDTH + 3).unwrap();
     batch.set_compile_after(Some(0));
     let mut singles: Vec<Emulator> = (0..batch.lanes()).map(|_| Emulator::new(program).unwrap()).collect();
@@ -110,7 +110,7 @@ fn compare_lanes(context: &str, program: &takt_isa::Program, seed: u64, periods:
     batch.compiled_runs()
 }
 
-/// Every operation that computes, each of its results also in a sum, whose code then looks at that alone.
+/// Every computing operation, once on the inputs and once on its own result.
 #[test]
 fn every_operation_agrees() {
     for row in ROWS.iter().filter(|row| row.effect == Effect::Compute) {
@@ -128,7 +128,7 @@ fn every_operation_agrees() {
             source.insert_str(0, &format!(".input in{i} {input} bits\n"));
         }
         writeln!(source, "{} {result}, {sources}", row.mnemonic).unwrap();
-        // Its own result as every operand.
+        // The result as every operand.
         let own = vec![result.as_str(); row.shape.sources()].join(", ");
         writeln!(source, "{} {chained}, {own}", row.mnemonic).unwrap();
         writeln!(source, "wait 1").unwrap();
@@ -146,7 +146,7 @@ fn every_operation_agrees() {
     }
 }
 
-/// Random programs of every kind whose constants are numbers, so that their blocks' code is used.
+/// Random programs of every kind whose constants are ordinary numbers, so that the compiled code is used.
 #[test]
 fn programs_of_numbers_agree() {
     let mut all = [CompiledRuns::default(); 2];
@@ -156,7 +156,7 @@ fn programs_of_numbers_agree() {
             let mut program = random_program(seed, machine, options);
             program.latched = seed % 3 == 2;
             let mut random = Random::new(!seed);
-            // The addresses of loads and stores stay.
+            // Keep the addresses of loads and stores.
             let least = if machine.data_depth > 1024 { machine.data_depth } else { 600 };
             for (_, bits) in
                 program.constants.iter_mut().filter(|(_, bits)| bits.cast_signed().unsigned_abs() > least)

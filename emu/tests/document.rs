@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The examples in `docs/timing.md` are what the emulator does. `TAKT_BLESS=1 cargo test -p takt-emu --test suite document::`
-//! rewrites them.
+//! The emulator reproduces the examples in `docs/timing.md`. `TAKT_BLESS=1 cargo test -p takt-emu --test suite document::` rewrites them.
 
 use crate::common::{input, program};
 use std::fmt::Write as _;
@@ -118,7 +117,7 @@ fn bundle_text(program: &Program, address: BundleAddress) -> String {
     if texts.is_empty() { "nop".to_owned() } else { texts.join(" || ") }
 }
 
-/// The example's program, then its cycles, as the document shows them.
+/// Renders an example as in the document: its program, then its cycles.
 fn render(example: &Example) -> String {
     let program = program(example.machine, example.source);
     let mut emulator = Emulator::new(&program).unwrap();
@@ -149,7 +148,7 @@ fn render(example: &Example) -> String {
                 _ => {}
             })
             .step_cycle();
-        // The end of the example's program.
+        // The example ends with a halt or a fault.
         let Ok(step) = result else { break };
         let (cycle, what) = match step {
             Step::Issued { cycle, address } => {
@@ -177,7 +176,7 @@ fn documented_examples_equal_the_emulators_timing() {
         expected.push_str(before);
         expected.push_str(&marker);
         expected.push_str(&render(example));
-        // The old table, if there is one, ends with the fence.
+        // An old table, if any, ends with the fence.
         rest = match after.strip_prefix("```text\n").and_then(|table| table.split_once("```\n")) {
             Some((_, rest)) => rest,
             None => after,

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Every fault: where the machine stops, what it says, and that nothing of the faulting bundle has happened.
+//! Every fault: its address, its message, and that the faulting bundle has had no effect.
 
 use crate::common::{at, input, latency, program};
 use takt_emu::{Emulator, Event, Fault, FaultKind, LoadError, Status, Step, Stop};
 use takt_isa::{F1, F3, Function, Program, Register, SlotIndex, T3};
 
-/// Runs as blocks and by the stepper, which must agree, and returns the fault.
+/// Runs a program as blocks and with the stepper, checks that both agree, and returns the fault.
 fn fault(program: &Program) -> (Fault, Emulator) {
     let mut blocks = Emulator::new(program).unwrap();
     let mut stepper = blocks.clone();
@@ -15,7 +15,7 @@ fn fault(program: &Program) -> (Fault, Emulator) {
     assert_eq!(blocks.now(), stepper.now());
     assert_eq!(blocks.statistics(), stepper.statistics());
     assert_eq!(*blocks.status(), Status::Faulted(fault.clone()));
-    // It stays so.
+    // Further steps return the same fault.
     assert_eq!(blocks.step_cycle(), Err(fault.clone()));
     (fault, blocks)
 }
@@ -23,7 +23,7 @@ fn fault(program: &Program) -> (Fault, Emulator) {
 #[test]
 fn faults_name_place_and_cause() {
     let refill = u64::from(F3.refill);
-    // Source; cycle of the fault from the first issue; what it says after "test.s:line".
+    // Source; cycle of the fault from the first issue; message after `test.s:line`.
     let cases: &[(&str, u64, &str)] = &[
         ("nop\nmov x0, x1", 1, ":2: bundle 1, slot aux, cycle {}: reads x1, which was never written"),
         (
@@ -54,7 +54,7 @@ fn faults_name_place_and_cause() {
         ),
         ("jmp 65535", 1 + refill, "bundle 65535, cycle {}: execution left the program, which has 1 bundle"),
         ("nop", 1, "bundle 1, cycle {}: execution left the program, which has 1 bundle"),
-        // The operand's wait comes first: the address is known only then.
+        // The stall for the operand comes first, since the address depends on the operand.
         (
             ".preset a0 5000\nmov x0, a0\nld x1, 0[x0]",
             latency(&F3, Function::Alu),
@@ -72,7 +72,7 @@ fn faults_name_place_and_cause() {
     }
 }
 
-/// A loop counts from 1 to 65,535, both included.
+/// Counts from 1 to 65,535 are allowed.
 #[test]
 fn loops_keep_their_promised_counts() {
     for (count, may) in [(-1, false), (0, false), (1, true), (65_535, true), (65_536, false)] {
@@ -116,7 +116,7 @@ fn illegal_words_fault_where_they_are_reached() {
         assert_eq!((fault.cycle, fault.address, fault.slot), (13, at(2), SlotIndex::new(word % 3)));
         program.code[word] = old;
     }
-    // One that is not reached does no harm.
+    // An illegal word that is not reached does no harm.
     program.code[3] = 0;
     program.code[11] = 0;
     let (fault, _) = fault(&program);
@@ -125,7 +125,7 @@ fn illegal_words_fault_where_they_are_reached() {
 
 #[test]
 fn a_faulting_bundle_does_nothing() {
-    // The bundle stores, adds and faults; what issued before it still shows in its cycle.
+    // The bundle stores, adds and faults; results of earlier bundles still appear in their cycles.
     let source = ".preset m0 1.0
                   .preset x9 7
                   fmul m1, m0, m0 || mov x0, x9
@@ -142,11 +142,11 @@ fn a_faulting_bundle_does_nothing() {
     assert_eq!(in_flight, [0, 2, 2].map(at));
 }
 
-/// A block that ran ahead is undone: registers, memory, flags, NaNs that went out.
+/// A fault undoes the block's effects so far: registers, memory, flags, NaNs written to ports.
 #[test]
 fn fault_in_a_block_undoes_later_operations() {
-    // The block counts in memory, then divides by i1 and loads from i0: run twice, it would count twice; and when the
-    // load faults, the flag of the division is still in flight.
+    // The block increments a word in memory, then divides by i1 and loads from i0. If it ran twice, it would increment twice; when the
+    // load faults, the division's flag is still in flight.
     let source = ".output F x224
                   .preset x0 1
                   .preset m0 1.0
@@ -182,7 +182,7 @@ fn fault_in_a_block_undoes_later_operations() {
     assert_eq!(blocks.in_flight().count(), stepper.in_flight().count());
 }
 
-/// As above for a result that was in flight when the block began, and would have been written before the block's end.
+/// Likewise for a result in flight at the block's entry with its writeback before the block's end.
 #[test]
 fn a_fault_in_a_block_undoes_results_of_earlier_blocks() {
     let source = ".preset m0 1.0
@@ -223,7 +223,7 @@ fn the_cycle_limit_is_exact_and_the_hosts() {
             let statistics = blocks.statistics();
             assert_eq!(statistics, stepper.statistics());
             assert_eq!(statistics.cycles, statistics.bundles + statistics.stalled());
-            // It is the host that stopped it; with a higher limit it goes on.
+            // The limit is the host's, not a fault of the machine: with a higher limit, the run continues.
             blocks.set_cycle_limit(limit + 1);
             assert!(blocks.step_cycle().is_ok());
         }
@@ -282,12 +282,12 @@ fn programs_that_do_not_fit_are_refused() {
         Emulator::new(&on_t1).err().unwrap().to_string(),
         "constant for register address 600, which f1 does not have"
     );
-    // An empty program is one that is left at once.
+    // Execution leaves an empty program at once.
     let (fault, _) = fault(&program(&F3, ""));
     assert_eq!(fault.kind, FaultKind::ProgramCounter { bundles: 0 });
 }
 
-/// Tables that do not belong to the code must not matter: images come from anywhere.
+/// Tables that do not match the code must not cause a panic: images may come from anywhere.
 #[test]
 fn nonsense_in_a_program_does_not_panic() {
     let mut program = program(&F3, "ret");

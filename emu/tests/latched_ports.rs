@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Latched ports: what the host sets and sees, and when.
+//! Latched ports: when the program sees the host's inputs, and when the host sees the program's outputs.
 
 use crate::common::{latency, program};
 use std::num::NonZeroU64;
 use takt_emu::{Emulator, Number, Stop};
 use takt_isa::{F3, Function, Program};
 
-/// Reads its input early and late and writes both, once before the first period and in each.
+/// Program that reads its input early and late and writes both values, in `.once` and in each period.
 fn early_and_late() -> Program {
     let program = program(
         &F3,
@@ -33,7 +33,7 @@ fn outputs(emulator: &Emulator) -> [Option<i32>; 2] {
     })
 }
 
-/// With and without blocks.
+/// Runs a test with and without blocks.
 fn both(test: impl Fn(&mut Emulator)) {
     for blocks in [true, false] {
         let mut emulator = Emulator::new(&early_and_late()).unwrap();
@@ -47,12 +47,12 @@ fn inputs_are_taken_at_reset_and_at_the_tick() {
     both(|emulator| {
         emulator.set_input("x", 1.into()).unwrap();
         assert_eq!(outputs(emulator), [None, None]);
-        // The code that runs once sees what was set before it began, and nothing later.
+        // The code that runs once sees the inputs set before it began, and no later ones.
         emulator.run_until(1).unwrap();
         emulator.set_input("x", 2.into()).unwrap();
         let Stop::Wait { cycle: wait, .. } = emulator.run_to_wait().unwrap() else { panic!() };
         assert_eq!(outputs(emulator), [Some(1), Some(1)]);
-        // A period has what was set up to its tick, none of what is set within it.
+        // A period sees the inputs set before its tick, and none set during the period.
         let tick = wait + 20;
         assert!(emulator.tick_at(tick));
         emulator.run_until(tick).unwrap();
@@ -88,7 +88,7 @@ fn outputs_are_published_at_the_wait() {
     });
 }
 
-/// The tick that came too early takes its inputs in the cycle after the `wait` that ends the period before.
+/// After an early tick, the inputs are latched in the cycle after the `wait` that ends the previous period.
 #[test]
 fn a_remembered_tick_takes_inputs_after_the_wait() {
     both(|emulator| {
@@ -108,7 +108,7 @@ fn a_remembered_tick_takes_inputs_after_the_wait() {
     });
 }
 
-/// A debugger's period that is cut into pieces takes its inputs once.
+/// A period run in several pieces latches its inputs once.
 #[test]
 fn pieces_of_a_run_make_no_difference() {
     both(|emulator| {

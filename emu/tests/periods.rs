@@ -6,7 +6,7 @@ use std::num::NonZeroU64;
 use takt_emu::{Emulator, Event, Number, PeriodError, PortError, Stop};
 use takt_isa::{F1, F3, Function, Program, Register};
 
-/// F = x · x, three bundles a period: the product, a filler, the end.
+/// Program that squares its input in a period of three bundles: the product, a filler, the `wait`.
 fn square() -> Program {
     program(
         &F3,
@@ -39,7 +39,7 @@ fn a_period_runs_from_tick_to_wait() {
         assert_eq!(emulator.output("F"), Ok(Some(Number::Float(x * x))));
         assert_eq!(emulator.output("k"), Ok(Some(Number::Integer(i))));
     }
-    // The refill is hidden: no cycle of a period but the first's is charged to the front end.
+    // The refill is hidden: only the first period charges cycles to the front end.
     let statistics = emulator.statistics();
     assert_eq!(statistics.stalls()[0], u64::from(F3.refill));
     assert_eq!(statistics.ticks, 99);
@@ -58,7 +58,7 @@ fn ports_have_names_and_types() {
     assert!(emulator.set_input("n", Number::Bits(1)).is_ok());
     let m0 = F3.register_address("m0").unwrap();
     assert!(emulator.set_input_bits(m0, 1).is_err() && emulator.set_input_bits(Register::ZERO, 1).is_err());
-    // A wrong input leaves everything as it was.
+    // An invalid input leaves the state unchanged.
     let error = emulator.run_period(&[("x", 1.0.into()), ("z", 1.0.into())]).unwrap_err();
     assert_eq!(error, PeriodError::Port(unknown("z", "input")));
     assert_eq!((emulator.now(), emulator.register(input(&F3, 0))), (0, None));
@@ -80,7 +80,7 @@ fn regular_ticks_start_after_the_first_wait() {
     assert_eq!(emulator.run(), Ok(Stop::Idle));
 }
 
-/// Ticks that are set while the machine waits begin with the next multiple, the current cycle included.
+/// A tick period set while the machine waits takes effect at the next multiple, which may be the current cycle.
 #[test]
 fn regular_ticks_can_begin_while_the_machine_waits() {
     let mut emulator = Emulator::new(&square()).unwrap();
@@ -89,8 +89,8 @@ fn regular_ticks_can_begin_while_the_machine_waits() {
     assert_eq!(emulator.run_period(&[("x", 1.0.into()), ("n", 1.into())]).unwrap().tick, 100);
 }
 
-/// The tick comes every 8 cycles; a period needs more. Each one then starts late, with the tick that is remembered, and
-/// the others are lost.
+/// The tick comes every 8 cycles, but a period takes longer. Each period then starts late, with the remembered tick, and the other ticks
+/// are lost.
 #[test]
 fn missed_deadlines_are_remembered_once() {
     assert_eq!(F3.refill, 6, "the numbers below are worked out for this");
@@ -102,11 +102,11 @@ fn missed_deadlines_are_remembered_once() {
     assert_eq!((report.tick, report.start, report.wait, report.cycles), (8, 8, 22, 14));
     assert!(report.missed && report.lost == 0, "16 was too early and is remembered");
     let report = emulator.run_period(&[]).unwrap();
-    // 24 is remembered, 32 is lost.
+    // The tick in cycle 24 is remembered, the one in cycle 32 is lost.
     assert_eq!((report.tick, report.start, report.wait, report.cycles), (16, 22, 38, 16));
     assert_eq!((report.missed, report.lost), (true, 1));
     let report = emulator.run_period(&[]).unwrap();
-    // 40 is remembered, 48 is lost.
+    // The tick in cycle 40 is remembered, the one in cycle 48 is lost.
     assert_eq!((report.tick, report.start, report.wait), (24, 38, 54));
     let statistics = emulator.statistics();
     assert_eq!((statistics.ticks, statistics.missed, statistics.lost), (6, 3, 2));
@@ -204,7 +204,7 @@ fn nans_on_ports_are_reported() {
     }
 }
 
-/// A period that somebody has stepped into is run to its end; one in a machine that halts has none.
+/// `run_period` completes a period that was begun by single steps; after a halt it returns an error.
 #[test]
 fn periods_can_be_stepped_into() {
     let mut emulator = Emulator::new(&square()).unwrap();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A machine placed where another one stands between two periods goes on as that one does.
+//! A machine restored to the state of another one between two periods continues like the original.
 
 use std::collections::BTreeMap;
 use takt_emu::testing::{Options, Random, input_ports, random_program};
@@ -19,7 +19,7 @@ fn saved(emulator: &Emulator, at: Position) -> MachineState {
     }
 }
 
-/// Registers, memory, flags, outputs.
+/// Registers, memory, flags and outputs of a machine.
 type MachineSnapshot = (BTreeMap<Register, u32>, Vec<u32>, u8, Vec<Option<u32>>);
 
 fn seen(emulator: &Emulator) -> MachineSnapshot {
@@ -61,7 +61,7 @@ fn restored_emulator_continues_like_the_original() {
             }
             let Status::Waiting { address, .. } = *original.status() else { break };
             assert!(original.stack().is_empty());
-            // The host has set the next inputs before it looked.
+            // The host sets the next inputs before the state is saved.
             inputs = input_ports(machine).map(|port| (port, random.word())).collect();
             let mut moved = saved(&original, Position::Wait(address));
             moved.registers.extend(inputs.iter().copied());

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A run cut into slices at any cycle is the same run, and `upcoming` tells the truth: debuggers and traces rest on it.
+//! Slicing a run at arbitrary cycles does not change it, and `upcoming` predicts correctly: debuggers and traces rely on both.
 
 use takt_emu::testing::{Options, Random, input_ports, random_program};
 use takt_emu::{Emulator, PeriodError, Step};
@@ -22,13 +22,13 @@ fn periods_in_slices() {
             let (mut whole, mut sliced) = (loaded(&program, seed), loaded(&program, seed));
             let mut random = Random::new(seed);
             for _ in 0..4 {
-                // Some halt; they do so together.
+                // Some programs halt; both emulators must then halt together.
                 let Ok(report) = whole.run_period(&[]) else {
                     assert_eq!(sliced.run_period_until(u64::MAX), Err(PeriodError::Halted));
                     break;
                 };
                 let again = loop {
-                    // Looking must not change what happens.
+                    // A prediction must not change the run.
                     if random.once_in(3) {
                         sliced.upcoming();
                     } else if random.once_in(5) {
@@ -85,7 +85,7 @@ fn predicted_issue_equals_the_next_issue() {
     assert!(issued > 300 && stalled > 1000, "{issued} {stalled}");
 }
 
-/// A value that is set is read by the bundle that issues next, even if a result arrives in the same cycle.
+/// The bundle that issues next reads the value that was set, even if a result is written back in the same cycle.
 #[test]
 fn set_values_are_read_back() {
     let mut found = 0;

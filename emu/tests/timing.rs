@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The rules of `docs/timing.md`, each on a program of a few bundles, with the cycles worked out by hand. Latencies,
-//! intervals and refills are the table's, by unit; all other numbers are the rules'.
+//! Rules of `docs/timing.md`, each on a program of a few bundles, with the cycles worked out by hand. Latencies, intervals and refills
+//! are taken from the machine's table, by unit; all other numbers follow from the rules.
 //!
-//! Every program is run both ways, as blocks and by the stepper.
+//! Every program is run in both modes, as blocks and with the stepper.
 
 use crate::common;
 use crate::common::{at, latency, program, unit};
@@ -16,11 +16,11 @@ use takt_isa::{
     Register, Slot, T3,
 };
 
-/// Stalled cycles by the bundle that could not issue, and why.
+/// Stalled cycles, by the bundle that could not issue and the cause.
 type Stalls = BTreeMap<(BundleAddress, Cause), u64>;
 
-/// Runs a program to its end; returns cycles of issue, counted from the first bundle's, by bundle in the order of issue, and
-/// the stalls without those before it.
+/// Runs a program to its end. Returns each issued bundle with its cycle, counted from the first issue, and the stalls after the first
+/// issue.
 fn run(program: &Program) -> (Vec<(BundleAddress, u64)>, Stalls) {
     let reset = u64::from(program.machine.refill);
     let mut stepper = Emulator::new(program).unwrap();
@@ -42,7 +42,7 @@ fn run(program: &Program) -> (Vec<(BundleAddress, u64)>, Stalls) {
     (issues, causes)
 }
 
-/// Checks the cycles of issue (from the first bundle's) of the bundles in order, and all stalls.
+/// Checks the cycles of issue, counted from the first, of the bundles in order, and all stalls.
 #[track_caller]
 fn check(machine: &'static Machine, source: &str, cycles: &[u64], stalls: &[((BundleAddress, Cause), u64)]) {
     let (issues, causes) = run(&program(machine, source));
@@ -93,7 +93,7 @@ fn operand_distance_is_the_latency_of_every_unit() {
     }
 }
 
-/// Without a reason to wait, one bundle issues each cycle.
+/// Without a hazard, one bundle issues each cycle.
 #[test]
 fn independent_bundles_issue_back_to_back() {
     check(
@@ -108,7 +108,7 @@ fn independent_bundles_issue_back_to_back() {
     );
 }
 
-/// Rule 2: the charge goes to the producer whose result comes last; results on different banks alike.
+/// Rule 2: the stall is charged to the producer whose result comes last, in whatever bank.
 #[test]
 fn the_last_operand_is_charged() {
     let (multiply, add) = (latency(&F3, Function::Multiply), latency(&F3, Function::Add));
@@ -129,13 +129,13 @@ fn the_last_operand_is_charged() {
     );
 }
 
-/// If two come last, the first operand of the first slot is charged.
+/// If two results come last together, the first operand of the first slot is charged.
 #[test]
 fn ties_are_charged_in_operand_order() {
     let (multiply, add) = (latency(&F3, Function::Multiply), latency(&F3, Function::Add));
     let (first, second) = if multiply < add { (0, add - multiply) } else { (multiply - add, 0) };
     for (operands, name, producer) in [("m1, a1", "m1", second), ("a1, m1", "a1", first)] {
-        // Issued so far apart that both come in the same cycle.
+        // Issue the producers so far apart that both results come in the same cycle.
         let mut bundles = vec!["nop".to_owned(); 1 + first.max(second) as usize];
         let place = |bundles: &mut Vec<String>, at: u64, text: &str| {
             let bundle = &mut bundles[at as usize];
@@ -151,7 +151,7 @@ fn ties_are_charged_in_operand_order() {
     }
 }
 
-/// A bundle issues as a whole, and those after it wait with it.
+/// A bundle issues as a whole, and later bundles wait for it.
 #[test]
 fn issue_is_in_order_and_whole() {
     let multiply = latency(&F3, Function::Multiply);
@@ -168,7 +168,7 @@ fn issue_is_in_order_and_whole() {
     );
 }
 
-/// Rule 3: a register is not written again before the earlier result is there.
+/// Rule 3: a register is not written again before the earlier result is written back.
 #[test]
 fn destination_waits_for_the_earlier_result() {
     for (machine, source, register_name) in [
@@ -181,7 +181,7 @@ fn destination_waits_for_the_earlier_result() {
     }
 }
 
-/// Rule 4: an iterative unit accepts an operation every interval; another unit of the slot does not mind.
+/// Rule 4: an iterative unit accepts an operation once per interval; other units of the slot are unaffected.
 #[test]
 fn unit_accepts_one_operation_every_interval() {
     let (_, interval) = unit(&F1, Function::Divide);
@@ -199,25 +199,25 @@ fn unit_accepts_one_operation_every_interval() {
         &[0, 1, interval, interval + 1],
         &[((at(2), cause), interval - 2)],
     );
-    // A root takes the same unit.
+    // A square root uses the same unit.
     check(
         &F1,
         ".preset r0 2.0\nfdiv r1, r0, r0\nfsqrt r2, r0\nnop",
         &[0, interval, interval + 1],
         &[((at(1), cause), interval - 1)],
     );
-    // Fully pipelined on f3.
+    // On f3 the divider is fully pipelined.
     check(&F3, ".preset m0 2.0\nfdiv x1, m0, m0\nfdiv x2, m0, m0\nnop", &[0, 1, 2], &[]);
 }
 
-/// Rule 6: two results of a bank never reach its write port in one cycle; the later bundle tries cycle by cycle.
+/// Rule 6: two results never reach a bank's write port in the same cycle; the later bundle stalls until the port is free.
 #[test]
 fn write_port_takes_one_result_a_cycle() {
     let [add, divide, sine] =
         [Function::Add, Function::Divide, Function::Sine].map(|function| latency(&F1, function));
-    // The sine comes one cycle after the quotient.
+    // The sine is written back one cycle after the quotient.
     let sine_at = divide + 1 - sine;
-    // The sum, issued in `at`, would come with the quotient; one later with the sine; one later it comes alone.
+    // A sum issued in `at` would be written back with the quotient, a cycle later with the sine, and two cycles later alone.
     let at = divide - add;
     let nops = |count: u64| "nop\n".repeat(count as usize);
     let source = format!(
@@ -228,14 +228,14 @@ fn write_port_takes_one_result_a_cycle() {
     let cycles: Vec<u64> = (0..at).chain([at + 2, at + 3]).collect();
     let (slot, _) = F1.host(Function::Add).unwrap();
     check(&F1, &source, &cycles, &[((common::at(at), Cause::WritePort { slot }), 2)]);
-    // Banks have a port each.
+    // Each bank has its own write port.
     let at = latency(&F3, Function::Divide) - latency(&F3, Function::Add);
     let nops = "nop\n".repeat(at as usize - 1);
     let source = format!(".preset m0 2.0\nfdiv x1, m0, m0\n{nops}fadd a1, m0, m0\nnop");
     check(&F3, &source, &(0..at + 2).collect::<Vec<_>>(), &[]);
 }
 
-/// The order of the rules: a cycle is charged to the first that is not met.
+/// Order of the rules: a stalled cycle is charged to the first rule that is not met.
 #[test]
 fn cycles_are_charged_in_the_order_of_the_rules() {
     let (add, (divide, interval)) = (latency(&F1, Function::Add), unit(&F1, Function::Divide));
@@ -265,7 +265,7 @@ fn cycles_are_charged_in_the_order_of_the_rules() {
         &[0, 1, interval, interval + 1],
         &[((at(2), destination), add - 1), ((at(2), busy), interval - (1 + add))],
     );
-    // Operand before destination; the operand's wait covers that for the same register.
+    // Operand before destination: the stall for the operand covers the stall for the same register as destination.
     let operand = Cause::Operand { register: register(&F1, "r1"), producer: at(0) };
     check(
         &F1,
@@ -278,11 +278,11 @@ fn cycles_are_charged_in_the_order_of_the_rules() {
     );
 }
 
-/// Rule 5: what drains waits for the last result; no write port is in its way then.
+/// Rule 5: a draining operation waits for the last result; then no write port is busy.
 #[test]
 fn drain_waits_for_every_result() {
     let (divide, alu) = (latency(&F1, Function::Divide), latency(&F1, Function::Alu));
-    // Were it not for the drain, the flags would meet the quotient at the write port.
+    // Without the drain, the flags and the quotient would reach the write port together.
     let at = divide - alu;
     let nops = "nop\n".repeat(at as usize - 1);
     let source = format!(".preset r0 2.0\nfdiv r1, r0, r0\n{nops}rdflags r2\nnop");
@@ -294,11 +294,11 @@ fn drain_waits_for_every_result() {
         let cycles: Vec<u64> = [0, divide].into_iter().chain(next).collect();
         check(&F3, &source, &cycles, &[((common::at(1), Cause::Drain), divide - 1)]);
     }
-    // Operations that issue together with it are not waited for.
+    // A draining operation does not wait for operations of its own bundle.
     check(&F3, ".preset m0 2.0\nfmul m1, m0, m0 || halt", &[0], &[]);
 }
 
-/// A jump costs the refill.
+/// A jump costs the refill time.
 #[test]
 fn a_jump_refills() {
     for machine in MACHINES {
@@ -357,7 +357,7 @@ fn branches_are_taken_by_all_32_bits() {
     }
 }
 
-/// A branch to the very next bundle is taken or not like any other.
+/// A branch to the next bundle costs as much as any other branch.
 #[test]
 fn a_branch_to_the_next_bundle_refills() {
     for (input, cost) in [(0, F3.refill), (1, F3.resolve)] {
@@ -406,7 +406,7 @@ fn a_bundle_reads_before_it_writes() {
     }
 }
 
-/// So it is with the flags, where two slots work on them: they are read, then cleared.
+/// The same for flags in two slots: they are read, then cleared.
 #[test]
 fn flags_are_read_before_they_are_cleared() {
     let source = ".preset x1 1.0
@@ -428,7 +428,7 @@ fn flags_are_read_before_they_are_cleared() {
     }
 }
 
-/// A result shows, and its flags join, in the cycle of its writeback and not before.
+/// A result becomes visible, and its flags are set, in the cycle of its writeback and not before.
 #[test]
 fn results_show_at_writeback() {
     let source = ".preset m0 1.0\nfdiv x1, m0, zero\nfmul m2, m0, m0\nhalt";
@@ -448,8 +448,7 @@ fn results_show_at_writeback() {
     }
 }
 
-/// A bundle that halts still writes what its other slots computed: registers, ports and flags, each in its cycle, in both ways of
-/// execution.
+/// A bundle that halts still writes the results of its other slots: registers, ports and flags, each in its cycle, in both modes.
 #[test]
 fn a_bundle_that_halts_writes_its_results() {
     let source = ".preset m0 3.0
@@ -475,18 +474,18 @@ fn a_bundle_that_halts_writes_its_results() {
     };
     emulator.observed(&mut sink).run().unwrap();
     let mut wanted = vec![(halt + multiply, 9_f32.to_bits()), (halt + add, 6_f32.to_bits())];
-    // Of one cycle, in the order of slots.
+    // Within a cycle, results are in slot order.
     wanted.sort_by_key(|result| result.0);
     assert_eq!(retired, wanted);
     assert_eq!(ports, [(halt + add, 6_f32.to_bits())]);
-    // The flags of a result that comes after the halt join, too.
+    // Flags of a result written back after the halt are set, too.
     let mut emulator =
         Emulator::new(&program(&F3, ".preset m0 300000000000000000000.0\nfmul m1, m0, m0 || halt")).unwrap();
     emulator.run().unwrap();
     assert_eq!(emulator.flags(), Flags::OVERFLOW);
 }
 
-/// The report of an operation has the value that it wrote to a register or to memory, and 0 if it wrote none.
+/// The event of an operation has the value that it wrote to a register or to memory, and 0 if it wrote none.
 #[test]
 fn operations_without_result_report_zero() {
     let source = ".preset m0 7.0
@@ -518,7 +517,7 @@ fn operations_without_result_report_zero() {
     assert!(seen.values().all(|value| *value == 0), "{seen:?}");
 }
 
-/// Loads and stores go to memory in order, at issue: a load sees the store just before it.
+/// Loads and stores access memory in order, at issue: a load sees the store of the previous bundle.
 #[test]
 fn memory_is_in_order() {
     for machine in MACHINES {
@@ -533,7 +532,7 @@ fn memory_is_in_order() {
     }
 }
 
-/// An input shows to bundles that issue after it was set.
+/// Bundles that issue after an input was set read its new value.
 #[test]
 fn inputs_show_to_later_bundles() {
     let mut emulator = Emulator::new(&program(&F3, "mov x0, i0\nmov x1, i0\nhalt")).unwrap();
@@ -544,14 +543,14 @@ fn inputs_show_to_later_bundles() {
     assert_eq!(["x0", "x1"].map(|name| emulator.register(register(&F3, name))), [Some(1), Some(2)]);
 }
 
-/// When the bundle after a `wait` issues, by the cycle of the tick; and what the cycles between are charged to.
+/// Cycle in which the bundle after a `wait` issues, for each cycle of the tick, and the causes of the stalls between.
 #[test]
 fn a_wait_ends_with_the_tick() {
     let source = "wait 1\nnop\nhalt";
     for machine in MACHINES {
         let (waited, refill) = (u64::from(machine.refill), u64::from(machine.refill));
         let missed = |tick: u64| tick <= waited;
-        // In the cycle of the `wait` or before it, the tick came too early. After it, it counts from the next cycle on.
+        // A tick in the cycle of the `wait` or earlier is early; a later tick counts from the next cycle on.
         for tick in (0..waited + 3 * refill).chain([waited + 1000]) {
             let mut emulator = Emulator::new(&program(machine, source)).unwrap();
             assert!(emulator.tick_at(tick));

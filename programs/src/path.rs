@@ -35,7 +35,7 @@ pub enum Path {
 
 /// Arc in the XY plane.
 ///
-/// The radius changes linearly between the ends, so that the arc ends exactly at its programmed end, although the centre was printed with
+/// The radius changes linearly between the ends, so the arc ends exactly at its programmed end, although the centre was printed with
 /// finitely many digits.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Arc {
@@ -50,7 +50,7 @@ pub struct Arc {
 }
 
 impl Arc {
-    /// Sweeps below this count as a full turn: the two directions differ by rounding only.
+    /// Sweeps below this count as a full turn: start and end then differ in direction by rounding only.
     const SAME_DIRECTION: f64 = 1e-9;
 
     /// Arc about `centre` from one point to another (all m); a full circle if the two coincide.
@@ -199,7 +199,7 @@ mod tests {
 
     #[test]
     fn path_derivatives_agree_with_differences() {
-        // The end is a little off the circle, so that the radius changes along the arc.
+        // The end is a little off the circle, so the radius changes along the arc.
         let piece = arc_move([0.04, 0.01], [-0.03, 0.0281], [0.0, 0.0], false);
         let h = 1e-5;
         for fraction in [0.1, 0.5, 0.9] {

@@ -61,7 +61,7 @@ fn stimuli(machine: &Machine, periods: &[Vec<(Register, u32)>]) -> String {
     let mut text = String::from("// 1: input port, index, value; 2: tick\n");
     for inputs in periods {
         for &(register, bits) in inputs {
-            // Skips registers that are no inputs.
+            // Skip registers that are not input ports.
             let Some(index) = machine.inputs.index(register) else { continue };
             let _ = writeln!(text, "1{:03x}{bits:08x}", index.get());
         }

@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Reader of unit headers: the facts that the generator and the tests need in order to instantiate `rtl/units/<unit>.v`.
 //!
-//! A unit selects among its operations by an operation code of its own, as short as suits it. The header of its Verilog file is
-//! the only place that states the code of each instruction:
+//! A unit selects among its operations by its own operation code, which is as short as possible. The header of its Verilog file is the
+//! only place that states the code of each instruction:
 //!
 //! ```text
 //! //@ op 1'b0 fadd
 //! //@ op 1'b1 fsub
 //! ```
 //!
-//! Several instructions may share a code. A unit with a single operation has no `op` port and writes `-` for the code. A
-//! wrapper around another unit's module takes over that one's codes: `//@ as alu`. The other ports follow from the unit's row in
-//! the table of units: there are as many operands (`a`, `b`, `c`) as its instructions have sources. If a machine's row uses only a
-//! part of the unit's functions, the ports are the same.
+//! Several instructions may share a code. A unit with a single operation has no `op` port and writes `-` for the code. A wrapper around
+//! another unit's module takes over that unit's codes: `//@ as alu`. The other ports follow from the unit's row in the table of units:
+//! there are as many operands (`a`, `b`, `c`) as its instructions have sources. If a machine's row uses only a part of the unit's
+//! functions, the ports are the same.
 
 use crate::files;
 use std::collections::BTreeMap;
@@ -68,7 +68,7 @@ pub enum CircuitError {
     /// Operation codes of different widths.
     #[error("`{0}`: the code differs in width from the codes before it")]
     Width(String),
-    /// Mnemonic that is no instruction of this unit.
+    /// A mnemonic that the unit does not execute.
     #[error("`{0}` is no instruction that the unit `{1}` offers")]
     Foreign(String, &'static str),
     /// An instruction with two codes.
@@ -139,7 +139,7 @@ pub fn limits(text: &str) -> Vec<Limit> {
         .collect()
 }
 
-/// The unit's module executes the instruction: it writes a register and is no load.
+/// The unit's module executes the instruction: it writes a register and is not a load.
 fn computes(unit: &Unit, row: &Row) -> bool {
     unit.functions.contains(&row.function) && row.shape.has_dest() && row.effect != Effect::Load
 }

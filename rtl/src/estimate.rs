@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Estimates of a core's area and clock on [`MEASURED`], for rows that were never placed. The area is the sum of its units' areas plus a
-//! line over source operands; the period is a line over the area. Both lines are least-squares fits through the placed and routed machines
-//! (`rtl/synthesis.json`). Block RAMs and multipliers are counted.
+//! linear function of the number of source operands; the clock period is a linear function of the area. Both functions are least-squares
+//! fits through the placed and routed machines (`rtl/synthesis.json`). Block RAMs and multipliers are counted.
 
 use crate::Library;
 use crate::memories::block_rams;

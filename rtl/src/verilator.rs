@@ -15,7 +15,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use thiserror::Error;
 
-/// Error that prevents a program.
+/// Reason why a program cannot be built.
 #[derive(Debug, Error)]
 pub enum VerilatorError {
     /// A tool is not installed.

@@ -217,7 +217,7 @@ pub fn wrapper(design: &Design, latched: u16) -> String {
 pub const PINS: Resources =
     Resources { luts: 15, carries: None, flip_flops: 145, multipliers: 0, block_rams: 0 };
 
-/// Connects the slave to a few pins, for a place-and-route run without a board. It is between registers, as in a system on the same device.
+/// Connects the slave to a few pins, for a place-and-route run without a board. Registers surround it, as in a system on the same device.
 /// RESTORE is left out, since its memory belongs to the system.
 pub fn on_few_pins(design: &Design) -> String {
     let (name, slave) = (synthesis_top(design.machine), name(design));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Tests how other tools see the exported design.
+//! Other tools accept the exported designs without complaint.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -13,8 +13,8 @@ fn silent(command: &mut Command) {
     assert!(output.status.success() && text.trim().is_empty(), "{command:?}\n{text}");
 }
 
-/// Writes the folders of every machine, and of a machine with the smallest and a machine with the largest memories, and hands each on, with
-/// the core's name.
+/// Writes the folders of every machine, and of one machine with the smallest and one with the largest memories, and passes each to
+/// `look`, with the core's name.
 fn folders(mut look: impl FnMut(&Path, &Machine, &str)) {
     let other = ["t1,code=2,data=2", "t3,code=65536,data=65536"].map(Machine::from_name);
     let other = other.map(|machine| machine.expect("it is a machine"));

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Mutants of the units, which yosys has planted in a unit's netlist, meet the units' test. `cargo evidence mutants` runs this test.
+//! Runs the units' test on mutants that yosys has planted in a unit's netlist. `cargo evidence mutants` runs this test.
 //!
-//! `TAKT_MUTANTS` names a folder with a netlist for each unit, whose plusarg `fault` chooses a mutant, and with a file of the mutants'
-//! numbers to be tried, one a line.
+//! `TAKT_MUTANTS` names a folder with a netlist for each unit, whose plusarg `fault` selects a mutant, and with a file of the mutants'
+//! numbers to try, one per line.
 #![allow(clippy::print_stdout)]
 
 use crate::harness::{Simulation, circuit, compile, library};
@@ -39,7 +39,7 @@ fn units() {
                 }
             }
         }
-        // Nobody will ask for this netlist's program again.
+        // This netlist's program will not be needed again.
         let _ = fs::remove_file(program);
     }
 }

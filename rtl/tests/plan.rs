@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Rows that are machines but have no circuit: the test sees every reason, by the message that names machine, slot, unit and value. Every
-//! machine of the table has a circuit.
+//! Valid machines without a circuit: every reason, reported with machine, slot, unit and value. Every machine of the table has a circuit.
 
 use takt_isa::spec::fixture::FIXTURES;
 use takt_isa::spec::units::*;
@@ -29,7 +28,7 @@ fn units(number: usize, units: &[Unit]) -> Machine {
     slot(number, |slot| slot.units = leak(units))
 }
 
-/// The machine with a sequencer that counts loops.
+/// Adds counted loops to a machine's sequencer.
 fn counting(machine: Machine) -> Machine {
     Machine { loop_depth: 1, ..machine }
 }
@@ -121,7 +120,7 @@ fn every_reason() {
     }
 }
 
-/// A row that is no machine has no circuit, either.
+/// An invalid row has no circuit, either.
 #[test]
 fn no_machine() {
     let machine = Box::leak(Box::new(Machine { slots: &[], ..F3 }));
@@ -129,7 +128,7 @@ fn no_machine() {
     assert_eq!(error.to_string(), "machine `f3`: 0 slots; a machine has 1 to 8");
 }
 
-/// A slot cannot have a name that the core has already.
+/// A slot must not have a name that the core already uses.
 #[test]
 fn names_that_clash() {
     for name in ["m_mul", "r"] {

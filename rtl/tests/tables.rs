@@ -5,7 +5,8 @@ use std::fs;
 use std::path::Path;
 use takt_rtl::tables::reciprocal::{Digits, Tables};
 
-/// Compares a generated file with the file in `units/common`, or writes that file if `TAKT_BLESS=1`; the bounds on the table's words hold.
+/// Compares each generated file with the file in `units/common`, or writes it if `TAKT_BLESS=1`, and checks the bounds on the table's
+/// words.
 #[test]
 fn files_are_current() {
     for table in takt_rtl::tables::checked().unwrap_or_else(|error| panic!("{error}")) {

@@ -6,7 +6,7 @@
 use crate::harness::{Simulation, circuit, elaborate, full, library, lint};
 use takt_isa::{Function, UNITS, Unit};
 
-/// Units that are wired into the core, instead of computing a value from operands.
+/// The unit computes a value from operands; others are wired into the core.
 fn is_arithmetic(unit: &Unit) -> bool {
     !unit
         .functions
@@ -34,7 +34,7 @@ fn unit(name: &str) -> Unit {
     unit
 }
 
-/// Each circuit is read without a warning, refuses latencies that it cannot honour, and computes the meaning of its instructions.
+/// A circuit lints without a warning, rejects latencies that it does not support, and computes the meaning of its instructions.
 fn check(name: &str) {
     let (library, unit) = (library(), unit(name));
     let circuit = circuit(&library, &unit).unwrap_or_else(|error| panic!("{error}"));
@@ -60,7 +60,7 @@ macro_rules! units {
     ($($unit:ident)*) => {
         $(#[test] fn $unit() { check(stringify!($unit)); })*
 
-        /// A unit that the specification gains must get a circuit and a test.
+        /// A new unit in the specification must get a circuit and a test.
         #[test]
         fn every_unit_is_tested() {
             let tested = [$(stringify!($unit)),*];

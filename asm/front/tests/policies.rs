@@ -165,7 +165,7 @@ fn rejects_unsupported_operators_by_name() {
         ),
         (
             "outputs",
-            "a policy with one output is read; this has 2 that depend on the input (`action`, `v1`): name the one",
+            "a policy with one output is read; this has 2 that depend on the input (`action`, `v1`): name one of them",
         ),
         ("inputs", "a policy with one input is read; output `action` depends on 2 (`obs`, `task`)."),
         ("width", "node `/MatMul_0` (MatMul): its weights expect 9 numbers, and the vector has 8"),

@@ -4,7 +4,7 @@
 //! The analysis explores every control-flow path with the machine's exact timing state, by the same rules of
 //! [`takt_isa::timing`] that the emulator applies. Paths that meet are merged only if their timing states are equivalent,
 //! that is, if they time every continuation alike ([`Residue`]); the merged path keeps the shortest and the longest time.
-//! Nothing else is merged, so that timing anomalies need no assumption: a path that is longer so far may end earlier.
+//! Nothing else is merged, so timing anomalies need no assumption: a path that is longer so far may end earlier.
 //! Subroutines, loops and iterations ([`Region`]) are analysed once for each state in which they are entered, and their
 //! summaries reused. Counts of loops that depend on the iterations around them are computed along each path ([`Slice`]).
 //! A promised total of a loop's iterations, which no merged path can count, enters by Lagrangian relaxation ([`bound_with`]).
@@ -145,7 +145,7 @@ fn bound_with(program: &Program, slice: Slice, prices: &Prices) -> Result<(Bound
         active: Vec::new(),
         steps: 0,
     };
-    // Worklist over sections and their timing states at entry. A period's tick may come any time after the `wait`, so that results may
+    // Worklist over sections and their timing states at entry. A period's tick may come any time after the `wait`, so results may
     // still be pending or not when its first bundle is delivered: each such state, up to the empty one, is analysed (`delivered`). The
     // first of these states also arises after a missed deadline.
     let mut sections: BTreeMap<(bool, BundleAddress), SectionBounds> = BTreeMap::new();
@@ -337,7 +337,7 @@ fn add<K: Ord>(costs: &mut BTreeMap<K, Cost>, key: K, cost: Cost) {
     costs.entry(key).and_modify(|known| *known = known.or(cost)).or_insert(cost);
 }
 
-/// Limits the states of a place: beyond [`MAX_VALUES`], drops the register values, which leaves one state for each timing state.
+/// Limits the states at one bundle: beyond [`MAX_VALUES`], drops the register values, which leaves one state for each timing state.
 fn widened(states: BTreeMap<State, Cost>) -> BTreeMap<State, Cost> {
     if states.len() <= MAX_VALUES {
         return states;

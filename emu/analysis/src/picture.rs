@@ -41,7 +41,7 @@ pub struct Picture<'p> {
     pub chain: Vec<Link>,
     /// Effect of each faster unit.
     pub faster: Vec<Speedup>,
-    /// Accuracy of its lines, as in `takt accuracy --json`.
+    /// Accuracy of the program's lines, as in `takt accuracy --json`.
     pub accuracy: Option<Value>,
     /// Names and texts of the source files, which the page opens at a click on an operation. May be empty.
     pub sources: Vec<(String, String)>,

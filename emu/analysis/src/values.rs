@@ -2,7 +2,7 @@
 //! Constant propagation along each path, for the registers from which loop counts are computed.
 //!
 //! The count of a triangular loop is a function of the iterations around it. Its registers begin with constants and are advanced by
-//! constants, so that every entry of the loop has a known count, and its bound is exact. The registers followed are the backward slice of
+//! constants, so every entry of the loop has a known count, and its bound is exact. The registers followed are the backward slice of
 //! the counts, and of the branches on the same registers.
 
 use crate::graph::Graph;
@@ -10,7 +10,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use takt_isa::fp::Host;
 use takt_isa::{BundleAddress, Effect, Flow, Instruction, Program, Register, Type, compute};
 
-/// Limit on the register values that are told apart at one place. Beyond it, they are forgotten there.
+/// Limit on the distinct values of registers at one place; beyond it, the values are dropped there.
 pub(crate) const MAX_VALUES: usize = 64;
 
 /// Known values of some registers, and the count of a loop that begins.
@@ -52,8 +52,8 @@ impl Slice {
     pub(crate) fn new(graph: &Graph<'_>) -> Slice {
         let program = graph.program;
         let nodes = || program.addresses().filter_map(|address| graph.node(address).ok());
-        // Sources of the computations that write each register. A register holds many values, one after the other; the path decides which
-        // of these a count has.
+        // Sources of the computations that write each register. A register takes several values in turn; the path decides which of them a
+        // count takes.
         let mut sources: BTreeMap<Register, BTreeSet<Register>> = BTreeMap::new();
         for (instruction, slot) in
             nodes().flat_map(|node| node.instructions.iter().zip(program.machine.slots))

@@ -303,7 +303,7 @@ fn integer_after_a_hazard_is_unbounded() {
     );
     assert_eq!(found, [Problem::Domain, Problem::DivisionByZero]);
     assert_eq!(enclosure.outputs[0].error, None);
-    // A comparison gives 1 or 0 even behind a hazard.
+    // A comparison gives 1 or 0 even after a hazard.
     let (found, enclosure) = problems(
         ".input x\n.output y\n.reg c:int f\n.range x = -1, 40\n",
         " fsqrt f, x\n flt c, f, 2.0\n itof y, c\n",
@@ -347,7 +347,7 @@ fn first_period_must_begin_in_the_ranges_of_used_states() {
     let enclosure = enclose(&source(text, &F3)).unwrap();
     let later: Vec<_> = enclosure.later().map(|state| state.found.unwrap().high).collect();
     assert_eq!((enclosure.first().count(), later), (0, vec![100.0]));
-    // A state that the first period writes before anything reads it may begin anywhere: the tracking program's last positions.
+    // A state that the first period writes before any read may begin anywhere, like the last positions of the tracking program.
     let text = ".input x\n.range x = 0, 1\n.output y\n.state s\n.range s = 0, 1\n.once\n wait q\nq: mov s, x\n.period\np: mov y, s\n mov s, x\n wait p\n";
     assert!(enclose(&source(text, &F3)).unwrap().assumed.is_empty());
 }
@@ -387,7 +387,7 @@ fn unenclosable_program_names_the_missing_range() {
 
 #[test]
 fn loops_are_followed_turn_by_turn() {
-    // x to the power of nine, by a counter; and a loop that data ends.
+    // The ninth power of x in a counted loop; then a loop whose end depends on data.
     let text = format!(
         ".input x\n.range x = 0.9, 1.1\n.output y\n.reg p n:int\n{HEAD} mov p, x\n li n, 8\n.loop_bound 8\n\
          q: fmul p, p, x\n isub n, n, 1\n bnz n, q\n mov y, p\n wait p\n"
@@ -569,7 +569,7 @@ fn each_iteration_is_a_place_of_its_own() {
 
 #[test]
 fn an_error_of_one_sign_moves_the_range_to_its_side() {
-    // The sum is 1 in the run and larger exactly, so that the difference's range begins at 0 in the run.
+    // The sum is 1 in the run and larger exactly, so the difference's range begins at 0 in the run.
     let (low, high) =
         range(&format!("{ONE_INPUT}.range x = 0.9, 1\n"), " mov f, 1.0\n fadd f, f, 5.9e-8\n fsub y, f, x\n");
     assert!(low <= 0.0 && high >= f64::from(1.0 - 0.9f32), "{low} {high}");

@@ -135,8 +135,8 @@ fn shipped_programs_take_exactly_their_bounds() {
                 let periods = bounds.sections.iter().filter(|section| !section.once);
                 let measured: BTreeSet<BundleAddress> = measured[1..].iter().map(|one| one.address).collect();
                 assert!(measured.into_iter().eq(periods.map(|section| section.address)));
-                // A period beyond the worst case keeps its deadlines. A shorter one misses some, if only after a while: each late period
-                // leaves less of the refill hidden in the next.
+                // A tick period above the worst case keeps every deadline. A shorter one misses some, perhaps only after a while: each
+                // late period leaves less of the refill hidden in the next.
                 assert_eq!(
                     emulator.deadline_missed(),
                     tick.is_some_and(|tick| tick <= worst),
@@ -186,7 +186,7 @@ fn straight_programs_take_exactly_their_bounds() {
     random_programs(options, 300, |seed, program, bounds, measured| {
         for &one in measured {
             let exact = check(bounds, one, program.machine.refill);
-            // The bundle of the `wait` may leave results in flight, so that the period's cycles may depend on when the tick comes.
+            // The bundle of the `wait` may leave results in flight, so the period's cycles may depend on when the tick comes.
             let section = section(bounds, one);
             if one.entered == SectionEntry::Reset {
                 assert!(exact, "seed {seed}");
@@ -294,7 +294,7 @@ fn counted_loops_are_bounded_by_their_turns() {
             let mut emulator = Emulator::new(&program).unwrap();
             assert_eq!(emulator.run(), Ok(Stop::Halted));
             assert_eq!(bounds.sections[0].cycles.worst, emulator.now(), "all turns are taken: the worst");
-            // A loop bound one less is a fault, in both ways of execution.
+            // A loop bound that is too small by one is a fault in both modes.
             if turns > 1 {
                 let program = source(&nest(turns, turns - 1), machine);
                 for blocks in [true, false] {
@@ -418,7 +418,7 @@ fn total_bounds_a_nest_by_the_sum_of_its_rows() {
                         emulator.set_input_bits(port.register, bits).unwrap();
                     }
                 };
-                // Each period starts the count anew.
+                // Each period restarts the count.
                 let measured = measure(&mut emulator, 3, set);
                 for one in &measured {
                     check(if sum <= total { &bounds } else { &without }, *one, machine.refill);
@@ -455,8 +455,9 @@ fn one_iteration_beyond_a_total_is_a_fault() {
     }
 }
 
-/// The tick may come at any distance from the `wait`, while a result of the `wait`'s own bundle is still in flight. At one distance alone
-/// that result meets the product at the write port, which costs a cycle: an odd one with one first bundle, an even one with the other.
+/// The tick may come at any distance from the `wait`, while a result of the `wait`'s own bundle is still in flight. At a single distance,
+/// that result conflicts with the product at the write port, which costs a cycle: at an odd distance with one first bundle, at an even
+/// one with the other.
 #[test]
 fn ticks_at_every_distance_are_bounded_exactly() {
     for first in ["", " nop\n"] {

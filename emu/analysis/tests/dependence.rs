@@ -104,7 +104,7 @@ fn what_is_sent_with_the_wait_comes_before_its_bundle() {
     let text =
         ".input i:int\n.output o:int\n.once\n mov o, zero\n wait p\n.period\np: nop\n mov o, i || wait p\n";
     let options = Options { machine: &F3, ..Options::default() };
-    // The write goes to a slot beside the sequencer's.
+    // The write goes to another slot than the sequencer's.
     let text = text
         .replace("mov o, i", "fadd o, i, 0.0")
         .replace(":int", "")
@@ -172,8 +172,8 @@ fn more_call_paths_than_the_limit() {
     assert_eq!(at_wait, written);
 }
 
-/// Compares claims about a random program with runs; counts responses that show, and pairs of ports claimed to have none before later
-/// periods.
+/// Compares claims about a random program with its runs. Counts claims of no response within the period of the read, observed responses,
+/// and responses observed in a later period.
 fn compare(seed: u64, program: &Program, met: &mut [u64; 3]) {
     let Ok(dependence) = Dependence::new(program, &BTreeSet::new()) else { return };
     let mut random = Random::new(!seed);

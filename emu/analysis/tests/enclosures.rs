@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Falsifier of `takt accuracy`: random programs over all operations, runs that look for values at the ends of ranges, and a comparison of
-//! every statement of an [`Enclosure`] with the run.
+//! Falsifier of `takt accuracy`: random programs over all operations, with inputs at the ends of their ranges; every statement of an
+//! [`Enclosure`] is compared with the run.
 //!
 //! Campaign: `TAKT_PROGRAMS=10000 cargo test --release -p takt-analysis --test suite enclosures::`; `TAKT_SEED` moves its seeds.
 #![allow(clippy::print_stdout)]
@@ -192,7 +192,7 @@ impl Writer<'_> {
         name
     }
 
-    /// Decision by a comparison: a selection of values that depend on what is compared, or a branch around operations.
+    /// Decision by a comparison: a selection of values that depend on the compared ones, or a branch around operations.
     fn decision(&mut self) {
         let flag = self.condition();
         if self.random.once_in(2) {
@@ -304,7 +304,7 @@ fn source(random: &mut Random, machine: &'static Machine) -> String {
     let keeps = random.once_in(2);
     let state = match random.below(4) {
         0 => format!(" mov s0:float, {}\n", states[0]),
-        // A filter, which keeps its range over all periods or does not.
+        // A filter, which may or may not keep its range over all periods.
         2 => " fsub s0, s0, x0\n fmul s0, s0, -0.875\n".to_owned(),
         1 => " fmul s0, s0, 0.5\n".to_owned(),
         _ => String::new(),
@@ -322,7 +322,7 @@ fn source(random: &mut Random, machine: &'static Machine) -> String {
         writeln!(text, ".reg {temporaries}").unwrap();
     }
     let enter = match writer.random.below(3) {
-        // Gives the first period code of its own.
+        // Gives the first period its own code.
         0 => " wait q\nq: mov s0, 0.25\n.period\np:\n".to_owned(),
         _ => " wait p\n.period\np:\n".to_owned(),
     };

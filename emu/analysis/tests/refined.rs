@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Bounds that ranges, conditions and relations between values make tight: programs as authors of controllers write them, each compared
-//! with its runs.
+//! Bounds that ranges, conditions and relations between values make tight: typical controller programs, each compared with its runs.
 
 use crate::accuracy::{HEAD, check, source};
 use takt_analysis::accuracy::{Enclosure, Interval, Problem, enclose, ulp};
@@ -88,27 +87,27 @@ fn results_of_functions_stay_within_the_ranges_of_the_functions() {
         assert_eq!((range.low, range.high), (low, high), "{period}");
         assert!(error <= high - low + 1e-7, "{period}: {error}");
     }
-    // Behind a function, an arccosine is not beyond its domain.
+    // The sine lies in the domain of the arccosine.
     let (.., hazards) = of_period("x, z = -100, 100", " fsin y, x\n facos y, y\n");
     assert_eq!(hazards, []);
 }
 
 #[test]
 fn a_limit_that_the_run_never_reaches_keeps_the_value() {
-    // The product is at most 1 in the run, and may be more exactly.
+    // The product is at most 1 in the run, but may exceed 1 in exact arithmetic.
     let limited = " fmul y, x, 0.1\n fmin z2, y, 1.0\n fsub y, z2, y\n";
     let (range, error, _) = of_period("x = 0, 10", &format!(".reg z2\n{limited}"));
     assert!(range.magnitude() < 1e-6 && error < 4.0 * ulp(1.0), "{range:?} {error:e}");
 }
 
-/// Range at the end of a period of a state that is not shown to keep its own.
+/// Ranges at the end of a period of the states that are not proved to keep their declared ranges.
 fn left(enclosure: &Enclosure) -> Vec<(f64, f64)> {
     let ends =
         |found: Option<Interval>| found.map_or((f64::NEG_INFINITY, f64::INFINITY), |at| (at.low, at.high));
     enclosure.later().map(|state| ends(state.found)).collect()
 }
 
-/// Encloses a program on two machines, with the branches as they stand and as selections of the scheduler.
+/// Encloses a program on two machines, with its branches unchanged and with branches converted to selections by the scheduler.
 fn both_ways(text: &str, mut test: impl FnMut(&Enclosure, &str)) {
     for schedule in ["", ".schedule on\n"] {
         for machine in [&F3, MACHINES[MACHINES.len() - 1]] {
@@ -120,7 +119,7 @@ fn both_ways(text: &str, mut test: impl FnMut(&Enclosure, &str)) {
 
 #[test]
 fn counters_stay_in_their_ranges() {
-    // The mode that wraps counts as a selection, as a branch, and by a comparison with its last value.
+    // A counter modulo 20: by a selection, by a branch, and by a comparison with its last value.
     for next in [
         "        c = c == 19 ? 0 : c + 1\n",
         "        c = c >= 19 ? 0 : c + 1\n",
@@ -168,7 +167,7 @@ p:
 
 #[test]
 fn dead_zones_and_guards_decide_what_is_computed() {
-    // A dead zone: the sign tells which side, the magnitude how much.
+    // A dead zone: the sign gives the side, the magnitude the amount.
     let dead = ".reg m\n m = max(abs(x) - 0.5, 0)\n y = x < 0 ? -m : m\n";
     let (range, error, hazards) = of_period("x = -2, 2", dead);
     assert!(range.magnitude() <= 1.5 && error < 1e-6 && hazards.is_empty(), "{range:?} {error:e}");
@@ -191,7 +190,7 @@ fn dead_zones_and_guards_decide_what_is_computed() {
     let guarded = " y = 60/max(x, 0.001)\n";
     let (range, _, hazards) = of_period("x = 0, 10", guarded);
     assert!(range.high <= 60_000.0 * 1.0001 && hazards.is_empty(), "{range:?}");
-    // The root of what a comparison shows to be positive.
+    // The root of a value that a comparison proves positive.
     let root = ".reg c:int f\n fmul f, x, x\n fsub f, 1.0, f\n mov y, 0.0\n flt c, f, 0.0\n bnz c, out\n fsqrt y, f\nout:\n";
     let (range, _, hazards) = of_period("x = -2, 2", root);
     assert!(range.low == 0.0 && range.high <= 1.0 && hazards.is_empty(), "{range:?} {hazards:?}");
@@ -247,7 +246,7 @@ p:
         wait    p
 ";
     both_ways(text, |enclosure, about| {
-        // Within the limit, e is (v - s)/0.8, so that s shrinks; beyond, it is fed back.
+        // Within the limit, e is (v - s)/0.8, so s shrinks; beyond, it is fed back.
         assert_eq!(left(enclosure), [], "{about}");
     });
 }
@@ -264,7 +263,7 @@ fn components_of_a_norm_are_at_most_one() {
         assert_eq!(hazards, [], "{period}");
         assert!(range.magnitude() <= 1.0 && error < most, "{period}: {range:?} {error:e}");
     }
-    // Behind the quotient, an arccosine is not beyond its domain.
+    // The quotient lies in the domain of the arccosine.
     let (.., hazards) =
         of_period("x, z = -2, 2", ".reg n\n n = max(sqrt(x*x + z*z), 1e-6)\n n = x/n\n facos y, n\n");
     assert_eq!(hazards, []);
@@ -273,7 +272,7 @@ fn components_of_a_norm_are_at_most_one() {
     let text = format!(".ports latched\n.input x, z\n.output y\n.reg n\n.range x, z = -2, 2\n{HEAD}{fused}");
     let (range, error) = output(&held(&source(&text, MACHINES[MACHINES.len() - 1])), "y");
     assert!(range.magnitude() <= 1.0 && error < 1e-6, "{range:?} {error:e}");
-    // A voltage that a bridge cannot give is scaled to its length.
+    // A voltage beyond the bridge's limit is scaled down to it.
     let scaled = ".reg m v s\n m = x*x + z*z\n v = 24.0\n s = v/sqrt(max(m, v*v))\n y = s*x\n";
     let (range, error, hazards) = of_period("x, z = -100, 100", scaled);
     assert!(range.magnitude() <= 100.0 && error < 1e-4 && hazards.is_empty(), "{range:?} {error:e}");
@@ -284,7 +283,7 @@ fn components_of_a_norm_are_at_most_one() {
 
 #[test]
 fn a_quotient_errs_by_a_share_of_itself() {
-    // Six digits of the divisor's magnitude: the error is relative.
+    // The divisor spans many orders of magnitude, so the bound must be relative.
     let (range, error, _) =
         of_period("x = 0.001, 1000\n.range z = -3, 3", ".reg n\n n = x*x*x\n y = n/(n + 1e-3*x)\n");
     assert!(range.high <= 1.03 && error < 1e-6, "{range:?} {error:e}");

@@ -60,7 +60,7 @@ fn the_tracking_program_waits_for_its_units() {
         let period = trace(&mut emulator).unwrap();
         check(&program, &period);
         for what in period.what_if(&program) {
-            // A faster unit may cost cycles: its results meet others at the write port.
+            // A faster unit may cost cycles, because its results conflict with others at the write port.
             assert!(what.cycles.abs_diff(period.cycles) < 60, "{what:?} {}", period.cycles);
             // The additional cycles are stalls with a named cause, except in the front end.
             let more: i64 = what.stalls.iter().sum();

@@ -21,7 +21,7 @@ use takt_isa::fp::{Flags, Value};
 use takt_isa::timing::{self, Cycle};
 use takt_isa::{BundleAddress, Flow, Program, Register};
 
-/// Runs of a single emulator that take about as long as one run of all lanes.
+/// Cost of one run of all lanes, in runs of a single emulator.
 const RUN: u64 = 4;
 
 /// Presence of a lane in the group.
@@ -253,7 +253,7 @@ impl Group {
         }
     }
 
-    /// First lane that is present.
+    /// First present lane.
     fn model(&self) -> Option<usize> {
         self.present.iter().position(|&present| present)
     }
@@ -287,7 +287,7 @@ impl Group {
         GroupContinuation::More
     }
 
-    /// Latches the inputs, if that is due before the next cycle.
+    /// Latches the inputs, if latching is due before the next cycle.
     fn take_inputs(&mut self) {
         if self.lead.state.latches.as_ref().is_some_and(|latches| latches.take) {
             self.lanes.take_inputs(&mut self.lead.state);
@@ -342,7 +342,8 @@ impl Group {
         agree
     }
 
-    /// Runs a block's operations. If some lanes leave their memory, the error is the set of these lanes, and all effects are undone.
+    /// Runs a block's operations. If some lanes address words outside the data memory, the error is the set of these lanes, and all
+    /// effects are undone.
     fn try_block(&mut self, id: u32, last: Cycle) -> Result<(), Mask> {
         let Group { lead, lanes, present, offsets, .. } = self;
         let Emulator { cache, state, compiled_runs, .. } = lead;

@@ -48,7 +48,7 @@ pub(crate) struct Lanes {
 #[derive(Clone, Debug, Default)]
 struct Undo {
     registers: Vec<(Register, Row)>,
-    /// The block may fault, so that the log is kept.
+    /// The log is kept, because the block may fault.
     kept: bool,
     /// Rows of memory before a store.
     stored: Vec<(usize, Row)>,
@@ -57,7 +57,7 @@ struct Undo {
     nans: Vec<(usize, u64)>,
 }
 
-/// Call of [`Lanes::run`], compiled once for each width of vectors that the host may have.
+/// Arguments of [`Lanes::run`], whose code is compiled once for each vector width that the host may have.
 struct Run<'a> {
     lanes: &'a mut Lanes,
     block: &'a Block,
@@ -157,7 +157,7 @@ impl Lanes {
         }
     }
 
-    /// Latches the inputs, if that is due for `state`.
+    /// Latches the inputs, if latching is due for `state`.
     pub(crate) fn take_inputs(&mut self, state: &mut State) {
         let (Some(latches), Some(rows)) = (&mut state.latches, &self.latches) else { return };
         latches.take = false;
@@ -250,7 +250,7 @@ impl Lanes {
         }
     }
 
-    /// Runs the compiled code of a block. If the result is false, the block must be run by its micros: the state that it reads is
+    /// Runs the compiled code of a block. Returns false if the block's micros must run instead; the state that the block reads is then
     /// unchanged.
     pub(crate) fn run_code(&mut self, block: &Block, code: &jit::LaneCode) -> bool {
         if !code.run(&mut self.registers, &mut self.memory, &mut self.flags, &mut self.rows) {
@@ -267,8 +267,8 @@ impl Lanes {
         true
     }
 
-    /// Runs the micros of a block. If some present lanes leave their memory, the error is the set of these lanes, and the caller must undo
-    /// the block.
+    /// Runs the micros of a block. If some present lanes address words outside the data memory, the error is the set of these lanes, and
+    /// the caller must undo the block.
     pub(crate) fn run(&mut self, block: &Block, present: &Mask) -> Result<(), Mask> {
         Arch::new().dispatch(Run { lanes: self, block, present })
     }
@@ -336,8 +336,8 @@ impl Lanes {
         }
     }
 
-    /// Data words that a load or store addresses in each lane; the error is the set of present lanes that leave the memory. (Absent lanes
-    /// address no word.)
+    /// Data words that a load or store addresses in each lane; the error is the set of present lanes whose address is outside the data
+    /// memory. (Absent lanes address no word.)
     fn addresses(&self, micro: &Micro, present: &Mask) -> Result<[Option<usize>; LANES], Mask> {
         let bases = &self.registers[micro.a.index()];
         let words = bases.map(|base| {
@@ -347,7 +347,7 @@ impl Lanes {
         if outside == [false; LANES] { Ok(words) } else { Err(outside) }
     }
 
-    /// Address of a load or store, if it is the same in every lane, and in the memory.
+    /// Address of a load or store, if it is the same in every lane and inside the data memory.
     fn common_address(&self, micro: &Micro) -> Option<usize> {
         let bases = &self.registers[micro.a.index()];
         let address = data_address(micro.constant, bases[0]);

@@ -52,7 +52,7 @@ pub struct Batch {
 impl Batch {
     /// Number of lanes of a group, which share the cost of control flow. A multiple of this number is the best size of a batch.
     pub const WIDTH: usize = LANES;
-    /// Limit on the number of lanes. (Each takes about 5 kB, and its data memory.)
+    /// Limit on the number of lanes. (Each takes about 5 kB plus its data memory.)
     pub const MAX_LANES: usize = 1 << 20;
     /// Limit on the words of all lanes' data memories: 4 GiB.
     pub const MAX_WORDS: usize = 1 << 30;
@@ -90,7 +90,8 @@ impl Batch {
             .for_each(|group| group.each_emulator(|emulator| emulator.set_tick_period(cycles)));
     }
 
-    /// Sets the runs before compilation, like [`crate::Emulator::set_compile_after`]; a run of all lanes of a group counts as one.
+    /// Sets the number of runs after which a block is compiled, like [`crate::Emulator::set_compile_after`]; a run of all lanes of a
+    /// group counts as one.
     pub fn set_compile_after(&mut self, runs: Option<u64>) {
         self.groups
             .iter_mut()
@@ -112,8 +113,8 @@ impl Batch {
     /// Sets an input port, with one value for each lane. The values are read from the next period on (and by the section that runs once).
     ///
     /// # Errors
-    /// If the program has no such port, or one of another type, or the number of values differs from the number of lanes. No lane is set
-    /// then.
+    /// If the program has no such port, the port has another type, or the number of values differs from the number of lanes. Then no lane
+    /// is set.
     pub fn set_input<N: Into<Number> + Copy>(&mut self, name: &str, values: &[N]) -> Result<(), PortError> {
         let register = input_for(&self.program, name, values.iter().map(|&value| value.into()))?;
         let bits: Vec<u32> = values.iter().map(|&value| value.into().bits()).collect();
@@ -194,8 +195,8 @@ impl Batch {
         self.lane(lane).map_or(0, |(group, lane)| group.now(lane))
     }
 
-    /// Number of periods, summed over all lanes, that ran outside of their group, at least in part, because of a branch with another
-    /// outcome than in most lanes, or of a fault. They are slower, with the same results.
+    /// Number of periods, summed over all lanes, that ran outside of their group, at least in part, because a branch went another way
+    /// than in most lanes, or because of a fault. Such periods are slower, but their results are the same.
     pub fn periods_apart(&self) -> u64 {
         self.groups.iter().map(|group| group.apart).sum()
     }

@@ -10,7 +10,7 @@ use std::sync::OnceLock;
 /// ancestors'. There is no lock, since a lock that some thread holds during `fork` would stay locked in the child.
 struct Pools {
     process: u32,
-    /// Thread pool; `None` if threads cannot be created, so that the work is done without them.
+    /// Thread pool; `None` if threads cannot be created, so the work is done without them.
     pool: Option<ThreadPool>,
     next: NextPools,
 }

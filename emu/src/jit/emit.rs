@@ -8,7 +8,7 @@ use cranelift::codegen::ir::condcodes::{FloatCC, IntCC};
 use cranelift::codegen::ir::{ConstantData, Type};
 use cranelift::prelude::{FunctionBuilder, Ieee32, InstBuilder, MemFlagsData, Value, types};
 
-/// Lanes of a vector.
+/// Number of lanes in one SIMD vector: four words of 32 bits.
 pub(super) const VECTOR: usize = 4;
 
 /// Target of code: scalar or SIMD.
@@ -62,7 +62,7 @@ impl Emit<'_> {
         (4 * word * self.width.stride()) as i32
     }
 
-    /// Vectors are not aligned to more than their words.
+    /// Flags of memory accesses. Vectors are aligned to words only, not to their full width.
     fn flags(&self) -> MemFlagsData {
         if self.is_vector() { MemFlagsData::new().with_notrap() } else { MemFlagsData::trusted() }
     }

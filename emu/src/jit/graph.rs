@@ -56,7 +56,7 @@ impl Node {
 /// Values of a block in topological order, with its results.
 pub(super) struct Graph {
     pub(super) nodes: Vec<Node>,
-    /// Last values of the registers, and words of late results, that the block writes.
+    /// Registers and late-result words that the block writes, each with its final value.
     pub(super) results: Vec<(Word, Id)>,
     /// Flags at the block's end; `None` if the block does not change them.
     pub(super) flags: Option<Id>,

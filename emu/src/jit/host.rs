@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Instruction selection: the operations for which the host has an instruction.
 //!
-//! Operations are matched by their meaning: an operation that gives the same results as a host instruction, for many operands, is that
-//! instruction. Thus no instruction of the machine is named here.
+//! Operations are matched by their meaning: an operation is compiled to the host instruction that gives the same results for all probe
+//! operands. Thus no instruction of the machine is named here.
 
 use std::sync::OnceLock;
 use takt_isa::fp::{self, is_nan};
@@ -83,8 +83,8 @@ const ALL: [Host; 33] = [
     Host::Fused(true, true),
 ];
 
-/// Operands for which an operation is compared with the host's: zeros, ones, halves, ends of the ranges, subnormals, and numbers without a
-/// pattern.
+/// Operands for which an operation is compared with the host's: zeros, ones, halves, ends of the ranges, subnormals, and arbitrary
+/// numbers.
 const PROBES: [u32; 24] = [
     0,
     0x8000_0000,
@@ -229,7 +229,7 @@ impl Host {
 mod tests {
     use super::*;
 
-    /// Host instructions are distinct: no two are equivalent, and each is an operation of the machine, so that none is taken for another.
+    /// Host instructions are distinct: no two are equivalent, and each is an operation of the machine, so none is taken for another.
     #[test]
     fn operations_are_told_apart() {
         for host in ALL {

@@ -18,8 +18,8 @@ use cranelift::prelude::{
 };
 use takt_isa::{Op, ROWS, compute, compute_lanes, fp};
 
-/// Layout of the scratch words, which pass other results than registers and memory: the flags, values of watched ports, data words of late
-/// loads, and for each store its address and the word it replaced (the undo log).
+/// Layout of the scratch words, which hold the results other than registers and memory: the flags, values of watched ports, data words of
+/// late loads, and for each store its address and the word it replaced (the undo log).
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Scratch {
     pub(super) watched: usize,
@@ -116,7 +116,7 @@ struct Lowering<'a, 'f> {
     watches: usize,
 }
 
-/// Compiles a block, for a data memory of `depth` words; `None` if the compiled code would not be worth while.
+/// Compiles a block, for a data memory of `depth` words; `None` if compiling the block would not be worthwhile.
 pub(super) fn lower(graph: &Graph, depth: u32, scratch: Scratch, width: Width) -> Option<NativeBlock> {
     let target = target()?;
     let has =
@@ -266,8 +266,8 @@ impl Lowering<'_, '_> {
         });
     }
 
-    /// Address of a data word, and its index in every lane. If it is outside of the memory, or if lanes differ, sets the mark and gives a
-    /// valid address.
+    /// Address of a data word, and its index in every lane. If it is outside of the memory, or if lanes differ, sets the mark and returns
+    /// a valid address.
     fn address(&mut self, base: Id, offset: u32) -> (Value, Value) {
         let number = match self.nodes[base] {
             Node::Constant(base) if offset.wrapping_add(base) < self.depth => {

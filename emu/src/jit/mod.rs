@@ -114,7 +114,8 @@ pub(crate) fn compile_lanes(micros: &[Micro], late: &[LateResult], depth: u32) -
 }
 
 impl LaneCode {
-    /// Runs the block in all lanes. If the result is false, the interpreter must run it; the state that it reads is unchanged.
+    /// Runs the block in all lanes. Returns false if the interpreter must run it instead; the state that the block reads is then
+    /// unchanged.
     pub(crate) fn run(
         &self,
         registers: &mut [Row; WORDS],
@@ -155,7 +156,7 @@ impl LaneCode {
 }
 
 impl Code {
-    /// Runs the block. If the result is false, the interpreter must run it; the state that it reads is unchanged.
+    /// Runs the block. Returns false if the interpreter must run it instead; the state that the block reads is then unchanged.
     pub(crate) fn run(
         &self,
         from: &[LateResult],

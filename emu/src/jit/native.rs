@@ -57,7 +57,7 @@ impl NativeBlock {
         let target = target()?;
         let mut context = Context::for_function(function);
         let compiled = context.compile(target, &mut ControlPlane::default()).ok()?;
-        // Calls are by address, so that no relocations are needed.
+        // Calls are by address, so no relocations are needed.
         if !compiled.buffer.relocs().is_empty() {
             return None;
         }
@@ -67,8 +67,8 @@ impl NativeBlock {
         Some(NativeBlock { code: pages.make_exec().ok()?, width, memory, scratch })
     }
 
-    /// Runs the block in the lanes of one vector, from `lane` on (scalar code: in lane 0 only). If a check failed, the result is false, and
-    /// in these lanes every register that the block reads before it writes it is unchanged.
+    /// Runs the block in the lanes of one vector, from `lane` on (scalar code: in lane 0 only). Returns false if a check failed; then, in
+    /// these lanes, every register that the block reads before it writes it is unchanged.
     pub(super) fn call(
         &self,
         registers: &mut [u32],

@@ -78,7 +78,7 @@ impl Inputs {
     /// Sets the inputs that count from the core's next cycle on.
     pub fn set(&mut self, emulator: &mut Emulator) {
         while let Some((_, register, value)) = self.0.pop_front_if(|(cycle, ..)| *cycle <= emulator.now()) {
-            // The register is an input port, so that setting it cannot fail.
+            // The register is an input port, so setting it cannot fail.
             let _ = emulator.set_input_bits(register, value);
         }
     }

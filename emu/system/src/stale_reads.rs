@@ -16,7 +16,7 @@ const NEXT: Cycle = 1 + MIN_LATENCY;
 /// Reason why a read is doubtful.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Doubt {
-    /// The source reads before the pop, and the scheduler has moved the read behind it: it gets the next head, if there is one.
+    /// The source reads before the pop, but the scheduler has moved the read after it: the read gets the next head, if there is one.
     Moved,
     /// Too soon after the pop: the read may get the old head or the next one.
     Between,
@@ -163,7 +163,7 @@ impl Seek<'_> {
         lines.iter().flatten().max_by_key(|line| line.line).copied()
     }
 
-    /// The source reads before the pop. Lines of a macro defined above the stretch say nothing about the order, so that reads on such lines
+    /// The source reads before the pop. Lines of a macro defined above the stretch say nothing about the order, so reads on such lines
     /// do not count.
     fn stands_before(&self, read: &Access, pop: &Access, above: Option<Location>) -> bool {
         let (Some(read), Some(pop)) = (read.line, pop.line) else { return false };
@@ -172,7 +172,7 @@ impl Seek<'_> {
     }
 }
 
-/// Code repeated for each entry (`.rep`) is no stale read: the same line also reads the field before the pop.
+/// Code repeated for each entry (`.rep`): the same line also reads the field before the pop, so the read is not stale.
 fn repeated(read: &Access, pop: &Access, reads: &[Access]) -> bool {
     reads.iter().any(|other| {
         other.register == read.register && other.line == read.line && other.cycle < pop.cycle + NEXT

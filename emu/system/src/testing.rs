@@ -147,7 +147,7 @@ pub fn describe(
     })
 }
 
-/// Random system of a seed. Systems that are no valid file (a tick that is too short) are replaced by the next one.
+/// Random system of a seed. A seed whose file is invalid (its tick is too short) is replaced by the next one.
 pub fn random_description(seed: u64, machines: &[&'static Machine]) -> Description {
     let seeds = (0..).map(|i: u64| seed.wrapping_add(i << 32));
     let tries = seeds.map(|seed| random_system(seed, machines));

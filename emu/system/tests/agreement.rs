@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The emulator, whose cores run ahead, against the cycle-by-cycle reference: random systems.
+//! Emulator, whose cores run ahead, against the cycle-by-cycle reference, on random systems.
 
 use takt_emu::testing::Random;
 use takt_isa::{Register, timing::Cycle};

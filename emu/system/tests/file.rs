@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Mistakes in a system's file: one clear error each, at its line, with a mend.
+//! Mistakes in a system's file: one clear error each, at its line, with a suggested fix.
 
 use std::convert::Infallible;
 use std::fmt::Write as _;

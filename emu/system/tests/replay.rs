@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Replays: a core by itself repeats its run in a system.
+//! Replays: a core alone repeats its run in a system.
 
 use takt_emu::Event;
 use takt_isa::{T1, T3};

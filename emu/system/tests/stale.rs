@@ -33,8 +33,8 @@ fn doubts(description: &Description) -> Vec<(String, Doubt)> {
     stale_reads(description).iter().map(|read| (name(read), read.doubt)).collect()
 }
 
-/// For every distance from a pop to reads of all fields: where the emulator shows the old entry, no read is reported; where a read is
-/// reported, the field may belong to either; behind, all fields are the next entry's.
+/// For every distance from a pop to reads of all fields: while the emulator shows the old entry, no read is reported; a reported read may
+/// get either entry's field; later reads get the next entry's.
 #[test]
 fn reported_stale_reads_equal_the_observed_ones() {
     let (mut old, mut between, mut new) = (0, 0, 0);
@@ -64,7 +64,7 @@ fn reported_stale_reads_equal_the_observed_ones() {
                 (_, true) => between += 1,
                 other => panic!("distance {distance}, {name}: {other:?}"),
             }
-            // Unreported reads get the old entry before the pop, and the new one behind it.
+            // Unreported reads get the old entry before the pop, and the new one after it.
             let cycle = distance as u64 + i as u64;
             assert!(is_told || (seen[i] == 1) == (cycle < 12), "distance {distance}, {name}: {}", seen[i]);
         }
@@ -72,7 +72,7 @@ fn reported_stale_reads_equal_the_observed_ones() {
     assert!(old > 0 && between > 0 && new > 0, "{old} {between} {new}");
 }
 
-/// The scheduler moves a read behind the pop that follows it in the source.
+/// The scheduler moves a read after the pop that follows it in the source.
 #[test]
 fn reports_reads_moved_after_the_pop() {
     // The use of `x` waits for a long chain, and the read with it.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A few lines of assembler, so that these tests stand on the specification alone.
+//! Minimal assembler, so that these tests depend on the specification alone.
 //!
 //! A line is a label, a bundle (`op d, a, b || op …`, canonical register names, labels as targets), or a directive:
 //! `.preset register value`, `.input name register`, `.output name register type`.
@@ -80,12 +80,12 @@ pub(crate) fn program(machine: &'static Machine, source: &str) -> Program {
     program
 }
 
-/// The bundle of this number.
+/// Address of bundle `number`.
 pub(crate) fn at(number: impl TryInto<u32>) -> BundleAddress {
     BundleAddress::new(number.try_into().ok().unwrap())
 }
 
-/// The input port of this number.
+/// Input port `number` of a machine.
 pub(crate) fn input(machine: &Machine, number: usize) -> Register {
     machine.inputs.registers().nth(number).unwrap()
 }
@@ -109,12 +109,12 @@ fn parse(machine: &Machine, text: &str, labels: &HashMap<&str, u32>) -> (SlotInd
     };
     let mut instruction = Instruction::bare(row.op);
     let operands: Vec<&str> = operands.split(',').map(str::trim).filter(|o| !o.is_empty()).collect();
-    // Of the slots that may execute it the one that writes the destination.
+    // Among the slots that host the function, choose the one whose bank has the destination.
     let dest = row.shape.operands().iter().position(|operand| *operand == Operand::Dest);
     let writes = |slot: &SlotIndex| {
         dest.is_none_or(|dest| machine.slot(*slot).bank.index(register(operands[dest])).is_some())
     };
-    // Every slot takes those that do nothing.
+    // Operations that do nothing may stand in any slot.
     let slot = machine.hosts(row.function).iter().find(writes).or(SlotIndex::new(0)).unwrap();
     assert_eq!(operands.len(), row.shape.operands().len(), "{text}");
     for (operand, text) in row.shape.operands().iter().zip(operands) {
@@ -138,7 +138,7 @@ fn parse(machine: &Machine, text: &str, labels: &HashMap<&str, u32>) -> (SlotInd
     (slot, instruction)
 }
 
-/// A float if it has a point, else an integer.
+/// Word from a number: binary32 if it has a decimal point, otherwise an integer.
 fn value(text: &str) -> u32 {
     if text == "nan" {
         0x7fc0_0000
@@ -149,7 +149,7 @@ fn value(text: &str) -> u32 {
     }
 }
 
-/// Everything that can be seen of a lane is as in its own emulator.
+/// Asserts that all observable state of a lane equals that of its own emulator.
 pub(crate) fn assert_lane(context: &str, batch: &Batch, lane: usize, single: &Emulator) {
     assert_eq!(batch.now(lane), single.now(), "{context}: now");
     assert_eq!(batch.flags(lane), single.flags(), "{context}: flags");

@@ -11,7 +11,7 @@ use takt_system::{CorePeriods, Description, HostError, ProgramError, ReadError, 
 
 /// Limit on the cycles until the cores' first ticks.
 const START: u64 = 10_000_000;
-/// Ticks from record to record.
+/// Ticks between two records.
 pub const RECORD_TICKS: u64 = 10;
 /// Limit on the records; later ones are dropped.
 const RECORDS: usize = 1 << 20;
@@ -19,7 +19,7 @@ const RECORDS: usize = 1 << 20;
 /// Controller that comes with the crate.
 ///
 /// # Errors
-/// If its own programs are wrong; the text renders the mistakes.
+/// If one of its programs does not assemble; the text renders the mistakes.
 pub fn standard() -> Result<Description, String> {
     let text =
         |name: &str| takt_programs::THREE.iter().find(|(known, _)| *known == name).map(|(_, text)| *text);
@@ -36,7 +36,7 @@ pub fn standard() -> Result<Description, String> {
 /// Reason why there is no controller.
 #[derive(Debug, thiserror::Error)]
 pub enum ControllerError {
-    /// A port or link of the host that the system lacks.
+    /// The system lacks a port or link that the host needs.
     #[error("the system is no robot controller: {0}")]
     Host(#[from] HostError),
     /// A core's memories cannot hold its program.

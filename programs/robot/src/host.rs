@@ -89,11 +89,11 @@ pub trait Robot {
     /// Advances by one tick.
     ///
     /// # Errors
-    /// If the cores cannot go on; the text says why.
+    /// If the cores cannot continue; the text gives the reason.
     fn tick(&mut self, inputs: &Inputs) -> Result<(), String>;
     /// Number of words that can be sent now.
     fn room(&self) -> usize;
-    /// Sends a word, for which [`Robot::room`] has room.
+    /// Sends a word; the caller checks [`Robot::room`] first.
     fn send(&mut self, word: u32);
     /// Fields of the reports that have arrived.
     fn reports(&mut self) -> Vec<[u32; 4]>;
@@ -106,7 +106,7 @@ pub trait Robot {
 pub enum LinkFault {
     /// A bit of the next packet is inverted.
     Corrupt,
-    /// The next packet is lost, so that its successor is out of order.
+    /// The next packet is lost, so its successor is out of order.
     Order,
     /// The next packet is delayed in its middle.
     Late,
@@ -162,7 +162,7 @@ pub enum Problem {
 }
 
 impl Problem {
-    /// Number of its cause; 0 without a cause.
+    /// Number of the error's cause; 0 without a cause.
     pub fn cause(&self) -> u32 {
         match self {
             Problem::Refused(report) | Problem::Stopped(report) => report.cause.map_or(0, Cause::number),
@@ -170,7 +170,7 @@ impl Problem {
         }
     }
 
-    /// A program can catch the error and go on.
+    /// A program can catch the error and continue.
     pub fn can_be_caught(&self) -> bool {
         matches!(self, Problem::Refused(_) | Problem::Stopped(_) | Problem::Late(_))
     }
@@ -322,7 +322,7 @@ impl<R: Robot> Host<R> {
     /// Advances by one tick of 100 µs.
     ///
     /// # Errors
-    /// If the cores cannot go on.
+    /// If the cores cannot continue.
     pub fn tick(&mut self) -> Result<(), Problem> {
         self.happen();
         if self.ready && self.out.is_empty() && self.ticks >= self.last_sent + NOP_TICKS {
@@ -427,7 +427,7 @@ impl<R: Robot> Host<R> {
         let fault = if self.faults.is_empty() { None } else { Some(self.faults.remove(0)) };
         match fault {
             Some(LinkFault::Corrupt) => {
-                // Any bit does: the checksum covers all.
+                // Any bit will do: the checksum covers all of them.
                 let word = words.len() - 2;
                 words[word] ^= 1 << 13;
             }

@@ -26,7 +26,7 @@ macro_rules! numbers {
             /// All variants, ascending by number.
             pub const ALL: &[$name] = &[$($name::$variant),*];
 
-            /// Variant of this number; `None` if there is no such one.
+            /// Variant of this number; `None` if no variant has it.
             pub fn of(number: u32) -> Option<$name> {
                 match number { $($number => Some($name::$variant),)* _ => None }
             }
@@ -352,7 +352,7 @@ pub struct Report {
     pub value: f32,
 }
 
-/// Reason why words are no report.
+/// Reason why words are not a report.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ReportError {
     /// Unknown kind of report.

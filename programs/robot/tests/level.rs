@@ -124,7 +124,7 @@ fn faults_of_the_link_stop_the_robot() {
     }
 }
 
-/// An unanswered reset leaves the robot stopped: the wait ends, and the next reset is the mend.
+/// An unanswered reset leaves the robot stopped: the wait ends, and another reset recovers.
 #[test]
 fn a_reset_without_an_answer_ends() {
     let (mut session, _) = session();
@@ -252,7 +252,7 @@ fn the_documents_program_is_one() {
     session.check("docs", listing).unwrap_or_else(|error| panic!("{}", error.render(false)));
 }
 
-/// Mistakes: each gives one error, at its place, with the mend.
+/// Mistakes: each gives one error, at its place, with a suggested fix.
 #[test]
 fn mistakes() {
     let mut all = String::new();

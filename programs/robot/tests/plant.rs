@@ -68,7 +68,7 @@ fn mass_matrix(arm: &Arm, q: &Joints) -> [[f64; JOINTS]; JOINTS] {
     std::array::from_fn(|a| std::array::from_fn(|b| entry(a, b)))
 }
 
-/// Potential energy of gravity and springs: the springs' is opposite to the balanced part of gravity's, of upper arm and forearm with the
+/// Potential energy of gravity and springs. The springs cancel the balanced part of gravity's moments: upper arm, and forearm with the
 /// wrist straight.
 fn potential(arm: &Arm, q: &Joints) -> f64 {
     let weight = |q: &Joints, from: usize| -> f64 {

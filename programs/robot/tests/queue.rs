@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Queue of the kinematic core, filled to its end by the host, on the three cores.
+//! Queue of the kinematic core, filled to capacity by the host, on the three cores.
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -56,7 +56,7 @@ fn stop_ends_waiting_statements() {
     host.wait_until(within, || "it does not stand".to_owned(), &|| false, |host| Ok(host.stands()))
         .unwrap_or_else(|problem| panic!("{problem}"));
     assert_eq!(host.unanswered(), 0);
-    // Operation goes on after the stop.
+    // Operation continues after the stop.
     let news = host.take_news();
     assert!(news.iter().any(
         |(_, news)| matches!(news, HostEvent::Report(report) if report.cause == Some(Cause::QueueFull))

@@ -33,7 +33,7 @@ pub const OUT_OF_REACH: u32 = 1;
 pub const WRIST_SINGULAR: u32 = 2;
 /// `status` of the inverse: the wrist's centre lies on joint 1's axis.
 pub const ON_AXIS: u32 = 3;
-/// `status` of the forward kinematics: the tool points nearly up or down, so that roll and yaw are ill-conditioned.
+/// `status` of the forward kinematics: the tool points nearly up or down, so roll and yaw are ill-conditioned.
 pub const STEEP: u32 = 1;
 /// `status` of the forward kinematics: an input is out of range, NaN or infinite.
 pub const NO_ANGLE: u32 = 2;
@@ -43,8 +43,8 @@ pub const STRAIGHT: f64 = 1.0 / 1_048_576.0;
 /// Squared distance from joint 1's axis below which the inverse reports the axis singularity, mm².
 pub const AXIS_RADIUS2: f64 = 1.0;
 
-/// Margin of stated accuracy: the sines of θ5 and of ψ (the angle between upper arm and forearm's line) and cos(pitch) are no less, 10°
-/// from the singularities.
+/// Margin of stated accuracy: lower limit on the sines of θ5 and of ψ (the angle between upper arm and forearm's line) and on cos(pitch),
+/// 10° from the singularities.
 pub const MARGIN: f64 = 0.173_648_177_666_930_33;
 /// Margin of stated accuracy: least distance of the wrist's centre from joint 1's axis, mm.
 pub const AXIS_MARGIN: f64 = 50.0;

@@ -190,7 +190,7 @@ fn index(configuration: Configuration) -> usize {
     configuration.iter().rev().fold(0, |index, &bit| 2 * index + usize::from(bit))
 }
 
-/// A pose moved by 0.01 mm along an axis does not have this failure, so that the pose is at the limit of reach or singularity.
+/// A pose moved by 0.01 mm along an axis does not have this failure: the pose is at the limit of reach or singularity.
 fn is_just_beyond(pose: &Pose<f32>, tool: [f64; 3], configuration: Configuration, failure: Failure) -> bool {
     let pose = wide(pose);
     [-0.01, 0.01].iter().any(|step| {
@@ -202,9 +202,9 @@ fn is_just_beyond(pose: &Pose<f32>, tool: [f64; 3], configuration: Configuration
     })
 }
 
-/// Sweeps `count` random sets of joints, each anywhere in its turn, with tools up to 2·[`A1`] long in each direction.
+/// Sweeps `count` random sets of joints, over the full turn of each joint, with tools up to 2·[`A1`] long in each direction.
 ///
-/// Each set goes forward; the pose goes back through all eight configurations, and every solution forward again.
+/// Each set goes through the forward program; its pose goes back through all eight configurations, and every solution forward again.
 pub fn sweep<A: Arm>(
     arm: &mut A,
     count: u64,

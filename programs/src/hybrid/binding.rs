@@ -15,7 +15,7 @@ pub struct Binding {
     pub outputs: [Register; OUTPUTS.len()],
 }
 
-/// Reason why a program is no tracking program.
+/// Reason why a program is not a tracking program.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum BindingError {
     /// An input port that the algorithm does not have.

@@ -47,7 +47,7 @@ pub trait TrackingController {
     ///
     /// # Errors
     ///
-    /// A failure after which the controller cannot go on.
+    /// A failure after which the controller cannot continue.
     fn step(&mut self, inputs: &Inputs) -> Result<Outputs<f64>, Self::Error>;
 }
 
@@ -87,7 +87,7 @@ pub struct Record {
     pub tool_error: f64,
 }
 
-/// Reason why a closed loop cannot go on.
+/// Reason why a closed loop cannot continue.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum LoopError<E> {
     /// The controller failed in this period.

@@ -68,7 +68,7 @@ pub fn gravity<T: Real>(length: [T; 3], point: [T; 3]) -> [T; 3] {
     gravity_of(gravity_mass(length), length, point)
 }
 
-/// [`gravity`] of another mass, kg.
+/// [`gravity`] for another mass, kg.
 #[inline]
 pub(super) fn gravity_of<T: Real>(mass: T, length: [T; 3], point: [T; 3]) -> [T; 3] {
     let [x, y, z] = point;

@@ -50,7 +50,7 @@ const fn plain(coulomb: f64, sign_speed: f64, viscous: f64) -> Friction {
     Friction { coulomb, stribeck: 0.0, stribeck_speed: 1.0, sign_speed, viscous }
 }
 
-/// Forces of the arms, N, that accelerate platform, sliders and arms along the reference, each mass with its motion when all arms move.
+/// Forces of the arms, N, that accelerate platform, sliders and arms along the reference, with the arms' motions coupled.
 ///
 /// The force `F` with `Σ u_i·F_i = (m_p + Σ κ_j)·ẍ + Σ (m_s - κ_j)·u_j·(u_j·ẍ)`: a term of the second sum is a force along its own arm, and
 /// the first is solved in closed form, like gravity. `length` holds the measured lengths, m, that also determine the reduced masses.

@@ -51,7 +51,7 @@ pub struct Block {
     pub periods: u32,
 }
 
-/// Reason why a move fits no block.
+/// Reason why a move does not fit a block.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum BlockError {
     /// A coordinate out of range.
@@ -134,7 +134,7 @@ fn words(pose: &Pose, line: usize) -> Result<[i32; 5], BlockError> {
     ])
 }
 
-/// Nearest integer in a unit. Half the range is allowed, so that the difference of two integers fits, too.
+/// Nearest integer in a unit. Half the range is allowed, so the difference of two integers fits, too.
 fn integer(value: f64, unit: f64, line: usize) -> Result<i32, BlockError> {
     let rounded = (value / unit).round();
     let fits = rounded.abs() <= f64::from(i32::MAX / 2);

@@ -192,7 +192,7 @@ fn gauss(mut equations: [[f64; 5]; 4]) -> Option<[f64; 4]> {
         equations.swap(column, pivot);
         let chosen = equations[column];
         let scale = chosen[..4].iter().fold(0.0, |largest: f64, value| largest.max(value.abs()));
-        // Written so that a NaN is no pivot.
+        // Written so that a NaN is rejected as a pivot.
         let usable = chosen[column].abs() > 1e-13 * scale;
         if !usable {
             return None;

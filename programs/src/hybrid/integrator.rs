@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Nonlinear integrator of one axis, (29)-(35) and (37).
 //!
-//! Friction changes sign with the reference velocity; the integrator is boosted for `Tc` after a reversal, so that it unwinds the old
+//! Friction changes sign with the reference velocity; the integrator is boosted for `Tc` after a reversal, so it unwinds the old
 //! friction and winds up the new one sooner.
 
 use super::params;

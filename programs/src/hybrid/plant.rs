@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Plant for closing the loop: the full coupled manipulator with friction, actuators and encoders.
 //!
-//! Deliberately more than the decoupled model of the controller. The specification leaves open how a period is integrated and how it
-//! begins; here each of its [`PLANT_STEPS`](params::PLANT_STEPS) steps first lets the actuators follow, then the velocity with the
-//! acceleration, then the position with the new velocity (semi-implicit Euler), and the plant begins at rest with its actuators balancing
-//! gravity. Explicit Euler, an exact exponential for the lag and the other order of lag and motion were tried: the largest tool errors move
-//! by less than half a per cent.
+//! The plant deliberately models more than the controller's decoupled model. The specification leaves open how a period is integrated and
+//! how it begins; here each of its [`PLANT_STEPS`](params::PLANT_STEPS) steps updates first the actuators, then the velocity by the
+//! acceleration, then the position by the new velocity (semi-implicit Euler), and the plant begins at rest with its actuators balancing
+//! gravity. With explicit Euler, an exact exponential for the lag, or the opposite order of lag and motion, the largest tool errors
+//! change by less than half a per cent.
 
 use super::dynamics::{dot, end_inertia_of, gravity_mass_of, gravity_of, solve};
 use super::kinematics::{Reference, arms, inverse};

@@ -6,9 +6,9 @@
 //! would overshoot, `V = L/Tr`. The duration `L/V + Tr` is rounded up to whole periods and the profile
 //! stretched to it, with the derivatives scaled to match. The rotary axes follow the same `s`.
 //!
-//! Rounding up is the plain binary64 `ceil((L/V + Tr)/Ts)`, with lengths in metres, without a tolerance. Several moves of the AGH path last
-//! a whole number of periods on paper and an ulp more in binary64; each gets one more period, which gives the 346,666 periods that the
-//! specification counts (346,661 otherwise).
+//! Rounding up is the plain binary64 `ceil((L/V + Tr)/Ts)`, with lengths in metres, without a tolerance. Several moves of the AGH path
+//! take a whole number of periods in exact arithmetic and an ulp more in binary64; each gets one more period, which gives the 346,666
+//! periods that the specification counts (346,661 otherwise).
 
 use super::gcode::Program;
 use super::kinematics::Reference;

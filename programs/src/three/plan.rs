@@ -65,7 +65,7 @@ pub fn admissible(way: impl Fn(f64) -> SixValues, curved: bool, limits: &Limits,
 /// Shortest course within the largest speed and acceleration.
 ///
 /// # Errors
-/// If the demand exceeds them.
+/// If the demand exceeds these limits.
 pub fn course(demand: Demand, profile: Profile, (fastest, strongest): (f64, f64)) -> Result<Course, Refusal> {
     // Acceleration of a ramp of duration t to the speed v: top·v/t.
     let root = profile.top() / strongest;

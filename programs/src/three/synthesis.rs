@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Motion through any number of points: courses of the segments one after the other, overlapping where a point is passed without a stop.
+//! Motion through any number of points: the segments' courses in sequence, overlapping where the motion passes a point without stopping.
 
 use super::profile::Course;
 use super::{PERIOD, SixValues};
@@ -11,7 +11,7 @@ pub struct Segment {
     pub to: SixValues,
     /// Course of the motion along the segment.
     pub course: Course,
-    /// Passes its end: the next segment begins during the final ramp.
+    /// Passes its end without stopping: the next segment begins during the final ramp.
     pub via: bool,
 }
 

@@ -56,8 +56,8 @@ fn machines_and_schedules_agree_bit_for_bit() {
     }
 }
 
-/// Comparison of `tracking_equations.s` with `tracking.s`: outputs, state and flags bit for bit on every machine, every period in the same
-/// cycles on t1 and nearly so elsewhere, from half the lines.
+/// Compares `tracking_equations.s` with `tracking.s`: outputs, state and flags agree bit for bit on every machine; periods take the same
+/// cycles on t1 and nearly the same elsewhere; the source has half the lines.
 #[test]
 fn equations_agree_with_the_hand_written_program() {
     let stimuli = stimuli();

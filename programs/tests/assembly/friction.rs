@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Tests of `tracking_friction.s` alone, beside its share in every other test.
+//! Tests of `tracking_friction.s` alone; it also takes part in the tests of all programs.
 
 use super::inputs::{moves, recorded};
 use super::processor::{FRICTION, Processor, source};

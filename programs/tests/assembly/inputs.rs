@@ -88,8 +88,8 @@ pub(crate) fn reference(random: &mut Random) -> Reference<f32> {
     .convert()
 }
 
-/// Two consecutive periods near a random reference, which is the same in both: the axes are off by between a count or two and 0.1 m or rad,
-/// and move at about the reference's velocity.
+/// Two consecutive periods near a random reference, the same in both. The axes are off by a count or two up to 0.1 m or rad, and move at
+/// about the reference's velocity.
 pub(crate) fn pair(random: &mut Random) -> [Inputs; 2] {
     let reference = reference(random);
     let joint = inverse(&reference.convert::<f64>());

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Nonlinear integrator in open loop: reversals, both thresholds of `tc`, errors on either side of `ec`, saturation.
 //!
-//! The reference keeps its position while its velocity changes at will, and the encoders are off by as many counts as a scenario needs; the
-//! law takes only the sign of the velocity and the error, so that the two need not be consistent.
+//! The reference keeps its position while its velocity changes at will, and the encoders are off by the counts that a scenario needs; the
+//! law uses only the sign of the velocity and the error, so the two need not be consistent.
 
 use super::inputs::Random;
 use super::law::Velocity;
@@ -19,7 +19,7 @@ use takt_programs::hybrid::{Inputs, Reference};
 pub(crate) enum EncoderError {
     /// Less than `ec`: a boost ends at `Tc/2`.
     Below,
-    /// More than `ec`: a boost goes on to `Tc`.
+    /// More than `ec`: a boost lasts until `Tc`.
     Above,
     /// Randomly less or more than `ec` in every period.
     Mixed,
@@ -53,7 +53,7 @@ impl EncoderError {
     }
 }
 
-/// Directions of the reference, one run of periods after the other: `vx`, `vy`, `vz` in m/s, `ωα`, `ωγ` in rad/s.
+/// Directions of the reference in successive runs of periods: `vx`, `vy`, `vz` in m/s, `ωα`, `ωγ` in rad/s.
 ///
 /// A boost lasts 500 periods, its first half 250: there are runs that pass both thresholds, and runs that end just before, at and just
 /// after each. Zero counts as a direction. A change of speed alone, as after the first 40 of 260, is no reversal.
@@ -90,7 +90,7 @@ pub(crate) fn scenario(off: EncoderError, seed: u64) -> Vec<Inputs> {
         let reference =
             Reference { velocity: [vx, vy, vz], angular_velocity: [omega_alpha, omega_gamma], ..rest }
                 .convert();
-        // The error changes its sign with the direction, so that only `Far` saturates.
+        // The error changes its sign with the direction, so only `Far` saturates.
         let sign = if direction % 2 == 0 { 1 } else { -1 };
         for _ in 0..periods {
             let counts = std::array::from_fn(|i| at_rest[i] + sign * off.counts(i, &mut random));

@@ -66,7 +66,7 @@ pub(crate) struct Figures {
     /// is the sum of these, and of the integral of an ulp of position so far.
     pub(crate) ideal: LargestError,
     /// Error of `F` and `τ` against [`Law`], given the program's `l_d`, `v_d`, `a_d` and the measured values in binary32, in ulps of the
-    /// largest term and of the integrator's sums. No error is magnified here, so that errors of a millionth in masses, gravity, gains and
+    /// largest term and of the integrator's sums. No error is magnified here, so errors of a millionth in masses, gravity, gains and
     /// integrator show. A dozen roundings lead to a force.
     pub(crate) law: LargestError,
     /// Error of the integrators against [`Law`]'s, in ulps of the sum, one for each period: adding costs half an ulp, the step another half

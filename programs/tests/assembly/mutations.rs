@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Mutation test: every single mistake in `tracking.s` and `tracking_friction.s` must be noticed.
 //!
-//! Mistakes change the source's text: in every line with an instruction another operation, operands exchanged, a constant off by a
-//! ten-thousandth; in every named constant of the robot the same; and some by hand. Exchanged operands of sums and products are no mistake,
-//! and must pass.
+//! Mutations change the source's text: every instruction gets another operation, exchanged operands, or a constant off by a
+//! ten-thousandth; every named constant of the robot is changed likewise; and a few mistakes are made by hand. Exchanging the operands of
+//! sums and products is no mistake, and must pass.
 
 use super::integrator::{self, EncoderError};
 use super::measure::bounds;
@@ -23,7 +23,7 @@ struct Mutation {
     to: String,
 }
 
-/// The line of `tracking.s` is in a part that only its variant assembles.
+/// The line of `tracking.s` is in a part that only its friction variant assembles.
 fn is_variants(line: usize) -> bool {
     let mut within = false;
     for text in source(TRACKING).lines().take(line) {
@@ -47,7 +47,7 @@ fn is_sticking(line: usize) -> bool {
     })
 }
 
-/// Program that contains the mistake.
+/// Program that assembles the mutated line.
 fn victim(mutation: &Mutation) -> &'static str {
     let friction = mutation.file == FRICTION || mutation.file == TRACKING && is_variants(mutation.line);
     if friction { FRICTION } else { TRACKING }
@@ -110,7 +110,7 @@ fn is_expression(operand: &str) -> bool {
     operand.contains(['*', '/', '^', '(']) || operand.starts_with(|c: char| c.is_ascii_digit())
 }
 
-/// Factor for a mistake in a constant: the smallest that must be noticed.
+/// Factor for a mistake in a constant: the smallest that the tests must notice.
 ///
 /// - `ec` is a threshold between errors that are whole counts.
 /// - `fall` and its sources change only the second half of a boost; a change by a ten-thousandth is less than rounding.

@@ -6,8 +6,8 @@ use super::measure::{Comparison, Figures, bounds};
 use super::processor::{PROGRAMS, Processor, full};
 use takt_isa::{MACHINES, T3};
 
-/// Errors of a program at random points, from reset for every point: a first period supplies previous counts, a second is measured with
-/// them.
+/// Errors of a program at random points. Each point starts from reset: a first period supplies the previous counts, and a second is
+/// measured.
 pub(crate) fn measure(path: &str, processor: &Processor, points: u64, seed: u64) -> Figures {
     let mut random = Random::new(seed);
     let mut comparison = Comparison::new(path);

@@ -35,7 +35,7 @@ fn listings_take_the_documented_cycles() {
     }
 }
 
-/// Programs that the book opens in the playground.
+/// Complete programs of the listings, which the book opens in the playground.
 #[test]
 fn every_listings_program_assembles() {
     let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs");

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Period of a straight-line program over many operands at once: each operation in the order of its bundles, by the machine's arithmetic.
-//! The interlocks make a machine's results independent of timing, so that this is the emulator's result, many times faster; `functions.rs`
+//! The interlocks make a machine's results independent of timing, so this is the emulator's result, many times faster; `functions.rs`
 //! compares the two.
 
 use std::collections::HashMap;
@@ -8,13 +8,13 @@ use takt_isa::fp::{Flags, Host};
 use takt_isa::spec::check::MAX_SLOTS;
 use takt_isa::{Effect, Program, ROWS, Register, compute};
 
-/// Operands at once: as many as the first-level cache holds with some dozens of registers.
+/// Operands per run: as many as the first-level cache holds for a few dozen registers.
 pub(crate) const LANES: usize = 128;
 
 type Column = [u32; LANES];
 type Kernel = fn(&Column, &Column, &Column, &mut Column, &mut [Flags; LANES]);
 
-/// Operation of one row over all lanes; the row is a compile-time constant, so that the loop contains its arithmetic only.
+/// Operation of one row over all lanes; the row is a compile-time constant, so the loop contains its arithmetic only.
 fn kernel<const ROW: usize>(a: &Column, b: &Column, c: &Column, d: &mut Column, flags: &mut [Flags; LANES]) {
     if ROW >= ROWS.len() {
         return;

@@ -19,7 +19,7 @@ pub(crate) struct Function {
     pub(crate) own: bool,
     /// Limit of the domain: beyond this magnitude, the result is NaN and invalid.
     pub(crate) limit: f32,
-    /// Pole: finite operand with an infinite result that is no overflow.
+    /// Pole: finite operand with an infinite result that is not an overflow.
     pub(crate) pole: f32,
     /// Treatment of a NaN operand.
     pub(crate) passes: Passes,

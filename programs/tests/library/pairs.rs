@@ -60,7 +60,7 @@ fn measure(
     pieces.into_iter().fold(ErrorStatistics::default(), ErrorStatistics::join)
 }
 
-/// Operands of a power by turns: random bits; a base of any size and an exponent that leads to a result of any size; a base near 1;
+/// Operands of a power, in turn: random bits; a base of any size and an exponent that leads to a result of any size; a base near 1;
 /// integers and halves.
 fn draw_power(index: u64, random: &mut SplitMix64) -> [u32; 2] {
     let bits = random.next_u64();
@@ -121,7 +121,7 @@ fn powers_are_within_the_documented_error() {
     }
 }
 
-/// Operands of a remainder by turns: random bits; quotients up to 2^24; multiples and their neighbours; subnormals.
+/// Operands of a remainder, in turn: random bits; quotients up to 2^24; multiples and their neighbours; subnormals.
 fn draw_remainder(index: u64, random: &mut SplitMix64) -> [u32; 2] {
     let bits = random.next_u64();
     let (x, y) = (bits as u32, (bits >> 32) as u32);

@@ -155,7 +155,7 @@ impl PeriodObservation {
     }
 }
 
-/// Observations of a tick: the controls, the encoders' counts, the points received, the reference.
+/// Observations of a tick: controls, encoder counts, points received, reference.
 pub(crate) type TickObservation = (SixValues, [i32; 6], Option<[Point; 6]>, SixValues);
 
 /// Registers of frequently read output ports.

@@ -26,8 +26,8 @@ fn planned(from: &SixValues, to: &SixValues, demand: Demand, profile: Profile, v
     course(demand, profile, (speed * 0.999, acceleration * 0.95 * share)).expect("it is possible")
 }
 
-/// Errors of angles, velocities and accelerations against a motion that began in the first period seen; accelerations are left out in
-/// `steps`, where they have two values.
+/// Errors of angles, velocities and accelerations against a motion that began in the first observed period. Accelerations in the periods
+/// `steps` are skipped, since they jump there.
 fn errors(seen: &[PeriodObservation], motion: &Motion, steps: &[u32]) -> [f64; 3] {
     let mut worst = [0f64; 3];
     for (k, seen) in seen.iter().enumerate() {
@@ -84,7 +84,7 @@ fn each_profile_is_its_binary64_model() {
     }
 }
 
-/// Continuity: of the velocity; of the acceleration, except with the rectangular profile; of the jerk with the cosine.
+/// Checks continuity: of the velocity, of the acceleration except with the rectangular profile, and of the jerk with the cosine profile.
 fn continuous(seen: &[PeriodObservation], course: Course, from: &SixValues, to: &SixValues) {
     let longest = apart(from, to);
     let ramp = f64::from(course.ramp) * PERIOD;

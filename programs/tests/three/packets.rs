@@ -13,7 +13,7 @@ fn the_checksum_is_zlibs() {
     assert_eq!(checksum(&[0x5404_0000, 2]), 0x9929_3cff);
 }
 
-/// Sends words while the robot moves; it must stop for the cause, report it once, refuse further commands, and go on after a reset.
+/// Sends words while the robot moves; it must stop for the cause, report it once, refuse further commands, and continue after a reset.
 fn stops(bench: &mut Bench, words: &[u32], cause: u32, forward: bool) {
     bench.reports.clear();
     let mut to = HOME;
@@ -122,7 +122,7 @@ fn rejects_contradictory_demands() {
     assert_eq!(bench.until(REFUSED, jog).cause, 6);
     let jog = bench.send(3, &[vec![3], bits(&[0.0; 6])].concat());
     assert_eq!(bench.until(REFUSED, jog).cause, 3);
-    // Refusals are no errors: the next motion runs.
+    // Refusals are not errors: the next motion runs.
     let mut near = HOME;
     near[5] += 0.01;
     let sequence = bench.motion(MOVE, near, good);

@@ -71,7 +71,7 @@ fn every_packet_is_answered() {
     let stop = bench.send(STOP, &[]);
     assert_eq!(bench.until(STOPPED, stop).cause, 0);
     bench.until_mode(0);
-    // Operation goes on after the stop.
+    // Operation continues after the stop.
     bench.run(60);
     let output = bench.send(OUTPUT, &[2, 2]);
     bench.until(FINISHED, output);

@@ -57,7 +57,7 @@ fn a_digital_input_counts_once_it_has_stood_for_two_periods() {
     assert_eq!(tracked(0b10, 3 * PERIOD).last(), Some(&0b10));
 }
 
-/// A kinematic core with ticks a quarter as often misses half of the requested periods.
+/// A kinematic core that ticks a quarter as often misses half of the requested periods.
 #[test]
 fn a_kinematic_core_behind_its_time_is_an_error() {
     let mut description = description().clone();

@@ -61,8 +61,8 @@ fn a_line_is_straight_and_its_joints_are_binary64s() {
     println!("pose {off:.2e} m and rad, joints {worst:?}, reported pose {tool:.2e}");
     assert!(off < 3e-6, "{off}");
     assert!(tool < 2e-6, "{tool}");
-    // The acceleration is a difference over a period: late by half a period, and as noisy as the velocity's last places. The servo
-    // compensates the resulting error of the nominal control, which is less than a count of the encoders.
+    // The acceleration is a difference over a period: it lags by half a period and is as noisy as the last digits of the velocity. The
+    // servo compensates the resulting error of the nominal control, which is less than a count of the encoders.
     assert!(worst[0] < 5e-6 && worst[1] < 5e-5 && worst[2] < 0.2, "{worst:?}");
     let count = std::f64::consts::TAU / f64::from(1 << 18);
     let behind = worst[2] / (std::f64::consts::TAU * 15.0).powi(2);

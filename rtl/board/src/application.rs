@@ -167,7 +167,7 @@ impl Application<'_> {
         Application { arrays, ..self }
     }
 
-    /// Names of an array's elements, in order of indices; `None` if the name is no array's (`M`, in a system `core.M`).
+    /// Names of an array's elements, in order of indices; `None` if the name is not an array's (`M`, in a system `core.M`).
     pub fn elements(&self, name: &str) -> Option<Vec<String>> {
         let (core, own) = match name.split_once('.') {
             Some((core, own)) if !self.is_program => (self.description.core_named(core)?, own),
@@ -189,7 +189,7 @@ impl Application<'_> {
         (!elements.is_empty()).then(|| elements.into_iter().map(full).collect())
     }
 
-    /// The application is a single program, whose ports are no endpoints of links.
+    /// The application is a single program, whose ports are not endpoints of links.
     pub fn is_program(&self) -> bool {
         self.is_program
     }

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Boards, as data: `rtl/board/boards/*.toml`, each with its sources named, and files of the same form that a user writes.
+//! Boards as data: the files `rtl/board/boards/*.toml`, which name their sources, and files of the same form that a user writes.
 
 use crate::document::{Document, Located, Mistake, Table};
 use std::collections::BTreeMap;
 use takt_family::{FAMILIES, Family, Part, Pinout, Pull, Sites};
 
-/// The files that come with this crate, by the name of the board.
+/// Files that come with this crate, by the name of the board.
 const FILES: &[(&str, &str)] = &[
     ("ulx3s-85f", include_str!("../boards/ulx3s-85f.toml")),
     ("ulx3s-45f", include_str!("../boards/ulx3s-45f.toml")),
@@ -14,18 +14,18 @@ const FILES: &[(&str, &str)] = &[
     ("icepi-zero", include_str!("../boards/icepi-zero.toml")),
 ];
 
-/// A board.
+/// FPGA board, as described by its file.
 #[derive(Clone, Debug)]
 pub struct Board {
     /// Name on the command line.
     pub name: String,
     /// Description in a sentence.
     pub text: String,
-    /// The source of its facts.
+    /// Source of the facts in the board's file.
     pub source: String,
     /// The device's family.
     pub family: &'static Family,
-    /// The device on it.
+    /// FPGA on the board.
     pub device: &'static Part,
     /// The family's packages and pins.
     pub pinout: &'static Pinout,
@@ -33,9 +33,9 @@ pub struct Board {
     pub package: String,
     /// The device's speed grade.
     pub grade: u8,
-    /// The level of its pins.
+    /// I/O standard of all pins.
     pub standard: String,
-    /// Sites that are driven high, always.
+    /// Sites that are always driven high.
     pub high: Vec<String>,
     /// The site of the clock, and its frequency in MHz.
     pub clock: (String, f64),
@@ -78,10 +78,10 @@ impl Board {
         FILES.iter().map(|(name, _)| *name)
     }
 
-    /// The board of this name.
+    /// Finds a board that comes with this crate; `None` for an unknown name.
     ///
     /// # Errors
-    /// Mistakes in its file.
+    /// Mistakes in the board's file.
     pub fn from_name(name: &str) -> Option<Result<Board, Vec<Mistake>>> {
         let (_, text) = FILES.iter().find(|(board, _)| *board == name)?;
         Some(Board::read(&format!("{name}.toml"), text))
@@ -90,15 +90,15 @@ impl Board {
     /// Reads a board from the text of a file.
     ///
     /// # Errors
-    /// Everything that is wrong with it, in the order of the file.
+    /// All mistakes in the file, in its order.
     pub fn read(file: &str, text: &str) -> Result<Board, Vec<Mistake>> {
         Board::read_among(file, text, FAMILIES)
     }
 
-    /// Reads a board as [`Board::read`] does, whose device is of one of these families.
+    /// Reads a board like [`Board::read`]; its device must be of one of these families.
     ///
     /// # Errors
-    /// Everything that is wrong with it, in the order of the file.
+    /// All mistakes in the file, in its order.
     pub fn read_among(
         file: &str,
         text: &str,
@@ -115,7 +115,7 @@ impl Board {
     }
 }
 
-/// One of a list, or a mistake that names them.
+/// Looks up a value in a list; a mistake names the valid values.
 fn one_of<'a>(
     document: &Document<'_>,
     what: &str,
@@ -148,7 +148,7 @@ fn board(document: &Document<'_>, top: &Table<'_>, families: &'static [&'static 
     let parts: Vec<&str> = devices.iter().map(|(part, ..)| part.name).collect();
     let part = text(top, "part").and_then(|part| one_of(document, "device", &part, &parts));
     let device = devices.into_iter().find(|(device, ..)| Some(device.name) == part);
-    // Names of an unknown device's package and pins are taken as they are: the file's other mistakes are still found.
+    // With an unknown device, names of package and pins are not checked, so that the file's other mistakes are still found.
     let pinout = device.map(|(_, _, pinout)| pinout);
     let known = |what, given: &Located<String>, all: fn(&Pinout) -> &'static [&'static str]| {
         pinout.and_then(|pinout| one_of(document, what, given, all(pinout)))
@@ -232,16 +232,16 @@ fn board(document: &Document<'_>, top: &Table<'_>, families: &'static [&'static 
     })
 }
 
-/// Sites that are taken, and by what.
+/// Sites in use, each with its user and line.
 struct SiteAllocation<'a> {
     document: &'a Document<'a>,
-    /// Names of the device's pins; none if it is unknown.
+    /// Form of the names of the device's pins; `None` for an unknown device.
     sites: Option<Sites>,
     taken: std::cell::RefCell<BTreeMap<String, (String, usize)>>,
 }
 
 impl SiteAllocation<'_> {
-    /// The site, if it looks like one and is not taken.
+    /// Takes a site, if its name is valid and it is free.
     fn take(&self, site: Located<String>, by: &str) -> Option<String> {
         if let Some(sites) = self.sites.filter(|sites| !(sites.is_site)(&site.value)) {
             let text = format!("`{}` is no site; a site is {}", site.value, sites.form);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! From a circuit to a bitstream: yosys, nextpnr, and what packs the family's bitstreams.
+//! Builds a bitstream from a circuit: yosys, nextpnr, and the packing program of the family.
 
 use crate::application::Application;
 use crate::boards::Board;
@@ -20,7 +20,7 @@ pub(crate) const ROUTED: &str = "routed.json";
 /// yosys' netlist, in the same folder.
 const NETLIST: &str = "netlist.json";
 
-/// The reason for which there is no bitstream.
+/// Reason why there is no bitstream.
 #[derive(Debug, Error)]
 pub enum BuildError {
     /// There is no circuit.
@@ -37,7 +37,7 @@ pub enum BuildError {
     /// A file cannot be written or read.
     #[error("{0}: {1}")]
     File(String, io::Error),
-    /// nextpnr's report is none.
+    /// nextpnr's report cannot be read.
     #[error("nextpnr's report {0} cannot be read")]
     Report(String),
     /// The clock is not met.
@@ -59,24 +59,24 @@ pub enum BuildError {
 pub struct Options {
     /// Seed of the placement.
     pub seed: u32,
-    /// True if nextpnr writes the routed netlist, too, for [`crate::netlist`].
+    /// nextpnr also writes the routed netlist, for [`crate::netlist`].
     pub netlist: bool,
 }
 
 /// The result of a build.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Report {
-    /// Each clock: net, MHz that it reaches, MHz that it has to.
+    /// Clocks: net, reached frequency, required frequency, both in MHz.
     pub clocks: Vec<(String, f64, f64)>,
-    /// Resources by nextpnr's name: how many are used, and how many there are.
+    /// Resources by nextpnr's name: number used, and number available.
     pub used: BTreeMap<String, (u64, u64)>,
     /// File of the bitstream.
     pub bitstream: &'static str,
-    /// Bytes of the bitstream.
+    /// Size of the bitstream in bytes.
     pub bytes: u64,
     /// Records of the program in block RAM.
     pub records: usize,
-    /// Records that there is room for.
+    /// Number of records that the image has room for.
     pub room: usize,
 }
 
@@ -107,7 +107,7 @@ pub fn packages(board: &Board) -> Result<[&'static str; 2], BuildError> {
 /// Writes the circuit into a folder.
 ///
 /// # Errors
-/// If there is none, or a file cannot be written.
+/// If there is no circuit, or a file cannot be written.
 pub fn write<'a>(
     board: &Board,
     wiring: &Wiring,
@@ -129,7 +129,7 @@ fn put(folder: &Path, name: &str, text: &str) -> Result<(), BuildError> {
     made.map_err(|error| BuildError::File(path.display().to_string(), error))
 }
 
-/// Builds the bitstream, its `report.json` and `manifest.json` in a folder. `step` is told what begins.
+/// Builds the bitstream, its `report.json` and `manifest.json` in a folder. `step` gets a description of each step as it begins.
 ///
 /// # Errors
 /// If a tool fails, or the clock is not met: there is then no bitstream.
@@ -179,7 +179,7 @@ pub fn build<'a>(
     }
     placed?;
     let report = report.ok_or_else(|| BuildError::Report(path("report.json")))?;
-    // A report without the core's clock says nothing of it.
+    // A report without the core's clock proves nothing about it.
     if !clocks.iter().any(|(_, _, wanted)| (wanted / wiring.clock - 1.0).abs() < 0.01) {
         return Err(BuildError::Report(path("report.json")));
     }

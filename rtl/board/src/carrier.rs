@@ -42,16 +42,16 @@ pub enum TickPlace {
     Valley,
     /// At peaks.
     Peak,
-    /// At both.
+    /// At valleys and at peaks.
     Both,
 }
 
-/// Ticks that a carrier gives.
+/// Ticks that follow a carrier.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CarrierTick {
     /// Index of the carrier.
     pub carrier: usize,
-    /// Places before the ticks.
+    /// Place that precedes each tick.
     pub place: TickPlace,
     /// Cycles from a place to its tick.
     pub after: u32,
@@ -67,7 +67,8 @@ pub struct Instant {
 }
 
 impl Wiring {
-    /// Positions of a carrier in the cycles of the board's ticks; `None` if no carrier gives the ticks, or the carrier does not fit those.
+    /// Positions of a carrier in the cycles of the board's ticks; `None` if no carrier gives the ticks, or this carrier's period does not
+    /// fit them.
     pub fn tick_positions(&self, carrier: usize) -> Option<Vec<u32>> {
         let tick = self.tick.as_ref()?;
         let (from, to) = (self.carriers.get(tick.carrier)?, self.carriers.get(carrier)?);

@@ -25,7 +25,7 @@ pub struct Findings {
     pub warnings: Vec<Mistake>,
 }
 
-/// The wiring, with a list of findings for each degree.
+/// The wiring, with a list of findings for each severity.
 struct Fit<'a> {
     wiring: &'a Wiring,
     mistakes: Document<'a>,
@@ -137,7 +137,7 @@ impl Fit<'_> {
                 "a tick can be missed: a period of the program takes up to {}: {mend}",
                 figures(busy.worst)
             );
-            // On a carrier, the time of a deadline is what the wiring is for.
+            // On a carrier, the program must meet its deadline: report a mistake instead of a warning.
             let list = if self.wiring.tick.is_some() { &self.mistakes } else { &self.warnings };
             list.mistake(&place, text);
         }

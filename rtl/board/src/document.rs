@@ -154,19 +154,19 @@ impl<'a> Table<'a> {
         self.get(key, "true or false", DeValue::as_bool)
     }
 
-    /// Integer of a range.
+    /// Integer within a range.
     pub(crate) fn integer(&self, key: &'static str, least: u32, most: u32) -> Option<Located<u32>> {
         let Located { value, place } = self.signed(key, least.into(), most.into())?;
         u32::try_from(value).ok().map(|value| Located { value, place })
     }
 
-    /// Integer of a range that may begin below 0.
+    /// Integer within a range that may begin below 0.
     pub(crate) fn signed(&self, key: &'static str, least: i64, most: i64) -> Option<Located<i64>> {
         let expected = format!("a whole number from {least} to {most}");
         self.get(key, &expected, |value| integer(value).filter(|n| (least..=most).contains(n)))
     }
 
-    /// Number of a range.
+    /// Number within a range.
     pub(crate) fn number(&self, key: &'static str, least: f64, most: f64) -> Option<Located<f64>> {
         let expected = format!("a number from {least} to {most}");
         self.get(key, &expected, |value| number(value).filter(|n| (least..=most).contains(n)))
@@ -197,7 +197,7 @@ impl<'a> Table<'a> {
         value
     }
 
-    /// All keys, which must have texts.
+    /// All keys, whose values must be texts.
     pub(crate) fn texts(&self) -> Vec<(Located<String>, Located<String>)> {
         let mut texts = Vec::new();
         for (key, value) in &self.entries {
@@ -219,7 +219,7 @@ impl<'a> Table<'a> {
         texts
     }
 
-    /// All keys, which must have numbers.
+    /// All keys, whose values must be numbers.
     pub(crate) fn numbers(&self) -> Vec<(Located<String>, Located<f64>)> {
         let mut numbers = Vec::new();
         for (key, value) in &self.entries {
@@ -235,7 +235,7 @@ impl<'a> Table<'a> {
         numbers
     }
 
-    /// All keys, which must have tables, in the order of the file.
+    /// All keys, whose values must be tables, in the order of the file.
     pub(crate) fn tables(&self) -> Vec<(Located<String>, Table<'a>)> {
         let mut tables = Vec::new();
         for (key, value) in &self.entries {

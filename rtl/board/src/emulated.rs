@@ -210,7 +210,7 @@ impl EmulatedBoard {
         self.stop = level;
     }
 
-    /// True while the outputs drive.
+    /// The outputs drive.
     pub fn drives(&self) -> bool {
         self.control & (RUN | ENABLE) == RUN | ENABLE && self.begun && self.causes == 0
     }
@@ -411,7 +411,7 @@ impl EmulatedBoard {
             self.silent = 0;
             self.set.clear();
             self.values.fill(0);
-            // `Emulated::new` has checked that the program fits.
+            // `EmulatedBoard::new` has checked that the program fits.
             self.system = starts.then(|| System::new(&self.description).ok()).flatten();
         }
         if starts {

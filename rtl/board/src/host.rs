@@ -29,7 +29,7 @@ const PART: usize = 64;
 /// Time limit of a request with all its attempts.
 const LIMIT: Duration = Duration::from_secs(90);
 
-/// Times that a program is asked for its `wait`, with a pause of the line in between.
+/// Limit on the polls for the program's `wait`, with a pause of the line between two.
 const ASKED: u32 = 30;
 
 /// Connection to a board that answers.
@@ -48,7 +48,7 @@ pub struct Host<L> {
     room: usize,
 }
 
-/// Times in a row that a stream may bring nothing before it is given up.
+/// Limit on consecutive reads of a stream without a frame.
 const STILL: u32 = 50;
 
 /// Words for ports with consecutive numbers, after the address of the first port.
@@ -174,7 +174,7 @@ impl<L: Line> Host<L> {
     /// Connects to a board. `number` is the number of the first request and should differ from run to run.
     ///
     /// # Errors
-    /// If there is no answer, or the answer is no Takt board's.
+    /// If there is no answer, or the answer is not from a Takt board.
     pub fn connect(line: L, number: u8) -> Result<Host<L>, LinkError> {
         let receiver = Receiver::default();
         let mut host =
@@ -431,7 +431,7 @@ impl<L: Line> Host<L> {
         self.load_with(records, |_| ())
     }
 
-    /// Loads a program, as [`Host::load`]; `loaded` gets the number of records that each step has written and compared.
+    /// Loads a program like [`Host::load`]; `loaded` gets the number of records that each step has written and compared.
     ///
     /// # Errors
     /// See [`Host::load`].
@@ -463,7 +463,7 @@ impl<L: Line> Host<L> {
         self.set("records", records.len() as u32)
     }
 
-    /// Index of the first record that differs in the board's image. The register `records` tells how many the board has.
+    /// Index of the first record that differs in the board's image. The register `records` holds the number of records on the board.
     ///
     /// # Errors
     /// If the board does not answer.

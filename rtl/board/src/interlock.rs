@@ -7,7 +7,7 @@ use crate::protocol::{ENABLE, HOLD, Line, LinkError, RUN};
 use crate::wiring::{Peripheral, Wiring};
 use takt_isa::Type;
 
-/// The figures of a core with which a cause is told.
+/// Figures of a core that the text of a cause contains.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Figures {
     /// The register `fault`, of a core that has one.
@@ -19,7 +19,7 @@ pub(crate) struct Figures {
     pub(crate) nan: Vec<String>,
 }
 
-/// A host's command after which outputs are safe without a cause, in words, from two bits of the register `control` then.
+/// Describes the host's command that made outputs safe without a cause, from two bits of the register `control`.
 pub(crate) fn command(run: bool, enable: bool) -> &'static str {
     match (run, enable) {
         (false, _) => "it is stopped",
@@ -28,7 +28,7 @@ pub(crate) fn command(run: bool, enable: bool) -> &'static str {
     }
 }
 
-/// A trip that is held, in words, by its number.
+/// Describes a held trip, by its number.
 pub(crate) fn trip(wiring: Option<&Wiring>, number: usize) -> String {
     let Some((wiring, Peripheral { name, .. })) =
         wiring.and_then(|wiring| Some((wiring, wiring.trips().nth(number)?)))
@@ -45,7 +45,7 @@ pub(crate) fn trip(wiring: Option<&Wiring>, number: usize) -> String {
 }
 
 impl Figures {
-    /// A cause, as [`Status::causes`] names it, with its figures.
+    /// Describes a cause with its figures; `cause` is a name of [`Status::causes`].
     pub(crate) fn reason(&self, cause: &str) -> String {
         match (cause, self.fault) {
             ("fault", Some(word)) => format!("fault: {} at bundle {}", fault_kind(word), word & 0xffff),
@@ -100,8 +100,8 @@ impl<L: Line> Host<L> {
         Ok(reasons)
     }
 
-    /// Trips that are held, with the peripherals that they make safe, if the wiring is known. They come beside [`Host::safe_reasons`]: other
-    /// outputs may drive.
+    /// Trips that are held, with the peripherals that they make safe, if the wiring is known. They are separate from
+    /// [`Host::safe_reasons`], since other outputs may drive.
     ///
     /// # Errors
     /// If the board does not answer.

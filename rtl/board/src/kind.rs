@@ -48,7 +48,7 @@ pub struct Parameter {
     pub default: u32,
     /// Meaning and unit, for documentation.
     pub text: &'static str,
-    /// Names of the values from `least` on, with which a wiring states the parameter; empty of a number.
+    /// Names of the values from `least` on, with which a wiring states the parameter; empty if the parameter is a number.
     pub names: &'static [&'static str],
 }
 

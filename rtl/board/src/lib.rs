@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! From a program to a robot: the core of Takt on a board that one can buy, with signals on its pins.
+//! Takt's cores on FPGA boards, with the ports of their programs connected to pins through peripherals.
 //!
-//! [`kind`] is the table of peripherals, of which each is a Verilog file in `rtl/board/verilog/` and, in [`model`], a behavioural model in
-//! Rust. [`boards`] are the boards, as data. A user writes a [`Wiring`]: which peripherals are at which pins, and which ports of the
-//! program, or of a system's cores, are their registers; [`Application`] is that program or system.
+//! [`kind`] is the table of peripherals. Each is a Verilog file in `rtl/board/verilog/` and a behavioural model in [`model`]. [`boards`]
+//! holds the boards, as data. A user writes a [`Wiring`]: which peripherals are on which pins, and which ports of the program, or of a
+//! system's cores, are connected to their registers; [`Application`] is that program or system.
 
 mod application;
 pub mod boards;

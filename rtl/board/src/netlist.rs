@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The netlist after place and route as Verilog, so that it can be simulated like the circuit that it was made from.
+//! Netlist after place and route as Verilog, which can be simulated like the original circuit.
 //!
 //! nextpnr writes its netlist as JSON ([`crate::build::Options::netlist`]); yosys makes Verilog of it. The family has the models of the
 //! cells: those of yosys' library, and its own ([`Models`]).
@@ -15,11 +15,11 @@ use takt_rtl::export::DesignFile;
 
 /// The files that yosys reads and writes.
 const NETLIST: (&str, &str) = ("simulated.json", "simulated.v");
-/// The routed design of a folder in which [`crate::build::build`] has written it. `change` may change the netlist before (to plant
-/// a fault): it gets the cells of the top module, by name.
+/// Routed design as Verilog, from a folder where [`crate::build::build`] has written it. `change` may modify the netlist first, to plant
+/// a fault: it gets the cells of the top module, by name.
 ///
 /// # Errors
-/// If there is none, or yosys fails.
+/// If the folder has no routed design, or yosys fails.
 pub fn verilog(
     venv: &Venv,
     models: &Models,

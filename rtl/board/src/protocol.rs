@@ -15,8 +15,8 @@ pub const VERSION: u32 = 2;
 pub const INPUTS: u16 = 0x1000;
 /// Address of output port 0.
 pub const OUTPUTS: u16 = 0x2000;
-/// Addresses that each core has for its board registers, its input ports and its output ports: core *n*'s begin *n* times as many addresses
-/// further on.
+/// Number of addresses that each core has for its board registers, its input ports and its output ports. The addresses of core *n* are
+/// *n* times this number higher than those of core 0.
 pub const CORE: u16 = 0x100;
 /// Address of the first value of a link that the host drives.
 pub const DRIVEN: u16 = 0x3000;
@@ -88,7 +88,7 @@ pub const READ_ONLY: u8 = 1;
 /// Status of an answer: the program did not wait.
 pub const BUSY: u8 = 2;
 
-/// Tells if a request to this address waits until the program is between two periods.
+/// A request to this address waits until the program is between two periods.
 pub const fn waits(address: u16) -> bool {
     matches!(address >> 12, 1..=3 | 8..)
 }
@@ -192,7 +192,7 @@ pub fn record_words(core: usize, record: &LoadRecord) -> [u32; 3] {
 /// A frame from the board.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Frame {
-    /// Tells a frame of the stream from an answer.
+    /// The frame belongs to the stream; otherwise it is an answer.
     pub stream: bool,
     /// The number of the answered request; in the stream, a number that goes up by 1 with each frame sent.
     pub number: u8,
@@ -212,7 +212,7 @@ pub fn write(number: u8, address: u16, words: &[u32]) -> Vec<u8> {
     request(number, 2, words.len() as u8, address, words)
 }
 
-/// Tells if the bytes begin with a whole request.
+/// The bytes begin with a whole request.
 pub fn has_request(bytes: &[u8]) -> bool {
     let [_, _, command, count, ..] = bytes else { return false };
     let words = if *command == 2 { usize::from(*count) } else { 0 };
@@ -274,7 +274,7 @@ pub(crate) fn streamed(number: u8, words: &[u32]) -> Vec<u8> {
     from_board(STREAM, number, DONE, words)
 }
 
-/// Tells if the bytes begin with a whole request that writes.
+/// The bytes begin with a whole request that writes.
 pub fn has_write(bytes: &[u8]) -> bool {
     has_request(bytes) && bytes[2] == 2
 }
@@ -337,7 +337,7 @@ impl Receiver {
         }
     }
 
-    /// Drops the first byte: a frame that has begun, but has not ended before a pause, will not end any more.
+    /// Drops the first byte: a frame that was incomplete before a pause will never be complete.
     pub fn give_up(&mut self) {
         if !self.bytes.is_empty() {
             self.bytes.remove(0);
@@ -354,21 +354,20 @@ pub trait Line {
     /// If the line is gone.
     fn send(&mut self, bytes: &[u8]) -> std::io::Result<()>;
 
-    /// Receives the bytes that have come, after waiting a little for them; to receive no byte is no error.
+    /// Receives the bytes that have come, after waiting a little for them; receiving no byte is not an error.
     ///
     /// # Errors
     /// If the line is gone.
     fn receive(&mut self) -> std::io::Result<Vec<u8>>;
 
-    /// The number of reads in a row that may stay without a byte until the host repeats a request.
+    /// Number of consecutive reads without a byte after which the host repeats a request.
     fn patience(&self) -> u32;
 
-    /// The time that has passed on the line since any beginning: the host hears an endless stream of bytes no longer than a request may
-    /// take.
+    /// Time on the line since an arbitrary start. It limits how long the host listens to an endless stream of bytes.
     fn time(&self) -> Duration;
 }
 
-/// The reason why the board did not do what the host asked for.
+/// Reason why the board did not do what the host asked for.
 #[derive(Debug, Error)]
 pub enum LinkError {
     /// The line is gone.
@@ -379,7 +378,7 @@ pub enum LinkError {
         "no answer in {0} attempts: is this the right port, with the right baud rate, and the board's bitstream loaded?"
     )]
     Silence(u32),
-    /// Each answer came with another number of words than was asked for.
+    /// All answers had the wrong number of words.
     #[error(
         "the board answers with {came} words where {wanted} were asked for, in {attempts} attempts: its circuit is not one of `takt board build`, or of another version"
     )]
@@ -422,7 +421,7 @@ pub enum LinkError {
         "no period has ended for a while: the program has stopped, or is held; `takt live PORT status` says which"
     )]
     Still,
-    /// The port's other end is no board of Takt.
+    /// The device at the other end is not a Takt board.
     #[error("what answers is no board of Takt: its register `id` is {0:#010x}")]
     Stranger(u32),
     /// A record of the image came back different from the record that was written.
@@ -480,7 +479,7 @@ mod tests {
             receiver.put(&[byte]);
             assert!(receiver.frame().is_none(), "what noise seems to begin waits for its end");
         }
-        // A pause tells the receiver that the bytes are noise.
+        // After a pause, the receiver treats the bytes as noise.
         receiver.give_up();
         while let Some(frame) = receiver.frame() {
             found.push((frame.number, frame.words));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The moment at which outputs of a simulated board become safe: the nets of the circuit that the driver looks at in every cycle, and
-//! the reason that they give, in words.
+//! Detects when the outputs of a simulated board become safe: the nets of the circuit that the driver watches in every cycle, and the
+//! reason that they give, as text.
 
 use crate::application::Application;
 use crate::host::Status;
@@ -10,7 +10,7 @@ use crate::top::{AROUND, TOP};
 use crate::wiring::Wiring;
 use std::fmt::Write as _;
 
-/// Words of a moment, as the driver sends it: the cycle of the run, the core, then what [`Watch::header`] lists, `drive` left out.
+/// Words of a moment, as the driver sends it: the cycle of the run, the core, then the words of [`Watch::header`] without `drive`.
 pub(crate) const WORDS: usize = 10;
 
 /// The cores that are watched.
@@ -19,7 +19,7 @@ pub(crate) struct Watch {
     /// MHz of the clock.
     clock: f64,
     cores: Vec<Core>,
-    /// The wiring's trips: their names, and what is told of each.
+    /// Trips of the wiring: name and description of each.
     trips: Vec<(String, String)>,
 }
 
@@ -42,7 +42,7 @@ impl Watch {
         Watch { clock: wiring.clock, cores: cores.collect(), trips: trips.collect() }
     }
 
-    /// The nets: modules, and those of their nets that Verilator is to keep.
+    /// Nets that Verilator must keep, each with its module.
     fn nets(&self) -> Vec<(&'static str, String)> {
         let mut nets = ["drives", "fault_kind", "fault_address", "period", "run", "enable"]
             .map(|net| (AROUND, net.to_owned()))
@@ -66,7 +66,7 @@ impl Watch {
         format!("`verilator_config\n{}", self.nets().into_iter().map(keep).collect::<String>())
     }
 
-    /// The driver's access to them: of a core, `drive` and the words of a moment.
+    /// C++ header with the driver's access to the nets: for each core, `drive` and the words of a moment.
     pub(crate) fn header(&self) -> String {
         let net = |name: &str| format!("top->rootp->{TOP}__DOT__around__DOT__{name}");
         let mut text = format!(
@@ -111,7 +111,7 @@ impl Watch {
         if bits.is_empty() { "0".to_owned() } else { bits.join(" | ") }
     }
 
-    /// The time and the reasons of a moment. `begun`: the cycles before the run.
+    /// Time and reasons of a moment, as text; `begun` is the number of cycles before the run.
     pub(crate) fn text(&self, begun: u64, words: &[u32]) -> String {
         let [cycle, core, cause, misses, most_cycles, fault, which, period, control, trips] = *words else {
             return String::new();

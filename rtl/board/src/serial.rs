@@ -24,8 +24,8 @@ pub struct Serial {
 }
 
 impl Serial {
-    /// The line to a simulated board, which loses no byte, and which is slow while the machine is busy: a request that was repeated would
-    /// come a second time.
+    /// Adapts the line to a simulated board, which loses no byte but is slow while the computer is busy: a repeated request would arrive
+    /// twice.
     #[must_use]
     pub fn patient(self) -> Serial {
         Serial { patience: PATIENT, ..self }
@@ -34,7 +34,7 @@ impl Serial {
     /// Opens a port with this baud rate, 8 data bits, no parity and 1 stop bit.
     ///
     /// # Errors
-    /// Fails if the port cannot be opened, or is no terminal.
+    /// Fails if the port cannot be opened, or is not a terminal.
     pub fn open(path: &Path, baud: u32) -> io::Result<Serial> {
         let mut port = SerialPort::open(path, |mut settings: Settings| {
             settings.set_raw();

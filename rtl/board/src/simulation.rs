@@ -20,7 +20,7 @@ use thiserror::Error;
 
 const DRIVER: &str = include_str!("driver.cpp");
 
-/// The reason for which a board cannot be simulated.
+/// Reason why a board cannot be simulated.
 #[derive(Debug, Error)]
 pub enum SimulationError {
     /// There is no circuit.
@@ -29,7 +29,7 @@ pub enum SimulationError {
     /// Verilator is missing or failed.
     #[error(transparent)]
     Verilator(#[from] VerilatorError),
-    /// The simulation cannot be started, or a file not be written.
+    /// The simulation cannot be started, or a file cannot be written.
     #[error("{0}: {1}")]
     Start(String, io::Error),
     /// The simulation ended.
@@ -42,9 +42,9 @@ pub enum SimulationError {
 pub struct EncoderMotion {
     /// Pins of the encoder, as numbers of inputs.
     pub pins: [usize; 2],
-    /// The count at which it begins.
+    /// Count before the motion.
     pub from: i32,
-    /// Counts by which it turns.
+    /// Counts of the motion; negative turns backwards.
     pub by: i32,
 }
 
@@ -58,13 +58,13 @@ pub struct Simulation {
     outputs: Vec<String>,
     /// Encoders that turn in the next cycles, once.
     pub turns: Vec<EncoderMotion>,
-    /// One in so many bits of the UART is turned, in either direction; 0: none.
+    /// One in this many bits of the UART is inverted, in either direction; 0 for none.
     pub noise: u32,
-    /// Bytes to the board are lost while this is true.
+    /// The line is interrupted: bytes to the board are lost.
     pub unplugged: bool,
     /// Cycles simulated since reset.
     pub cycles: u64,
-    /// Is told, of a board that was made of a program or a system, when and why outputs become safe.
+    /// Called with the time and reason when outputs become safe, if the board was made from a program or a system.
     pub tell: Option<fn(&str)>,
     watch: Option<Watch>,
     high: Vec<u32>,
@@ -89,8 +89,8 @@ impl Simulation {
         Simulation::start(&files, board, wiring, folder, 0, Some(watch))
     }
 
-    /// Builds a board from files, of which the top level is [`TOP`] with the wiring's pins, and starts it in a folder, where memory images
-    /// are written. What was built before is found in the user's cache folder.
+    /// Builds a board from files, whose top level is [`TOP`] with the wiring's pins, and starts it in a folder, where memory images are
+    /// written. Earlier builds are reused from the user's cache folder.
     ///
     /// # Errors
     /// If Verilator is missing or fails.
@@ -103,7 +103,7 @@ impl Simulation {
         Simulation::with_fault(files, board, wiring, folder, 0)
     }
 
-    /// Starts as [`Simulation::of`] does, with one of the faults that [`takt_rtl::verilator::plant`] has planted in the files; 0: without.
+    /// Starts like [`Simulation::of`], with one of the faults that [`takt_rtl::verilator::plant`] has planted in the files; 0 for none.
     ///
     /// # Errors
     /// If Verilator is missing or fails.
@@ -170,7 +170,7 @@ impl Simulation {
         &self.outputs
     }
 
-    /// Sets an input by its number, from the next cycle on.
+    /// Sets an input by its name, from the next cycle on.
     pub fn set(&mut self, name: &str, level: bool) {
         if let Some(at) = self.input(name) {
             self.inputs[at].1 = level.into();
@@ -183,7 +183,7 @@ impl Simulation {
         Some((self.levels[at] != 0, self.high[at]))
     }
 
-    /// Runs `cycles` cycles, in which these bytes begin to go to the board.
+    /// Runs `cycles` cycles, and starts sending these bytes to the board.
     ///
     /// # Errors
     /// If the simulation has ended.
@@ -193,7 +193,7 @@ impl Simulation {
         words.push(self.turns.len() as u32);
         for EncoderMotion { pins: [a, b], from, by } in self.turns.drain(..) {
             words.extend([a as u32, b as u32, from as u32, by as u32]);
-            // They stay where the turn ends.
+            // The pins keep the levels at the end of the motion.
             let end = from.wrapping_add(by) as u32;
             self.inputs[a].1 = end.wrapping_add(1) >> 1 & 1;
             self.inputs[b].1 = end >> 1 & 1;
@@ -228,7 +228,7 @@ impl Simulation {
         Ok(bytes.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect())
     }
 
-    /// The bytes that have come from the board since this was last asked.
+    /// Takes the bytes received from the board since the last call.
     pub fn take_received(&mut self) -> Vec<u8> {
         std::mem::take(&mut self.received)
     }
@@ -248,7 +248,7 @@ impl Line for Simulation {
         40
     }
 
-    /// A microsecond a cycle.
+    /// Simulated time: one microsecond per cycle.
     fn time(&self) -> Duration {
         Duration::from_micros(self.cycles)
     }

@@ -18,10 +18,10 @@ pub struct Stream {
 }
 
 impl Stream {
-    /// The stream of the values that `names` name ([`Application::find`]).
+    /// Stream of the values with these names ([`Application::find`]).
     ///
     /// # Errors
-    /// Says in words that a name does not exist, or that the names do not fit into a frame.
+    /// A message, if a name does not exist, or the names do not fit into a frame.
     pub fn of(application: &Application<'_>, names: &[String]) -> Result<Stream, String> {
         let found = names.iter().map(|name| application.find(name)).collect::<Result<Vec<_>, _>>()?;
         let addresses = || found.iter().map(|place| place.read);

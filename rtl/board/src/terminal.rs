@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A pseudo-terminal, at which a simulated board has its UART for any host.
+//! Pseudo-terminal through which any host reaches the UART of a simulated board.
 
 use rustix::fs::{OFlags, fcntl_setfl};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
@@ -43,7 +43,7 @@ impl Terminal {
         &self.path
     }
 
-    /// Receives the bytes that the host has sent; to receive no byte is no error.
+    /// Receives the bytes that the host has sent; receiving no byte is not an error.
     ///
     /// # Errors
     /// Fails if the line is gone.

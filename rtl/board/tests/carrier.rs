@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Three half bridges on a small carrier: every duty after every other, given out in every cycle of a period, and interruptions in every
+//! Three half bridges on a small carrier: every duty after every other, written in every cycle of a period, and interruptions in every
 //! cycle, against rules about whole waveforms that share no code with circuit and model.
 
 use crate::harness::{Part, compare};
@@ -31,7 +31,7 @@ fn settings() -> Vec<Setting> {
     all.collect()
 }
 
-/// Cycles of the pulse for a duty: what is too short is left out.
+/// Cycles of the pulse for a duty: pulses and gaps that are too short are left out.
 fn length(duty: u32, setting: Setting) -> u32 {
     let least = setting.dead + setting.minimum.max(1);
     match duty.min(PERIOD) {
@@ -57,8 +57,8 @@ fn in_force(cycles: usize, puts: &[(usize, u32)], setting: Setting) -> Vec<u32> 
     force
 }
 
-/// The pulse in each cycle. In a half before a peak it begins in the first cycle that lies no further before the peak than half the length
-/// in force, and stands until the peak; in a half behind a peak it ends in the first cycle that lies as far behind.
+/// Pulse in each cycle. In a half before a peak, it begins in the first cycle that is no further from the peak than half the length in
+/// force, and lasts until the peak; in a half after a peak, it ends in the first cycle that is as far from the peak.
 fn pulse(force: &[u32]) -> Vec<bool> {
     let halves = force.chunks(HALF as usize).enumerate().flat_map(|(number, half)| {
         let rises = number % 2 == 0;
@@ -80,8 +80,8 @@ enum Switch {
     High,
 }
 
-/// Switches in each cycle, from those wanted, with the dead time between two, and the least time of one unless it is interrupted. They are
-/// a cycle behind.
+/// Switches in each cycle, from the requested ones, with the dead time between two, and the minimum time of one unless it is interrupted.
+/// They lag by a cycle.
 fn switches(wanted: &[Switch], interrupted: impl Fn(usize) -> bool, setting: Setting) -> Vec<Switch> {
     let (mut rows, mut now) = (vec![Switch::Off], Switch::Off);
     while rows.len() < wanted.len() {
@@ -114,7 +114,7 @@ fn pins(phases: &[Vec<Switch>; 3], cycle: usize) -> Vec<u32> {
         .collect()
 }
 
-/// Waveforms known before, in place of a model.
+/// Precomputed waveforms, in place of a model.
 struct Expected {
     cycle: usize,
     phases: [Vec<Switch>; 3],
@@ -141,7 +141,7 @@ struct Inputs {
     duties: Option<[u32; 3]>,
 }
 
-/// Half bridges with their inputs from the first experiment on, and what is expected of them.
+/// Half bridges with their inputs from the first experiment on, and their expected waveforms.
 fn part(number: usize, setting: Setting, inputs: Vec<Inputs>) -> Part {
     let phases = [0, 1, 2].map(|phase| {
         let puts: Vec<(usize, u32)> =
@@ -215,7 +215,7 @@ fn compared(name: &str, inputs: impl Fn(Setting) -> Vec<Inputs>) {
     assert!(found.is_empty(), "{}", found.join("\n"));
 }
 
-/// Tells if no switch goes on twice within less than the time of a half.
+/// No switch turns on twice within half a period.
 fn goes_on_once(phase: &[Switch]) -> bool {
     [Switch::High, Switch::Low].into_iter().all(|on| {
         let goes = |cycle: &usize| phase[*cycle] == on && phase[cycle - 1] != on;
@@ -253,7 +253,7 @@ fn interruptions_in_every_cycle_keep_the_dead_time() {
                     for (i, inputs) in experiment.iter_mut().skip((2 * PERIOD + at) as usize).enumerate() {
                         let is_in = i < length as usize;
                         inputs.trip = is_in && kind != 1;
-                        // A trip while the drive is not enabled, which outlasts it.
+                        // A trip that begins while the drive is disabled, and outlasts that.
                         inputs.disabled = is_in && (kind == 1 || kind == 2 && i < 2);
                     }
                     // A duty in the cycle of the interruption.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Numbers of a wiring that are each in range, but do not fit each other: the report names each number's place, its figures and a mend.
+//! Numbers of a wiring that are each in range, but do not fit each other: the report gives each number's place and figures, and a fix.
 
 use takt_asm::{MemoryLoader, Options, assemble};
 use takt_board::{Board, Findings, Mistake, Wiring};
@@ -145,7 +145,7 @@ fn a_program_that_misses_its_ticks_is_named() {
     let found = findings(WIRING, &source(2000));
     let late = lines(&found.late);
     assert!(late.len() == 1 && late[0].starts_with("w.toml:4:1: every tick is missed"), "{found:#?}");
-    // The longer way alone, of two ways through the period, misses the tick.
+    // Of the two paths through the period, only the longer one misses the tick.
     let source = ".input x:int, n:int\n.output y, z\n.reg f g c:int\n.period\np: itof f, x\n itof g, n\n ilt c, x, n\n bnz c, short\n .for i, 1, 2000\n fadd f, f, f\n .endfor\nshort: fmul y, f, g\n mov z, y\n wait p\n";
     let found = findings(WIRING, source);
     let warnings = lines(&found.warnings);
@@ -208,7 +208,7 @@ fn what_does_not_fit_a_carrier_is_an_error() {
         );
         assert!(found.warnings.is_empty(), "{found:#?}");
     }
-    // An update at the peak, just where the period's length decides: the shorter way reaches it, the longer one does not.
+    // An update at the peak, where the period's length just decides: the shorter path reaches it, the longer one does not.
     let source = ".input ca:int, cb:int, n:int, tripped:int\n.output da, db, dc\n.reg f c:int\n.period\np: itof f, ca\n ilt c, ca, cb\n bnz c, short\n .for i, 1, 4\n fadd f, f, f\n .endfor\nshort: mov da, f\n mov db, f\n mov dc, f\n wait p\n";
     let bounds = takt_analysis::bound(&program(source)).expect("bounds");
     let span = bounds.sections.iter().find(|section| !section.once).expect("a period").cycles;

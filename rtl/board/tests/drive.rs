@@ -79,7 +79,7 @@ latch = "main.peak"
 ports = { level = "limit" }
 "#;
 
-/// Three duties, `da` to `dc`, to which the sample adds the bits of `ma` to `mc`; with `work`, more than a period's.
+/// Program with three duties, `da` to `dc`, to which the sample adds the bits of `ma` to `mc`; with `work`, a period takes too long.
 const PROGRAM: &str = "
 .input x:int, tripped:int, limit:int, work:int, reset:int, ma:int, mb:int, mc:int, da:int, db:int, dc:int
 .output a:int, b:int, c:int, clear:int, seen:int
@@ -269,7 +269,7 @@ fn trips_hold_until_they_are_cleared() {
         let text = host.tripped(Some(&wiring().1)).expect("it answers");
         assert_eq!(text, ["the trip `fault` is held: `now` is safe"]);
         assert_eq!(host.status().expect("it answers").causes().collect::<Vec<_>>(), ["trip"]);
-        // A clear while the pin asks is none, and a released pin alone neither.
+        // Clearing has no effect while the pin still trips, nor has releasing the pin alone.
         set(&mut host, "reset", 1);
         host.line.run(3 * PERIOD, &[]).expect("it runs");
         assert!(!host.tripped(None).expect("it answers").is_empty());
@@ -293,7 +293,7 @@ fn carriers_keep_their_phase() {
     let place =
         |host: &mut Host<Simulation>, pin: &str, rises: bool| run_to(&mut host.line, pin, rises) % period;
     let sample = place(&mut host, "adc_select", false);
-    // The tick comes 100 cycles after the valley, of which the select pin falls a cycle later.
+    // The tick comes 100 cycles after the valley, and the select pin falls one cycle after the valley.
     let tick = (sample + 99) % period;
     // Half a duty rises in the middle of the rising half; a quarter of a period later on the second carrier.
     let rises = (sample - 1 + u64::from(HALF) / 2 + 1) % period;

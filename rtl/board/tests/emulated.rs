@@ -148,7 +148,7 @@ fn emulated_board_fails_safe_and_rejects_unknown_addresses() {
         (host.line.board.output("motor"), causes(&mut host)),
         (Some(0), vec!["host silent".to_owned()])
     );
-    // A start mends the outputs; `stop` stays until the next start.
+    // A start lets the outputs drive again; the cause `stop` stays until the next start.
     host.set("control", 0).expect("it stops");
     host.set("control", RUN | ENABLE).expect("it starts");
     pass(&mut host, 3);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A family that exists in no shop: other memories, no memory in look-up tables, no PLL, no tools. A board with it exports and simulates
-//! like any other, and what it lacks is said before a tool is started.
+//! Fictitious family: other memories, no memory in look-up tables, no PLL, no tools. A board with it exports and simulates like any
+//! other, and missing features are reported before a tool starts.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -35,7 +35,7 @@ lamp = "17"
 drive = "18"
 "#;
 
-/// 25 cycles a microsecond, and blink's 500 periods a side.
+/// Wiring with 25 cycles per microsecond and periods of 500 cycles.
 const WIRING: &str = r#"
 board = "breadboard"
 clock = 25
@@ -189,7 +189,7 @@ fn reports_missing_device_features_first() {
     );
 }
 
-/// Without contents of block RAM there is no image, without first values of registers no start.
+/// A family is rejected if its block RAM has no initial contents, or its registers have no initial values.
 #[test]
 fn a_family_that_starts_empty_is_refused() {
     static EMPTY: Family = Family {

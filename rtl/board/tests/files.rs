@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Boards and wirings as files: the values that are read from right files, and the mistakes that are found in wrong files.
+//! Boards and wirings as files: values read from valid files, and mistakes found in invalid ones.
 
 use takt_asm::{MemoryLoader, Options, assemble};
 use takt_board::{Board, Mistake, Wiring};

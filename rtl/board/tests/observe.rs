@@ -82,7 +82,7 @@ fn compare(host: &mut Host<Simulation>, program: &Program, periods: u32, ranges:
         for bank in program.machine.banks() {
             let first = Register::new(bank.base.into()).expect("a register");
             let at = on_board.register(0, first).expect("it can be read");
-            // The last input is `zero`, which is no port.
+            // The last input is `zero`, which is not a port.
             let count = usize::from(bank.depth) - usize::from(*bank == program.machine.inputs);
             let read = host.read(at, count).expect("a bank");
             for (register, bits) in bank.registers().zip(read) {

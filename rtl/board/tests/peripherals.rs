@@ -107,7 +107,7 @@ fn stimulus(kind: &'static Kind, parameters: &[u32], seed: u64) -> Box<dyn FnMut
         let mut value = |i: usize, name: &str| match name {
             "enable" => u32::from(cycle >= disabled),
             "start" => random.one_in(if cycle % 4096 < 1024 { 20 } else { 400 }).into(),
-            // It outlasts the time without enable.
+            // The trip outlasts the time without enable.
             "trip" => u32::from(cycle < disabled + 5 && disabled.is_multiple_of(2)),
             "clear" => random.one_in(50).into(),
             "place" => cycle % half.expect("a carrier"),
@@ -276,12 +276,12 @@ fn mutants() {
             }
         }
     }
-    // Nobody will ask for these netlists' simulation again.
+    // These netlists' simulation will not be needed again.
     let _ = fs::remove_file(program);
 }
 
-/// Faults: file, text that occurs there once, and the text that takes its place. The faults of a round are planted together, for every
-/// module is compared by itself.
+/// Faults: file, text that occurs there once, and its replacement. The faults of a round are planted together, because every module is
+/// compared by itself.
 const FAULTS: &[&[(&str, &str, &str)]] = &[
     &[
         ("takt_quadrature.v", "at_index <= count", "at_index <= count + 32'd1"),
@@ -343,7 +343,7 @@ fn planted_faults_are_found() {
         let differences = compare(&format!("faults{round}"), &files, &mut parts, CYCLES / 3);
         for (name, what, _) in *faults {
             let module = name.trim_end_matches(".v");
-            // The faults of modules within others show in those.
+            // Faults in an inner module show in the modules around it.
             let is_hit = |part: &Part| match module {
                 "takt_filter" => true,
                 "takt_pwm_phase" => part.module == "takt_pwm3",

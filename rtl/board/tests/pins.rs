@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Latencies from pin to pin over several cores, measured in a complete board: links of every kind, ticks that differ, a period under way.
+//! Latencies from pin to pin over several cores, measured in a complete board: links of every kind, different ticks, a period under way.
 
 use crate::harness::board::{STRETCH, Ticks};
 use std::path::Path;
@@ -50,8 +50,8 @@ ports = { level = "third.p" }
 "#;
 
 /// System whose first core has every base tick; the second has every second base tick, and latched ports; the third has every third base
-/// tick. The third core's period is longer than two base ticks and reads its input first and last, so that a value can arrive while the
-/// period is under way. Ways over the FIFO have no bound.
+/// tick. The third core's period is longer than two base ticks and reads its input first and last, so a value can arrive while the
+/// period is under way. Paths over the FIFO have no bound.
 const SYSTEM: &str = r#"
 tick = 1000
 [[core]]
@@ -182,7 +182,7 @@ fn system(text: &str) -> Description {
     read.unwrap_or_else(|_| panic!("the system is right"))
 }
 
-/// The bound of the way to each of the outputs, and the least and the most measured cycles.
+/// Bound of the path to each of the outputs, and the least and the most measured cycles.
 fn bound_and_measured<const N: usize>(
     [system_text, wiring_text]: [&str; 2],
     folder: &str,
@@ -233,7 +233,7 @@ fn paths_over_every_kind_of_link_keep_their_bound() {
     assert_eq!((last[0], last[0].0, first[0].1), (first[0], last[1].0, first[1].1));
 }
 
-/// An output of a core may come over a much longer way than another output. The other output's values can then be taken before their own
+/// An output of a core may come over a much longer path than another output. The other output's values can then be taken before their own
 /// `wait`, and a `wait` can come while the values of the `wait` before are being put.
 #[test]
 fn a_slow_link_beside_a_fast_one_is_within_the_bound() {
@@ -336,8 +336,8 @@ fn each_peripheral_keeps_its_stated_latency() {
     let bounds = takt_analysis::bound(&program).expect("it can be bounded");
     let period = bounds.sections.iter().find(|section| !section.once).expect("a period").cycles;
     let way = undivided(&wiring, period).into_iter().next().expect("inputs and outputs");
-    // A kind that the wiring leaves out has no pin to state a bound of (`spi`), or has a test of its own (`pwm` in top.rs, `pwm3` and `trip`
-    // in drive.rs).
+    // A kind that the wiring omits has no pin with a stated bound (`spi`), or has its own test (`pwm` in top.rs, `pwm3` and `trip` in
+    // drive.rs).
     for kind in KINDS.iter().filter(|kind| !["spi", "pwm", "pwm3", "trip"].contains(&kind.name)) {
         assert!(wiring.peripherals.iter().any(|known| known.kind == kind), "{} is not tried", kind.name);
     }
@@ -391,7 +391,7 @@ fn each_peripheral_keeps_its_stated_latency() {
     }
 
     // The modulator takes a stream's value on as stated. A value of ones alone shows that at once, with the next bit; the first bit of a
-    // small value comes any time later, so that the pin has no stated bound.
+    // small value comes any time later, so the pin has no stated bound.
     for stream in ["full", "faint"] {
         let out = way.outputs.iter().find(|output| output.peripheral == stream).expect("a stream");
         assert_eq!(out.answer, Answer::Density);

@@ -177,7 +177,7 @@ fn pins_follow_as_the_bound_says(host: &mut Host<Simulation>, description: &Desc
         ticks.measured(sim, before, |sim| sim.turns.push(turn), "lamp_out")
     });
     assert_eq!(found, (total.best, total.worst));
-    // Base ticks are a whole number of the PWM's periods apart, so that values always come at the same place of a period.
+    // Base ticks are a whole number of the PWM's periods apart, so values always come at the same place of a period.
     let (fixed, pwm) =
         (Part::sum("", motor.inputs[0].parts.iter().chain(&motor.between)), motor.total().expect("an edge"));
     let (least, most) =
@@ -290,7 +290,7 @@ fn a_system_runs_talks_and_fails_safe() {
     assert!(host.retries > 0, "there was no noise");
     assert!(!host.fifo(&reached).expect("a FIFO").overflow());
 
-    // A FIFO that nobody takes from refuses an entry, and says so; so does a full FIFO.
+    // A FIFO that nobody empties refuses an entry and reports it; so does a full FIFO.
     host.set("control", 0b111).expect("hold");
     let pushed = (0..6).filter(|_| host.push(&moves, &[float(1.0), float(9.0)]).expect("a FIFO")).count();
     assert_eq!(pushed, 4);

@@ -15,13 +15,14 @@ use takt_board::{Application, Board, Host, Wiring, build, model, netlist, top};
 use takt_isa::timing::Span;
 use takt_isa::{Program, T1};
 
-/// Wiring and program are files because `cargo xtask test` makes the circuit of them, too, and runs the routed test if it has changed.
+/// Wiring and program are files because `cargo xtask test` also makes the routed circuit from them, and runs the routed test if they have
+/// changed.
 const WIRING: &str = include_str!("top/wiring.toml");
 
-/// Cycles of a period, as the system has them.
+/// Cycles of a period, as in the wiring.
 const PERIOD: u32 = 2000;
 
-/// A proportional controller with a set point that the host sets; `force` is a quarter of the difference, and the lamp is lit at odd counts.
+/// A proportional controller with a set point from the host; `force` is a quarter of the difference, and the lamp is lit at odd counts.
 const PROGRAM: &str = include_str!("top/loop.s");
 
 /// More work than a period has cycles for.
@@ -66,7 +67,7 @@ fn pulse(board: &mut Simulation) -> u32 {
     board.output("motor_high").expect("a pin").1
 }
 
-/// Of each pin of a PWM, over every change of the duty in every phase, the least and the most cycles until the change shows.
+/// Least and most cycles until a change of the duty shows at each pin of a PWM, over all changes in all phases.
 fn shows(pwm: &Peripheral, half: i32) -> [(u64, u64); 2] {
     let dead = pwm.parameter("dead").cast_signed();
     let (put, end) = (4 * half + dead, 12 * half + 4 * dead);
@@ -86,7 +87,7 @@ fn shows(pwm: &Peripheral, half: i32) -> [(u64, u64); 2] {
             let with = runs(old, new, put + phase);
             for (pin, (least, most)) in found.iter_mut().enumerate() {
                 let first = with.iter().zip(&without).position(|(a, b)| a[pin] != b[pin]);
-                // Outputs after the clock's edge of a cycle are those of the next one. Pulses within the dead time are not seen.
+                // Outputs after the clock's edge of a cycle are those of the next cycle. Pulses within the dead time are not seen.
                 let Some(first) = first else { continue };
                 let cycles = (first as i32 + 1 - put - phase) as u64;
                 (*least, *most) = ((*least).min(cycles), (*most).max(cycles));
@@ -96,7 +97,7 @@ fn shows(pwm: &Peripheral, half: i32) -> [(u64, u64); 2] {
     found
 }
 
-/// Of a PWM with any dead time, the first cycle in which a new duty shows at one of its pins.
+/// First cycle in which a new duty shows at a pin of a PWM, for any dead time.
 #[test]
 fn duty_latency_equals_the_bound() {
     let board = Board::from_name("ulx3s-85f").expect("a board").expect("a right one");
@@ -136,7 +137,7 @@ fn board_runs_talks_and_fails_safe() {
 
 static TOLD: Mutex<Vec<String>> = Mutex::new(Vec::new());
 
-/// Each reason for safe outputs is told as it comes about: by a pin, by the host, by a value that the program meets.
+/// Each reason for safe outputs is reported when it occurs: a pin, the host, a value in the program.
 #[test]
 fn reports_the_reason_for_safe_outputs_at_once() {
     let (board, wiring, first, folder) = target("board-reasons");
@@ -156,7 +157,7 @@ fn reports_the_reason_for_safe_outputs_at_once() {
         let (time, reason) = told.split_once(" ms: the outputs become safe: ").expect("a time");
         let now = host.line.cycles as f64 / wiring.clock / 1e3;
         let time: f64 = time.parse().expect("a number");
-        // A period has 0.04 ms; the request that brought it about takes some.
+        // A period takes 0.04 ms; the request that caused the reason takes several.
         assert!(reason.starts_with(says) && (now - 1.0..now).contains(&time), "{says}: {told} at {now}");
     };
     // By the host, and by the pin.
@@ -197,7 +198,7 @@ fn reports_the_reason_for_safe_outputs_at_once() {
     told(&mut host, "host silent: no request for as many periods as the wiring's `host` allows");
 }
 
-/// The same, with what nextpnr has placed and routed, from which the bitstream is made; and a fault planted there is noticed.
+/// Runs the same test on the placed and routed netlist, from which the bitstream is made; a fault planted there must be found.
 ///
 /// Synthesis, place and route take minutes: with `TAKT_ROUTED=1` only, as `cargo xtask test` sets it, in the tools' environment that
 /// `TAKT_VENV` names, or `.venv`.
@@ -235,7 +236,7 @@ fn the_routed_design_does_the_same() {
     assert!(noticed.is_err(), "the planted fault was not noticed");
 }
 
-/// Exercises all that the board has to do, from power-up on.
+/// Tests everything that the board has to do, from power-up on.
 fn runs_talks_and_fails_safe(mut sim: Simulation, wiring: &Wiring, first: &Program) {
     let encoder = [sim.input("encoder_a").expect("a pin"), sim.input("encoder_b").expect("a pin")];
 
@@ -284,14 +285,14 @@ fn runs_talks_and_fails_safe(mut sim: Simulation, wiring: &Wiring, first: &Progr
     assert_eq!(host.read(port(first, "force"), 1).expect("a port")[0], 3.0_f32.to_bits());
     assert_eq!(pulse(&mut host.line), 250 + 48 - 5);
     let cycles = host.register("cycles").expect("a register");
-    // Of them the first part, the wait for the tick, is not counted.
+    // The first of these parts, the wait for the tick, is not counted.
     let exact = Part::sum("", &way.between[1..]);
     assert_eq!((exact.best, exact.worst), (cycles.into(), cycles.into()), "cycles from tick to outputs");
     assert_eq!(host.register("misses").expect("a register"), 0);
 
-    // A write to an address that cannot be written is refused, as a whole: registers to read and addresses without one, ports that the program or a peripheral
-    // drives, and the last one, which the machine does not have; the image of a program that runs; a tick of its own while it is not
-    // held, with two registers before it that can be written; what the core holds.
+    // A write to an address that cannot be written is refused as a whole: read-only registers, and addresses without one; ports that the
+    // program or a peripheral drives, and the last port, which the machine does not have; the image of a running program; a tick of the
+    // host's own while the program is not held, with two writable registers before it; memories of the core.
     let n = port(first, "n");
     for address in [0, 2, 9, 20, 0xfff, port(first, "force"), n, INPUTS + 255, INPUTS + 256, 0x3000] {
         refuses(&mut host, address, &[1]);
@@ -326,7 +327,7 @@ fn runs_talks_and_fails_safe(mut sim: Simulation, wiring: &Wiring, first: &Progr
     assert!(seen.windows(2).all(|pair| pair[1] == pair[0] + 2), "{seen:?}");
     host.set("stream", 0).expect("stream");
 
-    // Noise on the line: requests are made again, none is lost or made twice.
+    // Noise on the line: requests are repeated, and none is lost or carried out twice.
     host.line.noise = 400;
     host.set("control", 0b111).expect("control");
     let before = host.register("periods").expect("a register");
@@ -347,7 +348,7 @@ fn runs_talks_and_fails_safe(mut sim: Simulation, wiring: &Wiring, first: &Progr
     host.line.unplugged = false;
     let status = host.status().expect("it is back");
     assert_eq!(status.causes().collect::<Vec<_>>(), ["host silent"]);
-    // A start makes it drive again. What is set at once waits until the start's zeros are written.
+    // A start lets the board drive again. A value set immediately waits until the start's zeros are written.
     host.set("control", 0x105).expect("control");
     host.write(port(first, "wanted"), &[52]).expect("a port");
     assert_eq!(host.read(port(first, "wanted"), 1).expect("a port")[0], 52);
@@ -373,7 +374,7 @@ fn runs_talks_and_fails_safe(mut sim: Simulation, wiring: &Wiring, first: &Progr
     periods(&mut host.line, 6);
     assert!(host.status().expect("status").drives(), "after a reset");
 
-    // A program that misses its deadlines, one that halts, one that makes no number.
+    // Programs that miss their deadlines, halt, or compute a NaN.
     host.set("control", 0).expect("control");
     refuses(&mut host, IMAGE + 4 * top::RECORDS as u16, &[1, 2, 3, 0]);
     let instead = |what: &str| PROGRAM.replace("        iand    lit, n, 1\n", what);
@@ -395,12 +396,12 @@ fn runs_talks_and_fails_safe(mut sim: Simulation, wiring: &Wiring, first: &Progr
         );
     }
     assert!(host.register("misses").expect("a register") == 0, "of this program, none");
-    // And back to the first one.
+    // The first program again.
     host.load(&top::image(first).expect("it fits").records).expect("it is loaded");
     host.set("control", 5).expect("control");
     periods(&mut host.line, 6);
     assert!(host.status().expect("status").drives());
-    // A broken image: one that does not fit is refused before anything happens.
+    // An invalid image: an image that does not fit is refused before anything happens.
     let record = top::image(first).expect("it fits").records[0];
     let error = host.load(&vec![record; top::RECORDS + 1]).expect_err("too big");
     assert_eq!(error.to_string(), "the program takes 2049 records; the board has room for 2048");

@@ -10,7 +10,7 @@ use takt_isa::timing::Cycle;
 pub struct Difference {
     /// Cycle of the event.
     pub cycle: Cycle,
-    /// Core, link or pin of a system; empty for a core by itself.
+    /// Core, link or pin of a system; empty for a single core.
     pub place: String,
     /// Instruction and its place in the source, if the event has one.
     pub instruction: String,
@@ -100,7 +100,7 @@ impl<E> EventMismatch<E> {
     }
 }
 
-/// A core of a circuit: its name, empty for a core by itself, and its program.
+/// Core of a circuit: its name, empty for a single core, and its program.
 pub(crate) type Core<'a> = (&'a str, &'a Program);
 
 impl Comparison<CircuitEvent> {
@@ -135,7 +135,7 @@ impl Comparison<CircuitEvent> {
 mod tests {
     use super::*;
 
-    /// A difference of each kind: in the value, and an event that one side lacks.
+    /// One difference of each kind: in a value, and an event that one side lacks.
     #[test]
     fn the_first_difference_is_found() {
         let check = |expected: &[(u64, char)], found: &[(u64, char)]| {

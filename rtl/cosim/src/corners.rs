@@ -1,31 +1,31 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Directed programs: coincidences that random programs meet seldom or never. Calls to every depth, faults beside results and other
-//! faults, loops around each carry of an address, beyond the program memory, of many iterations.
+//! Directed programs for coincidences that random programs rarely or never produce: calls to every depth, faults beside results and other
+//! faults, and loops across each carry of an address, beyond the program memory, or of many iterations.
 
 use takt_emu::testing::{Options, random_program};
 use takt_isa::{
     BankIndex, Effect, Function, Instruction, Machine, Operand, Program, ROWS, Register, Row, SlotIndex,
 };
 
-/// The registers of the first slot with constants of their own: a loop's count. None is an output port of a machine.
+/// Registers of the first slot that hold the iteration counts of loops; none is an output port on any machine.
 const COUNTS: [usize; 3] = [40, 41, 42];
-/// The register of each slot that results are written to.
+/// Register of each slot that results are written to.
 const RESULT: usize = 30;
-/// A data word that every memory has.
+/// Data word that every memory has.
 const WORD: u32 = 65;
 
-/// A directed program.
+/// Directed program.
 #[derive(Clone, Debug)]
 pub struct Corner {
-    /// The case, in words.
+    /// Description of the case.
     pub name: String,
     /// The program.
     pub program: Program,
-    /// The fault that ends it, in words; `None` if it halts.
+    /// Expected fault, as text; `None` if the program halts.
     pub fault: Option<&'static str>,
 }
 
-/// Every directed program of a machine.
+/// All directed programs of a machine.
 pub fn corners(machine: &'static Machine) -> Vec<Corner> {
     let base = &random_program(0, machine, Options { bundles: 6, ..Options::TAME });
     let mut corners = calls(base);
@@ -40,14 +40,14 @@ pub fn corners(machine: &'static Machine) -> Vec<Corner> {
     corners
 }
 
-/// A program that is being written.
+/// Program under construction.
 struct Writer<'a> {
     base: &'a Program,
     bundles: Vec<Vec<u64>>,
     counts: [u32; COUNTS.len()],
 }
 
-/// The word of an empty slot.
+/// Word of an empty slot.
 fn filler() -> u64 {
     Instruction::NOP.encode().unwrap_or(0)
 }
@@ -61,7 +61,7 @@ impl Writer<'_> {
         self.base.machine
     }
 
-    /// The word of a slot in a bundle, before which all are there.
+    /// Word of a slot in a bundle; adds missing bundles up to it.
     fn word(&mut self, at: u32, slot: SlotIndex) -> &mut u64 {
         let (at, slots) = (at as usize, self.machine().slots.len());
         if self.bundles.len() <= at {
@@ -70,7 +70,7 @@ impl Writer<'_> {
         &mut self.bundles[at][slot.index()]
     }
 
-    /// Puts an operation with this effect into a slot that hosts it; its source, if it has one, is a register.
+    /// Puts an operation with this effect into a slot that hosts it; if it has a source, that is register `source`.
     fn put_in(&mut self, at: u32, slot: SlotIndex, effect: Effect, constant: u32, source: Register) {
         if let Some(row) = ROWS.iter().find(|row| row.effect == effect) {
             let mut instruction = Instruction { constant, ..Instruction::bare(row.op) };
@@ -80,7 +80,7 @@ impl Writer<'_> {
         }
     }
 
-    /// The same in the first slot that hosts it.
+    /// Puts an operation with this effect into the first slot that hosts it.
     fn put(&mut self, at: u32, effect: Effect, constant: u32, source: Register) {
         let row = ROWS.iter().find(|row| row.effect == effect);
         if let Some((slot, _)) = row.and_then(|row| self.machine().host(row.function)) {
@@ -96,7 +96,7 @@ impl Writer<'_> {
         self.put(at, Effect::Halt, 0, Register::ZERO);
     }
 
-    /// A loop of so many iterations, whose body ends before `target`.
+    /// Puts a loop of `count` iterations, whose body ends before `target`.
     fn counted(&mut self, at: u32, count: u32, target: u32) {
         let known = self.counts.iter().position(|known| *known == count);
         let free = self.counts.iter().position(|known| *known == 0);
@@ -106,8 +106,8 @@ impl Writer<'_> {
         self.put(at, Effect::Loop, target, register);
     }
 
-    /// Fills the slots of a bundle that are empty with an operation each, of the unit of this number, that gives a result: in the first bundle
-    /// to an output port.
+    /// Fills the empty slots of a bundle with one operation each, of the slot's unit number `unit`, that gives a result; in the first
+    /// bundle, the result goes to an output port.
     fn results(&mut self, at: u32, unit: usize) {
         let sources: Vec<Register> = self.base.constants.iter().map(|constant| constant.0).collect();
         for (slot, description) in self.machine().numbered_slots() {
@@ -147,7 +147,7 @@ impl Writer<'_> {
     }
 }
 
-/// True if an operation gives its result from its operands alone, or from the data memory.
+/// The result depends on the operands alone, or on the data memory.
 fn is_pure(row: &Row) -> bool {
     matches!(row.effect, Effect::Compute | Effect::Load)
 }
@@ -157,17 +157,17 @@ fn count_register(machine: &Machine, place: usize) -> Register {
     index.and_then(|index| machine.slots[0].bank.register(index)).unwrap_or(Register::ZERO)
 }
 
-/// The slot of the sequencer.
+/// Slot of the sequencer.
 fn sequencer(machine: &Machine) -> Option<SlotIndex> {
     machine.host(Function::Control).map(|(slot, _)| slot)
 }
 
 /// Nested calls, and the fault with which each program ends: as deep as the return stack, twice; one deeper, at once and after returns; a
-/// return without a call, at once and after as many returns as calls. Each call returns to an address of its own.
+/// return without a call, at once and after as many returns as calls. Each call returns to a different address.
 fn calls(base: &Program) -> Vec<Corner> {
     let deepest = base.machine.stack_depth.cast_signed() as isize;
     let (full, empty) = ("return stack full", "return stack empty");
-    // Calls, if positive, and returns, one after the other: a program's whole course.
+    // Each course is a sequence of calls (positive) and returns (negative), which make up the whole program.
     let courses: [(&[isize], &str); 6] = [
         (&[deepest, -deepest, deepest, -deepest], "program counter"),
         (&[deepest + 1], full),
@@ -180,9 +180,9 @@ fn calls(base: &Program) -> Vec<Corner> {
     courses.into_iter().map(corner).collect()
 }
 
-/// A program of calls and returns, so many of the one, then of the other, and so on. It ends behind its first subroutine's last bundle.
+/// Program with runs of calls and returns in turn, of the given lengths. It ends after the last bundle of its first subroutine.
 fn of_course<'a>(base: &'a Program, course: &[isize]) -> Writer<'a> {
-    // Of each subroutine: the one that it calls, or a return, one after the other. The first one is the program itself.
+    // For each subroutine, its calls (of other subroutines) and returns, in order. The first one is the program itself.
     let mut bodies: Vec<Vec<Option<usize>>> = vec![Vec::new()];
     let mut way = Vec::new();
     let mut at = 0;
@@ -196,7 +196,7 @@ fn of_course<'a>(base: &'a Program, course: &[isize]) -> Writer<'a> {
             at = way.pop().unwrap_or(0);
         }
     }
-    // Behind a jump, and the program itself last. An operation has a bundle, and a subroutine another one.
+    // The program itself comes last, after a jump at the beginning. Each operation takes a bundle, and each subroutine one more.
     let order: Vec<usize> = (1..bodies.len()).chain([0]).collect();
     let mut end = 1;
     let mut starts = vec![0; bodies.len()];
@@ -214,14 +214,14 @@ fn of_course<'a>(base: &'a Program, course: &[isize]) -> Writer<'a> {
             }
         }
     }
-    // A bundle behind the last one.
+    // Bundle after the last one.
     writer.word(end - 1, SlotIndex::FIRST);
     writer
 }
 
-/// Accesses outside of the data memory, by each slot's port: beside results of every unit, before and behind others; before a `halt`, a
-/// `wait` or a reading of flags, which must not happen; beside a fault of the sequencer, of which the first slot's counts; by two
-/// ports at once.
+/// Accesses outside of the data memory, by each slot's port: beside, before and after results of every unit; before a `halt`, a `wait` or
+/// a read of the flags, which must not happen; beside a fault of the sequencer, where the fault of the first slot counts; by two ports at
+/// once.
 fn stray_accesses(base: &Program) -> Vec<Corner> {
     let machine = base.machine;
     let address = Some("data address");
@@ -236,7 +236,7 @@ fn stray_accesses(base: &Program) -> Vec<Corner> {
             writer.put_in(at, slot, effect, machine.data_depth, Register::ZERO);
         };
         let name = |what: &str| format!("{effect:?} outside of the memory in slot {}, {what}", slot.get());
-        // Units that are busy with an earlier operation would not take one beside the access, or behind it.
+        // Units that are busy with an earlier operation would not accept one beside or after the access.
         for (unit, from) in (0..units).flat_map(|unit| [(unit, 0), (unit, 2), (unit, 3)]) {
             let mut writer = Writer::new(base);
             stray(&mut writer, 2);
@@ -261,7 +261,7 @@ fn stray_accesses(base: &Program) -> Vec<Corner> {
             corners.push(writer.corner(name(&what), address));
         }
         let Some(control) = sequencer(machine).filter(|control| *control != slot) else { continue };
-        // Without a fault of its own, beside what would publish the outputs that were written, or stop.
+        // Beside operations without a fault that would publish the written outputs, or stop.
         for own in [Effect::Wait, Effect::Halt] {
             let mut writer = Writer::new(base);
             writer.results(0, 0);
@@ -284,8 +284,8 @@ fn stray_accesses(base: &Program) -> Vec<Corner> {
     corners
 }
 
-/// Words that are no instructions: in each set of slots, with results in flight; behind a loop, where fetch has seen them before the loop
-/// ends, behind a branch that is taken and one that is not.
+/// Words that are not instructions: in each set of slots, with results in flight; after a loop, where fetch has seen them before the loop
+/// ends; and after a branch that is taken and one that is not.
 fn illegal_words(base: &Program) -> Vec<Corner> {
     let machine = base.machine;
     let illegal = Some("illegal word");
@@ -322,13 +322,13 @@ fn illegal_words(base: &Program) -> Vec<Corner> {
     corners
 }
 
-/// The powers of two below a machine's program memory that are far enough from each other.
+/// Powers of two below a machine's program memory that are far enough apart.
 fn carries(machine: &Machine) -> impl Iterator<Item = u32> + use<> {
     (5..machine.code_depth.ilog2()).map(|bit| 1 << bit)
 }
 
-/// Loops whose addresses lie on either side of each power of two: of short and long bodies in every place, and one within another that
-/// ends before it, with it, or beyond.
+/// Loops whose addresses lie on either side of each power of two: with short and long bodies at every position, and nested so that the
+/// inner loop ends before, with or beyond the outer one.
 fn loops_at_carries(base: &Program) -> Vec<Corner> {
     let machine = base.machine;
     let mut corners = Vec::new();
@@ -337,7 +337,7 @@ fn loops_at_carries(base: &Program) -> Vec<Corner> {
             let mut writer = Writer::new(base);
             let mut from = 0;
             for carry in carries(machine) {
-                // The loop's own bundle, and the one after its body.
+                // The loop's own bundle, and the bundle after its body.
                 let (at, target) = (carry + shift - body - 2, carry + shift - 1);
                 writer.jump(from, at - 1);
                 writer.counted(at, 3, target);
@@ -369,8 +369,8 @@ fn loops_at_carries(base: &Program) -> Vec<Corner> {
     corners
 }
 
-/// Loops that end beyond the program memory, at an address that is a bundle's but for its upper bits: by themselves, with a jump in the
-/// body, around another loop.
+/// Loops that end beyond the program memory, at an address that equals a bundle's except for its upper bits: alone, with a jump in the
+/// body, and around another loop.
 fn loops_beyond_memory(base: &Program) -> Vec<Corner> {
     let machine = base.machine;
     let mut corners = Vec::new();
@@ -393,12 +393,12 @@ fn loops_beyond_memory(base: &Program) -> Vec<Corner> {
     corners
 }
 
-/// Loops with two faults at once, of which the first in the table of docs/timing.md counts.
+/// Loops with two simultaneous faults, of which the first in the table of docs/timing.md counts.
 fn faults_of_loops(base: &Program) -> Vec<Corner> {
     let machine = base.machine;
     let depth = machine.loop_depth;
     let mut corners = Vec::new();
-    // Loops inside one another, as deep as it goes, and one more.
+    // Nested loops, as deep as the sequencer allows, and one more.
     for (count, target) in [(0, 30), (2, 30), (2, 100), (0, 100)] {
         let mut writer = Writer::new(base);
         (0..depth).for_each(|level| writer.counted(level, 2, 60 - 2 * level));
@@ -416,7 +416,7 @@ fn faults_of_loops(base: &Program) -> Vec<Corner> {
             writer.corner("a loop of no iterations across another's end".to_owned(), Some("loop count")),
         );
     }
-    // An operation that redirects as a loop's last bundle, at fault itself.
+    // An operation that redirects, as a loop's last bundle, with a fault of its own.
     for effect in [Effect::Return, Effect::Loop, Effect::Call, Effect::Halt, Effect::Wait] {
         let mut writer = Writer::new(base);
         writer.counted(0, 2, 9);
@@ -424,7 +424,7 @@ fn faults_of_loops(base: &Program) -> Vec<Corner> {
         writer.halt(30);
         corners.push(writer.corner(format!("{effect:?} as a loop's last bundle"), Some("loop nesting")));
     }
-    // The same of a call with the return stack full.
+    // The same for a call with a full return stack.
     let mut writer = Writer::new(base);
     (0..machine.stack_depth).for_each(|at| writer.put(at, Effect::Call, at + 1, Register::ZERO));
     writer.counted(machine.stack_depth, 2, machine.stack_depth + 9);
@@ -433,7 +433,7 @@ fn faults_of_loops(base: &Program) -> Vec<Corner> {
     corners
 }
 
-/// Loops of many iterations: each place of a count from which the next one is borrowed, up to 2^9.
+/// Loops of many iterations: each position of a count from which a borrow occurs, up to 2^9.
 fn long_loops(base: &Program) -> Vec<Corner> {
     let corner = |bit: u32| {
         let mut writer = Writer::new(base);

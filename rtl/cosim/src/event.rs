@@ -119,7 +119,7 @@ pub enum EventKind {
     Fault,
     /// Publication: a `wait` issues, and the last value written to an output port since the last `wait` becomes visible.
     Publish,
-    /// Value on the input pins; of a system only, whose driver reports it.
+    /// Value on the input pins; only in a system, whose driver reports it.
     Input,
 }
 

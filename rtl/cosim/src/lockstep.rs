@@ -13,7 +13,7 @@ use takt_rtl::export::{INPUT_DELAY, LATCHED_INPUT_DELAY, TICK_DELAY};
 use takt_system::HostError;
 use thiserror::Error;
 
-/// Most cycles between an event and its report by the circuit.
+/// Limit on the cycles between an event and its report by the circuit.
 pub(crate) const REPORT_DELAY: Cycle = 3;
 
 /// Error that ends a lockstep run.
@@ -51,8 +51,8 @@ enum Pin {
 
 /// A program running on the emulator and on the circuit.
 ///
-/// The emulator runs ahead; [`Lockstep::compare`] lets the circuit follow. Inputs and ticks for the emulator are put on the circuit's pins
-/// so many cycles earlier that both see them in the same cycle.
+/// The emulator runs ahead; [`Lockstep::compare`] lets the circuit follow. Inputs and ticks reach the circuit's pins earlier, by the
+/// delay of the pins, so that both sides see them in the same cycle.
 pub struct Lockstep {
     emulator: Emulator,
     simulation: Simulation,
@@ -84,7 +84,7 @@ impl Lockstep {
         }
         let mut emulator = Emulator::new(program)?;
         for &(register, bits) in inputs {
-            // Neither side accepts a register that is no input.
+            // Neither side accepts a register that is not an input port.
             let _ = emulator.set_input_bits(register, bits);
         }
         simulation.load(program, inputs)?;
@@ -243,7 +243,7 @@ impl Lockstep {
                     event.cycle <= cycle || !matches!(event.kind, EventKind::Missed | EventKind::Lost)
                 })
             }
-            // The circuit does not detect this fault and goes on.
+            // The circuit does not detect this fault and continues.
             (Some(fault), _) => {
                 let cycle = fault.cycle;
                 self.check(|event| event.cycle < cycle)
@@ -267,7 +267,7 @@ impl Lockstep {
     }
 }
 
-/// Event of a core by itself.
+/// Event of a single core.
 fn alone(event: CoreEvent) -> CircuitEvent {
     CircuitEvent::Core { core: 0, event }
 }

@@ -10,7 +10,7 @@ use takt_rtl::verilator::Sources;
 
 /// Main program around a circuit: the counterpart of [`Simulation`].
 const DRIVER: &str = include_str!("driver.cpp");
-/// Part of the main program for a core by itself.
+/// Part of the main program for a single core.
 const CORE: &str = include_str!("core.h");
 
 /// A design compiled for simulation.

@@ -25,7 +25,7 @@ const RESULT: usize = 30;
 const OTHER: usize = 31;
 /// First bundles of a short program, among which the changed word lies.
 const CHANGED: u32 = 10;
-/// Input ports spread over their bank: for any two bits of their numbers, some port has 0 and 1, and another 1 and 0. The last of 256
+/// Input ports spread over their bank: for any two bits of their numbers, one port has 0 and 1, and another has 1 and 0. The last of 256
 /// registers is `zero`.
 const PLACES: [usize; INPUTS] = [0x01, 0x55, 0xaa, 0xfe];
 
@@ -50,8 +50,8 @@ pub struct Coverage {
     pub missed: u64,
 }
 
-/// The program of a seed is directed and spread. Two of four programs stay plain, because they meet faults of fetch in loops with branches,
-/// which are rare (`flush) begun <= 3'd1` of takt_loops is found by seed 566 on t3).
+/// The program of a seed is directed and spread. Two of four programs stay plain, because these reach faults of fetch in loops with
+/// branches, which are rare (`flush) begun <= 3'd1` of takt_loops is found by seed 566 on t3).
 fn is_directed(seed: u64) -> bool {
     seed % 4 < 2
 }
@@ -89,8 +89,8 @@ pub fn with_inputs_at(mut program: Program, registers: &[Register]) -> Program {
     program
 }
 
-/// Short program of a seed, with one or two bits of a word near its beginning changed: some thousand programs cover every bit that a
-/// decoder must refuse, with results in flight. Third sources are frequent, and the input ports are spread over their bank.
+/// Short program of a seed, with one or two bits of a word near its beginning changed: a few thousand programs cover every bit that a
+/// decoder must reject, with results in flight. Third sources are frequent, and the input ports are spread over their bank.
 pub fn short_program(seed: u64, machine: &'static Machine) -> Program {
     let mut program = random_program(seed, machine, Options { bundles: 6, three: true, ..Options::TAME });
     program.code.iter_mut().for_each(|word| *word &= WORD_MASK);
@@ -106,7 +106,7 @@ pub fn short_program(seed: u64, machine: &'static Machine) -> Program {
     program
 }
 
-/// Programs of one word each: every instruction of every slot, unchanged and with each bit changed. A decoder must refuse nearly every
+/// Programs of one word each: every instruction of every slot, unchanged and with each bit changed. A decoder must reject nearly every
 /// changed word.
 pub fn words(machine: &'static Machine) -> Vec<Program> {
     let program = random_program(0, machine, Options { bundles: 6, ..Options::TAME });
@@ -149,7 +149,7 @@ pub fn words(machine: &'static Machine) -> Vec<Program> {
 }
 
 /// Programs that read a result after every number of bundles from 0 to beyond its latency: of every unit, by every operand of every slot,
-/// with the bundle before the reader stalled or not. So a reader meets the result in every place, in every stage.
+/// with and without a stall of the bundle before the reader. Thus a reader meets the result at every place, in every stage.
 pub fn distances(machine: &'static Machine) -> Vec<Program> {
     let program = random_program(0, machine, Options { bundles: 6, ..Options::TAME });
     let random = &mut Random::new(2);
@@ -190,7 +190,7 @@ pub fn distances(machine: &'static Machine) -> Vec<Program> {
     for (to, reader) in readers {
         for operand in 0..reader.shape.sources() {
             for &(from, unit, producer) in &producers {
-                // The bundle before the reader waits for nothing, for a result of the shortest latency, or for any result.
+                // The bundle before the reader does not wait, or waits for a result of the shortest latency, or for any result.
                 for waiting in 0..3 {
                     let mut bundles: Vec<Vec<u64>> = Vec::new();
                     let mut put = |slot: usize, instruction: &Instruction| {
@@ -245,7 +245,7 @@ pub fn run_directed(
 /// Runs the program of a [`Corner`] on both sides.
 ///
 /// # Errors
-/// As [`run`].
+/// See [`run`].
 pub fn run_corner(
     corner: &Corner,
     simulation: Simulation,
@@ -268,7 +268,7 @@ pub fn run(
     run_program(program(seed, machine), CYCLES, seed, simulation, coverage)
 }
 
-/// Runs the short program of a seed, as [`run`] does.
+/// Runs the short program of a seed, like [`run`].
 ///
 /// # Errors
 /// See [`run`].

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Spreads a random program over registers, ports and memories. The generator uses the first registers, the lowest ports, a few words and
-//! the first bundles, so that a circuit that ignored a bit of an index would go unnoticed.
+//! the first bundles; a circuit that ignored a bit of an index would otherwise go unnoticed.
 //!
 //! The result need not make sense: it only has to run equally on both sides.
 
@@ -9,7 +9,7 @@ use takt_isa::{
     BundleAddress, Effect, Instruction, Machine, Op, Operand, Program, ROWS, Register, SlotIndex,
 };
 
-/// Most registers of each bank, and most ports, that the generator uses.
+/// Limit on the registers of each bank, and on the ports, that the generator uses.
 const USED: usize = 20;
 /// Bundles within which a program straddles the end of a block of the program memory.
 const ACROSS: u32 = 60;
@@ -39,8 +39,8 @@ fn each(program: &mut Program, mut change: impl FnMut(SlotIndex, &mut Instructio
     }
 }
 
-/// Exchanges registers of each bank, output ports and input ports with others. Many partners differ from a used register in one bit of the
-/// index.
+/// Exchanges registers of each bank, output ports and input ports with others. Many of these differ from a used register in one bit of
+/// the index.
 fn rename(program: &mut Program, random: &mut Random) {
     let machine = program.machine;
     let mut names: Vec<Register> = Register::all().collect();
@@ -80,7 +80,7 @@ fn rename(program: &mut Program, random: &mut Random) {
         .for_each(|port| port.register = name(port.register));
 }
 
-/// Redirects half of the accesses with constant addresses to a word whose address differs in one bit, the same for all.
+/// Redirects half of the accesses with constant addresses to a word whose address differs in one bit, the same bit for all.
 fn scatter(program: &mut Program, random: &mut Random) {
     let bit = 1 << random.below(program.machine.data_depth.ilog2());
     each(program, |_, instruction| {
@@ -91,8 +91,8 @@ fn scatter(program: &mut Program, random: &mut Random) {
     });
 }
 
-/// Moves the program from some bundle on to a place across the end of a block of the program memory, or so far that addresses differ in one
-/// bit from those before. A jump leads there.
+/// Moves the program from some bundle on across the end of a block of the program memory, or so far that its addresses differ in one bit
+/// from those before. A jump leads to the moved part.
 fn raise(program: &mut Program, random: &mut Random) {
     let (machine, bundles) = (program.machine, program.bundles());
     let Some((slot, jump)) = jump(machine) else { return };

@@ -1,18 +1,17 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The core behind its AXI4-Lite slave: what it does over the Wishbone slave, parts of words, accesses at once, and faults planted in the
-//! slave.
+//! Core behind its AXI4-Lite slave: the Wishbone slave's jobs, partial words, simultaneous accesses, and faults planted in the slave.
 
 use crate::bus::{AXI, Bus, Fault, Job, counts_and_faults, is_same, register, restart, survivors, tracking};
 use std::fmt::Write as _;
 use takt_isa::T1;
 
-/// Writes of a part of a word, which are refused and change nothing, and a write and a read at once: the one is served first that was
-/// not last.
+/// Writes to parts of a word, which are rejected and change nothing, and simultaneous writes and reads: the side that was not served last
+/// is served first.
 fn parts_and_orders() -> Job {
     let mut bus = Bus::default();
     let period = register("period");
     bus.put(1, period, 0x1234_5670);
-    // Elsewhere, at each address that differs in one bit.
+    // The register's address with one bit changed.
     (3..16).for_each(|bit| bus.put(1, period ^ 1 << bit, 7));
     bus.read(period, 0x1234_5670);
     for strobes in 0..15 {
@@ -20,7 +19,7 @@ fn parts_and_orders() -> Job {
         writeln!(bus.expected, "{period:04x} answered 2").expect("a string takes it");
         bus.read(period, 0x1234_5670);
     }
-    // The last one that was served, and the value.
+    // The side that was served last, and the value.
     let mut value = 0x1234_5670;
     for round in 0..12_u32 {
         let is_read_last = round % 3 != 1;
@@ -32,7 +31,7 @@ fn parts_and_orders() -> Job {
         let (order, seen) = if is_read_last { ("wr", new) } else { ("rw", value) };
         writeln!(bus.expected, "{period:04x} {order} {seen:08x}").expect("a string takes it");
         if round % 3 == 0 {
-            // A write is the last.
+            // The write is served last.
             bus.write("period", new);
         }
         value = new;
@@ -54,7 +53,7 @@ fn axi_slave_agrees_with_the_wishbone_slave() {
 
 #[rustfmt::skip]
 const FAULTS: &[Fault] = &[
-    // What is served, and when: an address without its data, the one side for ever, both sides at once, while a response stands.
+    // Arbitration: an address without its data, one side forever, both sides at once, a request while a response is pending.
     ("s_axi_awvalid & s_axi_wvalid & ~s_axi_bvalid", "s_axi_awvalid & ~s_axi_bvalid"),
     ("s_axi_awvalid & s_axi_wvalid & ~s_axi_bvalid", "s_axi_wvalid & ~s_axi_bvalid"),
     ("~(to_read & wrote)", "1'b1"),
@@ -67,12 +66,12 @@ const FAULTS: &[Fault] = &[
     ("write & ~&s_axi_wstrb", "write & ~|s_axi_wstrb"),
     ("<= 3'b110", "<= 3'b100"),
     ("<= 3'b110", "<= 3'b010"),
-    // Responses: that do not stay, or stay for ever.
+    // Responses that are withdrawn early, or never.
     ("if (s_axi_bready) s_axi_bvalid <= 1'b0;", "s_axi_bvalid <= 1'b0;"),
     ("if (s_axi_rready) s_axi_rvalid <= 1'b0;", "s_axi_rvalid <= 1'b0;"),
     ("if (s_axi_rready) s_axi_rvalid <= 1'b0;", ""),
     ("s_axi_rdata} <= {1'b1, read}", "s_axi_rdata} <= {1'b1, 1'b0, read[30:0]}"),
-    // The address: of the other side, its upper bits, its place.
+    // Address: of the wrong side, without its upper bits, shifted.
     ("write ? s_axi_awaddr[17:2] : s_axi_araddr[17:2]", "s_axi_awaddr[17:2]"),
     ("write ? s_axi_awaddr[17:2]", "write ? {1'b0, s_axi_awaddr[16:2]}"),
     ("s_axi_araddr[17:2]", "s_axi_araddr[15:0]"),

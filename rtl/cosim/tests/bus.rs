@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A core behind a bus slave, in Icarus Verilog: loaded, run, read and started again over the bus. A script says what a master does, the
+//! Core behind a bus slave, in Icarus Verilog: loaded, run, read and restarted over the bus. A script defines the master's actions, the
 //! same for every bus.
 #![allow(clippy::print_stdout)]
 
@@ -15,10 +15,11 @@ use takt_rtl::wishbone::{INPUTS, OUTPUTS, REGISTERS};
 use takt_rtl::{Design, Library, axi, bench, export, wishbone};
 
 const PERIODS: usize = 2;
-/// An expression that occurs once in a slave's text, and what takes its place.
+/// Expression that occurs once in a slave's text, and its replacement.
 pub(crate) type Fault = (&'static str, &'static str);
 
-/// A bus: the name of its slave of a design, and a master in Verilog that follows the script, given the slave's name and parameters.
+/// Bus: the name of a design's slave, and a generator of a master in Verilog that follows the script, given the slave's name and
+/// parameters.
 #[derive(Clone, Copy)]
 pub(crate) struct Protocol {
     pub(crate) name: &'static str,
@@ -40,9 +41,9 @@ fn run(folder: &Path, program: &str, arguments: &[&str]) -> Result<String, Strin
     }
 }
 
-/// A master's module around what is its bus's own: nets and the slave, what each reset does, the tasks `put` and `get`, and further actions.
-/// A line of `bus.hex` is an action: its kind, 1 to 7, address and value. It writes, reads and prints, reads until a bit is set, reads,
-/// pauses for so many cycles; the last two are a bus's own.
+/// Module of a master, with its bus's parts filled in: nets and the slave, the effect of each reset, the tasks `put` and `get`, and
+/// further actions. A line of `bus.hex` is an action: kind, address and value. Kinds 1 to 5 write, read and print, read until a bit is
+/// set, read, and pause for a number of cycles; 6 and 7 are specific to the bus.
 fn module(nets: &str, reset: &str, tasks: &str, own: &str) -> String {
     format!(
         r#"`timescale 1ns / 1ps
@@ -98,7 +99,7 @@ endmodule
     )
 }
 
-/// A Wishbone master of classic cycles, which ends them at the clock edge at which it sees the acknowledgement.
+/// Wishbone master of classic cycles, which it ends at the clock edge at which it sees the acknowledgement.
 fn wishbone_master(slave: &str, parameters: &str) -> String {
     let nets = format!(
         "    reg         stb, we;
@@ -128,9 +129,9 @@ fn wishbone_master(slave: &str, parameters: &str) -> String {
     module(&nets, "{stb, we, adr, dat} = 50'd0;", tasks, "")
 }
 
-/// An AXI4-Lite master that offers addresses, data and readiness in any order, and looks whether the slave keeps what it shows until it is
-/// taken. Of its own: 6 writes with the strobes that are the value's low bits and prints the response, 7 writes and reads an address at
-/// once and prints in which order they were taken, and what was read.
+/// AXI4-Lite master that offers addresses, data and readiness in any order, and checks that the slave holds its outputs until they are
+/// accepted. Its own actions: 6 writes with the value's low bits as strobes and prints the response; 7 writes and reads an address at
+/// once, and prints the order in which they were served, and the value read.
 fn axi_master(slave: &str, parameters: &str) -> String {
     let nets = format!(
         "    reg         awvalid, wvalid, bready, arvalid, rready, at_once;
@@ -221,7 +222,7 @@ fn axi_master(slave: &str, parameters: &str) -> String {
     module(&nets, reset, tasks, own)
 }
 
-/// The master's actions, and the text that it is to print.
+/// Actions of the master, and the text that it must print.
 #[derive(Default)]
 pub(crate) struct Bus {
     script: String,
@@ -237,7 +238,7 @@ impl Bus {
         self.put(1, register(name), value);
     }
 
-    /// Reads an address, where a value is to stand.
+    /// Reads an address and expects a value.
     pub(crate) fn read(&mut self, address: u16, value: u32) {
         self.put(2, address, 0);
         writeln!(self.expected, "{address:04x} {value:08x}").expect("a string takes it");
@@ -251,8 +252,8 @@ impl Bus {
         self.put(5, 0, cycles);
     }
 
-    /// Loads a program: its own bundles and what the fetch runs ahead to, its data and registers. Neither a place that follows the last
-    /// one nor upper bits that stay are written.
+    /// Loads a program: its bundles and those that fetch runs ahead to, its data and registers. Skips the write of a place that follows
+    /// the last one, and of upper bits that stay the same.
     pub(crate) fn load(&mut self, program: &Program) {
         let (mut next, mut high) = (None, None);
         for record in load_records(program) {
@@ -288,7 +289,7 @@ impl Bus {
         self.until_waiting();
     }
 
-    /// The script of a machine, whose slave has these parameters, and the judgement of what it prints.
+    /// Makes a job of the script for a machine, whose slave has these parameters, with the judge of its output.
     pub(crate) fn job(
         mut self,
         name: String,
@@ -308,7 +309,7 @@ impl Bus {
     }
 }
 
-/// What is printed is what was expected.
+/// The output equals the expected text.
 pub(crate) fn is_same(said: &str, expected: &str) -> Result<(), String> {
     if said == expected { Ok(()) } else { Err(format!("it says\n{said}instead of\n{expected}")) }
 }
@@ -316,7 +317,7 @@ pub(crate) fn is_same(said: &str, expected: &str) -> Result<(), String> {
 /// Comparison of the output of a simulation with the expected output; an error states the difference.
 type Judge = Box<dyn Fn(&str, &str) -> Result<(), String>>;
 
-/// A script for a machine, and what it must print.
+/// Script for a machine, and its expected output.
 pub(crate) struct Job {
     name: String,
     machine: &'static Machine,
@@ -327,10 +328,10 @@ pub(crate) struct Job {
 }
 
 impl Job {
-    /// Runs it over a bus, perhaps with a fault in the slave.
+    /// Runs the job over a bus, optionally with a fault in the slave.
     ///
     /// # Errors
-    /// In words, what is not as it must be.
+    /// Description of the difference from the expected output.
     pub(crate) fn run(&self, protocol: Protocol, fault: Option<Fault>) -> Result<(), String> {
         let design = export(self.machine, &Library::builtin()).expect("it has a circuit");
         let slave = (protocol.slave)(&design);
@@ -372,7 +373,7 @@ impl Job {
             lint.extend(list[1..].iter().map(String::as_str));
             run(&folder, "verilator", &lint)?;
         }
-        // Some versions of Icarus Verilog remark that the script does not fill its memory.
+        // Some versions of Icarus Verilog warn that the script does not fill its memory.
         let said = run(&folder, "vvp", &["-n", "master"])?;
         let said: String = said
             .lines()
@@ -384,7 +385,7 @@ impl Job {
     }
 }
 
-/// Faults in a bus's slave that none of the jobs finds. Each is run over what is cheap first.
+/// Faults in a bus's slave that none of the jobs finds. The jobs are in order of increasing cost.
 pub(crate) fn survivors(protocol: Protocol, jobs: &[Job], faults: &[Fault]) -> Vec<String> {
     let mut survivors = Vec::new();
     for &fault in faults {
@@ -400,12 +401,12 @@ pub(crate) fn register(name: &str) -> u16 {
     REGISTERS.iter().find(|row| row.name == name).expect("a register").address
 }
 
-/// The address of an output port on the bus.
+/// Address of an output port on the bus.
 pub(crate) fn output(machine: &Machine, register: Register) -> u16 {
     OUTPUTS + machine.output_number(register).expect("an output")
 }
 
-/// The robot's controller, for a few periods.
+/// Controller of the robot, for a few periods.
 pub(crate) fn tracking(machine: &'static Machine) -> Job {
     let program = assemble(machine, "hybrid/tracking.s");
     let mut emulator = Emulator::new(&program).expect("it fits");
@@ -413,7 +414,8 @@ pub(crate) fn tracking(machine: &'static Machine) -> Job {
     bus.load(&program);
     bus.write("control", 1);
     bus.until_waiting();
-    // A reset asked for briefly, while the program runs, lasts its time. A constant loaded at once waits for what is in flight.
+    // A reset requested briefly while the program runs lasts its full time. A constant loaded immediately afterwards waits for results in
+    // flight.
     let kept = load_records(&program).into_iter().find(|record| record.space == Space::Register);
     let kept = kept.expect("the program has constants");
     bus.write("load_place", u32::from(kept.address) | (Space::Register as u32) << 16);
@@ -427,7 +429,7 @@ pub(crate) fn tracking(machine: &'static Machine) -> Job {
     bus.write("control", 0);
     bus.write("control", 1);
     bus.until_waiting();
-    // Nowhere: further pages of the inputs and the outputs, the last input port.
+    // Addresses without a port: further pages of the inputs and the outputs, the last input port.
     bus.put(1, INPUTS + 0x300, 0x7fc0_0000);
     bus.put(1, INPUTS + machine.inputs.depth - 1, 1);
     bus.read(OUTPUTS + machine.outputs_per_bank, 0);
@@ -448,7 +450,7 @@ pub(crate) fn tracking(machine: &'static Machine) -> Job {
     bus.job(format!("tracking-{}", machine.name), machine, String::new(), is_same)
 }
 
-/// Its outputs depend on what earlier periods left in registers and data memory; an output and an input have a first value.
+/// Program whose outputs depend on the registers and data memory that earlier periods left; an output and an input have initial values.
 const MEMORY: &str = "
 .input  x, gain, n:int
 .output sum, product, k:int, first
@@ -475,8 +477,8 @@ period: fadd    s, s, x
         wait    period
 ";
 
-/// Runs periods, starts again over the bus, runs them again: the same outputs, those of the emulator, which is reset. Without what keeps
-/// the first values, the second run goes on where the first ended.
+/// Runs periods, restarts the program over the bus, and runs them again: the outputs must be the same, and equal those of the emulator
+/// after a reset. Without the memory for initial values, the second run continues where the first ended.
 pub(crate) fn restart(machine: &'static Machine, latched: bool, restores: bool) -> Job {
     let options = takt_asm::Options { machine, ..takt_asm::Options::default() };
     let source = if latched { format!(".ports latched\n{MEMORY}") } else { MEMORY.to_owned() };
@@ -495,7 +497,7 @@ pub(crate) fn restart(machine: &'static Machine, latched: bool, restores: bool) 
         bus.read(output(machine, port("first")), 7.5f32.to_bits());
         for i in 0..periods {
             let mut inputs = vec![(port("x"), (i as f32 * 0.75 - 1.0).to_bits()), (port("n"), 1 + i % 2)];
-            // From the second period on: in the first it is what the loader wrote.
+            // Only from the second period on: the first uses the loader's value.
             if i > 0 {
                 inputs.push((port("gain"), (1.0 + i as f32).to_bits()));
             }
@@ -516,7 +518,7 @@ pub(crate) fn restart(machine: &'static Machine, latched: bool, restores: bool) 
     emulator.reset();
     run(&mut bus, &mut emulator, 5);
     assert_eq!(bus.expected, once.repeat(2));
-    // Stopped amid a period, with an input written on the way.
+    // Stopped in the middle of a period, with a write to an input under way.
     bus.write("tick", 1);
     bus.put(1, INPUTS + machine.input_number(port("x")).expect("an input"), 1);
     bus.write("control", 0);
@@ -536,7 +538,7 @@ pub(crate) fn restart(machine: &'static Machine, latched: bool, restores: bool) 
     })
 }
 
-/// Counts its periods; faults if `n` is beyond the memory.
+/// Program that counts its periods, and faults if `n` is beyond the memory.
 const COUNT: &str = "
 .input  n:int
 .output count:int
@@ -554,13 +556,13 @@ period: iadd    k, k, 1
         ld      t, table[n]
         wait    period
 ";
-/// The slave's period, pauses of many, the number of periods in one.
+/// Period of the slave in cycles, and the number of periods in a pause.
 const PERIOD: u32 = 40;
 const PERIODS_PAUSED: u32 = 50;
-/// A period that is over before the program runs, if it is counted from there.
+/// A period that would be over before the program runs, if it were counted from the write.
 const LONG: u32 = 400;
 
-/// The bits of the status that mean something: without a fault, the fields of one do not.
+/// Bits of the status that are meaningful: without a fault, the fields of the fault are not.
 fn meant(status: u32) -> u32 {
     let row = REGISTERS.iter().find(|row| row.name == "status").expect("a register");
     let mask = |name: &str| {
@@ -572,15 +574,15 @@ fn meant(status: u32) -> u32 {
     if status & mask("fault") == 0 { status & !of_fault } else { status }
 }
 
-/// The status word with these fields, of which the others are 0.
+/// Status word with these fields; the others are 0.
 fn status(fields: &[(&str, u32)]) -> u32 {
     let row = REGISTERS.iter().find(|row| row.name == "status").expect("a register");
     let place = |name: &str| row.fields.iter().find(|field| field.name == name).expect("a field").low;
     fields.iter().fold(0, |word, (name, value)| word | value << place(name))
 }
 
-/// Ticks by the slave's own period, each field of its status, a fault, a restart after it. The count of periods in a pause is printed
-/// twice, before it and after.
+/// Ticks by the slave's own period, each field of its status, a fault, and a restart after it. The number of periods is printed before
+/// and after a pause.
 pub(crate) fn counts_and_faults(machine: &'static Machine) -> Job {
     let options = takt_asm::Options { machine, ..takt_asm::Options::default() };
     let loader = takt_asm::MemoryLoader::of("count.s", COUNT);
@@ -593,7 +595,7 @@ pub(crate) fn counts_and_faults(machine: &'static Machine) -> Job {
     let mut bus = Bus::default();
     bus.load(&program);
     bus.put(1, input, 0);
-    // The period is counted from the first `wait` on, not from here.
+    // The period is counted from the first `wait` on, not from this write.
     bus.write("period", LONG);
     bus.pause(LONG);
     bus.write("control", 1);
@@ -606,13 +608,13 @@ pub(crate) fn counts_and_faults(machine: &'static Machine) -> Job {
         bus.pause(pause);
         bus.read(count, 0);
     }
-    // The period in which it is stopped is the last.
+    // The period in which it is stopped is the last one.
     bus.write("period", 0);
     bus.pause(2 * PERIOD);
     bus.read(register("status"), status(&[("waiting", 1)]));
     bus.read(register("period"), 0);
     bus.read(register("control"), 1);
-    // The second tick comes too early.
+    // The second tick is early.
     (0..2).for_each(|_| bus.write("tick", 1));
     bus.pause(2 * PERIOD);
     bus.read(register("status"), status(&[("waiting", 1), ("deadline_missed", 1)]));
@@ -630,7 +632,7 @@ pub(crate) fn counts_and_faults(machine: &'static Machine) -> Job {
     bus.write("control", 0);
     bus.load(&program);
     bus.put(1, input, 0);
-    // Neither is the next run's first period counted from the last run.
+    // The next run's first period is not counted from the last run, either.
     bus.write("period", LONG);
     bus.pause(LONG);
     bus.write("control", 1);

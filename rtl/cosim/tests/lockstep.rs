@@ -85,7 +85,7 @@ fn short_programs() {
     }
 }
 
-/// Every instruction of every slot with each of its bits changed, a fifth of them unless `TAKT_FULL=1`: nearly all are refused.
+/// Every instruction of every slot with each of its bits changed, a fifth of them unless `TAKT_FULL=1`: nearly all must be rejected.
 #[test]
 fn changed_words() {
     let is_full = std::env::var_os("TAKT_FULL").is_some();
@@ -93,7 +93,7 @@ fn changed_words() {
         let mut simulation = model(machine).start(&[]).unwrap_or_else(|error| panic!("{error}"));
         let (mut coverage, mut refused) = (random::Coverage::default(), 0);
         let programs = random::words(machine);
-        // Each instruction has 49 programs, no multiple of 5, so that the sample covers every bit.
+        // Each instruction has 49 programs, which is not a multiple of 5, so the sample covers every bit.
         for program in programs.iter().step_by(if is_full { 1 } else { 5 }) {
             simulation = random::run_directed(program, simulation, &mut coverage)
                 .unwrap_or_else(|error| panic!("{}: {:x?}: {error}", machine.name, program.code));
@@ -117,8 +117,8 @@ fn results_at_every_distance() {
     }
 }
 
-/// Calls to every depth, faults beside results and other faults, loops around each carry of an address: each program ends as it must, in
-/// the same cycle on both sides.
+/// Calls to every depth, faults beside results and other faults, and loops across each carry of an address: each program ends with its
+/// expected event, in the same cycle on both sides.
 #[test]
 fn directed_programs_end_with_their_expected_event() {
     for machine in MACHINES {
@@ -133,7 +133,7 @@ fn directed_programs_end_with_their_expected_event() {
     }
 }
 
-/// Programs with loops of 2^k + 1 iterations, which a single wrong bit would end early. They are not run to the end.
+/// Programs with loops of 2^k + 1 iterations, which a single wrong bit would end early. They are not run to their end.
 pub(crate) fn early_ends(machine: &'static Machine) -> Vec<Program> {
     let program = |(bit, body): (u32, usize)| {
         let source = format!(
@@ -168,7 +168,7 @@ fn loops_do_not_end_early() {
     }
 }
 
-/// A program with long counted loops: each bit of a count is 1 in one loop and 0 in another; two loops are nested.
+/// Program with long counted loops: each bit of a count is 1 in one loop and 0 in another; two loops are nested.
 pub(crate) fn long_loops(machine: &'static Machine) -> Program {
     let counted = |count: u32| {
         format!(
@@ -228,8 +228,8 @@ pub(crate) fn runs_long_loops(
     Ok(lockstep.into_simulation())
 }
 
-/// Rows other than the table's: four slots with two adders and two ALUs; two slots with iterative units, and banks of different depths that
-/// leave gaps in the register space. The assembler's programs for the first row use both of its adders and ALUs.
+/// Rows other than the table's: four slots with two adders and two ALUs; two slots with iterative units, and banks of different depths
+/// that leave gaps in the register space. The programs assembled for the first row use both adders and both ALUs.
 #[test]
 fn rows_of_an_independent_author() {
     use takt_isa::spec::units::*;
@@ -282,7 +282,7 @@ fn rows_of_an_independent_author() {
     }
 }
 
-/// A machine from a file (docs/machines.md): t3 with a second adder, with random programs and with scheduled ones, whose sums both adders
+/// Machine from a file (docs/machines.md): t3 with a second adder, with random programs and with scheduled ones, whose sums both adders
 /// execute.
 #[test]
 fn machine_of_a_file() {
@@ -435,7 +435,7 @@ fn tracking_programs() {
     }
 }
 
-/// Scheduled programs run alike on circuit and emulator, and give the results of the unscheduled ones.
+/// Scheduled programs run alike on circuit and emulator, and give the same results as unscheduled ones.
 #[test]
 fn scheduled_programs() {
     for machine in MACHINES {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Tests of the crate from outside, one program: a module for each subject.
+//! Integration tests of the crate, in one executable: a module for each subject.
 
 mod axi;
 mod bus;

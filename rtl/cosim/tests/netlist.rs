@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Netlists that yosys made of a core, in lockstep with the emulator: with planted mutants, and mapped to the cells of an FPGA.
 //!
-//! `TAKT_NETLIST` names a folder with `machine.txt` (its name), `netlist.v` and, for mutants, `mutants.txt`, the numbers to be tried.
-//! `cargo evidence mutants` and `cargo evidence netlist` call this.
+//! `TAKT_NETLIST` names a folder with `machine.txt` (the machine's name), `netlist.v` and, for mutants, `mutants.txt`, the numbers of the
+//! mutants to try. `cargo evidence mutants` and `cargo evidence netlist` run this test.
 #![allow(clippy::print_stdout)]
 
 use crate::common::{assemble, folder};
@@ -15,7 +15,7 @@ use takt_isa::{Machine, Program};
 use takt_rtl::export::DesignFile;
 use takt_rtl::{Design, Library, export};
 
-/// Programs that a mutant may survive before it counts as not found: random and short ones.
+/// Numbers of random and of short programs that a mutant may survive before it counts as not found.
 const PROGRAMS: u64 = 300;
 const SHORT: u64 = 6000;
 
@@ -33,7 +33,7 @@ fn netlist() -> (&'static Machine, Model, PathBuf) {
     (machine, model.unwrap_or_else(|error| panic!("{error}")), place)
 }
 
-/// A program that a netlist runs beside the emulator.
+/// Program that a netlist runs in lockstep with the emulator.
 enum Case {
     Random(u64),
     Short(u64),

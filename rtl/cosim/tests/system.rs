@@ -19,8 +19,8 @@ fn folder() -> PathBuf {
     PathBuf::from(env!("CARGO_TARGET_TMPDIR"))
 }
 
-/// Small cores, which compile fast, because the test is about their surroundings: one with a single slot, and one with two, whose output
-/// ports are in two banks.
+/// Small cores, which compile fast, because the test is about their surroundings: one with a single slot, and one with two slots, whose
+/// output ports are in two banks.
 fn machines() -> [&'static Machine; 2] {
     static ONE: OnceLock<Machine> = OnceLock::new();
     static TWO: OnceLock<Machine> = OnceLock::new();
@@ -47,7 +47,7 @@ fn machines() -> [&'static Machine; 2] {
     [one, two]
 }
 
-/// Circuit of a system, with room for the programs of all the given ones.
+/// Circuit of a system, with room for the programs of all `systems`.
 fn design(systems: &[Description], name: &str) -> SystemDesign {
     let designs = systems.iter().map(|system| {
         export_system(system, name, &Library::builtin()).unwrap_or_else(|error| panic!("{error}"))
@@ -189,7 +189,7 @@ latency = 5
 push = "B1"
 "#;
 
-/// The system [`LINKS`] with random programs, whose input ports are all over their bank; core a has latched ports.
+/// The system [`LINKS`] with random programs, whose input ports are spread over their bank; core a has latched ports.
 fn with_every_link() -> Description {
     let [one, two] = machines();
     let programs: BTreeMap<String, Program> = [("a.s", one, 1), ("b.s", two, 2), ("c.s", one, 3)]
@@ -230,7 +230,7 @@ const FAULTS: &[Fault] = &[
     ("takt_snapshot", "HOST ? arrived : working", "working"),
     ("takt_pace", "left == TAKE[BITS-1:0]", "left == TAKE[BITS-1:0] + 1'b1"),
     ("takt_system_links", "c_take & c_waiting", "c_take"),
-    // FIFO: flags that do not stick, room that a pop makes left unused, an unreported refusal, and the like.
+    // FIFO: flags that are not sticky, room after a pop that stays unused, an unreported refusal, and the like.
     ("takt_fifo", "overflow | refused", "refused"),
     ("takt_fifo", "underflow | missed", "missed"),
     ("takt_fifo", "~full | popped", "~full"),
@@ -241,23 +241,23 @@ const FAULTS: &[Fault] = &[
     ("takt_fifo", "words[first]", "words[free]"),
     ("takt_fifo", "{empty, full, count, overflow, underflow}", "{empty, full, count, 1'b0, underflow}"),
     ("takt_fifo", "write[f] ? value[32*f +: 32] : working[32*f +: 32]", "working[32*f +: 32]"),
-    // FIFO: its end where a power of two has one, for the next entry and for the first.
+    // FIFO: wraps at a power of two instead of its depth, for the next entry and for the first.
     ("takt_fifo", "free == LAST[ADDRESS-1:0]", "&free"),
     ("takt_fifo", "first == LAST[ADDRESS-1:0]", "&first"),
     // Loader: a record left out.
     ("takt_loader", "state == 2'd1", "state == 2'd1 & next != 3"),
-    // Gate: one of two ports whose numbers differ in a bit, the last mailbox first, an older value that stays, a newer one that is lost.
+    // Gate: one of two ports whose numbers differ in a bit, the last mailbox first, an old value that stays, a newer value that is lost.
     ("takt_gate", "NUMBERS[INDEX*i +: INDEX]", "(NUMBERS[INDEX*i +: INDEX] & ~64)"),
     ("takt_gate", "next & (~next + 1'b1)", "next & ~((next >> 1) | (next >> 2) | (next >> 3))"),
     ("takt_gate", "arrives[k]", "arrives[k] & ~waits[k]"),
     ("takt_gate", "arrives | (waits & ~goes)", "(arrives & ~waits) | (waits & ~goes)"),
-    // Ticks: before all cores have waited, at no multiple of their distance, at a wrong distance.
+    // Ticks: before all cores have waited, at a cycle that is not a multiple of their interval, at a wrong interval.
     ("takt_start", "&(waited | waiting | halted)", "|(waited | waiting | halted)"),
     ("takt_start", "left == {BITS{1'b0}} ? LAST[BITS-1:0] : left - 1'b1", "left == {BITS{1'b0}} ? LAST[BITS-1:0] - 1'b1 : left - 1'b1"),
     ("takt_pace", "left == {BITS{1'b0}} ? LAST[BITS-1:0] : left - 1'b1", "left == {BITS{1'b0}} ? LAST[BITS-1:0] - 1'b1 : left - 1'b1"),
 ];
 
-/// Sets of programs that a fault may survive before it counts as not found.
+/// Number of sets of programs that a fault may survive before it counts as not found.
 const VARIANTS: u64 = 32;
 
 /// A single simulation holds all faults, and `+fault=` selects a fault; each fault is found.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The three-processor controller as a circuit, in lockstep with the emulator: host and encoders act as at the beginning of a motion.
+//! Three-processor controller as a circuit, in lockstep with the emulator, with host and encoders as at the beginning of a motion.
 #![allow(clippy::print_stdout)]
 
 use std::path::PathBuf;
@@ -13,8 +13,8 @@ use takt_robot::plant::Plant;
 use takt_rtl::{Library, export_system};
 use takt_system::HostAction;
 
-/// The controller takes and answers packets, plans a motion, begins it, and the servo follows. `TAKT_FULL=1` runs a longer part of the
-/// demonstration.
+/// The controller accepts and answers packets, plans a motion and begins it, and the servo follows. `TAKT_FULL=1` runs a longer part of
+/// the demonstration.
 #[test]
 fn the_controller_is_its_emulator() {
     let description = standard().unwrap_or_else(|error| panic!("{error}"));

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A check of the project's sources: code about one family stands in the family's folder.
+//! Check of the project's sources: code that is specific to a family must be in the family's folder.
 
 use crate::REFERENCE;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Folders with sources, and endings of their files. Documents may name a family.
+/// Folders with sources, and extensions of their files. Documents may name a family.
 const FOLDERS: [&str; 8] = ["isa", "asm", "emu", "rtl", "programs", "tools", "benches", ".github"];
 const ENDINGS: [&str; 12] = ["rs", "v", "vh", "in", "py", "s", "c", "h", "cpp", "toml", "typ", "yml"];
 
@@ -31,7 +31,7 @@ fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
-/// Words that only that family's folder has: name, cells, options of its tools.
+/// Words that only that family's folder may contain: its name, cells, and options of its tools.
 fn words() -> Vec<String> {
     let cells = REFERENCE.cells;
     let cells = [cells.carries, cells.flip_flops, cells.multipliers, cells.block_rams].into_iter().flatten();

@@ -8,12 +8,12 @@ use serde_json::Value;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Resources {
-    /// Look-up tables ([`Family::lut`](crate::Family::lut)), those of carry chains and of memories in logic included.
+    /// Look-up tables ([`Family::lut`](crate::Family::lut)), including those of carry chains and of memories in logic.
     pub luts: u64,
     /// Look-up tables in carry chains among these, where they were counted.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub carries: Option<u64>,
-    /// Flip-flops.
+    /// Number of flip-flops.
     pub flip_flops: u64,
     /// Multipliers of the family's width.
     pub multipliers: u64,
@@ -21,35 +21,36 @@ pub struct Resources {
     pub block_rams: u64,
 }
 
-/// Cells by their names in yosys, each with the places that it takes. A name stands for all that begin with it; the longest counts.
+/// Cells by their names in yosys, each with the number of places that it takes. A name matches all cells that begin with it; the longest
+/// matching name counts.
 #[derive(Clone, Copy, Debug)]
 pub struct Cells {
     /// Cells in look-up tables.
     pub luts: &'static [(&'static str, u64)],
-    /// Cells of carry chains among these; empty if they are no cells of their own.
+    /// Cells of carry chains among these; empty if carry chains have no cells of their own.
     pub carries: &'static [(&'static str, u64)],
-    /// Flip-flops.
+    /// Flip-flop cells.
     pub flip_flops: &'static [(&'static str, u64)],
-    /// Multipliers.
+    /// Multiplier cells.
     pub multipliers: &'static [(&'static str, u64)],
-    /// Block RAMs.
+    /// Block RAM cells.
     pub block_rams: &'static [(&'static str, u64)],
 }
 
-/// Places that a cell takes.
+/// Number of places that a cell takes.
 fn places(cells: &[(&str, u64)], name: &str) -> u64 {
-    // The longest name counts: `SDP` and `SP` are two.
+    // The longest matching name counts: `SDP` and `SP` differ.
     let fitting = cells.iter().filter(|(kind, _)| name.starts_with(kind));
     fitting.max_by_key(|(kind, _)| kind.len()).map_or(0, |(_, places)| *places)
 }
 
 impl Cells {
-    /// Resources of no cell.
+    /// Resources without any cell.
     pub fn none(&self) -> Resources {
         Resources { carries: (!self.carries.is_empty()).then_some(0), ..Resources::default() }
     }
 
-    /// Adds `number` cells of a kind.
+    /// Adds `count` cells of a kind.
     pub fn add(&self, resources: &mut Resources, kind: &str, count: u64) {
         resources.luts += count * places(self.luts, kind);
         resources.carries = resources.carries.map(|carries| carries + count * places(self.carries, kind));
@@ -58,7 +59,7 @@ impl Cells {
         resources.block_rams += count * places(self.block_rams, kind);
     }
 
-    /// Resources by yosys' statistics (`stat -json`).
+    /// Resources by the statistics of yosys (`stat -json`).
     pub fn resources(&self, statistics: &Value) -> Resources {
         let mut resources = self.none();
         let cells = statistics["design"]["num_cells_by_type"].as_object();

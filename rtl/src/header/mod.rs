@@ -183,7 +183,7 @@ impl Header {
         match language {
             Language::C => c::write(self),
             Language::Rust => rust::write(self),
-            // Strings and numbers only, so that serialisation cannot fail.
+            // Strings and numbers only, so serialisation cannot fail.
             Language::Json => serde_json::to_string_pretty(self).unwrap_or_default() + "\n",
             Language::Svd => svd::write(self),
         }

@@ -237,7 +237,7 @@ fn writing(slot: &'static Slot) -> impl Iterator<Item = &'static Unit> {
 }
 
 /// Length of a slot's shift register of results in flight (`takt_in_flight`): the largest latency of a pipelined unit or, for an iterative
-/// unit, the latency left when the unit accepts its next operation, so that a single tracker covers the rest. At least 4, as takt_hazard
+/// unit, the latency left when the unit accepts its next operation, so a single tracker covers the rest. At least 4, as takt_hazard
 /// requires.
 fn depth(slot: &'static Slot) -> u32 {
     let places = |unit: &Unit| match unit.interval {

@@ -52,11 +52,11 @@ fn run(command: &mut Command) -> Result<String, String> {
 
 /// Waivers of `verilator -Wall`, each with its reason.
 const WAIVERS: &[&str] = &[
-    // A unit's file has the name of its row, `add.v`; modules have a prefix, `takt_add`, for the namespace is global.
+    // A unit's file has the name of its row, `add.v`; modules have a prefix, `takt_add`, because their namespace is global.
     "-Wno-DECLFILENAME",
 ];
 
-/// Verilator's lint of a circuit, which also tries the elaboration.
+/// Lints a circuit with Verilator, which also elaborates it.
 pub(crate) fn lint(library: &Library, circuit: &Circuit) -> Result<String, String> {
     let folder = Folder::new(circuit, "lint");
     run(Command::new("verilator")
@@ -67,7 +67,7 @@ pub(crate) fn lint(library: &Library, circuit: &Circuit) -> Result<String, Strin
         .args(folder.write(library, circuit)))
 }
 
-/// Elaboration by Icarus Verilog, which refuses the extensions of Verilog-2005 that Verilator accepts.
+/// Elaborates a circuit with Icarus Verilog, which rejects the extensions of Verilog-2005 that Verilator accepts.
 pub(crate) fn elaborate(library: &Library, circuit: &Circuit) -> Result<String, String> {
     let folder = Folder::new(circuit, "elaborate");
     let top = circuit.unit.rtl;
@@ -77,7 +77,7 @@ pub(crate) fn elaborate(library: &Library, circuit: &Circuit) -> Result<String, 
         .args(folder.write(library, circuit)))
 }
 
-/// A folder of its own for every use, removed with everything in it.
+/// Temporary folder, unique to each use, and removed with its contents.
 struct Folder(PathBuf);
 
 impl Folder {
@@ -108,7 +108,7 @@ impl Drop for Folder {
     }
 }
 
-/// A unit that runs in a process of its own.
+/// Unit that is simulated in its own process.
 pub(crate) struct Simulation {
     pub(crate) circuit: Circuit,
     program: PathBuf,
@@ -128,7 +128,7 @@ pub(crate) struct Request {
 }
 
 impl Simulation {
-    /// Builds a circuit and starts it. The program stays in the target folder until something of it changes.
+    /// Builds a circuit and starts it. The program stays in the target folder until one of its sources changes.
     pub(crate) fn new(library: &Library, circuit: &Circuit) -> Result<Simulation, String> {
         Simulation::start(circuit, compile(library, circuit).map_err(|error| error.to_string())?, &[])
     }
@@ -150,7 +150,7 @@ impl Simulation {
         Ok(Simulation { circuit: circuit.clone(), program, stdin, stdout: stdout.expect("piped"), process })
     }
 
-    /// Removes the program of a circuit that nobody will ask for again.
+    /// Removes the program of a circuit that will not be needed again.
     pub(crate) fn remove(self) {
         let _ = fs::remove_file(&self.program);
     }
@@ -203,8 +203,8 @@ impl Simulation {
         Ok(())
     }
 
-    /// Passes all pairs of special values through, for every operation; a third operand takes a few values. Of three numbers, the third
-    /// takes every seventh special value that is a number, another seventh for each pair; with `TAKT_FULL=1`, it takes all.
+    /// Passes all pairs of special values through, for every operation; a third operand takes a few values. If all three operands are
+    /// floats, the third takes every seventh special float, a different seventh for each pair; with `TAKT_FULL=1`, it takes all.
     fn check_special_values(&mut self) -> Result<u64, String> {
         let values = self.special_values();
         let mut count = 0;
@@ -321,7 +321,7 @@ impl Simulation {
             requests.clear();
             let gaps = (done / BATCH as u64) % 2 == 1;
             while requests.len() < BATCH && done < total {
-                // Every round has each operation once, in an order of the round's own.
+                // Every round has each operation once, in a new order.
                 let n = operations.len() as u64;
                 let (round, turn) = (done / n, done % n);
                 let operation = operations[((turn + round * 7 + round / n) % n) as usize];
@@ -346,7 +346,7 @@ impl Drop for Simulation {
     }
 }
 
-/// Tells if an instruction takes three numbers.
+/// The instruction takes three floats.
 fn is_fused(row: &Row) -> bool {
     row.shape.sources() == 3 && (0..3).all(|index| row.source_type(index) == Type::F)
 }
@@ -401,7 +401,7 @@ pub(crate) fn compile(library: &Library, circuit: &Circuit) -> Result<PathBuf, V
         headers: Vec::new(),
         arguments: parameters.chain(waivers).collect(),
         defines,
-        // Millions of operations go through.
+        // Millions of operations run through the program: optimise it.
         optimise: "-O2",
         trace: false,
     };
@@ -457,8 +457,8 @@ impl Operands {
         self.random.bits() & 0x8000_0000 | ((127 + exponent) as u32) << 23 | fraction & 0x007f_ffff
     }
 
-    /// Two numbers of whose product nothing lies below rounding's place but the lowest bit of all: significands with
-    /// a·b = 1 modulo 2^place, for a result that is rounded at that place, subnormal if need be.
+    /// Two numbers whose product has, below the place of rounding, only its lowest bit set: significands with a·b = 1 modulo 2^place, for
+    /// a result that is rounded at that place, subnormal if need be.
     fn lone_bit(&mut self) -> (u32, u32) {
         let place = 22 + self.random.bits() % 10;
         let (a, b) = loop {
@@ -505,7 +505,7 @@ impl Operands {
         if row.shape.sources() == 1 && row.source_type(0) == F && self.random.bits() & 1 == 0 {
             a = self.near_integer();
         }
-        // Operands at which the trigonometric functions are neither trivial nor refused.
+        // Operands at which the trigonometric functions are neither trivial nor outside their domain.
         use takt_isa::Function::{Arccosine, Arctangent, Sine};
         if matches!(row.function, Sine | Arctangent | Arccosine) && self.random.bits() & 3 != 0 {
             let highest = if row.function == Sine { 135 } else { 126 };

@@ -34,7 +34,7 @@ impl Affine {
         self.center == 0.0 && self.slack == 0.0 && self.terms.is_empty()
     }
 
-    /// Interval without correlation: slack only, no symbol, so that a symbol of its own may be worth giving.
+    /// The form has slack and no symbols: a symbol of its own would let later values be correlated with it.
     pub(super) fn is_free(&self) -> bool {
         self.slack > 0.0 && self.terms.is_empty()
     }
@@ -158,8 +158,8 @@ impl Affine {
         Affine { center: product, ..mixed }.widened(rest * (1.0 + ROUNDING))
     }
 
-    /// Parts of [-1, 1] in which symbols must lie so that the form is not positive, where these are narrower than what is `known`; `None` if
-    /// the form is positive everywhere.
+    /// Parts of [-1, 1] to which symbols are confined if the form is not positive, for symbols where that is narrower than `known`;
+    /// `None` if the form is positive everywhere.
     pub(super) fn confines(&self, known: &dyn Fn(u32) -> Option<Interval>) -> Option<Vec<(u32, Interval)>> {
         let of = |symbol: u32| known(symbol).unwrap_or(Interval::new(-1.0, 1.0));
         let least = |(symbol, coefficient): &(u32, f64)| {
@@ -189,8 +189,8 @@ impl Affine {
         Some(confined.collect())
     }
 
-    /// Form with symbols replaced that lie in a part of [-1, 1]: each by its middle, radius and the new symbol for it. New symbols are larger
-    /// than all old ones, in the same order.
+    /// Form with its confined symbols replaced. `by` gives, for each symbol, the middle and radius of its part of [-1, 1], and the new
+    /// symbol for that part. New symbols are larger than all old ones, in the same order.
     pub(super) fn replaced(&self, by: &BTreeMap<u32, (f64, f64, u32)>) -> Option<Affine> {
         if !self.terms.iter().any(|(symbol, _)| by.contains_key(symbol)) {
             return None;
@@ -211,7 +211,7 @@ impl Affine {
         Some(Affine { center, terms: kept.into(), slack: self.slack }.widened(lost * ROUNDING + LEAST))
     }
 
-    /// Coefficients of some symbols, and a bound on the magnitude of what the form holds beyond these and a number.
+    /// Coefficients of `symbols`, and a bound on the magnitude of the rest of the form less the number `from`.
     pub(super) fn apart(&self, symbols: &[u32], from: f64) -> (Vec<f64>, f64) {
         let rest = self.terms.iter().filter(|(symbol, _)| !symbols.contains(symbol));
         let rest: f64 = rest.map(|(_, coefficient)| coefficient.abs()).sum();

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Assumptions: a decision of the run narrows the values that it compares, and the operands from which these were computed.
 //!
-//! A condition narrows the operands of its comparison, and these the operands of the operations behind them (forward and backward
+//! A condition narrows the operands of its comparison, and then the operands of the operations that computed them (forward and backward
 //! contraction, HC4: Benhamou and others, 1999). Linear relations between values enter as forms that are not positive, and confine the
 //! symbols of affine forms.
 
@@ -32,12 +32,12 @@ pub(super) enum View {
     Integer,
 }
 
-/// Assumptions about decisions of the run, and what follows for values.
+/// Assumptions about decisions of the run, and their consequences for values.
 #[derive(Default)]
 pub(super) struct Context {
     /// Nodes by address, with their narrower values.
     narrowed: HashMap<*const Node, (Rc<Node>, Value)>,
-    /// Forms of values in the run that are not positive.
+    /// Affine forms that are at most zero in the run.
     pub(super) constraints: Vec<Affine>,
     /// Symbols that lie in a part of [-1, 1].
     pub(super) confined: BTreeMap<u32, Interval>,
@@ -153,7 +153,7 @@ impl Context {
         }
     }
 
-    /// `less` is below `more` in the run, or may equal it unless the order is strict.
+    /// Assumes that `less` is below `more` in the run, or equal unless the order is strict.
     pub(super) fn order(&mut self, less: &Rc<Node>, more: &Rc<Node>, strict: bool, view: View) -> Followed {
         let (Some(x), Some(y)) = (self.range(less, view), self.range(more, view)) else { return Ok(()) };
         let (high, low) = match (strict, view) {
@@ -235,7 +235,7 @@ impl Context {
         }
     }
 
-    /// The sign bit is set, or clear. A zero has either sign.
+    /// Assumes that the sign bit is set, or clear. A zero has either sign.
     fn sign(&mut self, node: &Rc<Node>, negative: bool) -> Followed {
         let float = matches!(self.current(node), Value::Float(_));
         match (float, negative) {
@@ -246,7 +246,7 @@ impl Context {
         }
     }
 
-    /// A value lies in an interval in the run.
+    /// Assumes that a value lies in an interval in the run.
     pub(super) fn narrow(&mut self, node: &Rc<Node>, to: Interval, view: View) -> Followed {
         let Some(value) = restricted(self.current(node), to, view)? else { return Ok(()) };
         let before = self.range(node, view);
@@ -270,7 +270,7 @@ impl Context {
         let Some(meaning) = Meaning::of(&made.instruction) else { return Ok(()) };
         let row = made.instruction.op.row();
         match (view, row.result_type(), &meaning) {
-            // Of a word that another type reads, only the sign's bit is followed.
+            // If the word is used as another type, only its sign bit is followed back.
             (_, Type::B, Meaning::Bitwise(..) | Meaning::Choose(_)) => self.back(&meaning, now, &made, view),
             (View::Float, Type::F, _) => {
                 let size = now.magnitude();
@@ -282,7 +282,7 @@ impl Context {
         }
     }
 
-    /// Like [`Context::narrow`], of a float, without a step back to what the value was computed from.
+    /// Like [`Context::narrow`], for a float, without following the value back to its operands.
     pub(super) fn pin(&mut self, node: &Rc<Node>, to: Interval) -> Followed {
         self.steps = MAX_STEPS;
         self.narrow(node, to, View::Float)
@@ -431,7 +431,7 @@ fn below(value: f64) -> f64 {
     f64::from(if f64::from(near) < value { near } else { near.next_down() })
 }
 
-/// Numbers in `x` whose magnitude lies in an interval: an interval that holds them.
+/// Interval that encloses the members of `x` whose magnitude lies in `magnitude`.
 fn signed(x: Interval, magnitude: Interval) -> Interval {
     let high = magnitude.high;
     let low = magnitude.low;
@@ -466,7 +466,7 @@ fn floats_of(known: Interval, bits: Interval) -> Interval {
     floats
 }
 
-/// Part of a value that lies in an interval; `None` if that is all of it.
+/// Part of a value that lies in an interval; `None` if the whole value does.
 fn restricted(value: &Value, to: Interval, view: View) -> Result<Option<Value>, Impossible> {
     let cut = |range: Interval| {
         let both = Interval::new(range.low.max(to.low), range.high.min(to.high));
@@ -509,7 +509,7 @@ fn restricted(value: &Value, to: Interval, view: View) -> Result<Option<Value>, 
             if !narrower.actual.within(both) {
                 return Ok(None);
             }
-            // The form stays that of the whole, which confines its symbols.
+            // Keep the form of the whole value, which confines its symbols.
             Ok(Some(Value::Integer(Rc::new(Number { form: number.form.clone(), ..narrower }))))
         }
         _ => Ok(None),

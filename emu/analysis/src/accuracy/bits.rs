@@ -5,9 +5,9 @@
 //! Integers have no error: the run's value counts as exact, like any decision. Their affine form keeps the correlation with other
 //! values. Sums wrap modulo 2³², as in the machine; a range that wraps only in part becomes the range of all integers.
 //!
-//! Four operations on the bits of a float keep its error, here as in [`Shadow`](super::Shadow): adding or subtracting a multiple of
-//! 2²³ scales the float by a power of two, and masks of the sign bit clear, set or flip the sign. If an operand carries an error and
-//! it is unknown if the other one makes the operation one of these, the result has no enclosure as a float.
+//! Four operations on the bits of a float keep its error, here as in [`Shadow`](super::Shadow): adding or subtracting a multiple of 2²³
+//! scales the float by a power of two, and masks of the sign bit clear, set or flip the sign. If an operand carries an error, and the
+//! other may or may not make the operation one of these, the result has no enclosure as a float.
 
 use super::affine::Affine;
 use super::interval::Interval;
@@ -29,7 +29,7 @@ pub(super) fn decided((yes, no): (bool, bool)) -> Value {
 }
 
 /// Rounds a sum with a rounding constant to the nearest integer, since binary32 has no fraction bits at its magnitude. The sum counts as a
-/// decision, so that the run's result is exact. `symbol` is for the rounding.
+/// decision, so the run's result is exact. `symbol` is for the rounding.
 pub(super) fn nearest(sum: &Number, symbol: u32) -> Number {
     let Interval { low, high } = sum.actual;
     let actual = Interval::new(f64::from(low as f32), f64::from(high as f32));
@@ -140,7 +140,7 @@ pub(super) fn difference(a: &Value, b: &Value) -> Value {
     Value::Integer(Rc::new(added(&a.whole(), &negated(&other))))
 }
 
-/// Fraction of a positive float: subtracts the exponent relative to a base, so that the result lies between the base and its double.
+/// Fraction of a positive float: subtracts the exponent relative to a base, so the result lies between the base and its double.
 fn fraction(float: &Number, offset: &Offset) -> Option<Number> {
     if float.actual.low < power(LEAST_EXPONENT) {
         return None;
@@ -248,7 +248,7 @@ fn both(op: Bitwise, a: &Value, b: &Value) -> Value {
     if a.actual.low < 0.0 || b.actual.low < 0.0 {
         return Value::Integer(Rc::new(anything()));
     }
-    // Operands without a common bit position produce no carry, so that OR and XOR are sums.
+    // Operands without a common bit position produce no carry, so OR and XOR are sums.
     let below = |number: &Number, other: &Number| number.actual.high < power(other.grid.unwrap_or(0));
     if op != Bitwise::And && (below(&a, &b) || below(&b, &a)) {
         return Value::Integer(Rc::new(added(&a, &b)));

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Brute-force check of the abstract domains: evaluates every rule on every member of every abstract value of a small format.
 //!
-//! Intervals and affine forms have ends and coefficients of a few digits, so that binary64 computes with their members exactly.
+//! Intervals and affine forms have ends and coefficients of a few digits, so binary64 computes with their members exactly.
 //! Abstract words stand for up to three neighbouring words at the places where binary32 and integers change: zero, the subnormals,
 //! powers of two, the largest, the ends of the integers. All members of all operands go through each row of the instructions.
 
@@ -302,7 +302,7 @@ fn bits_are_narrow() {
     assert!(cut.form.sub(&float.form).range().low > -1e-9, "{cut:?}");
 }
 
-/// Word in the set of an abstract value.
+/// Member of an abstract value: a concrete word.
 #[derive(Clone, Copy, Debug)]
 struct Member {
     bits: u32,

@@ -18,8 +18,8 @@ use takt_isa::fp::{Flags, Host};
 use takt_isa::{Instruction, Register, Row, Type, compute, real};
 
 impl Explorer<'_> {
-    /// Result of an operation. A copy, a selection that is decided and a limit that is not reached give the operand's node: they are the same
-    /// number.
+    /// Result of an operation. A copy, a decided selection and a limit that is not reached return the operand's node, since they are the
+    /// same number.
     pub(super) fn apply(&mut self, made: &Made) -> Rc<Node> {
         let Made { word, instruction, operands } = made;
         let meaning = Meaning::of(instruction);
@@ -67,7 +67,7 @@ impl Explorer<'_> {
         let Some(problem) = problem.filter(|problem| self.quiet == 0 && *problem != Problem::Told) else {
             return node;
         };
-        // The cases of what the operands depend on may exclude the hazard.
+        // Case distinctions in the operands' histories may exclude the hazard.
         if broken {
             let value = self.by_cases(&node);
             if !matches!(value, Value::Broken | Value::Any | Value::Unknown) {
@@ -154,7 +154,7 @@ impl Explorer<'_> {
         }
     }
 
-    /// Symbol for an error whose terms give way: of the operation that they mostly came from.
+    /// Symbol for an error whose terms it replaces: attributed to the operation with the largest of these terms.
     fn symbol_of(&mut self, error: &Affine, word: u32) -> u32 {
         let largest = error.largest().and_then(|symbol| self.symbols[symbol as usize]);
         self.symbol(Some(largest.unwrap_or(word)))
@@ -237,7 +237,7 @@ impl Explorer<'_> {
     }
 }
 
-/// Operand that a minimum or maximum is, whatever the run.
+/// Operand that a minimum or maximum takes in every run, if there is one.
 fn passed(a: &Rc<Node>, b: &Rc<Node>, least: bool) -> Option<Rc<Node>> {
     let (Value::Float(x), Value::Float(y)) = (&a.value, &b.value) else { return None };
     let below = |x: &Number, y: &Number| x.actual.high <= y.actual.low && x.exact.high <= y.exact.low;

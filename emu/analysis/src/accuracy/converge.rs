@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! States that converge: bounds for all time of the linear part of a period, whose states no single period keeps in a box.
+//! Convergence of states: bounds for all time on the states of a period's linear part, where no single period keeps them in a box.
 //!
-//! With x' = B·x + w and |w| ≤ v, the states after any number of periods are within Σ |Bᵏ|·v of what is left of their first values, the sum of
-//! the magnitudes of the impulse response: no bound is less (the l1 norm of control). Everything of a period that is not linear in the
-//! states, inputs and roundings, is in v. Powers of B are enclosed by intervals; the sum ends when a power is small, and the rest is a
-//! geometric series.
+//! With x' = B·x + w and |w| ≤ v, the states after any number of periods lie within Σ |Bᵏ|·v of the remainder of their first values. This
+//! sum of the magnitudes of the impulse response (the l1 norm of control theory) is the least possible bound. Everything in a period that
+//! is not linear in the states, inputs and roundings is in v. Powers of B are enclosed by intervals; the sum ends when a power is small,
+//! and the rest is a geometric series.
 
 use super::interval::Interval;
 
@@ -20,7 +20,7 @@ const GROWN: f64 = 1e9;
 
 type Matrix = Vec<Vec<Interval>>;
 
-/// Linear map of a period on its states, in parts of their ranges, and the largest magnitudes of what is added to each.
+/// Linear map of a period on its states, which are scaled to their ranges, and the largest magnitudes of the terms added to each.
 pub(super) struct Linear {
     pub(super) rows: Matrix,
     pub(super) added: Vec<f64>,
@@ -38,14 +38,14 @@ fn up(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 impl Linear {
-    /// Largest magnitude of each state over all time; `None` if the states are not seen to converge.
+    /// Largest magnitude of each state over all time; `None` if the states are not proved to converge.
     pub(super) fn largest(&self) -> Option<Vec<f64>> {
         let count = self.rows.len();
         let unit =
             |row: usize, column: usize| if row == column { Interval::point(1.0) } else { Interval::ZERO };
         let mut powers: Vec<Matrix> =
             vec![(0..count).map(|row| (0..count).map(|column| unit(row, column)).collect()).collect()];
-        // Twice as many powers each time: by single steps, the intervals of a rotation would grow without bound.
+        // Double the number of powers each time: in single steps, the intervals of a rotation would grow without bound.
         let mut next = self.rows.clone();
         let ones = vec![1.0; count];
         let norm = loop {
@@ -109,7 +109,7 @@ mod tests {
             let linear = Linear { rows, added: added.to_vec(), first: vec![0.25, 1.0] };
             let Some(bound) = linear.largest() else { continue };
             converging += 1;
-            // The impulse response gives the worst signs of what is added.
+            // The impulse response gives the signs of the worst input.
             let step = |[a, b]: [f64; 2]| matrix.map(|[p, q]| p * a + q * b);
             for (state, bound) in bound.iter().enumerate() {
                 let (mut sum, mut first) = (0.0f64, 0.0f64);
@@ -139,7 +139,7 @@ mod tests {
         enclose(&program).unwrap()
     }
 
-    /// Low-pass filter of eighth order, no state of which a period by itself keeps in a box.
+    /// Eighth-order low-pass filter, whose states no single period keeps in a box.
     #[test]
     fn a_filter_keeps_its_states_for_all_time() {
         let filter = include_str!("../../../../programs/examples/biquads.s");
@@ -148,7 +148,7 @@ mod tests {
         let most = enclosure.converging.iter().map(|state| state.found.magnitude()).fold(0.0, f64::max);
         assert!((1.0..5.5).contains(&most), "{most}");
         assert!(enclosure.outputs[0].error.is_some_and(|error| error < 1e-5), "{enclosure:?}");
-        // Ranges that are too narrow are not kept.
+        // Too narrow ranges are not proved.
         let narrow = filter.replace("= -6, 6", "= -0.5, 0.5");
         assert_ne!(narrow, filter);
         assert!(enclosed(&narrow).later().next().is_some());
@@ -163,7 +163,7 @@ mod tests {
             let (a, b) = (2 * pair, 2 * pair + 1);
             head += &format!(".state s{a}\n.state s{b}\n.range s{a}, s{b} = -40, 40\n.reg n{a} n{b}\n");
             start += &format!(" s{a} = 0\n s{b} = 0\n");
-            // A rotation that shrinks by 3 % a period, driven by the pair before.
+            // A rotation that shrinks by 3 % per period, driven by the previous pair.
             let angle = 0.3 * f64::from(pair + 1);
             let (cos, sin) = (0.97 * libm::cos(angle), 0.97 * libm::sin(angle));
             let input = if pair == 0 { "x".to_owned() } else { format!("0.1*s{}", a - 1) };

@@ -22,7 +22,7 @@ use takt_isa::{BundleAddress, Effect, Flow, Instruction, Program, Register, Slot
 
 /// Limit on the bundles executed abstractly, over all sections.
 pub const MAX_BUNDLES: u64 = 1 << 18;
-/// Limit on the parts of ranges that are evaluated by themselves, in all of a program.
+/// Limit on the parts of ranges that are evaluated separately, over a whole program.
 const MAX_PARTS: u32 = 1 << 14;
 /// Limit on the words of data memory that a load with an unknown address may read.
 const MAX_WORDS: usize = 4096;
@@ -139,11 +139,11 @@ pub(super) struct Explorer<'p> {
     computed: BTreeMap<Register, Value>,
     bundles: u64,
     pub(super) operations: u64,
-    /// Values are evaluated again: hazards have been listed before.
+    /// Depth of re-evaluations, during which hazards are not listed again.
     pub(super) quiet: u32,
-    /// Parts of ranges that may still be evaluated by themselves.
+    /// Number of parts of ranges that may still be evaluated separately.
     pub(super) parts: u32,
-    /// Selections whose conditions are assumed.
+    /// Number of nested selections whose conditions are assumed.
     pub(super) nested: u32,
     /// Data words that the program may change.
     stored: BTreeSet<u32>,
@@ -281,7 +281,7 @@ impl Explorer<'_> {
         Ok(targets)
     }
 
-    /// State on the way on which a condition holds, or does not; `None` if no run takes it.
+    /// State on the path where a condition holds, or does not; `None` if no run takes that path.
     fn assumed(&mut self, state: &State, condition: &Rc<Node>, holds: bool) -> Option<State> {
         let mut state = state.clone();
         match (condition.value.tested(), holds) {
@@ -540,7 +540,7 @@ impl Explorer<'_> {
         }
     }
 
-    /// States that no single period keeps in their ranges, if their linear part keeps all of them there for all time.
+    /// States that no single period keeps in their ranges, if their linear part proves that all of them stay there for all time.
     fn converging(&self) -> Vec<Converging> {
         let is_open = |range: &&Range| {
             let left = self.left.get(&range.register);
@@ -548,11 +548,11 @@ impl Explorer<'_> {
                 && left.is_some_and(|value| !shown(range, Some(value)))
         };
         let open: Vec<&Range> = self.program.ranges.iter().filter(is_open).collect();
-        // Periods with code of their own have states with symbols of their own.
+        // With several periods, each has its own symbols for the states.
         if open.is_empty() || self.periods != 1 {
             return Vec::new();
         }
-        // A state that the others keep in its range may converge with them, or be one that does not: a limited integrator.
+        // A state whose range is proved already may converge with the others, or not (a limited integrator): try with and without these.
         let is_float = |range: &&Range| matches!(self.left.get(&range.register), Some(Value::Float(_)));
         let is_state = |range: &&Range| !self.program.machine.is_input(range.register);
         let all: Vec<&Range> = self.program.ranges.iter().filter(is_state).filter(is_float).collect();

@@ -59,7 +59,7 @@ pub struct UnprovedRange {
     pub found: Option<Interval>,
 }
 
-/// State whose range no single period keeps, but all periods together: what a period makes of the states is linear and converges.
+/// State whose range no single period keeps, but all periods together do: the period's map of the states is linear and converges.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Converging {
     /// State's register and declared range.

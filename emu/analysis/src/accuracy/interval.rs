@@ -94,7 +94,7 @@ impl Interval {
         Interval::new(self.low.min(other.low), self.high.max(other.high))
     }
 
-    /// Intersection of two intervals that enclose the same value, so that it is not empty; if rounding leaves nothing, returns `self`.
+    /// Intersection of two intervals that enclose the same value, so it is not empty; if rounding leaves nothing, returns `self`.
     pub(super) fn meet(self, other: Interval) -> Interval {
         let both = Interval::new(self.low.max(other.low), self.high.min(other.high));
         if both.low <= both.high { both } else { self }
@@ -115,8 +115,8 @@ impl Interval {
         Interval::new(down(product(least, least)), up(product(most, most)))
     }
 
-    /// Interval of binary32 that holds the rounded members, each off by less than an ulp: away from zero, no rounding passes the binary32 next
-    /// to the end. Towards zero it may, below a power of two.
+    /// Interval of binary32 that holds the rounded members, each off by less than an ulp: away from zero, no rounding passes the binary32
+    /// next to the end. Towards zero it may, below a power of two.
     pub(super) fn outer(self, ulps: f64) -> Interval {
         let (low, high) = (self.low as f32, self.high as f32);
         let next_low = if f64::from(low) > self.low { low.next_down() } else { low };

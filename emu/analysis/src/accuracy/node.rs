@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Values with the operations that gave them, so that a value can be computed again where more is known about what it depends on.
+//! Values with the operations that computed them, so that a value can be computed again where more is known about its operands.
 
 use super::value::Value;
 use std::ops::{Add, Div, Mul, Neg, Sub};
@@ -7,7 +7,7 @@ use std::rc::Rc;
 use takt_isa::Instruction;
 use takt_isa::fp::{Bitwise, Real};
 
-/// Limit on the operations that lie one behind the other in the history of a value; the value beyond it has no history.
+/// Limit on the length of a value's history, in dependent operations; a value beyond it has no history.
 const MAX_DEPTH: u32 = 200;
 
 /// Value of a register or data word, with its history.
@@ -49,13 +49,13 @@ impl Node {
         Rc::new(Node { value, made: Some(made), origin: None, depth })
     }
 
-    /// Node that holds under a condition, in place of `self`.
+    /// Node that replaces `self` under a condition.
     pub(super) fn narrowed(self: &Rc<Node>, value: Value, made: Option<Made>) -> Rc<Node> {
         let origin = Some(Rc::clone(self));
         Rc::new(Node { value, made, origin, depth: self.depth })
     }
 
-    /// Joins the nodes of a register on two paths that meet. What the same node became under their conditions is that node again.
+    /// Joins the nodes of a register on two paths that meet. If both narrow the same node under the paths' conditions, returns that node.
     pub(super) fn join(self: &Rc<Node>, other: &Rc<Node>) -> Rc<Node> {
         if Rc::ptr_eq(self, other) {
             return Rc::clone(self);

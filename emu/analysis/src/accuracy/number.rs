@@ -97,8 +97,8 @@ impl Number {
         })
     }
 
-    /// Caps each of range, exact range and error by the other two. The error's terms give way where both ranges bound it better, as behind
-    /// a clamp; `symbol` then stands for the error.
+    /// Caps each of range, exact range and error by the other two. Where both ranges bound the error better than its terms do, as after a
+    /// clamp, `symbol` replaces the terms.
     pub(super) fn capped(mut self, symbol: impl FnOnce(&Affine) -> u32) -> Number {
         self.exact = self.exact.meet(self.form.range());
         let error = self.error_range();
@@ -110,7 +110,7 @@ impl Number {
         self
     }
 
-    /// Both ranges bound the error to half of what its terms do.
+    /// The ranges bound the error to less than half of the bound by its terms.
     pub(super) fn is_loose(&self) -> bool {
         !self.error.is_zero() && 2.0 * self.error_range().radius() < self.error.radius()
     }
@@ -280,11 +280,11 @@ pub(super) fn to_float(number: &Number) -> Result<Number, Problem> {
 pub enum Problem {
     /// The divisor may be zero.
     DivisionByZero,
-    /// The operand may lie where the function has no value, so that the result may be a NaN.
+    /// The operand may lie where the function has no value, so the result may be a NaN.
     Domain,
     /// The result may be too large for binary32.
     Overflow,
-    /// The result may not fit a 32-bit integer, so that the conversion saturates and is invalid.
+    /// The result may not fit a 32-bit integer, so the conversion saturates and is invalid.
     Conversion,
     /// An operand may have the bit pattern of an infinity or a NaN.
     NotFinite,

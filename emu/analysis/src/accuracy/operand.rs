@@ -113,7 +113,7 @@ fn linear(
 /// Minimum of two numbers whose order is not known in exact arithmetic.
 fn least(a: &Number, b: &Number) -> Number {
     let exact = a.exact.minimum(b.exact);
-    // The run takes `less`; exact arithmetic may take the other one, by what it lies below.
+    // The run takes `less`; exact arithmetic may take the other operand, which is smaller by at most `below`.
     let taken = |less: &Number, other: &Number| {
         let below = (less.exact - other.exact).high.max(0.0);
         let by = Interval::new(0.0, below);
@@ -134,7 +134,7 @@ fn least(a: &Number, b: &Number) -> Number {
 /// Magnitude of a number whose sign is not known in exact arithmetic.
 pub(super) fn magnitude(x: &Number) -> Number {
     let exact = x.exact.abs();
-    // With the run's sign, twice what the exact value lies on the other side of zero is missing.
+    // With the run's sign, the exact magnitude is too small by twice the distance of the exact value beyond zero.
     let signed = |x: &Number| {
         let by = Interval::new(0.0, 2.0 * (-x.exact.low).max(0.0));
         (x.form.add(&Affine::free(by)), x.error.add(&Affine::free(-by)))
@@ -297,7 +297,7 @@ impl Real for Operand {
                 let square = all_x.square() + all_y.square();
                 y.error.scale(all_x / square).add(&x.error.scale(-(all_y / square)))
             };
-            // An error of a share of both changes the angle by at most half of it, in whatever direction the point lies.
+            // A relative error of both coordinates changes the angle by at most half of it, whatever the direction of the point.
             let whole = |number: &Number| Relative::of(number).whole(number.exact.abs().low);
             let (of_y, of_x) = (whole(y), whole(x));
             let turn = 0.6 * (of_y.share + of_x.share);

@@ -32,8 +32,8 @@ impl Probe {
         !exact.is_nan() && exact != f64::from(f32::from_bits(self.bits))
     }
 
-    /// Float scaled by the power of two that adding an integer to its bits (`sign` = -1: subtracting) amounts to; `None` if the integer has
-    /// digits of the fraction.
+    /// Float scaled by the power of two that adding an integer to its bits (`sign` = -1: subtracting) amounts to; `None` if the integer
+    /// reaches into the fraction.
     fn scaled(self, by: Probe, sign: i32) -> Option<f64> {
         let (exact, _) = self.whole.zip(by.whole)?;
         let exponent = by.bits.cast_signed() >> FRACTION;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Values under assumptions: operations are evaluated again where a condition of a branch or a selection narrows what they depend on, and
+//! Values under assumptions: operations are evaluated again where a condition of a branch or a selection narrows their operands, and
 //! results are evaluated case by case.
 
 use super::affine::Affine;
@@ -15,7 +15,7 @@ use takt_isa::fp::Bitwise;
 
 /// Limit on selections whose conditions are assumed within each other.
 const MAX_NESTED: u32 = 3;
-/// Limit on the cases that are distinguished behind a result, as a power of two.
+/// Limit on the cases that are distinguished for a result, as a power of two.
 const MAX_CASES: u32 = 6;
 /// Limit on the divisions of a range.
 const MAX_DIVISIONS: u32 = 128;
@@ -27,7 +27,7 @@ pub(super) struct Scene {
     context: Context,
     /// Confined symbols: middle, radius, and the symbol that replaces each.
     replaced: BTreeMap<u32, (f64, f64, u32)>,
-    /// Nodes by address, and what they are under the assumptions.
+    /// Nodes by address, each with its replacement under the assumptions.
     nodes: HashMap<*const Node, (Rc<Node>, Rc<Node>)>,
 }
 
@@ -130,8 +130,8 @@ impl Explorer<'_> {
         split.map_or_else(|| node.value.clone(), |value| both(&node.value, value))
     }
 
-    /// Value of a node from parts of the range of the last value that all of it depends on: those parts are divided further in which the
-    /// result is largest, or errs most.
+    /// Value of a node by dividing the range of the last value on which all of it depends: parts in which the result is largest, or errs
+    /// most, are divided further.
     pub(super) fn in_parts(&mut self, node: &Rc<Node>) -> Value {
         let Some(waist) = waist(node) else { return node.value.clone() };
         let Ok(whole) = waist.value.float().map(|number| number.actual) else { return node.value.clone() };
@@ -193,7 +193,7 @@ impl Explorer<'_> {
     }
 }
 
-/// Nearest value through which alone a node depends on everything else; `None` if there is none or it is an operand that is used once.
+/// Nearest value that all other dependences of a node pass through; `None` without one, or if it is an operand that is used once.
 fn waist(node: &Rc<Node>) -> Option<Rc<Node>> {
     let mut open = BTreeMap::from([((node.depth(), Rc::as_ptr(node)), Rc::clone(node))]);
     let mut steps = 0;
@@ -229,7 +229,7 @@ fn middle(range: Interval) -> Option<f64> {
     (low < middle && middle < high).then_some(middle)
 }
 
-/// Questions behind a node, the nearest first.
+/// Open questions in a node's history, the nearest first.
 fn cases(node: &Rc<Node>, seen: &mut HashSet<*const Node>, questions: &mut Vec<Case>) {
     let mut next = vec![Rc::clone(node)];
     let mut asked = HashSet::new();
@@ -263,7 +263,7 @@ fn questions_of(meaning: &Meaning, made: &Made) -> Vec<Case> {
         _ => None,
     };
     let range = |node: &Rc<Node>| node.value.float().ok().map(|number| number.actual);
-    // A limit that is a number divides the values of the operand.
+    // A constant limit divides the range of the operand.
     let cut = |node: &Rc<Node>, at: f64| {
         let open = range(node).is_some_and(|range| range.low < at && at < range.high);
         open.then(|| Case::Cut(Rc::clone(node), at))

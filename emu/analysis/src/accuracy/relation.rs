@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Relations between values that intervals and linear forms do not see: a component is at most the norm that it is part of.
+//! Relations between values that intervals and linear forms do not capture: a component is at most the norm that it is part of.
 
 use super::interval::Interval;
 use super::node::{Meaning, Node};
 use super::value::Value;
 use std::rc::Rc;
 
-/// Limit on the operations that a relation is looked for in.
+/// Limit on the depth of the search for a relation, in operations.
 const MAX_DEPTH: u32 = 24;
 /// Least norm whose square root is known to be no less than a component: smaller squares may lose digits to underflow.
 const LEAST_NORM: f64 = 1.0 / (1u64 << 60) as f64;
-/// Largest norm whose inverse is no subnormal number.
+/// Largest norm whose inverse is not a subnormal number.
 const LARGEST_NORM: f64 = (1u128 << 100) as f64;
 /// Ratio of a divisor's magnitudes, or a root's, from which its range is divided into parts.
 const STEEP: f64 = 64.0;
@@ -65,7 +65,7 @@ fn positive(node: &Rc<Node>) -> bool {
     node.value.float().is_ok_and(|number| number.actual.low >= 0.0 && number.exact.low >= 0.0)
 }
 
-/// Node whose magnitude a node has.
+/// Operand below negations and absolute values, whose magnitude is the same.
 fn unsigned(node: &Rc<Node>) -> &Rc<Node> {
     let Some(operation) = &node.made else { return node };
     match Meaning::of(&operation.instruction) {
@@ -104,7 +104,7 @@ fn has_square(sum: &Rc<Node>, component: &Rc<Node>, depth: u32) -> bool {
         }),
         _ => false,
     };
-    // A square inside a fused sum is not negative, as any square.
+    // A square inside a fused sum is not negative, like any square.
     let is_any_square = |part: &Meaning| match part {
         Meaning::Mul(of) => match [source(&of[0], operands), source(&of[1], operands)] {
             [Some(a), Some(b)] => Rc::ptr_eq(a, b),
@@ -124,7 +124,7 @@ fn has_square(sum: &Rc<Node>, component: &Rc<Node>, depth: u32) -> bool {
     }
 }
 
-/// Quotient or root whose operand has very different magnitudes, so that the middle of its range says little.
+/// Quotient or root whose operand has very different magnitudes, so the middle of its range says little.
 pub(super) fn is_steep(meaning: &Meaning, operands: &[Rc<Node>; 3]) -> bool {
     let range = |meaning: &Meaning| {
         let node = source(meaning, operands)?;

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Errors relative to the value, so that a quotient's error is small where the quotient is, however small the divisor.
+//! Errors relative to the value, so a quotient's error is small where the quotient is, however small the divisor.
 
 use super::interval::Interval;
 use super::number::Number;
 
 /// Allowance for the rounding of the bounds' own computation.
 const ROUNDING: f64 = 1.0 + 1.0 / (1u64 << 48) as f64;
-/// Distance of subnormal numbers of binary32.
+/// Spacing of the subnormal binary32 numbers, 2⁻¹⁴⁹.
 const LEAST: f64 = 1.0 / (1u128 << 100) as f64 / (1u64 << 49) as f64;
 
 /// Bound of an error by a share of the exact value's magnitude and a rest: |error| ≤ share·|exact| + rest.
@@ -29,7 +29,7 @@ impl Relative {
         (part + self.rest) * ROUNDING
     }
 
-    /// The rest as a share too, for values of at least this magnitude.
+    /// Bound with the rest folded into the share, for values of at least this magnitude.
     pub(super) fn whole(self, least: f64) -> Relative {
         if self.rest == 0.0 { self } else { Relative::new(self.share + self.rest / least, 0.0) }
     }
@@ -93,7 +93,7 @@ impl Relative {
         }
     }
 
-    /// Minimum of two numbers: what is not taken may err by a share of itself, which is larger.
+    /// Minimum of two numbers. The operand not taken may err by a share of itself, and it is the larger one.
     pub(super) fn minimum(a: &Number, b: &Number) -> Option<Relative> {
         let most = Relative::join(a, b);
         let positive = a.exact.low.min(b.exact.low) >= 0.0;

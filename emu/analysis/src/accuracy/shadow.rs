@@ -68,7 +68,7 @@ pub struct OperationAccuracy {
     pub absorbed: u64,
 }
 
-/// Decision of the run that binary64 would have made otherwise.
+/// Decision of the run that binary64 would have made differently.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Decision {
     /// Times that the decision differed.
@@ -77,7 +77,7 @@ pub struct Decision {
     pub period: u64,
 }
 
-/// A point at which the comparison with binary64 was lost and began anew.
+/// Operation at which the comparison with binary64 was lost and started afresh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LostComparison {
     /// Times that it was lost.
@@ -100,7 +100,7 @@ struct Cell {
 
 /// Shadow execution: the program in binary64, beside a run.
 ///
-/// Loads, stores, jumps and integer operations follow the run. Decisions that binary64 would have made otherwise are counted
+/// Loads, stores, jumps and integer operations follow the run. Decisions that binary64 would have made differently are counted
 /// ([`Shadow::decisions`]).
 #[derive(Clone)]
 pub struct Shadow {
@@ -177,7 +177,7 @@ impl Shadow {
         }
     }
 
-    /// Counts values as exact at the start of each period, so that errors are made within one period: static bounds are stated in this way.
+    /// Counts values as exact at the start of each period, so that each error arises within one period, as static bounds assume.
     #[must_use]
     pub fn each_period_afresh(self) -> Shadow {
         Shadow { afresh: true, ..self }
@@ -248,7 +248,7 @@ impl Shadow {
     pub fn issued(&mut self, emulator: &Emulator, address: BundleAddress) {
         let program = Rc::clone(&self.program);
         let Some(Ok(instructions)) = program.bundle(address) else { return };
-        // The interlocks ensure that a bundle reads the results of all earlier ones, so that results can be written at once.
+        // The interlocks ensure that a bundle reads the results of all earlier ones, so results can be written at once.
         let mut written = Vec::new();
         let machine = program.machine;
         for ((number, slot), instruction) in machine.numbered_slots().zip(&instructions) {
@@ -415,7 +415,7 @@ impl Shadow {
         &self.operations
     }
 
-    /// Decisions that binary64 would have made otherwise, by word.
+    /// Decisions that binary64 would have made differently, by word.
     pub fn decisions(&self) -> &BTreeMap<u32, Decision> {
         &self.decisions
     }

@@ -203,7 +203,7 @@ fn unfolded<'g>(graph: &'g Graph<'_>, start: BundleAddress) -> Result<Vec<Bundle
     Ok(bundles)
 }
 
-/// Removes bundles that only lead to a `halt`, since no period follows them, and enters the predecessors of each bundle.
+/// Removes bundles that only lead to a `halt`, since no period follows them, and records the predecessors of each bundle.
 fn prune(bundles: &mut [Bundle<'_>]) {
     let mut before = vec![Vec::new(); bundles.len()];
     for (from, bundle) in bundles.iter().enumerate() {

@@ -19,7 +19,7 @@ use solve::Solution;
 use std::collections::BTreeSet;
 use takt_isa::{Program, Register};
 
-/// Largest age that is told apart. A greater age counts as this one for the least, and as unbounded for the most.
+/// Largest age that is distinguished. A greater age is clamped to it in `least`, and unbounded in `most`.
 pub const MAX_PERIODS: u32 = 1 << 12;
 /// Limit on the bundles of all periods, a subroutine's counted for each call path. In a larger program, every output may depend on
 /// every input.
@@ -76,7 +76,7 @@ impl Dependence {
     /// Analyses a program. `sent_by` holds pairs (port, other port): a write to the other port sends the first.
     ///
     /// # Errors
-    /// Those of [`crate::bound`], if a loop or a call cannot be followed.
+    /// The errors of [`crate::bound`], if a loop or a call cannot be followed.
     pub fn new(
         program: &Program,
         sent_by: &BTreeSet<(Register, Register)>,

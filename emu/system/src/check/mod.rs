@@ -16,7 +16,7 @@ use takt_isa::system::{Core, Description, End, Field, Link, MAX_CORES, MAX_LATEN
 use takt_isa::{Machine, Program, Type};
 use toml::Spanned;
 
-/// Least cycles between the ticks of a core, besides the cycles in which its snapshots enter.
+/// Minimum cycles between the ticks of a core, in addition to the cycles in which its snapshots enter.
 const LEAST_PERIOD: u64 = 16;
 /// Name that files use for the host as a link's end.
 const HOST: &str = "host";
@@ -32,7 +32,7 @@ pub struct Request<'a> {
 /// Reason why there is no program.
 #[derive(Debug)]
 pub enum ProgramError<E> {
-    /// The program is not there, or cannot be read: a mistake of the system's file.
+    /// The program does not exist or cannot be read: a mistake in the system's file.
     Missing {
         /// Description of the mistake.
         message: String,
@@ -166,7 +166,7 @@ struct Checker<'m> {
 /// Port at a link's end.
 struct EndPort {
     name: String,
-    /// Core's port; `None` at the host, whose ports have names alone.
+    /// Core's port; `None` at the host, whose ports only have names.
     port: Option<Port>,
 }
 

@@ -6,7 +6,8 @@ use takt_analysis::dependence::{Dependence, Dependents, OutputEvent, Periods};
 use takt_isa::Register;
 use takt_isa::system::{Description, End, Link, LinkKind};
 
-/// Dependences from one link to another: for each field of the first, the periods to each field of the second, if it follows.
+/// Dependences from one link to another: for each field of the first, the periods to each field of the second; `None` where the second
+/// field does not depend on the first.
 type Fields = Vec<Vec<Option<Periods>>>;
 
 /// Dependences within every core of a system, by pairs of incoming and outgoing links.
@@ -18,7 +19,7 @@ pub(super) struct LinkDependences {
 /// Periods of state on a path from a field of its first link to a field of its last.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct States {
-    /// Least number of periods in each core between.
+    /// Least number of periods in each core on the path.
     pub(super) least: Vec<u32>,
     /// Greatest number of periods in each core, if certain for every core.
     pub(super) most: Option<Vec<u32>>,
@@ -48,7 +49,7 @@ impl LinkDependences {
                 OutputEvent::Written | OutputEvent::AtWait => None,
             });
             let by: BTreeSet<(Register, Register)> = by.flatten().collect();
-            // A program that cannot be followed has no bounds either, so that the error is reported there.
+            // A program that cannot be followed has no bounds either, so the error is reported there.
             let dependence = Dependence::new(&description.cores[number].program, &by);
             let dependence = dependence.unwrap_or_else(|_| Dependence::unknown());
             let mut dependents: BTreeMap<Register, Dependents<'_>> = BTreeMap::new();
@@ -115,7 +116,7 @@ impl States {
         }
     }
 
-    /// Sooner of two dependences over the same links: the least core by core, the most by their sum.
+    /// Merges two dependences over the same links: the smaller least number for each core, and the greatest numbers with the smaller sum.
     fn or(self, other: States) -> States {
         let sum = |most: &Vec<u32>| most.iter().map(|&periods| u64::from(periods)).sum::<u64>();
         States {

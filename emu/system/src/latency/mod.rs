@@ -2,8 +2,8 @@
 //! Bounds on the time from a host's command to its effect on an output, over cores and links.
 //!
 //! A core reads an arriving value in its next period and writes the results by that period's end, or as many periods later as its states
-//! take ([`takt_analysis::dependence`]); links and ticks add the delays of `docs/system.md`. Ticks come on one grid: the path from core to
-//! core is followed for every phase that they can have to each other, which is tighter than a sum of each core's worst case.
+//! take ([`takt_analysis::dependence`]); links and ticks add the delays of `docs/system.md`. All ticks lie on one grid: the path from
+//! core to core is followed for every relative phase of their ticks, which is tighter than a sum of each core's worst case.
 
 mod dependences;
 mod limits;
@@ -121,7 +121,7 @@ fn end(passages: &Passages<'_>, way: &[usize], passes: &[Pass]) -> i64 {
     passes.last().map_or(0, |pass| pass.leaves) + carry(description, &description.links[*last])
 }
 
-/// Least time of a command that is given in one of the cycles from `first` to `last`.
+/// Least response time of a command given in one of the cycles from `first` to `last`.
 fn least(passages: &Passages<'_>, route: &Route, first: i64, last: i64) -> i64 {
     let way = &route.links;
     let end = |start| end(passages, way, &passages.fastest(route, start));

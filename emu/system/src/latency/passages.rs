@@ -147,10 +147,11 @@ impl<'a> Passages<'a> {
         self.spans[core].map(|span| (span.best, span.worst))
     }
 
-    /// Paths from these links of the host to these links to the host, if an output depends on an input over them. No path visits a core
-    /// twice, or a core that never waits for a tick.
+    /// Paths that begin at a link in `from`, end at a link in `to`, and carry an input of the host to an output that depends on it. No
+    /// path visits a core twice, or a core that never waits for a tick.
     ///
-    /// If there are too many paths, or too many phases of ticks to each other.
+    /// # Errors
+    /// If there are too many paths, or too many relative phases of ticks.
     pub fn routes(
         &self,
         from: impl Fn(usize) -> bool,

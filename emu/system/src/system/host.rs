@@ -13,8 +13,8 @@ impl System {
         }
     }
 
-    /// Writes an input of the system, which goes onto its link now. A field of a snapshot or of a FIFO waits for [`System::publish`],
-    /// [`System::push`].
+    /// Writes an input of the system. A wire carries the value at once; a field of a snapshot or of a FIFO waits for [`System::publish`]
+    /// or [`System::push`].
     ///
     /// # Errors
     /// If there is no such input.
@@ -52,7 +52,7 @@ impl System {
     /// Publishes the values of a snapshot that the host has set.
     ///
     /// # Errors
-    /// If the link is no snapshot from the host.
+    /// If the link is not a snapshot from the host.
     pub fn publish(&mut self, link: usize) -> Result<(), HostError> {
         let description = Arc::clone(&self.description);
         let now = self.now;
@@ -73,11 +73,11 @@ impl System {
         }
     }
 
-    /// Pushes the host's values into a FIFO. Returns false if the FIFO overflows, as far as the host can know: entries on their way count,
-    /// room that is made meanwhile does not.
+    /// Pushes the host's values into a FIFO. Returns false if the FIFO overflows, as far as the host can know: entries under way count as
+    /// present, and pops before the entry arrives are not foreseen.
     ///
     /// # Errors
-    /// If the link is no FIFO from the host.
+    /// If the link is not a FIFO from the host.
     pub fn push(&mut self, link: usize) -> Result<bool, HostError> {
         let description = Arc::clone(&self.description);
         let now = self.now;
@@ -100,7 +100,7 @@ impl System {
     /// Pops the head of a FIFO to the host; `None` if the FIFO is empty.
     ///
     /// # Errors
-    /// If the link is no FIFO to the host.
+    /// If the link is not a FIFO to the host.
     pub fn pop(&mut self, link: usize) -> Result<Option<Vec<u32>>, HostError> {
         let description = Arc::clone(&self.description);
         let now = self.now;

@@ -126,7 +126,7 @@ impl System {
         true
     }
 
-    /// Makes the newest published values of a snapshot that can be seen in a cycle the shown ones.
+    /// Shows the receiver of a snapshot the newest published values that are visible in a cycle.
     pub(super) fn see(&mut self, number: usize, cycle: Cycle) {
         if let LinkState::Snapshot { published, shown, .. } = &mut self.links[number] {
             while let Some((_, values)) = published.pop_front_if(|(first, _)| *first <= cycle) {
@@ -241,8 +241,8 @@ impl System {
     }
 }
 
-/// Applies a core's writes to the fields of a link, and calls `tell` with all fields whenever `action` is written. Writes of fields in the
-/// same cycle count.
+/// Applies a core's writes to the fields of a link, and calls `tell` with all fields whenever `action` is written. Fields written in the
+/// same cycle as the action are included.
 fn follow(
     link: &Link,
     action: Register,

@@ -3,8 +3,8 @@
 //!
 //! Reads of linked inputs are the only places at which a core sees others, and no value arrives earlier than
 //! [`MIN_LATENCY`](crate::MIN_LATENCY) cycles after it was sent. So a core runs to the next bundle that reads such an input with an unknown
-//! value (or to a tick that takes a snapshot), and goes on once every sender has come within the link's latency of that cycle. The core
-//! that is farthest behind can always go on.
+//! value (or to a tick that takes a snapshot), and continues once every sender has come within the link's latency of that cycle. The core
+//! that is farthest behind can always continue.
 
 mod host;
 mod links;
@@ -32,10 +32,10 @@ pub struct SystemFault {
     pub fault: Fault,
 }
 
-/// An error of the host's request.
+/// Error in a request of the host.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum HostError {
-    /// A port or link that the system does not have at the host.
+    /// The host has no port or link of this kind and name.
     #[error("the system has no {what} `{name}`")]
     Unknown {
         /// Kind of the missing port or link: `input`, `output`, `snapshot from the host`, ….
@@ -43,7 +43,7 @@ pub enum HostError {
         /// Name in the request.
         name: String,
     },
-    /// A number of values that differs from the link's fields.
+    /// The number of values differs from the number of the link's fields.
     #[error("`{name}` has {wanted} fields, not {given}")]
     Fields {
         /// Name of the link.
@@ -249,7 +249,7 @@ impl System {
             for port in &core.program.inputs {
                 let mailbox = mailboxes.iter().find(|mailbox| mailbox.register == port.register);
                 let initial = mailbox.map_or(0, |mailbox| description.initial(mailbox.source));
-                // The port belongs to the program, so that setting it cannot fail.
+                // The port belongs to the program, so setting it cannot fail.
                 let _ = emulator.set_input_bits(port.register, initial);
             }
             emulator.set_watched(watched(&description, number));
@@ -437,7 +437,7 @@ fn come_together(description: &Description, one: Source, other: Source) -> bool 
     }
 }
 
-/// Output ports whose writes push to or pop from a FIFO: the core then sees the FIFO change through its own doing.
+/// Output ports whose writes push to or pop from a FIFO: by them, the core itself changes the FIFO that it sees.
 fn acting(description: &Description, core: usize) -> impl Iterator<Item = Register> {
     let here = End::Core(core);
     description

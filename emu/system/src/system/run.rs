@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Scheduler of the cores: each runs ahead to where it needs to know of others.
+//! Scheduler of the cores: each runs ahead until it needs the results of others.
 
 use super::{InputEvent, System, SystemFault, latched};
 use crate::system::{CoreState, LinkState};
@@ -16,7 +16,7 @@ impl System {
     /// the first base tick, if known by then.
     ///
     /// # Errors
-    /// The first fault of a core; asked again, the same one.
+    /// The first fault of a core; later calls return the same fault.
     pub fn run_to_start(&mut self, limit: Cycle) -> Result<Option<Cycle>, SystemFault> {
         if self.start.is_none() && !self.halted() {
             self.starting = true;
@@ -30,7 +30,7 @@ impl System {
     /// Runs until `cycle` cycles have passed since reset.
     ///
     /// # Errors
-    /// The first fault of a core; asked again, the same one. The cores that had run ahead of it stay ahead.
+    /// The first fault of a core; later calls return the same fault. The cores that had run ahead of it stay ahead.
     pub fn run_until(&mut self, cycle: Cycle) -> Result<(), SystemFault> {
         self.until = cycle.max(self.now);
         loop {
@@ -79,8 +79,8 @@ impl System {
         }
     }
 
-    /// Starts the ticks once every core has waited: in the first cycle that is a multiple of their distance and that leaves the host and
-    /// the snapshots enough time.
+    /// Starts the ticks once every core has waited: in the first cycle that is a multiple of the base tick and leaves the host and the
+    /// snapshots enough time.
     fn try_start(&mut self) {
         if self.start.is_some() || self.halted() || self.cores.iter().any(|core| core.waited.is_none()) {
             return;
@@ -150,7 +150,7 @@ impl System {
         let inputs = &mut self.inputs;
         gate.run((now + 1).saturating_sub(delay), |cycle, mailbox, value| {
             let register = mailboxes[mailbox].register;
-            // The register is an input port, so that setting it cannot fail.
+            // The register is an input port, so setting it cannot fail.
             let _ = emulator.set_input_bits(register, value);
             if let Some(inputs) = inputs {
                 inputs.push(InputEvent { cycle, core, register, value });
@@ -158,7 +158,7 @@ impl System {
         });
     }
 
-    /// Runs a core, at most until cycle `until`, to where it needs to know of others. Returns false if it cannot go on.
+    /// Runs a core, at most until cycle `until`, to the point where it needs the results of others. Returns false if it cannot continue.
     fn segment(&mut self, core: usize, until: Cycle) -> Result<bool, Fault> {
         let state = &self.cores[core];
         let now = state.emulator.now();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Parser from tokens to the tree. It skips a line with a mistake and goes on with the next.
+//! Parser from tokens to the tree. It skips a line with a mistake and continues with the next.
 
 use super::table;
 use super::tokens::Token;
@@ -148,7 +148,7 @@ impl<'t> Parser<'t> {
         Ok(Name { text, span })
     }
 
-    /// Takes a quoted text; returns its inside.
+    /// Takes a quoted text; returns it without the quotes.
     fn quoted(&mut self, what: &str) -> Outcome<Name> {
         let span = self.expect(Token::Text, what)?;
         let text = self.text(span).trim_matches('"').to_owned();

@@ -152,7 +152,7 @@ pub enum Course {
     Whole,
     /// Keyword `via`: the motion blends into the next one.
     Via,
-    /// Keyword `start`: the program goes on during the motion.
+    /// Keyword `start`: the program continues during the motion.
     Start,
     /// Keyword `check`: the motion is checked and not executed.
     Check,

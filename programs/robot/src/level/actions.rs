@@ -421,7 +421,7 @@ impl<R: Robot + Clone> Session<R> {
         let mut limits = self.settings.limits;
         for ((limit, value), own) in limits[which].iter_mut().zip(list).zip(BUILT_IN[which]) {
             let value = number_in(value, "a limit", 1e-3, FARTHEST, &self.environment(machine))?;
-            // A limit above the controller's own means the controller's.
+            // A limit above the controller's own is reduced to it.
             *limit = on_link(value).min(own as f32);
         }
         self.done()?;

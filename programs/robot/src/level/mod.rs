@@ -365,7 +365,7 @@ impl<R: Robot + Clone> Session<R> {
         }
     }
 
-    /// Ends a program after an error: stops the robot, which must not go on without its program.
+    /// Ends a program after an error: stops the robot, which must not move on without its program.
     fn broken_off(&mut self, mistake: Diagnostic) -> Diagnostics {
         self.interrupt.store(false, Ordering::Relaxed);
         let list = match (self.host.stopped(), self.host.stands()) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Table of G-code: the effect of each code. Codes are passed over if the path is the same without them, and refused if it would not be.
+//! Table of G-code: the effect of each code. A code is passed over if it does not change the path, and refused otherwise.
 
 /// Motion mode (modal group 1).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -14,7 +14,7 @@ pub(super) enum Motion {
 pub(super) enum Effect {
     /// Selects a motion mode.
     Moves(Motion),
-    /// Selects a mode in which the reader always is.
+    /// Selects a mode that the reader always uses.
     Agrees,
     /// Cancels the selected motion mode.
     Cancels,
@@ -39,7 +39,7 @@ pub(super) struct Codes {
     /// Code numbers in tenths: G43.1 is 431.
     pub(super) numbers: &'static [u32],
     pub(super) effect: Effect,
-    /// Meaning of the code; for a refused code, the suggested mend.
+    /// Meaning of the code; for a refused code, the suggested fix.
     pub(super) text: &'static str,
 }
 

@@ -16,7 +16,7 @@ pub struct GcodeError {
     pub kind: GcodeErrorKind,
 }
 
-/// Kind of a mistake; messages name the mend.
+/// Kind of a mistake; messages suggest a fix.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum GcodeErrorKind {
@@ -45,10 +45,10 @@ pub enum GcodeErrorKind {
     UnsupportedCode {
         /// Code as written in the source.
         code: String,
-        /// Suggested mend, or the supported codes.
+        /// Suggested fix, or the supported codes.
         hint: &'static str,
     },
-    /// A letter that is no word of this machine.
+    /// A letter that this machine does not know.
     #[error("unknown word `{0}`; words are G M X Y Z A C I J R F, and N S T H P Q")]
     UnknownLetter(char),
     /// A parameter or an expression in place of a number.

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Reader of the hybrid robot's G-code dialect.
 //!
-//! [`codes`] is the table of codes that are read, passed over and refused; `docs/readers.md` shows it. An error names the line, the column
-//! and the mend. The first motions must be G0s that give X, Y and Z; they place the robot and take no time. Text after the end (M2, M30, a
-//! second `%`) is not read.
+//! [`codes`] is the table of codes that are read, passed over and refused; `docs/readers.md` shows it. An error names the line, the
+//! column and a fix. The first motions must be G0s that give X, Y and Z; they place the robot and take no time. Text after the end (M2,
+//! M30, a second `%`) is not read.
 //!
 //! The files of this folder are one module and import one another: the reader's types and limits are here, and its errors state them.
 

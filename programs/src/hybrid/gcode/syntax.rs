@@ -73,7 +73,7 @@ impl<'s> Line<'s> {
         self.fail(GcodeErrorKind::Syntax { found }, at)
     }
 
-    /// Skips blanks and comments; returns true if the line goes on.
+    /// Skips blanks and comments; returns true if the line has more text.
     fn goes_on(&mut self) -> Result<bool, LocatedError> {
         loop {
             self.blanks();

@@ -448,7 +448,7 @@ fn table(list: &[Kernel], sources: &[(&str, &str)]) -> String {
         .filter(|(kernel, machine)| kernel.machines.contains(machine))
         .collect();
     let count = jobs.len() as u64;
-    // Takes jobs from both ends of the list by turns, since the long ones stand together.
+    // Alternates between both ends of the list, because the long jobs are adjacent.
     let job = |index: u64| if index.is_multiple_of(2) { index / 2 } else { count - 1 - index / 2 };
     let work = |range: std::ops::Range<u64>| -> Vec<(u64, u64)> {
         range.map(job).map(|at| (at, judge(jobs[at as usize].0, jobs[at as usize].1, sources))).collect()

@@ -19,7 +19,7 @@ impl Fit<'_> {
         self.mistakes.top().and_then(find).unwrap_or(0..0)
     }
 
-    /// Place of what says the ticks: the key `period`, or the carrier that gives them.
+    /// Place in the file that defines the ticks: the key `period`, or the carrier that gives them.
     pub(super) fn tick_place(&self) -> Range<usize> {
         match &self.wiring.tick {
             Some(tick) => self.carrier_place(&self.wiring.carriers[tick.carrier]),

@@ -101,7 +101,7 @@ fn another_number_of_words_is_no_answer() {
     assert_eq!(host.line.sent, ATTEMPTS);
 }
 
-/// Occasional bytes are no silence, but a request still ends.
+/// Occasional bytes do not count as silence, but a request still ends.
 #[test]
 fn sparse_bytes_end_at_the_time_limit() {
     let mut host = connected(|_| None);

@@ -37,14 +37,14 @@ impl Range {
     }
 }
 
-/// Ends of ways, by the link that begins or ends there, with the link's field.
+/// Ends of paths, by the link that begins or ends there, with the link's field.
 type EndsByLink = BTreeMap<usize, Vec<(usize, End)>>;
 
-/// Ways through a system's cores, visiting no core twice, if no deadline is missed. A core is assumed to read a value in the first period
-/// with it, and to write its consequence by that period's `wait`, or as many periods later as its states take.
+/// Paths through a system's cores that visit no core twice, if no deadline is missed. A core is assumed to read a value in the first
+/// period with it, and to write its consequence by that period's `wait`, or as many periods later as its states take.
 ///
 /// # Errors
-/// If there are too many ways, or too many phases of ticks.
+/// If there are too many paths, or too many phases of ticks.
 pub(super) fn ways(
     wiring: &Wiring,
     application: &Application<'_>,
@@ -141,8 +141,8 @@ fn tails(application: &Application<'_>, wiring: &Wiring, sinks: &[Vec<Sink<'_>>]
     tails
 }
 
-/// Parts between the peripherals' registers at both ends of a way, and their total from the board's tick on; `sinks` are the last core's, with the most pipeline
-/// registers on a link to them.
+/// Parts between the peripherals' registers at both ends of a path, and their total from the board's tick on. `sinks` are the last core's
+/// sinks, whose link has the most pipeline registers.
 fn between(
     passages: &Passages<'_>,
     route: &Route,

@@ -26,15 +26,15 @@ pub enum PinPathsError {
     /// No section of the program is a period.
     #[error("the program has no period: it never waits for the tick")]
     NoPeriod,
-    /// Too many ways, or too many phases of ticks.
+    /// Too many paths, or too many phases of ticks.
     #[error("no bound from pin to pin: {0}")]
     Links(#[from] LatencyError),
 }
 
-/// Finds the ways through a board; `bounds` holds the bounds of its cores' programs.
+/// Finds the paths through a board; `bounds` holds the bounds of its cores' programs.
 ///
 /// # Errors
-/// If a program has no period, or a system too many ways or phases of ticks.
+/// If a program has no period, or a system has too many paths or phases of ticks.
 pub fn ways(
     wiring: &Wiring,
     application: &Application<'_>,

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Parts of a way within peripherals: from a pin's edge to a register, and from a register to a pin.
+//! Parts of a path within peripherals: from a pin's edge to a register, and from a register to a pin.
 
 use super::pin_path::{Answer, End, Part, Sample};
 use crate::wiring::{Peripheral, Starts, Wiring};
 
-/// Cycles from the put of a duty to the first in which it can act.
+/// Cycles from the put of a duty to the first cycle in which it can act.
 const ACTS: u64 = 2;
 
 fn parameter(peripheral: &Peripheral, name: &str) -> u64 {
@@ -16,7 +16,8 @@ pub(crate) fn frame(peripheral: &Peripheral) -> u64 {
     parameter(peripheral, "half") * (2 * parameter(peripheral, "bits") + 1)
 }
 
-/// The parts from a pin's edge to the register, then to the board's tick, of peripherals with such an edge; and what a carrier samples.
+/// Parts from a pin's edge to the register, and then to the board's tick, for peripherals with such an edge; and the sample that a
+/// carrier starts, if any.
 fn edge_in(
     wiring: &Wiring,
     peripheral: &Peripheral,
@@ -48,8 +49,9 @@ fn edge_in(
     Some((parts, until, Some(Sample::Latch)))
 }
 
-/// The update of half bridges on a carrier: the least and greatest cycles from a put to the instant from which it acts; and by how much the
-/// cycles from the tick differ from the sums with `busy`, the least and greatest cycles from tick to put, if those are known.
+/// Update of half bridges on a carrier: the least and greatest cycles from a put to the instant at which it acts. The second pair is the
+/// slack of the sums with `busy` (the least and greatest cycles from tick to put) against the cycles from the tick; 0 if `busy` is
+/// unknown.
 pub(crate) fn update(
     wiring: &Wiring,
     peripheral: &Peripheral,
@@ -126,7 +128,7 @@ fn answer(
     }
 }
 
-/// Input ports of a peripheral, with the end of ways at each; `None` without an edge to count from.
+/// Input ports of a peripheral, with the end of paths at each; `None` without an edge to count from.
 pub(super) fn inputs<'a>(
     wiring: &'a Wiring,
     peripheral: &'a Peripheral,
@@ -147,8 +149,8 @@ pub(super) fn inputs<'a>(
     })
 }
 
-/// Output ports of a peripheral, with the end of ways at each; `None` without an edge to count to. `busy`: the least and greatest cycles from
-/// the tick to the outputs' update, if known.
+/// Output ports of a peripheral, with the end of paths at each; `None` without an edge to count to. `busy` holds the least and greatest
+/// cycles from the tick to the outputs' update, if known.
 pub(super) fn outputs<'a>(
     wiring: &'a Wiring,
     peripheral: &'a Peripheral,
@@ -168,7 +170,7 @@ pub(super) fn outputs<'a>(
     })
 }
 
-/// Peripherals of a wiring without a port at an end of a way.
+/// Peripherals of a wiring without a port at an end of a path.
 pub(super) fn peripherals_without_path(wiring: &Wiring) -> Vec<String> {
     let is_other = |peripheral: &&Peripheral| {
         !inputs(wiring, peripheral).chain(outputs(wiring, peripheral, None)).any(|(_, end)| end.is_some())

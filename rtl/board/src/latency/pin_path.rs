@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Ways from pin to pin, as lists of parts.
+//! Paths from pin to pin, as lists of parts.
 
-/// A part of a way.
+/// Step of a path.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Part {
     /// The step in words.
@@ -17,7 +17,7 @@ impl Part {
         Part { text: text.into(), best, worst }
     }
 
-    /// The sum of parts that follow each other.
+    /// Sum of consecutive parts.
     pub fn sum<'a>(text: &str, parts: impl IntoIterator<Item = &'a Part>) -> Part {
         let add = |sum: Part, part: &Part| Part {
             best: sum.best + part.best,
@@ -28,13 +28,13 @@ impl Part {
     }
 }
 
-/// The kind of a pin's answer.
+/// Kind of a pin's answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Answer {
-    /// The pin answers with an edge: the parts of the way end with the edge.
+    /// The pin answers with an edge: the parts of the path end with the edge.
     Edge,
-    /// The pin answers with a stream of pulses whose density is the value: a single pulse says nothing, and the first pulse that differs
-    /// can come at any time. The parts of the way end where the modulator takes the value on.
+    /// The pin answers with a stream of pulses whose density is the value. A single pulse tells nothing, and the first pulse that differs
+    /// can come at any time, so the parts of the path end where the modulator takes the new value.
     Density,
 }
 
@@ -43,28 +43,28 @@ pub enum Answer {
 pub struct End {
     /// The name of the pin's peripheral.
     pub peripheral: String,
-    /// The name that the wiring gives to the port that the register drives, or takes.
+    /// Port in the wiring that the register drives, or takes its value from.
     pub port: String,
     /// The steps between pin and register.
     pub parts: Vec<Part>,
     /// The kind of an output pin's answer; an input has `Edge`.
     pub answer: Answer,
-    /// Part of an input from these places to the board's tick.
+    /// For an input, the part from these steps to the board's tick.
     pub until: Part,
-    /// Sample of an input that a carrier samples.
+    /// For an input, the sample if a carrier triggers one.
     pub sample: Option<Sample>,
-    /// Slack of half bridges on a carrier: cycles by which the sum of all parts is less than the least, and more than the greatest,
-    /// as an update waits for a place of the carrier, however long the program takes. The last part is then the one from the instant
-    /// at which the duty acts. `None` for other ends.
+    /// Slack of half bridges on a carrier, where an update waits for a place of the carrier: cycles by which the sum of all parts is
+    /// below the least time, and above the greatest. The last part then begins at the instant at which the duty acts. `None` for other
+    /// ends.
     pub update: Option<[u64; 2]>,
 }
 
-/// A sample at a place of a carrier.
+/// Sample at a place of a carrier.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Sample {
-    /// A converter's, with the beginning of its frame: the way begins with it.
+    /// Sample of a converter at the beginning of its frame, where the path begins.
     Frame,
-    /// A register's: the way begins with the pin's edge before it.
+    /// Sample of a register; the path begins with the pin's edge before it.
     Latch,
 }
 
@@ -73,43 +73,43 @@ pub enum Sample {
 pub enum Until {
     /// The instant from which the duty acts.
     Acts,
-    /// The first edge at a pin that differs.
+    /// First edge at a pin that differs.
     Edge,
 }
 
-/// A way from pins to pins: from each of its inputs to each of its outputs.
+/// Path from pins to pins: from each of its inputs to each of its outputs.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PinPath {
-    /// The cores of a system that the way leads through.
+    /// Cores of a system on the path.
     pub cores: Vec<String>,
-    /// The links of a system before, between and after the way's cores.
+    /// Links of a system before, between and after the path's cores.
     pub links: Vec<String>,
     /// The parts from an edge at a pin to the register that a program reads.
     pub inputs: Vec<End>,
     /// The parts from the read registers to the registers that a program writes, if no deadline is missed.
     pub between: Vec<Part>,
-    /// The sum of `between`. Over several cores, the worst case of a part may exclude the worst case of another: `periods` is then less
+    /// Sum of `between`. Over several cores, the worst case of one part may exclude the worst case of another: `periods` is then less
     /// than the sum of the parts.
     pub periods: Part,
     /// The parts from the written registers to an edge at a pin.
     pub outputs: Vec<End>,
-    /// Tells a certain worst case from a likely one. Where branches, or addresses of data memory, can put the first response off, the worst
-    /// case is the worst of the fewest states that the response can come through, and `is_certain` is false.
+    /// The worst case is certain. It is not if branches, or addresses of data memory, can delay the first response: the worst case then
+    /// assumes the fewest states through which the response can come.
     pub is_certain: bool,
 }
 
 impl PinPath {
-    /// The sum from pin to pin, over all inputs and all outputs that answer with an edge; `None` if no output does.
+    /// Sum from pin to pin, over all inputs and all outputs that answer with an edge; `None` if no output does.
     pub fn total(&self) -> Option<Part> {
         self.total_to(Answer::Edge, "from pin to pin")
     }
 
-    /// The sum from pin to the modulators of all outputs that answer with a density; `None` if no output does.
+    /// Sum from the pins to the modulators of all outputs that answer with a density; `None` if no output does.
     pub fn total_to_modulator(&self) -> Option<Part> {
         self.total_to(Answer::Density, "from pin to modulator")
     }
 
-    /// The sum from a sample at a place of a carrier to half bridges on a carrier; `None` without such a sample or half bridges.
+    /// Sum from a sample at a place of a carrier to half bridges on a carrier; `None` without such a sample or half bridges.
     pub fn from_sample(&self, until: Until) -> Option<Part> {
         let sample = self.inputs.first()?.sample?;
         let outputs = self.outputs.iter().filter(|end| end.update.is_some()).map(|end| match until {
@@ -128,7 +128,7 @@ impl PinPath {
         self.total_of(outputs.map(|end| end.total(end.parts.len())).collect(), true, text)
     }
 
-    /// The sum over all inputs, with their parts or from the sample on, and these outputs.
+    /// Sum over all inputs (their parts, or from the sample on) and these outputs.
     fn total_of(&self, outputs: Vec<[i64; 2]>, has_inputs: bool, text: &str) -> Option<Part> {
         let inputs = self.inputs.iter().map(|end| end.total(if has_inputs { end.parts.len() } else { 0 }));
         let inputs: Vec<[i64; 2]> = inputs.collect();
@@ -144,7 +144,7 @@ impl PinPath {
 }
 
 impl End {
-    /// The sum of the first `parts` parts, with what an update adds to the least and takes from the greatest.
+    /// Sum of the first `parts` parts, plus the slack of an update in the least time, minus its slack in the greatest.
     fn total(&self, parts: usize) -> [i64; 2] {
         let Part { best, worst, .. } = Part::sum("", self.parts.iter().take(parts));
         let [more, less] = self.update.unwrap_or_default();
@@ -153,21 +153,21 @@ impl End {
     }
 }
 
-/// The ways through a board.
+/// Paths through a board.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PinPaths {
-    /// The ways. The ways of a program differ in the states between their inputs and outputs.
+    /// Paths; the paths of a program differ in the states between their inputs and outputs.
     pub ways: Vec<PinPath>,
     /// Peripherals whose ports have no edge to count from or to, such as converters.
     pub others: Vec<String>,
-    /// FIFOs on ways from pin to pin of a system. Ways over FIFOs are not among `ways`, because their latency depends on the entries that
-    /// are queued.
+    /// FIFOs on paths from pin to pin of a system. Paths over FIFOs are not among `ways`, because their latency depends on the number of
+    /// queued entries.
     pub queues: Vec<String>,
-    /// Deadlines that can be missed, in words; the bounds do not include a missed deadline.
+    /// Deadlines that can be missed, as text; the bounds assume that none is missed.
     pub late: Vec<String>,
 }
 
-/// The periods that states take, in words; `None` for no period.
+/// Number of periods that states take, as text; `None` for no period.
 pub(super) fn states_text(least: u32, most: u32) -> Option<String> {
     match (least, most) {
         (0, 0) => None,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The ways through a core without links.
+//! Paths through a core without links.
 
 use super::peripherals::{inputs, outputs, peripherals_without_path};
 use super::pin_path::{End, Part, PinPath, PinPaths, states_text};
@@ -12,8 +12,8 @@ use takt_isa::timing::Span;
 
 /// Cycles that `takt_exchange` takes, without any input, from the board's tick to the core's tick.
 const BEGIN: u64 = 5;
-/// The cycles, without any output, from the cycle in which `wait` issues to the cycle in which `put` is high: the core's `waiting`,
-/// `takt_exchange` and the rounding of the last output.
+/// Cycles, without any output, from the issue of `wait` to the cycle in which `put` is high: the core's `waiting`, `takt_exchange` and
+/// the rounding of the last output.
 const END: u64 = 14;
 
 /// Cycles of a period that the program does not take: `reads` registers become input ports, and output ports become `writes` registers.
@@ -21,7 +21,7 @@ pub(crate) fn copies(reads: usize, writes: usize) -> u64 {
     reads as u64 + BEGIN + writes as u64 + END
 }
 
-/// The ways of a program, with the periods that states add: inputs and outputs with equal states share a way. Outputs that follow no input
+/// Paths of a program, with the periods that states add: inputs and outputs with equal states share a path. Outputs that follow no input
 /// are left out.
 pub(super) fn ways(wiring: &Wiring, program: &Program, span: Span) -> PinPaths {
     let ways = undivided(wiring, span);
@@ -52,7 +52,7 @@ pub(super) fn ways(wiring: &Wiring, program: &Program, span: Span) -> PinPaths {
             let latest = most.unwrap_or(least);
             let mut between = way.between.clone();
             if let Some(text) = states_text(least, latest) {
-                // The part of the states goes behind the program, before the output registers.
+                // The states' part comes after the program's, before the output registers.
                 between.insert(
                     between.len() - 1,
                     Part::new(text, u64::from(least) * period, u64::from(latest) * period),
@@ -75,9 +75,9 @@ pub(super) fn ways(wiring: &Wiring, program: &Program, span: Span) -> PinPaths {
     }
 }
 
-/// The ways from all inputs of a wiring to all of its outputs, whatever depends on what, through a core without links: one for the inputs that
-/// wait for a tick, and for each time from a carrier's sample to the tick. The periods of the core take the cycles of `span` from tick to
-/// `wait`, and the next tick comes after the `wait`. Empty if the wiring has no such input, or no such output.
+/// Paths from all inputs of a wiring to all its outputs, regardless of dependences, through a core without links: one for the inputs that
+/// wait for a tick, and one for each time from a carrier's sample to the tick. The periods of the core take the cycles of `span` from
+/// tick to `wait`, and the next tick comes after the `wait`. Empty if the wiring has no such input, or no such output.
 pub fn undivided(wiring: &Wiring, span: Span) -> Vec<PinPath> {
     let inputs: Vec<_> = wiring.peripherals.iter().flat_map(|of| inputs(wiring, of)).collect();
     let writes = wiring.peripherals.iter().map(|of| of.writes.iter().flatten().count() as u64).sum::<u64>();

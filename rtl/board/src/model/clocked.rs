@@ -10,12 +10,12 @@ pub trait Model {
     fn clock(&mut self, inputs: &[u32]);
 }
 
-/// Tells if the signal at place `at` is high; a signal that is missing is low.
+/// The signal at index `at` is high; a missing signal is low.
 pub(super) fn high(inputs: &[u32], at: usize) -> bool {
     inputs.get(at).is_some_and(|&value| value != 0)
 }
 
-/// The signal of 32 bits at place `at`; a signal that is missing is 0.
+/// Signal of 32 bits at index `at`; a missing signal is 0.
 pub(super) fn word(inputs: &[u32], at: usize) -> u32 {
     inputs.get(at).copied().unwrap_or(0)
 }

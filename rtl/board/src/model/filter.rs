@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Model of the circuit `takt_filter`.
 
-/// A pin from outside in step with the clock, without pulses that are too short.
+/// Synchroniser of an input pin, with a filter against short pulses.
 #[derive(Clone, Debug)]
 pub struct Filter {
     hold: u32,
@@ -11,7 +11,7 @@ pub struct Filter {
 }
 
 impl Filter {
-    /// A filter that passes a level which has stood for `hold` cycles.
+    /// Filter that passes a level once it has been stable for `hold` cycles.
     pub fn new(hold: u32) -> Filter {
         Filter { hold: hold.max(1), synchroniser: [false; 2], held: 0, level: false }
     }

@@ -15,7 +15,7 @@ pub struct Quadrature {
 }
 
 impl Quadrature {
-    /// A counter of levels that have stood for `filter` cycles, with the count `start` after a reset.
+    /// Counter with filters that pass levels of `filter` cycles, and with the count `start` after a reset.
     pub fn new(filter: u32, start: u32) -> Quadrature {
         let pins = [(); 3].map(|()| Filter::new(filter));
         let now = [start, 0, 0, 0];
@@ -69,7 +69,7 @@ pub struct Step {
 }
 
 impl Step {
-    /// A counter of levels that have stood for `filter` cycles.
+    /// Counter with filters that pass levels of `filter` cycles.
     pub fn new(filter: u32) -> Step {
         Step { step: Filter::new(filter), direction: Filter::new(filter), was: false, count: 0, taken: 0 }
     }
@@ -108,7 +108,7 @@ pub struct DigitalIn {
 }
 
 impl DigitalIn {
-    /// An input whose levels have stood for `hold` cycles.
+    /// Input that passes levels of `hold` cycles.
     pub fn new(hold: u32, invert: bool) -> DigitalIn {
         DigitalIn { pin: Filter::new(hold), invert, was: false, rises: 0, taken: [0; 2] }
     }

@@ -21,7 +21,7 @@ pub use spi::Spi;
 
 use crate::Kind;
 
-/// The model of a peripheral with the parameters given in the order of the kind's table; a missing parameter has its default. Of a kind on a
+/// Model of a peripheral with the parameters given in the order of the kind's table; a missing parameter has its default. For a kind on a
 /// carrier, half the carrier's period in cycles follows.
 pub fn of(kind: &Kind, parameters: &[u32]) -> Option<Box<dyn Model>> {
     let value = |i: usize| {

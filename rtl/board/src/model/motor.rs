@@ -31,7 +31,7 @@ impl Model for Carrier {
     }
 }
 
-/// Parameters of a [`Pwm3`], as those of the circuit.
+/// Parameters of a [`Pwm3`], like the circuit's.
 #[derive(Clone, Copy, Debug)]
 pub struct Bridges {
     /// Half a carrier's period in cycles.
@@ -54,7 +54,7 @@ pub struct Bridges {
 #[derive(Clone, Copy, Debug)]
 struct Phase {
     taken: u32,
-    /// Cycles of the pulse before and behind the peak.
+    /// Cycles of the pulse before and after the peak.
     parts: [u32; 2],
     pulse: bool,
     /// 0 off, 1 low, 2 high.
@@ -154,7 +154,7 @@ pub struct Trip {
 }
 
 impl Trip {
-    /// A trip by a level that has stood for `filter` cycles.
+    /// Trip that responds to a level once it has been stable for `filter` cycles.
     pub fn new(filter: u32, invert: bool) -> Trip {
         Trip {
             pin: (filter > 0).then(|| Filter::new(filter)),

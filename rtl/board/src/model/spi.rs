@@ -25,8 +25,8 @@ pub struct Spi {
 }
 
 impl Spi {
-    /// A master at rest. `half` is half a bit in cycles, and `bits` the length of a frame; `polarity` and `second_edge` are the mode bits
-    /// of SPI; `signed` tells if the received number is signed, and `preset` is the first number sent.
+    /// SPI master at rest. `half` is half a bit in cycles, `bits` the length of a frame; `polarity` and `second_edge` are the mode bits
+    /// of SPI; with `signed`, the received number is signed; `preset` is the first number sent.
     pub fn new(half: u32, bits: u32, polarity: bool, second_edge: bool, signed: bool, preset: u32) -> Spi {
         Spi {
             half,

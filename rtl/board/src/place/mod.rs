@@ -25,10 +25,10 @@ pub const TARGET_MHZ: u32 = 200;
 pub const NETLIST: &str = "netlist.json";
 /// yosys' statistics of it.
 const STATISTICS: &str = "statistics.json";
-/// The hash of what the netlist was made from.
+/// File with the hash of the netlist's sources.
 const MADE_FROM: &str = "netlist.txt";
 
-/// The reason for which there is no clock.
+/// Reason why there is no clock.
 #[derive(Debug, Error)]
 pub enum PlaceError {
     /// There is no circuit.
@@ -37,13 +37,13 @@ pub enum PlaceError {
     /// No open tools place and route designs of the family.
     #[error("no open tools that Takt knows place and route designs of {0}")]
     NoTools(&'static str),
-    /// A tool failed, as for want of room on the device.
+    /// A tool failed, for example because the device is too small.
     #[error(transparent)]
     Tool(#[from] ToolError),
     /// A file cannot be written or read.
     #[error("{0}: {1}")]
     File(String, io::Error),
-    /// A report lacks something.
+    /// A report lacks a figure.
     #[error("{0}")]
     Report(String),
 }
@@ -100,8 +100,8 @@ pub fn packages(family: &'static Family) -> Result<[&'static str; 2], PlaceError
     Ok([YOSYS, Tools::of(family)?.place.package])
 }
 
-/// A machine with its memories as `takt rtl` writes it, with the family's own modules: its bus slave on a few pins, what serves
-/// verification only left out.
+/// Core of a machine with its memories, as `takt rtl` writes it, with the family's own modules and the bus slave on a few pins, but
+/// without the parts that serve verification only.
 ///
 /// # Errors
 /// If it has no circuit.
@@ -116,7 +116,7 @@ pub fn core(machine: &'static Machine, library: &Library, family: &Family) -> Re
     Ok(Core { files, top: synthesis_top(machine) })
 }
 
-/// A hash of all that [`PlacedCore`] depends on but the seed: the core's Verilog and the tools.
+/// Hash of everything that determines a [`PlacedCore`] except the seed: the core's Verilog and the tools.
 ///
 /// # Errors
 /// If the machine has no circuit, or the family no tools.
@@ -168,7 +168,7 @@ pub fn synthesise(
 /// yosys' statistics of the netlist in a folder.
 ///
 /// # Errors
-/// If they are not there.
+/// If the folder has no statistics.
 pub fn statistics(folder: &Path) -> Result<Value, PlaceError> {
     json(&folder.join(STATISTICS))
 }
@@ -187,17 +187,17 @@ pub fn arguments(place: &Place, part: &Part, grade: u8, mhz: u32, seed: u32, rep
 /// A core placed and routed with one seed.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlacedCore {
-    /// The clock that it reaches, MHz.
+    /// Clock that the core reaches, MHz.
     pub mhz: f64,
-    /// Look-up tables, those of carry chains included, without what only the measurement needs.
+    /// Look-up tables, including carry chains, without the logic that only the measurement needs.
     pub luts: u64,
-    /// Block RAMs.
+    /// Number of block RAMs.
     pub block_rams: u64,
-    /// Multipliers.
+    /// Number of multipliers.
     pub multipliers: u64,
 }
 
-/// Synthesises a machine's core in a folder, unless it was.
+/// Synthesises a machine's core in a folder, unless it has been synthesised there.
 ///
 /// # Errors
 /// If it has no circuit, or a tool fails.
@@ -218,7 +218,7 @@ pub fn prepare(
 /// Places and routes the core that [`prepare`] has synthesised in a folder, on the family's measured device.
 ///
 /// # Errors
-/// If nextpnr fails: the machine has no room there.
+/// If nextpnr fails, because the machine does not fit the device.
 pub fn place(
     venv: &Venv,
     folder: &Path,

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The tools' reports.
+//! Figures from the tools' reports.
 
 use crate::place::PlaceError;
 use serde_json::Value;
 use takt_family::{Family, Resources};
 
-/// The resources of a design, from those of it in its wrapper.
+/// Resources of a design: the total less the wrapper's share.
 pub fn less(all: Resources, wrapper: Resources) -> Resources {
     Resources {
         luts: all.luts.saturating_sub(wrapper.luts),
@@ -18,18 +18,18 @@ fn lacking(what: &str) -> PlaceError {
     PlaceError::Report(format!("nextpnr's report has no {what}"))
 }
 
-/// The clock in MHz that a report of nextpnr states.
+/// Clock in MHz that nextpnr's report states.
 ///
 /// # Errors
-/// If it states none.
+/// If the report states no clock.
 pub fn clock(report: &Value) -> Result<f64, PlaceError> {
     let clocks = report["fmax"].as_object().ok_or_else(|| lacking("clock"))?;
     let achieved = clocks.values().filter_map(|clock| clock["achieved"].as_f64());
     achieved.reduce(f64::min).ok_or_else(|| lacking("clock"))
 }
 
-/// The resources of a design: as nextpnr counts them, if a report is given and the family's has them; else as yosys' statistics do, of which
-/// carry chains always come.
+/// Resources of a design: from nextpnr's report, if it is given and the family's reports count resources, otherwise from yosys'
+/// statistics. Carry chains are always counted by yosys.
 ///
 /// # Errors
 /// If nextpnr's report lacks one of them.
@@ -51,8 +51,8 @@ pub fn resources(
     })
 }
 
-/// The longest path from register to register, in words: its time, the signals on it that have a name in the source, and
-/// what it passes through.
+/// Longest path from register to register, as text: its time, the signals on it that have a name in the source, and the cells that it
+/// passes through.
 pub fn critical_path(report: &Value, family: &Family) -> Option<String> {
     let ports = family.carry.map_or(&[][..], |carry| carry.ports);
     let suffixes = family.place.as_ref()?.suffixes;
@@ -90,13 +90,13 @@ pub fn critical_path(report: &Value, family: &Family) -> Option<String> {
     ))
 }
 
-/// Nanoseconds of the steps of some kinds.
+/// Total time of the steps of these kinds, ns.
 fn total(steps: &[Value], kinds: &[&str]) -> f64 {
     let some = steps.iter().filter(|step| step["type"].as_str().is_some_and(|kind| kinds.contains(&kind)));
     some.filter_map(|step| step["delay"].as_f64()).sum()
 }
 
-/// The name that a net or cell has in the source: without what yosys and nextpnr append.
+/// Name of a net or cell in the source, without the suffixes of yosys and nextpnr.
 fn signal(name: &str, suffixes: &[&str]) -> String {
     let end = suffixes.iter().filter_map(|suffix| name.find(suffix)).min().unwrap_or(name.len());
     let name = &name[..end];

@@ -11,7 +11,7 @@ use takt_family::{Constraints, Pin, PllError, Pull};
 
 /// Name of the board's top module.
 pub const TOP: &str = "takt_board";
-/// The number, as a power of two, of the cycles that a reset of the board lasts at least.
+/// Minimum length of the board's reset in cycles, as a power of two.
 const RESET_BITS: u32 = 8;
 /// Cycles from power-up until the board's reset is over. Before, a simulation's pins may be anything.
 pub const RESET: u32 = 2 << RESET_BITS;

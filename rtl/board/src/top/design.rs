@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The design of the cores that a board carries, and the number by which a host knows it again.
+//! Design of the cores that a board carries, and the number by which a host recognises it.
 
 use super::error::TopError;
 use crate::application::Application;
@@ -14,7 +14,7 @@ pub(super) struct Design {
     pub(super) files: Vec<DesignFile>,
     /// The module of the core, or of the system.
     pub(super) top: String,
-    /// The number by which the host knows it again.
+    /// Number by which the host recognises the design.
     pub(super) number: u32,
     /// The plan of a system.
     pub(super) plan: Option<SystemPlan>,
@@ -37,13 +37,13 @@ impl Design {
 
 fn system(description: &Description, library: &Library) -> Result<SystemDesign, TopError> {
     let mut design = export_driven(description, "board", library, Driver::Board)?;
-    // The board's own do this.
+    // The board has its own modules for loading and ticks.
     let others = ["takt_loader.v", "takt_start.v", "takt_pace.v"];
     design.files.retain(|file| !others.iter().any(|name| file.name.ends_with(name)));
     Ok(design)
 }
 
-/// The number by which a host knows a circuit again.
+/// Number by which a host recognises a circuit.
 ///
 /// # Errors
 /// If the system has no circuit.

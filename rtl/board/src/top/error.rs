@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The reasons for which there is no circuit.
+//! Reasons why there is no circuit.
 
 use crate::protocol::{PAGE, PAGES};
 use takt_family::PllError;
@@ -8,7 +8,7 @@ use thiserror::Error;
 /// Records that an image may have: limited by the protocol's addresses.
 pub(super) const MOST_RECORDS: usize = PAGES * PAGE;
 
-/// The reason for which there is no circuit.
+/// Reason why there is no circuit.
 #[derive(Debug, Error)]
 pub enum TopError {
     /// The program, or the system's programs, are too big for the image.
@@ -28,7 +28,7 @@ pub enum TopError {
         kind: &'static str,
         /// Flip-flops of these memories.
         needed: u64,
-        /// The family's text.
+        /// Maker and name of the family.
         family: &'static str,
         /// Device.
         device: &'static str,

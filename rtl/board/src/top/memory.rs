@@ -12,12 +12,12 @@ use takt_isa::memory::{BlockRam, Shape};
 use takt_rtl::plan::Plan;
 use takt_rtl::{Library, memories};
 
-/// Bits of a record of the image, for so many cores: a single one has no number (`takt_boot`).
+/// Bits of a record of the image; with a single core, records have no core number (`takt_boot`).
 fn record_bits(cores: usize) -> u64 {
     if cores > 1 { 73 } else { 69 }
 }
 
-/// Block RAMs of the copies that the host reads, of a core among so many.
+/// Block RAMs of a core's copies that the host reads, in a system of `cores` cores.
 fn copies(machine: &Machine, cores: usize, block: &BlockRam) -> u64 {
     let words = |words: u32| block.blocks(Shape { words: words.into(), bits: 32 });
     let banks = machine.slots.iter().map(|slot| words(slot.bank.depth.into()));
@@ -42,7 +42,7 @@ pub(super) fn check(
     let machines = || application.description().cores.iter().map(|core| core.program.machine);
     let mut cores = 0;
     for machine in machines() {
-        // A machine without a circuit is the export's to report.
+        // The export reports machines without a circuit.
         let Ok(plan) = Plan::new(machine, library) else { return Ok(()) };
         cores += memories::block_rams(&plan, library, block);
     }

@@ -57,7 +57,7 @@ fn at(wiring: &Wiring, instant: Instant) -> String {
     format!("{place} == 16'd{at} & {}{back}", if behind { "" } else { "~" })
 }
 
-/// The carriers, and the signal that lets ticks begin: wherever they do if no carrier gives them.
+/// Carriers, and the signal that lets ticks begin; if no carrier gives the ticks, they may begin at any time.
 pub(super) fn carriers(wiring: &Wiring) -> Values {
     let mut text = String::new();
     for carrier in &wiring.carriers {

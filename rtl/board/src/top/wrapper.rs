@@ -17,7 +17,7 @@ use takt_system::{Link, MAX_CORES};
 
 /// Name of the module around cores and peripherals.
 pub const AROUND: &str = "takt_peripherals";
-/// Least cycles of reset after the last record: as many as anything can be under way in a core, or on a link.
+/// Minimum cycles of reset after the last record: longer than anything is under way in a core or on a link.
 const SETTLE: u64 = 128;
 
 /// The module around the cores of a design.

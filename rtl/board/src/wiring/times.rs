@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The reader of what a peripheral has to do with carriers and trips, and of parameters by name.
+//! Reader of a peripheral's keys for carriers and trips, and of parameters by name.
 
 use super::{Peripheral, Reader, Starts};
 use crate::carrier::{self, Instant};
@@ -76,7 +76,7 @@ impl<'a> Reader<'a> {
         times
     }
 
-    /// Finds names in `trips` that are no trips.
+    /// Finds names in `trips` that are not trips.
     pub(super) fn check_trips(&self, peripherals: &[Peripheral]) {
         let trips = peripherals.iter().filter(|peripheral| peripheral.kind.strobes.trips);
         let names: Vec<&str> = trips.map(|trip| trip.name.as_str()).collect();

@@ -27,7 +27,7 @@ pub(crate) fn refuses(host: &mut Host<Simulation>, address: u16, words: &[u32]) 
     }
 }
 
-/// Tells if a running program leaves the word at an address unchanged.
+/// A running program leaves the word at an address unchanged.
 fn is_constant(address: u16) -> bool {
     !matches!(address, 2..=3 | 7..=11 | 19 | 0x102 | 0x3400..)
 }

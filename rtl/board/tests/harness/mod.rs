@@ -110,7 +110,7 @@ pub(crate) fn build(name: &str, files: &[(&str, String)], parts: &[Part]) -> Pat
         .unwrap_or_else(|error| panic!("{error}: `cargo xtask test` installs what the tests need"))
 }
 
-/// Runs `cycles` cycles, and says for each part in which cycle it first differed from its model, and how.
+/// Runs `cycles` cycles; returns for each part the cycle of the first difference from its model, and the difference.
 pub(crate) fn compare(
     name: &str,
     files: &[(&str, String)],

@@ -22,8 +22,8 @@ pub struct SystemLockstep {
     events: Comparison<CircuitEvent>,
     actions: Vec<PinAction>,
     simulated: Cycle,
-    /// For each link, values that the host has written to a FIFO's fields, by pin; and the first cycles in which the FIFO can take the
-    /// host's next entry, and give one.
+    /// For each link: values that the host has written to a FIFO's fields, by pin; and the first cycles in which the FIFO can accept, or
+    /// deliver, the host's next entry.
     working: Vec<BTreeMap<usize, u32>>,
     free: Vec<[Cycle; 2]>,
 }
@@ -63,7 +63,7 @@ impl SystemLockstep {
         self.events.compared
     }
 
-    /// Sets an input of the host, as [`System::set_input`].
+    /// Sets an input of the host, like [`System::set_input`].
     ///
     /// # Errors
     /// See [`System::set_input`].
@@ -91,13 +91,13 @@ impl SystemLockstep {
                 self.strobe(now, link, PinKind::Send);
             }
             LinkKind::Snapshot { .. } => self.actions.push((now, pin, bits)),
-            // On the pins in the cycle of the push.
+            // The values are on the pins in the cycle of the push.
             LinkKind::Fifo { .. } => drop(self.working[link].insert(pin, bits)),
         }
         Ok(())
     }
 
-    /// Publishes a snapshot of the host, as [`System::publish`].
+    /// Publishes a snapshot of the host, like [`System::publish`].
     ///
     /// # Errors
     /// See [`System::publish`].
@@ -107,7 +107,7 @@ impl SystemLockstep {
         Ok(())
     }
 
-    /// Pushes an entry of the host, as [`System::push`]. Several pushes at one time enter the circuit in successive cycles.
+    /// Pushes an entry of the host, like [`System::push`]. Several pushes at the same time enter the circuit in successive cycles.
     ///
     /// # Errors
     /// See [`System::push`].
@@ -124,14 +124,14 @@ impl SystemLockstep {
         self.actions.extend(pin.map(|pin| (cycle, pin, 1)));
     }
 
-    /// Cycle in which a FIFO takes the host's next entry, or gives one: one entry per cycle.
+    /// Cycle in which a FIFO accepts the host's next entry, or delivers one: one entry per cycle.
     fn turn(&mut self, link: usize, way: usize) -> Cycle {
         let cycle = self.system.now().max(self.free[link][way]);
         self.free[link][way] = cycle + 1;
         cycle
     }
 
-    /// Carries out an action of the host, as [`System::act`].
+    /// Performs an action of the host, like [`System::act`].
     ///
     /// # Errors
     /// See [`System::act`].
@@ -144,8 +144,8 @@ impl SystemLockstep {
         }
     }
 
-    /// Writes all fields of a link that the host drives: sets the value of a wire, publishes a snapshot, or pushes an entry. False if a
-    /// FIFO is full, as far as the host can know.
+    /// Writes all fields of a link that the host drives: sets the value of a wire, publishes a snapshot, or pushes an entry. Returns
+    /// false if a FIFO is full, as far as the host can know.
     ///
     /// # Errors
     /// If the host drives no such link.
@@ -165,7 +165,8 @@ impl SystemLockstep {
         }
     }
 
-    /// Pops the head of a FIFO for the host; `None` if the FIFO is empty. Several pops at one time reach the circuit in successive cycles.
+    /// Pops the head of a FIFO for the host; `None` if the FIFO is empty. Several pops at the same time reach the circuit in successive
+    /// cycles.
     ///
     /// # Errors
     /// If there is no such FIFO.
@@ -234,7 +235,7 @@ impl SystemLockstep {
         Ok(())
     }
 
-    /// Collects the circuit's reports of the last cycles, and compares them. The host can do nothing more.
+    /// Collects the circuit's reports of the last cycles, and compares them. No action of the host may follow.
     ///
     /// # Errors
     /// A difference, or the end of the simulation.
@@ -243,7 +244,7 @@ impl SystemLockstep {
         let (found, _) = self.simulation.run(now + REPORT_DELAY, &[])?;
         self.events.found.extend(found);
         self.simulated = now + REPORT_DELAY;
-        // Faults that the circuit does not detect are no events, and its behaviour in that cycle is undefined.
+        // Faults that the circuit does not detect are not events, and its behaviour in that cycle is undefined.
         let end = match self.system.fault() {
             Some(fault) if circuit_stops(&fault.fault) => fault.fault.cycle + 1,
             Some(fault) => fault.fault.cycle,

@@ -19,7 +19,7 @@ pub const CYCLES: Cycle = 4000;
 /// Counts of the events in random runs.
 #[derive(Clone, Debug, Default)]
 pub struct Coverage {
-    /// Runs to the end.
+    /// Number of completed runs.
     pub runs: u64,
     /// Cycles of all runs.
     pub cycles: u64,
@@ -29,17 +29,17 @@ pub struct Coverage {
     pub started: u64,
     /// Runs stopped by a fault.
     pub faults: u64,
-    /// Deadlines that were missed.
+    /// Number of missed deadlines.
     pub missed: u64,
 }
 
-/// A random system and its [`variants`].
+/// Random system and its [`variants`].
 pub fn systems(seed: u64, machines: &[&'static Machine], count: u64) -> Vec<Description> {
     variants(random_description(seed, machines), seed, count)
 }
 
-/// A system, and others that differ only in their random programs: one circuit with different memory contents. Ports and presets of output
-/// ports stay the first system's, because they are part of the circuit.
+/// Variants of a system that differ only in their random programs: one circuit with different memory contents. Ports and presets of
+/// output ports stay the first system's, because they are part of the circuit.
 pub fn variants(first: Description, seed: u64, count: u64) -> Vec<Description> {
     let others = (1..count).map(|number| {
         let mut other = first.clone();
@@ -55,7 +55,7 @@ pub fn variants(first: Description, seed: u64, count: u64) -> Vec<Description> {
 
 fn another(first: &Program, seed: u64) -> Program {
     let machine = first.machine;
-    // Few bundles, so that some periods write no port; many, so that some periods exceed the distance of ticks.
+    // Few bundles, so that some periods write no port; many, so that some periods exceed the interval of ticks.
     let bundles = 2 + Random::new(seed).below(45);
     let program = random_program(seed, machine, Options { bundles, ..Options::TAME });
     let inputs: Vec<_> = first.inputs.iter().map(|port| port.register).collect();

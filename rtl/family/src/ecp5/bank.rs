@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The block RAM of a register bank in a netlist of yosys, for the comparison of `takt_bank.v` with the general module.
+//! Block RAM of a register bank in a yosys netlist, for the comparison of `takt_bank.v` with the general module.
 
 use serde_json::Value;
 use std::collections::BTreeMap;
 
-/// Pins of a block RAM that decide together whether it writes: port A's enable, and the bytes of its word.
+/// Pins of a block RAM that together determine whether it writes: port A's enable, and the bytes of its word.
 const WRITES: [&str; 5] = ["CEA", "ADA0", "ADA1", "ADA2", "ADA3"];
 
-/// The net on each pin of the only block RAM in a netlist, and the net after each output's register.
+/// Net on each pin of the only block RAM in a netlist; for an output with an external register, the net after that register.
 pub(super) fn pins(netlist: &Value) -> Result<BTreeMap<String, String>, String> {
     let module = &netlist["modules"]["takt_bank"];
     let lacking = |what: &str| format!("the netlist of takt_bank has no {what}");

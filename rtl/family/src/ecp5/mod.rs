@@ -106,7 +106,7 @@ LOCATE COMP \"serial_out\" SITE \"U1\";
     ),
     options: &[
         "--lpf-allow-unconstrained",
-        // More weight on the longest paths than by default: 137.7 MHz instead of some 133 with t3's seed 1.
+        // More weight on the longest paths than by default: 137.7 MHz instead of about 133 with t3's seed 1.
         "--placer-heap-critexp",
         "4",
         "--placer-heap-timingweight",
@@ -116,15 +116,15 @@ LOCATE COMP \"serial_out\" SITE \"U1\";
     units: &[("fused", 1635, 3), ("addmul", 945, 3), ("recurrence", 657, 0)],
 };
 
-/// A file for yosys: the delays of multipliers and block RAMs, which its mapping of logic does not know by itself.
+/// File for yosys: the delays of multipliers and block RAMs, which its logic mapping does not know by itself.
 const DELAYS: File = ("ecp5_delays.v", include_str!("delays.v"));
 
-/// yosys' commands, for which [`DELAYS`] is in the folder.
+/// yosys' commands, which expect [`DELAYS`] in the folder.
 ///
-/// They differ from a plain `synth_lattice` in how logic is mapped: by a longer way (`flow2`), in which comparators come out at half the
-/// size and a machine loses a tenth; with the delays of the other cells; with 550 ps for a wire in place of 300, as after place and
-/// route a wire takes more than a table. Short comparisons with constants on carry chains, which have to be entered and left, take
-/// more than in tables. Fast mapping uses the slices' multiplexers for tables of up to seven inputs.
+/// The mapping of logic differs from a plain `synth_lattice`. It runs a longer script (`flow2`), which halves comparators and makes a
+/// machine smaller by a tenth. It knows the delays of the other cells. It assumes 550 ps for a wire instead of 300, because after place
+/// and route a wire takes longer than a table. Short comparisons with constants do not use carry chains: entering and leaving a chain
+/// takes longer than tables. Fast mapping uses the slices' multiplexers for tables of up to seven inputs.
 fn synthesis(top: &str, netlist: &str, mapping: Mapping) -> String {
     let synth = format!("synth_lattice -family ecp5 -cmp2softlogic -top {top}");
     let delays = DELAYS.0;

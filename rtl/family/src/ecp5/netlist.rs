@@ -1,27 +1,27 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The netlist of nextpnr as models of its cells take it: open pins are tied, tables become expressions.
+//! Adapts nextpnr's netlist to the models of its cells: open pins are tied, tables become expressions.
 
 use serde_json::{Map, Value, json};
 
-/// yosys' library, mended: the carry of a cell is assigned to a wire of its own there, which nothing reads.
+/// Corrects a file of yosys' library that assigns a cell's carry to a new wire, which nothing reads, instead of to its output.
 pub(super) fn library(text: &str) -> String {
     text.replace("wire FCO = (", "assign FCO = (")
 }
 
-/// The cells of a routed netlist as the models take them.
+/// Adapts the cells of a routed netlist to their models.
 pub(super) fn mend(cells: &mut Map<String, Value>) {
-    // A placeholder of a memory's write port has no logic of its own.
+    // The placeholder of a memory's write port has no logic of its own.
     cells.retain(|_, cell| cell["parameters"]["MODE"] != "RAMW_BLOCK");
     cells.values_mut().for_each(mend_cell);
 }
 
-/// The truth table of a cell that is plain logic.
+/// Truth table of a cell that is plain logic; `None` for other cells.
 pub(super) fn truth_table(cell: &mut Value) -> Option<&mut Value> {
     let is_logic = cell["type"] == "TRELLIS_COMB" && cell["parameters"]["MODE"].is_null();
     is_logic.then(|| &mut cell["parameters"]["INITVAL"])
 }
 
-/// A cell of nextpnr as the models take it. Pins without a net are left out; what they are instead is stated.
+/// Adapts a cell of nextpnr to its model: removes pins without a net, and ties those that the model needs.
 fn mend_cell(cell: &mut Value) {
     let pins = cell["connections"].as_object_mut().map(|pins| {
         let open: Vec<String> =
@@ -32,25 +32,25 @@ fn mend_cell(cell: &mut Value) {
     let is_open = |pin: &str| pins.iter().flatten().any(|open| open == pin);
     let kind = cell["type"].as_str().unwrap_or_default().to_owned();
     match kind.as_str() {
-        // Its stand-in knows no frequencies.
+        // The PLL's stand-in in simulation has no parameters.
         "EHXPLLL" => cell["parameters"] = json!({}),
         "TRELLIS_IO" => buffer(cell),
         "TRELLIS_FF" => {
-            // The datum that does not come from the table beside it is at another pin.
+            // A datum that does not come from the adjacent table is at pin M.
             if take(cell, "SD").is_none_or(|direct| direct == "0")
                 && let Some(pins) = cell["connections"].as_object_mut()
                 && let Some(datum) = pins.remove("M")
             {
                 tie(cell, "DI", datum);
             }
-            // Without a net it is not set, and always enabled.
+            // Without a net, set and reset are inactive and the clock enable is active.
             for (pin, level) in [("LSR", "0"), ("CE", "1")] {
                 if cell["connections"][pin].is_null() {
                     tie(cell, pin, json!([level]));
                 }
             }
         }
-        // An open input of a table is high; carries count on it.
+        // Open inputs of a table are high; carry chains rely on it.
         "TRELLIS_COMB" => {
             take(cell, "WCKMUX");
             for pin in ["A", "B", "C", "D"] {
@@ -59,7 +59,8 @@ fn mend_cell(cell: &mut Value) {
                 }
             }
         }
-        // An open input is high, too, but for what its multiplexer says: `CEAMUX` is 0, 1, INV, or CEA as it is.
+        // Open inputs are high here, too, unless a parameter of the pin's multiplexer says otherwise: `CEAMUX` is 0, 1, INV, or CEA for
+        // the pin itself.
         "DP16KD" | "MULT18X18D" => {
             let parameters: Vec<String> =
                 cell["parameters"].as_object().into_iter().flatten().map(|(name, _)| name.clone()).collect();
@@ -68,7 +69,7 @@ fn mend_cell(cell: &mut Value) {
                 match take(cell, name).as_deref() {
                     Some(level @ ("0" | "1")) => tie(cell, pin, json!([level])),
                     Some("INV") if !connected => tie(cell, pin, json!(["0"])),
-                    // No model has it: Verilator says so.
+                    // No model supports an inverted pin: Verilator reports the parameter.
                     Some("INV") => cell["parameters"][name] = json!("INV"),
                     _ if !connected => tie(cell, pin, json!(["1"])),
                     _ => {}
@@ -79,8 +80,8 @@ fn mend_cell(cell: &mut Value) {
     }
 }
 
-/// The design with its tables, carries and multiplexers as yosys' own cells, which it writes as expressions. (As instances of the
-/// library's model each table would be a module of its own: Verilator takes minutes for thousands of them.)
+/// Replaces tables, carries and multiplexers of a design by yosys' own cells, which yosys writes as expressions. (As instances of the
+/// library's model, each table would be a separate module: Verilator takes minutes for thousands of these.)
 pub(super) fn tables(cells: Map<String, Value>) -> Map<String, Value> {
     let nets = cells.values().flat_map(|cell| cell["connections"].as_object().into_iter().flatten());
     let bits = nets.flat_map(|(_, net)| net.as_array().into_iter().flatten()).filter_map(Value::as_u64);
@@ -93,7 +94,7 @@ pub(super) fn tables(cells: Map<String, Value>) -> Map<String, Value> {
         }
         let is_carry = take(&mut cell, "MODE").is_some_and(|mode| mode == "CCU2");
         let injects = take(&mut cell, "CCU2_INJECT1").is_some_and(|injects| injects == "YES");
-        // A multiplexer of multiplexers, for a table of six inputs or more; else one of two tables.
+        // A multiplexer of multiplexers, for a table of six inputs or more; otherwise a multiplexer of two tables.
         let is_wide = ["FXA", "FXB"].iter().any(|pin| !cell["connections"][pin].is_null());
         let table = format!("{:0>16}", take(&mut cell, "INITVAL").unwrap_or_default());
         let pin = |name: &str| match &cell["connections"][name] {
@@ -116,7 +117,7 @@ pub(super) fn tables(cells: Map<String, Value>) -> Map<String, Value> {
             });
             found.insert(format!("{name}{what}"), cell);
         };
-        // A net of the design if there is one, or one of its own.
+        // The design's net at a pin, or a new net.
         let mut net = |name: Option<&str>| match name.map(|name| &cell["connections"][name]) {
             Some(Value::Array(net)) => net[0].clone(),
             _ => {
@@ -152,7 +153,7 @@ pub(super) fn tables(cells: Map<String, Value>) -> Map<String, Value> {
     found
 }
 
-/// A parameter, which the cell then has no longer. (A text that could be bits has a space behind it.)
+/// Removes a parameter from a cell and returns its text. (A text that could be read as bits ends with a space.)
 fn take(cell: &mut Value, name: &str) -> Option<String> {
     let value = cell["parameters"].as_object_mut()?.remove(name)?;
     value.as_str().map(|text| text.trim().to_owned())
@@ -163,12 +164,12 @@ fn tie(cell: &mut Value, pin: &str, net: Value) {
     cell["port_directions"][pin] = json!("input");
 }
 
-/// A pin of the device as a buffer: the model with three states has a port of the top driven from both sides.
+/// Replaces a pin of the device by a buffer: the tristate model would drive a port of the top from both sides.
 fn buffer(cell: &mut Value) {
     let (from, to) = match take(cell, "DIR").as_deref() {
         Some("INPUT") => ("B", "O"),
         Some("OUTPUT") => ("I", "B"),
-        // Boards have none.
+        // Boards have no bidirectional pins.
         _ => return,
     };
     *cell = json!({

@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The PLL, EHXPLLL: its dividers and an instance.
+//! PLL cell EHXPLLL: dividers and instance.
 
 use crate::PllError;
 
-/// The PLL's dividers: the output is `input / reference * feedback`, and the oscillator in it `output * outputs`.
+/// Dividers of the PLL: its output is `input / reference * feedback`, and its oscillator runs at `output * outputs`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Dividers {
-    /// CLKI_DIV.
+    /// Parameter CLKI_DIV.
     reference: u32,
-    /// CLKFB_DIV.
+    /// Parameter CLKFB_DIV.
     feedback: u32,
-    /// CLKOP_DIV.
+    /// Parameter CLKOP_DIV.
     outputs: u32,
 }
 
@@ -19,10 +19,10 @@ const DETECTOR: (f64, f64) = (3.125, 400.0);
 const OSCILLATOR: (f64, f64) = (400.0, 800.0);
 
 impl Dividers {
-    /// The dividers for exactly this clock, both in MHz.
+    /// Dividers that make exactly the clock `wanted` from `input`, both in MHz.
     ///
     /// # Errors
-    /// If there are none: the nearest clocks.
+    /// The nearest possible clocks, if no dividers make this one.
     fn new(input: f64, wanted: f64) -> Result<Dividers, PllError> {
         let (mut below, mut above) = (0.0_f64, f64::INFINITY);
         for reference in 1..=128_u32 {
@@ -32,7 +32,7 @@ impl Dividers {
             }
             for feedback in 1..=80_u32 {
                 let output = detector * f64::from(feedback);
-                // The oscillator in the middle of its range, where it can be.
+                // Place the oscillator in the middle of its range, if possible.
                 let outputs = (600.0 / output).round().clamp(1.0, 128.0);
                 if !(OSCILLATOR.0..=OSCILLATOR.1).contains(&(output * outputs)) {
                     continue;
@@ -52,7 +52,7 @@ impl Dividers {
     }
 }
 
-/// An instance of the PLL, for frequencies in MHz.
+/// Instance of the PLL, for frequencies in MHz.
 pub(super) fn instance(input: f64, wanted: f64) -> Result<String, PllError> {
     let Dividers { reference, feedback, outputs } = Dividers::new(input, wanted)?;
     Ok(format!(

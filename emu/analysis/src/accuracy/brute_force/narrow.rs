@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Brute force backwards: what a decision, a range or a constraint leaves of operands and symbols.
+//! Brute-force check of backward narrowing: the operands and symbols that a decision, a range or a constraint leaves possible.
 
 use super::{Member, Sample, forms, noise, samples};
 use crate::accuracy::assume::{Context, View};
@@ -42,8 +42,8 @@ fn rounded(row: &Row, value: Value) -> Value {
     }
 }
 
-/// Narrowing of every row's operands by what its result is: every combination of members with such a result stays, and its noise stays within
-/// the confined symbols. Returns how many operands were narrowed.
+/// Narrows every row's operands by the row's result: every combination of members with that result must remain, and its noise must stay
+/// within the confined symbols. Returns the number of narrowed operands.
 fn narrowing_holds(part: usize) -> u64 {
     let all = [samples(0), samples(1), samples(2)];
     let (mut turn, mut narrowed) = (0, 0);
@@ -87,7 +87,7 @@ fn narrowing_holds(part: usize) -> u64 {
             (true, Some(View::Integer), Box::new(move |bits| ends(whole).contains(whole(bits)))),
         ];
         for (truth, view, kept) in questions {
-            // Of a word that is no number of the view, nothing is said.
+            // The analysis claims nothing about a word that is not a number in this view.
             if view == Some(View::Float) && results.iter().any(|(_, bits)| float(*bits).is_nan()) {
                 continue;
             }
@@ -133,7 +133,7 @@ fn narrowing_holds(part: usize) -> u64 {
     narrowed
 }
 
-/// Soundness of every row backwards. `TAKT_FULL=1` tries all combinations.
+/// Soundness of backward narrowing for every row. `TAKT_FULL=1` tries all combinations.
 #[test]
 fn narrowed_operands_hold_what_gives_the_result() {
     let full = std::env::var("TAKT_FULL").is_ok_and(|value| value == "1");
