@@ -494,7 +494,7 @@ fn nan_on_an_output_is_a_warning() {
     assert_eq!(without_cycles(&done.stderr), "warning: NaN written to F in cycle N by bundle 0 (once.s:2)\n");
 }
 
-/// Rows have a maximal length, tables have none; any source and any line ends are accepted.
+/// Rows have a maximum length, tables have none; any source and any line ends are accepted.
 #[test]
 fn long_tables() {
     let folder = Folder::new();

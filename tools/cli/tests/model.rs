@@ -336,7 +336,7 @@ fn mistakes_have_one_message() {
     }
 }
 
-/// Recursive parsers stop at a maximal depth, for every format of other tools.
+/// Recursive parsers stop at a maximum depth, for every format of other tools.
 #[test]
 fn excessive_nesting_has_one_message() {
     const DEEP: usize = 200_000;

@@ -93,7 +93,7 @@ pub struct Line {
 pub struct CoreLine {
     /// Name of the core in the system's description.
     pub name: String,
-    /// State of the core in the cycle to come, in words.
+    /// State of the core in the next cycle, in words.
     pub state: String,
     /// The core is selected: commands and the other panes refer to it.
     pub selected: bool,
@@ -124,7 +124,7 @@ pub struct Panes {
     pub outputs: Vec<NamedRegister>,
     /// Operations in flight, with the cycles left to their writeback.
     pub flight: Vec<InFlightOperation>,
-    /// Stall cause of the cycle to come; `None` if a bundle issues.
+    /// Stall cause of the next cycle; `None` if a bundle issues.
     pub cause: Option<String>,
     /// Cycles since reset by cause, with their texts.
     pub stalls: Vec<(u64, String)>,
@@ -212,7 +212,7 @@ pub(crate) fn head(session: &mut Session) -> String {
     format!("{times}: {what}")
 }
 
-/// State of a core in the cycle to come, in a few words.
+/// State of a core in the next cycle, in a few words.
 pub(crate) fn core_state(session: &mut Session) -> String {
     let stall = session.stall();
     let program = session.program();

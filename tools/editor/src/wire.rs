@@ -7,9 +7,9 @@
 use serde_json::Value;
 use std::io::{self, BufRead, Read, Write};
 
-/// Maximal size of a message in bytes; the largest source fits.
+/// Maximum size of a message in bytes; the largest source fits.
 pub const MESSAGE_BYTES: usize = 256 << 20;
-/// Maximal size of a header line in bytes.
+/// Maximum size of a header line in bytes.
 const HEADER_BYTES: u64 = 4096;
 
 /// Errors of reading a message.

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use takt_rtl::header::{Header, Language};
 use takt_rtl::{Library, bench, export};
 
-/// Maximal number of input rows in the test bench.
+/// Maximum number of input rows in the test bench.
 const BENCH_PERIODS: usize = 100;
 
 pub(crate) fn image(loaded: &LoadedProgram) -> Result<Vec<u8>, String> {

@@ -39,11 +39,11 @@ use takt_editor::lsp::Inline;
 use takt_isa::Machine;
 use takt_isa::timing::Cycle;
 
-/// Maximal number of cycles of a period or of a debugger command: about a second in a browser.
+/// Maximum number of cycles of a period or of a debugger command: about a second in a browser.
 pub const CYCLES: Cycle = 20_000_000;
-/// Maximal number of input rows, and of periods in a run.
+/// Maximum number of input rows, and of periods in a run.
 pub const PERIODS: usize = 100_000;
-/// Maximal size of a source in bytes.
+/// Maximum size of a source in bytes.
 pub const SOURCE_BYTES: usize = 4 << 20;
 
 /// State of the page: language server, loaded program, debug session, and runs.

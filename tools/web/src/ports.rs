@@ -4,9 +4,9 @@
 
 use takt_isa::{BundleAddress, Instruction, Program, Register, SlotIndex};
 
-/// Maximal length of a unit in characters.
+/// Maximum length of a unit in characters.
 const UNIT: usize = 12;
-/// Maximal number of copies followed between a limiting operation and a port.
+/// Maximum number of copies followed between a limiting operation and a port.
 const COPIES: usize = 8;
 
 /// Unit at the beginning of a port declaration's comment; `None` if the comment begins otherwise. `directive` is `.input` or `.output`.

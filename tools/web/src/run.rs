@@ -14,9 +14,9 @@ use takt_isa::{Program, Register, Type};
 
 /// Default number of periods without recorded inputs.
 const ZERO_PERIODS: usize = 20;
-/// Maximal number of cycles in a call.
+/// Maximum number of cycles in a call.
 const SLICE: u64 = 1_000_000;
-/// Maximal number of periods in a call.
+/// Maximum number of periods in a call.
 const SLICE_PERIODS: u64 = 2000;
 
 /// A run in progress.

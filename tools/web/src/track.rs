@@ -12,7 +12,7 @@ use takt_programs::hybrid::params;
 use takt_programs::hybrid::{Binding, LoopError, Outputs, UnwrittenOutput};
 use takt_programs::trajectory::Trajectory;
 
-/// Maximal number of periods in a call.
+/// Maximum number of periods in a call.
 const SLICE: u64 = 20_000;
 /// Distance in periods between two poses kept for drawing.
 const EVERY: u64 = 100;

@@ -122,7 +122,7 @@ pub(crate) struct Target {
     pub(crate) source: SourceArguments,
 }
 
-/// Maximal size of a board file or a wiring in bytes.
+/// Maximum size of a board file or a wiring in bytes.
 const LIMIT: usize = 1 << 20;
 
 /// Name and text of a file.

@@ -36,7 +36,7 @@ Examples:
   echo 3F800000 00000000 | takt eval fdiv   1 / 0: prints 7F800000 08, divide by zero
   testfloat_gen f32_mul | takt eval fmul    TestFloat's operands";
 
-/// Maximal length of a line in bytes.
+/// Maximum length of a line in bytes.
 const LINE_LIMIT: usize = 1 << 20;
 const CHUNK: usize = 1 << 16;
 

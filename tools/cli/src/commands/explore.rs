@@ -98,9 +98,9 @@ Examples:
   takt explore a.s --route 3 --seeds 5         place and route the three fastest
   takt explore a.s --hq-server ~/server        on the workers of a HyperQueue server";
 
-/// Maximal number of rows in a search: each has a few dozen neighbours, and a process holds 16,384 rows.
+/// Maximum number of rows in a search: each has a few dozen neighbours, and a process holds 16,384 rows.
 const MOST: u64 = 5000;
-/// Maximal number of rows whose neighbours are tried, some 60 each.
+/// Maximum number of rows whose neighbours are tried, some 60 each.
 const EXPANDED: usize = 200;
 
 /// Resource limits of a machine.

@@ -30,7 +30,7 @@ use takt_programs::hybrid::ports::INPUTS;
 use takt_programs::hybrid::{Binding, Outputs, Robot, Spread};
 use takt_programs::trajectory::Trajectory;
 
-/// Maximal size of a spread file in bytes.
+/// Maximum size of a spread file in bytes.
 const SPREAD_LIMIT: usize = 1 << 20;
 /// Requirement of the paper on the tool error, m.
 const REQUIREMENT: f64 = 10e-6;

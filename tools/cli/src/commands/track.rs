@@ -125,7 +125,7 @@ impl Track {
     }
 }
 
-/// Maximal size of G-code in bytes; a longer file would consist of moves of micrometres.
+/// Maximum size of G-code in bytes; a longer file would consist of moves of micrometres.
 const GCODE_LIMIT: usize = 16 << 20;
 
 /// Cycles in the sampling period at a clock in MHz.

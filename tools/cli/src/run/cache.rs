@@ -18,7 +18,7 @@ use takt_isa::{BundleAddress, Machine};
 
 /// Minimal assembly time of a cached program.
 const SLOW: Duration = Duration::from_millis(100);
-/// Maximal number of cached programs; the newest are kept.
+/// Maximum number of cached programs; the newest are kept.
 const MOST: usize = 400;
 
 /// A program, and for each scheduled block its first bundle and its cycles above the lower bound.

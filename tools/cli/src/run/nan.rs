@@ -11,7 +11,7 @@ pub(crate) struct NanWrites {
     first: Vec<PortWrite>,
 }
 
-/// Maximal number of individual warnings.
+/// Maximum number of individual warnings.
 const SHOWN: usize = 5;
 
 impl NanWrites {

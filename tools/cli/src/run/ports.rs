@@ -86,7 +86,7 @@ pub(crate) fn finish(outputs: Option<Out>, rows: u64, result: Result<()>) -> Res
     result.and(finished)
 }
 
-/// Maximal number of periods generated without a CSV file.
+/// Maximum number of periods generated without a CSV file.
 const MOST_PERIODS: u64 = 10_000_000;
 
 /// Inputs of each period, at most `periods`; without a CSV file, `periods` rows of zeros, by default `otherwise`.

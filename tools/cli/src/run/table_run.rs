@@ -43,7 +43,7 @@ pub(crate) struct Tables<'a> {
     /// Input table; `None`: every input is 0.
     pub(crate) inputs: Option<&'a Path>,
     pub(crate) outputs: Option<&'a Path>,
-    /// Maximal number of rows.
+    /// Maximum number of rows.
     pub(crate) most: Option<u64>,
 }
 

@@ -59,7 +59,7 @@ pub(crate) fn natural(text: &str) -> Result<u64, String> {
     whole(text, 0..=u64::MAX)
 }
 
-/// Maximal number of robots in `takt track --monte-carlo`.
+/// Maximum number of robots in `takt track --monte-carlo`.
 const ROBOTS: u64 = 1_000_000;
 
 /// Parses a number of robots, for clap.

@@ -10,7 +10,7 @@ use textwrap::{Options, WordSplitter, WrapAlgorithm};
 /// Terminal sequences for bold text: begin and end.
 const BOLD: (&str, &str) = ("\x1b[1m", "\x1b[0m");
 
-/// Minimal width in columns of a comment beside an example.
+/// Minimum width in columns of a comment beside an example.
 const BESIDE: usize = 24;
 
 /// Format of printed results.
@@ -101,7 +101,7 @@ fn indent(line: &str, width: usize, furthest: usize) -> usize {
 /// A column of a table.
 #[derive(Clone, Copy)]
 pub(crate) struct Column {
-    /// Minimal width in characters.
+    /// Minimum width in characters.
     pub(crate) width: usize,
     pub(crate) side: Side,
     /// Priority for removal on a narrow page: highest rank first, rank 0 never.

@@ -10,7 +10,7 @@ use std::ops::Range;
 use takt_programs::hybrid::closed_loop::Record;
 use takt_programs::hybrid::params::SAMPLE_TIME;
 
-/// Maximal number of points of a curve; all periods would make hundreds of thousands.
+/// Maximum number of points of a curve; all periods would make hundreds of thousands.
 pub(crate) const POINTS: u64 = 1000;
 /// Size of a plot in pixels.
 pub(crate) const SIZE: u32 = 1000;

@@ -5,7 +5,7 @@ use takt_emu::LoadError;
 use takt_isa::fp::Flags;
 use takt_isa::{BundleAddress, Register};
 
-/// Activity of a machine that runs elsewhere.
+/// Activity of a remote machine.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Activity {
     /// In reset; the program does not run.
@@ -44,7 +44,7 @@ impl State {
     }
 }
 
-/// Errors of a machine that runs elsewhere.
+/// Errors of a remote machine.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum RemoteError {
     /// The program does not reach its `wait`.
@@ -61,7 +61,7 @@ impl From<LoadError> for RemoteError {
     }
 }
 
-/// A machine that runs elsewhere. Each method fails if the machine does not answer.
+/// A remote machine. Each method fails if the machine does not answer.
 #[allow(clippy::missing_errors_doc, reason = "said above, once")]
 pub trait Remote {
     /// Queries the state without delay.

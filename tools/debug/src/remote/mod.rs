@@ -32,7 +32,7 @@ pub(crate) struct Goal {
     memory: bool,
 }
 
-/// Debug session on a machine that runs elsewhere, with an emulator in step as its shadow.
+/// Debug session on a remote machine, with an emulator in step as its shadow.
 pub struct RemoteSession {
     remote: Box<dyn Remote + Send>,
     control: Arc<Control>,

@@ -3,7 +3,7 @@
 //!
 //! | written | means |
 //! |---|---|
-//! | `x` | what the source line at hand would read: the port or register of that name, or the label's address, or the constant |
+//! | `x` | the value that the current source line would read: a port or register of that name, a label's address, or a constant |
 //! | `P[2,3]` | the element of an array, in registers or in data memory; its indices count from 1 |
 //! | `@m12` | the register at that place (`m12` too, if nothing else is named so) |
 //! | `table[i]`, `4[i]`, `[i]` | the data word at that offset and index from 0, as binary32 |

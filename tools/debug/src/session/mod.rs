@@ -330,7 +330,7 @@ impl Session {
         (self.core.emulator.next_address(), issue)
     }
 
-    /// Stall cause of the cycle to come; `None` if a bundle issues, or the machine has stopped.
+    /// Stall cause of the next cycle; `None` if a bundle issues, or the machine has stopped.
     pub fn stall(&mut self) -> Option<Cause> {
         let now = self.cycle();
         match self.core.emulator.status() {

@@ -80,7 +80,7 @@ impl ExceptionCounts {
     fn now(session: &Session, filters: Filters) -> ExceptionCounts {
         let emulator = session.emulator();
         let statistics = emulator.statistics();
-        // Include flags raised in the cycle to come: the operation that clears the flags may issue in that cycle.
+        // Include flags raised in the next cycle: the operation that clears the flags may issue in that cycle.
         let raised = emulator.in_flight().filter(|retire| retire.cycle <= emulator.now());
         let flags = raised.fold(emulator.flags(), |flags, retire| flags | retire.flags);
         ExceptionCounts {

@@ -15,13 +15,13 @@ use takt_debug::system::link_text;
 use takt_isa::program::{Location, Port};
 use takt_isa::{BundleAddress, Register, Type};
 
-/// Maximal number of variables in one list.
+/// Maximum number of variables in one list.
 const VARIABLES: usize = 4096;
-/// Maximal number of completions in an answer.
+/// Maximum number of completions in an answer.
 const COMPLETIONS: usize = 200;
-/// Maximal number of bundles in an answer.
+/// Maximum number of bundles in an answer.
 const BUNDLES: u64 = 4096;
-/// Maximal number of memory bytes in an answer.
+/// Maximum number of memory bytes in an answer.
 const BYTES: u64 = 1 << 20;
 
 /// Numbers of a core's variable lists.

@@ -13,7 +13,7 @@ use takt_debug::session::{ValueNotations, ulp_distance};
 use takt_isa::program::Space;
 use takt_isa::{BundleAddress, Machine, Op, Register, Row, Type, manual};
 
-/// Maximal number of symbols listed for one place in a macro or a repetition.
+/// Maximum number of symbols listed for one place in a macro or a repetition.
 const TOLD: usize = 8;
 
 /// Hover text at a byte of a file, with the range it describes.

@@ -13,7 +13,7 @@ use takt_isa::program::Location;
 use takt_isa::timing::Cycle;
 use takt_isa::{BundleAddress, Instruction, Program, SlotIndex};
 
-/// Maximal number of bundles in a diagram.
+/// Maximum number of bundles in a diagram.
 const BUNDLES: usize = 4096;
 
 /// Diagram of a program, as JSON for the client.

@@ -10,9 +10,9 @@ use takt_asm::schedule::BlockReport;
 use takt_isa::program::Location;
 use takt_isa::{BundleAddress, Instruction, Program, SlotIndex};
 
-/// Maximal number of cycles listed for a line; if there are more, the first and the last.
+/// Maximum number of cycles listed for a line; if there are more, the first and the last.
 const LISTED: usize = 4;
-/// Maximal number of operations explained for a line.
+/// Maximum number of operations explained for a line.
 const EXPLAINED: usize = 12;
 
 /// Inlay hint beside a line.

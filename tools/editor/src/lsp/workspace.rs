@@ -10,13 +10,13 @@ use takt_asm::source::line_feeds;
 use takt_asm::tokens::{self, TokenKind};
 use takt_asm::{Directive, Open};
 
-/// Maximal number of files scanned for `.include`s.
+/// Maximum number of files scanned for `.include`s.
 const FILES: usize = 2000;
-/// Maximal depth of nested folders scanned.
+/// Maximum depth of nested folders scanned.
 const DEPTH: usize = 6;
-/// Maximal size in bytes of a scanned file.
+/// Maximum size in bytes of a scanned file.
 const FILE_BYTES: u64 = 4 << 20;
-/// Maximal number of programs assembled for one file.
+/// Maximum number of programs assembled for one file.
 pub(crate) const ROOTS: usize = 8;
 
 /// Open documents, and the files in their folders.

@@ -6,9 +6,9 @@ use takt_analysis::accuracy::ErrorShare;
 use takt_isa::Program;
 use takt_isa::program::Location;
 
-/// Maximal number of lines in each list of the text; --json has all.
+/// Maximum number of lines in each list of the text; --json has all.
 pub(super) const SHOWN: usize = 12;
-/// Maximal number of lines shown as origins of an output's error.
+/// Maximum number of lines shown as origins of an output's error.
 pub(super) const SHOWN_PARTS: usize = 3;
 
 pub(super) fn location(program: &Program, word: u32) -> Option<Location> {

@@ -23,7 +23,7 @@ use takt_debug::inputs::Table;
 use takt_isa::program::Port;
 use takt_isa::{Register, Type};
 
-/// Maximal length of a command line in bytes.
+/// Maximum length of a command line in bytes.
 const LINE: u64 = 4096;
 /// Number of lines that are read from standard input in advance.
 const AHEAD: usize = 64;

@@ -13,7 +13,7 @@ use takt_analysis::Bounds;
 use takt_board::latency::{Answer, End, Part, PinPath, PinPaths, Until};
 use takt_board::{Application, Board, Wiring};
 
-/// Minimal width of a part's text in characters.
+/// Minimum width of a part's text in characters.
 const WIDTH: usize = 36;
 
 /// Format of the table of parts.

@@ -98,7 +98,7 @@ fn carries<L: Line>(host: &mut Host<L>, records: &[[u32; 3]]) -> Result<()> {
     }
 }
 
-/// A board as a machine that runs elsewhere.
+/// A board as a remote machine.
 struct Board<L> {
     host: Host<L>,
     program: Program,

@@ -6,7 +6,7 @@ use rustyline::history::{FileHistory, History};
 use std::env;
 use std::path::{Path, PathBuf};
 
-/// Maximal number of commands in the history.
+/// Maximum number of commands in the history.
 const COMMANDS: usize = 1000;
 
 /// Configuration of line editor and history.

@@ -87,9 +87,9 @@ Examples:
   takt debug prog.s --board /dev/ttyUSB0     on a board that carries it, a period at a time
   takt debug --track                         the robot's controller, where the tracking error is largest";
 
-/// Maximal number of input rows.
+/// Maximum number of input rows.
 const ROWS: usize = 1 << 20;
-/// Maximal size of a script in bytes.
+/// Maximum size of a script in bytes.
 const SCRIPT_LIMIT: usize = 16 << 20;
 /// Interval between two progress checks of a running command.
 const WATCH: Duration = Duration::from_millis(50);

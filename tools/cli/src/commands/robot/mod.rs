@@ -70,7 +70,7 @@ Examples:
   takt robot square.robot --faults corrupt@1.5       what the controller does about a bad packet
   echo 'move joints(30, _, _, _, _, _)' | takt robot";
 
-/// Maximal duration in s.
+/// Maximum duration in s.
 const LONGEST: f64 = limits::LONGEST;
 
 /// Parses a link fault such as `corrupt@2.5`.

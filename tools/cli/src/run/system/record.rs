@@ -9,7 +9,7 @@ use std::path::Path;
 use takt_isa::timing::Cycle;
 use takt_system::{HostAction, System};
 
-/// Maximal number of rows: a hundred seconds at a tick of 100 µs.
+/// Maximum number of rows: a hundred seconds at a tick of 100 µs.
 const ROWS: usize = 1_000_000;
 
 /// Writes the host's actions since [`System::keep_host_actions`], one row per base tick.

@@ -14,7 +14,7 @@ const LABELS: usize = 9;
 /// Rows of the error panel, and maximal rows of the path panel.
 const ERROR_ROWS: usize = 10;
 const PATH_ROWS: usize = 30;
-/// Minimal distance in columns between labels of the horizontal axis.
+/// Minimum distance in columns between labels of the horizontal axis.
 const TICK: usize = 14;
 
 /// Colours of dots, as in the SVG. If several fall into one character, the later in this order wins: the path hides small deviations.
