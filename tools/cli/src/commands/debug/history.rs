@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Command history across sessions, in the file `takt/history` of XDG's state folder.
+//! Command history across sessions, in the file `takt/history` of the XDG state folder.
 
 use rustyline::Config;
 use rustyline::history::{FileHistory, History};
@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 /// Maximum number of commands in the history.
 const COMMANDS: usize = 1000;
 
-/// Configuration of line editor and history.
+/// Configuration of the line editor and its history.
 pub(super) fn config() -> Config {
     Config::builder()
         .auto_add_history(true)
@@ -18,14 +18,14 @@ pub(super) fn config() -> Config {
         .map_or_else(|_| Config::default(), |builder| builder.build())
 }
 
-/// History of commands. A missing or unwritable file is no error.
+/// Command history. A missing or unwritable file is not an error.
 pub(super) struct CommandHistory {
     pub(super) history: FileHistory,
     pub(super) file: Option<PathBuf>,
 }
 
 impl CommandHistory {
-    /// History from earlier sessions.
+    /// Loads the history of earlier sessions.
     pub(super) fn load() -> CommandHistory {
         let mut history = FileHistory::with_config(&config());
         let file = file();
@@ -51,7 +51,7 @@ impl CommandHistory {
     }
 }
 
-/// Writes new commands to the file at once, so that they survive any end of the session.
+/// Appends new commands to the file at once, so that they survive however the session ends.
 pub(super) fn append(history: &mut FileHistory, file: Option<&Path>) {
     if let Some(file) = file {
         let _ = file.parent().map(std::fs::create_dir_all);

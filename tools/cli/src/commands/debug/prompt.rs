@@ -23,7 +23,7 @@ use takt_debug::session::Control;
 /// Terminal sequence that clears the rest of the line.
 const CLEAR: &str = "\x1b[K";
 
-/// Completion over the prompt's session.
+/// Completion of the prompt's input, from its session.
 struct Prompt(Rc<RefCell<Console>>);
 
 impl Helper for Prompt {}
@@ -67,7 +67,7 @@ pub(super) fn run(console: Console, control: &Arc<Control>, color: bool, out: &m
         let answer = execute(&mut console, &line, control, || {
             shown = std::io::stderr().is_terminal();
             if shown {
-                // A full-width bar would be broken by the terminal's `^C`.
+                // The terminal's `^C` would wrap a full-width bar.
                 write!(std::io::stderr(), "\r{}{CLEAR}", running(counts, control))?;
             }
             Ok(())
