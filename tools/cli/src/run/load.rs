@@ -25,7 +25,7 @@ pub(crate) struct Load {
     pub(crate) machine: Option<&'static Machine>,
     /// Messages on standard error are coloured.
     pub(crate) color: bool,
-    /// Which bundles to schedule.
+    /// Selection of the bundles to schedule.
     pub(crate) schedule: Schedule,
     /// Effort of the scheduler.
     pub(crate) effort: u32,
