@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Speed of the assembler over the length of the source, and of the scheduler over the length of a block.
+//! Speed of the assembler as the source grows, and of the scheduler as a block grows.
 #![allow(missing_docs, clippy::print_stdout)]
 
 use criterion::Criterion;
@@ -7,8 +7,8 @@ use std::fmt::Write as _;
 use takt_asm::{MemoryLoader, Options};
 use takt_benches::{DEEP, FastestTimes, source};
 
-/// A straight-line block of this many operations, with dependence chains as in a controller. `memory`: every third operation loads or
-/// stores at an address known only at run time.
+/// A straight-line block of `operations` operations, with dependence chains as in a controller. With `memory`, every third operation
+/// loads or stores at an address known only at run time.
 fn block(operations: usize, memory: bool) -> String {
     let mut text = String::from(
         ".input x, y, n:int\n.output F\n.schedule on\n.data\ntable: .space 64\n.period\nperiod:\n",

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Debug session 10⁸ cycles from the start: moves and searches back, compared with the time of the run itself.
+//! Debug session 10⁸ cycles from the start: steps and searches backwards, compared with the time of the run itself.
 #![allow(missing_docs, clippy::print_stdout)]
 
 use criterion::Criterion;
@@ -29,7 +29,7 @@ fn main() {
     assert_eq!(there.go_to(CYCLES), StopReason::Done);
     let mut rows = Vec::new();
     for (name, unit) in [("cycle", Unit::Cycle), ("bundle", Unit::Bundle), ("line", Unit::Line)] {
-        // Positions near the end and deep in the run, between two checkpoints, where the way is longest.
+        // Positions spread over the run, between checkpoints: a step back replays the cycles since the checkpoint before.
         let mut at = 0;
         let seconds = group.seconds(&format!("back a {name}, anywhere"), 1, || {
             at = (at + 37_000_003) % CYCLES;

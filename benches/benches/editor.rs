@@ -18,7 +18,7 @@ const LINES: usize = 10_000;
 const KEYS: usize = 60;
 const URI: &str = "untitled:bench";
 
-/// A source of this many lines, in a realistic mix.
+/// A source with `lines` lines, in a realistic mix.
 fn source(lines: usize) -> String {
     let mut text = String::from(
         ".const k = 2*pi*80\n.input n:int, x, y\n.output F\n.reg a b c d t\n.macro scale to, by\n fmul to, to, by\n.endm\n\

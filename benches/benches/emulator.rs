@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Speed of the emulator on the tracking program, beside the same algorithm as native Rust binary32 in the same run.
+//! Speed of the emulator on the tracking program, compared with the same algorithm as native Rust in binary32.
 #![allow(missing_docs, clippy::print_stdout)]
 
 use criterion::Criterion;
@@ -12,7 +12,7 @@ use takt_programs::hybrid::{Controller, ports};
 use takt_programs::trajectory::Trajectory;
 use takt_programs::{AGH, SOURCES, gcode};
 
-/// Number of periods in a sample.
+/// Periods in a sample.
 const PERIODS: usize = 4000;
 
 /// Inputs recorded in closed loop with the binary64 controller.

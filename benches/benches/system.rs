@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Cost of links and of taking turns: a whole system (the three-processor controller at the start of a motion) compared with each of its
-//! cores run alone on the same inputs in the same cycles.
+//! Cost of links and of interleaving cores: a whole system (the three-processor controller at the start of a motion) compared with each
+//! core run alone on the same inputs in the same cycles.
 #![allow(missing_docs, clippy::print_stdout)]
 
 use criterion::Criterion;
@@ -15,7 +15,7 @@ use takt_robot::level::{NoFiles, Session};
 use takt_robot::plant::Plant;
 use takt_system::{Description, HostAction, System};
 
-/// Commands of the host: a motion of the joints and back.
+/// Host commands: a motion of the joints and back.
 const MOTION: &str = "via move joints(12, 82, 4, 4, -40, 4)\nmove joints(0, 90, 0, 0, -45, 0)\nwait 0.05\n";
 
 /// Inputs of a core: cycle of effect, port, value.

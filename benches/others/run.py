@@ -27,10 +27,10 @@ CORTEX = ["--target=armv7em-none-eabihf", "-mcpu=cortex-m7", "-mfloat-abi=hard"]
 RISCV = ["-march=rv32imfc_zicsr", "-mabi=ilp32f"]
 FREE = ["-O3", "-ffast-math", "-fno-math-errno", "-fomit-frame-pointer", "-ffreestanding", "-nostdlib", "-static"]
 
-# Tolerance of results against the host, relative to the largest: sums are formed in another order.
+# Relative tolerance of results against the host, which sums in another order.
 TOLERANCE = 1e-4
 
-# Repetitions of a block in the model.
+# Repetitions of a block in the performance model.
 REPEATED = 100
 
 
@@ -122,7 +122,7 @@ def arm(kernel, folder, expected):
             function = found[1]
         elif found := re.match(r"\s*([0-9a-f]+):\s+(\S.*)", line):
             text = found[2].split("@")[0].split("<")[0].strip()
-            # Drop the branch target, which the model does not know.
+            # Drop the branch target, which the performance model cannot resolve.
             text = re.sub(r"^(b\w*|cbn?z)(\.\w)?(\s.*?)?0x[0-9a-f]+$", lambda m: f"{m[1]}{m[2] or ''}{m[3] or ' '}.", text)
             instructions[int(found[1], 16)] = (function, text)
     blocks = executed(program, folder / f"{kernel}.log")

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Common part of the benchmarks: measures through criterion and keeps the times, so that a run can end with ratios.
+//! Shared code of the benchmarks: measures through criterion and keeps the times, so that a run can end with ratios.
 //!
 //! Benchmarks run on shared, noisy machines: an absolute time says little, and no test asserts one. Each benchmark prints ratios of fastest
 //! samples within one run.
@@ -9,13 +9,13 @@ use std::fmt::Write as _;
 use std::time::{Duration, Instant};
 use takt_isa::{Machine, T3};
 
-/// Group of measurements that keeps the fastest time of each.
+/// Group of measurements; records the fastest time of each.
 pub struct FastestTimes<'c> {
     group: BenchmarkGroup<'c, WallTime>,
 }
 
 impl<'c> FastestTimes<'c> {
-    /// Opens a group with this name.
+    /// Opens a group named `name`.
     pub fn new(criterion: &'c mut Criterion, name: &str) -> FastestTimes<'c> {
         let mut group = criterion.benchmark_group(name);
         group
@@ -47,7 +47,7 @@ impl<'c> FastestTimes<'c> {
 /// t3 with room for a million bundles.
 pub static DEEP: Machine = Machine { name: "t3-deep", code_depth: 1 << 21, ..T3 };
 
-/// A source of this many lines in a realistic mix: comments, blank lines, labels, bundles, uses of macros, constants.
+/// A source with `lines` lines in a realistic mix: comments, blank lines, labels, bundles, uses of macros, constants.
 pub fn source(lines: usize) -> String {
     let mut text = String::from(
         ".const k = 2*pi*80\n.input n:int, x, y\n.output F\n.reg a b c d t\n.macro scale to, by\n fmul to, to, by\n.endm\n\

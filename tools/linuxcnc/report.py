@@ -16,10 +16,10 @@ from pathlib import Path
 
 import numpy as np
 
-#: s from tick to tick, and ticks from knot to knot.
+#: Tick in s, and ticks per knot.
 TICK, EVERY = 1e-4, 10
 STEP = TICK * EVERY
-#: LinuxCNC's units in SI units.
+#: LinuxCNC's units, in SI units.
 SI = np.array([1e-3, 1e-3, 1e-3, np.pi / 180, np.pi / 180])
 JOINTS = ["X", "Y", "Z", "A (tilt)", "C (rotation)"]
 
@@ -57,7 +57,7 @@ class Moves:
             length = way @ way
             along = np.clip((points - start) @ way / length, 0, 1) if length > 0 else np.zeros(len(points))
             return np.linalg.norm(points - start - along[:, None] * way, axis=1)
-        # An arc in the XY plane, Z linear along it: the angle says how far along a point is.
+        # An arc in the XY plane, with Z linear along it: the angle gives the position along the arc.
         sign = -1 if motion == 2 else 1
         begin = angles(start, centre)
         is_circle = np.linalg.norm((end - start)[:2]) < 1e-9
@@ -86,7 +86,7 @@ class Run:
         if any(len(row) != 21 for row in rows):
             raise SystemExit(f"{folder}: halsampler has lost samples")
         rows = np.array(rows, dtype=float)
-        # The last start of the board.
+        # Start from the last start of the board.
         knot = rows[:, 11]
         first = int(np.flatnonzero(knot == 1)[-1])
         rows, knot = rows[first:], knot[first:]
@@ -95,7 +95,7 @@ class Run:
         self.position, self.velocity = rows[new, 1:6] * SI, rows[new, 6:11] * SI
         self.velocity[0] = 0
         self.line = rows[new, 15].astype(int)
-        # Ticks at which the board began a knot: the same distance throughout, or it has lost one.
+        # Ticks at which the board began a knot: their distance is constant unless it has lost one.
         period, taken, phase = rows[:, 12], rows[:, 13], rows[:, 14]
         moving = (taken > 1) & (period > 0)
         offsets = np.unique(period[moving] - EVERY * taken[moving] - phase[moving])
@@ -103,14 +103,14 @@ class Run:
         self.queue = (knot - taken)[moving]
         states = np.genfromtxt(folder / "sim.csv", delimiter=",", names=True)
         self.states = states
-        # The last time that the outputs drove.
+        # Last stretch of time in which the outputs drove.
         last = np.flatnonzero(states["drive"])[-1]
         off = np.flatnonzero(states["drive"][:last] == 0)
         driven = np.arange(off[-1] + 1 if len(off) else 0, last + 1)
         self.driven = driven
         self.tool = np.stack([states[axis][driven] for axis in ("x", "y", "z", "alpha", "gamma")], axis=1)
         self.tick = states["tick"][driven]
-        # From knots to ticks, as interpolation.s has it: the point at u = 0 is knot 1.
+        # Interpolates between knots at the ticks, as interpolation.s does: u = 0 is knot 1.
         u = (self.tick - offsets[0]) / EVERY - 1
         u = np.clip(u, 1, len(new) - 1.001)
         k = u.astype(int)
@@ -236,7 +236,7 @@ def draw(file, run, cut, event):
     left.legend(loc="upper center", ncols=2, fontsize="small")
     seconds = run.tick * TICK
     distance = np.linalg.norm((run.tool - run.point)[:, :3], axis=1) * 1e6
-    # The largest of every 100 periods, so that no peak is lost.
+    # Plot the largest of every 100 periods, so that no peak is lost.
     whole = len(distance) // 100 * 100
     peaks = distance[:whole].reshape(-1, 100).max(axis=1)
     top.plot(seconds[:whole:100], peaks, color="C3", lw=0.5)
@@ -255,7 +255,8 @@ def draw(file, run, cut, event):
     pictures.save(figure, file)
 
 
-#: Of the tool, m: what the founding paper requires; from an event to safe outputs, s: `host` in followed_board.toml, and a tick.
+#: Limits: tool error in m, required by the founding paper; time from an event to safe outputs in s, which is `host` in
+#: followed_board.toml plus a tick.
 ERROR, SAFE = 10e-6, 30.2e-3
 
 
@@ -269,7 +270,7 @@ def wrong(name, run, wanted):
             f"the tool is {figures['path'] * 1e6:.2f} µm off the programmed path": figures["path"] < ERROR,
             f"hal_takt says {takt}": all(takt[pin] == "0" for pin in ("fault-code", "starved", "skipped", "misses")),
             f"periods are out of step by {run.offsets}": figures["lost"] == 0,
-            # Every tick from the first to the last has been recorded.
+            # Every tick from the first to the last must be recorded.
             "ticks are missing": (np.diff(run.tick) == 1).all(),
         }
     else:

@@ -14,7 +14,7 @@ import time
 
 import linuxcnc
 
-#: Seconds without progress until it is given up, unless stated.
+#: Default time without progress before giving up, in s.
 PATIENCE = 60
 
 
@@ -76,7 +76,7 @@ class Machine:
             if stat.motion_line not in (line, 0):
                 line, since = stat.motion_line, time.time()
             if estop_at and line >= estop_at:
-                # Within the move, not at its beginning.
+                # Within the move rather than at its beginning.
                 time.sleep(0.2)
                 self.command.state(linuxcnc.STATE_ESTOP)
                 estop_at = None
@@ -87,7 +87,7 @@ class Machine:
 
 def main():
     parser = argparse.ArgumentParser()
-    # LinuxCNC gives a display its configuration ahead of its own arguments.
+    # LinuxCNC passes its configuration to a display before the display's own arguments.
     parser.add_argument("-ini")
     parser.add_argument("--estop-at", type=int)
     parser.add_argument("--patience", type=float, default=PATIENCE)
@@ -98,7 +98,7 @@ def main():
     time.sleep(0.5)
     machine.switch_on()
     end, line = machine.run(arguments.program, arguments.estop_at)
-    # What follows the end, as far as the board still says it.
+    # Wait for the last reports of the board.
     time.sleep(0.5)
     stat = machine.poll()
     result = {

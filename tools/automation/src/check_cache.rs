@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Memory of passed checks: a slow check with few input files runs again only after a change of its inputs.
+//! Cache of passed checks: a slow check with few input files runs again only after a change of its inputs.
 //!
 //! The user's cache folder keeps a hash of each check's inputs. The hash is equal on all machines: it covers contents and relative paths of
 //! files tracked by git, and versions of tools.
@@ -14,11 +14,11 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::{Mutex, PoisonError};
 
-/// Inputs of a check, hashed: files that it reads, and tools that it runs.
+/// Hash of a check's inputs: files that it reads, and tools that it runs.
 pub struct Inputs {
     hasher: DefaultHasher,
     root: PathBuf,
-    /// Paths of the files, for tests.
+    /// Paths of the hashed files, for tests.
     files: Vec<String>,
 }
 
@@ -29,7 +29,7 @@ impl Default for Inputs {
 }
 
 impl Inputs {
-    /// Empty inputs; file names are relative to this folder.
+    /// Starts an empty set of inputs; file names are relative to `root`.
     pub fn below(root: &Path) -> Inputs {
         Inputs { hasher: DefaultHasher::default(), root: root.to_owned(), files: Vec::new() }
     }
@@ -48,7 +48,7 @@ impl Inputs {
         self.and((program, said.unwrap_or_default()))
     }
 
-    /// Adds a file, or all files below a folder, as far as git tracks them: tools leave other files beside them.
+    /// Adds a file, or all files below a folder, if git tracks them: tools leave other files beside them.
     ///
     /// # Errors
     /// If git tracks no such file, or a file cannot be read.
@@ -66,7 +66,7 @@ impl Inputs {
         listed.split_terminator('\0').try_fold(self, |inputs, file| inputs.file(file))
     }
 
-    /// Adds all files below a folder of generated files.
+    /// Adds all files below a folder of generated files, tracked or not.
     ///
     /// # Errors
     /// If a file cannot be read.
@@ -98,7 +98,7 @@ impl Inputs {
         format!("{:016x}", self.hasher.finish())
     }
 
-    /// The hash covers this file.
+    /// The hash covers the file at `path`.
     pub fn covers(&self, path: &str) -> bool {
         self.files.iter().any(|file| file == path)
     }
@@ -106,7 +106,7 @@ impl Inputs {
 
 /// A check that a test run may skip.
 pub struct Check {
-    /// Name in messages and in the cache.
+    /// Name in messages and in the cache; unique.
     pub name: &'static str,
     /// Command that runs the check alone.
     pub command: &'static str,
@@ -131,14 +131,14 @@ pub const CHECKS: [Check; 9] = [
     check(EXHAUSTIVE, "cargo xtask test --full", None),
 ];
 
-/// Name of all proofs of the units; the check `units` is the part of them that takes seconds each.
+/// Name of the check with all proofs of the units; the check `units` covers those that take seconds each.
 pub const OPERANDS: &str = "units, all proofs";
 /// Name of the check that runs LinuxCNC with the robot on a simulated board.
 pub const LINUXCNC: &str = "linuxcnc";
 /// Name of the check with all operands of unary operations, and more random programs, points and packets.
 pub const EXHAUSTIVE: &str = "exhaustive tests";
 
-/// Checks skipped in this run, each with the reason.
+/// Checks skipped in this run, with reasons.
 static LEFT_OUT: Mutex<Vec<(String, &str)>> = Mutex::new(Vec::new());
 
 /// Records a skipped check.
@@ -146,7 +146,7 @@ pub fn leave_out(name: &str, reason: &'static str) {
     LEFT_OUT.lock().unwrap_or_else(PoisonError::into_inner).push((name.to_owned(), reason));
 }
 
-/// Report of the skipped checks, one line each: reason, last duration, command. Empty without skipped checks.
+/// Report of the skipped checks, one line each: reason, last duration, command. Empty if no check was skipped.
 pub fn left_out() -> String {
     let left_out = LEFT_OUT.lock().unwrap_or_else(PoisonError::into_inner);
     lines(&left_out, progress::last)
@@ -187,7 +187,7 @@ impl Cache {
     }
 }
 
-/// The check has passed with these inputs; it is then recorded as skipped in this run.
+/// The check has passed with these inputs. If so, records it as skipped in this run.
 pub fn has_passed(name: &str, inputs: &Inputs) -> bool {
     let passed = Cache::of_user().has(name, inputs);
     if passed {
@@ -196,7 +196,7 @@ pub fn has_passed(name: &str, inputs: &Inputs) -> bool {
     passed
 }
 
-/// Runs a check unless it has passed with these inputs; `always` runs it in any case.
+/// Runs a check unless it has passed with these inputs; `always` forces it.
 ///
 /// # Errors
 /// If the check fails.
@@ -228,7 +228,7 @@ mod tests {
         assert_eq!(lines(&[], |_| None), "");
     }
 
-    /// Planted stale entry: a check that passed with other contents of any of its files does not count as passed.
+    /// A check that passed with other contents of any input file does not count as passed.
     #[test]
     fn changed_contents_rerun_a_passed_check() {
         let folder = std::env::temp_dir().join(format!("takt-passed-{}", std::process::id()));

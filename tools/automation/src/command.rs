@@ -29,7 +29,7 @@ pub fn run(command: &mut Command) -> Result<()> {
     Ok(())
 }
 
-/// Standard output of a program; its standard error goes to the terminal.
+/// Runs a program and returns its standard output; standard error goes to the terminal.
 ///
 /// # Errors
 /// If the program cannot start, fails, or its output is not UTF-8.
@@ -43,22 +43,22 @@ pub fn output_of(command: &mut Command) -> Result<String> {
     String::from_utf8(output.stdout).with_context(|| format!("{program} writes no text"))
 }
 
-/// Cargo features that give takt all its commands.
+/// Cargo features that enable every command of takt.
 pub const EVERYTHING: &str = "takt/full";
 
-/// Cargo, in the project's folder.
+/// A cargo command in the project's folder.
 pub fn cargo() -> Command {
     let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     command.current_dir(root());
     command
 }
 
-/// The program exists, and exits with status 0 on this argument.
+/// The program exists and exits with status 0 when given `argument`.
 pub fn works(program: &str, argument: &str) -> bool {
     Command::new(program).arg(argument).output().is_ok_and(|output| output.status.success())
 }
 
-/// Programs that the tests call: name, an argument with which it exits successfully, Debian package.
+/// Programs that the tests call: name, an argument with which the program exits successfully, Debian package.
 const TOOLS: [(&str, &str, &str); 10] = [
     // C compiler for Berkeley SoftFloat, the reference arithmetic.
     ("cc", "--version", "gcc"),
@@ -135,7 +135,7 @@ pub fn output(command: &mut Command) -> Result<Report> {
     let (mut reader, writer) = std::io::pipe()?;
     command.stdin(Stdio::null()).stdout(writer.try_clone()?).stderr(writer);
     let child = command.spawn();
-    // Drop the command's copies of the pipe's writing end, so that the text ends with the program.
+    // Drop the command's copies of the pipe's writing end, so that reading stops when the program ends.
     command.stdout(Stdio::null()).stderr(Stdio::null());
     let mut child = child.with_context(|| format!("cannot start {}", command.get_program().display()))?;
     let mut bytes = Vec::new();

@@ -26,7 +26,7 @@ pub fn update(files: impl IntoIterator<Item = (PathBuf, String)>, check: bool) -
     Ok(stale)
 }
 
-/// Fails if files are stale, with their names and the command that rewrites them.
+/// Fails if files are stale; the message names them and the command that rewrites them.
 ///
 /// # Errors
 /// If a file is stale.

@@ -20,7 +20,7 @@ fn cargo_fuzz(verb: &str) -> Result<Command> {
     Ok(command)
 }
 
-/// Fuzzes each target for this many minutes.
+/// Fuzzes each target for `minutes` minutes.
 pub fn fuzz(minutes: u32) -> Result<()> {
     corpus(&root().join("asm/fuzz/corpus"))?;
     for target in ["assemble", "image"] {

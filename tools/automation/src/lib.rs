@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Common part of the project's automation: of `xtask`, which builds, tests and releases, and of `evidence`, which proves and measures.
+//! Shared code of the project's automation: of `xtask`, which builds, tests and releases, and of `evidence`, which proves and measures.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
 pub mod check_cache;
@@ -14,6 +14,6 @@ pub mod venv;
 /// Licence identifier in the first line of each source file.
 pub const SPDX: &str = "SPDX-License-Identifier: MIT OR Apache-2.0";
 
-/// Commands of `cargo xtask`; a test of `xtask` compares them with its parser.
+/// Commands of `cargo xtask`; a test in `xtask` compares this list with the command-line parser.
 pub const XTASK: [&str; 10] =
     ["test", "lint", "docs", "book", "web", "wheel", "extension", "release", "reach", "fuzz"];

@@ -11,14 +11,14 @@ use std::path::PathBuf;
 use std::sync::{LazyLock, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Minimal duration of a step that is reported at its end.
+/// Steps that take at least this long are reported when they finish.
 const LONG: Duration = Duration::from_secs(10);
 
 fn file() -> PathBuf {
     root().join("target/xtask-times.txt")
 }
 
-/// Previous durations in seconds, by name.
+/// Previous durations in seconds, by step.
 static TIMES: LazyLock<Mutex<BTreeMap<String, f64>>> = LazyLock::new(|| {
     let text = std::fs::read_to_string(file()).unwrap_or_default();
     let line = |line: &str| {

@@ -12,7 +12,7 @@ use std::process::Command;
 /// Cargo arguments for the packages and features of all tests.
 pub const WORKSPACE: [&str; 4] = ["--workspace", "--release", "--features", EVERYTHING];
 
-/// Runs one ignored test with these environment variables, and returns its output.
+/// Runs one ignored test with the given environment variables, and returns its output.
 ///
 /// # Errors
 /// If the test fails.
@@ -41,7 +41,7 @@ pub fn program(package: &str) -> Result<(PathBuf, PathBuf)> {
 /// A compiled test binary.
 pub struct Program {
     target: String,
-    /// The binary of the crate's `tests` folder, not of its unit tests.
+    /// The binary comes from the crate's `tests` folder, not from its unit tests.
     is_suite: bool,
     package: String,
     folder: PathBuf,
@@ -49,7 +49,7 @@ pub struct Program {
 }
 
 impl Program {
-    /// Test binary announced by a message of cargo.
+    /// Parses the cargo message that announces a test binary.
     pub fn of(message: &Value) -> Option<Program> {
         let executable = message["executable"].as_str()?;
         if message["profile"]["test"] != true {
@@ -69,7 +69,7 @@ impl Program {
         })
     }
 
-    /// Jobs into which the binary is split: name, and arguments that select the tests.
+    /// Splits the binary into jobs: name, and arguments that select the tests.
     ///
     /// # Errors
     /// If the binary cannot list its tests.
@@ -102,7 +102,7 @@ impl Program {
         Ok(text.lines().filter_map(|line| line.strip_suffix(": test")).map(str::to_owned).collect())
     }
 
-    /// Name of the binary's package.
+    /// Package that the binary belongs to.
     pub fn package(&self) -> &str {
         &self.package
     }

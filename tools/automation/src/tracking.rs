@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Tracking program with its first periods: reference for comparisons of circuits outside the tests.
+//! Tracking program with inputs and outputs of its first periods: reference for comparisons of circuits outside the tests.
 
 use crate::command::root;
 use anyhow::{Context, Result, anyhow};
@@ -10,7 +10,7 @@ use takt_programs::hybrid::{Controller, Outputs, Plant};
 use takt_programs::trajectory::Trajectory;
 use takt_programs::{AGH, gcode};
 
-/// Path of the tracking program, from the project's folder.
+/// Path of the tracking program, relative to the project's folder.
 pub const PROGRAM: &str = "programs/hybrid/tracking.s";
 const PERIODS: usize = 3;
 
@@ -25,7 +25,7 @@ pub fn program(machine: &'static Machine) -> Result<Program> {
     Ok(assemble(&name, &loader, &options).map_err(|error| anyhow!("{PROGRAM}: {error:?}"))?.program)
 }
 
-/// Inputs of the first periods along the letters' path, with the robot at its start, and binary64 outputs for them.
+/// Inputs of the first periods along the letters' path, with the robot at its start, and the binary64 outputs for them.
 ///
 /// # Errors
 /// If the path is beyond the robot's reach.

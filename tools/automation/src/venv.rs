@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Python environment in the project's folder, shared with `takt board build`: open tools for synthesis, place and route, and formal
-//! verification, and packages for tests.
+//! Python environment in the project's folder, shared with `takt board build`: open-source tools for synthesis, place and route, and
+//! formal verification, and packages for tests.
 
 use crate::command::{apt_install, root};
 use anyhow::Result;
@@ -36,7 +36,7 @@ pub const MODELS: [&str; 11] = [
 pub struct Venv(tools::Venv);
 
 impl Venv {
-    /// Environment with these packages; creates it and installs missing packages.
+    /// Opens an environment with these packages; creates it and installs missing packages.
     pub fn with(packages: &[&str]) -> Result<Venv> {
         let folder = std::env::var_os("TAKT_VENV").map_or_else(|| root().join(".venv"), PathBuf::from);
         eprintln!("installing {} in {}", packages.join(", "), folder.display());
@@ -51,7 +51,7 @@ impl Venv {
         Ok(Venv(venv))
     }
 
-    /// The environment in `takt_board`'s type.
+    /// The environment as the type that `takt_board` expects.
     pub fn tools(&self) -> &tools::Venv {
         &self.0
     }
@@ -61,7 +61,7 @@ impl Venv {
         self.0.tool(name)
     }
 
-    /// Command for a program in the environment, with the others on its PATH.
+    /// Command for a program in the environment, with the environment's other programs on PATH.
     pub fn command(&self, name: &str) -> Result<Command> {
         let paths = std::env::var_os("PATH").unwrap_or_default();
         let path = std::env::join_paths(std::iter::once(self.tool("")).chain(std::env::split_paths(&paths)))?;

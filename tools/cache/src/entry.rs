@@ -9,10 +9,10 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::SystemTime;
 
-/// Maximal size of an entry in bytes.
+/// Largest size of an entry, in bytes.
 const LONGEST: u64 = 1 << 28;
 
-/// Checksum of 64 bits (SipHash): a corrupted file passes with a probability of 2⁻⁶⁴.
+/// 64-bit checksum (SipHash): a corrupted file passes with a probability of 2⁻⁶⁴.
 pub(crate) fn sum(bytes: &[u8]) -> u64 {
     let mut hasher = DefaultHasher::new();
     hasher.write(bytes);
@@ -32,7 +32,7 @@ pub fn unseal(bytes: &[u8]) -> Option<&[u8]> {
     (sum(contents) == u64::from_le_bytes(*expected)).then_some(contents)
 }
 
-/// Bytes of a regular file of this user. Any other file counts as missing: a pipe would block, and another user's file is not trusted.
+/// Reads a regular file of this user. Any other file counts as missing: a pipe would block, and another user's file is not trusted.
 pub fn plain(path: &Path) -> Option<Vec<u8>> {
     let about = fs::symlink_metadata(path).ok()?;
     if !about.is_file() || !is_own(&about) || about.len() > LONGEST {
@@ -43,7 +43,7 @@ pub fn plain(path: &Path) -> Option<Vec<u8>> {
     Some(bytes)
 }
 
-/// Contents of an entry, if it exists. A damaged entry is removed.
+/// Reads an entry, if it exists. Removes a damaged entry.
 pub fn read(path: &Path) -> Option<Vec<u8>> {
     let mut bytes = plain(path)?;
     let length = unseal(&bytes).map(<[u8]>::len);
@@ -55,7 +55,7 @@ pub fn read(path: &Path) -> Option<Vec<u8>> {
     Some(bytes)
 }
 
-/// Stores contents as an entry, atomically, in place of anything at the path. Creates the folder.
+/// Stores contents as an entry, atomically, replacing whatever is at the path. Creates the folder.
 ///
 /// # Errors
 /// If the file cannot be written.
@@ -63,7 +63,7 @@ pub fn keep(path: &Path, contents: Vec<u8>) -> io::Result<()> {
     write(path, &seal(contents))
 }
 
-/// Writes contents without a checksum, for other programs, unless the file has them already.
+/// Writes contents without a checksum, for other programs, unless the file already has these contents.
 ///
 /// # Errors
 /// If the file cannot be written.
@@ -99,7 +99,7 @@ pub fn discard(path: &Path) {
     };
 }
 
-/// Removes the oldest entries of a folder beyond the number `most`.
+/// Keeps the newest `most` entries of a folder and removes the others.
 pub fn prune(folder: &Path, most: usize) {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
     let mut kept: Vec<(SystemTime, PathBuf)> =

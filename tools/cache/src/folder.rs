@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Cache folder: location, and safety of its permissions.
+//! Location of the cache folder, and checks of its permissions.
 
 use std::ffi::OsString;
 use std::fs::{self, DirBuilder, Metadata};
@@ -21,7 +21,7 @@ pub struct CacheError {
 /// the temporary folder.
 ///
 /// # Errors
-/// If the folder cannot be made, belongs to another user, or is writable by others.
+/// If the folder cannot be created, belongs to another user, or is writable by others.
 pub fn folder() -> Result<PathBuf, CacheError> {
     folder_among(|name| std::env::var_os(name), &std::env::temp_dir())
 }
@@ -34,7 +34,7 @@ pub fn folder_among(
     variable: impl Fn(&str) -> Option<OsString>,
     temporary: &Path,
 ) -> Result<PathBuf, CacheError> {
-    // The XDG specification demands to ignore relative paths, since they would depend on the current folder.
+    // The XDG specification requires relative paths to be ignored: they would depend on the current folder.
     let absolute = |name: &str| variable(name).map(PathBuf::from).filter(|path| path.is_absolute());
     let base = absolute("XDG_CACHE_HOME")
         .or_else(|| Some(absolute("HOME")?.join(".cache")))
@@ -52,7 +52,7 @@ pub fn folder_among(
     Ok(folder)
 }
 
-/// Creates a folder with access for its user only, if it is missing.
+/// Creates a missing folder, accessible to its user only.
 fn make(folder: &Path) -> io::Result<()> {
     if let Some(parent) = folder.parent() {
         fs::create_dir_all(parent)?;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Cache folder of the user: decides where results are stored, and which stored results can be trusted.
+//! The user's cache folder: where results are stored, and which stored results can be trusted.
 //!
 //! Cached circuits are programs that run with the user's rights. Hence the folder must belong to the user and be writable by no one else,
-//! entries must be regular files of the user, and each has a checksum: a damaged entry is removed and computed again.
+//! and entries must be regular files of the user. Each entry has a checksum: a damaged entry is removed and computed again.
 
 mod entry;
 mod folder;

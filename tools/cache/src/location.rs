@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Results by content key: an entry contains its whole key, so that a hash collision is no hit.
+//! Results by content key: an entry contains its whole key, so that a hash collision is detected as a miss.
 
 use crate::entry::{keep, prune, read};
 use crate::folder::folder;
@@ -7,7 +7,7 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
-/// Location of a result in the cache.
+/// Path of a result in the cache, with its key.
 #[derive(Clone, Debug)]
 pub struct CacheLocation {
     path: PathBuf,
@@ -15,7 +15,7 @@ pub struct CacheLocation {
 }
 
 impl CacheLocation {
-    /// Location of the result of a key, among results of a kind; `None` without a cache folder.
+    /// Location of the result for `key` among the results of `kind`; `None` without a cache folder.
     pub fn of(kind: &str, key: Vec<u8>) -> Option<CacheLocation> {
         let mut hasher = DefaultHasher::new();
         key.hash(&mut hasher);
@@ -23,7 +23,7 @@ impl CacheLocation {
         Some(CacheLocation { path, key })
     }
 
-    /// Parts of the result, if it is stored.
+    /// Reads the parts of the result, if it is stored.
     pub fn read(&self) -> Option<Vec<Vec<u8>>> {
         let bytes = read(&self.path)?;
         let (mut rest, mut parts) = (bytes.as_slice(), Vec::new());
@@ -37,7 +37,7 @@ impl CacheLocation {
         own.then(|| parts.split_off(1))
     }
 
-    /// Stores the parts of a result, and keeps the newest `most` results of its kind. Errors are ignored: the result is then computed
+    /// Stores the parts of a result, and keeps the newest `most` results of its kind. Errors are ignored: a missing result is computed
     /// again.
     pub fn keep(&self, parts: &[&[u8]], most: usize) {
         let mut bytes = Vec::new();

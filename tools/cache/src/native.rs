@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Native code: programs and objects with the checksum in a separate file, because some systems refuse a program with trailing bytes.
+//! Native code: programs and object files with the checksum in a separate file, because some systems reject a program with trailing bytes.
 
 use crate::entry::{plain, sum};
 use std::fs;

@@ -6,7 +6,7 @@ use std::fs;
 use std::os::unix::fs::{MetadataExt, chown, symlink};
 use takt_cache::{copy, discard, is_whole, keep, plain, prune, read, seal_program};
 
-/// All single-bit corruptions of a file's bytes.
+/// All single-bit corruptions of `bytes`.
 fn flips(bytes: &[u8]) -> impl Iterator<Item = Vec<u8>> {
     (0..bytes.len() * 8).map(|bit| {
         let mut damaged = bytes.to_vec();
@@ -51,7 +51,7 @@ fn every_flipped_bit_of_a_program_is_noticed() {
     fs::write(&path, &code).unwrap();
     let sum = root.0.join("program.sum");
     let text = fs::read(&sum).unwrap();
-    // The last byte is the line's end.
+    // The last byte, a newline, is not part of the checksum.
     for damaged in flips(&text[..16]) {
         fs::write(&sum, damaged).unwrap();
         // Upper-case digits denote the same number.
@@ -91,7 +91,7 @@ fn pipes_links_and_folders_are_no_entries() {
     assert!(!is_whole(&path));
 }
 
-/// Needs the right to change a file's owner; without it the test prints a note and passes.
+/// Needs the right to change a file's owner; without it, prints a note and passes.
 #[test]
 fn a_file_of_another_user_is_no_entry() {
     let root = Folder::new("foreign");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Cache folder: its location, and rejected folders.
+//! Location of the cache folder, and rejected folders.
 
 use crate::{Folder, pipe};
 use std::ffi::OsString;
@@ -8,7 +8,7 @@ use std::os::unix::fs::{MetadataExt, PermissionsExt, chown, symlink};
 use std::path::{Path, PathBuf};
 use takt_cache::folder_among;
 
-/// Cache folder for some environment variables.
+/// Cache folder for the given environment variables and temporary folder.
 fn folder(variables: &[(&str, &Path)], temporary: &Path) -> Result<PathBuf, String> {
     let find = |name: &str| variables.iter().find(|(own, _)| *own == name);
     folder_among(|name| find(name).map(|(_, value)| OsString::from(value)), temporary)
@@ -51,7 +51,7 @@ fn folder_writable_by_others_is_not_used() {
         fs::set_permissions(&own, Permissions::from_mode(open)).unwrap();
         assert!(folder(&variables, &root.0).unwrap_err().contains("can be written by others"), "{open:o}");
     }
-    // A folder that others may read becomes private.
+    // A folder that others can read is made private.
     for readable in [0o755, 0o750, 0o500] {
         fs::set_permissions(&own, Permissions::from_mode(readable)).unwrap();
         assert_eq!(folder(&variables, &root.0), Ok(own.clone()));
@@ -72,12 +72,12 @@ fn files_in_place_of_the_folder_are_not_used() {
     fs::remove_file(&own).unwrap();
     symlink(root.0.join("nowhere"), &own).unwrap();
     assert!(folder(&variables, &root.0).is_err());
-    // A link of the user to a folder of the user is accepted.
+    // The user's own link to the user's own folder is accepted.
     fs::create_dir(root.0.join("nowhere")).unwrap();
     assert_eq!(folder(&variables, &root.0), Ok(own));
 }
 
-/// Needs the right to change a file's owner; without it the test prints a note and passes.
+/// Needs the right to change a file's owner; without it, prints a note and passes.
 #[test]
 fn a_folder_of_another_user_is_not_used() {
     let root = Folder::new("owners");
@@ -92,7 +92,7 @@ fn a_folder_of_another_user_is_not_used() {
     assert!(folder(&[], &temporary).unwrap_err().contains(&refused));
     fs::rename(&own, root.0.join("takt")).unwrap();
     assert!(folder(&[("XDG_CACHE_HOME", &root.0)], &temporary).unwrap_err().contains(&refused));
-    // A link of another user to a folder of this user.
+    // Another user's link to a folder of this user is rejected.
     fs::create_dir_all(root.0.join("mine")).unwrap();
     symlink(root.0.join("mine"), &own).unwrap();
     std::os::unix::fs::lchown(&own, Some(user + 1000), None).unwrap();

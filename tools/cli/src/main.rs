@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Takt: assembles, emulates and times controllers for robots. Each command is a module of `commands`; only this crate knows the terminal.
+//! Takt: assembles, emulates and times controllers for robots. Each command is a module of `commands`; only this crate accesses the
+//! terminal.
 
 mod commands;
 mod run;
@@ -75,7 +76,7 @@ enum Command {
 }
 
 impl Command {
-    /// Results are tables and sentences, folded at the terminal's width; other commands print sources, or are interactive.
+    /// The results are tables and sentences, which are folded to the terminal's width. Other commands print sources, or are interactive.
     fn is_for_people(&self) -> bool {
         use Command::{
             Accuracy, Analyse, Arm, Asm, Bound, Cosim, Explore, Isa, Machines, Robot, Run, Track, Verify,
@@ -131,14 +132,14 @@ fn run(arguments: &Arguments, color: bool, out: &mut Out) -> Result<()> {
     }
 }
 
-/// A command with its subcommands, with examples folded to the terminal.
+/// Folds the examples in the help of a command and its subcommands to the terminal's width.
 fn fit(command: clap::Command, page: Page) -> clap::Command {
     let below = command.get_after_help().map(|text| page.below_help(&text.to_string()));
     let command = below.into_iter().fold(command, clap::Command::after_help);
     command.mut_subcommands(|command| fit(command, page))
 }
 
-/// Parses the arguments; the error is the exit status after an answer of clap (help, version, a mistake).
+/// Parses the arguments. If clap has answered instead (help, version, a mistake), the error is the exit status.
 fn parse(out: &mut Out) -> Result<Arguments, ExitCode> {
     let command = fit(Arguments::command(), Page::of_stdout(None));
     let parsed = command.try_get_matches().and_then(|matches| Arguments::from_arg_matches(&matches));
@@ -150,12 +151,12 @@ fn parse(out: &mut Out) -> Result<Arguments, ExitCode> {
             output::message(&if color { text.ansi().to_string() } else { text.to_string() });
             return ExitCode::from(2);
         }
-        // Print help like results, so that a full disk or a closed pipe has the same effect.
+        // Print help in the same way as results, so that a full disk or a closed pipe has the same effect.
         end(write!(out, "{}", answer.render()).and_then(|()| out.flush()).map_err(Into::into), false)
     })
 }
 
-/// Reports an error, and returns the exit status. A closed pipe, as in `| head`, is no error.
+/// Reports an error and returns the exit status. A closed pipe, as in `| head`, is not an error.
 fn end(result: Result<()>, color: bool) -> ExitCode {
     let Err(error) = result else { return ExitCode::SUCCESS };
     if output::is_closed_pipe(&error) {
@@ -193,7 +194,7 @@ fn main() -> ExitCode {
         out.set_page(Page::of_stdout(arguments.color.explicit_choice()));
     }
     let result = run(&arguments, color, &mut out);
-    // Results before an error are still written; the first error decides.
+    // Write the results before the error; the first error determines the status.
     let flushed = out.flush().map_err(anyhow::Error::from);
     end(result.and(flushed), color)
 }

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Batches (`takt run --batch`, `takt track --monte-carlo`): each run gives the same result as alone.
+//! Batches (`takt run --batch`, `takt track --monte-carlo`): each run gives the same result as a single run.
 
 use crate::common;
 use crate::common::Folder;
 use serde_json::Value;
 
-/// A law with a state, a data-dependent branch, and a division that may fail.
+/// A control law with a state, a data-dependent branch, and a division that may fail.
 const LAW: &str = "\
 .input x, limit
 .output y, count:int
@@ -25,7 +25,7 @@ small:  fadd    y, sum, zero
         wait    period
 ";
 
-/// Inputs of runs: names and rows.
+/// Inputs of the runs: names and rows.
 fn runs() -> Vec<(String, Vec<String>)> {
     (0..21)
         .map(|run| {
@@ -35,7 +35,7 @@ fn runs() -> Vec<(String, Vec<String>)> {
         .collect()
 }
 
-/// A cycle limit ends a run in a batch in the same period as alone.
+/// A cycle limit ends a run of a batch in the same period as a single run.
 #[test]
 fn cycle_limit_acts_as_in_a_single_run() {
     let folder = Folder::new();
@@ -103,7 +103,7 @@ fn each_run_of_a_batch_equals_a_single_run() {
     let of_folder = folder.line("run law.s --tick 500 --batch runs --outputs -").ok();
     assert_eq!(of_folder, expected);
 
-    // Interleaved rows of the same runs in one file.
+    // Rows of the same runs, interleaved in one file.
     let mut csv = "limit,run,x\n".to_owned();
     for row in 0..8 {
         for (name, rows) in runs() {
@@ -116,7 +116,7 @@ fn each_run_of_a_batch_equals_a_single_run() {
     folder.write("all.csv", csv);
     assert_eq!(folder.line("run law.s --tick 500 --batch all.csv --outputs -").ok(), expected);
 
-    // Runs that raised a flag are named.
+    // The JSON names the runs that raised a flag.
     let json = folder.line("run law.s --tick 500 --batch all.csv --json").ok();
     let json: Value = serde_json::from_str(&json).unwrap();
     for run in json["runs"].as_array().unwrap() {
@@ -170,7 +170,7 @@ fn mistakes_in_batches() {
     }
 }
 
-/// JSON output of a command that must succeed.
+/// JSON output of a command, which must succeed.
 fn json(folder: &Folder, line: &str) -> Value {
     serde_json::from_str(&folder.line(line).ok()).unwrap()
 }
@@ -204,7 +204,7 @@ fn robots_do_not_depend_on_threads_and_return_by_their_seeds() {
             json(&folder, &format!("track -q --json --periods 400 --seed {seed} --spread spread.toml"));
         assert_eq!(alone["tracking_error_m"], drive["tracking_error_m"], "seed {seed}");
     }
-    // Another seed gives another robot.
+    // A different seed gives a different robot.
     assert_ne!(all["drives"][0]["tracking_error_m"], all["drives"][1]["tracking_error_m"]);
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The commands `takt board`, `load` and `live`: output, refusals, and the loop through a simulated board's pins.
+//! The commands `takt board`, `load` and `live`: output, refusals, and the control loop through a simulated board's pins.
 #![cfg(unix)]
 
 use crate::common::{Folder, SimulatedBoard};
@@ -18,7 +18,7 @@ fn example(name: &str) -> String {
     format!("{}/../../programs/examples/board/{name}", env!("CARGO_MANIFEST_DIR"))
 }
 
-/// Wiring and program of the example, as arguments.
+/// Wiring and program of the example, as command-line arguments.
 fn position() -> String {
     format!("--wiring {} --program {} --machine t1", example("position.toml"), example("position.s"))
 }
@@ -49,7 +49,7 @@ fn the_example_fits_its_board_and_a_circuit_is_written() {
     assert!(pins.contains("LOCATE COMP \"encoder_a\" SITE \"B11\";"), "{pins}");
 }
 
-/// A program that always misses its tick is an error with figures; other checks of numbers are tested in `takt-board`.
+/// A program that always misses its tick is an error that states the figures; `takt-board` tests other checks of numbers.
 #[test]
 fn a_program_that_is_always_late_is_refused() {
     let folder = Folder::new();
@@ -80,7 +80,7 @@ fn a_program_alone_is_a_circuit_too() {
     let folder = Folder::new();
     let program = format!("--program {} --machine t1", example("position.s"));
     folder.line(&format!("board build --board colorlight-i5 {program} --sources -o out")).ok();
-    // Verilator parses all of it, except the device's own cells.
+    // Verilator parses everything except the device's own cells.
     let lint = "find . -name '*.v' -exec verilator --lint-only -Wno-fatal -Wno-lint -Wno-style --top-module takt_board {} +";
     let out = folder.path().join("out");
     let done = std::process::Command::new("/bin/sh").args(["-c", lint]).current_dir(out).output().unwrap();
@@ -138,7 +138,7 @@ fn the_loop_closes_through_the_pins_of_a_simulated_board() {
         folder.line(&format!("live {port} --baud {baud} --program {program} --machine t1 {what}")).ok()
     };
     live("set wanted=30");
-    // The axis covers a third of the error per millisecond of board time, until dead time swallows the pulses.
+    // The axis covers a third of the error per millisecond of board time, until the dead time swallows the pulses.
     let error = || -> i32 { live("read error").trim().trim_start_matches("error = ").parse().unwrap() };
     assert!((0..200).any(|_| error().abs() <= 2), "{}", live("read"));
     // Requests may displace frames of the stream, which is then reported.
@@ -147,25 +147,25 @@ fn the_loop_closes_through_the_pins_of_a_simulated_board() {
     ));
     assert_eq!((stream.status, stream.stdout.lines().count()), (Some(0), 3), "{stream:?}");
     assert!(live("status").contains("the program runs; outputs drive"), "{}", live("status"));
-    // While held the axis stays; single steps move it.
+    // While held, the axis stays; single steps move it.
     live("hold");
     live("set wanted=-30");
     assert!(error().abs() <= 2);
     live("step");
-    // The error is about -60. With a slow host the axis moved further on the last duty before the outputs became safe: compare with the
-    // position where it stands.
+    // The error is about -60. If the host was slow, the axis moved further on the last duty before the outputs became safe, so compare
+    // with the position where it stopped.
     let read = live("read");
     let value = |name: &str| -> i32 {
         let line = read.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(" = "));
         line.unwrap_or_else(|| panic!("{name}: {read}")).parse().unwrap()
     };
     assert!(value("error") == -30 - value("n") && (-90..=-30).contains(&value("error")), "{read}");
-    // In step with the emulator from the start: first the same program, then one with a different duty.
+    // In step with the emulator from the start: first with the same program, then with one that has a different duty.
     let same = live("shadow wanted=7 --periods 12");
     assert_eq!(same, "12 periods, 2 input ports, 2 output ports: no difference; the board is held\n");
     let status = live("status");
     assert!(status.contains("the program held; outputs are safe"), "{status}");
-    // The duty differs at every position, since with a slow host the axis may be anywhere.
+    // The duty differs at every position, since the axis may be anywhere after a slow host.
     let planted =
         std::fs::read_to_string(&program).unwrap().replace("gain, 1), -1)", "gain, 1), -1) + 0.0625");
     assert!(planted.contains("0.0625"));
@@ -180,7 +180,7 @@ fn the_loop_closes_through_the_pins_of_a_simulated_board() {
         "{}",
         different.stderr
     );
-    // Data memory, all zero in this program.
+    // Data memory, which is all zero in this program.
     assert_eq!(live("read [0] [1023]"), "[0] = 0\n[1023] = 0\n");
     let beyond =
         folder.line(&format!("live {port} --baud {baud} --program {program} --machine t1 read [1024]"));
@@ -238,12 +238,12 @@ period: isub    error, wanted, n
 ring:   .float  0, 0, 0, 0, 0, 0, 0, 0
 ";
 
-/// The debugger on a simulated board: registers, memory, moves, differences, and the state in which it leaves the board.
+/// The debugger on a simulated board: registers, memory, moves, differences, and the state in which the board is left.
 #[test]
 fn a_board_is_debugged() {
     let folder = Folder::new();
     folder.write("ring.s", RING);
-    // A faster line saves time in the many reads of the whole data memory.
+    // A faster serial line speeds up the many reads of the whole data memory.
     let wiring = std::fs::read_to_string(example("position.toml")).unwrap();
     assert_eq!(wiring.matches("baud = 1_000_000").count(), 1);
     folder.write("wiring.toml", wiring.replace("baud = 1_000_000", "baud = 10_000_000"));
@@ -259,7 +259,7 @@ fn a_board_is_debugged() {
     let status = || folder.line(&format!("live {port} --baud {baud} status")).ok();
     assert!(status().contains("the program runs; outputs drive"), "{}", status());
 
-    // Outputs have the computed values, and agree with the emulator throughout.
+    // The outputs have the computed values, and always agree with the emulator.
     let same = "check error == wanted - n\ncheck x == error\ncheck abs(duty - x * gain) < 0.0001\ncheck ring[(at + 7) % 8] == x\n\
         check count == period\ncheck at == period % 8\n";
     let commands = format!(
@@ -273,7 +273,7 @@ fn a_board_is_debugged() {
     assert!(text.ends_with("(takt) quit\nthe program runs; outputs drive\n"), "{text}");
     assert!(status().contains("the program runs; outputs drive"), "{}", status());
 
-    // From a restart, where unwritten values are known; the program stays held, as requested.
+    // After a restart unwritten values are known; the program stays held, as requested.
     let commands = format!("print x\nstep 12\n{same}check sum == 12 * x\n");
     let text = debug("ring.s", "--restart", &commands).ok();
     assert!(text.starts_with("period 0: waits") && text.contains("x = (never written)\n"), "{text}");
@@ -282,7 +282,7 @@ fn a_board_is_debugged() {
     let text = debug("ring.s", "", "goto start\nstep\ngo\nhold\ngo\n").ok();
     assert!(text.ends_with("the program runs; outputs are safe\n"), "{text}");
 
-    // A session with another program is refused, since names would be wrong.
+    // A session with another program is refused: names would be wrong.
     folder.write("other.s", RING.replace("itof    x, error", "itof    x, wanted"));
     let other = debug("other.s", "", "print x\n");
     assert_eq!((other.status, other.stdout.as_str()), (Some(1), ""));
@@ -296,7 +296,7 @@ fn a_board_is_debugged() {
     let longer = debug("longer.s", "", "print x\n");
     assert!(longer.stderr.contains("its image has "), "{}", longer.stderr);
 
-    // Differences: the board runs a changed program while it claims to carry the right one.
+    // Differences: the board runs a changed program but claims to run the original.
     let planted = |what: &str, by: &str, commands: &str| {
         assert_eq!(RING.matches(what).count(), 1);
         folder.write("planted.s", RING.replace(what, by));
@@ -350,7 +350,7 @@ fn a_board_is_debugged() {
         "{stopped:?}"
     );
 
-    // A program that does not reach its `wait`, and outputs that drive while it is stepped.
+    // A program that does not reach its `wait`, and outputs that drive while the program is stepped.
     folder.write("endless.s", RING.replace("count, 1\n", "count, 1\n bnz wanted, period\n"));
     folder.line(&format!("load {port} --baud {baud} endless.s --machine t1")).ok();
     let endless =
@@ -363,7 +363,7 @@ fn a_board_is_debugged() {
     let driven = debug("endless.s", "--restart --drive", "step 2\n").ok();
     assert!(driven.ends_with("the program stays held; outputs drive\n"), "{driven}");
 
-    // The emulator does not reach the `wait` either, and that is the message.
+    // The emulator does not reach the `wait` either, which the message reports.
     let line =
         format!("live {port} --baud {baud} --program endless.s --machine t1 shadow wanted=1 --periods 3");
     let shadow = folder.line(&line);
@@ -377,7 +377,7 @@ fn a_board_is_debugged() {
     let mut host = host.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     wait_until_at(&mut host, &port);
     drop(board);
-    // The host may have ended already.
+    // The host may already have ended.
     let _ = host.stdin.take().unwrap().write_all(b"step\nprint count\n");
     let done = host.wait_with_output().unwrap();
     let stderr = String::from_utf8_lossy(&done.stderr);
@@ -385,7 +385,7 @@ fn a_board_is_debugged() {
     assert!(done.status.code() == Some(1) && stderr.contains(says), "{done:?}");
 }
 
-/// Proxy between host and board that claims that any image is RING's.
+/// Proxy between host and board which claims that any image is RING's.
 struct Liar {
     port: String,
     over: Arc<AtomicBool>,
@@ -446,7 +446,7 @@ impl Drop for Liar {
     }
 }
 
-/// Waits until a process has opened the port, according to Linux's list of its files, or has ended.
+/// Waits until a process has opened the port, according to Linux's list of its open files, or has ended.
 fn wait_until_at(host: &mut std::process::Child, port: &str) {
     let open = std::path::PathBuf::from(format!("/proc/{}/fd", host.id()));
     let is_at_the_port = || {
@@ -494,8 +494,8 @@ fn hybrid(name: &str) -> String {
     format!("{}/../../programs/hybrid/{name}", env!("CARGO_MANIFEST_DIR"))
 }
 
-/// The tracking error through encoders, PWMs and UART of the complete top level equals the emulator's, plus the effect of the pins: forces
-/// in steps of 0.5 N, delayed by a PWM period.
+/// The tracking error through encoders, PWMs and UART of the complete top level equals the emulator's, plus the effect of the pins:
+/// forces are quantised to 0.5 N and delayed by a PWM period.
 #[test]
 fn the_hybrid_robot_closes_its_loop_through_pins() {
     let folder = Folder::new();
@@ -569,7 +569,7 @@ fn path_from_pin_to_pin_has_a_bound() {
     };
     assert_eq!(way["total"]["best"], sum("best"));
     assert_eq!(way["total"]["worst"], sum("worst"));
-    // Two periods of states lengthen the path by two periods; pins without a dependence are on no path.
+    // Two periods of state lengthen the path by two periods; pins without a dependence are on no path.
     let delayed = "delayed.s";
     folder.write(
         delayed,
@@ -595,7 +595,7 @@ fn path_from_pin_to_pin_has_a_bound() {
     refused(&format!("--wiring {wiring} --deadline 100us"), "--deadline is not for --pins");
     folder.write("none.toml", "period = 100\n");
     refused("--wiring none.toml", "none.toml names no board: `--board NAME`, or a line");
-    // The message is equal for a board in --board and in the file.
+    // The message is the same for a board given by --board and in the file.
     folder.write("system.toml", "[core.one]\nmachine = \"t1\"\n");
     for board in ["", " --board ulx3s-85f"] {
         refused(

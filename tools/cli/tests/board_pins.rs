@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Pins of a simulated board and their drivers, the board named in a wiring, and bounds of pins with pulse-density outputs.
+//! Pins of a simulated board and their drivers, the board named in a wiring, and latency bounds of pins with pulse-density outputs.
 #![cfg(unix)]
 
 use crate::common::{Folder, RunOutput};
@@ -36,7 +36,7 @@ pins = { out = "gp1" }
 ports = { level = "lit" }
 "#;
 
-/// Drives towards a limit switch and lights a lamp there; faster once the encoder has turned.
+/// Drives towards a limit switch and lights a lamp there; goes faster once the encoder has turned.
 const PROGRAM: &str = "\
 .schedule on
 .input  at_end:int, n:int
@@ -59,14 +59,14 @@ fn folder() -> Folder {
 
 const TARGET: &str = "--wiring limit.toml --program limit.s --machine t1";
 
-/// Runs a simulation; Verilator needs a higher memory limit than other tests.
+/// Runs a simulation; Verilator needs more memory than the limit of other tests allows.
 fn sim(folder: &Folder, more: &str, input: &str) -> RunOutput {
     let mut command = Command::new(env!("CARGO_BIN_EXE_takt"));
     let line = format!("board sim {TARGET} {more}");
     command.args(line.split_whitespace()).current_dir(folder.path());
     command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut child = command.spawn().unwrap();
-    // The process may end before it has read everything.
+    // The process may end before it has read all input.
     let _ = child.stdin.take().unwrap().write_all(input.as_bytes());
     RunOutput::from(child.wait_with_output().unwrap())
 }
@@ -80,7 +80,7 @@ fn the_wiring_names_the_board() {
     folder.line(&format!("board build {TARGET} --sources -o out")).ok();
     let pins = folder.line("board pins --wiring limit.toml").ok();
     assert!(pins.contains("limit.in"), "{pins}");
-    // Without a board in wiring and arguments, the message says what to write.
+    // If neither wiring nor arguments name a board, the message states what to write.
     folder.write("limit.toml", WIRING.split_once('\n').unwrap().1);
     for line in [
         &format!("board check {TARGET}"),
@@ -96,7 +96,7 @@ fn the_wiring_names_the_board() {
     assert!(done.status == Some(2) && done.stderr.contains("--board"), "{done:?}");
 }
 
-/// A limit switch, driven by a script file and by standard input; the host at the UART sees it, too.
+/// A limit switch, driven by a script file and by standard input; the host at the UART also sees it.
 #[test]
 fn a_script_drives_a_limit_switch() {
     let folder = folder();
@@ -112,12 +112,12 @@ fn a_script_drives_a_limit_switch() {
     assert!(before.starts_with("1.000 ms\n") && before.contains("  limit.in = 0\n"), "{text}");
     assert!(before.contains("  lamp.out = 0 (output)\n"), "{text}");
     assert!(after.contains("  limit.in = 1\n") && after.contains("  lamp.out = 1 (output)\n"), "{text}");
-    // A level from power-up on, and interactive commands.
+    // A level that is set from power-up on, and interactive commands.
     let done = sim(&folder, "--script - --set limit=1", "wait 1ms\nshow\nfly\n");
     assert!(done.stdout.ends_with("  lamp.out = 1 (output)\n"), "{done:?}");
     assert!(done.status == Some(1) && done.stderr.contains("standard input:3: no command `fly`"), "{done:?}");
 
-    // Mistakes are reported before the circuit is compiled, and in standard input with the line.
+    // Mistakes are reported before the circuit is compiled; those in standard input, with the line number.
     for (line, text, says) in [
         ("--set limt=1", "", "--set no input pin `limt`; did you mean `limit`?; there are "),
         ("--set limit", "", "--set `limit` is not `pin=level`"),
@@ -145,7 +145,7 @@ fn a_script_drives_a_limit_switch() {
     }
 }
 
-/// A plant at two pipes: converts the motor's pulses to encoder counts, and has a limit switch at its end.
+/// A plant at two pipes: converts the motor's pulses to encoder counts, and has a limit switch at the end of its travel.
 #[test]
 fn a_plant_closes_the_loop_at_the_pins() {
     let folder = folder();
@@ -165,7 +165,7 @@ fn a_plant_closes_the_loop_at_the_pins() {
         writeln!(stdin, "{limit},{}", position as i32).unwrap();
         let values: Vec<f64> = row().split(',').map(|field| field.parse().unwrap()).collect();
         (fastest, lit) = (fastest.max(values[0]), values[1]);
-        // The outputs are safe first; later one half means 0.
+        // The outputs are safe at first; later, one half means 0.
         position += (4.0 * (values[0] - 0.5)).max(0.0);
         if lit == 1.0 {
             break;
@@ -176,11 +176,11 @@ fn a_plant_closes_the_loop_at_the_pins() {
     assert_eq!(done.status, Some(0), "{done:?}");
     let mut said = done.stderr.lines();
     assert!(said.any(|line| line.starts_with("/dev/") && line.ends_with(" 1000000")), "the port: {done:?}");
-    // In half a period, 0.5 of full duty is 512 of 1250 cycles; beyond 10 counts full duty, 1024.
+    // Half a period at 0.5 of full duty gives 512 of 1250 cycles; beyond 10 counts, full duty gives 1024.
     assert!(lit == 1.0 && position >= 20.0, "it has come to its end: {position}");
     assert!((fastest - (1250.0 + 1024.0) / 2500.0).abs() < 1e-9, "{fastest}");
 
-    // From a file: rows are answered up to the first malformed one.
+    // From a file: rows are answered up to the first malformed row.
     folder.write("in.csv", "limit\n1\n1\n1\n1\n1\n1\n1\n1\n2\n");
     let done = sim(&folder, "--inputs in.csv --outputs -", "");
     let says = "in.csv:10: column limit.in: a pin's level is 0 or 1, not 2";
@@ -197,7 +197,7 @@ fn a_plant_closes_the_loop_at_the_pins() {
     }
 }
 
-/// Each cause for which outputs become safe, by what the pins do: `/` by 0, a word before the memory, an iteration too many.
+/// Causes of safe outputs, selected by the pins: `/` by 0, an access before the start of memory, one iteration too many.
 const MISTAKES: &str = "\
 .input  at_end:int, n:int
 .output duty, lit:int
@@ -223,7 +223,7 @@ period: ld      t, table[n]
 done:   wait    period
 ";
 
-/// The moment at which outputs become safe, and the reason, are told as it happens, however it comes.
+/// When outputs become safe, time and reason are reported at once, whatever the cause.
 #[test]
 fn reports_the_reason_for_safe_outputs_at_once() {
     let folder = folder();
@@ -259,11 +259,11 @@ fn reports_the_reason_for_safe_outputs_at_once() {
         let [told] = told[..] else { panic!("{done:?}") };
         let (time, told) = told.split_once(" ms: the outputs become safe: ").unwrap();
         assert!(told.starts_with(says), "{told}");
-        // Twelve periods of 0.1 ms without a host; all else after six, and the period in which it is noticed.
+        // A silent host is noticed after twelve periods of 0.1 ms. Other causes come after six, and are noticed in a further period.
         let time: f64 = time.parse().unwrap();
         let from = if case == 4 { 1.2 } else { 0.6 };
         assert!((from..from + 0.25).contains(&time), "{case}: {time}");
-        // Its end says the same.
+        // The message at the end of the simulation is the same.
         assert!(
             done.stderr
                 .contains(&format!("at the end the outputs are safe: {}", told.split(':').next().unwrap())),
@@ -272,7 +272,7 @@ fn reports_the_reason_for_safe_outputs_at_once() {
     }
 }
 
-/// A pin with a pulse-density stream has no bound; the path to its modulator has one.
+/// A pin with a pulse-density stream has no latency bound; the path to its modulator has one.
 #[test]
 fn a_density_has_no_bound_at_its_pin() {
     let folder = folder();
@@ -290,7 +290,7 @@ fn a_density_has_no_bound_at_its_pin() {
     let way = &json["ways"][0];
     assert!(way["total"].is_null() && way["total_to_modulator"]["worst"].is_u64(), "{json}");
     assert_eq!(way["outputs"][0]["answer"], "density");
-    // A path has a total if one of its pins answers with an edge.
+    // A path has a total if one of its pins responds with an edge.
     let json: serde_json::Value = serde_json::from_str(&bound("both.toml", "--json")).unwrap();
     let mut totals = 0;
     for way in json["ways"].as_array().unwrap() {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The commands `takt board`, `load` and `live` with a system of several cores: the example through a simulated board, and refusals.
+//! The commands `takt board`, `load` and `live` on a system of several cores: the example through a simulated board, and refusals.
 #![cfg(unix)]
 
 use crate::common::{Folder, SimulatedBoard};
@@ -8,7 +8,7 @@ fn example(name: &str) -> String {
     format!("{}/../../programs/examples/board/axis/{name}", env!("CARGO_MANIFEST_DIR"))
 }
 
-/// Wiring and system of the example, as arguments.
+/// Wiring and system of the example, as command-line arguments.
 fn axis() -> String {
     format!("--board ulx3s-85f --wiring {} --program {}", example("wiring.toml"), example("axis.toml"))
 }
@@ -24,7 +24,7 @@ fn a_system_fits_its_board_and_a_circuit_is_written() {
     folder.line(&format!("board build {} --sources -o out", axis())).ok();
     assert!(folder.read_text("out/takt_system_board.v").contains("module takt_system_board"));
     assert!(folder.read_text("out/pins.lpf").contains("LOCATE COMP \"encoder_a\" SITE \"B11\";"));
-    // Without a wiring, the host has all ends of links.
+    // Without a wiring, all outer ends of links are at the host.
     let alone = format!("--board ulx3s-85f --program {}", example("axis.toml"));
     let text = folder.line(&format!("board check {alone}")).ok();
     assert!(
@@ -86,7 +86,7 @@ fn wrong_systems_and_ports_are_refused() {
     let two = "[peripheral.other]\nkind = \"step\"\npins = { step = \"gp4\", direction = \"gn4\" }\nports = { count = \"n\" }\n[peripheral.lamp]";
     wired("[peripheral.lamp]", two, "input port `n` is driven twice: `encoder` drives it, too");
 
-    // Errors: a port of several cores; an offset that no board can keep; a system too large for any board.
+    // Errors: one port of several cores; an offset that no board can keep; a system that is too large for any board.
     let system = std::fs::read_to_string(example("axis.toml")).unwrap();
     for name in ["profile.s", "servo.s", "watch.s"] {
         folder.write(name, std::fs::read_to_string(example(name)).unwrap());
@@ -113,7 +113,7 @@ fn wrong_systems_and_ports_are_refused() {
     refused(&format!("board check {} --machine t1", axis()), "--machine with a system");
     refused(&format!("board sim {} --robot", axis()), "`takt track --system` drives it with one");
 
-    // Detected before the serial line is opened.
+    // Detected before the serial port is opened.
     let live = |what: &str| format!("live /dev/nothing --program {} {what}", example("axis.toml"));
     refused(&live("set servo.wanted=1"), "`servo.wanted` comes from the link `reference`");
     refused(&live("set servo.duty=1"), "`servo.duty` is an output port, which the program sets");
@@ -162,7 +162,7 @@ fn paths_from_pin_to_pin_over_cores_have_bounds() {
         assert_eq!(way["total"][edge], parts.map(|part| part[edge].as_u64().unwrap()).sum::<u64>());
     }
 
-    // Encoders that differ only in their wires share a row; a converter has no edge; a queue has no time.
+    // Encoders that differ only in their wires share a row; a converter has no edge; a queue has no bounded time.
     let more = "[peripheral.second]\nkind = \"quadrature\"\npins = { a = \"gp4\", b = \"gn4\" }\nports = { count = \"servo.n2\" }\n\
                 [peripheral.converter]\nkind = \"spi\"\npins = { clock = \"gp5\", select = \"gn5\", in = \"gp6\" }\n\
                 ports = { received = \"servo.n3\" }\n[peripheral.lamp]";
@@ -187,7 +187,7 @@ fn paths_from_pin_to_pin_over_cores_have_bounds() {
         assert!(text.contains(says), "{says}: {text}");
     }
 
-    // A deadline that can be missed does not enter a bound.
+    // A deadline that can be missed does not contribute to a bound.
     let slow = "        .loop_bound 2000\nagain:  isub    k, k, 1\n        bnz     k, again\n        fabs    a, error\n";
     copied(
         &folder,
@@ -208,7 +208,7 @@ fn paths_from_pin_to_pin_over_cores_have_bounds() {
     refused(&[], " --deadline 100us", "--deadline is not for --pins");
     refused(&[("wiring.toml", "servo.n", "axle.n")], "", "wiring.toml:17:19: the system has no core `axle`");
     refused(&[("wiring.toml", "period = 100 ", "period = 50 ")], "", "the system's `tick` is 5000 cycles");
-    // An encoder at a core without a path to a pin; a lamp behind a queue.
+    // An encoder at a core that has no path to a pin; a lamp after a queue.
     let wiring = std::fs::read_to_string(example("wiring.toml")).unwrap();
     let [motor, lamp] = ["[peripheral.motor]", "[peripheral.lamp]"].map(|table| wiring.find(table).unwrap());
     let apart = [
@@ -276,7 +276,7 @@ fn a_simulated_board_carries_a_system() {
     let rows: Vec<Vec<&str>> = stream.stdout.lines().map(|line| line.split(' ').collect()).collect();
     assert_eq!((stream.status, rows.len()), (Some(0), 3), "{stream:?}");
     assert!(rows.iter().all(|row| row.len() == 3 && row[0] == row[2]), "{stream:?}");
-    // While held, a FIFO fills up; single base ticks continue the ramp.
+    // While the system is held, a FIFO fills up; single base ticks continue the ramp.
     live("hold");
     for _ in 0..4 {
         live("push moves target=40 rate=2");
@@ -296,7 +296,7 @@ fn a_simulated_board_carries_a_system() {
     let same = live("shadow limit=0.5 --periods 12");
     assert_eq!(same, "12 base ticks, 2 inputs, 8 output ports: no difference; the board is held\n");
 
-    // The circuit accepts other programs; a single program, and a system with other links, are refused.
+    // The circuit accepts other programs, but refuses a single program and a system with other links.
     let sources = ["profile.s", "servo.s", "watch.s"]
         .map(|name| (name, std::fs::read_to_string(example(name)).unwrap()));
     for (name, text) in &sources {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Cache of assembled programs: equal results with and without it, and no hit after a change.
+//! Cache of assembled programs: results are the same with and without it, and a change causes a miss.
 #![allow(clippy::print_stderr)]
 
 use crate::common::{Folder, RunOutput};
@@ -44,7 +44,7 @@ fn results_are_the_same_from_the_cache() {
     }
     assert_eq!(std::fs::read(&files[0]).unwrap(), whole);
 
-    // A changed source, another machine and another option have their own entries.
+    // A changed source, another machine and another option have separate entries.
     folder.write("t.s", format!("{TRACKING}\n; changed"));
     assert_eq!(takt(&folder, "bound t.s"), own);
     let small = takt(&folder, "bound t.s -m t1");
@@ -52,12 +52,12 @@ fn results_are_the_same_from_the_cache() {
     takt(&folder, "bound t.s --contract on -m t4");
     assert_eq!(kept(&folder).len(), 4);
 
-    // A changed included source has its own entry, too.
+    // A changed include also has a separate entry.
     folder.write("robot.s", format!("{ROBOT}\n; changed"));
     takt(&folder, "bound t.s");
     assert_eq!(kept(&folder).len(), 5);
 
-    // Quickly assembled programs are not cached.
+    // Programs that assemble quickly are not cached.
     folder.write("small.s", ".output y\n.period\np: mov y, zero\n wait p\n");
     takt(&folder, "bound small.s");
     assert_eq!(kept(&folder).len(), 5);
@@ -79,7 +79,7 @@ fn entry(parts: &[Vec<u8>]) -> Vec<u8> {
     takt_cache::seal(parts.iter().flat_map(part).collect())
 }
 
-/// Path of the entry of one program, the entries of two programs, and the correct output of the first.
+/// Path of one program's entry, the entries of two programs, and the correct output of the first.
 fn two_entries(folder: &Folder) -> (std::path::PathBuf, [Vec<u8>; 2], String) {
     folder.write("t.s", TRACKING);
     folder.write("robot.s", ROBOT);
@@ -114,7 +114,7 @@ mod owned {
     use std::fs;
     use std::os::unix::fs::{MetadataExt, chown};
 
-    /// Runs a command with other environment variables, and `tmp` as the folder for temporary files.
+    /// Runs a command with other environment variables, and with `tmp` as folder for temporary files.
     fn bound(folder: &Folder, variables: &[(&str, &str)]) -> RunOutput {
         let mut command = folder.command(&["bound", "t.s"]);
         command.env_remove("HOME").env_remove("XDG_CACHE_HOME").env("TMPDIR", folder.path().join("tmp"));
@@ -147,7 +147,7 @@ mod owned {
     fn a_program_of_another_user_is_not_used() {
         let folder = Folder::new();
         let (path, [own, other], right) = two_entries(&folder);
-        // An entry with the key of this program and the code of another.
+        // An entry with the key of this program, but the code of another.
         let wrong = [parts(&own)[..1].to_vec(), parts(&other)[1..].to_vec()].concat();
         let user = fs::metadata(folder.path()).unwrap().uid();
         let cache = folder.path().join(format!("tmp/takt-{user}"));
@@ -164,7 +164,7 @@ mod owned {
         takt_cache::keep(&planted, takt_cache::unseal(&entry(&wrong)).unwrap().to_vec()).unwrap();
         chown(&cache, Some(user + 1000), None).unwrap();
         assert_eq!(bound(&folder, &[]).ok(), right);
-        // Circuits are compiled to native code, which is refused without a folder of the user's own.
+        // Circuits are compiled to native code, which is refused unless the folder belongs to the user.
         let mut command = folder.command(&["cosim", "t.s"]);
         command.env_remove("HOME").env_remove("XDG_CACHE_HOME").env("TMPDIR", folder.path().join("tmp"));
         let text = RunOutput::of(command).stderr;

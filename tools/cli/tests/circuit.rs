@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The commands `takt rtl` and `takt cosim`.
+//! The commands `takt rtl` and `takt cosim`: exported circuits, and lockstep with the emulator.
 
 use crate::common::{Folder, RunOutput};
 
@@ -8,7 +8,7 @@ const PROGRAM: &str = ".input in0\n.output out0\n.period\nloop: fadd out0, in0, 
 fn cosim(folder: &Folder, line: &str) -> RunOutput {
     let arguments: Vec<&str> = line.split_whitespace().collect();
     let mut command = folder.command(&arguments);
-    // Compiled circuits are shared between runs of the tests.
+    // Share compiled circuits between test runs.
     command.env("XDG_CACHE_HOME", env!("CARGO_TARGET_TMPDIR"));
     RunOutput::of(command)
 }
@@ -42,7 +42,7 @@ fn test_bench_runs_the_rows() {
     let two = stimuli("rtl -o out --program p.s --inputs in.csv --periods 2");
     assert_eq!(two, ["10003fc00000", tick, "1000c0000000", tick]);
     assert_eq!(stimuli("rtl -o out --program p.s"), ["100000000000", tick].repeat(3));
-    // Results of an earlier export are removed.
+    // A new export removes the results of an earlier one.
     assert!(stimuli("rtl -o out").is_empty());
     assert_eq!(folder.read_text("out/program.hex").lines().count(), 1);
     let many = folder.line("rtl -o out --program p.s --periods 40000");
@@ -81,7 +81,7 @@ fn without_verilator_its_package_is_named() {
     assert!(done.stderr.contains("apt-get install verilator"), "{}", done.stderr);
 }
 
-/// The circuit's ports are latched as in the program.
+/// The circuit's ports are latched exactly if the program's are.
 #[test]
 fn latched_ports_come_from_the_program() {
     let folder = Folder::new();
@@ -99,7 +99,7 @@ fn latched_ports_come_from_the_program() {
     assert!(text.contains("3 periods on t1") && text.contains("no difference"), "{text}");
 }
 
-/// System of the repository with three cores on two machines.
+/// The repository's system with three cores on two machines.
 #[test]
 fn a_system_is_a_circuit() {
     let folder = Folder::new();

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Commands as users run them.
+//! Commands of `takt` as users run them.
 
 use crate::common::{Folder, RunOutput, source};
 use std::collections::BTreeMap;
 use std::process::{Command, Stdio};
 use takt_isa::fp::HAS_SOFTFLOAT;
 
-/// Columns of a CSV text by title.
+/// Columns of a CSV text, by title.
 fn columns(csv: &str) -> BTreeMap<String, Vec<String>> {
     let mut lines = csv.lines().map(|line| line.split(',').map(str::to_owned).collect::<Vec<_>>());
     let titles = lines.next().unwrap();
@@ -16,7 +16,7 @@ fn columns(csv: &str) -> BTreeMap<String, Vec<String>> {
     titles.into_iter().enumerate().map(|(i, title)| (title, column(i))).collect()
 }
 
-/// Rounds floating-point numbers to three digits; further digits depend on the host's sine.
+/// Rounds floating-point numbers to three digits; further digits depend on the host's sine function.
 fn round(value: &mut serde_json::Value) {
     match value {
         serde_json::Value::Object(map) => map.values_mut().for_each(round),
@@ -34,7 +34,7 @@ fn track() {
     let folder = Folder::new();
     let text = folder.line("track -m f3 --periods 200").ok();
     assert_eq!(folder.line("track -m f3 --periods 200").ok(), text, "the same every time");
-    // Place and route has its own record, rtl/synthesis.json.
+    // Place and route is recorded separately, in rtl/synthesis.json.
     let steady: String = text
         .split_inclusive('\n')
         .filter(|line| !line.to_lowercase().contains("placed and routed"))
@@ -79,7 +79,7 @@ fn arm() {
     assert_eq!(folder.list(), [""; 0]);
 }
 
-/// Joint angles along a closed square in space, and their plot.
+/// Joint angles along a closed square in space, and the plot of them.
 #[test]
 fn the_arm_draws_a_square() {
     let folder = Folder::new();
@@ -95,7 +95,7 @@ fn the_arm_draws_a_square() {
     assert!((number("y", 2000) - number("y", 1000) - 200.0).abs() < 1e-3);
     let svg = folder.read_text("s.svg");
     assert!(svg.starts_with("<svg") && svg.matches("<polyline").count() >= 7 && svg.contains("θ6"));
-    // The tool's path is the line that returns to its start: in projection, the square is a parallelogram.
+    // The tool path is the line that returns to its start: projected, the square is a parallelogram.
     let points = |line: &str| -> Vec<(f64, f64)> {
         let points = line.split("points=\"").nth(1).unwrap().split('"').next().unwrap().split_whitespace();
         let point = |point: &str| {
@@ -146,14 +146,14 @@ fn track_as_json() {
         }
         assert_eq!(json["max_error"].as_object().unwrap().len(), 15);
         assert!(json["tracking_error_m"]["cutting"].is_f64() && json["tracking_error_m"]["overall"].is_f64());
-        // Each cycle of the last period either issues or is charged to a cause.
+        // Each cycle of the last period either issues a bundle or is charged to a cause.
         let stalls: u64 =
             json["stalls"].as_object().unwrap().values().map(|count| count.as_u64().unwrap()).sum();
         assert_eq!(json["bundles"].as_u64().unwrap() + stalls, 12_500, "125 MHz, 100 µs");
     }
 }
 
-/// The source contains the lines that --fit-friction prints, each table names its program, and a run without friction is refused.
+/// The source contains the lines that --fit-friction prints, each table names its program, and a run without friction is rejected.
 #[test]
 fn friction_is_identified_from_a_run() {
     let folder = Folder::new();
@@ -210,7 +210,7 @@ fn images_run_like_their_sources() {
             assert_eq!(folder.line("run image --inputs rec.csv --outputs -").ok(), table);
             let mut stats = folder.line(&format!("run {source} -m {machine} --inputs rec.csv --stats")).ok();
             assert_eq!(folder.line("run image --inputs rec.csv --stats").ok(), stats);
-            // From standard input too.
+            // The program may also come from standard input.
             let image = folder.read("image");
             stats = folder.fed("run - --inputs rec.csv --stats", &image).ok();
             assert!(stats.starts_with("50 periods on "), "{stats}");
@@ -251,7 +251,7 @@ fn an_image_is_proved_to_be_its_source() {
     assert!(folder.line("verify a.s a.s").stderr.contains("a.s is no image"));
 }
 
-/// A program with everything that the tracking programs lack: data, branches, calls, integers, bits, bundles by hand.
+/// A program with everything that the tracking programs lack: data, branches, calls, integers, bits, manual bundles.
 #[test]
 fn a_program_that_halts() {
     let folder = Folder::new();
@@ -315,12 +315,12 @@ fn analyse_accounts_for_the_cycles_of_a_period() {
     let text = folder.line(&format!("analyse {} -m f3", source("tracking.s"))).ok();
     folder.line(&format!("asm {} -m f1 -o small", source("tracking.s"))).ok();
     insta::assert_snapshot!("analyse", format!("{text}\n{}", folder.line("analyse small").ok()));
-    // With --reassemble: the same, with an additional column and without the hint.
+    // With --reassemble: the same output, with an additional column and without the hint.
     let again = folder.line(&format!("analyse {} -m f3 --reassemble", source("tracking.s"))).ok();
     let (same, table) = again.split_once("\none cycle less in").unwrap();
     assert!(text.starts_with(same));
     insta::assert_snapshot!("analyse_reassembled", table);
-    // The account equals the run's cycles on recorded inputs; an image has no source to reassemble.
+    // The account equals the run's cycles for recorded inputs; an image has no source to reassemble.
     folder.line("track --periods 4 --csv rec.csv -q").ok();
     folder.line(&format!("asm {} -o image", source("tracking.s"))).ok();
     let run: serde_json::Value =
@@ -339,7 +339,7 @@ fn analyse_accounts_for_the_cycles_of_a_period() {
     let told = worse.map(|unit| {
         let stalls: i64 = unit["stalls"].as_object().unwrap().values().map(cycles).sum();
         assert_eq!(cycles(&unit["as_it_is"]) - cycles(&json["cycles"]), stalls, "{unit}");
-        // Unless it is a single cycle, the reason is the write port.
+        // Except for a single cycle, the reason is the write port.
         assert!(stalls == 1 || cycles(&unit["stalls"]["write port"]) > 0, "{unit}");
     });
     assert!(told.count() > 2);
@@ -353,7 +353,7 @@ fn analyse_accounts_for_the_cycles_of_a_period() {
     assert!(folder.line("analyse halts.s -m f3").ok().starts_with("what runs once on f3: "));
 }
 
-/// A loop with an early or late end and a branch inside: best and worst case, and a deadline at the limit.
+/// A loop with an early or late end and a branch inside: best and worst case, and a deadline exactly at the limit.
 #[test]
 fn a_deadline_decides_the_status() {
     let folder = Folder::new();
@@ -387,7 +387,7 @@ skip:   isub    i, i, 1
         assert_eq!((status, stderr.as_str()), (Some(1), ""));
         assert!(stdout.contains("not kept") || stdout.contains("\"kept\": false"), "{stdout}");
     }
-    // Eight nanoseconds are a cycle.
+    // One cycle takes eight nanoseconds.
     let time = |cycles: u64| folder.line(&format!("bound loop.s --deadline {}ns", cycles * 8)).status;
     assert_eq!((time(worst), time(worst + 1)), (Some(1), Some(0)));
 }
@@ -395,7 +395,7 @@ skip:   isub    i, i, 1
 #[test]
 fn eval_in_the_format_of_testfloat() {
     let folder = Folder::new();
-    // Operands, result, flags; TestFloat's further columns are ignored.
+    // Operands, result, flags; further columns of TestFloat are ignored.
     let cases: [(&str, &[(&str, &str)]); 8] = [
         (
             "fadd",
@@ -450,10 +450,10 @@ fn eval_in_the_format_of_testfloat() {
             );
         }
     }
-    // Input longer than any buffer, split at arbitrary places.
+    // Input longer than any buffer, split at arbitrary positions.
     let many = "3F800000 40000000\n".repeat(100_000);
     assert_eq!(folder.fed("eval fsub", many.as_bytes()).ok(), "BF800000 00\n".repeat(100_000));
-    // An answer comes before the end of the input.
+    // Answers come before the end of the input.
     let mut command = folder.command(&["eval", "fneg"]);
     let mut child = command.stdin(Stdio::piped()).spawn().unwrap();
     let (mut stdin, stdout) = (child.stdin.take().unwrap(), child.stdout.take().unwrap());
@@ -465,7 +465,7 @@ fn eval_in_the_format_of_testfloat() {
     assert!(child.wait().unwrap().success());
 }
 
-/// Replaces `in cycle 12` by `in cycle N`: cycles depend on latencies, which are not under test here.
+/// Replaces `in cycle 12` by `in cycle N`: cycles depend on latencies, which this test does not cover.
 fn without_cycles(text: &str) -> String {
     let mut pieces = text.split("in cycle ");
     let mut out = pieces.next().unwrap().to_owned();
@@ -488,13 +488,13 @@ fn nan_on_an_output_is_a_warning() {
     assert_eq!(columns(&folder.read_text("out.csv"))["F"], [["NaN"; 7].as_slice(), &["inf"]].concat());
     let json = folder.line("run nan.s --inputs in.csv --json").stdout;
     assert!(json.contains("\"nan_writes\": 7"), "{json}");
-    // A program without periods is treated alike.
+    // Programs without periods behave in the same way.
     folder.write("once.s", ".output F\n fdiv F, zero, zero\n halt\n");
     let done = folder.line("run once.s");
     assert_eq!(without_cycles(&done.stderr), "warning: NaN written to F in cycle N by bundle 0 (once.s:2)\n");
 }
 
-/// Rows have a maximal length, tables have none; any source and any line ends are accepted.
+/// Rows have a maximum length, tables do not; any source and any line endings are accepted.
 #[test]
 fn long_tables() {
     let folder = Folder::new();
@@ -504,12 +504,12 @@ fn long_tables() {
     let json = folder.fed("run sum.s --inputs - --json", table.as_bytes()).ok();
     let json: serde_json::Value = serde_json::from_str(&json).unwrap();
     assert_eq!((&json["periods"], &json["outputs"]["k"]), (&rows.into(), &rows.into()));
-    // --periods stops earlier.
+    // --periods ends the run earlier.
     let text = folder.fed("run sum.s --inputs - --outputs - --periods 3", table.as_bytes()).ok();
     assert_eq!(columns(&text)["k"], ["1", "2", "3"]);
 }
 
-/// Input ports without a value are 0 in all commands that run programs.
+/// Input ports without values are 0, in all commands that run programs.
 #[test]
 fn without_inputs_the_ports_are_zero() {
     let folder = Folder::new();
@@ -526,7 +526,7 @@ fn without_inputs_the_ports_are_zero() {
     );
     let debug = folder.fed("debug law.s", b"goto period 1\nprint F, k, a\n").ok();
     assert!(debug.contains("F = 1.0") && debug.contains("k = 2"), "{debug}");
-    // A program without periods is treated alike.
+    // Programs without periods behave in the same way.
     folder.write("once.s", ".input a\n.output F\n fadd F, a, 1.0\n halt\n");
     assert!(folder.line("run once.s").ok().contains("F = 1.0"));
 }
@@ -567,7 +567,7 @@ fn asm_reports_transformations_of_the_source() {
     folder.line(&format!("asm {source} --readmemh memories")).ok();
     let code = folder.read_text("memories/code_mul.hex");
     assert_eq!(code.lines().count() as u64, json["bundles"].as_u64().unwrap());
-    // For unscheduled code only size and memories are printed, without blocks.
+    // For unscheduled code, only size and memories are printed; there are no blocks.
     let unscheduled = folder.line(&format!("asm {source} -o image --schedule off")).ok();
     assert_eq!(unscheduled.lines().count(), 2, "{unscheduled}");
 }
@@ -595,7 +595,7 @@ fn the_plot_shows_the_path() {
     ] {
         assert!(svg.contains(text), "{text}");
     }
-    // The cutting moves form one polyline, as wide as high; the legend's is shorter.
+    // The cutting moves form one polyline that is as wide as high; the legend's is shorter.
     let lines = svg.lines().filter(|line| line.starts_with("<polyline") && line.contains("1F4E9C"));
     let line = lines.max_by_key(|line| line.len()).unwrap();
     let points = line.split("points=\"").nth(1).unwrap().split('"').next().unwrap();
@@ -615,11 +615,11 @@ fn the_plot_shows_the_path() {
         extent(|p| p.1)
     );
     assert_eq!(folder.line("track --gcode square.ngc --plot -").ok(), svg);
-    // Deviations are lines beside the path, some millimetres away: their end points are not on it.
+    // Deviations are lines some millimetres beside the path, so their end points are not on it.
     let deviating = svg.lines().filter(|line| line.starts_with("<polyline") && line.contains("D08810"));
     let longest = deviating.map(|line| line.matches(',').count()).max().unwrap_or(0);
     assert!(longest > 20, "{longest} points");
-    // The plot on the terminal, in dots; in a pipe without colours.
+    // The plot for the terminal, in dots; without colours in a pipe.
     let drawn = folder.line("track --gcode square.ngc --plot").ok();
     for text in [
         "Tool path of square.ngc",
@@ -663,7 +663,7 @@ fn references() {
     }
 }
 
-/// Memory depths in a machine's name, on the command line or in the source, from assembler to circuit.
+/// Memory depths in the name of a machine, on the command line or in the source, from assembler to circuit.
 #[test]
 fn memories_of_other_depths() {
     let folder = Folder::new();
@@ -708,7 +708,7 @@ fn memories_of_other_depths() {
     assert!(folder.read_text("circuit/takt_t3_data_8192.v").contains("module takt_t3_data_8192 "));
 }
 
-/// Options and operands introduced in a help text, and whether each has an explanation beside or below it.
+/// Options and operands that a help text introduces, and whether an explanation follows beside or below each.
 fn explained(help: &str) -> BTreeMap<String, bool> {
     let lines: Vec<&str> = help.lines().collect();
     let begins = |line: &str, what: &[&str]| what.iter().any(|what| line.starts_with(what));
@@ -725,14 +725,14 @@ fn explained(help: &str) -> BTreeMap<String, bool> {
     entries.map(entry).collect()
 }
 
-/// Options named in a text, without their values: `--gcode`, `-m`, `-D` of `-DNDEBUG`.
+/// Options that a text names, without their values: `--gcode`, `-m`, `-D` of `-DNDEBUG`.
 fn options(text: &str) -> Vec<&str> {
     let words = text.split(|c: char| !(c.is_ascii_alphanumeric() || c == '-'));
     let options = words.filter(|word| word.starts_with('-') && !word.trim_start_matches('-').is_empty());
     options.map(|word| if word.starts_with("--") { word } else { &word[..2] }).collect()
 }
 
-/// Commands listed in a help text.
+/// Commands that a help text lists.
 fn commands(help: &str) -> Vec<&str> {
     let list = help.split_once("\nCommands:\n").unwrap().1.split("\n\n").next().unwrap();
     let names = list.lines().filter(|line| line.starts_with("  ") && !line.starts_with("   "));
@@ -769,7 +769,7 @@ fn help() {
         for line in text.lines() {
             assert!(line.chars().count() <= 100, "{line}");
         }
-        // Text beside an example is a comment; a bar separates programs.
+        // Text beside an example is a comment; a vertical bar separates programs.
         let programs = text.lines().filter_map(|line| line.trim().split("  ").next()?.split(" | ").into());
         for example in programs.flatten().filter_map(|program| program.strip_prefix("takt ")) {
             let command = example.split(' ').next().unwrap();
@@ -804,7 +804,7 @@ fn a_closed_pipe_is_no_error() {
         let done = RunOutput::from(child.wait_with_output().unwrap());
         assert_eq!((done.status, done.stderr.as_str()), (Some(0), ""), "{line}");
     }
-    // Interrupted in the middle of its work.
+    // Interrupt the command while it is working.
     let mut child = folder.command(&["eval", "fneg"]).stdin(Stdio::piped()).spawn().unwrap();
     let mut stdin = child.stdin.take().unwrap();
     drop(child.stdout.take());
@@ -867,7 +867,7 @@ fn names_of_files_need_not_be_text() {
     assert_eq!(done.stderr, "error: cannot open no\u{fffd}: No such file or directory\n");
 }
 
-/// An output through a symbolic link writes the target and keeps its permissions; devices are written directly.
+/// An output through a symbolic link replaces the target and keeps its permissions; devices are written directly.
 #[cfg(unix)]
 #[test]
 fn outputs_go_to_the_named_files() {
@@ -882,7 +882,7 @@ fn outputs_go_to_the_named_files() {
     assert!(folder.path().join("link").is_symlink());
     assert!(folder.read("real").starts_with(b"\x7fELF"));
     assert_eq!(std::fs::metadata(&real).unwrap().permissions().mode() & 0o777, 0o640);
-    // Anything but a regular file is written, never replaced. The test uses a pipe: a bug would destroy /dev/null.
+    // Files other than regular ones are written, never replaced. The test uses a pipe, since a bug would destroy /dev/null.
     let pipe = folder.path().join("pipe");
     assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
     let reader = std::thread::spawn({
@@ -898,7 +898,7 @@ fn outputs_go_to_the_named_files() {
     assert_eq!((done.status, done.stderr.as_str()), (Some(1), "error: cannot write real: it is read-only\n"));
 }
 
-/// Rows completed before a fault are written to files and pipes alike; without rows, and after a mistake in the inputs, a file stays
+/// Rows completed before a fault are written, to files and to pipes; without rows, and after a mistake in the inputs, a file is left
 /// unchanged.
 #[test]
 fn keeps_rows_completed_before_a_fault() {
@@ -909,7 +909,7 @@ fn keeps_rows_completed_before_a_fault() {
     folder.write("faults.csv", "i\n0\n1\n0\n99999\n1\n");
     folder.write("at-once.csv", "i\n99999\n1\n");
     folder.write("wrong.csv", "i\n1\n0\nx\n");
-    // Program, inputs, completed rows, and whether they are kept.
+    // Program, inputs, completed rows, and whether the rows are kept.
     for (program, inputs, rows, keeps) in [
         ("table.s", "faults.csv", 3, true),
         ("table.s", "wrong.csv", 2, false),
@@ -931,7 +931,7 @@ fn keeps_rows_completed_before_a_fault() {
     assert!(folder.list().iter().all(|name| !name.contains("partial")), "{:?}", folder.list());
 }
 
-/// Equal loop iterations share a line with a count.
+/// Identical loop iterations share a line, with a count.
 #[test]
 fn stalls_of_a_loop_are_one_line() {
     const LOOP: &str = ".input x\n.output y\n.reg n:int s\n.once\n wait p\n.period\np: li n, 12\n mov s, x\nturn: fmul s, s, x\n fadd s, s, x\n isub n, n, 1\n bnz n, turn\n mov y, s\n wait p\n";
@@ -958,7 +958,7 @@ fn stalls_of_a_loop_are_one_line() {
     assert!(json["cycles"].as_u64().unwrap() > all);
 }
 
-/// A command name of another tool, or of similar meaning, is answered with Takt's command.
+/// For a command name from another tool, or one of similar meaning, the error suggests Takt's command.
 #[test]
 fn unknown_commands_suggest_existing_ones() {
     let folder = Folder::new();
@@ -976,7 +976,7 @@ fn unknown_commands_suggest_existing_ones() {
     assert!(!done.stderr.contains("takt run"), "{}", done.stderr);
 }
 
-/// States outside their range at the start, and hazards, are reported and decide the exit status.
+/// States outside their ranges at the start, and hazards, are reported and determine the exit status.
 #[test]
 fn hidden_rows_count_for_the_status_of_accuracy() {
     let folder = Folder::new();
@@ -1039,7 +1039,7 @@ fn run_shows_words_of_data_memory() {
         ]
     );
     assert!(folder.line("run sums.s --periods 1 --memory P").ok().contains("  P[2,2] = 4.0\n"));
-    // Words behind a label count from 0, as addresses do.
+    // Words after a label are counted from 0, like addresses.
     let table = folder.line("run sums.s --periods 1 --memory table --memory table[1]").ok();
     assert!(table.contains("  table[0] = 5.0\n  table[1] = 6.0\n  table[1] = 6.0\n"), "{table}");
     for (name, says) in [

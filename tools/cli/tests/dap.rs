@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The command `takt dap` with clients: on standard input and output, on a socket, and with Microsoft's test client.
+//! The command `takt dap` with several clients: on standard input and output, on a socket, and with Microsoft's test client.
 
 use crate::common;
 mod systems;
@@ -9,7 +9,7 @@ use crate::common::{Folder, SUM};
 use serde_json::{Value, json};
 use std::process::Command;
 
-/// A launched session, stopped at its beginning.
+/// Launches a session, which stops at its beginning.
 fn launched(folder: &Folder, configuration: Value) -> Client {
     let mut client = Client::start(folder, "dap");
     assert_eq!(client.command("initialize", json!({ "adapterID": "takt" }))["success"], true);
@@ -30,7 +30,7 @@ fn ok(client: &mut Client, command: &str, arguments: Value) -> Value {
     answer["body"].clone()
 }
 
-/// Sends a request that ends in a stop; returns the reason and the line.
+/// Sends a request that leads to a stop; returns the reason and the line.
 fn go(client: &mut Client, command: &str, arguments: Value) -> (String, u64) {
     ok(client, command, arguments);
     let body = client.event("stopped")["body"].clone();
@@ -92,11 +92,11 @@ fn reports_a_broken_configuration() {
         let text = answer["body"]["error"]["variables"]["text"].as_str().unwrap();
         assert!(text.contains(told), "{configuration}: {text}");
     }
-    // Many clients show only one line, so it contains the place.
+    // Many clients show only one line, so it must contain the place.
     let answer = client.command("launch", json!({ "program": "wrong.s" }));
     let line = answer["message"].as_str().unwrap();
     assert_eq!(line, "wrong.s:1:1: error[unknown-instruction]: there is no instruction or macro `fad`");
-    // After all errors a launch still succeeds; fields added by clients are accepted.
+    // After all these errors a launch still succeeds; additional fields from clients are accepted.
     let socket = json!({ "program": "sum.s", "host": "localhost", "debugServer": 4711 });
     assert_eq!(client.command("launch", socket)["success"], true);
     assert_eq!(client.command("launch", json!({ "program": "sum.s" }))["success"], false);
@@ -169,7 +169,7 @@ fn steps_forward_and_back_in_the_editor() {
     let answer = ok(&mut client, "setBreakpoints", breakpoints);
     assert_eq!(answer["breakpoints"][0]["verified"], true);
     assert_eq!(start(&mut client)["reason"], "entry");
-    // The first step has an effect, although the first bundle is not yet about to issue.
+    // The first step has an effect, although the first bundle is not about to issue yet.
     assert_eq!(go(&mut client, "next", json!({ "threadId": 1 })), ("step".to_owned(), 4));
     assert_eq!(go(&mut client, "continue", json!({ "threadId": 1 })), ("breakpoint".to_owned(), 12));
     assert_eq!(value(&mut client, "i"), "1");
@@ -205,7 +205,7 @@ fn steps_forward_and_back_in_the_editor() {
     end(client);
 }
 
-/// An endless program is stopped by `pause`, and ends with its client.
+/// `pause` stops an endless program, which ends with its client.
 #[test]
 fn a_running_program_can_be_paused() {
     let folder = Folder::new();
@@ -254,7 +254,7 @@ turn:   isub    n, n, 1
     go(&mut client, "stepBack", json!({ "threadId": 1 }));
     end(client);
 
-    // A fault always stops, without a filter.
+    // A fault always stops the program, even without a filter.
     folder.write("read.s", ".reg _a i:int\n li i, 5000\n ld _a, [i]\n halt\n");
     let mut client = launched(&folder, json!({ "program": "read.s" }));
     start(&mut client);
@@ -263,7 +263,7 @@ turn:   isub    n, n, 1
     end(client);
 }
 
-/// A run without debugging: stops are ignored, and its end ends the session.
+/// A run without debugging ignores stops, and ends the session when it ends.
 #[test]
 fn runs_without_debugging() {
     let folder = Folder::new();
@@ -298,7 +298,7 @@ fn a_missed_deadline_stops() {
     end(client);
 }
 
-/// The closed loop starts at the largest tracking error.
+/// The session on the closed loop starts at the largest tracking error.
 #[test]
 fn attaches_to_the_closed_loop() {
     let folder = Folder::new();
@@ -323,7 +323,7 @@ fn listens_on_a_socket() {
     let mut line = String::new();
     BufReader::new(child.stderr.take().unwrap()).read_line(&mut line).unwrap();
     let address = line.trim().strip_prefix("listening on ").unwrap().to_owned();
-    // Clients are served one after the other.
+    // Clients are served one after another.
     for _ in 0..2 {
         let mut stream = std::net::TcpStream::connect(&address).unwrap();
         let text =
@@ -341,7 +341,7 @@ fn listens_on_a_socket() {
     assert_eq!(folder.line("dap --listen nowhere").status, Some(1));
 }
 
-/// Emacs's dap-mode, with the repository's configuration.
+/// Emacs's dap-mode, with the repository's configuration file.
 #[test]
 fn emacs_debugs_a_program() {
     let folder = Folder::new();

@@ -19,12 +19,12 @@ fn a_script() {
         folder.fed("debug sum.s -m f3", &script).ok(),
         folder.fed("debug sum.s -m f3 --script -", &script).ok()
     );
-    // An image contains everything that its source has.
+    // An image contains everything from its source.
     folder.line("asm sum.s -m f3 -o sum.takt").ok();
     assert_eq!(folder.line("debug sum.takt --script good.txt").ok(), said);
 }
 
-/// An image carries the assembled source, independent of later changes to the file, unless it is stripped.
+/// An image contains the assembled source, independent of later changes to the file, unless it is stripped.
 #[test]
 fn the_source_of_an_image() {
     let folder = Folder::new();
@@ -83,7 +83,7 @@ fn mistakes() {
         assert_eq!(done.stdout, "", "{line}");
         text.push_str(&format!("$ takt {line}\n[{}]\n{}\n", done.status.unwrap(), done.stderr));
     }
-    // A wrong command does not end the session; the exit status reports it.
+    // A wrong command does not end the session, but determines the exit status.
     for command in [
         "step sideways",
         "break nowhere",
@@ -116,7 +116,7 @@ fn mistakes() {
 fn in_the_closed_loop() {
     let folder = Folder::new();
     let text = folder.fed("debug --track --periods 300", b"print F1, x\nback period\nstep period\n").ok();
-    // The schedule of the program is not under test here.
+    // The schedule of the program is not under test.
     let worst = "programs/hybrid/tracking.s along agh.ngc, 300 periods: the largest tracking error is 5.53";
     assert!(text.starts_with(worst) && text.contains("in period 115 (not cutting)"), "{text}");
     let places: Vec<&str> = text.lines().filter(|line| line.starts_with("cycle ")).collect();
@@ -124,7 +124,7 @@ fn in_the_closed_loop() {
     assert!(begin.contains(", period 115: bundle ") && begin.ends_with(", period issues"), "{begin}");
     assert!(back.contains(", period 115: waits for the tick"), "{back}");
     assert!(on.contains(", period 116: waits for the tick"), "{on}");
-    // The session runs the recorded inputs.
+    // The session uses the recorded inputs.
     folder.line("track --periods 300 --csv rec.csv -q").ok();
     let rows = folder.read_text("rec.csv");
     let (title, row) = (rows.lines().next().unwrap(), rows.lines().nth(201).unwrap());

@@ -4,7 +4,7 @@
 use crate::common::Folder;
 use serde_json::{Value, json};
 
-/// Divides by its input, then clears the flags: raised flags count nevertheless.
+/// Divides by its input, then clears the flags; raised flags must count nevertheless.
 const LAW: &str = "\
 .input x, y
 .output q, p
@@ -55,12 +55,12 @@ fn reports_event_first_place_and_count() {
     assert_eq!(deny("overflow,nan"), (Some(3), json!([overflow]), overflow_text.clone()));
     assert_eq!(deny("all"), (Some(3), json!([by_zero, overflow]), format!("{by_zero_text}{overflow_text}")));
     assert_eq!(deny("missed,invalid,nan"), (Some(0), json!([]), String::new()));
-    // A trace of any part of the run changes nothing.
+    // A trace of any part of the run does not change the result.
     for options in ["", "--trace-cycles 60..70"] {
         let done = folder.line(&format!("run law.s --inputs in.csv --deny all --trace t.jsonl {options}"));
         assert_eq!((done.status, done.stderr), (Some(3), format!("{by_zero_text}{overflow_text}")));
     }
-    // Results are complete and independent of --deny.
+    // Results are complete whether or not --deny is given.
     let with = folder.line("run law.s --inputs in.csv --outputs with.csv --deny all");
     assert_eq!(with.stdout, folder.line("run law.s --inputs in.csv --outputs without.csv").ok());
     assert_eq!(folder.read_text("with.csv"), folder.read_text("without.csv"));
@@ -142,7 +142,7 @@ fn names() {
         assert_eq!(done.status, Some(2), "{what}");
         assert!(done.stderr.contains(reason), "{}", done.stderr);
     }
-    // A fault is still an error.
+    // A fault remains an error.
     folder.write("falls.s", ".output F\n fadd F, zero, zero\n");
     assert_eq!(folder.line("run falls.s --deny all").status, Some(1));
 }

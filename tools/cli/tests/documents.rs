@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Console listings of documents equal the commands' output: all blocks ```` ```console ```` after a line `<!-- output -->`.
+//! Console listings in documents equal the commands' output: all blocks ```` ```console ```` after a line `<!-- output -->`.
 //!
-//! `TAKT_BLESS=1` writes the present output. A line `…` stands for omitted lines; after it, each line matches the next equal line of the
-//! output, or else the next with the same first word, and the part after the last `…` extends to the output's end. A command without lines
-//! below shows nothing. Lines `(takt) …` are typed. Commands run in a folder with the project's programs and the document's named listings
-//! (`<!-- listing: NAME -->`), as NAME.s.
+//! `TAKT_BLESS=1` writes the current output. A line `…` stands for omitted lines; after it, each line matches the next equal line of the
+//! output, or else the next with the same first word, and the part after the last `…` extends to the end of the output. A command without
+//! lines below it shows no output. Lines `(takt) …` are typed. Commands run in a folder that has the project's programs and the
+//! document's named listings (`<!-- listing: NAME -->`), as NAME.s.
 
 use crate::common::Folder;
 use std::path::{Path, PathBuf};
@@ -14,7 +14,7 @@ use takt_programs::listings::listings;
 const MARK: &str = "<!-- output -->";
 const DOTS: &str = "…";
 
-/// A command of a block, with the output shown below it.
+/// A command of a block, with the output that follows it.
 struct DocumentedCommand {
     command: String,
     lines: Vec<String>,
@@ -38,7 +38,7 @@ fn commands(block: &[&str]) -> Vec<DocumentedCommand> {
     all
 }
 
-/// Output of a command, with standard error.
+/// Output of a command, including standard error.
 fn printed(folder: &Folder, shown: &DocumentedCommand) -> Vec<String> {
     let takt = Path::new(env!("CARGO_BIN_EXE_takt")).parent().unwrap().display();
     let path = format!("{takt}:{}", std::env::var("PATH").unwrap());
@@ -56,14 +56,14 @@ fn printed(folder: &Folder, shown: &DocumentedCommand) -> Vec<String> {
     String::from_utf8(output.stdout).unwrap().lines().map(|line| line.trim_end().to_owned()).collect()
 }
 
-/// Updated output lines of a command; empty if none are shown.
+/// Updated output lines of a command; empty if the document shows none.
 fn renewed(document: &Path, shown: &DocumentedCommand, printed: Vec<String>) -> Vec<String> {
     if shown.lines.is_empty() {
         return Vec::new();
     }
     let first = |line: &str| line.split_whitespace().next().map(str::to_owned);
     let mut rest = &printed[..];
-    // The next equal line of the output, or else the next with the same first word.
+    // Next equal line of the output, or else the next with the same first word.
     let find = |rest: &mut &[String], line: &String| {
         let same = rest.iter().position(|one| one == line);
         let found = same.or_else(|| rest.iter().position(|one| first(one) == first(line)));
@@ -82,7 +82,7 @@ fn renewed(document: &Path, shown: &DocumentedCommand, printed: Vec<String>) -> 
             lines.extend(begins.map(|line| find(&mut rest, line)));
         }
         match pieces.peek() {
-            // The last part extends to the output's end.
+            // The last part extends to the end of the output.
             None if number == 0 || begins.is_some() => lines.extend_from_slice(rest),
             None => {}
             Some(_) => {
@@ -94,7 +94,7 @@ fn renewed(document: &Path, shown: &DocumentedCommand, printed: Vec<String>) -> 
     lines
 }
 
-/// Document text with every marked block updated.
+/// Text of a document with every marked block updated.
 fn document(path: &Path, text: &str) -> String {
     let folder = Folder::new();
     copy(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../programs")), &folder.path().join("programs"));

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The command `takt explore`: its rows are valid machines for other commands, its cycles equal `takt run`'s, and its results are cached.
+//! The command `takt explore`: its rows are valid machines for other commands, its cycles equal those of `takt run`, and its results are
+//! cached.
 
 use crate::common::{Folder, RunOutput};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
-/// Two sums and products that gain from a second adder and a second multiplier.
+/// Two sums and two products, which gain from a second adder and a second multiplier.
 const SUMS: &str = "\
 .input a b c d
 .output y z
@@ -48,7 +49,7 @@ fn rows_are_machines_and_cycles_are_the_runs() {
     assert!(new > 0, "{text}");
     assert_eq!(folder.read_text("front.csv").lines().count(), front.len() + 1);
     assert!(folder.read_text("front.svg").contains("<circle"));
-    // A second search takes all results from the cache.
+    // A second search finds all results in the cache.
     assert_eq!(folder.line(line).ok(), text);
 }
 
@@ -64,8 +65,8 @@ fn a_budget_is_kept() {
     }
 }
 
-/// Workers of a HyperQueue server find the same front as this process. HyperQueue is in the Python environment made by `cargo xtask test`
-/// (`TAKT_VENV`, or `.venv`).
+/// Workers of a HyperQueue server find the same front as this process. HyperQueue is in the Python environment that `cargo xtask test`
+/// creates (`TAKT_VENV`, or `.venv`).
 #[test]
 fn a_search_elsewhere_is_the_same() {
     let folder = workshop();
@@ -74,7 +75,7 @@ fn a_search_elsewhere_is_the_same() {
     let line = |more: &str, cache: &str| {
         let line = format!("explore sums.s --candidates 30 --effort 0 --json{more}");
         let mut command = folder.command(&line.split(' ').collect::<Vec<_>>());
-        // A separate cache: otherwise earlier results would answer.
+        // Use a separate cache; otherwise earlier results would be found.
         command.env("XDG_CACHE_HOME", folder.path().join(cache)).env("TAKT_VENV", &venv);
         RunOutput::of(command).ok()
     };
@@ -89,7 +90,7 @@ fn mistakes() {
     let folder = workshop();
     folder.write("named.s", format!(".machine t3\n{SUMS}"));
     folder.write("wrong.s", "fad a, b\n");
-    // A valid machine row without a circuit: a branch takes too few cycles.
+    // A valid machine row that has no circuit: a branch takes too few cycles.
     let row = folder.line("machines t3 --toml").ok().replace("name = \"t3\"", "name = \"bare\"");
     folder.write("bare.toml", row.replace("refill = 6", "refill = 4"));
     let mut text = String::new();

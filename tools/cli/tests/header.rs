@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The option `takt asm --header`: headers, read by the compilers and tools of each language.
+//! The option `takt asm --header`: headers checked by compilers and tools of each language.
 
 use crate::common::Folder;
 use std::process::Command;
 
-/// Port names that are keywords in other languages, or indistinguishable there.
+/// Port names that are keywords in other languages, or that these cannot distinguish.
 const PROGRAM: &str = "
 .ports  latched
 .input  x, n:int @ 7, type, X:bits, self
@@ -35,7 +35,7 @@ fn write(language: &str, file: &str) -> Folder {
     folder.write("2-pd*.s", PROGRAM);
     let done = folder.line(&format!("asm 2-pd*.s --header {language} --header-file {file}"));
     assert!(done.ok().contains("assembled"));
-    // To standard output: the same text, without an image.
+    // To standard output: the same text, and no image.
     assert_eq!(folder.line(&format!("asm 2-pd*.s --header {language}")).ok(), folder.read_text(file));
     assert!(!folder.path().join("2-pd*.takt").exists());
     folder
@@ -119,7 +119,7 @@ fn json_equals_the_loaders_words() {
     };
     assert_eq!(port("inputs", 1), ("n".into(), 7.into(), 0x1007.into(), "int".into()));
     assert_eq!(port("outputs", 4), ("p_q".into(), 31.into(), 0x201f.into(), "bits".into()));
-    // Nonzero words of the circuit's own memory image.
+    // Nonzero words of the circuit's memory image.
     folder.line("rtl -o out --program 2-pd*.s").ok();
     let hex = folder.read_text("out/program.hex");
     let image = hex.lines().filter(|line| !line.starts_with("//")).map(|line| {
@@ -132,7 +132,7 @@ fn json_equals_the_loaders_words() {
     };
     let records = json["load"]["records"].as_array().expect("a list");
     assert_eq!(records.iter().map(record).collect::<Vec<_>>(), image);
-    // Bounds equal `takt bound`'s.
+    // The bounds equal those of `takt bound`.
     let bound: serde_json::Value =
         serde_json::from_str(&folder.line("bound 2-pd*.s --json").ok()).expect("JSON");
     assert_eq!(json["cycles"][1]["cycles"], bound["sections"][1]["in_time"]);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! LinuxCNC's component `tools/linuxcnc/hal_takt.c`, compiled without LinuxCNC into a program that calls it like the servo thread, on an
-//! emulated board with the hybrid robot. With LinuxCNC: `cargo evidence linuxcnc`.
+//! emulated board with the hybrid robot. With LinuxCNC itself: `cargo evidence linuxcnc`.
 #![cfg(unix)]
 
 use crate::common::{Folder, SimulatedBoard, source};
@@ -24,12 +24,12 @@ fn board(more: &str) -> String {
     format!("board sim --robot --serve --wiring {wiring} --program {system} {more}")
 }
 
-/// Runs the component; returns its messages from both outputs.
+/// Runs the component; returns its messages from standard output and standard error.
 fn drive(folder: &Folder, port: &str, timeout: u32) -> (String, String) {
     drive_with(folder, port, timeout, &[])
 }
 
-/// The same with parameters, as `loadrt` gives them.
+/// Runs the component with parameters, in the form that `loadrt` passes.
 fn drive_with(folder: &Folder, port: &str, timeout: u32, parameters: &[&str]) -> (String, String) {
     let mut harness = Command::new(folder.path().join("harness"));
     let harness = harness.args([port, "3000000", &timeout.to_string()]).args(parameters);
@@ -43,7 +43,7 @@ fn number(said: &str, name: &str) -> f64 {
     words.nth(1).and_then(|word| word.parse().ok()).unwrap_or_else(|| panic!("no {name}: {said}"))
 }
 
-/// Number of periods that a board records after the drive; then it writes the file.
+/// Number of periods that a board records after the drive, before it writes the file.
 const AFTER: usize = 100;
 /// Time limit for the recording after the host has ended.
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -84,7 +84,7 @@ fn the_component_drives_the_robot() {
     let error = number(&said, "error");
     assert!(error > 1e-4 && error < 0.02, "{said}");
     assert_eq!(number(&said, "knots"), 220.0);
-    // A second drive, from the present position.
+    // A second drive, which starts at the current position.
     let (said, errors) = drive(&folder, &board.port, 30_000);
     assert_eq!((errors.as_str(), number(&said, "code")), ("", 0.0), "{said}");
     assert!((number(&said, "moved") - 5.0).abs() < 1e-3, "{said}");
@@ -106,7 +106,7 @@ fn the_robots_hal_file_is_written_by_a_command() {
     );
 }
 
-/// A system whose ends at the host lie elsewhere is driven by the same component, with the parameters that `takt board hal` writes.
+/// The same component drives a system with other addresses at the host, given the parameters that `takt board hal` writes.
 #[test]
 fn another_system_needs_no_c() {
     let folder = Folder::new();
@@ -117,7 +117,7 @@ fn another_system_needs_no_c() {
     let text = text.replace("program = \"tracking.s\"", &program("tracking.s"));
     let first = "[[wire]]\nfrom = \"host.n1\"\nto = \"interpolation.n1\"";
     assert!(text.contains(first));
-    // One more value that the host sees, ahead of the snapshot.
+    // Place one more host value before the snapshot.
     let more = "[[wire]]\nfrom = \"interpolation.pop\"\nto = \"host.taken\"\n\n";
     folder.write("other.toml", text.replace(first, &format!("{more}{first}")));
     let wiring = source("followed_board.toml");
@@ -130,7 +130,7 @@ fn another_system_needs_no_c() {
     let (said, errors) = drive_with(&folder, &board.port, 30_000, &parameters);
     assert_eq!((errors.as_str(), number(&said, "code")), ("", 0.0), "{said}");
     assert!((number(&said, "moved") - 5.0).abs() < 1e-3, "{said}");
-    // Encoders as they are: arms of 893 mm, and two angles.
+    // Encoders without conversion: arms of 893 mm, and two angles.
     let direct = ["joints=LLLRR", "geometry=direct", "counts=2.5e-7:2.5e-7:2.5e-7:1e-5:1e-5"];
     let (said, errors) = drive_with(&folder, &board.port, 30_000, &direct);
     assert_eq!(errors, "");

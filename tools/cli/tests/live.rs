@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! `takt live` on a simulated board: elements of arrays by the names that the source has, settings, the stream as it comes, the reason for
+//! `takt live` on a simulated board: array elements by their names in the source, settings, the stream as it arrives, and the reason for
 //! safe outputs.
 #![cfg(unix)]
 
@@ -7,7 +7,7 @@ use crate::common::{Folder, SimulatedBoard};
 use std::io::{BufRead, BufReader};
 use std::process::{Command, Stdio};
 
-/// Arrays in data memory and in registers, a table behind a label.
+/// Arrays in data memory and in registers, and a table after a label.
 const PROGRAM: &str = "\
 .input  n:int, gain
 .output duty, k:int
@@ -63,7 +63,7 @@ fn board(folder: &Folder) -> SimulatedBoard {
     SimulatedBoard::start(line, folder.path())
 }
 
-/// An array's element has one name in the source, on a board, in a run and in the debugger; so has a word behind a label.
+/// An array element, or a word after a label, has the same name in the source, on a board, in a run and in the debugger.
 #[test]
 fn values_have_the_names_of_the_source() {
     let folder = folder();
@@ -90,7 +90,7 @@ fn values_have_the_names_of_the_source() {
             "{name}: {done:?}"
         );
     }
-    // The same names elsewhere: in a run, where the count is that of its periods, and in the debugger.
+    // The same names in a run, whose count is that of its periods, and in the debugger.
     let run = folder
         .line("run arrays.s --machine t1 --periods 3 --memory M[2,3] --memory v --memory table[3]")
         .ok();
@@ -103,7 +103,7 @@ fn values_have_the_names_of_the_source() {
         assert!(debugged.contains(says), "{says}: {debugged}");
     }
 
-    // Settings: a port of the host's, between two periods; all else is refused by name, before the port is opened.
+    // Settings: ports from the host, between two periods. Everything else is refused by name, before the port is opened.
     live("set gain=0.25").ok();
     assert!(
         (0..50).any(|_| read("duty") == "duty = 0.125\n"),
@@ -127,7 +127,7 @@ fn values_have_the_names_of_the_source() {
     ));
     assert!(wired.stderr.contains("`n` cannot be set: the wiring connects it to "), "{wired:?}");
 
-    // Why outputs are safe, from the board itself and as it happened.
+    // The reason for safe outputs: from the board itself, and from the live report.
     assert!(
         live("status").ok().starts_with("the program runs; outputs drive\n  periods "),
         "{:?}",
@@ -143,8 +143,7 @@ fn values_have_the_names_of_the_source() {
     assert!(told.contains(" ms: the outputs become safe: it is stopped\n"), "{told}");
 }
 
-/// Lines of a stream come one by one: some thousand fit into the buffer of an output that nobody reads at once, and those after the first
-/// that was read are fewer.
+/// Lines of a stream are printed one by one: an output buffer would hold back about a thousand lines; fewer may follow the first one read.
 #[test]
 fn a_stream_is_printed_as_it_comes() {
     let folder = folder();

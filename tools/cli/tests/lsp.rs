@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The command `takt lsp` with clients: on standard input and output, and with Neovim.
+//! The command `takt lsp` with two clients: on standard input and output, and Neovim.
 
 use crate::common::protocol::Client;
 use crate::common::{Folder, source};
@@ -63,7 +63,7 @@ impl Session {
         text.replace(from, to)
     }
 
-    /// The next published diagnostics of a document.
+    /// Next published diagnostics of a document.
     fn told(&mut self, name: &str) -> Vec<Value> {
         let uri = self.uri(name);
         let message = self.client.wait(|message| {
@@ -88,7 +88,7 @@ impl Session {
         self.client.ask("textDocument/rename", params)
     }
 
-    /// Texts after a workspace edit.
+    /// Texts of the files after a workspace edit.
     fn applied(&self, answer: &Value, files: &[(&str, &str)]) -> Vec<String> {
         assert!(answer.get("error").is_none(), "{answer}");
         let changes = answer["result"]["changes"].as_object().unwrap();
@@ -109,7 +109,7 @@ impl Session {
                 for edit in edits {
                     let (line, from) = start(&edit);
                     let to = edit["range"]["end"]["character"].as_u64().unwrap();
-                    // All texts are ASCII, so columns are bytes.
+                    // All texts are ASCII, so columns equal bytes.
                     lines[line as usize]
                         .replace_range(from as usize..to as usize, edit["newText"].as_str().unwrap());
                 }
@@ -133,7 +133,7 @@ fn position(text: &str, of: &str, more: usize) -> Value {
     json!({ "line": text[..at].matches('\n').count(), "character": text[start..at].encode_utf16().count() })
 }
 
-/// Diagnostics of `takt asm` for a file: code, message and first place of each.
+/// Diagnostics of `takt asm` for a file: code, message and first place.
 fn told_by_asm(folder: &Folder, file: &str) -> Vec<(String, String, u64, u64)> {
     let done = folder.line(&format!("asm {file} --check --json"));
     let json: Value = serde_json::from_str(&done.stdout).unwrap();
@@ -164,7 +164,7 @@ fn shown(told: &[Value], text: &str) -> Vec<(String, String, u64, u64)> {
     list
 }
 
-/// All mistakes of the assembler's tests: server and `takt asm` report the same.
+/// For all mistakes in the assembler's tests, server and `takt asm` report the same diagnostics.
 #[test]
 fn diagnostics_are_those_of_the_assembler() {
     let mistakes = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../asm/tests/mistakes");
@@ -173,7 +173,7 @@ fn diagnostics_are_those_of_the_assembler() {
     for entry in std::fs::read_dir(mistakes).unwrap() {
         let path = entry.unwrap().path();
         let Ok(text) = std::fs::read_to_string(&path) else { continue };
-        // Sources for another machine are assembled for this one, with other mistakes, as in the server.
+        // Assemble sources for other machines for this one, as the server does, which gives other mistakes.
         let name = format!("{compared}/main.s");
         std::fs::create_dir(session.folder.path().join(compared.to_string())).unwrap();
         session.folder.write(&name, &text);
@@ -184,7 +184,7 @@ fn diagnostics_are_those_of_the_assembler() {
         }
         let mut told = shown(&session.open(&name, &text), &text);
         if told != expected {
-            // Diagnostics of the assembler come first; the scheduler's follow when it is done.
+            // Diagnostics of the assembler come first; those of the scheduler follow when it is done.
             assert!(
                 told.iter().all(|one| expected.contains(one)),
                 "{}: {told:?} {expected:?}",
@@ -247,16 +247,16 @@ fn names_are_followed_through_macros_repetitions_and_includes() {
     let references = session.ask("textDocument/references", params);
     assert_eq!(references.as_array().unwrap().len(), 2, "{references}");
 
-    // A constant: renamed in both files, and in the unused macro.
+    // A constant: renamed in both files, and in an unused macro.
     let answer = session.rename("main.s", MAIN, "K\n", "gain");
     let texts = session.applied(&answer, &files);
     assert_eq!(texts, [MAIN.replace('K', "gain"), PART.replace('K', "gain")]);
-    // A family of registers, renamed from the use of one member.
+    // A family of registers, renamed from a use of one member.
     let answer = session.rename("main.s", MAIN, "p{i}, x", "pos{i}");
     let texts = session.applied(&answer, &files);
     assert_eq!(texts[0], MAIN.replace("p{i}", "pos{i}").replace("p1, p2", "pos1, pos2"));
     assert_eq!(texts[1], PART);
-    // A parameter and a local, only in the macro; the macro itself, in both files.
+    // A parameter and a local name, only in the macro; the macro itself, in both files.
     for (of, to) in [("to, by", "target"), ("tmp, to", "t"), ("scale", "times")] {
         let old = of.split(',').next().unwrap();
         let answer = session.rename("part.s", PART, of, to);
@@ -264,7 +264,7 @@ fn names_are_followed_through_macros_repetitions_and_includes() {
         let (again, main) = (PART.replace(old, to), MAIN.replace(old, to));
         assert_eq!(texts, [if old == "scale" { main } else { MAIN.to_owned() }, again], "{of}");
     }
-    // A rename that changes the program's meaning is refused with the reason.
+    // A rename that would change the program's meaning is rejected with the reason.
     for (of, to, why) in [
         ("K\n", "x", "would not stay the same"),
         ("p{i}, x", "x{i}x", "must end in `{i}`"),
@@ -319,7 +319,7 @@ fn names_of_equations_and_arrays_are_followed() {
         };
         assert_eq!(texts, [expected], "{of}");
     }
-    // Formatted exactly as by `takt fmt`.
+    // The result is formatted exactly as by `takt fmt`.
     assert_eq!(session.folder.line("fmt --check main.s").status, Some(0));
     session.end();
 }
@@ -329,7 +329,7 @@ fn an_included_file_is_read_as_it_is_open() {
     let mut session = Session::new(&[("main.s", MAIN), ("part.s", PART)]);
     session.open("main.s", MAIN);
     session.open("part.s", PART);
-    // Unsaved edit: the file on disk stays unchanged.
+    // An unsaved edit: the file on disk stays unchanged.
     let edited = session.edit("part.s", PART, ".const  K", ".const  L");
     let told = session.told("main.s");
     assert!(
@@ -358,7 +358,7 @@ fn suggested_spelling_fixes_the_name() {
     session.end();
 }
 
-/// The assembler's suggestions are offered as quick fixes, and repair the source.
+/// The assembler's suggestions are offered as quick fixes, which repair the source.
 #[test]
 fn each_suggestion_is_a_code_action() {
     let cases = [
@@ -388,7 +388,7 @@ fn each_suggestion_is_a_code_action() {
     session.end();
 }
 
-/// Cycles beside the lines and above the section, and their places after added lines.
+/// Cycles are shown beside lines and above the section, and keep their places when lines are added.
 #[test]
 fn cycles_stand_beside_the_lines() {
     let mut session = Session::new(&[("main.s", MAIN), ("part.s", PART)]);
@@ -420,7 +420,7 @@ fn cycles_stand_beside_the_lines() {
     assert!(title.starts_with(&format!("period: {} cycles, bound ", cycles["worst"])), "{title}");
     assert_eq!(lenses[0]["range"]["start"]["line"], 5);
 
-    // Two lines inserted above; old hints move with their lines until the new count arrives.
+    // Insert two lines above; old hints move with their lines until the new counts arrive.
     session.edit("main.s", MAIN, ".schedule on\n", "\n\n.schedule on\n");
     let after = lines(&session.ask("textDocument/inlayHint", params));
     let moved: Vec<_> = before.iter().map(|(line, text)| (line + 2, text.clone())).collect();
@@ -428,8 +428,8 @@ fn cycles_stand_beside_the_lines() {
     session.end();
 }
 
-/// A program included by another one shows its own cycles above its section. A temporary mistake does not change that; without its section
-/// it becomes a part of the other.
+/// A program that another one includes shows its own cycles above its section. A temporary mistake does not change that; without its
+/// section it becomes a part of the other program.
 #[test]
 fn included_programs_have_their_own_cycles() {
     let inner = ".input  x\n.output y\n.period\nperiod: fadd    y, x, x\n.if macro.longer\n        longer  y\n\
@@ -461,7 +461,7 @@ fn included_programs_have_their_own_cycles() {
     session.end();
 }
 
-/// Pipeline view: cycles equal the inlay hints, and lines follow edits.
+/// Pipeline view: cycles equal those of the inlay hints, and lines follow edits.
 #[test]
 fn the_picture_has_each_operation_at_its_line() {
     let mut session = Session::new(&[("main.s", MAIN), ("part.s", PART)]);
@@ -512,7 +512,7 @@ fn the_picture_has_each_operation_at_its_line() {
     session.end();
 }
 
-/// A pipeline view of older text is marked as such, even if the change is in an included file.
+/// A pipeline view of an older text is marked as such, even if the change is in an included file.
 #[test]
 fn the_picture_is_old_while_an_included_file_is_wrong() {
     let mut session = Session::new(&[("main.s", MAIN), ("part.s", PART)]);
@@ -533,7 +533,7 @@ fn the_picture_is_old_while_an_included_file_is_wrong() {
     session.end();
 }
 
-/// A mistake just after a correct change: results of the previous text remain.
+/// A mistake just after a correct change: the results for the previous text remain.
 #[test]
 fn a_mistake_soon_after_a_change_loses_no_cycles() {
     let mut session = Session::new(&[("main.s", MAIN), ("part.s", PART), ("other.s", MAIN)]);
@@ -544,7 +544,7 @@ fn a_mistake_soon_after_a_change_loses_no_cycles() {
     session.ask("takt/pipeline", params.clone());
     session.edit("main.s", &changed, "fadd    F", "fad     F");
     assert_eq!(session.ask("takt/pipeline", params.clone())["current"], false);
-    // Several programs wait to be scheduled together.
+    // Several programs wait to be scheduled at the same time.
     session.open("other.s", MAIN);
     let other = session.uri("other.s");
     session.client.wait(|message| message["method"] == "takt/counted" && message["params"]["uri"] == *other);
@@ -618,7 +618,7 @@ fn a_document_is_laid_out_as_by_fmt() {
     session.end();
 }
 
-/// Malformed messages, unknown methods, missing documents: each yields an error, and the session continues.
+/// Malformed messages, unknown methods, missing documents: each gives an error, and the session continues.
 #[test]
 fn survives_and_reports_invalid_messages() {
     let folder = Folder::new();
@@ -654,7 +654,7 @@ fn survives_and_reports_invalid_messages() {
         let told = client.wait(|message| message["params"]["uri"] == uri);
         assert_eq!(told["params"]["diagnostics"][0]["code"], "unknown-name", "{told}");
     }
-    // Positions beyond the text, in every request with a position.
+    // Positions beyond the end of the text, in every request that has a position.
     for method in ["hover", "completion", "definition", "documentHighlight", "prepareRename"] {
         let params = json!({ "textDocument": { "uri": "untitled:Untitled-1" }, "position": { "line": 4_000_000, "character": 4_000_000 } });
         let answer = client.ask(&format!("textDocument/{method}"), params);
@@ -673,7 +673,7 @@ fn survives_and_reports_invalid_messages() {
     client.notify("exit", Value::Null);
     assert_eq!(client.end(), (Some(0), String::new()));
 
-    // A malformed stream, and a truncated one: failure without a panic.
+    // A malformed and a truncated stream: failure without a panic.
     let mut client = Client::start(&folder, "lsp");
     client.raw(b"GET / HTTP/1.1\n");
     let (status, stderr) = client.end();
@@ -681,7 +681,7 @@ fn survives_and_reports_invalid_messages() {
     assert!(stderr.contains("begins with `Content-Length: …`") || stderr.contains("header"), "{stderr}");
 }
 
-/// A request cancelled before its answer.
+/// A request that is cancelled before its answer.
 #[test]
 fn cancelled_requests_are_not_answered() {
     let mut session = Session::new(&[("main.s", MAIN), ("part.s", PART)]);
@@ -691,7 +691,7 @@ fn cancelled_requests_are_not_answered() {
     };
     let cancel =
         json!({ "jsonrpc": "2.0", "method": "$/cancelRequest", "params": { "id": 900 } }).to_string();
-    // All messages in one write, behind a slow request, so that the cancellation arrives before its request is handled.
+    // Send all messages in one write after a slow request, so that the cancellation arrives before its request is handled.
     let frames: String = [hover(899), hover(900), cancel]
         .iter()
         .map(|text| format!("Content-Length: {}\r\n\r\n{text}", text.len()))
@@ -703,7 +703,7 @@ fn cancelled_requests_are_not_answered() {
     session.end();
 }
 
-/// Neovim's own client, from the first keystroke to the end.
+/// Neovim's built-in client, from the first keystroke to the end.
 #[test]
 fn neovim_uses_the_language_server() {
     let folder = Folder::new();

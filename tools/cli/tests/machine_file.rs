@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Machine files in every place of a machine's name; `asm/tests/machine_files.rs` tests all mistakes in such files.
+//! Machine files wherever a machine's name is accepted; `asm/tests/machine_files.rs` tests all mistakes in such files.
 
 use crate::common::{Folder, source};
 
-/// A folder with t3's file, a copy with a second adder, and the controller.
+/// A folder that contains t3's file, a copy with a second adder, and the controller.
 fn workshop() -> Folder {
     let folder = Folder::new();
     let t3 = folder.takt(&["machines", "t3", "--toml"]).ok();
@@ -16,7 +16,7 @@ fn workshop() -> Folder {
     folder
 }
 
-/// A printed row denotes the same machine: images are equal byte for byte.
+/// A printed row describes the same machine: images are equal byte for byte.
 #[test]
 fn a_round_trip() {
     let folder = workshop();
@@ -28,7 +28,7 @@ fn a_round_trip() {
     assert_eq!(folder.read("a.elf"), folder.read("c.elf"));
 }
 
-/// An image suffices without its machine file, and its disassembly assembles again.
+/// An image can be used without its machine file, and its disassembly assembles again.
 #[test]
 fn an_image_needs_no_file() {
     let folder = workshop();
@@ -62,7 +62,7 @@ fn a_system_of_it() {
     assert!(told.stderr.contains("sub/system.toml:5:11") && told.stderr.contains("none.toml"), "{told:?}");
 }
 
-/// Mistakes found only by the circuit generator are reported at their places in the file, too.
+/// Mistakes that only the circuit generator finds are also reported at their places in the file.
 #[test]
 fn rows_without_a_circuit() {
     let folder = workshop();

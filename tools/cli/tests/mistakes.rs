@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Wrong inputs: each yields exactly one clear error on standard error, a nonzero status, nothing on standard output, and leaves all files
-//! unchanged. The texts are in `snapshots/`.
+//! Wrong inputs: each gives exactly one clear error on standard error, a nonzero status and nothing on standard output, and leaves all
+//! files unchanged. The texts are in `snapshots/`.
 
 use crate::common::{Folder, RunOutput, source};
 
@@ -15,7 +15,7 @@ period: fadd F, a, a
         wait period
 ";
 
-/// A folder with good and bad sources and tables.
+/// A folder with valid and invalid sources and tables.
 fn workshop() -> Folder {
     let folder = Folder::new();
     let files: [(&str, &[u8]); 36] = [
@@ -79,7 +79,7 @@ impl RunOutput {
         assert!(text.starts_with(beginning), "{text}");
     }
 
-    /// Error text for the snapshots, after checks common to all mistakes.
+    /// Error text for the snapshots, after the checks that apply to all mistakes.
     #[track_caller]
     fn mistake(&self, line: &str) -> String {
         let RunOutput { status, stdout, stderr } = self;
@@ -97,7 +97,7 @@ fn errors(stderr: &str) -> usize {
     stderr.lines().filter(|line| line.starts_with("error")).count()
 }
 
-/// Runs command lines and snapshots their messages; each must report one error.
+/// Runs commands and snapshots their messages; each must report one error.
 fn check(snapshot: &str, lines: &[&str]) {
     let folder = workshop();
     let before = folder.list();
@@ -199,7 +199,7 @@ fn programs_that_cannot_be_bounded() {
     );
 }
 
-/// Programs with the ports of a tracking program that do not work; the unused robot file gives warnings.
+/// Programs that have the ports of a tracking program but do not work; the unused robot file causes warnings.
 #[test]
 fn controllers_that_go_wrong() {
     let folder = Folder::new();
@@ -222,14 +222,14 @@ fn controllers_that_go_wrong() {
         assert_eq!(done.stderr.lines().last(), Some(format!("error: {message}").as_str()));
         assert_eq!(folder.list(), ["bad.s", "robot.s"]);
     }
-    // A fault is shown at its line.
+    // A fault is shown at its source line.
     folder.write("bad.s", ".include \"robot.s\"\n.once\n wait p\n.period\np: ret\n");
     let done = folder.line("track --program bad.s --csv out.csv");
     done.mistake("ret");
     let fault = &done.stderr[done.stderr.find("error").unwrap()..];
     insta::assert_snapshot!("controller", fault);
     assert_eq!(folder.list(), ["bad.s", "robot.s"]);
-    // A force that is NaN: every output is written once.
+    // A force that is NaN; every output is written once.
     let outputs = "F1 F2 F3 tau4 tau5 l1d l2d l3d v1d v2d v3d a1d a2d a3d th4d th5d om4d om5d ep4d ep5d";
     let writes: String = outputs.split(' ').map(|port| format!(" fdiv {port}, zero, zero\n")).collect();
     folder.write("bad.s", format!(".include \"robot.s\"\n.once\n wait p\n.period\np:\n{writes} wait p\n"));
@@ -264,7 +264,7 @@ fn tables_of_inputs() {
     let lines: Vec<String> = tables.iter().map(|table| format!("run pd.s --inputs {table}.csv")).collect();
     let mut lines: Vec<&str> = lines.iter().map(String::as_str).collect();
     lines.push("run pd.s --inputs folder");
-    // Further commands report mistakes in tables alike.
+    // Other commands report mistakes in tables in the same way.
     lines.extend([
         "analyse pd.s --inputs semicolon.csv",
         "debug pd.s --inputs header.csv",
@@ -387,7 +387,7 @@ fn operands_of_eval() {
     }
     insta::assert_snapshot!("operands", text);
 
-    // Commands before the mistake are answered.
+    // Lines before the mistake are answered.
     let done = folder.fed("eval fadd", b"3F800000 3F800000\n\nxyz 1\n");
     assert_eq!(done.stdout, "40000000 00\n");
     assert_eq!(
@@ -397,7 +397,7 @@ fn operands_of_eval() {
     assert_eq!(done.status, Some(1));
 }
 
-/// All errors of a source at once, and nothing else: no file, no result.
+/// All errors of a source are reported together, and nothing is written.
 #[test]
 fn all_errors_of_a_source() {
     let folder = workshop();
@@ -440,7 +440,7 @@ fn lines_of_a_hundred_megabytes() {
     insta::assert_snapshot!("endless", text);
 }
 
-/// An image truncated anywhere, or with any byte changed, either runs or is refused, without a crash.
+/// An image that is truncated anywhere, or has any byte changed, either runs or is rejected, without a crash.
 #[test]
 fn damaged_images() {
     let folder = workshop();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The command `takt model`.
+//! The command `takt model`: generated programs compared with other tools, and mistakes in descriptions.
 
 use crate::common::Folder;
 
@@ -24,7 +24,7 @@ fn a_robot_becomes_a_program_that_runs() {
     assert!(text.contains(" cycles on t3 (") && text.contains(" or later), bound "), "{text}");
     let source = folder.read_text("gravity.s");
     assert!(source.contains("\n.output tau_elbow ; force of elbow_joint, N m\n"), "{source}");
-    // The arm vertical except the wrist, and at an angle: Pinocchio's values within binary32.
+    // Once with the arm vertical except for the wrist, and once at an angle: Pinocchio's values to within binary32.
     folder.write("q.csv", "q_shoulder_lift,q_elbow,q_wrist_1,q_wrist_2\n-1.5707964,0,0,0\n0,0.5,-0.25,1\n");
     let rows = folder.line("run gravity.s --inputs q.csv --outputs -").ok();
     let rows: Vec<Vec<&str>> = rows.lines().map(|line| line.split(',').collect()).collect();
@@ -72,7 +72,8 @@ fn rewrites_can_be_switched_off() {
     }
 }
 
-/// The command in the head of `programs/examples/panda/law.s` regenerates the body beside it, and the law assembles without warnings.
+/// The command in the first lines of `programs/examples/panda/law.s` regenerates the body beside it, and the law assembles without
+/// warnings.
 #[test]
 fn stored_body_equals_the_commands_output() {
     let panda = concat!(env!("CARGO_MANIFEST_DIR"), "/../../programs/examples/panda");
@@ -121,7 +122,7 @@ fn expressions_become_programs() {
     folder.write("f.json", list.replace("OP", "atan2"));
     assert!(folder.line("model f.json -o f.s").ok().contains("operations: 1 ("));
     assert!(folder.read_text("f.s").contains("        y = atan2(x_1, x_2)\n"));
-    // A function without an instruction comes from the library.
+    // A function that has no instruction comes from the library.
     folder.write("e.json", list.replace("OP", "exp").replace("\"of\": [0, 1]", "\"of\": [0]"));
     assert!(folder.line("model e.json -o e.s").ok().contains("operations: 1 ("));
     assert!(folder.read_text("e.s").contains(".include <math.s>\n"));
@@ -169,7 +170,7 @@ fn a_policy_becomes_a_program_that_runs() {
         "\n{cycles} cycles on t3,data=4096 ({waiting} if the tick comes 6 cycles after the wait or later), "
     );
     assert!(text.contains(&both), "{text}");
-    // The two figures equal the bound.
+    // Both figures equal the bound.
     let bound = folder.line("bound relu.s").ok();
     assert!(bound.contains(&format!("  period          {waiting} ")), "{bound}");
     assert!(
@@ -178,7 +179,7 @@ fn a_policy_becomes_a_program_that_runs() {
         )),
         "{bound}"
     );
-    // Bounds hold for arrays that a period writes before it reads.
+    // Error bounds also cover arrays that a period writes before reading them.
     let accuracy = folder.line("accuracy relu.s").ok();
     assert!(accuracy.contains("\nno NaN, no overflow, no division by zero"), "{accuracy}");
     for (line, status, expected) in [
@@ -224,7 +225,7 @@ fn a_model_of_mujoco_is_read() {
 const PENDULUM: &str = r#"<mujoco model="leg"><worldbody><body name="leg"><joint name="hip" axis="0 1 0" armature="0.1" damping="0.2" frictionloss="0.05"/>
 <inertial mass="2" pos="0 0 -0.5" diaginertia="0.01 0.01 0.01"/></body></worldbody></mujoco>"#;
 
-/// Files in common variants: floating base, included file, encodings, spreadsheet export.
+/// Files in common variants: floating base, included file, encodings, export from a spreadsheet.
 #[test]
 fn reads_descriptions_of_every_origin() {
     let folder = folder();
@@ -336,7 +337,7 @@ fn mistakes_have_one_message() {
     }
 }
 
-/// Recursive parsers stop at a maximal depth, for every format of other tools.
+/// Recursive parsers stop at a maximum depth, for every format of other tools.
 #[test]
 fn excessive_nesting_has_one_message() {
     const DEEP: usize = 200_000;

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The page of `takt analyse` in a browser: it loads, its script runs to the end and draws every operation.
+//! The page of `takt analyse` in a browser: it loads, and its script runs to the end and draws every operation.
 
 use crate::common::{Folder, source};
 use std::process::Command;
 
-/// DOM of the page after its scripts, and the browser's console output.
+/// DOM of the page after its scripts have run, and the browser's console output.
 fn open(folder: &Folder, page: &str) -> (String, String) {
     let profile = folder.path().join("profile");
     let output = Command::new("chromium")
         .args(["--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking"])
-        // The window is high enough for every row, since only visible rows are drawn.
+        // The window is high enough for all rows, since only visible rows are drawn.
         .args(["--enable-logging=stderr", "--v=0", "--dump-dom", "--window-size=1300,16000"])
         .arg(format!("--user-data-dir={}", profile.display()))
         .arg(format!("file://{}", folder.path().join(page).display()))
@@ -39,19 +39,19 @@ fn the_page_opens_and_draws_every_operation() {
     let critical = bundles.iter().flat_map(|bundle| bundle["operations"].as_array().unwrap());
     let critical = critical.filter(|one| one["critical"] == true).count();
     assert!(critical > 10 && page.matches("class=\"tp-critical\"").count() == critical, "{critical}");
-    // An image has the names and texts of its sources.
+    // An image contains names and texts of its sources.
     assert!(page.contains(">tracking.s</option>") && page.matches("data-line=").count() > 100);
-    // The page fetches nothing.
+    // The page loads nothing from elsewhere.
     let text = folder.read_text("page.html");
     assert!(!text.contains("src=") && !text.contains("href="));
 
-    // Control: a failing script is detected.
+    // Control: a script that fails is detected.
     folder.write("broken.html", text.replace("const D = ", "missing(); const D = "));
     let (page, console) = open(&folder, "broken.html");
     assert!(!page.contains("data-rows=\"") && console.contains("missing is not defined"), "{console}");
 }
 
-/// The page of a system: each core's cycles equal its period's, and link events are drawn.
+/// The page of a system: the cycles of each core equal those of its period, and link events are drawn.
 #[test]
 fn the_page_of_a_system_draws_all_cores_and_links() {
     let folder = Folder::new();
@@ -67,7 +67,7 @@ fn the_page_of_a_system_draws_all_cores_and_links() {
     let cores = data["cores"].as_array().unwrap();
     assert_eq!(cores.len(), 3);
     for core in cores {
-        // Cycles from the last tick on.
+        // Cycles since the last tick.
         let tick = core["ticks"].as_array().unwrap().last().unwrap().as_u64().unwrap();
         let stretches = core["stretches"].as_array().unwrap().iter();
         let own = stretches.filter(|stretch| stretch[0].as_u64().unwrap() > tick);
@@ -134,7 +134,7 @@ fn hovering_shows_the_details() {
     assert!(stall.contains("operand") && stall.contains("awaits"), "{stall}");
     assert!(page.contains("[line 6: fdiv mean, sum,") && page.contains("[line 5: fadd sum, a, b]"), "{page}");
     assert!(page.contains("[false: "), "nothing is told where there is nothing");
-    // Without reassembly there is no such column.
+    // Without reassembly, the column is missing.
     assert!(page.contains("<th>as it is</th>") && !page.contains("<th>reassembled</th>"));
     folder.line("analyse mean.s -m f3 --reassemble --html page.html").ok();
     assert!(open(&folder, "page.html").0.contains("<th>reassembled</th>"));
@@ -143,7 +143,7 @@ fn hovering_shows_the_details() {
 #[test]
 fn names_cannot_leave_the_data() {
     let folder = Folder::new();
-    // The path of a file is the only text of a program with arbitrary characters.
+    // The path of a file is the only text in which a program can have arbitrary characters.
     let name = "</script><script>document.body.dataset.evil=1</script>.s";
     std::fs::create_dir_all(folder.path().join(name).parent().unwrap()).unwrap();
     folder.write(name, ".output y\n.period\np: mov y, zero\n wait p\n");

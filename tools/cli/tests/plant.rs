@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A user's plant, with `takt run` as the controller at the other end of two pipes.
+//! A user's plant connected by two pipes to `takt run` as the controller.
 
 use crate::common::{Folder, RunOutput};
 use std::f64::consts::TAU;
@@ -39,7 +39,7 @@ impl Motor {
     }
 }
 
-/// Controller in this process: encoder to current.
+/// Controller in this process: current from encoder count.
 fn controller() -> impl FnMut(i32) -> f64 {
     let options = Options::default();
     let assembled = takt_asm::assemble("servo.s", &FileLoader::new(example()), &options).unwrap();
@@ -50,14 +50,14 @@ fn controller() -> impl FnMut(i32) -> f64 {
         let report = emulator.run_period(&inputs).unwrap();
         assert!(!report.missed);
         let Some(Number::Float(current)) = emulator.output("current").unwrap() else { panic!("no current") };
-        // Convert through text, as in the pipe: the shortest decimal of a binary32, read as binary64, is another number.
+        // Convert through text, as in the pipe: the shortest decimal of a binary32, read as binary64, is a different number.
         format!("{current:?}").parse().unwrap()
     }
 }
 
 #[test]
 fn the_example_converges_and_equals_a_loop_without_pipes() {
-    // A deadlock of both sides must end.
+    // Ends the test if both sides deadlock.
     let mut command = Command::new("timeout");
     command
         .args([&PATIENCE.as_secs().to_string(), "python3"])
@@ -94,7 +94,7 @@ period: fdiv F, 1.0, a
         wait period
 ";
 
-/// Time after which a process counts as hung.
+/// Time after which a process is considered hung.
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// A running `takt run` process.
@@ -123,7 +123,7 @@ impl RunningProcess {
         self.stdin.as_mut().unwrap().write_all(text.as_bytes()).unwrap();
     }
 
-    /// The next line, which must arrive without further input.
+    /// Next line, which must arrive without further input.
     fn line(&mut self) -> String {
         let mut stdout = self.stdout.take().unwrap();
         let (sender, answer) = mpsc::channel();
@@ -155,14 +155,14 @@ fn answers_each_row_at_once() {
     let folder = Folder::new();
     for end in ["\n", "\r\n"] {
         let mut running = RunningProcess::new(&folder, "");
-        // Titles before any input; columns in any order, with additional ones.
+        // Titles come before any input; columns may be in any order, with additional ones.
         assert_eq!(running.line(), "F,k,cycles\n");
         running.send(&format!("n,time,a{end}"));
         for n in 0..5 {
             running.send(&format!("{n},now,4{end}"));
             assert_eq!(running.line(), format!("0.25,{},12\n", n + 1));
         }
-        // Rows in pieces, and several at once.
+        // Send rows in pieces, and several at once.
         running.send("5,no");
         running.send(&format!("w,4{end}6,now,4{end}7,now,4{end}"));
         for n in 5..8 {
@@ -172,13 +172,13 @@ fn answers_each_row_at_once() {
     }
 }
 
-/// A system behaves like a program: a reader that waits for the titles first is not blocked.
+/// A system behaves like a program: it does not block a reader that waits for the titles first.
 #[test]
 fn a_system_answers_a_plant_too() {
     let folder = Folder::new();
     let system = concat!(env!("CARGO_MANIFEST_DIR"), "/../../programs/systems/speed");
     let mut running = RunningProcess::of(&folder, &format!("{system}.toml"), "");
-    // Titles before any input.
+    // Titles come before any input.
     let mut answers = running.line();
     assert_eq!(answers, "u,seen.peak,seen.values\n");
     let rows = std::fs::read_to_string(format!("{system}.csv")).unwrap();
@@ -201,7 +201,7 @@ fn a_wrong_row_ends_the_run() {
     assert_eq!((running.line(), running.line()), ("F,k,cycles\n".to_owned(), "0.25,2,12\n".to_owned()));
     let error = "error: standard input:3: column n: `x` is no integer between -2147483648 and 2147483647\n";
     assert_eq!(running.end(), (Some(1), String::new(), error.to_owned()));
-    // A plant that sends nothing at all.
+    // A plant that sends nothing.
     let running = RunningProcess::new(&folder, "");
     let error = "error: standard input is empty: it needs a header with a column for each input port\n";
     assert_eq!(running.end(), (Some(1), "F,k,cycles\n".to_owned(), error.to_owned()));
@@ -226,7 +226,7 @@ fn a_plant_that_stops_reading_ends_the_run() {
     }
 }
 
-/// Warnings and statistics do not go to standard output.
+/// Warnings and statistics are not written to standard output.
 #[test]
 fn standard_output_has_rows_only() {
     let folder = Folder::new();

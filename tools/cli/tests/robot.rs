@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The command `takt robot` on the command line. The language is tested in programs/robot/tests.
+//! The command `takt robot` on the command line. programs/robot/tests covers the language.
 
 use crate::common::Folder;
 use serde_json::Value;
@@ -38,7 +38,7 @@ fn a_program_with_a_fault_of_the_link() {
     assert!(text.contains("a.robot can run: it takes 1."), "{text}");
 }
 
-/// The record of host and encoders is a table on which the cores repeat the run to the same end.
+/// The record of host and encoders is a table with which the cores repeat the run to the same end.
 #[test]
 fn a_session_is_recorded() {
     let folder = Folder::new();
@@ -70,7 +70,7 @@ fn mistakes_on_the_command_line() {
         assert_eq!(done.status, Some(status), "{line}: {done:?}");
         assert!(done.stderr.contains(text), "{line}: {}", done.stderr);
     }
-    // Another system lacks the ports that the host needs.
+    // Another system lacks the ports that the host requires.
     let speed = format!("{}/../../programs/systems/speed.toml", env!("CARGO_MANIFEST_DIR"));
     let done = folder.line(&format!("robot a.robot --system {speed}"));
     assert_eq!(done.status, Some(1));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Search of sources in all assembling commands: `-I`, and the built-in library; also `-W`.
+//! Search path of sources in all commands that assemble: `-I` and the built-in library; also `-W`.
 
 use crate::common::Folder;
 
@@ -19,7 +19,7 @@ period: twice   t, x
 
 const TWICE: &str = ".macro twice y, x\n        fadd    y, x, x\n.endm\n";
 
-/// A controller that needs a folder beside its own, with inputs.
+/// A controller that needs a folder besides its own, with inputs.
 fn project() -> Folder {
     let folder = Folder::new();
     for name in ["app", "lib", "other"] {
@@ -44,7 +44,7 @@ fn every_assembling_command_searches_folders_and_library() {
         assert!(run(&format!("{line} app/main.s -I lib")).contains("period"));
     }
     run("rtl -o rtl --machine t1 --program app/main.s -I lib");
-    // The first folder with the file is used.
+    // The first folder that contains the file is used.
     assert!(run("run app/main.s -I other -I lib --inputs in.csv --outputs -").contains("\n1.0,"));
     let track = folder.line("track --program app/main.s -I lib");
     assert!(track.stderr.contains("port"), "it assembles, and has not the robot's ports: {}", track.stderr);
@@ -117,7 +117,7 @@ fn warnings_can_be_errors() {
     assert!(done.stderr.contains("there is no warning `type`; did you mean `types`?"), "{}", done.stderr);
 }
 
-/// More live values than registers in a bank: every command that shows a program's cost reports the spills.
+/// More live values than registers in a bank: every command that shows a program's cost reports spilled values.
 #[test]
 fn reports_spilled_values() {
     let folder = Folder::new();

@@ -42,12 +42,12 @@ fn bound_follows_a_command_through_the_cores() {
         let way = ways.iter().find(|way| way["inputs"][0] == "moves.target" && way["outputs"][0] == end);
         way.unwrap()["worst"].as_u64().unwrap()
     };
-    // A command just too late for a tick waits for the next one.
+    // A command that comes just too late for a tick waits for the next one.
     assert!(worst("u") > 125_000 && worst("u") < 2 * 125_000, "{}", worst("u"));
     let late = folder.line(&format!("bound {toml} --deadline {} --empty-fifos", worst("u") - 1));
     assert_eq!(late.status, Some(1));
     folder.line(&format!("bound {toml} --deadline {} --empty-fifos", worst("seen.peak"))).ok();
-    // Queued entries are served first.
+    // Entries that are already queued are served first.
     let queued = folder.line(&format!("bound {toml} --deadline {}", worst("seen.peak")));
     assert_eq!(queued.status, Some(1));
     assert!(queued.stdout.contains("if nothing is queued in moves: not certain to be kept\n"), "{queued:?}");
@@ -91,7 +91,7 @@ fn bound_counts_the_periods_of_states() {
     let worst = way["worst"].as_u64().unwrap();
     folder.line(&format!("bound delayed.toml --deadline {worst}")).ok();
     assert_eq!(folder.line(&format!("bound delayed.toml --deadline {}", worst - 1)).status, Some(1));
-    // The length of a ring depends on its addresses: no deadline is certain.
+    // The length of a ring buffer depends on its addresses, so no deadline is certain.
     let ring = folder.line("bound ring.toml --deadline 1ms");
     assert!(
         ring.status == Some(1) && ring.stdout.contains("with the fewest states: not certain to be kept\n"),
@@ -157,7 +157,7 @@ fn deny_applies_to_every_core() {
     );
     folder.write("in.csv", "x\n2\n4\n0\n8\n0\n");
     let run = |what: &str| folder.line(&format!("run two.toml --inputs in.csv --json --deny {what}"));
-    // Code that runs once does not divide.
+    // The code that runs once does not divide.
     let done = run("divide-by-zero");
     let json: Value = serde_json::from_str(&done.stdout).unwrap();
     assert_eq!(done.status, Some(3), "{done:?}");
@@ -170,7 +170,7 @@ fn deny_applies_to_every_core() {
     run("overflow,nan,missed").ok();
 }
 
-/// Each core alone on its inputs from the system: the errors equal its program's on these inputs.
+/// The errors of each core equal those of its program run alone on the inputs from the system.
 #[test]
 fn accuracy_of_each_core() {
     let folder = Folder::new();
@@ -181,7 +181,7 @@ fn accuracy_of_each_core() {
     };
     let measured = &json(&format!("{toml} --inputs {csv}"))["cores"];
     assert_eq!((&measured["servo"]["periods"], &measured["watch"]["periods"]), (&10.into(), &5.into()));
-    // A system of one core has the errors of its program.
+    // A system of one core has the same errors as its program.
     folder.write("pass.s", ".input x\n.output y\n.once\n wait p\n.period\np: fmul y, x, 0.1\n wait p\n");
     folder.write(
         "one.toml",
@@ -197,7 +197,7 @@ fn accuracy_of_each_core() {
         assert_eq!(alone["outputs"], within["cores"]["a"]["outputs"], "{options}");
         assert_eq!(alone["periods"], within["cores"]["a"]["periods"], "{options}");
     }
-    // Bounds of a core with ranges, and the reason for their absence in one without.
+    // Bounds of a core with ranges, and the reason why a core without ranges has none.
     let done = folder.line(&format!("accuracy {toml}"));
     assert_eq!(done.status, Some(1));
     assert!(done.stdout.contains("\nservo, ../examples/pi.s:\none period on t3"), "{done:?}");
@@ -217,7 +217,7 @@ fn a_trace_shows_all_cores_on_one_axis() {
         assert_eq!(text.matches(&format!("$scope module {scope} $end")).count(), 1, "{scope}");
     }
     assert_eq!(text.matches("$scope").count(), text.matches("$upscope").count());
-    // On the common time axis, every core sees its first tick in its own cycle.
+    // On the common time axis, each core sees its first tick in a different cycle.
     let identifier = |scope: &str| {
         let rest = &text[text.find(&format!("$scope module {scope} ")).unwrap()..];
         let line = rest.lines().find(|line| line.ends_with(" tick $end")).unwrap();
@@ -291,11 +291,11 @@ fn the_hybrid_robot_on_two_processors() {
     };
     let (one, both) = (json(""), json(&format!("--system {two}")));
     let number = |value: &serde_json::Value| value.as_f64().unwrap_or_else(|| panic!("{value} in {both}"));
-    // Points come from a core, past the first move of the table (period 26958): the robot follows them as it follows the host's.
+    // A core computes the points, beyond the first move of the table (period 26958): the robot follows them as it follows the host's.
     let overall = |run: &serde_json::Value| number(&run["tracking_error_m"]["overall"]);
     assert!((overall(&one) - overall(&both)).abs() < 1e-7, "{both} {one}");
     assert_eq!(both["missed"], 0);
-    // The point arrives before the tracking core's tick, 400 cycles later.
+    // The point arrives before the tick of the tracking core, 400 cycles later.
     assert!(both["cores"][0]["longest"].as_u64() < Some(400), "{both}");
     assert!(number(&both["points"][0]["largest_error"]) < 6.2e-8, "{both}");
     let text = folder.line(&format!("track -q --periods 10 --deny all --system {two}")).ok();
@@ -318,18 +318,18 @@ fn the_hybrid_robot_on_two_processors() {
     }
 }
 
-/// The recorded host of a run is a table on which the system repeats the run; with `TAKT_FULL=1` its circuit, too.
+/// The recorded host actions of a run are a table with which the system repeats the run; with `TAKT_FULL=1`, so does its circuit.
 #[test]
 fn host_actions_are_recorded_as_a_table() {
     let folder = Folder::new();
     let two = common::source("two.toml");
     folder.line(&format!("track -q --periods 40 --system {two} --csv in.csv")).ok();
-    // The block that places the robot has its own tick.
+    // The block that places the robot has a tick of its own.
     assert_eq!(folder.read_text("in.csv").lines().count(), 1 + 41);
     let run = |line: &str| folder.line(&format!("run {two} --inputs in.csv {line}")).ok();
     let text = run("");
     assert!(text.contains("41 base ticks") && text.contains("; 0 refused when full"), "{text}");
-    // The core received the first block: the path begins at its place.
+    // The core has received the first block: the path begins at its position.
     let json: Value = serde_json::from_str(&run("--json")).unwrap();
     assert!(json["fifos"]["blocks"]["pushed"].as_u64() > Some(8), "{json}");
     assert!(json["outputs"]["progress.block"].as_u64() > Some(1), "{json}");
@@ -341,7 +341,7 @@ fn host_actions_are_recorded_as_a_table() {
     }
 }
 
-/// A late read of a FIFO's head is reported at its line; all systems of the repository are free of them.
+/// A late read of a FIFO's head is reported at its source line; no system in the repository has one.
 #[test]
 fn warns_of_a_head_read_after_its_pop() {
     let folder = Folder::new();
@@ -349,12 +349,12 @@ fn warns_of_a_head_read_after_its_pop() {
         let done = folder.line(&format!("bound {}", speed(&format!("../{system}"))));
         assert_eq!((done.status, done.stderr.as_str()), (Some(0), ""), "{system}");
     }
-    // A mistake that the generation once had: no constraint kept the reads before the pop.
+    // A former mistake in the generation: no constraint kept the reads before the pop.
     for name in ["two.toml", "generation.s", "tracking.s", "robot.s"] {
         let text = std::fs::read_to_string(speed(&format!("../hybrid/{name}"))).unwrap();
         let without = text.lines().filter(|line| !line.starts_with(".order") || !line.ends_with(", pop"));
         let text: String = without.map(|line| format!("{line}\n")).collect();
-        // On t4 the schedule moves a read after the pop.
+        // On t4, the schedule moves a read behind the pop.
         folder.write(
             name,
             text.replace("program = \"generation.s\"", "program = \"generation.s\"\nmachine = \"t4\""),

@@ -9,13 +9,13 @@ use std::num::NonZeroU16;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
-/// A program without an end.
+/// A program that never ends.
 const ENDLESS: &str = ".output n:int\n        mov n, zero\nloop:   iadd n, n, 1\n        jmp loop\n";
 
 /// Time limit for any change on the screen.
 const PATIENCE: Duration = Duration::from_secs(30);
 
-/// A `takt` process on a terminal.
+/// A `takt` process on a pseudo-terminal.
 struct Terminal {
     master: Box<dyn MasterPty + Send>,
     keys: Box<dyn Write + Send>,
@@ -25,7 +25,7 @@ struct Terminal {
 }
 
 impl Terminal {
-    /// Runs a shell command line on a terminal of this size, in a folder that also holds the state.
+    /// Runs a shell command line on a terminal of this size, in a folder that also serves as the state folder.
     fn new(folder: &Folder, line: &str, rows: u16, cols: u16) -> Terminal {
         let size = PtySize { rows, cols, ..PtySize::default() };
         let pair = native_pty_system().openpty(size).unwrap();
@@ -60,7 +60,7 @@ impl Terminal {
         self.keys.flush().unwrap();
     }
 
-    /// Waits until the screen has a property.
+    /// Waits until the screen satisfies a condition.
     #[track_caller]
     fn until(&mut self, what: &str, is: impl Fn(&vt100::Screen) -> bool) {
         let end = Instant::now() + PATIENCE;
@@ -68,7 +68,7 @@ impl Terminal {
             match self.output.recv_timeout(end.saturating_duration_since(Instant::now())) {
                 Ok(bytes) => {
                     self.parser.process(&bytes);
-                    // Answer the query for the cursor's position, as terminals do.
+                    // Answer the query for the cursor position, as terminals do.
                     if bytes.windows(4).any(|window| window == b"\x1b[6n") {
                         self.press("\x1b[1;1R");
                     }
@@ -100,7 +100,7 @@ impl Terminal {
                 self.parser.process(&bytes);
             }
             if let Some(status) = self.child.try_wait().unwrap() {
-                // The last output may still be on its way; the end of file follows it.
+                // The last output may still be in transit; the end of file follows it.
                 while let Ok(bytes) = self.output.recv_timeout(PATIENCE) {
                     self.parser.process(&bytes);
                 }
@@ -114,7 +114,7 @@ impl Terminal {
         }
     }
 
-    /// Waits for the end; returns the text that remains on the screen.
+    /// Waits for the end; returns the text left on the screen.
     #[track_caller]
     fn left(&mut self) -> String {
         self.ends();
@@ -131,8 +131,8 @@ impl Terminal {
     }
 }
 
-/// At every width lines are broken between words by takt, not by the terminal; numbers stay under their titles, and one figure is bold. In
-/// a pipe lines are not folded.
+/// At any width takt breaks lines between words, so that the terminal breaks none; numbers stay below their titles, and one figure is
+/// bold. In a pipe, lines are not folded.
 #[test]
 fn results_fit_the_terminal() {
     let folder = Folder::new();
@@ -155,7 +155,7 @@ fn results_fit_the_terminal() {
             terminal.shows("all printed");
             let text = terminal.text();
             if !line.contains("plot") {
-                // Word fragments broken by the terminal would not be in the text.
+                // If the terminal breaks a word, its fragments are not in the text.
                 let broken = words(&text)
                     .into_iter()
                     .find(|word| !known.contains(word) && !ADDED.contains(&word.as_str()));
@@ -169,7 +169,7 @@ fn results_fit_the_terminal() {
             assert_eq!((0..200).any(is_bold), wanted, "{line}");
         }
     }
-    // Columns are left out whole: in 80 columns the paper's PC and DSP are dropped, its FPGA stays.
+    // Columns are dropped as a whole: at 80 columns the paper's PC and DSP are omitted, its FPGA stays.
     let mut terminal = Terminal::new(&folder, "takt track -q --periods 20; echo all printed", 200, 80);
     terminal.shows("all printed");
     let text = terminal.text();
@@ -179,7 +179,7 @@ fn results_fit_the_terminal() {
     );
 }
 
-/// Comments beside the help's examples continue under their own beginning.
+/// Comments beside examples in the help continue under their own start.
 #[test]
 fn examples_of_the_help_fit_the_terminal() {
     let folder = Folder::new();
@@ -229,7 +229,7 @@ fn full_screen() {
     terminal.shows("cycle 0, period 0");
     terminal.press("s");
     terminal.shows("(takt) step");
-    // The command line has the prompt's history and completion.
+    // The command line has the history and completion of the prompt.
     terminal.press(":break ad\t if i == 1\r");
     terminal.shows("stop 1 at bundle");
     terminal.press("c");
@@ -259,7 +259,7 @@ fn full_screen() {
     assert!(text.contains("isig icanon iexten echo "), "{text}");
 }
 
-/// The panes show one core of a system, selected by a key; one line shows all cores.
+/// The panes show the core of a system that a key selects; one line shows all cores.
 #[test]
 fn full_screen_of_a_system() {
     let folder = Folder::new();
@@ -320,7 +320,7 @@ fn the_prompt() {
     let folder = Folder::new();
     folder.write("sum.s", SUM);
     let mut terminal = Terminal::new(&folder, "takt debug sum.s", 40, 100);
-    // Commands, labels and registers complete.
+    // Commands, labels and registers are completed.
     terminal.line("disp\t cou\t\r");
     terminal.shows("count = (never written)");
     terminal.line("break ad\t if i == 1\r");
@@ -338,7 +338,7 @@ fn the_prompt() {
     terminal.line("\x04");
     terminal.ends();
 
-    // The next session has this session's commands in its history.
+    // The history of the next session contains the commands of this one.
     let mut terminal = Terminal::new(&folder, "takt debug sum.s", 40, 100);
     terminal.line("\x1b[A\r");
     terminal.shows("\nstill here");
@@ -365,7 +365,7 @@ fn a_long_run_is_interrupted() {
     terminal.ends();
 }
 
-/// Ctrl-C holds a free-running board, and ends an endless search; the board is left as found.
+/// Ctrl-C holds a free-running board, and ends an endless search; the board returns to its original state.
 #[cfg(unix)]
 #[test]
 fn a_board_at_the_prompt() {
@@ -394,7 +394,7 @@ fn a_board_at_the_prompt() {
     assert!(terminal.text().ends_with("the program runs; outputs drive"), "{}", terminal.text());
 }
 
-/// Long work shows its remaining time, and slow assembly that it goes on; nothing of it is written to a pipe.
+/// Long commands show the remaining time, and slow assembly shows that it is running; none of this is written to a pipe.
 #[test]
 fn long_commands_show_progress() {
     const SLOW: &str = ".input x\n.output y\n.reg n:int\n.once\n wait p\n.period\np: li n, 100000\nturn: isub n, n, 1\n bnz n, turn\n mov y, x\n wait p\n";
@@ -419,7 +419,7 @@ fn long_commands_show_progress() {
     assert_eq!((done.status, done.stderr.as_str()), (Some(0), ""));
 }
 
-/// Ctrl-C clears a progress bar, and ends the command by the signal.
+/// Ctrl-C clears a progress bar, and the command ends by the signal.
 #[test]
 fn ctrl_c_leaves_no_bar_behind() {
     let folder = Folder::new();

@@ -19,7 +19,7 @@ fn traces() {
         assert_eq!(traced, plain, "the run is the same");
         assert!(folder.read(&format!("out.{extension}")).starts_with(start), "{extension}");
     }
-    // A program that halts, and a program with a fault: the trace shows the events before it.
+    // A program that halts, and one that faults: the trace shows the events before the fault.
     folder.write("halts.s", ".output F\n fadd F, zero, zero\n halt\n");
     folder.line("run halts.s --trace halts.jsonl").ok();
     assert!(folder.read_text("halts.jsonl").contains(r#""event":"halt""#));

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Untrusted texts in the output of `takt`: no terminal commands get through, and generated files stay well-formed.
+//! Untrusted text in the output of `takt`: terminal control sequences are escaped, and generated files stay well-formed.
 
 use crate::common::{Folder, RunOutput};
 use takt_isa::text::is_hidden;
 
-/// Control sequences that set a terminal's title and clear it.
+/// Control sequences that set a terminal's title and clear its screen.
 const COMMANDS: &str = "\u{1b}]0;owned\u{7}\u{1b}[2J\u{9b}31m";
 
 const PROGRAM: &str = ".input x\n.output y\n.period\np: fadd y, x, 1.0\n wait p\n";
@@ -32,7 +32,7 @@ fn mistakes_are_quoted_as_text() {
     shown(folder.line("run system.toml"));
     shown(folder.takt(&["run", &format!("no{COMMANDS}.s")]));
     shown(folder.fed("debug p.s", format!("{COMMANDS}\n").as_bytes()));
-    // Colours are takt's own; no other sequence passes.
+    // Only takt's own colours pass; other sequences are escaped.
     let coloured = folder.line("--color always asm evil.s").stderr;
     assert!(coloured.contains("\u{1b}[0m"));
     let rest: String =
@@ -40,7 +40,7 @@ fn mistakes_are_quoted_as_text() {
     assert!(!rest.contains(is_hidden) && coloured.contains("]0;owned\\u0007"), "{coloured:?}");
 }
 
-/// Valid inputs with such a text: listings, the debugger, images of others, file names.
+/// Valid inputs with such text: listings, the debugger, images of others, file names.
 #[test]
 fn results_are_text() {
     let folder = Folder::new();
@@ -59,18 +59,18 @@ fn results_are_text() {
     folder.write(&name, PROGRAM);
     shown(folder.takt(&["asm", &name]));
     shown(folder.takt(&["analyse", &name]));
-    // The contents of a file on standard output are unescaped.
+    // The contents of a file, written to standard output, are not escaped.
     let source = format!("; {COMMANDS}\n{PROGRAM}");
     let done = folder.fed("fmt -", source.as_bytes());
     assert!(done.ok().starts_with(&format!("; {COMMANDS}\n")));
-    // JSON decodes to the same text.
+    // JSON decodes to the original text.
     let json = folder.takt(&["analyse", &name, "--json"]).ok();
     assert!(!json.contains(is_hidden));
     let value: serde_json::Value = serde_json::from_str(&json).unwrap();
     assert!(value.to_string().contains("owned"), "{json}");
 }
 
-/// A name stays within a single comment line, in headers and in circuits.
+/// A name never extends beyond its comment line, in headers and in circuits.
 #[test]
 fn names_stay_in_their_comments() {
     let folder = Folder::new();
@@ -86,7 +86,7 @@ fn names_stay_in_their_comments() {
     }
 }
 
-/// A browser ends a script at `</script>`: the data contains neither that nor `<!--`.
+/// Browsers end a script at `</script>`, so the data must contain neither that nor `<!--`.
 #[test]
 fn names_leave_pages_whole() {
     let folder = Folder::new();
@@ -101,7 +101,7 @@ fn names_leave_pages_whole() {
     assert!(value.to_string().contains(name), "{data}");
 }
 
-/// A single carriage return ends a line of a source.
+/// A carriage return alone ends a line of a source.
 #[test]
 fn sources_of_old_macs_are_read() {
     let folder = Folder::new();

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The option `--hq`: units of other processes give the results of one process, with HyperQueue from `PATH` and no silent installation.
+//! The option `--hq`: units in other processes give the same results as a single process, with HyperQueue from `PATH` and no silent
+//! installation.
 //!
-//! A script stands in for the program `hq`; takt-work's tests run the real package.
+//! A script replaces the program `hq`; the tests of takt-work run the real package.
 
 use crate::common::{Folder, RunOutput};
 use std::os::unix::fs::{PermissionsExt, symlink};
@@ -9,7 +10,7 @@ use std::path::Path;
 
 const PROGRAM: &str = ".input x\n.output y\n.period\np: fadd y, x, x\n wait p\n";
 
-/// A folder with a `bin` for `PATH`, which has `hq`.
+/// A folder with a subfolder `bin` for `PATH`, which contains `hq`.
 fn workshop() -> Folder {
     let folder = Folder::new();
     std::fs::create_dir(folder.path().join("bin")).unwrap();
@@ -34,7 +35,7 @@ fn robots_of_other_processes_are_the_same() {
     let line = "track -q --json --monte-carlo 70 --seed 5 --periods 300";
     let here = takt(&folder, line).ok();
     assert_eq!(takt(&folder, &format!("{line} --hq")).ok(), here);
-    // Nothing was installed, and the server's folder and the units are gone.
+    // Nothing was installed, and the server's folder and the units have been removed.
     assert!(!folder.path().join("venv").exists());
     let left: Vec<_> = std::fs::read_dir(folder.path().join("cache/takt/track/units")).unwrap().collect();
     assert_eq!(left.len(), 0, "{left:?}");
@@ -90,7 +91,7 @@ fn robots_of_one_run_are_not_given_away() {
     assert!(done.stderr.contains("units read programs from files"), "{}", done.stderr);
 }
 
-/// Another program of that name is no HyperQueue; an installation is said, and where it fails the way without a network.
+/// Another program called `hq` is not used; an installation is announced, and if it fails the message states how to do without a network.
 #[test]
 fn an_installation_is_announced() {
     let folder = workshop();

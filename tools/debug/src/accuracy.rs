@@ -7,10 +7,10 @@ use std::fmt::Write as _;
 use takt_analysis::accuracy::{ErrorShare, Shadow, ulp};
 use takt_isa::{Program, Register, Type};
 
-/// Maximal number of source lines named as origins of an error.
+/// Maximum number of source lines listed as origins of an error.
 const LISTED: usize = 3;
 
-/// Register of a name, or without a name every output that carries binary32, each with its name.
+/// Looks up a register by name; without a name, all binary32 outputs. Returns each with its name.
 ///
 /// # Errors
 /// If the name is not a register.
@@ -27,7 +27,7 @@ pub(crate) fn registers(session: &Session, name: &str) -> Result<Vec<(String, Re
     }
 }
 
-/// Errors of registers at this position, which `shadow` has reached from reset.
+/// Errors of registers at this position, up to which `shadow` has run from reset.
 pub(crate) fn report(session: &Session, shadow: &Shadow, registers: &[(String, Register)]) -> String {
     let mut text = String::new();
     let width = registers.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
@@ -46,7 +46,7 @@ pub(crate) fn report(session: &Session, shadow: &Shadow, registers: &[(String, R
     text
 }
 
-/// Error per source line, largest share first, as a text for the console.
+/// Error contribution of each source line, largest first, as text for the console.
 fn lines(program: &Program, parts: &[ErrorShare]) -> String {
     let mut lines: BTreeMap<String, f64> = BTreeMap::new();
     for part in parts {

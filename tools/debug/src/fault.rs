@@ -8,8 +8,8 @@ use takt_emu::{Fault, FaultKind};
 use takt_isa::Program;
 use takt_isa::program::Location;
 
-/// Diagnostic of a fault: cause and source line. `sources` has the source texts under the program's names; without the text, the message
-/// gives the place as `FILE:LINE`.
+/// Diagnostic of a fault: cause and source line. `sources` maps the program's file names to texts; without the text, the message gives
+/// the place as `FILE:LINE`.
 pub fn diagnose(fault: &Fault, program: &Program, sources: &[(String, String)]) -> Diagnostics {
     const CODE: &str = "fault";
     let shown = fault.show(program);
@@ -42,7 +42,7 @@ fn mend(kind: &FaultKind, program: &Program) -> Option<String> {
     })
 }
 
-/// Statement of a source line, without its comment. `texts` has the source texts under the program's names.
+/// Statement on a source line, without the comment. `texts` maps the program's file names to texts.
 pub fn line(program: &Program, location: Location, texts: &[(String, String)]) -> Option<(Sources, Span)> {
     let name = program.files.get(location.file as usize)?;
     let (_, text) = texts.iter().find(|(known, _)| known == name)?;

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The `info` command: meaning of a name, and the lifetimes of its values, as text.
+//! The `info` command: meaning of a name, and lifetimes of its values, as text.
 
 use crate::session::{BreakpointLocation, LiveRange, Session};
 use std::fmt::Write as _;
 use takt_asm::expr::Value;
 use takt_isa::{BundleAddress, Program, Register};
 
-/// Maximal number of bundles listed among the writers or readers of a register.
+/// Maximum number of bundles listed as writers or readers of a register.
 const LISTED: usize = 6;
 
-/// Describes a name: its registers, the bundles that write and read them, and the register at the current line.
+/// Describes a name: its registers, the bundles that write and read them, and the register that the current line uses.
 ///
 /// # Errors
 /// If the name is unknown.
@@ -62,7 +62,7 @@ fn kind(program: &Program, register: Register) -> &'static str {
     }
 }
 
-/// Bundles that write and read a value, with the source line of each operation.
+/// Bundles that write and read a value, with the source lines of the operations.
 fn lifetime(program: &Program, life: &LiveRange) -> String {
     let (mut written, mut read) = (Vec::new(), Vec::new());
     let end = BundleAddress::new(program.bundles());
@@ -75,12 +75,12 @@ fn lifetime(program: &Program, life: &LiveRange) -> String {
                 let line = line.map_or(String::new(), |line| format!(" ({line})"));
                 format!("bundle {address}{line}")
             };
-            // With shared registers, the bundle of a value's last use may write the next value.
+            // If values share a register, the bundle of a value's last use may write the next value.
             let next = life.bundles.is_some() && address == last && address != first;
             if instruction.writes(slot) == Some(life.register) && !next {
                 written.push(place());
             }
-            // The bundle of a value's first write may read the previous value.
+            // The bundle of a value's first write may still read the previous value.
             let before = life.bundles.is_some() && address == first;
             if instruction.reads().contains(&life.register) && !before {
                 read.push(place());
@@ -90,7 +90,7 @@ fn lifetime(program: &Program, life: &LiveRange) -> String {
     format!("written in {}; read in {}", listed(written), listed(read))
 }
 
-/// Places of a breakpoint: `bundle 12 (a.s:4)`, or `3 places: …`.
+/// Text for the places of a breakpoint: `bundle 12 (a.s:4)`, or `3 places: …`.
 pub(crate) fn places(program: &Program, at: &BreakpointLocation) -> String {
     match at {
         BreakpointLocation::Bundle(address) => program.bundle_text(*address),
@@ -103,7 +103,7 @@ pub(crate) fn places(program: &Program, at: &BreakpointLocation) -> String {
     }
 }
 
-/// The first [`LISTED`] places, and their number if there are more.
+/// The first [`LISTED`] places; if there are more, also their number.
 fn listed(mut places: Vec<String>) -> String {
     places.dedup();
     let shown = || places.iter().take(LISTED).map(String::as_str).collect::<Vec<_>>().join(", ");

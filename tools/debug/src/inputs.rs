@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Input ports from a CSV table: a named column for each port, a row for each period.
+//! Input ports from a CSV table: one named column per port, one row per period.
 
 use std::io::{self, Read};
 use takt_asm::nearest;
@@ -7,7 +7,7 @@ use takt_emu::{Row, Rows};
 use takt_isa::Type;
 use takt_isa::program::Port;
 
-/// Parses a table's text into rows; more than `most` is an error.
+/// Parses the text of a table into rows; more than `most` rows are an error.
 ///
 /// # Errors
 /// If the table is malformed; the message has the table's name, line and column.
@@ -55,7 +55,7 @@ pub fn parse(ty: Type, text: &str) -> Result<u32, String> {
     }
 }
 
-/// Beginning of a possibly long field, for messages.
+/// Start of a possibly long field, for messages.
 fn field_start(text: &str) -> String {
     let mut start: String = text.chars().take(40).collect();
     if start.len() < text.len() {
@@ -64,7 +64,7 @@ fn field_start(text: &str) -> String {
     start
 }
 
-/// Rows of input values from a CSV with a named column for each input port; other columns are ignored.
+/// Rows of input values from a CSV file with a named column for each input port; other columns are ignored.
 pub struct Table {
     name: String,
     reader: csv::Reader<BudgetReader>,
@@ -78,18 +78,18 @@ pub struct Table {
     begins: bool,
 }
 
-/// Maximal size of a row in bytes, so that a file without line ends, or with an open quote, cannot fill the memory.
+/// Maximum size of a row in bytes: a file without line ends, or with an unclosed quote, must not fill the memory.
 pub const ROW_LIMIT: usize = 1 << 20;
 
 impl Table {
-    /// Reads the header of a table. `name` is the table's name in messages.
+    /// Reads the header of a table. `name` identifies the table in messages.
     ///
     /// # Errors
     /// If the header does not have exactly one column for each port.
     pub fn new(name: String, source: Box<dyn Read>, ports: &[Port]) -> Result<Table, String> {
         let OpenTable { reader, header, found, missing } = OpenTable::of(&name, source, ports)?;
         if let [first, ..] = missing[..] {
-            // A title that equals a port's name is no misspelling of another.
+            // A title that is the name of a port is not a misspelling of another port.
             let near =
                 suggest(first, header.iter().filter(|title| ports.iter().all(|port| port.name != **title)));
             let ports = if missing.len() == 1 { "input port" } else { "input ports" };
@@ -106,10 +106,10 @@ impl Table {
         Ok(Table::with(name, reader, &header, found))
     }
 
-    /// Reads the header of a table with columns for some of the ports and no others; errors call it `name`.
+    /// Reads the header of a table that may omit ports but has no other columns. `name` identifies the table in messages.
     ///
     /// # Errors
-    /// If a column belongs to no port, or the header is empty.
+    /// If a column belongs to no port, or if the header is empty.
     pub fn of_some(name: String, source: Box<dyn Read>, ports: &[Port]) -> Result<Table, String> {
         let OpenTable { reader, header, found, .. } = OpenTable::of(&name, source, ports)?;
         if let Some(other) = header.iter().find(|title| ports.iter().all(|port| port.name != **title)) {
@@ -139,7 +139,7 @@ impl Table {
 
     /// Titles of the columns, from the header.
     pub fn titles(&mut self) -> Vec<String> {
-        // The constructor has read the header row already.
+        // Cannot fail: the constructor has read the header row.
         let titles = self.reader.headers().map(|header| header.iter().map(str::to_owned).collect());
         titles.unwrap_or_default()
     }
@@ -154,10 +154,10 @@ impl Table {
         self.record.get(column).unwrap_or_default()
     }
 
-    /// Inputs of the next period; `None` at the end of the table, which must have at least one row.
+    /// Inputs of the next period; `None` at the end of the table. A table must have at least one row.
     ///
     /// # Errors
-    /// If the row's number of fields differs from the header's, or a field is not a value of its port's type.
+    /// If the row's number of fields differs from the header's, or if a field is not a value of its port's type.
     #[allow(clippy::should_implement_trait, reason = "what it gives is borrowed")]
     pub fn next(&mut self) -> Result<Option<&Row>, String> {
         self.reader.get_mut().left = ROW_LIMIT;
@@ -193,7 +193,7 @@ fn place(name: &str, record: &csv::StringRecord) -> String {
     format!("{name}:{}", record.position().map_or(0, csv::Position::line))
 }
 
-/// A table after its header.
+/// A table whose header has been read.
 struct OpenTable<'a> {
     reader: csv::Reader<BudgetReader>,
     header: csv::StringRecord,
@@ -206,7 +206,7 @@ struct OpenTable<'a> {
 impl<'a> OpenTable<'a> {
     fn of(name: &str, source: Box<dyn Read>, ports: &'a [Port]) -> Result<OpenTable<'a>, String> {
         let source = BudgetReader { source, left: ROW_LIMIT };
-        // Accept rows of any length here; `next` reports a wrong length with a better message.
+        // Accept rows of any length here; `next` reports a wrong length with a more helpful message.
         let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).flexible(true).from_reader(source);
         let header = reader.headers().map_err(|error| explain(name, error))?.clone();
         if header.is_empty() {
@@ -227,7 +227,7 @@ impl<'a> OpenTable<'a> {
     }
 }
 
-/// Hint for a row whose separator seems to be another character than the comma.
+/// Hint for a row that seems to use a separator other than the comma.
 fn separator(record: &csv::StringRecord) -> String {
     let others = [(';', "`;`"), ('\t', "a tab"), ('|', "`|`")];
     let found = others.iter().find(|(other, _)| record.iter().any(|field| field.contains(*other)));
@@ -257,7 +257,7 @@ fn explain(name: &str, error: csv::Error) -> String {
     }
 }
 
-/// Reader with a byte budget: returns an error after `left` bytes unless the budget is raised.
+/// Reader with a byte budget: returns an error once `left` bytes are read, unless the budget is raised.
 struct BudgetReader {
     source: Box<dyn Read>,
     left: usize,

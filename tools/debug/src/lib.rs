@@ -18,11 +18,11 @@ pub mod value;
 #[cfg(feature = "tui")]
 pub mod view;
 
-/// Matches a name with a pattern in which `*` stands for any number of characters.
+/// Matches a name against a pattern in which `*` stands for any number of characters.
 fn matches(pattern: &str, name: &str) -> bool {
     let Some((head, rest)) = pattern.split_once('*') else { return pattern == name };
     let Some(mut name) = name.strip_prefix(head) else { return false };
-    // The leftmost match of each part leaves most for the parts after it; the last part must match at the end.
+    // Match each part as far left as possible, which leaves the most text for later parts; the last part must match at the end.
     let mut parts = rest.split('*').peekable();
     while let Some(part) = parts.next() {
         if parts.peek().is_none() {

@@ -9,9 +9,9 @@ use takt_emu::Status;
 use takt_isa::timing::{Cause, Cycle};
 use takt_isa::{Register, Type};
 
-/// Number of source lines shown before and after the next one.
+/// Number of source lines shown before and after the current one.
 const LINES: u32 = 1000;
-/// Maximal number of bundles in the list of stalls, longest first.
+/// Maximum number of bundles in the list of stalls, longest first.
 const STALLS: usize = 10;
 
 /// Kind of a named register.
@@ -21,7 +21,7 @@ pub enum Kind {
     Input,
     /// Output port, read by the host.
     Output,
-    /// Register declared in the source, or assigned to a name of it.
+    /// Register declared in the source, or allocated to a name.
     Register,
 }
 
@@ -69,7 +69,7 @@ pub struct InFlightOperation {
     pub register: String,
     /// Mnemonic of the operation.
     pub mnemonic: &'static str,
-    /// Bundle that issued the operation, as text with its source line.
+    /// Bundle that issued the operation, with its source line.
     pub from: String,
 }
 
@@ -88,14 +88,14 @@ pub struct Line {
     pub stop: bool,
 }
 
-/// A core of a system, in the list of cores.
+/// A core of a system, as shown in the list of cores.
 #[derive(Clone, Debug)]
 pub struct CoreLine {
     /// Name of the core in the system's description.
     pub name: String,
-    /// State of the core in the cycle to come, in words.
+    /// State of the core in the next cycle, in words.
     pub state: String,
-    /// Commands and the other panes refer to this core.
+    /// The core is selected: commands and the other panes refer to it.
     pub selected: bool,
 }
 
@@ -112,11 +112,11 @@ pub struct Panes {
     pub file: String,
     /// Source lines around the current one.
     pub lines: Vec<Line>,
-    /// Next bundle: name and operation of each slot.
+    /// Next bundle: name of each slot with its operation.
     pub bundle: Vec<(&'static str, Option<String>)>,
     /// Source places of the bundle's operations, by slot: the line, preceded by the file if it differs from `file`.
     pub places: Vec<Option<String>>,
-    /// Registers of the source: first the changed ones, then those used by the next bundle, then all others.
+    /// Named registers: first changed ones, then those that the next bundle uses, then all others.
     pub registers: Vec<NamedRegister>,
     /// Input ports with their present values.
     pub inputs: Vec<NamedRegister>,
@@ -124,16 +124,16 @@ pub struct Panes {
     pub outputs: Vec<NamedRegister>,
     /// Operations in flight, with the cycles left to their writeback.
     pub flight: Vec<InFlightOperation>,
-    /// Stall cause of the cycle to come; `None` if a bundle issues.
+    /// Stall cause of the next cycle; `None` if a bundle issues.
     pub cause: Option<String>,
     /// Cycles since reset by cause, with their texts.
     pub stalls: Vec<(u64, String)>,
-    /// Expressions on display, with their values.
+    /// Displayed expressions with their values.
     pub displays: Vec<(String, String)>,
 }
 
 impl Panes {
-    /// Contents of all panes; `before` has the values of named registers ([`values`]) before the last command.
+    /// Contents of all panes; `before` has the values of named registers ([`values`]) from before the last command.
     pub(crate) fn new(
         session: &mut Session,
         before: &[Option<u32>],
@@ -212,7 +212,7 @@ pub(crate) fn head(session: &mut Session) -> String {
     format!("{times}: {what}")
 }
 
-/// State of a core in the cycle to come, in a few words.
+/// State of a core in the next cycle, in a few words.
 pub(crate) fn core_state(session: &mut Session) -> String {
     let stall = session.stall();
     let program = session.program();
@@ -232,7 +232,7 @@ pub(crate) fn bundle(session: &Session) -> Vec<(&'static str, Option<String>)> {
     slots.zip(session.bundle(session.emulator().next_address())).collect()
 }
 
-/// Source places of the next bundle's operations, by slot; lines of `file` without the file's name.
+/// Source places of the next bundle's operations, by slot. Lines of `file` are given without the file name.
 fn places(session: &Session, file: u32) -> Vec<Option<String>> {
     let program = session.program();
     let place = |location: &Option<takt_isa::program::Location>| {
@@ -258,7 +258,7 @@ pub(crate) fn loops(session: &Session) -> impl Iterator<Item = String> {
     })
 }
 
-/// Ports or registers of the source, in declaration order.
+/// Ports or registers named in the source, in declaration order.
 pub(crate) fn named(session: &Session, kind: Kind) -> impl Iterator<Item = NamedRegister> {
     let program = session.program();
     let ports = match kind {
@@ -327,7 +327,7 @@ pub fn stalls(session: &Session) -> Vec<(u64, String)> {
     rows
 }
 
-/// Lines of a source; `None` if its text is not available.
+/// Lines of a source; `None` if the text is not available.
 pub(crate) fn lines(session: &Session, file: u32, range: RangeInclusive<u32>) -> Option<Vec<Line>> {
     let program = session.program();
     let here = session.location().filter(|here| here.file == file);

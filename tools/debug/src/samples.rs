@@ -1,22 +1,22 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Samples along a run at growing distances: checkpoints, and the states of searches.
+//! Values sampled along a run at growing distances: checkpoints, and states of searches.
 
 use std::collections::BTreeMap;
 use takt_isa::timing::Cycle;
 
-/// Maximal number of values kept.
+/// Maximum number of values kept.
 pub(crate) const MOST: usize = 512;
 
-/// Values by cycle, [`MOST`] at most: beyond that, every second value is dropped and the interval doubles.
+/// Values by cycle, at most [`MOST`]: when this number is exceeded, every second value is dropped and the interval doubles.
 #[derive(Clone, Debug)]
 pub(crate) struct ThinnedSeries<T> {
     values: BTreeMap<Cycle, T>,
-    /// Distance in cycles at which the next value is due.
+    /// Distance from the last value to the next, in cycles.
     interval: Cycle,
 }
 
 impl<T> ThinnedSeries<T> {
-    /// An empty list that asks for a value every `interval` cycles.
+    /// An empty series that requests a value every `interval` cycles.
     pub(crate) fn every(interval: Cycle) -> ThinnedSeries<T> {
         ThinnedSeries { values: BTreeMap::new(), interval }
     }
@@ -33,18 +33,18 @@ impl<T> ThinnedSeries<T> {
         }
     }
 
-    /// Cycle at which the next value is due; never, before the last value.
+    /// Cycle at which the next value is due; `Cycle::MAX` if `now` precedes the last value.
     pub(crate) fn due(&self, now: Cycle) -> Cycle {
         let last = self.values.last_key_value().map_or(0, |(cycle, _)| *cycle);
         if now < last { Cycle::MAX } else { last + self.interval }
     }
 
-    /// The last value at or before a cycle.
+    /// Last value at or before a cycle, with its cycle.
     pub(crate) fn before(&self, cycle: Cycle) -> Option<(Cycle, &T)> {
         self.values.range(..=cycle).next_back().map(|(cycle, value)| (*cycle, value))
     }
 
-    /// The last value of the leading run for which `holds`; the first value if it holds for none.
+    /// Last value for which `holds`, or the first value if it holds for none.
     pub(crate) fn last_while(&self, holds: impl Fn(&T) -> bool) -> Option<&T> {
         self.values.values().rfind(|value| holds(value)).or_else(|| self.first())
     }
@@ -57,7 +57,7 @@ impl<T> ThinnedSeries<T> {
         self.values.keys().copied()
     }
 
-    /// Drops the values at and after a cycle.
+    /// Drops values at and after a cycle.
     pub(crate) fn forget_from(&mut self, cycle: Cycle) {
         self.values.split_off(&cycle);
     }

@@ -9,8 +9,8 @@ use takt_asm::source::Sources;
 use takt_system::Description;
 use takt_system::stale_reads::{Doubt, StaleRead};
 
-/// Diagnostic of a stale read, at its source line if `sources` (texts under the names in the core's program) has it. `None` if `levels`
-/// allow it.
+/// Diagnostic of a stale read, at its source line if `sources` has the text (keyed by the file names in the core's program). `None` if
+/// `levels` allow the read.
 pub fn diagnose(
     read: &StaleRead,
     description: &Description,

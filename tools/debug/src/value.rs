@@ -4,7 +4,7 @@
 use serde_json::{Number, Value};
 use takt_isa::Type;
 
-/// Bits in the notation of their type: the shortest decimal that reads back as the same binary32, an integer, or hexadecimal.
+/// Formats bits in the notation of their type: the shortest decimal that reads back as the same binary32, an integer, or hexadecimal.
 pub fn text(ty: Type, bits: u32) -> String {
     match ty {
         Type::F => format!("{:?}", f32::from_bits(bits)),
@@ -13,7 +13,7 @@ pub fn text(ty: Type, bits: u32) -> String {
     }
 }
 
-/// JSON number, or the [`text`] of values without one (NaN, infinities, hexadecimal).
+/// JSON number; values without one (NaN, infinities, hexadecimal) become a string with their [`text`].
 pub fn json(ty: Type, bits: u32) -> Value {
     let text = text(ty, bits);
     serde_json::from_str::<Number>(&text).map_or_else(|_| Value::from(text), Value::from)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Full-screen view: draws plain data into cells. It makes no decisions and knows neither session nor terminal.
+//! Full-screen view: draws plain data into cells. It makes no decisions, and depends neither on the session nor on the terminal.
 
 use crate::console::{commands, keys};
 use crate::panes::{self, CoreLine, NamedRegister, Panes};
@@ -10,22 +10,22 @@ use ratatui::style::{Color, Modifier, Style};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Block, Borders, Clear, Paragraph, Wrap};
 
-/// Minimal width for three columns.
+/// Minimum width for three columns.
 const WIDE: u16 = 110;
-/// Maximal number of lines in the log.
+/// Maximum number of lines in the log.
 const LOG: usize = 2000;
 /// Distance between tab stops in columns.
 const TAB: usize = 8;
-/// Maximal width of a name with text beside it.
+/// Maximum width of a name with text beside it.
 const NAME: usize = 20;
-/// Width of a slot's name with the blank after it.
+/// Width of a slot's name and the blank after it.
 const SLOT: usize = 5;
 /// Width of a value.
 const VALUE: usize = 15;
 
 const CHANGED: Style = Style::new().fg(Color::Yellow).add_modifier(Modifier::BOLD);
 const NEXT: Style = Style::new().fg(Color::Black).bg(Color::Green);
-/// Style of the other lines whose operations are in the next bundle.
+/// Style of the other source lines whose operations are in the next bundle.
 const PART: Style = Style::new().fg(Color::Green);
 const STOP: Style = Style::new().fg(Color::Red).add_modifier(Modifier::BOLD);
 const DIM: Style = Style::new().fg(Color::DarkGray);
@@ -76,15 +76,15 @@ pub struct Screen {
     pub panes: Panes,
     /// Lines of the log: commands with their answers.
     log: Vec<(LogLineKind, String)>,
-    /// Index in the log of the last command.
+    /// Index of the last command in the log.
     latest: usize,
-    /// Command line: its text and the cursor's column.
+    /// Command line: text and cursor column.
     pub typed: Option<(String, usize)>,
     /// Progress text of a running command.
     pub running: Option<String>,
-    /// Top line of the help; `None` while help is hidden.
+    /// Index of the help's top line; `None` while help is hidden.
     pub help: Option<usize>,
-    /// Pane with the focus, which keys scroll.
+    /// Focused pane, which the scroll keys move.
     pub focus: Pane,
     /// Scroll offset of each pane, in lines.
     scroll: [isize; Pane::ALL.len()],
@@ -105,7 +105,7 @@ impl Screen {
         }
     }
 
-    /// Adds a command and its answer to the log, and takes over the new panes.
+    /// Adds a command and its answer to the log, and replaces the panes.
     pub fn log_command(&mut self, command: &str, answer: &Result<String, String>, panes: Panes) {
         self.log.drain(..self.log.len().saturating_sub(LOG));
         self.latest = self.log.len();
@@ -119,7 +119,7 @@ impl Screen {
         self.scroll = [0; Pane::ALL.len()];
     }
 
-    /// Scrolls the help if shown, otherwise the pane with the focus.
+    /// Scrolls the help if it is shown, otherwise the focused pane.
     pub fn scroll(&mut self, lines: isize) {
         match &mut self.help {
             Some(top) => *top = top.saturating_add_signed(lines),
@@ -127,7 +127,7 @@ impl Screen {
         }
     }
 
-    /// Moves the focus by a number of panes; negative is back.
+    /// Moves the focus forward by a number of panes; backward if negative.
     pub fn turn(&mut self, panes: isize) {
         let at = (self.focus as isize + panes).rem_euclid(Pane::ALL.len() as isize);
         self.focus = Pane::ALL[at as usize];
@@ -151,7 +151,7 @@ pub fn draw(frame: &mut Frame<'_>, screen: &mut Screen) {
     }
 }
 
-/// The cores of a system in one line, each with its state.
+/// One line with all cores of a system and their states.
 fn core_line(panes: &Panes) -> Line<'static> {
     let core = |core: &CoreLine| {
         let style = if core.selected { TITLE.reversed() } else { TITLE };
@@ -202,7 +202,7 @@ fn areas(body: Rect, panes: &Panes) -> Vec<(Pane, Rect)> {
 fn draw_pane(frame: &mut Frame<'_>, screen: &mut Screen, pane: Pane, area: Rect) {
     let height = usize::from(area.height.saturating_sub(1));
     let panes = &screen.panes;
-    // Lines of the pane, and the top line while it is not scrolled.
+    // Lines of the pane, and its top line unless scrolled.
     let (title, lines, top) = match pane {
         Pane::Source => (plain(&panes.file), source(panes), source_top(panes, height)),
         Pane::Bundle => ("bundle".to_owned(), bundle(panes, area.width), 0),
@@ -261,7 +261,7 @@ fn source(panes: &Panes) -> Vec<Line<'static>> {
     panes.lines.iter().map(row).collect()
 }
 
-/// Top line of the source while it is not scrolled: shows all lines of the bundle if they fit, otherwise the next line.
+/// Top line of the source unless scrolled: shows all lines of the bundle if they fit, otherwise the current line.
 fn source_top(panes: &Panes, height: usize) -> usize {
     let marked = |line: &panes::Line| line.next || line.part;
     let next = panes.lines.iter().position(|line| line.next).unwrap_or(0);
@@ -269,7 +269,7 @@ fn source_top(panes: &Panes, height: usize) -> usize {
     let last = panes.lines.iter().rposition(marked).unwrap_or(next);
     let usual = next.saturating_sub(height / 3);
     match last - first < height {
-        // Move no farther from the usual position than the first and last line need.
+        // Stay as close to the usual position as the first and last line allow.
         true => usual.clamp((last + 1).saturating_sub(height), first),
         false => usual,
     }
@@ -304,7 +304,7 @@ fn shortened(text: &str, room: usize) -> String {
     text.chars().take(room.saturating_sub(1)).chain(['…']).collect()
 }
 
-/// Lines of the log, with long ones broken, and the index of the last command's line.
+/// Lines of the log, wrapped, and the index of the last command's line.
 fn log(log: &[(LogLineKind, String)], latest: usize, room: u16) -> (Vec<Line<'static>>, usize) {
     let (mut lines, mut top) = (Vec::new(), 0);
     for (i, (said, text)) in log.iter().enumerate() {
@@ -324,7 +324,7 @@ fn log(log: &[(LogLineKind, String)], latest: usize, room: u16) -> (Vec<Line<'st
     (lines, top)
 }
 
-/// Breaks a line into parts of at most `room` columns: at blanks, and inside words that are longer than a line.
+/// Wraps a line into parts of at most `room` columns: at blanks, or inside words that are longer than a line.
 fn broken(text: &str, room: usize) -> Vec<String> {
     let mut rest: Vec<char> = text.chars().collect();
     let mut parts = Vec::new();
@@ -339,7 +339,7 @@ fn broken(text: &str, room: usize) -> Vec<String> {
     parts
 }
 
-/// Rows of names and values, with changed ones marked; the bits follow where `room` columns hold them whole.
+/// Rows of names and values, with changed ones marked; bits are shown if they fit into `room` columns.
 fn values(rows: &[NamedRegister], prefix: &'static str, room: u16) -> Vec<Line<'static>> {
     let width = rows.iter().map(|row| row.name.len()).max().unwrap_or(0).min(NAME);
     let left = usize::from(room).saturating_sub(prefix.len() + 1 + width + 1);
@@ -353,7 +353,7 @@ fn values(rows: &[NamedRegister], prefix: &'static str, room: u16) -> Vec<Line<'
             Style::new()
         };
         let (mark, mut value) = (if row.changed { '*' } else { ' ' }, row.value());
-        // On a narrow pane, drop the parentheses first.
+        // On a narrow pane, omit the parentheses first.
         if value.len() > left && row.bits.is_none() {
             value = value.trim_matches(['(', ')']).to_owned();
         }
@@ -368,7 +368,7 @@ fn values(rows: &[NamedRegister], prefix: &'static str, room: u16) -> Vec<Line<'
 }
 
 fn ports(panes: &Panes, room: u16) -> Vec<Line<'static>> {
-    // Outputs before inputs, since outputs change more often.
+    // Show outputs before inputs, since outputs change more often.
     let mut lines = values(&panes.outputs, "out ", room);
     lines.extend(values(&panes.inputs, "in  ", room));
     lines
@@ -389,7 +389,7 @@ fn flight(panes: &Panes, room: u16) -> Vec<Line<'static>> {
     panes.flight.iter().map(row).collect()
 }
 
-/// `bundle 24 (pi.s:55)` in at most `room` columns; if too long, only the place or only the bundle.
+/// Formats `bundle 24 (pi.s:55)` for at most `room` columns; if it is too long, only the place or only the bundle.
 fn origin(from: &str, room: usize) -> String {
     if from.chars().count() <= room {
         return from.to_owned();
@@ -407,7 +407,7 @@ fn stalls(panes: &Panes) -> Vec<Line<'static>> {
     now.chain(rows).collect()
 }
 
-/// Draws the command line; without input, the hints on keys.
+/// Draws the command line, or the key hints if there is no input.
 fn draw_command(frame: &mut Frame<'_>, screen: &Screen, area: Rect) {
     if let Some(text) = &screen.running {
         frame.render_widget(Line::styled(plain(text), CHANGED), area);
@@ -418,7 +418,7 @@ fn draw_command(frame: &mut Frame<'_>, screen: &Screen, area: Rect) {
         frame.render_widget(hints(screen.panes.target, area.width), area);
         return;
     };
-    // Scroll to the right as far as keeps the cursor in sight.
+    // Scroll right just enough to keep the cursor visible.
     let room = usize::from(area.width).saturating_sub(PROMPT.len() + 1);
     let skipped = cursor.saturating_sub(room);
     let shown: String = text.chars().skip(skipped).collect();
@@ -429,10 +429,10 @@ fn draw_command(frame: &mut Frame<'_>, screen: &Screen, area: Rect) {
     }
 }
 
-/// Priority of keys in the hints: to quit, and to step back, come first.
+/// Keys in the order in which hints are chosen: quitting and stepping back come first.
 const HINTS: &str = "qscplbwgnuidok";
 
-/// Keys with their commands, as many as fit whole; a key and its capital, which goes back, share one hint.
+/// Keys with their commands, as many as fit entirely. A key and its capital, which goes back, share one hint.
 fn hints(target: Target, room: u16) -> Line<'static> {
     let known: Vec<(char, &str)> = keys(target).collect();
     let line_of =
@@ -442,7 +442,7 @@ fn hints(target: Target, room: u16) -> Line<'static> {
         let (Some(forth), back) = (line_of(key), line_of(key.to_ascii_uppercase())) else { continue };
         hints.push(match back {
             Some(back) => {
-                // "step line" and "back line" share their object.
+                // "step line" and "back line" end in the same word.
                 let object = forth.split_once(' ').map_or("", |(_, object)| object);
                 let verbs = [forth, back].map(|line| line.split(' ').next().unwrap_or(line));
                 let text = format!("{}/{} {object}", verbs[0], verbs[1]);
@@ -481,7 +481,7 @@ fn draw_help(frame: &mut Frame<'_>, target: Target, top: &mut usize, body: Rect)
         lines.push(Line::from(vec![Span::styled(usage, TITLE), Span::styled(keys, CHANGED)]));
         lines.push(Line::raw(format!("    {text}")));
     }
-    // Without line breaks there are as many rows as lines, the minimum.
+    // Without wrapping, the number of rows equals the number of lines, the minimum.
     *top = (*top).min(lines.len().saturating_sub(1));
     let block = Block::bordered().border_style(DIM).title(Span::styled(" help (Esc leaves) ", TITLE));
     let text = Paragraph::new(lines).wrap(Wrap { trim: false }).scroll((*top as u16, 0)).block(block);
@@ -489,7 +489,7 @@ fn draw_help(frame: &mut Frame<'_>, target: Target, top: &mut usize, body: Rect)
     frame.render_widget(text, body);
 }
 
-/// Expands tabs, and replaces other control characters by `·`.
+/// Expands tabs, and replaces other control characters with `·`.
 fn plain(text: &str) -> String {
     let mut plain = String::with_capacity(text.len());
     let mut column = 0;

@@ -8,7 +8,7 @@ use takt_debug::session::{Options, Session};
 use takt_emu::Emulator;
 use takt_isa::{F3, Program};
 
-/// A program with a macro, a bundle of two operations, a tab and comments, and its source texts.
+/// Assembles a program that contains a macro, a bundle of two operations, a tab and comments; also returns the source texts.
 fn assembled(body: &str) -> (Program, Vec<(String, String)>) {
     let files = [
         ("a.s", &*format!(".include \"word.s\"\n.reg r:int\n.state s:int\n.once\n{body}")),
@@ -38,7 +38,7 @@ fn faults_at_their_lines() {
         let without = diagnose(&fault, &program, &[]);
         text += &format!("{}\n{}\n", with.render(false), without.render(false));
         assert!(with.has_errors() && without.has_errors());
-        // A wrong, shorter text does not have the line.
+        // A different, shorter text lacks the line.
         let other: Vec<_> = sources.iter().map(|(name, _)| (name.clone(), String::new())).collect();
         let shown = diagnose(&fault, &program, &other).render(false);
         assert!(shown == without.render(false) || shown == with.render(false), "{shown}");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Integration tests in one binary: one module for each subject.
+//! Integration tests in one binary, one module per subject.
 
 mod faults;
 mod names;

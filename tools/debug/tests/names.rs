@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Meaning of names at a position: the value that the line at hand reads, checked against the program words.
+//! Meaning of names at a position: the value that the current line reads, checked against the program words.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -20,7 +20,7 @@ fn assembled(source: &str, machine: &'static Machine) -> AssembledProgram {
     }
 }
 
-/// A session on an image after some periods, with its inputs at 1, 2, ….
+/// A session on an image after some periods, with inputs 1, 2, ….
 fn session(assembled: &AssembledProgram, periods: usize) -> Session {
     let bytes =
         image::write_with(&assembled.program, Some(&assembled.debug_info())).expect("an image holds it");
@@ -42,7 +42,8 @@ const MACRO: &str = "\
 .endm
 ";
 
-/// A straight line that writes few names repeatedly, in macros and outside. Values live long, so that many of them share few registers.
+/// A straight-line program that writes few names repeatedly, inside and outside macros. Values live long, so that many share few
+/// registers.
 fn random_source(seed: u64, lines: usize) -> String {
     let mut random = Random::new(seed);
     let names: Vec<String> = (0..12).map(|i| format!("v{i}")).collect();
@@ -104,7 +105,7 @@ fn name_means_the_value_read_at_the_line() {
     assert!(looked > 1000 && renamed.len() > 100 && inside > 300, "{looked} {} {inside}", renamed.len());
 }
 
-/// With more values than registers, values share registers: a value that is gone cannot be read.
+/// With more values than registers, values share registers; an overwritten value cannot be read.
 #[test]
 fn overwritten_values_are_unavailable() {
     let assembled = assembled(&random_source(7, 700), MACHINES[MACHINES.len() - 1]);
@@ -209,14 +210,14 @@ fn info_describes_names() {
     insta::assert_snapshot!(text);
 }
 
-/// A breakpoint on a line of a macro or repetition stops in each use, a watched name at each of its values.
+/// A breakpoint on a line of a macro or repetition stops in each use; a watchpoint on a name, at each of its values.
 #[test]
 fn every_place_and_every_value() {
     let mut console = console();
     assert!(console.execute("break :7").unwrap().starts_with("stop 1 at 3 places: bundle "));
     let mut stops = 0;
     while console.execute("continue").unwrap().starts_with("stop 1") {
-        // The line at hand is the breakpoint's, independent of the bundle's other operations.
+        // The current line is that of the breakpoint, whatever other operations the bundle has.
         let place = console.execute("where").unwrap();
         assert!(
             place.contains("(a.s:7)") && place.contains("\n    7          fadd    own, own, by\n"),
@@ -228,7 +229,7 @@ fn every_place_and_every_value() {
     }
     assert_eq!(stops, 9, "three in each of two periods, and before the first tick");
     console.execute("goto start").unwrap();
-    // The condition, too, reads names at the breakpoint's line.
+    // The condition also reads names as of the breakpoint's line.
     console.execute("delete").unwrap();
     console.execute("break :7 if own == 4.0").unwrap();
     let mut uses = vec![];

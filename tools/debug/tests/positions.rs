@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Stop positions of a session, against a recording of the emulator's events that shares no code with the session's search.
+//! Stop positions of a session, compared with a recording of the emulator's events that shares no code with the session's search.
 
 use std::num::NonZeroU64;
 use std::ops::RangeInclusive;
@@ -12,13 +12,13 @@ use takt_isa::program::Location;
 use takt_isa::timing::Cycle;
 use takt_isa::{BundleAddress, Effect, Instruction, MACHINES, Program, Register};
 
-/// Number of periods in a run.
+/// Periods in a run.
 const PERIODS: u64 = 4;
-/// Maximal number of positions checked for `until`.
+/// Maximum number of positions checked for `until`.
 const HELD: usize = 150;
 
-/// A random program whose bundles have source lines. `bare`: nothing issues together with a `wait`, so nothing is in flight during the
-/// wait.
+/// A random program whose bundles have source lines. With `bare`, nothing issues together with a `wait`, so nothing is in flight while
+/// waiting.
 fn program(seed: u64, bare: bool) -> Program {
     let machine = MACHINES[seed as usize % MACHINES.len()];
     let mut program = random_program(seed, machine, ProgramOptions::TAME);
@@ -47,9 +47,9 @@ struct Recording {
     program: Program,
     /// Issued bundles, by cycle.
     issues: Vec<(Cycle, BundleAddress)>,
-    /// Writes to registers, by the first position that shows them.
+    /// Register writes, by the first position at which they are visible.
     writes: Vec<(Cycle, Register, u32)>,
-    /// Writes to data words, by the first position that shows them.
+    /// Data memory writes, by the first position at which they are visible.
     stores: Vec<(Cycle, u32, u32)>,
     /// Length of the run in cycles.
     end: Cycle,
@@ -90,7 +90,7 @@ impl Recording {
             }
         }
         recording.end = emulator.now();
-        // Results in flight at the end arrive after it; `halt` writes its results in flight at once.
+        // Results in flight at the end arrive later, but `halt` writes its results in flight at once.
         let halted = matches!(emulator.status(), takt_emu::Status::Halted { .. });
         for write in &mut recording.writes {
             write.0 = write.0.min(if halted { recording.end } else { Cycle::MAX });
@@ -99,7 +99,7 @@ impl Recording {
         recording
     }
 
-    /// Value at each position, from a list of changes.
+    /// Value at each position, reconstructed from a list of changes.
     fn history<K: PartialEq + Copy>(
         &self,
         changes: &[(Cycle, K, u32)],
@@ -154,7 +154,7 @@ impl Recording {
         (0..=self.end).map(at).collect()
     }
 
-    /// Positions just before the issue of a bundle from another line than the previous bundle's.
+    /// Positions just before the issue of a bundle whose line differs from that of the previous bundle.
     fn lines(&self) -> Vec<Cycle> {
         let line = |address| self.program.location(address);
         let begins = |i: &usize| {
@@ -166,7 +166,7 @@ impl Recording {
     }
 }
 
-/// Runs under test: each program without and with results in flight during its waits, with a tick on demand, a tick that is sometimes
+/// Runs under test: each program without and with results in flight during its waits; with a tick on demand, a tick that is sometimes
 /// early, and a late tick.
 fn runs(seeds: RangeInclusive<u64>) -> impl Iterator<Item = (String, Session, Recording)> {
     let cases = seeds.flat_map(|seed| [true, false].map(|bare| (seed, bare)));
@@ -186,7 +186,7 @@ fn runs(seeds: RangeInclusive<u64>) -> impl Iterator<Item = (String, Session, Re
     })
 }
 
-/// Stop positions of a command repeated up to the end or the start of the run.
+/// Stop positions of a command that is repeated up to the end or the start of the run.
 fn all(session: &mut Session, mut command: impl FnMut(&mut Session) -> StopReason) -> Vec<Cycle> {
     let mut positions = vec![];
     while matches!(command(session), StopReason::Done | StopReason::Stop { .. } | StopReason::Holds) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Sessions on a machine that runs elsewhere: here a second emulator with planted differences.
+//! Sessions on a remote machine: here a second emulator with planted differences.
 
 use std::sync::{Arc, Mutex};
 use takt_asm::{MemoryLoader, Options as AsmOptions, assemble};
@@ -10,7 +10,7 @@ use takt_emu::{Emulator, PeriodError, Status};
 use takt_isa::fp::Flags;
 use takt_isa::{BundleAddress, F3, Program, Register};
 
-/// Sums its input, keeps the last eight sums in a ring, and stops on command.
+/// Program that sums its input, keeps the last eight sums in a ring, and stops on command.
 const SOURCE: &str = "\
 .input  n, mode:int
 .output sum, count:int
@@ -45,12 +45,12 @@ table:  .float  0.5, 0.25
 
 ";
 
-/// Faults planted in the emulated board; by default none.
+/// Faults planted in the emulated board; none by default.
 #[derive(Clone, Copy, Default, Debug)]
 struct PlantedFaults {
-    /// Bits of a register that are wrong from a period on.
+    /// Bits that are wrong in a register, from a period on.
     register: Option<(u64, Register, u32)>,
-    /// Bits of a data word that are wrong from a period on.
+    /// Bits that are wrong in a data word, from a period on.
     word: Option<(u64, u32, u32)>,
     /// The board stops answering from this period on.
     gone: Option<u64>,
@@ -58,7 +58,7 @@ struct PlantedFaults {
     busy: Option<u64>,
 }
 
-/// Circuit of a board, simulated by an emulator.
+/// Circuit of a board, represented by an emulator.
 struct Circuit {
     emulator: Emulator,
     program: Program,
@@ -66,7 +66,7 @@ struct Circuit {
     runs: bool,
     drives: bool,
     planted: PlantedFaults,
-    /// Log of the requests, without reads of values.
+    /// Log of the requests, except reads of values.
     asked: Vec<&'static str>,
     control: Arc<Control>,
 }
@@ -105,7 +105,7 @@ impl Circuit {
     }
 }
 
-/// A board whose internal circuit the test can read.
+/// A board whose circuit is accessible to the test.
 #[derive(Clone)]
 struct Board(Arc<Mutex<Circuit>>);
 
@@ -207,7 +207,7 @@ impl Remote for Board {
                 Some((from, planted, bits)) if planted == register && circuit.periods >= from => bits,
                 _ => 0,
             };
-            // Registers without a write hold arbitrary bits.
+            // Registers that were never written hold arbitrary bits.
             let bits =
                 |register| circuit.emulator.register(register).unwrap_or(0xdead_beef) ^ wrong(register);
             registers.iter().map(|register| bits(*register)).collect()
@@ -377,7 +377,7 @@ fn a_script_leaves_the_board_as_it_found_it() {
     assert_eq!(ends(true, true, &["step"]), (held.to_owned(), false));
     assert_eq!(ends(true, true, &["step", "go"]), (runs.to_owned(), true));
     assert_eq!(ends(false, false, &["go"]), (runs.to_owned(), true));
-    // The board is released after any end of the console.
+    // However the console ends, the board is released.
     let (console, _, board) = begin(2, PlantedFaults::default(), false, false);
     assert!(!board.circuit(|circuit| circuit.runs));
     drop(console);
@@ -406,12 +406,12 @@ fn reports_each_difference_once_by_name() {
             text.contains(says) && text.contains("; inputs: n = 1.0, mode = 0\nperiod 4: waits"),
             "{text}"
         );
-        // A difference in a register that affects no output is found at the end of the command.
+        // A difference in a register that affects no output is found when the command ends.
         let text = one(planted(4, "at"), restart, &["step 5", "print at", "step"]);
         let period = if restart { 5 } else { 7 };
         assert!(text.contains(&format!("error: after period {period}: `at` (register ")), "{text}");
-        // The console shows the board's value, and the shadow has continued from it. Only the read values of this circuit are wrong, so it
-        // then differs again, as a shadow on its own course would.
+        // The console shows the board's value, and the shadow continues from it. In this circuit only the values that are read are wrong,
+        // so the two differ again in the next step.
         let at = (if restart { 5 } else { 7 }) | 0x40_0000;
         assert!(text.contains(&format!("at = {at} ")), "{text}");
         let word = PlantedFaults { word: Some((4, 3, 1)), ..PlantedFaults::default() };
@@ -436,7 +436,7 @@ fn reports_each_difference_once_by_name() {
     assert!(said.starts_with("register ") && said.contains(says), "{said}");
     let (_, said, _) = begin(2, PlantedFaults::default(), false, false);
     assert!(said.starts_with("period 2: waits for the tick, since bundle "), "{said}");
-    // Without a difference the console reports none, even for registers never written.
+    // Without a difference none is reported, not even for registers that were never written.
     for restart in [false, true] {
         let text = one(
             PlantedFaults::default(),

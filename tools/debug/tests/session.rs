@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Sessions against their run: every position shows the same state, reached forward or back.
+//! Sessions compared with their run: a position shows the same state whether it is reached forward or back.
 
 use std::sync::Arc;
 use takt_asm::{MemoryLoader, Options as AsmOptions, assemble};
@@ -10,7 +10,7 @@ use takt_debug::session::{
 use takt_emu::testing::{Options as ProgramOptions, Random, input_ports, random_program};
 use takt_isa::{BundleAddress, F3, MACHINES, Program, Register};
 
-/// A random program with inputs for some periods; `subroutines`: with calls.
+/// Session on a random program with inputs for some periods; `subroutines` adds calls.
 fn random_session(seed: u64, index: usize, periods: u64) -> Session {
     let machine = MACHINES[index % MACHINES.len()];
     session(&random_program(seed, machine, ProgramOptions::TAME), seed, periods)
@@ -83,7 +83,7 @@ fn anywhere() {
     }
 }
 
-/// Positions at which forward steps of a unit stop, from the beginning to the end.
+/// Positions at which forward steps by a unit stop, from the beginning to the end.
 fn forward(session: &mut Session, unit: Unit) -> Vec<u64> {
     session.go_to(0);
     let mut positions = vec![0];
@@ -154,7 +154,7 @@ fn value(console: &Console, text: &str) -> f64 {
     console.session().evaluate(&console.session().parse(text).unwrap()).unwrap().real()
 }
 
-/// The fixture has no counted loops; this source names a machine with them.
+/// The fixture has no counted loops, so this source names a machine that has them.
 #[test]
 fn loops_show_the_iterations_left() {
     let mut console = console(
@@ -229,7 +229,7 @@ fn stops_forth_and_back() {
     }
 }
 
-/// The position after the last cycle is a full position: operations that issue with `halt` are visible there.
+/// The position after the last cycle is complete: it shows operations that issue together with `halt`.
 #[test]
 fn the_last_position_counts() {
     let source = ".output y\n nop\n fadd y, 3.5, 3.5 || halt\n";
@@ -248,7 +248,7 @@ fn the_last_position_counts() {
     }
 }
 
-/// `until` goes to the next position at which its expression holds, even if it holds already.
+/// `until` goes to the next position at which its expression holds, even if it already holds.
 #[test]
 fn until_is_the_next_position() {
     let mut console = console(SOURCE);
@@ -316,13 +316,13 @@ fn edits_belong_to_the_run() {
     console.execute("goto cycle 100000").unwrap_or_default();
     assert_eq!(value(&console, "sum"), 0.5 + 100.0 - 1.75);
     let end = fingerprint(console.session_mut());
-    // Before the edit the value is the old one; beyond it, the new one again.
+    // Before the edit the value is the old one; after it, the new one again.
     console.execute("back cycle 100").unwrap();
     assert!(console.session().cycle() < at);
     assert_eq!(value(&console, "table[1]"), 0.25);
     console.execute("goto cycle 100000").unwrap_or_default();
     assert!(fingerprint(console.session_mut()) == end);
-    // An edit at the same place replaces the old one.
+    // An edit at the same position replaces the previous one.
     console.execute(&format!("goto cycle {at}")).unwrap();
     console.execute("set table[1] = 1").unwrap();
     console.execute("goto cycle 100000").unwrap_or_default();
@@ -380,7 +380,7 @@ fn expressions() {
     insta::assert_snapshot!(errors);
 }
 
-/// 10⁸ cheap cycles: checkpoints stay few, and dense enough for a short run to any earlier position.
+/// 10⁸ cheap cycles: checkpoints stay few, yet dense enough to reach any earlier position by a short run.
 #[test]
 fn a_long_run() {
     let loader = MemoryLoader::new(takt_programs::SOURCES);
@@ -401,7 +401,7 @@ fn a_long_run() {
     }
     assert_eq!(session.go_to(100_000_000), StopReason::Done);
     assert!(fingerprint(&mut session) == at_end);
-    // A search through the whole run: for a value that never occurs.
+    // A search through the whole run, for a value that never occurs.
     let [what, never] = ["F1", "1e9"].map(|text| Box::new(session.parse(text).unwrap()));
     let rare = Stop::Watch { what, test: Test::Above(never), text: String::new() };
     let id = session.add_stop(rare);
@@ -410,7 +410,7 @@ fn a_long_run() {
     assert_eq!(session.go_to(100_000_000), StopReason::Done);
     session.add_stop(Stop::Break { at: BreakpointLocation::Period(7), condition: None, text: String::new() });
     assert!(matches!(session.resume_back(), StopReason::Stop { .. }) && session.period() == 7);
-    // A stop in a cycle of a wait without events is found too.
+    // A stop in a cycle without events, during a wait, is also found.
     session.go_to(0);
     session.add_stop(Stop::Break {
         at: BreakpointLocation::Cycle(59_000),
@@ -422,7 +422,7 @@ fn a_long_run() {
     assert!(session.run_until(&clock) == StopReason::Holds && session.cycle() == 71_999);
 }
 
-/// Most programs have a label `period`: in a condition `period` is the counter, not the address.
+/// Most programs have a label `period`; in a condition, `period` means the counter, not the address.
 #[test]
 fn counters_come_before_labels() {
     let mut console = console(
@@ -432,7 +432,7 @@ fn counters_come_before_labels() {
     assert_eq!(value(&console, "period"), 3.0);
 }
 
-/// Elements of register arrays have names, and operations of an equation have the columns of their parts.
+/// Elements of register arrays have names, and operations of an equation have the columns of their terms.
 #[test]
 fn equations_and_arrays() {
     let source = ".input x\n.output y\n.state P[2,2]\n.once\n P[1,1], P[1,2], P[2,1], P[2,2] = 1, 2, 3, 4\n wait p\n\

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Stale values: every display of a value older than the line at hand would read carries a note.
+//! Stale values: every display of a value older than the current line would read carries a note.
 
 use std::sync::Arc;
 use takt_asm::{AssembledProgram, MemoryLoader, Options as AsmOptions, assemble};
@@ -7,7 +7,7 @@ use takt_debug::console::Console;
 use takt_debug::session::{Options, Session};
 use takt_isa::{F3, Register};
 
-/// `b` is in flight while the lines after it are at hand, and `c` is computed late.
+/// `b` is in flight while the following lines are current, and `c` is computed late.
 const STALE: &str = "\
 .schedule on
 .input a
@@ -45,7 +45,7 @@ fn console(source: &str) -> Console {
     Console::new(Session::new(&assembled.program, options).unwrap())
 }
 
-/// Visits a console in the second period, in each cycle in which `b` is in flight.
+/// Calls `visit` with a console in each cycle of the second period in which `b` is in flight.
 fn in_flight(mut visit: impl FnMut(&mut Console)) {
     let mut console = console(STALE);
     console.execute("goto period 2").unwrap();
@@ -104,7 +104,7 @@ fn every_command_that_shows_a_value_has_the_note() {
     });
 }
 
-/// A condition reads results in flight, as its line does.
+/// A condition reads results in flight, just as its line does.
 #[test]
 fn a_condition_reads_results_in_flight() {
     // `d` needs neither operand of the condition, and issues before they arrive.
@@ -115,7 +115,7 @@ fn a_condition_reads_results_in_flight() {
         console.execute("goto period 1").unwrap();
         console.execute(&format!("break :14 if {condition}")).unwrap();
         let text = console.execute("continue").unwrap();
-        // Over several periods, the session stops in the right one or reports that it could not decide.
+        // Over several periods, the session stops in the right one or reports that the condition could not be evaluated.
         let stopped = text.contains("stop 1: break :14") && console.session().period() == period - 1;
         assert!(stopped || text.contains("stop 1 was passed, its condition reads an old value"), "{text}");
     }

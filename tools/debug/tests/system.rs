@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Sessions on systems of several cores, against the forward-only emulator.
+//! Sessions on systems of several cores, compared with the forward-only emulator.
 
 use std::collections::BTreeMap;
 use takt_debug::console::{Console, Target, commands, first_mistake};
@@ -17,7 +17,7 @@ fn session(description: &Description) -> SystemSession {
     SystemSession::new(description, SystemOptions::default()).expect("a random system loads")
 }
 
-/// Visible state of a system: registers and memory of each core, and the entries of each FIFO.
+/// Visible state of a system: registers and memory of each core, and entries of each FIFO.
 type State = (Vec<Vec<Option<u32>>>, Vec<Vec<u32>>, Vec<Vec<Vec<u32>>>);
 
 fn state(system: &System) -> State {
@@ -29,7 +29,7 @@ fn state(system: &System) -> State {
     (registers.collect(), memories.collect(), fifos.collect())
 }
 
-/// Systems without faults within the tested length of time.
+/// Systems that do not fault within the tested time.
 fn systems() -> impl Iterator<Item = (u64, Description)> {
     let all = (0..16).map(|seed| (seed, random_description(seed, MACHINES)));
     let runs = |(_, description): &(u64, Description)| {
@@ -63,7 +63,7 @@ fn stops_at_every_event_forward_and_back() {
         system.keep_events();
         system.run_until(CYCLES).expect("no fault");
         let events = system.take_events();
-        // The rarest kind of event with more than three occurrences.
+        // The rarest kind of event that occurs more than three times.
         let mut counts: BTreeMap<(usize, &str), Vec<u64>> = BTreeMap::new();
         for event in events.iter().filter(|event| event.cycle + 1100 < CYCLES) {
             counts.entry((event.link, event.kind.name())).or_default().push(event.cycle + 1);
@@ -173,8 +173,8 @@ fn reports_mistakes() {
     assert!(console.execute("check cycle == 400").is_ok(), "every core is in the same cycle");
 }
 
-/// A watchpoint on a register of core 1 stops at each change of its value, forward and back; conditional stops stop at the positions at
-/// which the condition holds.
+/// A watchpoint on a register of core 1 stops at each change of its value, forward and back; conditional breakpoints stop where the
+/// condition holds.
 #[test]
 fn watchpoints_and_conditions_see_every_position() {
     const END: u64 = 1500;
@@ -196,7 +196,7 @@ fn watchpoints_and_conditions_see_every_position() {
         let ports = program.outputs.iter().take(1).chain(program.inputs.iter().take(2));
         let watched: Vec<String> = ports.map(|port| format!("{}:int", port.name)).collect();
         for what in &watched {
-            // Reference: the stops found position by position.
+            // Reference: stops found by visiting each position.
             let mut one = console();
             let value = |console: &mut Console| console.execute(&format!("print {what}")).expect("a value");
             let mut before = value(&mut one);
@@ -259,7 +259,7 @@ fn watchpoints_and_conditions_see_every_position() {
     assert!(changes > 20, "{changes} changes are too few to tell");
 }
 
-/// An edit is visible when the session returns to it, and not before it.
+/// An edit is visible whenever the session returns to it, but not before its position.
 #[test]
 fn edits_persist() {
     let (_, description) = systems().next().expect("a system");
@@ -283,7 +283,7 @@ fn edits_persist() {
     assert_eq!(run("stops"), "");
 }
 
-/// A program with calls that halts, and an endless one.
+/// A program that makes calls and halts, and an endless program.
 fn calling() -> (Description, [takt_asm::AssembledProgram; 2]) {
     const CALLING: &str = ".reg n:int m:int
         li      n, 3
@@ -323,7 +323,7 @@ machine = \"f1\"
     (description, programs)
 }
 
-/// Steps of a core in a system equal the steps of its program alone, forward and back.
+/// Steps of a core in a system equal those of its program alone, forward and back.
 #[test]
 fn steps_of_a_core_equal_a_single_programs() {
     let (description, programs) = calling();
@@ -369,7 +369,7 @@ fn steps_of_a_core_equal_a_single_programs() {
     assert_eq!(system.step(&mut views, 1, Unit::Line), SystemStopReason::Done);
 }
 
-/// A search proceeds in stretches, and also finds a bundle about to issue at a stretch's end.
+/// A search proceeds in stretches, and also finds a bundle that is about to issue at the end of a stretch.
 #[test]
 fn finds_stops_from_every_start() {
     let (description, programs) = calling();
@@ -398,7 +398,7 @@ fn finds_stops_from_every_start() {
     }
 }
 
-/// Periods count from reset for each core, in both directions of travel.
+/// Periods of each core count from reset, in both directions.
 #[test]
 fn goes_to_a_period_of_a_core() {
     let (_, description) = systems().next().expect("a system");
@@ -458,7 +458,7 @@ end:    jmp     end
     }
 }
 
-/// Every console command works on a system or explains its refusal.
+/// Every console command works on a system, or states why it does not.
 #[test]
 fn each_command_is_available_or_states_the_reason() {
     let names = |target| commands(target).map(|(usage, ..)| usage.split(' ').next().map(str::to_owned));
@@ -476,7 +476,7 @@ fn each_command_is_available_or_states_the_reason() {
     }
 }
 
-/// Values of another core are named with the core as prefix; the selection stays.
+/// Values of another core are named with that core's name as prefix; the selection does not change.
 #[test]
 fn names_of_another_core() {
     let (description, programs) = calling();
@@ -505,7 +505,7 @@ fn names_of_another_core() {
     assert!(run("check forever.n == 20").is_ok());
     assert!(run("continue").expect("it stops").contains("stop 2"));
     assert!(run("continue").expect("it stops").contains("stop 1"));
-    // An error in another core's expression is reported as in one's own.
+    // An error in an expression on another core is reported as for the selected core.
     let error = run("print forever.m, calling.n").expect_err("two cores");
     assert!(error.contains("one command is about one core"), "{error}");
     run("core calling").expect("it is there");

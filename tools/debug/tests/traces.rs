@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Traces against their run, read back by readers that share no code with the writers.
+//! Traces compared with their run, through readers that share no code with the writers.
 
 use std::cell::RefCell;
 use std::collections::{BTreeMap, HashMap};
@@ -13,7 +13,7 @@ use takt_emu::{Emulator, Event, Retire, Step};
 use takt_isa::timing::Cycle;
 use takt_isa::{F1, F3, MACHINES, Program, Type};
 
-/// A shared in-memory file with a size limit in bytes, after which writing fails.
+/// A shared in-memory file; writes fail beyond a size limit in bytes.
 #[derive(Clone)]
 struct Disk(Rc<RefCell<Vec<u8>>>, usize);
 
@@ -43,7 +43,7 @@ fn tracking(machine: &'static takt_isa::Machine) -> Program {
     assemble("hybrid/tracking.s", &loader, &options).unwrap().program
 }
 
-/// A machine with small random inputs.
+/// Emulator of a program, with small random inputs.
 fn loaded(program: &Program, seed: u64) -> Emulator {
     let mut emulator = Emulator::new(program).unwrap();
     let mut random = Random::new(seed);
@@ -80,7 +80,7 @@ fn traced(program: &Program, options: Options) -> (Vec<u8>, Summary) {
     (bytes, summary)
 }
 
-/// Expected waveform values in each cycle, signal by signal, computed without the tracer.
+/// Expected waveform values in each cycle, by signal, computed without the tracer.
 fn expected(program: &Program) -> Vec<BTreeMap<String, String>> {
     let mut whole = loaded(program, 1);
     for _ in 0..PERIODS {
@@ -122,7 +122,7 @@ fn expected(program: &Program) -> Vec<BTreeMap<String, String>> {
     cycles
 }
 
-/// Values in each cycle of the range, as wellen reads them from a waveform.
+/// Values in each cycle of the range, as read from a waveform by wellen.
 fn read_wave(bytes: Vec<u8>, cycles: Range<Cycle>) -> Vec<BTreeMap<String, String>> {
     let mut wave = wellen::simple::read_from_reader(Cursor::new(bytes)).unwrap();
     let vars: Vec<_> = wave
@@ -228,7 +228,7 @@ fn a_full_disk() {
     }
 }
 
-/// Every documented form of a signal name selects: alone, with its group, with its whole path.
+/// Signals can be selected by every documented form of their names: alone, with the group, with the whole path.
 #[test]
 fn signals_by_the_names_of_the_document() {
     let text = include_str!("../../../docs/traces.md");
@@ -259,7 +259,7 @@ fn signals_by_the_names_of_the_document() {
     let causes = table.split("charged to: `").nth(1).unwrap().split('`').next().unwrap();
     let stalls: Vec<String> = causes.split(' ').map(|cause| format!("takt.stall.{cause}")).collect();
     assert_eq!(selected("takt.stall.*"), stalls);
-    // A pattern of a name does not match groups by their prefix.
+    // A pattern for a name does not match the beginnings of group names.
     assert!(!selected("i*").iter().any(|path| path.starts_with("takt.inputs.") && !path.contains(".i")));
     assert_eq!(selected("*.F1"), ["takt.outputs.F1"]);
 }
@@ -324,11 +324,11 @@ fn retire_log() {
     }
 }
 
-/// An instruction of a Kanata log, as read back.
+/// An instruction read back from a Kanata log.
 #[derive(Default, Debug)]
 struct Row {
     text: String,
-    /// Stages: name, first cycle, cycle after the last.
+    /// Stages: name, first cycle, and cycle after the last.
     stages: Vec<(String, u64, Option<u64>)>,
     retired: Option<(u64, bool)>,
     producers: Vec<u64>,
@@ -413,7 +413,7 @@ fn konata() {
                 arrows += 1;
             }
         }
-        // Operations in flight at the end of the trace are logged to their end.
+        // Operations in flight at the end of the trace are logged until they complete.
         shown.retain(|(done, ..)| *done < summary.cycles.end);
         shown.sort_unstable();
         let mut real: Vec<_> = retires(&program)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Full-screen view in cells: layout at every size, and the picture in the documents.
+//! Full-screen view as cells: layout at all sizes, and the picture in the documents.
 
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
@@ -101,7 +101,7 @@ fn rows(backend: &TestBackend) -> Vec<String> {
     buffer.content.chunks(width).map(row).collect()
 }
 
-/// In the last line the keys to quit and to step back precede all others; no hint is cut.
+/// In the last line, the keys for quitting and stepping back come first, and no hint is truncated.
 #[test]
 fn the_last_line_has_whole_words() {
     let mut console = console(SOURCE);
@@ -120,7 +120,7 @@ fn the_last_line_has_whole_words() {
     }
 }
 
-/// All lines of a bundle are marked: in view where they fit, otherwise by their numbers in the source's title, and beside the operations.
+/// All lines of a bundle are marked: in the source where they fit, otherwise by number in the source's title, and beside the operations.
 #[test]
 fn every_line_of_a_bundle_is_shown() {
     let source = |between: usize| {
@@ -169,7 +169,7 @@ fn scrolling_stays_within() {
     let natural = drawn(&mut screen, 80, 24).buffer().clone();
     for pane in Pane::ALL {
         assert_eq!(screen.focus, pane);
-        // After any scroll beyond the end, one line back is visible at once.
+        // After any scroll beyond the end, scrolling back by one line has a visible effect at once.
         screen.scroll(1_000_000);
         let end = drawn(&mut screen, 80, 24).buffer().clone();
         screen.scroll(1_000_000);
@@ -190,7 +190,7 @@ fn scrolling_stays_within() {
 
 #[test]
 fn any_size_and_any_text() {
-    // Names of maximal length, a source with terminal escape sequences, and illegal program words.
+    // Names of maximum length, a source with terminal escape sequences, and illegal program words.
     let long = "n".repeat(200);
     let source = format!(
         ".output {long}\n.reg a{long}\n; \x1b[2J\u{7}\t世界 {long}\n{long}x: mov {long}, zero\nfadd a{long}, zero, zero\nhalt\n"
@@ -258,7 +258,7 @@ fn tracking(periods: usize) -> Console {
     Console::new(Session::new(&program, options).unwrap())
 }
 
-/// This test owns docs/pictures/debug.svg: with TAKT_PICTURES=1 it writes the file, otherwise it compares.
+/// This test writes docs/pictures/debug.svg if TAKT_PICTURES=1, and compares it otherwise.
 #[test]
 fn the_picture_of_the_documents() {
     let mut console = tracking(700);
@@ -284,7 +284,7 @@ fn the_picture_of_the_documents() {
     );
 }
 
-/// Cells as an SVG picture, in runs of one style.
+/// Converts cells to an SVG picture, in runs of equal style.
 fn svg(buffer: &Buffer) -> String {
     const WIDTH: f32 = 8.4;
     const HEIGHT: u16 = 18;

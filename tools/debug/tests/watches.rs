@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Watchpoints stop at the same positions for every start of a search and in both directions: compared with a walk through all positions
+//! Watchpoints stop at the same positions from any start of a search and in both directions; compared with a walk through all positions
 //! that uses no search.
 
 use std::fmt::Write as _;
@@ -14,9 +14,9 @@ use takt_isa::{MACHINES, Machine, Program, Register};
 use takt_system::Description;
 use takt_system::testing::random_description;
 
-/// Number of names that the source writes repeatedly.
+/// Number of names in the source, each written repeatedly.
 const NAMES: u32 = 40;
-/// Source that writes few names repeatedly: in straight lines, in loops, in skipped code and in a subroutine. Most results repeat.
+/// Source that writes few names repeatedly: in straight lines, in loops, in skipped code and in a subroutine. Most results recur.
 fn source(seed: u64, inputs: bool) -> String {
     let mut random = Random::new(seed);
     let names: Vec<String> = (0..NAMES).map(|i| format!("v{i}")).collect();
@@ -74,7 +74,7 @@ fn assembled(seed: u64, inputs: bool, machine: &'static Machine) -> AssembledPro
     }
 }
 
-/// Rows of inputs with few distinct values, so that most results repeat.
+/// Rows of inputs with few distinct values, so that most results recur.
 fn rows(program: &Program, seed: u64, periods: usize) -> Vec<Vec<(Register, u32)>> {
     let mut random = Random::new(seed);
     let mut value = || [0.5f32, 0.5, 2.0][random.below(3) as usize].to_bits();
@@ -93,7 +93,7 @@ const WATCHES: [(&str, Kind); 5] = [
 #[derive(Clone, Copy, Debug)]
 enum Kind {
     Changed,
-    /// The value is above another expression.
+    /// The value is above that of another expression.
     Above(&'static str),
 }
 
@@ -109,9 +109,9 @@ fn stop(session: &Session, (what, kind): (&str, Kind)) -> Stop {
 /// Value of a name, from the assembler's debug information.
 struct NameValue {
     register: Register,
-    /// Address range of the next bundle in which the register holds the value: above the first, up to the second.
+    /// Range of addresses of the next bundle within which the register holds the value: after the first, up to and including the second.
     range: Option<(u32, u32)>,
-    /// The register has further values.
+    /// The register also holds other values.
     shares: bool,
 }
 
@@ -131,7 +131,7 @@ impl NameValue {
         names.values.iter().filter(|value| value.name == name).map(held).collect()
     }
 
-    /// Bits of the value, if it is in its register.
+    /// Bits of the value; `None` if it is not in its register.
     fn bits(&self, session: &Session) -> Option<Option<u32>> {
         let next = session.emulator().next_address().get();
         if self.range.is_some_and(|(after, through)| next <= after || next > through)
@@ -149,7 +149,7 @@ struct Walk {
     values: Vec<NameValue>,
     other: Option<WatchExpression>,
     kind: Kind,
-    /// Per value: the bits last seen there, and whether they were above the other expression.
+    /// Per value: bits when last seen, and whether they were above the other expression.
     last: Vec<Option<(Option<u32>, bool)>>,
     stops: Vec<u64>,
 }
@@ -190,7 +190,7 @@ impl Walk {
     }
 }
 
-/// Maximal number of stops checked from each beginning, in each direction.
+/// Maximum number of stops checked from each start, in each direction.
 const MOST: usize = 8;
 
 /// Stop positions of a repeated command.
@@ -221,7 +221,7 @@ fn stops_are_independent_of_the_start() {
             let mut session = fresh();
             let mut walk = Walk::new(&session, &names, watch);
             assert!(walk.values.len() > 3 && walk.values.len() < 60, "{watch:?}: {}", walk.values.len());
-            // Half of the runs contain an edit.
+            // Half of the runs include an edit.
             let edit = random.once_in(2).then(|| u64::from(3000 + random.below(1000)));
             let edited = |session: &mut Session| {
                 if let Some(edit) = edit {
@@ -246,7 +246,7 @@ fn stops_are_independent_of_the_start() {
                 edited(&mut new);
                 new.add_stop(stop(&new, watch));
                 let (forward, back) = split(stops, begin);
-                // A session with earlier searches, and a new one.
+                // One session with earlier searches, and a new one.
                 for session in [&mut kept, &mut new] {
                     let told = format!("seed {seed}, {watch:?}, edit {edit:?}, from {begin}");
                     assert_eq!(session.go_to(begin), StopReason::Done);
@@ -260,7 +260,7 @@ fn stops_are_independent_of_the_start() {
     assert!(seen > 100, "{seen}");
 }
 
-/// A system of two cores with such programs.
+/// A system of two cores that run such programs.
 fn description() -> (Description, Vec<AssembledProgram>) {
     let programs: Vec<AssembledProgram> =
         (10..).zip(MACHINES).take(2).map(|(seed, machine)| assembled(seed, false, machine)).collect();
@@ -339,7 +339,7 @@ fn stops_of_a_systems_core_are_independent_of_the_start() {
     assert!(seen > 50, "{seen}");
 }
 
-/// An event at the end of a searched stretch takes effect a few positions later: an input port of a random system.
+/// An event at the end of a searched stretch takes effect a few positions later: shown for an input port of a random system.
 #[test]
 fn an_input_is_seen_over_the_end_of_a_stretch() {
     const END: u64 = 9000;

@@ -6,7 +6,7 @@ use takt_asm::Directive;
 use takt_asm::expr::{BUILTINS, Function};
 use takt_isa::ROWS;
 
-/// Alternation of words in a regular expression, longest first.
+/// Alternation of words as a regular expression, longest first.
 fn any_of<'w>(words: impl IntoIterator<Item = &'w str>) -> String {
     let mut words: Vec<&str> = words.into_iter().collect();
     words.sort_by_key(|word| (std::cmp::Reverse(word.len()), *word));

@@ -1,24 +1,24 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Framing of the language server and debug adapter protocols: a header with the length, then JSON.
+//! Framing of the language server and debug adapter protocols: a header with the length, followed by JSON.
 //!
-//! `lsp_server` has the same, but ends at the first malformed message and accepts any length. An editor's session should outlive one bad
-//! message.
+//! `lsp_server` provides the same framing, but ends at the first malformed message and accepts any length. An editor's session should
+//! survive a malformed message.
 
 use serde_json::Value;
 use std::io::{self, BufRead, Read, Write};
 
-/// Maximal size of a message in bytes; the largest source fits.
+/// Maximum size of a message in bytes; the largest source fits.
 pub const MESSAGE_BYTES: usize = 256 << 20;
-/// Maximal size of a header line in bytes.
+/// Maximum size of a header line in bytes.
 const HEADER_BYTES: u64 = 4096;
 
-/// Errors of reading a message.
+/// Errors while reading a message.
 #[derive(Debug, thiserror::Error)]
 pub enum WireError {
-    /// The stream is broken, or the header is malformed: the start of the next message is unknown.
+    /// The stream is broken, or the header is malformed: the start of the next message cannot be found.
     #[error("{0}")]
     Lost(String),
-    /// A single message is malformed; the next one can be read.
+    /// One message is malformed; the next one can be read.
     #[error("{0}")]
     Message(String),
 }
@@ -66,7 +66,7 @@ pub fn read(stream: &mut impl BufRead) -> Result<Option<Value>, WireError> {
     let length: usize =
         length.ok_or_else(|| WireError::Lost("a header without `Content-Length`".to_owned()))?;
     if length > MESSAGE_BYTES {
-        // Skip the announced bytes, so that the next message can be read.
+        // Skip the announced number of bytes, so that the next message can be read.
         io::copy(&mut stream.take(length as u64), &mut io::sink())?;
         let most = MESSAGE_BYTES >> 20;
         return Err(WireError::Message(format!("a message of {length} bytes: more than {most} MiB")));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Editor grammars in the repository equal the generated ones.
+//! Editor grammars in the repository equal those generated from the tables.
 
 use std::path::Path;
 use takt_editor::{grammar, tree_sitter};
@@ -23,7 +23,7 @@ fn the_grammars_are_as_generated() {
     is_as_generated("tree-sitter-takt/queries/folds.scm", &tree_sitter::folds());
 }
 
-/// The path that Helix's configuration names below the user's copy of Takt.
+/// Helix's configuration names a path that exists below the user's copy of Takt.
 #[test]
 fn helix_builds_the_grammar_from_a_folder_that_is_there() {
     let editors = Path::new(env!("CARGO_MANIFEST_DIR")).join("../editors");

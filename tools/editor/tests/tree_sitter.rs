@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! tree-sitter's parser accepts exactly the texts that the assembler's does: all shipped sources, all listings of the documents, random
-//! sources, and thousands of mutations of each. The tree-sitter runtime is Neovim's.
+//! tree-sitter's parser accepts exactly the texts that the assembler's accepts: all shipped sources, all listings in documents, random
+//! sources, and thousands of mutations of each. The tree-sitter runtime is that of Neovim.
 
 use crate::sources;
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
@@ -11,7 +11,7 @@ use takt_asm::diag::Severity;
 
 const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../editors/tree-sitter-takt");
 
-/// Generates the parser, which git does not keep, from the grammar, by a program in a workspace of its own.
+/// Generates the parser, which git does not track, from the grammar; the generator is a program in a separate workspace.
 fn generate() {
     static GENERATED: Once = Once::new();
     GENERATED.call_once(|| {
@@ -32,7 +32,7 @@ fn compile(library: &Path) {
     assert!(compile.status().expect("cc is there: `cargo xtask test` installs it").success());
 }
 
-/// A Neovim process with the parser.
+/// A Neovim process that has loaded the parser.
 struct Client {
     process: Child,
     requests: ChildStdin,
@@ -40,7 +40,7 @@ struct Client {
 }
 
 impl Client {
-    /// Compiles the parser and loads it. `name` separates the libraries of concurrent tests.
+    /// Compiles and loads the parser. `name` separates the libraries of concurrent tests.
     fn new(name: &str) -> Client {
         let library = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("takt_{name}.so"));
         compile(&library);
@@ -72,14 +72,14 @@ impl Client {
         String::from_utf8(answer).expect("it is text")
     }
 
-    /// Compares the verdicts of tree-sitter and the assembler; returns whether both accept, or `None` if the assembler stops at a limit.
+    /// Compares tree-sitter's verdict with the assembler's. Returns whether both accept, or `None` if the assembler stops at a limit.
     fn compare(&mut self, name: &str, text: &str) -> Option<bool> {
         if text.is_empty() {
             return Some(true);
         }
         let report = takt_asm::read(name, text);
         let errors = report.list.iter().filter(|diagnostic| diagnostic.severity == Severity::Error);
-        // Limits on sizes are not part of the grammar.
+        // Size limits are not part of the grammar.
         let limit = |code: &str, message: &str| {
             code == "limit"
                 || message.contains("does not fit a 64-bit integer")
@@ -104,13 +104,13 @@ impl Client {
 
 impl Drop for Client {
     fn drop(&mut self) {
-        // All requests are answered at this point; a failed test does not wait.
+        // All requests have been answered by now; after a failed test, there is nothing to wait for.
         let _ = self.process.kill();
         let _ = self.process.wait();
     }
 }
 
-/// All sources below the project's folder, and all listings of its documents.
+/// All sources in the project, and all listings in its documents.
 fn shipped() -> Vec<(String, String)> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let mut found = Vec::new();
@@ -158,7 +158,7 @@ fn grammar_accepts_the_assemblers_sources() {
         compare(name, text);
         let lines: Vec<&str> = text.lines().collect();
         for _ in 0..20 {
-            // A few lines suffice to hold a mistake.
+            // A few lines are enough to contain a mistake.
             let first = random.below(lines.len() as u64) as usize;
             let part = lines[first..lines.len().min(first + 12)].join("\n");
             compare(name, &sources::mutated(random, &part));
@@ -186,7 +186,7 @@ fn grammar_accepts_valid_random_sources() {
     }
 }
 
-/// Captures of Neovim's own queries in a source with every kind of item.
+/// Captures of Neovim's own queries in a source that has every kind of item.
 #[test]
 fn colours_and_folds() {
     let mut client = Client::new("colours");
@@ -214,7 +214,7 @@ loop: y = -x^2 < 3 ? p[0,1] : 1_000
     insta::assert_snapshot!(answer);
 }
 
-/// With the setup from docs/editors.md, Neovim colours a file that it opens.
+/// With the setup described in docs/editors.md, Neovim colours a file that it opens.
 #[test]
 fn neovim_colours_a_file() {
     let home = Path::new(env!("CARGO_TARGET_TMPDIR")).join("neovim");
@@ -237,7 +237,7 @@ fn neovim_colours_a_file() {
         .arg(&source)
         .args(["-c", &format!("lua io.write(tostring({active}))"), "-c", "qall!"])
         .env("XDG_CONFIG_HOME", &home)
-        // The language server is disabled: another test covers it.
+        // Disable the language server, which another test covers.
         .args(["--cmd", "lua vim.lsp.start = function() end"])
         .stdin(Stdio::null())
         .output()

@@ -1,4 +1,4 @@
-// Bundles the extension and the script of its view; with --tests, the tests.
+// Bundles the extension and the script of its view; with --tests, also the tests.
 import { build } from 'esbuild';
 import { copyFileSync, mkdirSync, readFileSync, readdirSync, writeFileSync } from 'node:fs';
 
@@ -12,9 +12,9 @@ if (tests) {
   const entryPoints = readdirSync('test').filter((name) => name.endsWith('.test.ts')).map((name) => `test/${name}`);
   await build({ ...common, ...extension, entryPoints, outdir: 'dist-tests' });
 } else {
-  // The package carries it.
+  // The package must contain a copy of the licence.
   copyFileSync('../../../LICENSE-MIT', 'LICENSE.txt');
-  // VS Code shows no picture of a page that lies beside it: they are put into the text.
+  // VS Code does not show pictures from files beside a page, so embed them in the text.
   const inside = (all, name, path) => `![${name}](data:image/png;base64,${readFileSync(path).toString('base64')})`;
   mkdirSync('dist', { recursive: true });
   writeFileSync('dist/README.md', readFileSync('README.md', 'utf8').replaceAll(/!\[([^\]]*)\]\((pictures\/[^)]+)\)/g, inside));

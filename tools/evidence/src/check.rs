@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The command `cargo evidence check`: parts of the evidence in CI, each repeated only after a change of its inputs.
+//! The command `cargo evidence check`: evidence that CI collects; each check is repeated only when its inputs change.
 
 use crate::{clients, formal, linuxcnc, litex, routed};
 use anyhow::{Result, ensure};
@@ -22,7 +22,7 @@ struct Share {
     name: &'static str,
     /// The check is part of every CI run.
     is_short: bool,
-    /// The files and tools on which the outcome depends; `None` if these are unknown, so that the check always runs.
+    /// Files and tools that determine the outcome; `None` if they are unknown, so that the check always runs.
     inputs: Option<fn() -> Result<Inputs>>,
     run: fn() -> Result<()>,
 }
@@ -41,7 +41,7 @@ const SHARES: [Share; 6] = [
     Share {
         name: LINUXCNC,
         is_short: false,
-        // The installed LinuxCNC may change unnoticed, so its check never counts as passed.
+        // An installed LinuxCNC may change unnoticed, so its check never counts as passed.
         inputs: None,
         run: || linuxcnc::linuxcnc(&linuxcnc::Arguments::default()),
     },
@@ -85,7 +85,7 @@ mod tests {
         }
     }
 
-    /// All files that a proof reads are covered by the hash that allows to skip it.
+    /// The hash that lets a proof be skipped covers all files that the proof reads.
     #[test]
     fn the_keys_of_proofs_cover_the_files_that_they_read() {
         let [formal, units] =
@@ -94,7 +94,7 @@ mod tests {
         for entry in std::fs::read_dir(folder).expect("rtl/formal") {
             let name = entry.expect("an entry").file_name().display().to_string();
             let path = format!("rtl/formal/{name}");
-            // `mutants.py` is no proof: it plants faults for `cargo evidence mutants`.
+            // `mutants.py` is not a proof: it plants faults for `cargo evidence mutants`.
             if name != "mutants.py" && (name.ends_with(".py") || name.ends_with(".v")) {
                 assert!(formal.covers(&path) || units.covers(&path), "{path} is in no key");
             }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The core's bus slaves and a board's UART against clients of other projects, in Icarus Verilog: rtl/tests/clients/.
+//! The core's bus slaves and a board's UART, tested in Icarus Verilog with clients from other projects: rtl/tests/clients/.
 
 use anyhow::{Context, Result, anyhow};
 use serde_json::{Map, Value, json};
@@ -16,7 +16,7 @@ use takt_isa::{Machine, Program, T1};
 use takt_rtl::bench;
 use takt_rtl::{Library, export, wishbone};
 
-/// Python packages of the clients, and of cocotb, which runs them.
+/// Python packages of the clients, and cocotb, which runs them.
 const CLIENTS: [&str; 4] =
     ["cocotb==1.9.2", "cocotbext-axi==0.1.28", "cocotbext-uart==0.1.4", "cocotbext-wishbone==0.2.2"];
 
@@ -25,10 +25,10 @@ const MACHINE: &Machine = &T1;
 const PROGRAM: &str = "programs/examples/board/position.s";
 const WIRING: &str = "programs/examples/board/position.toml";
 
-/// Maximal number of bundles fetched after a program's end.
+/// Maximum number of bundles fetched after a program's end.
 const FETCHED: usize = 16;
 
-/// Ports by name, with their addresses.
+/// Addresses of the ports, by name.
 fn ports(program: &Program, inputs: u16, outputs: u16) -> Result<(Map<String, Value>, Map<String, Value>)> {
     let index = |register| program.machine.inputs.index(register).context("an input port");
     let mut given = Map::new();
@@ -47,7 +47,7 @@ pub(crate) fn write(folder: &Path, name: &str, text: &str) -> Result<()> {
     fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))
 }
 
-/// Writes the core with its slaves, and the program's facts for the clients.
+/// Writes the core with its slaves, and a description of the program for the clients.
 fn core(program: &Program, folder: &Path) -> Result<()> {
     let design = export(MACHINE, &Library::builtin())?.latching(program.latched_inputs())?;
     for file in bench::folder(&design, Some(program), &[]) {
@@ -58,7 +58,7 @@ fn core(program: &Program, folder: &Path) -> Result<()> {
         .map(|register| (register.name.to_owned(), register.address.into()))
         .collect();
     let (inputs, outputs) = ports(program, wishbone::INPUTS, wishbone::OUTPUTS)?;
-    // Load memories only up to the fetches after the program's end, which suffices in simulation.
+    // Load memories only up to the last possible fetch, which suffices in simulation.
     let end = program.code.len() / MACHINE.slots.len() + FETCHED;
     let is_read = |record: &LoadRecord| match record.space {
         Space::Program => usize::from(record.address) < end,
@@ -75,7 +75,7 @@ fn core(program: &Program, folder: &Path) -> Result<()> {
     write(folder, "core.json", &description.to_string())
 }
 
-/// Writes a board, with its own clock in place of the PLL, and the facts for its host.
+/// Writes a board with a simulated clock in place of the PLL, and a description for its host.
 fn board(program: &Program, folder: &Path) -> Result<()> {
     let wrong = |mistakes: Vec<takt_board::Mistake>| {
         anyhow!("{}", mistakes.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))

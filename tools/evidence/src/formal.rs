@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Formal verification of a core's control with yosys and the solver Z3: properties of every program, not only of simulated ones.
+//! Formal verification of a core's control with yosys and the solver Z3: properties that hold for every program, not only for simulated
+//! ones.
 //!
-//! Units, banks and memories are cut off and their outputs left arbitrary: the program, the operands, the taken branches, the faulting
-//! bundles. The properties are the rules of `docs/timing.md`, stated for one arbitrary register of each bank, and so for all. `units.rs`
-//! proves the units that are cut off here.
+//! Units, banks and memories are cut out and their outputs left arbitrary, and with them the program, the operands, the taken branches,
+//! and the faulting bundles. The properties are the rules of `docs/timing.md`, stated for one arbitrary register of each bank, and so for
+//! all. `units.rs` proves the units.
 
 mod enumerate;
 pub(crate) mod results;
@@ -29,7 +30,7 @@ use takt_rtl::plan::names::net;
 use takt_rtl::plan::{ControlBit, Plan, SlotPlan, Stage};
 use takt_rtl::{Design, Library};
 
-/// Number of reset cycles before the proof.
+/// Reset cycles before the proof.
 const RESET: u32 = 6;
 
 #[derive(clap::Args)]
@@ -68,7 +69,7 @@ pub(crate) struct Arguments {
 }
 
 impl Arguments {
-    /// Share of the tests: every machine, to a depth that takes seconds; the units' short proofs, with one planted fault each.
+    /// Proofs in the test suite: every machine to a depth that takes seconds; for each unit the short proofs, and one planted fault.
     pub(crate) const SHARE: Arguments = Arguments {
         machine: None,
         depth: 9,
@@ -88,7 +89,7 @@ pub(crate) fn unit_inputs() -> Result<Inputs> {
     units::inputs(Inputs::default())
 }
 
-/// Runs the units' share of the tests.
+/// Runs the units' proofs of the test suite.
 pub(crate) fn unit_share() -> Result<()> {
     units::prove(&Arguments::SHARE, &[], true)
 }
@@ -176,14 +177,14 @@ fn python(venv: &Venv, name: &str, options: &[String]) -> Result<()> {
     Ok(())
 }
 
-/// Proves return targets, and the faults of calls and returns, for the return-stack depth of every machine.
+/// Proves return targets, and the faults of calls and returns, at the return-stack depth of every machine.
 fn calls(venv: &Venv) -> Result<()> {
     let depths: BTreeSet<u32> = MACHINES.iter().map(|machine| machine.stack_depth).collect();
     let depths = depths.iter().map(u32::to_string);
     python(venv, "calls", &["--depths".to_owned()].into_iter().chain(depths).collect::<Vec<_>>())
 }
 
-/// Proves the issue of operations around counted loops.
+/// Proves that operations issue correctly around counted loops.
 fn loops(venv: &Venv, arguments: &Arguments) -> Result<()> {
     let numbers = [("--cycles", u64::from(arguments.loops)), ("--mutants", arguments.mutants as u64)];
     let options = numbers.into_iter().flat_map(|(option, number)| [option.to_owned(), number.to_string()]);
@@ -191,7 +192,7 @@ fn loops(venv: &Venv, arguments: &Arguments) -> Result<()> {
     python(venv, "loops", &options.chain(verbose).collect::<Vec<_>>())
 }
 
-/// Proves that a family's bank equals the block RAM that yosys infers from the general bank, pin by pin, including the output registers.
+/// Proves pin by pin, including output registers, that a family's bank equals the block RAM that yosys infers from the general bank.
 fn bank(venv: &Venv, design: &Design, family: &Family, proof: &Proof) -> Result<()> {
     let text = |files: &[DesignFile]| {
         let file = files.iter().find(|file| file.base() == "takt_bank.v");
@@ -223,7 +224,7 @@ fn bank(venv: &Venv, design: &Design, family: &Family, proof: &Proof) -> Result<
     Ok(())
 }
 
-/// Proves the assertions in `properties`, added to a module of the design, for this number of cycles from any state.
+/// Proves the assertions in `properties`, added to a module of the design, for `cycles` cycles from any state.
 fn prove(venv: &Venv, design: &Design, module: &str, properties: &str, cycles: u32) -> Result<()> {
     let folder = root().join("target/formal").join(module);
     fs::create_dir_all(&folder)?;
@@ -234,7 +235,7 @@ fn prove(venv: &Venv, design: &Design, module: &str, properties: &str, cycles: u
         if name == format!("{module}.v") {
             let end = text.rfind("endmodule").context("a module ends")?;
             text.insert_str(end, properties);
-            // A misspelt name would be an undriven net with an arbitrary value, so forbid implicit nets.
+            // A misspelt name would become an undriven net with an arbitrary value, so forbid implicit nets.
             text = format!("`default_nettype none\n{text}`default_nettype wire\n");
         }
         fs::write(folder.join(name), text)?;
@@ -243,7 +244,7 @@ fn prove(venv: &Venv, design: &Design, module: &str, properties: &str, cycles: u
         let list = if is_cut { &mut cut } else { &mut read };
         let _ = write!(list, " {name}");
     }
-    // Branch decisions and fetch faults are arbitrary, too. Addresses do not matter to these properties.
+    // Branch decisions and fetch faults are also arbitrary. Addresses do not matter to these properties.
     let arbitrary = if module == design.top {
         let tested = design.plan.control().operand(0);
         format!("cutpoint w:{tested} w:{}; delete w:retire_* w:*_address w:output_*; ", net::F_OUTSIDE)
@@ -273,9 +274,9 @@ fn prove(venv: &Venv, design: &Design, module: &str, properties: &str, cycles: u
     })
 }
 
-/// Properties of a decoder: a word is illegal unless it is in the table; it selects at most one unit and at most one latency.
+/// Properties of a decoder: a word is illegal unless the table contains it; a word selects at most one unit and at most one latency.
 fn decoder(machine: &Machine, slot: &SlotPlan) -> String {
-    // Operands lie in one of the machine's banks or in the input ports.
+    // Operands must lie in a bank of the machine or in the input ports.
     let exists = |field: Field| {
         let bits = field.bits();
         let (low, high) = (bits.low, bits.low + bits.width - 1);
@@ -289,7 +290,7 @@ fn decoder(machine: &Machine, slot: &SlotPlan) -> String {
     let mut v = String::from("    always @* begin\n        assert (illegal == ~(");
     let mut legal = Vec::new();
     for row in &slot.rows {
-        // Conditions: opcode, zero in all unused bits, destination bank, operand banks.
+        // Conditions on the opcode, unused bits (zero), destination bank, and operand banks.
         let unused = !row.shape.mask() & ((1 << 41) - 1);
         let mut text = format!("word[47:41] == 7'h{:02x} && (word[40:0] & 41'h{unused:x}) == 0", row.opcode);
         if row.shape.has_dest() {
@@ -305,7 +306,7 @@ fn decoder(machine: &Machine, slot: &SlotPlan) -> String {
     v
 }
 
-/// Rules of issue as properties over issue events alone, without the core's own bookkeeping.
+/// Rules of issue as properties of issue events alone, independent of the core's scoreboard.
 fn scoreboard(plan: &Plan) -> String {
     let last = plan.index - 1;
     let banks = plan.slots.len();

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! LinuxCNC, without screen and real-time kernel, as the host of a simulated board with the hybrid robot: tools/linuxcnc, docs/linuxcnc.md.
+//! LinuxCNC, without screen and real-time kernel, as host of a simulated board with the hybrid robot; see tools/linuxcnc and
+//! docs/linuxcnc.md.
 
 use anyhow::{Context, Result, bail, ensure};
 use serde_json::json;
@@ -24,15 +25,15 @@ pub(crate) struct Arguments {
     only: Option<String>,
 }
 
-/// LinuxCNC and the compiler of its components: 2 GB with dependencies.
+/// LinuxCNC and the compiler for its components: 2 GB with dependencies.
 const PACKAGES: [&str; 2] = ["linuxcnc-uspace", "linuxcnc-uspace-dev"];
 /// Python packages of report.py.
 const REPORT: [&str; 2] = ["numpy==2.4.6", "matplotlib==3.11.2"];
 /// User for LinuxCNC, which refuses to run as root.
 const USER: &str = "nobody";
-/// Lock file of a running LinuxCNC: only one instance per machine is possible.
+/// Lock file of a running LinuxCNC, which allows one instance per computer.
 const LOCK: &str = "/tmp/linuxcnc.lock";
-/// Files of tools/linuxcnc needed in a run.
+/// Files of tools/linuxcnc that a run needs.
 const FILES: [&str; 4] = ["run.py", "takt.hal", "takt.ini", "record.hal"];
 /// Time limit for the board's start, which includes Verilator's compilation.
 const READY: Duration = Duration::from_secs(900);
@@ -43,17 +44,17 @@ struct Run {
     /// Title in the tables.
     title: &'static str,
     gcode: &'static str,
-    /// The program runs to its end.
+    /// The G-code program runs to its end.
     is_whole: bool,
     /// Additional arguments of `takt board sim`.
     board: &'static [&'static str],
     /// Additional arguments of run.py.
     display: &'static [&'static str],
-    /// Number of driven periods before an event on the board.
+    /// Number of periods with enabled drives before an event on the board.
     event: Option<u32>,
     /// Final message of LinuxCNC.
     says: &'static str,
-    /// Response timeout in ms that counts as a fault; a simulated board is slow.
+    /// Response timeout in ms beyond which the host reports a fault; simulated boards are slow.
     timeout: u32,
     /// Time limit of the run.
     limit: Duration,
@@ -63,7 +64,7 @@ const AGH: &str = "programs/data/agh.ngc";
 const SHORT: &str = "tools/linuxcnc/short.ngc";
 const EMULATED: Duration = Duration::from_secs(240);
 
-/// Template: a run of a whole program on an emulated board, without an event.
+/// Default run: a whole program on an emulated board, without an event.
 const PLAIN: Run = Run {
     name: "",
     title: "",
@@ -128,7 +129,7 @@ impl Drop for KilledOnDrop {
     }
 }
 
-/// The present user is root, as whom LinuxCNC must not run.
+/// The current user is root, under which LinuxCNC does not run.
 fn is_root() -> Result<bool> {
     Ok(id("-u", None)? == 0)
 }
@@ -155,7 +156,7 @@ fn install() -> Result<()> {
     )
 }
 
-/// Runs LinuxCNC with the boards, and reports.
+/// Runs LinuxCNC with each board, and writes the report.
 pub(crate) fn linuxcnc(arguments: &Arguments) -> Result<()> {
     ensure!(
         !Path::new(LOCK).exists(),
@@ -188,7 +189,7 @@ pub(crate) fn linuxcnc(arguments: &Arguments) -> Result<()> {
     self::run(&mut report)
 }
 
-/// The component reports the fault of a port, and refuses to load.
+/// The component reports that a port has no board, and refuses to load.
 fn refuses_what_is_no_board() -> Result<()> {
     for (port, baud, says) in [
         ("/dev/null", 3_000_000, "cannot open /dev/null at 3000000 baud: Inappropriate ioctl for device"),
@@ -206,7 +207,7 @@ fn refuses_what_is_no_board() -> Result<()> {
     Ok(())
 }
 
-/// Folder accessible to LinuxCNC's user, independent of the project's location.
+/// Folder that LinuxCNC's user can access, independent of the project's location.
 fn scratch(name: &str) -> Result<PathBuf> {
     let folder = std::env::temp_dir().join(format!("takt-linuxcnc-{}-{name}", std::process::id()));
     let _ = fs::remove_dir_all(&folder);
@@ -235,7 +236,7 @@ fn as_user(folder: &Path, command: &str) -> Result<Command> {
 }
 
 impl Run {
-    /// Executes the run; copies its output files to `target`.
+    /// Executes the run, and copies its output files to `target`.
     fn run(&self, target: &Path) -> Result<()> {
         let folder = scratch(self.name)?;
         let result = self.run_in(&folder);
@@ -288,7 +289,7 @@ impl Run {
         Ok(())
     }
 
-    /// Starts the board; returns it with its port.
+    /// Starts the board; returns the process and its port.
     fn board(&self, folder: &Path) -> Result<(KilledOnDrop, String)> {
         let mut sim = Command::new(root().join("target/release/takt"));
         sim.args(["board", "sim", "--robot", "--serve", "--wiring"]);
@@ -301,7 +302,7 @@ impl Run {
         let output = board.0.stdout.take().context("it has an output")?;
         let (send, receive) = std::sync::mpsc::channel();
         std::thread::spawn(move || {
-            // Drain further output, so that the board never blocks on the pipe.
+            // Drain the remaining output, so that the board never blocks on a full pipe.
             for line in BufReader::new(output).lines().map_while(Result::ok) {
                 let _ = send.send(line);
             }

@@ -18,7 +18,8 @@ use takt_programs::hybrid::ports::INPUTS;
 use takt_rtl::header::{Header, Language};
 use takt_rtl::{Library, bench, export};
 
-/// LiteX, its language, its CPU, and packages that its builder demands although neither C library nor simulator are built.
+/// LiteX, its hardware description language and CPU, and packages that its builder requires although neither C library nor simulator are
+/// built.
 const LITEX: [&str; 6] = [
     "litex==2024.12",
     "migen==0.10.0",
@@ -39,7 +40,7 @@ fn array(name: &str, values: &[u32]) -> String {
     format!("static const uint32_t {name}[{}] = {{ {} }};\n", values.len(), values.join(", "))
 }
 
-/// Writes circuit, header and periods of the tracking program, with the emulator's results for them.
+/// Writes circuit, header and periods of the tracking program, with the results of the emulator.
 fn prepare(folder: &Path) -> Result<()> {
     let program = program(MACHINE)?;
     let design = export(MACHINE, &Library::builtin())?.latching(program.latched_inputs())?;
@@ -87,7 +88,7 @@ fn prepare(folder: &Path) -> Result<()> {
 /// Output folder of the SoC's files.
 const FOLDER: &str = "target/clients/litex";
 
-/// Writes the SoC's files. Returns the inputs of its simulation: files and tools.
+/// Writes the SoC's files. Returns the inputs of the simulation: files and tools.
 pub(crate) fn inputs() -> Result<Inputs> {
     let folder = root().join(FOLDER);
     if folder.exists() {
@@ -101,7 +102,7 @@ pub(crate) fn inputs() -> Result<Inputs> {
         .files("tools/python/litex")
 }
 
-/// Installs LiteX and the wrapper, and simulates the files written by [`inputs`].
+/// Installs LiteX and the wrapper, and simulates the files that [`inputs`] wrote.
 pub(crate) fn test() -> Result<()> {
     let (compiler, ask, package) = RISCV;
     if !works(compiler, ask) {
@@ -109,7 +110,7 @@ pub(crate) fn test() -> Result<()> {
     }
     let venv = Venv::with(&LITEX)?;
     let python = || Command::new(venv.tool("python3"));
-    // Install as a user would; the dependencies are present.
+    // Install as a user would. Skip dependencies, which are present.
     let install =
         ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-deps", "--force-reinstall"];
     run(python().args(install).arg(root().join("tools/python/litex")))?;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Evidence of the project: proofs, planted faults, campaigns, synthesis, speed, clients of other makers, in one record that the documents
-//! show. `cargo evidence --help` lists the commands.
+//! Evidence of the project: proofs, planted faults, campaigns, synthesis, speed, and clients from other vendors, recorded for the
+//! documents. `cargo evidence --help` lists the commands.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
 mod campaign;
@@ -75,7 +75,7 @@ enum Task {
 fn main() -> ExitCode {
     match task(Arguments::parse().task) {
         Ok(()) => ExitCode::SUCCESS,
-        // Print the error chain only; locations in this program do not help users.
+        // Print only the error chain; source locations in this program do not help users.
         Err(error) => {
             eprintln!("error: {error:#}");
             ExitCode::FAILURE

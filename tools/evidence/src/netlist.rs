@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A core mapped by yosys to a family's cells, in lockstep with the emulator.
+//! A core mapped by yosys to the cells of an FPGA family, in lockstep with the emulator.
 //!
-//! Cells are translated back to Verilog by yosys' own models, block RAM and multiplier by the models of the routed board's simulation
+//! yosys's own models translate cells back to Verilog; block RAMs and multipliers use the models for simulating a routed board
 //! ([`takt_family::Models`]).
 
 use anyhow::{Context, Result, ensure};
@@ -79,7 +79,7 @@ pub(crate) fn lockstep(arguments: &Arguments) -> Result<()> {
     progress::step(&format!("{}: cells as Verilog", machine.name), || yosys("back.ys", back))?;
     let path = folder.join("netlist.v");
     let netlist = fs::read_to_string(&path)?;
-    // The driver sets the core's parameter, which is already resolved in the netlist.
+    // The test driver sets the core's parameter, which the netlist has already resolved.
     let head = format!("module {top}(");
     ensure!(netlist.matches(&head).count() == 1, "there is no module {top} in {}", path.display());
     let netlist = netlist.replace(&head, &format!("module {top} #(parameter LATCHED = 0) ("));
@@ -97,7 +97,7 @@ pub(crate) fn lockstep(arguments: &Arguments) -> Result<()> {
     Ok(())
 }
 
-/// Reduces a netlist to its top and cells, as `top.json` beside it. Returns the cells in words.
+/// Reduces a netlist to its top module and cells; writes `top.json` beside it. Returns the cell counts in words.
 fn mapped(path: &std::path::Path, top: &str, family: &Family) -> Result<String> {
     let netlist: Value =
         serde_json::from_str(&fs::read_to_string(path)?).context("yosys' netlist is no JSON")?;

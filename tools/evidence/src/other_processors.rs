@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Cycles of the kernels of `programs/taclebench` on other processors: a simulated RISC-V core, and a model of the Cortex-M7.
+//! Cycles of the kernels of `programs/taclebench` on other processors: a simulated RISC-V core, and a performance model of the Cortex-M7.
 
 use anyhow::{Context, Result, bail};
 use std::collections::BTreeMap;
@@ -23,7 +23,7 @@ const TOOLS: [(&str, &str, &str); 6] = [
     ("verilator", "--version", "verilator"),
 ];
 
-/// The document, and the marker before the table.
+/// Document with the table, and the marker before it.
 const DOCUMENT: &str = "docs/library.md";
 const MARKER: &str = "<!-- table: others -->\n";
 const HEAD: &str =
@@ -32,14 +32,14 @@ const HEAD: &str =
 /// Marker before the table of Takt's own cycles, which a test of `takt-programs` checks.
 const OWN: &str = "<!-- table: taclebench -->\n";
 
-/// Range of the table's rows after a marker.
+/// Byte range of the table rows after a marker.
 fn rows(text: &str, marker: &str) -> Result<Range<usize>> {
     let start = text.find(marker).with_context(|| format!("{DOCUMENT} has no {marker}"))? + marker.len();
     let rows = text[start..].split_inclusive('\n').take_while(|line| line.starts_with('|'));
     Ok(start..start + rows.map(str::len).sum::<usize>())
 }
 
-/// Installs the tools, counts the cycles, and writes the table into the document.
+/// Installs the tools, counts the cycles, and writes the table to the document.
 pub(crate) fn compare() -> Result<()> {
     let missing: Vec<&str> =
         TOOLS.iter().filter(|(tool, ask, _)| !works(tool, ask)).map(|(.., package)| *package).collect();

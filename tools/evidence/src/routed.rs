@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Test of the placed and routed board in `rtl/board/tests/top.rs`, with the files that determine its outcome.
+//! Test of the placed and routed board (`rtl/board/tests/top.rs`), and the files that determine its outcome.
 
 use anyhow::{Context, Result, anyhow};
 use std::fs;
@@ -14,8 +14,8 @@ const TEST: &str = "rtl/board/tests/top";
 /// Output folder of the circuit.
 const FOLDER: &str = "target/routed";
 
-/// Writes the circuit. Returns the test's inputs: the circuit, the tools, their scripts, and the test itself. The host's library and the
-/// emulator have the same test with the circuit as generated.
+/// Writes the circuit. Returns the inputs of the test: circuit, tools and their scripts, and the test itself. Host library and emulator
+/// are left out, since the same test runs with the circuit before synthesis.
 pub(crate) fn inputs() -> Result<Inputs> {
     let folder = root().join(FOLDER);
     if folder.exists() {

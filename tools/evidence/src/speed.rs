@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Speed of the tools, with the last release's emulator measured in the same run.
+//! Speed of the tools, compared with the emulator of the last release in the same run.
 
 use anyhow::{Context, Result, ensure};
 use std::path::PathBuf;
@@ -19,12 +19,12 @@ pub(crate) struct Arguments {
 
 /// Cargo arguments that build the program `speed`.
 const SPEED: [&str; 7] = ["--release", "--package", "takt-benches", "--features", "jit", "--bin", "speed"];
-/// Part that measures the last release, too.
+/// Part of the benchmark that also measures the last release.
 const EMULATOR: &str = "emulator";
-/// Part that needs another assembler.
+/// Part of the benchmark that needs another assembler.
 const ASSEMBLER: &str = "assembler";
 
-/// Measures and prints; writes docs/speed.md if every part is measured.
+/// Measures and prints the speeds; writes docs/speed.md if every part was measured.
 pub(crate) fn speed(arguments: Arguments) -> Result<()> {
     install()?;
     let Arguments { against, parts } = arguments;
@@ -48,7 +48,7 @@ pub(crate) fn speed(arguments: Arguments) -> Result<()> {
     std::fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))
 }
 
-/// Builds `speed` of the last release in its own work tree and target folder, which are kept for the next time.
+/// Builds `speed` of the last release in a separate work tree and target folder, which are kept for later runs.
 fn last_release() -> Result<PathBuf> {
     let changelog =
         std::fs::read_to_string(root().join("CHANGELOG.md")).context("cannot read CHANGELOG.md")?;

@@ -25,7 +25,7 @@ import takt.onnx
 from takt.mujoco import CLOCK, Controller
 
 PERIOD, TIME, STARTS = 0.02, 10.0, 100
-#: Masses, lengths and inertias of acrobot.py; both angles are 0 upright.
+#: Model with the masses, lengths and inertias of acrobot.py; both angles are 0 when upright.
 MODEL = """<mujoco><option gravity="0 0 -9.81" timestep="0.01" integrator="RK4"/>
 <visual><global offwidth="960" offheight="720"/></visual>
 <asset><texture name="sky" type="skybox" builtin="gradient" rgb1="0.93 0.95 0.98" rgb2="0.75 0.8 0.87" width="256" height="256"/></asset>
@@ -48,11 +48,11 @@ policy = takt.onnx.program(Path(__file__).parent / "acrobot.onnx", range=(-20, 2
 class Swings:
     """What came of swing-ups, by start and period."""
 
-    #: Angles of shoulder and elbow; each link's distance from upright, the larger one, rad; the torque.
+    #: Angles of shoulder and elbow, rad; the larger of the links' distances from upright, rad; torque, N m.
     angles: NDArray[np.float64]
     distance: NDArray[np.float64]
     torque: NDArray[np.float64]
-    #: Cycles of a period, and seconds that they took to simulate.
+    #: Cycles per period, and simulation time in s.
     cycles: int
     took: float
 
@@ -144,7 +144,7 @@ def plot(results: dict[str, Swings], file: str) -> None:
     figure, axes = plt.subplots(2, 1, figsize=(8, 4.8), layout="constrained", sharex=True)
     for name, result in results.items():
         if name == "starts thrice as far off":
-            continue  # Its first start is at rest, too.
+            continue  # its first start is at rest as well
         times = PERIOD * np.arange(1, result.distance.shape[1] + 1)
         axes[0].plot(times, result.distance[0], label=name, linewidth=1)
         axes[1].plot(times, result.torque[0], linewidth=1)

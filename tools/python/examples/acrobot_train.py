@@ -17,10 +17,10 @@ from onnx import TensorProto, helper, numpy_helper
 
 Array = NDArray[np.float64]
 STEP, LIMIT, FASTEST, DAMPING = 0.02, 20.0, 8.0, 0.1
-#: How the hanging robot may start: angles in rad, velocities in rad/s.
+#: Spread of the initial states around hanging: angles in rad, velocities in rad/s.
 SPREAD = np.array([0.1, 0.1, 0.1, 0.1])
 HANGING = np.array([np.pi, 0, 0, 0])
-#: Costs of a step, by the states' squares and the torque's.
+#: Weights of the cost per step: squares of the states, and of the torque.
 Q, R = STEP * np.diag([10.0, 10, 1, 1]), STEP * 0.1
 
 
@@ -143,7 +143,7 @@ def train(layers: Layers, x: Array, u: Array, k: Array, steps: int, random: np.r
     mean = 0.0
     for t in range(1, steps + 1):
         chosen = random.integers(0, len(x), 1024)
-        # Around a trajectory torques follow from its gains; the nearer to upright, the nearer are the samples.
+        # Around a trajectory, its gains give the torques; the samples are closer where it is near upright.
         far = np.minimum(0.15, 0.01 + 0.1 * np.abs(x[chosen]).max(1, keepdims=True)) * random.uniform(0, 1, (1024, 1))
         aside = far * random.normal(size=(1024, 4)) * [0.3, 0.3, 1, 1]
         wanted = np.clip((u[chosen] + (k[chosen] * aside).sum(1)) / LIMIT, -0.99, 0.99)[:, None].astype(np.float32)
@@ -187,7 +187,7 @@ def upright(x: Array) -> Array:
 
 def swing_ups(random: np.random.Generator, last: Array, gain: Array) -> tuple[Array, Array, Array]:
     """Trajectories, torques and gains from around rest, 5 s long, the last two of them around upright."""
-    # From rest: torques of a few random frequencies, improved; then the best of them, to the end.
+    # From rest: improve torques made of a few random frequencies, then continue with the best to the end.
     tries, time, more = 64, STEP * np.arange(150), 100
     shape = (6, tries, 1)
     waves = zip(random.normal(size=shape), random.uniform(0.2, 1.5, shape), random.uniform(0, 2 * np.pi, shape))
@@ -224,7 +224,7 @@ def from_seen(seen: Array, x: Array, u: Array, k: Array, last: Array, gain: Arra
     inside, at = when[:, :-1] < horizon, np.minimum(when[:, :-1], horizon - 1)
     to, torques = x[which, np.minimum(when, horizon)], u[which, at] * inside
     to, torques, gains, cost = towards(seen, to, torques, np.where(inside[..., None], k[which, at], gain), last, [0.15, 0.4, 0.7, 1])
-    # Those that found no way up teach nothing.
+    # Discard trajectories that found no way up.
     good = (np.abs(to[:, -1]).max(1) < 0.1) & (cost < 300)
     return to[good], torques[good], gains[good]
 
@@ -239,7 +239,7 @@ def main(path: str) -> None:
         runs = run(layers, starts(1000, random), 10)
         print(f"{len(u)} trajectories: error {error:.2f} N m, {upright(runs).mean():.1%} of 1000 upright", flush=True)
         if steps == 5000:
-            # Where the policy comes to in its first 3 s.
+            # States that the policy reaches within its first 3 s.
             seen = runs[random.integers(0, len(runs), 96), random.integers(0, 150, 96)]
             x, u, k = (np.concatenate(both) for both in zip((x, u, k), from_seen(seen, x, u, k, last, gain)))
     write(layers, path)

@@ -71,7 +71,7 @@ class Joints:
         import mujoco
 
         data, tip, jacobian, turn = mujoco.MjData(model), model.body(TIP).id, np.zeros((3, model.nv)), np.zeros((3, model.nv))
-        # Chebyshev's nodes, at which a polynomial of high degree does not swing at the ends.
+        # Chebyshev nodes, at which a polynomial of high degree does not oscillate at the ends.
         times, rows, q = LAP / 2 * (1 - np.cos(np.pi * (np.arange(160) + 0.5) / 160)), [], START.copy()
         data.qpos[:] = q
         mujoco.mj_kinematics(model, data)
@@ -101,10 +101,10 @@ class Joints:
 class Lap:
     """What came of a lap."""
 
-    #: The tip's distance from where it is to be, m, and the joints' errors, rad, by period.
+    #: Distance of the tip from its target, m, and errors of the joints, rad, by period.
     tip: Array
     joints: Array
-    #: Cycles of a period, and seconds that the lap took to simulate.
+    #: Cycles per period, and simulation time of the lap in s.
     cycles: set[int]
     took: float
 
@@ -130,7 +130,7 @@ def lap(model: Any, law: takt.Program, path: Joints, period: float = 1e-4, **opt
 
 
 ENCODER = Encoder(counts=2**20, cutoff=400)
-#: What is compared: period, and options of the controller.
+#: Compared cases: period, and options of the controller.
 CASES: dict[str, tuple[float, dict[str, Any]]] = {
     "10 kHz, no time for control": (1e-4, {"latency": 0}),
     "10 kHz, exact to the cycle": (1e-4, {}),
@@ -175,7 +175,7 @@ def plot(results: dict[str, Lap], file: str) -> None:
 
     figure, axes = plt.subplots(figsize=(8, 4.2), layout="constrained")
     for name, result in results.items():
-        # A thousand points are as many as the picture shows.
+        # The picture resolves about a thousand points.
         every = max(1, len(result.tip) // 1000)
         axes.semilogy(np.linspace(0, LAP, len(result.tip))[::every], 1e6 * result.tip[::every], label=name, linewidth=1)
     axes.set(xlabel="time, s", ylabel="distance of the tip from its path, µm", ylim=(1e-1, None))

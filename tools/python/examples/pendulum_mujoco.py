@@ -24,7 +24,7 @@ import takt.onnx
 from takt.mujoco import CLOCK, Controller
 
 PERIOD, TIME = 0.05, 20.0
-#: Weight, length and inertia are 1, as where the policy was trained; the angle is 0 upright.
+#: Model with weight, length and inertia 1, as in training; the angle is 0 when upright.
 MODEL = """<mujoco><option gravity="0 0 -1" timestep="0.01" integrator="RK4"/>
 <visual><global offwidth="960" offheight="720"/></visual>
 <asset><texture name="sky" type="skybox" builtin="gradient" rgb1="0.93 0.95 0.98" rgb2="0.75 0.8 0.87" width="256" height="256"/></asset>
@@ -44,11 +44,11 @@ policy = takt.onnx.program(Path(__file__).parent / "pendulum.onnx", range=(-3, 3
 class Swing:
     """What came of a swing-up, by period."""
 
-    #: The angle from upright, rad, as it grows, and as a distance; the torque.
+    #: Unwrapped angle from upright, rad, its distance from upright, rad; torque.
     angle: NDArray[np.float64]
     distance: NDArray[np.float64]
     torque: NDArray[np.float64]
-    #: Cycles of a period, and seconds that it took to simulate.
+    #: Cycles per period, and simulation time in s.
     cycles: int
     took: float
 

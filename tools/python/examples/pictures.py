@@ -12,7 +12,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-#: Digits after the point of a coordinate in points: a twentieth of a point is less than a pixel shows.
+#: Decimal places of coordinates, in points: a twentieth of a point is smaller than a pixel.
 DIGITS = 1
 
 

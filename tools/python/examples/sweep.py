@@ -55,7 +55,7 @@ def servo(outputs: dict[str, NDArray[Any]], period: int) -> Mapping[str, ArrayLi
 begin = time.perf_counter()
 loops = law.batch(RUNS).close(servo, PERIODS, {"q": q, "qr": 1.0, **gains}, record=["q"])
 closed = time.perf_counter() - begin
-# The same periods without a plant: inputs of all periods at once.
+# The same periods without a plant: the inputs of all periods are passed at once.
 given: dict[str, ArrayLike] = {"q": loops.inputs["q"], "qr": 1.0, **{name: values[:, None] for name, values in gains.items()}}
 begin = time.perf_counter()
 run = law.run(given)

@@ -26,12 +26,12 @@ import takt.mujoco
 from takt.mujoco import CLOCK, Controller
 
 Array = NDArray[np.float64]
-#: Time from tick to tick, and from state to state of the plan, s.
+#: Period of the controller, and step of the plan, s.
 PERIOD, STEP = 2e-3, 20e-3
-#: What the plan keeps: rad/s and rad/s². The motors have the torques of the robot: 150 and 28 N m.
+#: Limits within the plan: rad/s and rad/s². The motors have the robot's torques: 150 and 28 N m.
 FASTEST, HARDEST = 2.0, 15.0
 HOME = np.array([-1.5708, -1.5708, 1.5708, -1.5708, -1.5708, 0.0])
-#: Poses, and how long the robot has for each, s.
+#: Poses, and the time allowed for each, s.
 POSES = [HOME + [1.2, 0.3, -0.5, 0.4, 0.6, 1.0], HOME + [0.4, -0.3, 0.7, -0.6, -0.4, -1.0], HOME]
 TIME = 1.5
 
@@ -77,11 +77,11 @@ def plan() -> dict[str, Any]:
 class Round:
     """What came of a round through the poses, by period."""
 
-    #: Distances of the joints from their pose, rad, velocities, rad/s, and torques as parts of their limits.
+    #: Distances of the joints from their pose, rad; velocities, rad/s; torques as fractions of their limits.
     distance: Array
     velocity: Array
     torque: Array
-    #: Cycles of both programs, and seconds that the round took to simulate.
+    #: Cycles of both programs, and simulation time of the round in s.
     cycles: int
     took: float
 
@@ -133,7 +133,7 @@ def drive(model: Any, controller: takt.Program, dynamics: takt.Program, latency:
     return Round(distance, velocity, torque, sum(both), time.perf_counter() - begin)
 
 
-#: What is compared: options of `drive`.
+#: Compared cases: options of `drive`.
 CASES: dict[str, dict[str, Any]] = {
     "no time for control": {"latency": 0},
     "exact to the cycle": {"latency": None},

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The errors of a run's outputs against binary64, and bounds of those of every run: `takt accuracy`.
+//! Errors of a run's outputs against binary64, and bounds on the errors of all runs, as in `takt accuracy`.
 
 use crate::failure::{self, Failure};
 use crate::interrupt::Interrupt;
@@ -12,10 +12,10 @@ use std::num::NonZeroU64;
 use takt_analysis::accuracy::{ErrorShare, Interval, LargestError, Moment, OutputAccuracy, Shadow};
 use takt_emu::{Emulator, Fault};
 
-/// An error, the period from 0, what the output was, and what it is in binary64.
+/// Largest error: error, period from 0, value of the output, and value in binary64.
 type LargestErrorOf = (f64, u64, f64, f64);
 
-/// The measured accuracy of an output.
+/// Measured accuracy of an output.
 #[derive(IntoPyObject)]
 pub(crate) struct MeasuredOutput {
     name: String,
@@ -23,7 +23,7 @@ pub(crate) struct MeasuredOutput {
     absolute: Option<LargestErrorOf>,
     ulp: Option<LargestErrorOf>,
     relative: Option<LargestErrorOf>,
-    /// Place of an operation, and its share of the largest absolute error.
+    /// Places of operations, each with its share of the largest absolute error.
     operations: Vec<(String, f64)>,
 }
 
@@ -46,31 +46,32 @@ impl MeasuredOutput {
     }
 }
 
-/// The ends of an interval.
+/// Lower and upper end of an interval.
 type IntervalEnds = (f64, f64);
 
 fn ends(interval: Interval) -> IntervalEnds {
     (interval.low, interval.high)
 }
 
-/// The proved bounds of an output.
+/// Proved bounds of an output.
 #[derive(IntoPyObject)]
 pub(crate) struct OutputBound {
     name: String,
     range: Option<IntervalEnds>,
     error: Option<f64>,
     ulp: Option<f64>,
-    /// Place of an operation, and what its rounding adds at most.
+    /// Places of operations, each with the largest error that its rounding contributes.
     operations: Vec<(String, f64)>,
 }
 
-/// A warning at a place, with the names and ranges of the values that the operation reads.
+/// Warning: text, place, and the operation's operands with their ranges.
 type Hazard = (String, String, Vec<(String, Option<IntervalEnds>)>);
 
-/// A state's name, its range, whether the first period begins or any later one ends, and where the state may be then.
+/// Assumption on a state: name, range, whether it concerns the start of the first period instead of the end of every period, and the
+/// range found.
 type StateAssumption = (String, IntervalEnds, bool, Option<IntervalEnds>);
 
-/// Encloses what every period computes.
+/// Encloses the results of every period.
 #[pyfunction]
 pub(crate) fn enclose(
     py: Python<'_>,
@@ -107,7 +108,7 @@ pub(crate) fn enclose(
     ))
 }
 
-/// Runs the program over words by period and input port, and beside it the same operations in binary64.
+/// Runs the program on input words by period and port, in parallel with the same operations in binary64.
 #[pyfunction]
 pub(crate) fn accuracy(
     py: Python<'_>,
@@ -133,7 +134,7 @@ pub(crate) fn accuracy(
             for (port, bits) in ports.iter().zip(row(period)) {
                 emulator.set_input_bits(port.register, *bits).map_err(port_error)?;
             }
-            // Code that runs once sees the first period's inputs.
+            // The code that runs once also sees the first period's inputs.
             for _ in 0..if period == 0 { 2 } else { 1 } {
                 interrupt.check_now()?;
                 emulator.set_cycle_limit(emulator.now().saturating_add(max_cycles.get()));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A board at a serial port, from Python.
+//! A board at a serial port, for Python.
 
 use crate::program::Program;
 use crate::system;
@@ -15,9 +15,9 @@ use takt_board::{Application, Host, Stream, top};
 
 import_exception!(takt._errors, BoardError);
 
-/// The state of a core: its activity, whether outputs drive, what stopped them, the fault, counters by name.
+/// State of a core: activity, whether outputs drive, causes of the stop, fault, and counters by name.
 type Status = (&'static str, bool, Vec<&'static str>, Option<(u32, String)>, Vec<(&'static str, u32)>);
-/// The names of ports, each with `float`, `int` or `bits`.
+/// Port names, each with `float`, `int` or `bits`.
 type Ports = Vec<(String, &'static str)>;
 
 /// A board at a serial port.
@@ -38,7 +38,7 @@ fn wrong(text: String) -> PyErr {
 
 #[pymethods]
 impl Board {
-    /// A board with a program, or with the system of a file.
+    /// Opens a board that runs a program, or the system described in a file.
     #[new]
     fn new(
         py: Python<'_>,
@@ -58,7 +58,7 @@ impl Board {
             let opened = Serial::open(&port, baud);
             let line = opened
                 .map_err(|error| BoardError::new_err(format!("cannot open {}: {error}", port.display())))?;
-            // The first request's number: not that of an earlier host's last request.
+            // Number of the first request; it should differ from the last request of an earlier host.
             let now = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.subsec_micros());
             let mut host = Host::connect(line, now as u8).map_err(failed)?;
             host.fits(application.clone()).map_err(failed)?;
@@ -67,7 +67,7 @@ impl Board {
         Ok(Board { host, application, stream: None })
     }
 
-    /// The inputs that the host sets, and the output ports of the cores.
+    /// Inputs that the host sets, and output ports of the cores.
     fn ports(&self) -> PyResult<(Ports, Ports)> {
         let names = self.application.names();
         let (description, endpoints) = (self.application.description(), self.application.endpoints());
@@ -87,7 +87,7 @@ impl Board {
         Ok((inputs.collect::<PyResult<Ports>>()?, outputs))
     }
 
-    /// The names of the cores; a single program's is empty.
+    /// Names of the cores; empty for a single program.
     fn cores(&self) -> Vec<String> {
         self.application.description().cores.iter().map(|core| core.name.clone()).collect()
     }
@@ -105,7 +105,7 @@ impl Board {
             };
             let mut counters = Vec::new();
             for name in COUNTERS {
-                // Those of the line are the board's.
+                // Counters of the serial line belong to the board, not to a core.
                 let of = if ["errors", "lost"].contains(&name) { 0 } else { core };
                 counters.push((name, host.register_of(of, name)?));
             }
@@ -114,34 +114,34 @@ impl Board {
         .map_err(failed)
     }
 
-    /// Puts an entry, a word for each field, into a FIFO from the host; false if it is full.
+    /// Pushes an entry, one word per field, into a FIFO from the host; returns false if the FIFO is full.
     fn push(&mut self, py: Python<'_>, name: &str, entry: Vec<u32>) -> PyResult<bool> {
         let fifo = self.application.endpoints().fifo(name, false).map_err(wrong)?;
         let host = &mut self.host;
         py.detach(|| host.push(fifo, &entry)).map_err(failed)
     }
 
-    /// Takes an entry out of a FIFO to the host, a word for each field; `None` if it is empty.
+    /// Pops an entry from a FIFO to the host, one word per field; returns `None` if the FIFO is empty.
     fn pop(&mut self, py: Python<'_>, name: &str) -> PyResult<Option<Vec<u32>>> {
         let fifo = self.application.endpoints().fifo(name, true).map_err(wrong)?;
         let host = &mut self.host;
         py.detach(|| host.pop(fifo)).map_err(failed)
     }
 
-    /// The fields of a FIFO's entries.
+    /// Fields of a FIFO's entries, with their types.
     fn fields(&self, name: &str, to_host: bool) -> PyResult<Ports> {
         let fifo = self.application.endpoints().fifo(name, to_host).map_err(wrong)?;
         Ok(fifo.fields.iter().map(|(name, ty)| (name.clone(), ty.name())).collect())
     }
 
-    /// Loads the program; it does not start.
+    /// Loads the program without starting it.
     fn load(&mut self, py: Python<'_>) -> PyResult<()> {
         let records = top::image(self.application.clone()).map_err(|error| wrong(error.to_string()))?.records;
         let host = &mut self.host;
         py.detach(|| host.load(&records)).map_err(failed)
     }
 
-    /// `start`, `stop`, `hold` or `go`.
+    /// Executes `start`, `stop`, `hold` or `go`.
     fn control(&mut self, py: Python<'_>, what: &str) -> PyResult<()> {
         let host = &mut self.host;
         py.detach(|| {
@@ -157,7 +157,7 @@ impl Board {
         .map_err(failed)
     }
 
-    /// Runs one period, while the program is held.
+    /// Runs one period of a held program.
     fn step(&mut self, py: Python<'_>) -> PyResult<()> {
         let host = &mut self.host;
         let held = py.detach(|| host.register("control")).map_err(failed)? & HOLD != 0;
@@ -167,12 +167,12 @@ impl Board {
         py.detach(|| host.set("step", 1)).map_err(failed)
     }
 
-    /// The names of an array's elements; the name itself if it is no array's.
+    /// Names of an array's elements; for any other name, the name itself.
     fn elements(&self, name: &str) -> Vec<String> {
         self.application.elements(name).unwrap_or_else(|| vec![name.to_owned()])
     }
 
-    /// Type and bits of each name's value.
+    /// Reads values; returns type and bits for each name.
     fn read(&mut self, py: Python<'_>, names: Vec<String>) -> PyResult<Vec<(&'static str, u32)>> {
         let application = &self.application;
         let places = names.iter().map(|name| application.find(name)).collect::<Result<Vec<_>, _>>();
@@ -197,7 +197,7 @@ impl Board {
         py.detach(|| host.set_ports(&settings)).map_err(failed)
     }
 
-    /// Begins to stream the values of these names; returns their types.
+    /// Starts a stream of the named values; returns their types.
     fn stream(&mut self, py: Python<'_>, names: Vec<String>, every: u32) -> PyResult<Vec<&'static str>> {
         let application = &self.application;
         let stream = Stream::of(application, &names).map_err(wrong)?;
@@ -210,7 +210,7 @@ impl Board {
         Ok(types)
     }
 
-    /// The next frame: its period, and the bits of each name's value; `None` if there is none within a tenth of a second.
+    /// Next frame: its period, and the bits of each value; `None` if no frame arrives within a tenth of a second.
     fn frame(&mut self, py: Python<'_>) -> PyResult<Option<(u32, Vec<u32>)>> {
         let host = &mut self.host;
         let frame = py.detach(|| host.streamed()).map_err(failed)?;

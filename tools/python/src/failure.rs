@@ -1,38 +1,38 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The event that ended a run early, as Python sees it.
+//! Events that end a run early, for Python.
 
 use pyo3::prelude::*;
 use takt_debug::fault::diagnose;
 use takt_emu::{Fault, FaultKind, PeriodError};
 use takt_isa::Program;
 
-/// The event that ended a run.
+/// An event that ended a run.
 #[pyclass(name = "Fault", frozen, get_all, module = "takt")]
 #[derive(Clone, Debug)]
 pub(crate) struct Failure {
-    /// The run of a batch, from 0.
+    /// Number of the run in a batch, from 0.
     pub(crate) run: usize,
-    /// The period in which it happened, from 0.
+    /// Number of the period in which the event occurred, from 0.
     pub(crate) period: usize,
-    /// Its kind, in a word or two, as `data address`; `halted` if the program has halted.
+    /// Kind of the event in a word or two, such as `data address`; `halted` if the program has halted.
     pub(crate) kind: String,
-    /// Its description.
+    /// Description of the event.
     pub(crate) message: String,
-    /// The cycle, counted from reset.
+    /// Cycle of the event, counted from reset.
     pub(crate) cycle: Option<u64>,
-    /// The bundle's address.
+    /// Address of the bundle.
     pub(crate) bundle: Option<u32>,
-    /// The slot of the operation, where it is one operation's.
+    /// Slot of the operation, if a single operation caused the event.
     pub(crate) slot: Option<String>,
-    /// The source file, as far as the program knows it.
+    /// Source file, if the program knows it.
     pub(crate) file: Option<String>,
-    /// The line in it, from 1.
+    /// Line number in the source file, from 1.
     pub(crate) line: Option<u32>,
-    /// The whole message, with the source line if that is at hand.
+    /// Complete message, with the source line if its text is available.
     pub(crate) text: String,
 }
 
-/// The parts of a failure, for a pickle: in the order of its fields, the message's text last.
+/// Fields of a failure for pickling, in order; the text comes last.
 type Parts = (
     (usize, usize),
     (String, String, String),
@@ -40,7 +40,7 @@ type Parts = (
     (Option<String>, Option<u32>),
 );
 
-/// A failure that was pickled.
+/// Restores a pickled failure.
 #[pyfunction]
 pub(crate) fn restored_fault(place: Parts) -> Failure {
     let ((run, period), (kind, message, text), (cycle, bundle, slot), (file, line)) = place;
@@ -49,7 +49,7 @@ pub(crate) fn restored_fault(place: Parts) -> Failure {
 
 #[pymethods]
 impl Failure {
-    /// For `pickle`: what makes the same failure again.
+    /// Reduces the failure for `pickle`.
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (Parts,))> {
         let Failure { run, period, kind, message, cycle, bundle, slot, file, line, text } = self.clone();
         let parts = ((run, period), (kind, message, text), (cycle, bundle, slot), (file, line));
@@ -69,7 +69,7 @@ impl Failure {
     }
 }
 
-/// The failure of a period.
+/// Failure for an error of a period.
 pub(crate) fn of_period(
     error: &PeriodError,
     (run, period): (usize, usize),
@@ -83,7 +83,7 @@ pub(crate) fn of_period(
     }
 }
 
-/// A failure without a place in the program.
+/// Failure without a place in the program.
 pub(crate) fn plain(kind: &str, message: String, (run, period): (usize, usize)) -> Failure {
     Failure {
         run,
@@ -99,7 +99,7 @@ pub(crate) fn plain(kind: &str, message: String, (run, period): (usize, usize)) 
     }
 }
 
-/// A fault at its source line.
+/// Failure for a fault, with its source line.
 pub(crate) fn of_fault(
     fault: &Fault,
     (run, period): (usize, usize),

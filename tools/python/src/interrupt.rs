@@ -1,40 +1,40 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Ctrl-C while the interpreter is released.
+//! Handling of Ctrl-C while the interpreter is released.
 
 use pyo3::prelude::*;
 use std::time::{Duration, Instant};
 
-/// Cycles between two looks for Ctrl-C within one period: a few milliseconds.
+/// Cycles between two checks for Ctrl-C within a period: a few milliseconds.
 pub(crate) const SLICE: u64 = 250_000;
 
-/// Looks for signals now and then.
+/// Checks for signals from time to time.
 pub(crate) struct Interrupt {
     last: Instant,
-    /// Cycles that have been run since the time was asked for.
+    /// Cycles run since the clock was last read.
     cycles: u64,
 }
 
 impl Interrupt {
-    /// The shortest time between two looks.
+    /// Minimum time between two checks.
     const EVERY: Duration = Duration::from_millis(20);
-    /// The cycles that a period counts as beside its own: setting inputs and reading outputs takes time, too.
+    /// Cycles added to each period for setting inputs and reading outputs, which also take time.
     const PERIOD: u64 = 1000;
 
     pub(crate) fn new() -> Interrupt {
         Interrupt { last: Instant::now(), cycles: 0 }
     }
 
-    /// Counts the cycles of a period, or of a part of one.
+    /// Counts the cycles of a period or of a part of one.
     pub(crate) fn count(&mut self, cycles: u64) {
         self.cycles = self.cycles.saturating_add(cycles).saturating_add(Self::PERIOD);
     }
 
-    /// To be called before each period, or further part of one, once the one before was counted.
+    /// Checks for signals. Call this before each period or part of one, once the previous one has been counted.
     ///
     /// # Errors
-    /// The exception that a signal's handler has raised, as `KeyboardInterrupt`.
+    /// The exception raised by a signal handler, such as `KeyboardInterrupt`.
     pub(crate) fn check(&mut self) -> PyResult<()> {
-        // Asking for the time takes longer than the shortest period.
+        // Reading the clock takes longer than the shortest period.
         if self.cycles < SLICE {
             return Ok(());
         }
@@ -42,7 +42,7 @@ impl Interrupt {
         self.check_now()
     }
 
-    /// The same, for callers who come by seldom.
+    /// Checks for signals regardless of the count, for infrequent calls.
     pub(crate) fn check_now(&mut self) -> PyResult<()> {
         if self.last.elapsed() < Self::EVERY {
             return Ok(());

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Many closed loops at once: a batch, stepped from Python over arrays.
+//! Many closed loops at once: a batch that Python steps over arrays.
 
 use crate::failure::{self, Failure};
 use crate::program::Program;
@@ -11,7 +11,7 @@ use std::num::NonZeroU64;
 use std::sync::Arc;
 use takt_emu::Batch;
 
-/// Machines with the same program in them, stepped together period by period.
+/// Machines that run the same program, stepped together period by period.
 #[pyclass(module = "takt._takt")]
 pub(crate) struct Lanes {
     program: Arc<takt_isa::Program>,
@@ -19,9 +19,9 @@ pub(crate) struct Lanes {
     tick: Option<NonZeroU64>,
     max_cycles: u64,
     batch: Batch,
-    /// Addresses of the words of data memory that are outputs, behind the ports.
+    /// Addresses of data memory words that serve as outputs, after the ports.
     words: Vec<usize>,
-    /// Of each, true once it has failed.
+    /// Whether each run has failed.
     failed: Vec<bool>,
     #[pyo3(get)]
     failures: Vec<Failure>,
@@ -35,7 +35,7 @@ impl Lanes {
         self.batch.set_period_limit(self.max_cycles);
     }
 
-    /// A period of all of them; `inputs` and `outputs` by port and run.
+    /// Runs a period of all runs; `inputs` and `outputs` are indexed by port and run.
     fn run(
         &mut self,
         inputs: &[u32],
@@ -82,7 +82,7 @@ impl Lanes {
 
 #[pymethods]
 impl Lanes {
-    /// Machines with the program in their memories; `words` are addresses of data memory that are outputs, behind the ports.
+    /// Creates machines that run the program in step; `words` are addresses of data memory that are outputs, behind the ports.
     #[new]
     fn new(
         program: &Program,
@@ -112,8 +112,8 @@ impl Lanes {
         Ok(lanes)
     }
 
-    /// Runs a period with the words of `inputs`, by port and run; fills `outputs`, likewise, and `cycles` and `missed`, by run. True if
-    /// none has failed.
+    /// Runs a period with the words in `inputs`, by port and run. Fills `outputs`, by port and run, and `cycles` and `missed`, by run.
+    /// Returns true if no run has failed.
     fn step(
         &mut self,
         py: Python<'_>,
@@ -132,7 +132,7 @@ impl Lanes {
         Ok(self.failures.is_empty())
     }
 
-    /// Back to the state after loading.
+    /// Restores the state after loading.
     fn reset(&mut self) -> PyResult<()> {
         self.batch = loaded(Batch::new(&self.program, self.failed.len()))?;
         self.set();
@@ -142,7 +142,7 @@ impl Lanes {
         Ok(())
     }
 
-    /// The sticky exception flags of each, as bits.
+    /// Sticky exception flags of each run, as bits.
     #[getter]
     fn flags(&self) -> Vec<u8> {
         (0..self.failed.len()).map(|run| self.batch.flags(run).bits()).collect()

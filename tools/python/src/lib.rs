@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The extension module of the Python package `takt`: programs, runs and models for the Python code in `tools/python/takt`, which
-//! gives them names, shapes and types of NumPy. docs/python.md is about the package.
+//! Extension module of the Python package `takt`: programs, runs and models. The Python code in `tools/python/takt` adds names, shapes
+//! and NumPy types. docs/python.md describes the package.
 //!
-//! Arguments from Python are checked here as well as there: no argument makes it panic. Long work releases the interpreter
-//! and looks for Ctrl-C.
+//! Arguments are checked here as well as in Python, so that no argument causes a panic. Long operations release the interpreter and check
+//! for Ctrl-C.
 
 mod accuracy;
 mod board;
@@ -22,7 +22,7 @@ mod units;
 
 use pyo3::prelude::*;
 
-/// The extension module of the package `takt`; use that one.
+/// Extension module of the package `takt`, for use by that package only.
 #[pymodule]
 mod _takt {
     #[pymodule_export]

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Sources from robots' descriptions and from other tools' expressions: `takt_front`, for `takt.urdf`, `takt.casadi`, ….
+//! Sources generated from robot descriptions and from expressions of other tools: `takt_front`, for `takt.urdf`, `takt.casadi`, ….
 
 use crate::program::{machine, suggest};
 use pyo3::exceptions::PyValueError;
@@ -17,29 +17,29 @@ import_exception!(takt._errors, ModelError);
 /// An element of an array of ports.
 #[derive(IntoPyObject)]
 pub(crate) enum Element {
-    /// The port's name.
+    /// Element with a port of this name.
     Port(String),
-    /// An output that needs no port.
+    /// Output with a constant value, which needs no port.
     Constant(f64),
-    /// An input without effect.
+    /// Input without effect, which needs no port.
     None(Option<u8>),
 }
 
-/// Name, dimensions and elements, the last index fastest.
+/// Name, dimensions and elements of an array, last index fastest.
 pub(crate) type ShapedArray = (String, Vec<usize>, Vec<Element>);
 
-/// A source, and what its ports are.
+/// A generated source, with a description of its ports.
 #[derive(IntoPyObject)]
 pub(crate) struct Model {
     pub(crate) source: String,
     pub(crate) title: String,
     pub(crate) notes: Vec<String>,
     pub(crate) operations: usize,
-    /// The meaning of each port, and its unit.
+    /// Meaning and unit of each port.
     pub(crate) texts: Vec<(String, String)>,
     pub(crate) inputs: Vec<ShapedArray>,
     pub(crate) outputs: Vec<ShapedArray>,
-    /// Of the outputs that lie in data memory: name, array, and the word's number there.
+    /// Outputs in data memory: name, array, and index of the word in it.
     pub(crate) data: Vec<(String, String, usize)>,
     pub(crate) joints: Vec<String>,
 }
@@ -85,7 +85,7 @@ impl Model {
     }
 }
 
-/// An error with its place; `name` is what was read.
+/// Error with its place; `name` is the input that was read.
 pub(crate) fn located_error(name: &str, error: Error) -> PyErr {
     let text = error.located_text(name);
     ModelError::new_err((text, error.line))
@@ -105,19 +105,19 @@ fn rewrites(exact: bool, without: &[String]) -> PyResult<Rewrites> {
     Ok(rewrites)
 }
 
-/// The functions of a robot: name and description.
+/// Functions of a robot that can be generated: name and description.
 #[pyfunction]
 pub(crate) fn robot_functions() -> Vec<(&'static str, &'static str)> {
     RobotFunction::ALL.iter().map(|(_, name, text)| (*name, *text)).collect()
 }
 
-/// The text of a file that a description includes.
+/// Reads a file that a description includes.
 fn text_of(path: &Path) -> Result<String, String> {
     let bytes = std::fs::read(path).map_err(|error| format!("cannot read {}: {error}", path.display()))?;
     decode(bytes).map(|decoded| decoded.text).map_err(|why| format!("{}: {why}", path.display()))
 }
 
-/// A function of a robot that is described in URDF or MJCF, with the files of `folder` that it includes, or by a table of
+/// Generates a function of a robot. The robot is described in URDF or in MJCF, with includes from `folder`, or by a table of
 /// Denavit-Hartenberg parameters.
 #[pyfunction]
 #[allow(clippy::too_many_arguments)]
@@ -180,7 +180,7 @@ pub(crate) fn robot(
     py.detach(made).map_err(|error| located_error(name, error))
 }
 
-/// A list of instructions, as `takt_expressions` makes it.
+/// Generates a program from a list of instructions, as written by `takt_expressions`.
 #[pyfunction]
 pub(crate) fn expressions(
     py: Python<'_>,

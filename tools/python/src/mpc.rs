@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Sources from control problems: `takt_front::mpc`, for `takt.mpc`.
+//! Sources generated from control problems: `takt_front::mpc`, for `takt.mpc`.
 
 use crate::model::{Element, Model, ShapedArray, located_error};
 use crate::program::machine;
@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use takt_front::mpc::{self, Controller, MAX_RESTARTS, Search};
 use takt_front::{Error, no_files};
 
-/// Bundles of program memory: room for pipelined loops.
+/// Program memory depth in bundles: enough for pipelined loops.
 const BUNDLES: usize = 4096;
 
 type Ports = [(&'static str, Vec<usize>, &'static str)];
@@ -16,7 +16,7 @@ fn controller(text: &str) -> Result<Controller, Error> {
     mpc::read(text, "mpc", &no_files).and_then(Controller::new).map_err(|error| error.located(text))
 }
 
-/// Arrays of ports, whose elements are numbered from 1, the last index fastest.
+/// Arrays of ports, with elements numbered from 1, last index fastest.
 fn shaped(ports: &Ports) -> Vec<ShapedArray> {
     let array = |(name, dims, _): &(&'static str, Vec<usize>, &'static str)| -> ShapedArray {
         let mut indices = vec![Vec::new()];
@@ -37,7 +37,7 @@ fn shaped(ports: &Ports) -> Vec<ShapedArray> {
     ports.iter().map(array).collect()
 }
 
-/// A controller from a control problem in JSON.
+/// Generates a controller from a control problem in JSON.
 #[pyfunction]
 pub(crate) fn predictive(py: Python<'_>, text: &str, machine: &str) -> PyResult<Model> {
     let machine = self::machine(machine)?;
@@ -63,7 +63,7 @@ pub(crate) fn predictive(py: Python<'_>, text: &str, machine: &str) -> PyResult<
                 system.name, system.iterations
             ),
             notes: Vec::new(),
-            // Products and sums of both passes, of dense matrices.
+            // Products and sums in both passes, for dense matrices.
             operations: system.iterations * (steps - 1) * 2 * (2 * n * n + 4 * n * m + m * m),
             texts,
             inputs,
@@ -76,7 +76,7 @@ pub(crate) fn predictive(py: Python<'_>, text: &str, machine: &str) -> PyResult<
     py.detach(made).map_err(|error| located_error("mpc", error))
 }
 
-/// The weight of the plan's last state, row by row: the cost-to-go of the infinite horizon.
+/// Weight of the plan's last state, row by row: cost-to-go of the infinite horizon.
 #[pyfunction]
 pub(crate) fn predictive_weight(py: Python<'_>, text: &str) -> PyResult<Vec<Vec<f64>>> {
     let controller = py.detach(|| controller(text)).map_err(|error| located_error("mpc", error))?;
@@ -84,7 +84,7 @@ pub(crate) fn predictive_weight(py: Python<'_>, text: &str) -> PyResult<Vec<Vec<
     Ok(weight.row_iter().map(|row| row.iter().copied().collect()).collect())
 }
 
-/// The worst residuals and violation found over the problem's range: name, value and state.
+/// Worst residuals and violation found within the problem's range: name, value and state.
 #[pyfunction]
 pub(crate) fn predictive_worst(
     py: Python<'_>,

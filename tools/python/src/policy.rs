@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Sources from learned policies: `takt_front::policy`, for `takt.onnx`.
+//! Sources generated from learned policies: `takt_front::policy`, for `takt.onnx`.
 
 use crate::model::{Element, Model, ShapedArray, located_error};
 use crate::program::machine;
@@ -7,10 +7,10 @@ use pyo3::prelude::*;
 use std::path::PathBuf;
 use takt_front::policy::{self, Vector};
 
-/// Bundles of program memory: room for pipelined loops.
+/// Program memory depth in bundles: enough for pipelined loops.
 const BUNDLES: usize = 4096;
 
-/// A multi-layer perceptron from the bytes of a file in ONNX.
+/// Generates a multi-layer perceptron from the contents of an ONNX file.
 #[pyfunction]
 #[allow(clippy::too_many_arguments)]
 pub(crate) fn perceptron(

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Programs: from a source or an image, and what is known of them without running them.
+//! Programs: loaded from a source or an image, and analysed without running them.
 
 use pyo3::exceptions::PyValueError;
 use pyo3::import_exception;
@@ -24,33 +24,33 @@ use takt_isa::{MACHINES, Machine};
 import_exception!(takt._errors, AssemblyError);
 import_exception!(takt._errors, NoBoundError);
 
-/// A program in the machine's memories.
+/// A program for a machine.
 #[pyclass(frozen, module = "takt._takt")]
 pub(crate) struct Program {
     pub(crate) program: Arc<takt_isa::Program>,
-    /// Texts, by the names that the program has for them.
+    /// Source texts, keyed by the program's file names.
     pub(crate) sources: Arc<Vec<(String, String)>>,
-    /// The assembler's result, of one that was assembled here.
+    /// Result of the assembler, if the program was assembled in this process.
     pub(crate) assembled: Option<AssembledProgram>,
-    /// The same of one that was pickled.
+    /// Messages of the assembler, if the program was pickled.
     kept: Option<PickledMessages>,
-    /// The way it was assembled.
+    /// Source and options from which the program was assembled.
     recipe: Option<Recipe>,
-    /// And of one from an image.
+    /// Debug information, if the program comes from an image.
     debug: Option<DebugInfo>,
 }
 
-/// The scheduler's effort, unless given: about a second for a policy of a thousand operations, a quarter of what `takt asm` takes.
+/// Default effort of the scheduler: about a second for a policy of a thousand operations, a quarter of the time that `takt asm` takes.
 const EFFORT: u32 = 5;
-/// Programs that are assembled faster are not kept.
+/// Minimum assembly time for a program to be cached.
 const SLOW: Duration = Duration::from_millis(100);
-/// Programs that are kept, the newest.
+/// Maximum number of cached programs; the newest are kept.
 const MOST: usize = 400;
 
-/// This build of the package, of which another one may assemble otherwise; `None` if it is not known.
+/// Identification of this build, since another may assemble differently; `None` if it cannot be determined.
 static BUILD: OnceLock<Option<String>> = OnceLock::new();
 
-/// The package's version. `file` is that of the extension module.
+/// Version of the package. `file` is the path of the extension module.
 #[pyfunction]
 pub(crate) fn version(file: PathBuf) -> &'static str {
     let version = env!("CARGO_PKG_VERSION");
@@ -58,11 +58,11 @@ pub(crate) fn version(file: PathBuf) -> &'static str {
     version
 }
 
-/// The assembler's messages of a program, for one that comes from a pickle: there it is not assembled again.
+/// Messages of the assembler for a pickled program, which is not assembled again.
 #[derive(Clone, FromPyObject, IntoPyObject)]
 pub(crate) struct PickledMessages(String, Option<(String, String)>, Vec<(Option<String>, u32, u32)>);
 
-/// A source and the options that make a program of it.
+/// A source, and the options for assembling it.
 #[derive(Clone)]
 struct Recipe {
     text: Vec<u8>,
@@ -73,11 +73,11 @@ struct Recipe {
     options: Options,
 }
 
-/// The options in words: `schedule`, `contract`, `effort`, `warnings`.
+/// Options as text: `schedule`, `contract`, `effort`, `warnings`.
 #[derive(Clone, FromPyObject, IntoPyObject)]
 pub(crate) struct OptionTexts(String, String, Option<u32>, Vec<String>);
 
-/// A recipe in words, for a pickle: text, name, folder, folders of includes, wishes.
+/// A recipe in the form for pickling: text, name, folder, folders of includes, options.
 pub(crate) type Words = (Vec<u8>, String, PathBuf, Vec<PathBuf>, OptionTexts);
 
 impl Default for OptionTexts {
@@ -131,8 +131,8 @@ impl Recipe {
         takt_asm::assemble_bytes(&self.name, self.text.clone(), &self.search(), &self.options)
     }
 
-    /// The program, from the user's cache if it was assembled before. Programs that took long are kept, without warnings: those are
-    /// shown each time.
+    /// Assembles the program, or loads it from the user's cache. Programs that took long are cached, unless they have warnings, which
+    /// must be shown each time.
     fn make(self) -> Result<PyResult<Program>, Diagnostics> {
         let checked = takt_asm::check_bytes(&self.name, self.text.clone(), &self.search(), &self.options);
         let key = BUILD.get().and_then(Option::as_ref).map(|build| checked.key(build, &self.options));
@@ -155,7 +155,7 @@ impl Recipe {
     }
 }
 
-/// `; did you mean …?` if one of the names is near.
+/// Suffix `; did you mean …?` if a similar name exists.
 pub(crate) fn suggest<'a>(name: &str, names: impl IntoIterator<Item = &'a str>) -> String {
     nearest(name, names).map_or(String::new(), |near| format!("; did you mean `{near}`?"))
 }
@@ -164,7 +164,7 @@ pub(crate) fn machine(name: &str) -> PyResult<&'static Machine> {
     takt_asm::machine(name).map_err(PyValueError::new_err)
 }
 
-/// One of a few words.
+/// Parses one of several words.
 fn choice<T: Copy>(what: &str, given: &str, choices: &[(&str, T)]) -> PyResult<T> {
     let found = choices.iter().find(|(name, _)| *name == given);
     found.map(|(_, value)| *value).ok_or_else(|| {
@@ -174,32 +174,32 @@ fn choice<T: Copy>(what: &str, given: &str, choices: &[(&str, T)]) -> PyResult<T
     })
 }
 
-/// The machines: name and description.
+/// Available machines: name and description.
 #[pyfunction]
 pub(crate) fn machines() -> Vec<(&'static str, &'static str)> {
     MACHINES.iter().map(|machine| (machine.name, machine.text)).collect()
 }
 
-/// The exception flags: bit and name.
+/// Exception flags: bit and name.
 #[pyfunction]
 pub(crate) fn flag_names() -> Vec<(u8, &'static str)> {
     Flags::NAMES.iter().map(|(flag, name)| (flag.bits(), *name)).collect()
 }
 
-/// The longest time between ticks, cycles.
+/// Maximum number of cycles between ticks.
 #[pyfunction]
 pub(crate) fn longest_tick() -> u64 {
     takt_emu::LONGEST_TICK
 }
 
-/// The name most like a misspelt one, if one is near enough to be meant.
+/// Name most similar to a misspelt one, if it is similar enough.
 #[pyfunction]
 #[pyo3(name = "nearest")]
 pub(crate) fn nearest_name(name: &str, names: Vec<String>) -> Option<String> {
     nearest(name, names.iter().map(String::as_str))
 }
 
-/// Assembles a text. Included files are looked for in `folder`, then in `include`, then in Takt's library.
+/// Assembles a text. Included files are searched in `folder`, then in `include`, then in Takt's library.
 #[pyfunction]
 #[pyo3(signature = (text, name, folder, include, machine, schedule, contract, effort, warnings))]
 #[allow(clippy::too_many_arguments)]
@@ -227,7 +227,7 @@ pub(crate) fn assemble(
     }
 }
 
-/// A program that was pickled, from its image, how it was assembled, and what is said of it.
+/// Restores a pickled program from its image, its recipe, and the assembler's messages.
 #[pyfunction]
 pub(crate) fn restored_program(
     image: &[u8],
@@ -240,7 +240,7 @@ pub(crate) fn restored_program(
     Ok(Program { recipe, kept, ..program })
 }
 
-/// The program in a file: an image, or a source, which is assembled for the machine, or the first of all.
+/// Loads a program from a file: an image, or a source, which is assembled for `machine`, or else for the default machine.
 pub(crate) fn read_program(
     path: &Path,
     machine: Option<&'static Machine>,
@@ -262,7 +262,7 @@ pub(crate) fn read_program(
     of_machine(path, Arc::unwrap_or_clone(made.program), machine)
 }
 
-/// A program that was read, if it is for the machine that was asked for.
+/// Checks that a program is for the requested machine.
 fn of_machine(
     path: &Path,
     program: takt_isa::Program,
@@ -279,7 +279,7 @@ fn of_machine(
     }
 }
 
-/// The program in a file: an image, or `None` if that is a source, with its bytes.
+/// Loads an image; for a source, returns `None` and the bytes of the file.
 #[pyfunction]
 pub(crate) fn load(path: PathBuf) -> PyResult<(Option<Program>, Py<PyBytes>)> {
     let about = std::fs::metadata(&path).map_err(|error| named(&path, error))?;
@@ -296,10 +296,10 @@ pub(crate) fn named(path: &Path, error: std::io::Error) -> PyErr {
     std::io::Error::new(error.kind(), format!("cannot read {}: {error}", path.display())).into()
 }
 
-/// Cycles, from the fewest to the most.
+/// Smallest and largest number of cycles.
 type Pair = (u64, u64);
 
-/// A port: name, and `float`, `int` or `bits`.
+/// Name and type of each port; the type is `float`, `int` or `bits`.
 fn ports(ports: &[Port]) -> Vec<(String, &'static str)> {
     ports.iter().map(|port| (port.name.clone(), port.ty.name())).collect()
 }
@@ -321,13 +321,13 @@ impl Program {
         })
     }
 
-    /// The same source assembled for another machine; `None` of an image, and if it does not fit.
+    /// Assembles the same source for another machine; `None` for an image, or if the program does not fit.
     pub(crate) fn again(&self, machine: &'static Machine) -> Option<AssembledProgram> {
         let recipe = self.recipe.as_ref()?;
         Recipe { options: Options { machine, ..recipe.options }, ..recipe.clone() }.assemble().ok()
     }
 
-    /// The program that is kept at a place, and what the assembler said of it.
+    /// Loads a cached program, with the messages of the assembler.
     fn read(place: &CacheLocation, machine: &'static Machine, recipe: &Recipe) -> Option<Program> {
         let parts = place.read()?;
         let [known, image] = &parts[..] else { return None };
@@ -349,7 +349,7 @@ impl Program {
         }
     }
 
-    /// The arrays of its source in data memory.
+    /// Arrays that the source places in data memory.
     pub(crate) fn arrays(&self) -> Vec<Array> {
         let debug = self.assembled.as_ref().map(AssembledProgram::debug_info).or_else(|| self.debug.clone());
         let arrays = debug.map_or(Vec::new(), |debug| debug.names.arrays);
@@ -373,24 +373,24 @@ impl Program {
 
 #[pymethods]
 impl Program {
-    /// The machine's name.
+    /// Name of the machine.
     #[getter]
     fn machine(&self) -> &'static str {
         self.program.machine.name
     }
 
-    /// True if it is for the machine of a name, which may state the depths of memories in any order.
+    /// Whether the program is for the named machine; the name may state memory depths in any order.
     fn is_for(&self, machine: &str) -> PyResult<bool> {
         Ok(self::machine(machine)? == self.program.machine)
     }
 
-    /// Bundles in the program.
+    /// Number of bundles in the program.
     #[getter]
     fn bundles(&self) -> u32 {
         self.program.bundles()
     }
 
-    /// True if its ports are latched.
+    /// Whether the ports are latched.
     #[getter]
     fn latched(&self) -> bool {
         self.program.latched
@@ -408,19 +408,19 @@ impl Program {
         ports(&self.program.outputs)
     }
 
-    /// The address of an array in data memory.
+    /// Address of an array in data memory.
     fn data_address(&self, name: &str) -> Option<usize> {
         let of = |symbol: &&Symbol| symbol.space == Space::Data && symbol.name == name;
         Some(self.program.symbols.iter().find(of)?.address as usize)
     }
 
-    /// Texts, by file.
+    /// Source texts, by file.
     #[getter]
     fn sources(&self) -> Vec<(String, String)> {
         self.sources.to_vec()
     }
 
-    /// The assembler's warnings: rendered, and as JSON.
+    /// Warnings of the assembler: rendered, and as JSON.
     #[getter]
     fn warnings(&self) -> Option<(String, String)> {
         if let Some(PickledMessages(_, warnings, _)) = &self.kept {
@@ -430,7 +430,7 @@ impl Program {
         (!warnings.is_empty()).then(|| (warnings.render(false), warnings.to_json()))
     }
 
-    /// Words beside the source lines that they come from; of an image, source that assembles to it.
+    /// Program words beside the source lines that they come from; for an image, a source that assembles to it.
     fn listing(&self) -> String {
         match (&self.assembled, &self.kept) {
             (Some(assembled), _) => listing::listing(assembled),
@@ -439,14 +439,14 @@ impl Program {
         }
     }
 
-    /// The image, as `takt asm` writes it.
+    /// Image of the program, as `takt asm` writes it.
     pub(crate) fn image(&self) -> PyResult<Vec<u8>> {
         let debug = self.assembled.as_ref().map(AssembledProgram::debug_info).or_else(|| self.debug.clone());
         let image = image::write_with(&self.program, debug.as_ref());
         image.map_err(|error| PyValueError::new_err(format!("no image: {error}")))
     }
 
-    /// Of each block that the scheduler packed: label, cycles, and what no schedule can beat.
+    /// Scheduled blocks: label, cycles, and lower bound.
     fn blocks(&self) -> Vec<(Option<String>, u32, u32)> {
         if let Some(PickledMessages(_, _, blocks)) = &self.kept {
             return blocks.clone();
@@ -455,8 +455,8 @@ impl Program {
         blocks.map(|block| (block.label.clone(), block.cycles, block.bound.cycles())).collect()
     }
 
-    /// The best and the worst of each section: name, place, whether it runs once, and cycles as a pair three times: after a
-    /// long wait, with the tick in time, after a missed deadline. Then the worst period.
+    /// Best and worst case of each section: name, place, whether it runs once, and three pairs of cycles: after a long wait, with the
+    /// tick in time, and after a missed deadline. Then the worst period.
     #[allow(clippy::type_complexity)]
     fn bound(
         &self,
@@ -476,7 +476,7 @@ impl Program {
         Ok((sections.collect(), worst))
     }
 
-    /// For `pickle`: what makes the same program again.
+    /// Reduces the program for `pickle`.
     #[allow(clippy::type_complexity)]
     fn __reduce__<'py>(
         &self,
@@ -489,7 +489,7 @@ impl Program {
         Ok((py.import("takt._takt")?.getattr("restored_program")?, (image, recipe, kept)))
     }
 
-    /// A copy: nothing changes a program, so that it is the same.
+    /// Returns the program itself: it is immutable.
     fn __copy__(slf: Py<Self>) -> Py<Self> {
         slf
     }

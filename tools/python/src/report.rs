@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The report on the cycles of a period: `takt analyse`.
+//! Report on the cycles of a period, as in `takt analyse`.
 
 use crate::failure::{self, Failure};
 use crate::program::Program;
@@ -14,11 +14,11 @@ use takt_emu::PeriodError;
 use takt_isa::timing::Cycle;
 use takt_isa::{Machine, Register};
 
-/// Text, JSON and page; or what ended the run before.
+/// Text, JSON and page; or the event that ended the run early.
 type AnalysisResult = (Option<(String, String, String)>, Option<Failure>);
 
-/// Runs the program with these words on its input ports, a row for each period, and looks at period `wanted`, or else the last. With `reassemble` the program is
-/// assembled for each faster machine, too.
+/// Runs the program with the given words on its input ports, one row per period, and analyses period `wanted`, or else the last. With
+/// `reassemble`, the program is also assembled for each faster machine.
 #[pyfunction]
 pub(crate) fn analyse(
     py: Python<'_>,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Runs over arrays: one on an emulator, many in a batch.
+//! Runs over arrays: a single run on an emulator, several in a batch.
 
 use crate::failure::{self, Failure};
 use crate::interrupt::{Interrupt, SLICE};
@@ -12,45 +12,45 @@ use takt_emu::{Batch, Emulator, PeriodError, PeriodReport, Status, Stop};
 use takt_isa::Type;
 use takt_isa::program::Port;
 
-/// Lanes of a batch that run together; of more runs, so many at a time. (A lane takes 5 kB, and its data memory.)
+/// Maximum number of lanes that run together; more runs are split into groups. (A lane takes 5 kB plus its data memory.)
 const LANES: usize = 4096;
-/// Words of all their data memories, unless a single group has more.
+/// Maximum number of data memory words in all lanes, unless a single group needs more.
 const WORDS: usize = LANES * 1024;
-/// The value of an output of binary32 that no operation has written yet.
+/// Value of a binary32 output that has never been written.
 pub(crate) const UNWRITTEN: u32 = 0x7fc0_0000;
 
-/// The results of a run beside outputs and cycles.
+/// Results of a run apart from outputs and cycles.
 #[derive(IntoPyObject)]
 pub(crate) struct RunResults {
-    /// Of each run the periods that came to their end.
+    /// Number of completed periods, for each run.
     completed: Vec<usize>,
-    /// Of each run its sticky exception flags, as bits.
+    /// Sticky exception flags of each run, as bits.
     flags: Vec<u8>,
-    /// The events that ended runs early.
+    /// Events that ended runs early.
     failures: Vec<Failure>,
-    /// Of each output port the periods at whose end it had never been written.
+    /// For each output port, the number of periods that ended before it was ever written.
     unwritten: Vec<u64>,
-    /// NaNs written to output ports, in all runs.
+    /// Number of NaNs written to output ports, in all runs.
     nan_writes: u64,
 }
 
-/// The arrays of a call.
+/// Arrays that a call reads and fills.
 struct Arrays<'a> {
     ports: usize,
     periods: usize,
     runs: usize,
-    /// Input words in the order of ports, periods, runs.
+    /// Input words, indexed by port, period and run.
     inputs: &'a [u32],
-    /// Output words in the order of ports and words, periods, runs.
+    /// Output words, indexed by port or data word, period and run.
     outputs: &'a mut [u32],
-    /// Cycles in the order of periods, then runs.
+    /// Cycles, indexed by period and run.
     cycles: &'a mut [u64],
     missed: &'a mut [u64],
 }
 
 struct Settings<'a> {
     program: &'a takt_isa::Program,
-    /// Addresses of the words of data memory that are outputs, too.
+    /// Addresses of data memory words that serve as outputs.
     words: &'a [usize],
     sources: &'a [(String, String)],
     tick: Option<NonZeroU64>,
@@ -79,9 +79,9 @@ pub(crate) fn writable<'a, T: Element, D: numpy::ndarray::Dimension>(
     array.as_slice_mut().map_err(|_| PyValueError::new_err(format!("{what} is not contiguous")))
 }
 
-/// Runs the program over arrays of words: `inputs` and `outputs` by port, period and run, `cycles` and `missed` by period
-/// and run. The words of data memory at these addresses are outputs, too, behind the ports. One run alone is an emulator's, several are a
-/// batch's.
+/// Runs the program over arrays of words: `inputs` and `outputs` are indexed by port, period and run, `cycles` and `missed` by period and
+/// run. The data memory words at the given addresses are further outputs, after the ports. A single run uses an emulator, several runs a
+/// batch.
 #[pyfunction]
 #[pyo3(signature = (program, words, inputs, outputs, cycles, missed, tick, max_cycles))]
 #[allow(clippy::too_many_arguments)]
@@ -126,8 +126,8 @@ pub(crate) fn run(
     py.detach(|| if runs == 1 { alone(&settings, arrays) } else { together(&settings, arrays) })
 }
 
-/// Runs the program to its `halt`, with these words on the input ports: cycles, outputs (`None` where nothing was
-/// written) and then the words of data memory at these addresses, exception flags, and what ended it otherwise.
+/// Runs the program to its `halt`, with the given words on the input ports. Returns cycles, outputs (`None` if never written) followed by
+/// the data memory words at the given addresses, exception flags, and the event that ended the run otherwise.
 #[pyfunction]
 #[allow(clippy::type_complexity)]
 pub(crate) fn run_to_halt(
@@ -178,7 +178,7 @@ pub(crate) fn run_to_halt(
     Ok((emulator.now(), outputs, emulator.flags().bits(), failure))
 }
 
-/// Runs a period, looking for Ctrl-C.
+/// Runs a period while checking for Ctrl-C.
 pub(crate) fn period(
     emulator: &mut Emulator,
     max_cycles: u64,
@@ -198,12 +198,12 @@ pub(crate) fn period(
     }
 }
 
-/// Deadlines that were missed in a period.
+/// Number of deadlines missed in a period.
 pub(crate) fn misses(report: &PeriodReport) -> u64 {
     u64::from(report.missed) + report.lost
 }
 
-/// The state of an output: its value, and true if it was ever written.
+/// Value of an output; if it has never been written, NaN or 0.
 pub(crate) fn output_state(port: &Port, bits: Option<u32>) -> u32 {
     bits.unwrap_or(if port.ty == Type::F { UNWRITTEN } else { 0 })
 }
@@ -255,10 +255,10 @@ fn alone(settings: &Settings<'_>, arrays: Arrays<'_>) -> PyResult<RunResults> {
     Ok(ran)
 }
 
-/// As if no output was ever written.
+/// Fills the outputs as if none had ever been written.
 fn fill(program: &takt_isa::Program, outputs: &mut [u32], each: usize) {
     if each > 0 {
-        // Behind the ports are words.
+        // Data words follow the ports.
         outputs.fill(UNWRITTEN);
         let ports = program.outputs.iter().zip(outputs.chunks_exact_mut(each));
         ports.for_each(|(port, series)| series.fill(output_state(port, None)));

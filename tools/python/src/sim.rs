@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A closed loop, stepped from Python.
+//! A closed loop that Python steps.
 
 use crate::failure::{self, Failure};
 use crate::interrupt::Interrupt;
@@ -15,20 +15,20 @@ use takt_emu::{Emulator, Number};
 use takt_isa::program::Port;
 use takt_isa::{Register, Type};
 
-/// Input values and periods since reset of which a machine keeps what it was given (8 bytes each).
+/// Maximum size of a machine's input history: input values plus periods since reset (8 bytes each).
 const HISTORY: usize = 1 << 20;
 
-/// The inputs of a machine since reset: with them a pickle brings another one to the same state.
+/// Input history of a machine since reset: unpickling replays it to restore the state.
 #[derive(Clone, Default)]
 struct History {
-    /// For each period, how many inputs were given, and then each with its number and its bits.
+    /// For each period: number of inputs that were set, then number and bits of each.
     words: Vec<u32>,
-    /// The reason if there is none.
+    /// Reason why there is no history.
     lost: Option<&'static str>,
 }
 
 impl History {
-    /// Adds a period.
+    /// Adds the inputs of a period.
     fn add(&mut self, given: &[(usize, u32)]) {
         if self.lost.is_some() {
             return;
@@ -45,7 +45,7 @@ impl History {
     }
 }
 
-/// A machine with a program in it, stepped period by period.
+/// A machine that runs a program, stepped period by period.
 #[pyclass(module = "takt._takt")]
 pub(crate) struct Sim {
     tick: Option<NonZeroU64>,
@@ -54,10 +54,10 @@ pub(crate) struct Sim {
     sources: Arc<Vec<(String, String)>>,
     max_cycles: u64,
     inputs: HashMap<String, usize>,
-    /// Which inputs were ever given.
+    /// Whether each input has been set.
     given: Vec<bool>,
     outputs: Vec<(Py<PyString>, Register, Type)>,
-    /// The inputs with which the next period is to begin.
+    /// Inputs to set at the start of the next period.
     next: Vec<(Register, u32)>,
     #[pyo3(get)]
     periods: usize,
@@ -70,7 +70,7 @@ pub(crate) struct Sim {
 }
 
 impl Sim {
-    /// The value that Python gave, as the port's bits.
+    /// Converts a Python value to the bits of a port.
     fn bits(port: &Port, value: &Bound<'_, PyAny>, period: usize) -> PyResult<u32> {
         let wrong =
             |text: String| PyValueError::new_err(format!("input `{}` of period {period}: {text}", port.name));
@@ -133,7 +133,7 @@ impl Sim {
         Ok(())
     }
 
-    /// Runs a period with the inputs that it is to begin with; false if it failed.
+    /// Runs a period with the inputs in `next`; returns false if it failed.
     fn run(&mut self, py: Python<'_>) -> PyResult<bool> {
         for &(register, bits) in &self.next {
             self.emulator.set_input_bits(register, bits).map_err(port_error)?;
@@ -163,7 +163,7 @@ impl Sim {
 
 #[pymethods]
 impl Sim {
-    /// A machine with the program in its memory.
+    /// Creates a machine that runs the program.
     #[new]
     fn new(program: &Program, tick: Option<NonZeroU64>, max_cycles: NonZeroU64) -> PyResult<Sim> {
         let mut emulator = loaded(Emulator::new(&program.program))?;
@@ -189,7 +189,7 @@ impl Sim {
         })
     }
 
-    /// Sets inputs and runs a period. `None` if it failed; then `failure` says how.
+    /// Sets inputs and runs a period. Returns `None` if it failed; `failure` then has the event.
     fn step<'py>(
         &mut self,
         py: Python<'py>,
@@ -202,7 +202,7 @@ impl Sim {
         if self.run(py)? { self.read(py).map(Some) } else { Ok(None) }
     }
 
-    /// A machine in the same state, which goes on by itself.
+    /// An independent machine in the same state.
     fn __copy__(&self, py: Python<'_>) -> Sim {
         let outputs = self.outputs.iter().map(|(name, register, ty)| (name.clone_ref(py), *register, *ty));
         Sim {
@@ -222,7 +222,7 @@ impl Sim {
         }
     }
 
-    /// For a pickle: cycles from tick to tick, cycles that a period may take, and what it was given since reset.
+    /// State for pickling: cycles between ticks, cycle limit of a period, and input history since reset.
     fn state<'py>(&self, py: Python<'py>) -> PyResult<(Option<u64>, u64, Bound<'py, PyBytes>)> {
         if let Some(why) = self.history.lost {
             return Err(PyTypeError::new_err(format!(
@@ -233,7 +233,7 @@ impl Sim {
         Ok((self.tick.map(NonZeroU64::get), self.max_cycles, PyBytes::new(py, &bytes)))
     }
 
-    /// Runs from reset with what another one was given, so that this one is in its state.
+    /// Restores a pickled state: runs from reset with the recorded inputs.
     fn replay(&mut self, py: Python<'_>, history: &[u8]) -> PyResult<()> {
         let damaged = || PyValueError::new_err("the pickled Sim is damaged");
         if !history.len().is_multiple_of(4) {
@@ -261,7 +261,7 @@ impl Sim {
         Ok(())
     }
 
-    /// The values on the output ports; `None` on one that was never written.
+    /// Values of the output ports; `None` for a port that has never been written.
     fn read<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let values = PyDict::new(py);
         for (name, register, ty) in &self.outputs {
@@ -275,12 +275,12 @@ impl Sim {
         Ok(values)
     }
 
-    /// Words of data memory, by address.
+    /// Data memory words at the given addresses.
     fn words(&self, addresses: Vec<usize>) -> Vec<Option<u32>> {
         addresses.into_iter().map(|address| self.emulator.memory().get(address).copied()).collect()
     }
 
-    /// Back to the state after loading.
+    /// Restores the state after loading.
     fn reset(&mut self) {
         self.emulator.reset();
         self.given.fill(false);
@@ -288,13 +288,13 @@ impl Sim {
         (self.periods, self.cycles, self.missed, self.failure) = (0, 0, 0, None);
     }
 
-    /// Cycles since reset, waiting included.
+    /// Cycles since reset, including waits.
     #[getter]
     fn now(&self) -> u64 {
         self.emulator.now()
     }
 
-    /// The sticky exception flags, as bits.
+    /// Sticky exception flags, as bits.
     #[getter]
     fn flags(&self) -> u8 {
         self.emulator.flags().bits()

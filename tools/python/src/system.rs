@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Systems of several cores: read from their files, and stepped from Python.
+//! Systems of several cores: read from a file, and stepped by Python.
 
 use crate::failure::{self, Failure};
 use crate::interrupt::{Interrupt, SLICE};
@@ -12,10 +12,10 @@ use takt_system::{
     Description, End, LinkKind, ProgramError, ReadError, Request, System, SystemFault, SystemPort,
 };
 
-/// Cycles within which every core waits for its first tick.
+/// Cycle limit for all cores to reach their first `wait`.
 const START: u64 = 1_000_000_000;
 
-/// The system in a file, with its programs, which are looked for beside it.
+/// Reads a system from a file; paths of its programs are relative to that file.
 pub(crate) fn read(path: &Path) -> PyResult<Description> {
     let text = std::fs::read_to_string(path).map_err(|error| crate::program::named(path, error))?;
     let folder = path.parent().unwrap_or(Path::new(""));
@@ -36,15 +36,15 @@ pub(crate) fn read(path: &Path) -> PyResult<Description> {
     })
 }
 
-/// Names and types.
+/// Names and types of ports.
 type Ports = Vec<(String, &'static str)>;
 
-/// A system with a host, base tick by base tick. Between two steps it stands where the host writes what the periods of the next tick read.
+/// A system and its host, stepped by base ticks. Between two steps, it is in the cycle in which the host writes inputs for the next tick.
 #[pyclass(module = "takt._takt")]
 pub(crate) struct SystemSim {
     description: Description,
     system: System,
-    /// The cycle in which the host writes next.
+    /// Cycle of the host's next write.
     next: u64,
     #[pyo3(get)]
     ticks: usize,
@@ -58,7 +58,7 @@ impl SystemSim {
         links.filter(|(_, link)| wanted(link)).map(|(number, _)| number).collect()
     }
 
-    /// The FIFO of a name, with the host at one of its ends.
+    /// Finds a FIFO by name that starts or ends at the host.
     fn fifo(&self, name: &str, to_host: bool) -> PyResult<usize> {
         let host =
             |link: &takt_system::Link| if to_host { link.to == End::Host } else { link.from == End::Host };
@@ -75,17 +75,17 @@ impl SystemSim {
         })
     }
 
-    /// Ports of the host that are fields of a link.
+    /// Host ports that are fields of a link.
     fn of(&self, link: usize, ports: &[SystemPort]) -> Vec<SystemPort> {
         ports.iter().filter(|port| port.link == link).cloned().collect()
     }
 
-    /// True if an input or output belongs to no FIFO.
+    /// The port does not belong to a FIFO.
     fn steady(&self, port: &SystemPort) -> bool {
         !matches!(self.description.links[port.link].kind, LinkKind::Fifo { .. })
     }
 
-    /// Runs until a cycle, looking for Ctrl-C; false after a fault.
+    /// Runs until a cycle while checking for Ctrl-C; returns false after a fault.
     fn run_until(&mut self, py: Python<'_>, cycle: u64) -> PyResult<bool> {
         let mut interrupt = Interrupt::new();
         let system = &mut self.system;
@@ -112,7 +112,7 @@ impl SystemSim {
         self.failure = Some(failure);
     }
 
-    /// Runs to where the host writes for the first base tick.
+    /// Runs to the cycle in which the host writes for the first base tick.
     fn begin(&mut self, py: Python<'_>) -> PyResult<()> {
         let system = &mut self.system;
         match py.detach(|| system.run_to_start(START)) {
@@ -146,7 +146,7 @@ impl SystemSim {
         Ok(sim)
     }
 
-    /// Inputs and outputs that belong to no FIFO: name and type.
+    /// Inputs and outputs that do not belong to a FIFO: name and type.
     fn ports(&self) -> (Ports, Ports) {
         let named = |ports: Vec<SystemPort>| {
             let steady = ports.into_iter().filter(|port| self.steady(port));
@@ -155,7 +155,7 @@ impl SystemSim {
         (named(self.description.inputs()), named(self.description.outputs()))
     }
 
-    /// FIFOs from the host and to it.
+    /// Names of the FIFOs from the host, and of those to the host.
     fn fifos(&self) -> (Vec<String>, Vec<String>) {
         let fifo = |link: &takt_system::Link| matches!(link.kind, LinkKind::Fifo { .. });
         let named = |numbers: Vec<usize>| {
@@ -167,7 +167,7 @@ impl SystemSim {
         )
     }
 
-    /// The fields of a FIFO's entries: name and type.
+    /// Fields of a FIFO's entries: name and type.
     fn fields(&self, name: &str, to_host: bool) -> PyResult<Ports> {
         let link = self.fifo(name, to_host)?;
         let ports = if to_host { self.description.outputs() } else { self.description.inputs() };
@@ -178,13 +178,13 @@ impl SystemSim {
         Ok(self.of(link, &ports).into_iter().map(field).collect())
     }
 
-    /// Cores: name, and cycles from tick to tick.
+    /// Cores: name, and cycles between ticks.
     fn cores(&self) -> Vec<(String, u64)> {
         let core = |core: &takt_system::Core| (core.name.clone(), core.period(self.description.tick));
         self.description.cores.iter().map(core).collect()
     }
 
-    /// Of each core: periods, the shortest and the longest in cycles, and ticks that were skipped.
+    /// For each core: number of periods, shortest and longest in cycles, and number of skipped ticks.
     fn periods(&self) -> Vec<(u64, u64, u64, u64)> {
         let of = |core| {
             let takt_system::CorePeriods { count, shortest, longest, skipped } = self.system.periods(core);
@@ -193,7 +193,7 @@ impl SystemSim {
         (0..self.description.cores.len()).map(of).collect()
     }
 
-    /// Writes inputs, publishes the host's snapshots and runs a base tick; the words of the outputs, or none after a fault.
+    /// Writes inputs, publishes the host's snapshots and runs a base tick. Returns the words of the outputs, or `None` after a fault.
     fn step(&mut self, py: Python<'_>, inputs: Vec<(String, u32)>) -> PyResult<Option<Vec<u32>>> {
         if self.failure.is_some() {
             return Ok(None);
@@ -214,13 +214,13 @@ impl SystemSim {
         Ok(Some(self.read()))
     }
 
-    /// The words of the outputs.
+    /// Words of the outputs.
     fn read(&self) -> Vec<u32> {
         let outputs = self.description.outputs().into_iter().filter(|port| self.steady(port));
         outputs.map(|port| self.system.field_bits(port.link, port.field).unwrap_or(0)).collect()
     }
 
-    /// Puts an entry, a word for each field, into a FIFO. False if it does not fit.
+    /// Pushes an entry, one word per field, into a FIFO; returns false if it is full.
     fn push(&mut self, name: &str, entry: Vec<u32>) -> PyResult<bool> {
         let link = self.fifo(name, false)?;
         let wrong = |error: takt_system::HostError| PyValueError::new_err(error.to_string());
@@ -230,13 +230,13 @@ impl SystemSim {
         self.system.push(link).map_err(wrong)
     }
 
-    /// Takes an entry out of a FIFO.
+    /// Pops an entry from a FIFO; returns `None` if it is empty.
     fn pop(&mut self, name: &str) -> PyResult<Option<Vec<u32>>> {
         let link = self.fifo(name, true)?;
         self.system.pop(link).map_err(|error| PyValueError::new_err(error.to_string()))
     }
 
-    /// Back to the state after loading.
+    /// Restores the state after loading.
     fn reset(&mut self, py: Python<'_>) -> PyResult<()> {
         self.system = loaded(System::new(&self.description))?;
         (self.ticks, self.failure) = (0, None);
@@ -249,7 +249,7 @@ impl SystemSim {
         self.system.now()
     }
 
-    /// Cycles from base tick to base tick.
+    /// Cycles per base tick.
     #[getter]
     fn tick(&self) -> u64 {
         self.description.tick

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Units of work in other processes, here or on the workers of a HyperQueue server: `takt_work`, for `takt.distribute`.
+//! Units of work in other processes, on this computer or on the workers of a HyperQueue server: `takt_work`, for `takt.distribute`.
 
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
@@ -8,13 +8,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use takt_work::{Client, Event, HYPERQUEUE, Place, Unit, has_package, run};
 
-/// Between two looks for Ctrl-C.
+/// Interval between two checks for Ctrl-C.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// A unit in words: name, command, folder, the file that it writes.
+/// A unit: name, command, folder, and path of the file that it writes.
 type Words = (String, Vec<String>, PathBuf, PathBuf);
 
-/// HyperQueue on `PATH`, or in this Python; nothing is installed.
+/// Finds HyperQueue on `PATH` or in this Python; installs nothing.
 fn client(python: &Path) -> PyResult<Client> {
     Client::find(|| {
         if has_package(python) {
@@ -27,8 +27,8 @@ fn client(python: &Path) -> PyResult<Client> {
     })
 }
 
-/// Runs units on so many CPUs here, on a server and workers that are started (`hq`), or on the workers of a server. Returns name and reason
-/// of those that failed; `done` is called with the number of those that are done.
+/// Runs units on the given number of CPUs of this computer, on a server and workers started for this call (`hq`), or on the workers of an
+/// existing server. Returns the failed units with reasons; calls `done` with the number of finished units.
 #[pyfunction]
 #[allow(clippy::too_many_arguments)]
 pub(crate) fn run_units(
@@ -48,7 +48,7 @@ pub(crate) fn run_units(
     let units: Vec<Unit> = units.into_iter().map(unit).collect();
     py.detach(|| {
         let wrong = |error: takt_work::WorkError| PyRuntimeError::new_err(error.to_string());
-        // Workers that are started here end with the call.
+        // Workers started for this call end with it.
         let (place, _cluster) = if hq || server.is_some() {
             Place::queue(client(&python)?, server.as_deref(), &folder.join("server"), jobs).map_err(wrong)?
         } else {

@@ -53,7 +53,7 @@ from takt._sim import Sim
 from takt._system import CorePeriods, System
 from takt._takt import Fault
 
-#: The package's version.
+#: Version of the package.
 __version__ = _takt.version(_takt.__file__)
 
 __all__ = [

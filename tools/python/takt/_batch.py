@@ -18,7 +18,7 @@ from takt._results import flags_of
 if TYPE_CHECKING:
     from takt._program import Program
 
-#: A plant: what the machines put out, and the number of the period, from 0; what they read next.
+#: Plant function: receives the machines' outputs and the number of the period, from 0; returns their next inputs.
 Plant = Callable[[dict[str, NDArray[Any]], int], Mapping[str, ArrayLike]]
 
 
@@ -26,9 +26,9 @@ Plant = Callable[[dict[str, NDArray[Any]], int], Mapping[str, ArrayLike]]
 class Loops:
     """Closed loops that have run."""
 
-    #: Outputs by name as they were recorded, of shape (runs, periods), an array of ports with its own dimensions behind these.
+    #: Recorded outputs by name, of shape (runs, periods); an array of ports adds its dimensions after these.
     outputs: dict[str, NDArray[Any]]
-    #: And inputs; an element without effect, which has no port, is 0.
+    #: Recorded inputs, likewise; an element without effect, which has no port, is 0.
     inputs: dict[str, NDArray[Any]]
     #: Cycles of each period; int64 of shape (runs, periods).
     cycles: NDArray[np.int64]
@@ -54,7 +54,7 @@ class Batch:
         self._cycles = np.zeros(self.runs, np.uint64)
         self._missed = np.zeros(self.runs, np.uint64)
         rows = {name: row for row, name in enumerate(program.inputs)}
-        # By input and array of inputs: its shape, and which of its elements have ports in which rows, of which kind.
+        # For each input and array of inputs: shape, indices of the elements with ports, their rows, and the port of a single input.
         self._wanted: dict[str, tuple[tuple[int, ...], list[int], list[int], Port | None]] = {}
         for name, row in rows.items():
             self._wanted[name] = ((), [0], [row], program.inputs[name])
@@ -99,7 +99,7 @@ class Batch:
             else:
                 into[rows[0]] = values
             seen += rows
-        # One look at all of them; what is wrong with which is asked only then.
+        # Check all values at once; find out which is wrong only if one is.
         if not np.isfinite(floats[self._floats]).all():
             for name, value in inputs.items():
                 port = self._wanted[name][3]

@@ -16,11 +16,11 @@ from takt._exclusive import exclusive
 from takt._ports import KEPT, AnyPath, Port, count_of, mapping_of, near, path_of, value_of, word_of
 from takt._program import Program
 
-#: Periods from one frame of a stream to the next, at most.
+#: Maximum number of periods between two frames of a stream.
 _EVERY = 4095
-#: Bits per second, at most.
+#: Maximum baud rate, in bits per second.
 _BAUD = 12_000_000
-#: Tenths of a second in a row in which a stream may bring nothing.
+#: Time without a frame after which a stream has ended, in tenths of a second.
 _SILENCE = 50
 
 
@@ -28,15 +28,15 @@ _SILENCE = 50
 class BoardStatus:
     """The state of a core."""
 
-    #: `runs`, `held`, `stopped`, `halted` or `stopped with a fault`.
+    #: Activity: `runs`, `held`, `stopped`, `halted` or `stopped with a fault`.
     state: str
-    #: Whether the outputs drive; otherwise they are safe.
+    #: Whether the outputs drive; otherwise they are at their safe levels.
     drives: bool
-    #: What stopped the drive: `fault`, `halt`, `missed deadline`, `host silent`, `stop`, `NaN output`.
+    #: Causes of safe outputs: `fault`, `halt`, `missed deadline`, `host silent`, `stop`, `NaN output`.
     causes: tuple[str, ...]
-    #: Bundle and kind of a fault.
+    #: Bundle and kind of a fault; None without a fault.
     fault: tuple[int, str] | None
-    #: Since the start: periods, missed deadlines, and the cycles from tick to outputs, of the last period and at most. Since power-up:
+    #: Since the start: periods, missed deadlines, and the cycles from tick to outputs in the last period and at most. Since power-up:
     #: frames that were dropped (`errors`), and frames of the stream that were not sent (`lost`).
     periods: int
     misses: int
@@ -61,9 +61,9 @@ class Board:
     In a system, names are `core.name`, and the inputs are the values of links that the host drives.
     """
 
-    #: The program, or the path of the system's file, whose names are used. Only `load` makes sure that the board carries it.
+    #: Program, or path of a system's file, whose names are used. Only `load` ensures that the board carries it.
     program: Program | Path
-    #: The inputs that the host sets, and the output ports of the cores, by name.
+    #: Inputs that the host sets, and output ports of the cores, by name.
     inputs: dict[str, Port]
     outputs: dict[str, Port]
 

@@ -19,7 +19,7 @@ from takt._ports import AnyPath, count_of, path_of
 C = TypeVar("C")
 R = TypeVar("R")
 
-#: True in a process that does a unit.
+#: This process runs a unit of work.
 _is_unit = False
 
 
@@ -70,7 +70,7 @@ def distribute(
     try:
         units, results = [], []
         data = get_preparation_data("takt")
-        # What multiprocessing needs for itself is of no use elsewhere.
+        # Remove data that only multiprocessing itself needs.
         data.pop("authkey", None)
         for number, case in enumerate(cases):
             file, result = below / f"{number:06}.case", below / f"{number:06}.result"

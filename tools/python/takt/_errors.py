@@ -21,7 +21,7 @@ class Place:
     column: int
     end_line: int
     end_column: int
-    #: What is there; may be empty.
+    #: Text at the place; may be empty.
     message: str
 
 
@@ -31,15 +31,15 @@ class Diagnostic:
 
     #: `error` or `warning`.
     severity: str
-    #: The kind of mistake, in a word or two: stable, for tools.
+    #: Kind of mistake in a word or two; stable, for tools.
     code: str
     message: str
-    #: The place of the mistake first, others explain it; empty if it has none.
+    #: Places: first that of the mistake, then those that explain it; empty if there are none.
     places: tuple[Place, ...]
     notes: tuple[str, ...]
-    #: What to do about it.
+    #: Advice on how to correct the mistake.
     help: str | None
-    #: What to write in the place of the mistake.
+    #: Replacement for the faulty text.
     replacement: str | None
 
     @property
@@ -78,7 +78,7 @@ class TaktError(Exception):
 class AssemblyError(TaktError, ValueError):
     """The source has errors. As text it shows each at its line, as the command line does."""
 
-    #: Every error, and the warnings, in the order of the source.
+    #: All errors and warnings, in source order.
     diagnostics: list[Diagnostic]
 
     def __init__(self, rendered: str, messages: str) -> None:
@@ -104,7 +104,7 @@ class NoBoundError(TaktError, ValueError):
 class ModelError(TaktError, ValueError):
     """A robot's description or an expression that cannot become a program, and why."""
 
-    #: The line of the description, from 1, where it is known.
+    #: Line number in the description, from 1, if it is known.
     line: int | None
 
     def __init__(self, text: str, line: int | None = None) -> None:
@@ -125,7 +125,7 @@ class BoardError(TaktError, OSError):
 class FaultError(TaktError, RuntimeError):
     """The machine has stopped where the program does not mean it to."""
 
-    #: What happened, and where.
+    #: The fault, with its place.
     fault: Fault
 
     def __init__(self, fault: Fault) -> None:

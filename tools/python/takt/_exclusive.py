@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 T = TypeVar("T")
 
-#: The extension module's messages when two threads are in one object.
+#: Messages of the extension module when two threads use one object.
 _BORROWED = {"Already borrowed", "Already mutably borrowed"}
 
 

@@ -22,7 +22,7 @@ _DTYPES: dict[str, np.dtype[Any]] = {
 }
 
 
-#: A path, however it is written.
+#: A path in any form.
 AnyPath: TypeAlias = "str | bytes | os.PathLike[str] | os.PathLike[bytes]"
 
 
@@ -74,7 +74,7 @@ def first(wrong: NDArray[np.bool_]) -> str:
     return "" if not place else "[" + ", ".join(str(int(i)) for i in place) + "]"
 
 
-#: No values: every input keeps its own.
+#: Empty mapping: every input keeps its value.
 KEPT: Mapping[str, ArrayLike] = MappingProxyType({})
 
 
@@ -82,7 +82,7 @@ def mapping_of(what: str, values: Mapping[str, ArrayLike]) -> Mapping[str, Array
     """Values by name."""
     if values is None:
         raise TypeError(f"{what} are None: does the function that makes them lack a `return`? Without the argument, every input keeps its value")
-    # What has names and values will do, as a table of pandas does.
+    # Accept anything with keys and items, such as a pandas table.
     if not (hasattr(values, "keys") and hasattr(values, "items")):
         raise TypeError(f"{what} are values by the name of their port, as {{'x': 0.5}}, and not a {type(values).__name__}")
     return values
@@ -161,7 +161,7 @@ def count_of(what: str, value: int | None, least: int = 1) -> int | None:
     return number
 
 
-#: The longest time between ticks, cycles.
+#: Maximum number of cycles between ticks.
 LONGEST_TICK = _takt.longest_tick()
 
 

@@ -21,9 +21,9 @@ from takt._results import Accuracy, Analysis, Bound, Enclosure, Largest, Model, 
 from takt._sim import Sim
 from takt._words import in_python
 
-#: Cycles in which a period ends, or nobody expects it to any more.
+#: Default limit on the cycles of a period.
 MAX_CYCLES = 1_000_000_000
-#: The machine that sources are assembled for, unless told otherwise.
+#: Default machine for sources.
 DEFAULT_MACHINE = _takt.machines()[0][0]
 
 
@@ -35,13 +35,13 @@ def machines() -> dict[str, str]:
 class Program:
     """A program for one machine: `takt.assemble`, `takt.load` and the modules for models make them."""
 
-    #: The input and output ports, by name, in the order of their declaration.
+    #: Input and output ports by name, in order of declaration.
     inputs: dict[str, Port]
     outputs: dict[str, Port]
-    #: Arrays of ports, of programs from models.
+    #: Arrays of ports, for programs generated from models.
     input_arrays: tuple[Array, ...]
     output_arrays: tuple[Array, ...]
-    #: Of programs from models: what was read.
+    #: Description of the model that the program was generated from; None for other programs.
     model: Model | None
 
     def __init__(
@@ -53,7 +53,7 @@ class Program:
         data: Mapping[str, int] | None = None,
     ) -> None:
         self._core = core
-        # Outputs of a model for which the machine has no ports: by name, their addresses in data memory.
+        # Outputs of a model that exceed the machine's ports: address in data memory, by name.
         self._data = dict(data or {})
         self.model = model
         self.inputs = {name: Port(name, kind) for name, kind in core.inputs}
@@ -61,7 +61,7 @@ class Program:
         self.input_arrays = tuple(input_arrays)
         self.output_arrays = tuple(output_arrays)
 
-    # ---- What is known of it.
+    # ---- Properties.
 
     @property
     def machine(self) -> str:
@@ -194,7 +194,7 @@ class Program:
         """
         return Enclosure.of(self._core)
 
-    # ---- Running it.
+    # ---- Runs.
 
     def run(
         self,
@@ -432,7 +432,7 @@ def load(
 
 
 def _folders(include: Sequence[AnyPath]) -> list[str | os.PathLike[str]]:
-    # A str is a sequence of letters, and bytes one of numbers.
+    # Without this check, a str would be a sequence of letters and bytes one of numbers.
     if isinstance(include, (str, bytes, os.PathLike)):
         raise TypeError(f"include is a list of folders: [{include!r}]")
     return [path_of("include", folder) for folder in include]

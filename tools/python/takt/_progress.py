@@ -8,10 +8,10 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-#: Seconds before the first message, and between two messages.
+#: Seconds before the first message, and between messages.
 _QUIET, _EVERY = 1.0, 0.5
 
-#: A function of the work's name and the seconds so far.
+#: Callback with the name of the activity and the elapsed seconds.
 Listener = Callable[[str, float], None]
 
 _listener: Listener | None = None
@@ -41,7 +41,7 @@ class _Line:
         self._length = 0
 
     def show(self, text: str) -> None:
-        # Notebooks understand `\r`, but no sequences that clear a line.
+        # Notebooks support `\r`, but no control sequences that clear a line.
         sys.stderr.write("\r" + text.ljust(self._length))
         sys.stderr.flush()
         self._length = len(text)

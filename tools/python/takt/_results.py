@@ -16,7 +16,7 @@ from takt._errors import FaultError
 from takt._ports import Array
 
 _FLAGS = _takt.flag_names()
-#: Faults that a notebook shows.
+#: Number of faults shown in a notebook.
 _SHOWN = 3
 
 
@@ -28,13 +28,13 @@ def flags_of(bits: int) -> frozenset[str]:
 class Largest:
     """The largest error of a kind that an output has had, and when."""
 
-    #: In the output's unit, in ulps, or as a part of the exact value.
+    #: Error, in the unit of the output, in ulps, or as a fraction of the exact value.
     error: float
-    #: The period, from 0.
+    #: Number of the period, from 0.
     period: int
-    #: What the output was.
+    #: Value of the output.
     value: float
-    #: What it is in binary64.
+    #: Value in binary64.
     exact: float
 
 
@@ -43,13 +43,13 @@ class Accuracy:
     """The errors of an output at the ends of the periods, against the same operations in binary64."""
 
     name: str
-    #: Periods at whose end it was compared.
+    #: Number of periods at whose end the output was compared.
     periods: int
-    #: The largest in the output's own unit, in ulps, and in relation to the exact value; None if it never was a finite number.
+    #: Largest error in the unit of the output, in ulps, and relative to the exact value; None if the output never was a finite number.
     absolute: Largest | None
     ulp: Largest | None
     relative: Largest | None
-    #: Where the largest absolute error comes from, the largest share first: place (`law.s:12`) and share, which add up to it.
+    #: Origins of the largest absolute error, largest share first: place (`law.s:12`) and share; the shares add up to the error.
     operations: tuple[tuple[str, float], ...]
 
 
@@ -58,12 +58,12 @@ class OutputBound:
     """What is proved of an output, whatever the inputs and states in their ranges."""
 
     name: str
-    #: What it may be, its ends included; None if a hazard leaves that open.
+    #: Range of the output, including its ends; None if a hazard leaves it open.
     range: tuple[float, float] | None
-    #: The error at most, in the output's own unit, and in ulps of its largest value; None likewise.
+    #: Bound of the error, in the unit of the output and in ulps of its largest value; None if a hazard leaves it open.
     error: float | None
     ulp: float | None
-    #: What each operation's rounding adds to the error at most, the largest first: place (`law.s:12`) and error.
+    #: Bounds of the rounding errors that operations contribute, largest first: place (`law.s:12`) and error.
     operations: tuple[tuple[str, float], ...]
 
 
@@ -73,7 +73,7 @@ class Hazard:
 
     place: str
     problem: str
-    #: What it reads: names, and what may be in them, where that is known.
+    #: Operands: names, and their ranges where known.
     operands: tuple[tuple[str, tuple[float, float] | None], ...]
 
 
@@ -83,9 +83,9 @@ class Assumed:
 
     name: str
     range: tuple[float, float]
-    #: Whether this is about the beginning of the first period; else about the end of every period.
+    #: The assumption concerns the start of the first period, otherwise the end of every period.
     first: bool
-    #: Where it may be then; None if that is not known as a number.
+    #: Range found at that point; None if it may not be a number.
     found: tuple[float, float] | None
 
 
@@ -121,15 +121,15 @@ class Enclosure:
 class Model:
     """What a program was made of."""
 
-    #: What is computed, in a line.
+    #: One-line description of the computation.
     title: str
-    #: What was decided on the way.
+    #: Decisions made during generation.
     notes: tuple[str, ...]
-    #: Scalar operations after rewriting.
+    #: Number of scalar operations after rewriting.
     operations: int
-    #: Of a robot: its joints, in the order of the arrays.
+    #: Joints of a robot, in the order of the arrays.
     joints: tuple[str, ...]
-    #: What each port is, and its unit.
+    #: Meaning and unit of each port.
     ports: dict[str, str]
 
 
@@ -145,17 +145,17 @@ class Span:
 class Section:
     """What a section of a program can take, in cycles, whatever the inputs."""
 
-    #: The label that it begins at; of what runs once, `once`.
+    #: Label at which the section begins; `once` for code that runs once.
     name: str
-    #: Where it begins, as `pd.s:12`.
+    #: Place of the beginning, such as `pd.s:12`.
     place: str | None
-    #: Whether it begins with reset, not with a tick.
+    #: The section begins with reset, not with a tick.
     once: bool
-    #: With the tick long after the `wait`.
+    #: Cycles if the tick comes long after the `wait`.
     cycles: Span
-    #: With the tick at any time after the `wait`.
+    #: Cycles if the tick comes at any time after the `wait`.
     in_time: Span
-    #: After a missed deadline.
+    #: Cycles after a missed deadline.
     missed: Span
 
 
@@ -164,7 +164,7 @@ class Bound:
     """The best and the worst that each section can take."""
 
     sections: tuple[Section, ...]
-    #: The longest period, in cycles, with every tick in time; None if there is no period.
+    #: Cycles of the longest period if every tick comes in time; None if there is no period.
     worst_period: int | None
 
     def _repr_html_(self) -> str:
@@ -198,9 +198,9 @@ class Analysis:
     """Where the cycles of a period went. In a notebook it shows the pipeline as a picture; as text it is the report that
     `takt analyse` prints."""
 
-    #: Everything, as `takt analyse --json` prints it.
+    #: Complete result, as printed by `takt analyse --json`.
     data: dict[str, Any]
-    #: The picture, as a self-contained page for a browser.
+    #: Pipeline diagram, as a self-contained page for a browser.
     html: str
 
     def __init__(self, text: str, data: str, html: str) -> None:
@@ -222,7 +222,7 @@ class Analysis:
         return f"<takt.Analysis of {data['program']}, period {data['period']}: {data['cycles']} cycles on {data['machine']}>"
 
     def _repr_html_(self) -> str:
-        # A frame of its own: the page's styles and script are not the notebook's.
+        # Use a separate frame, so that styles and script of the page do not affect the notebook.
         page = html.escape(self.html, quote=True)
         return f'<iframe srcdoc="{page}" style="width:100%;height:720px;border:0" sandbox="allow-scripts"></iframe>'
 
@@ -234,24 +234,24 @@ class Run:
     as if never written and 0 cycles.
     """
 
-    #: Output by name; an array of ports has its own dimensions behind those of the run. float32, int32 or uint32. What
-    #: was never written is NaN or 0, and counted in `unwritten`.
+    #: Outputs by name, float32, int32 or uint32; an array of ports adds its dimensions after those of the run. Values never written are
+    #: NaN or 0, and counted in `unwritten`.
     outputs: dict[str, NDArray[Any]]
-    #: The same by port.
+    #: Outputs by port.
     ports: dict[str, NDArray[Any]]
     #: Cycles of each period, from the tick to the `wait`; int64.
     cycles: NDArray[np.int64]
-    #: Deadlines missed in each period: ticks that came before the `wait`; int64.
+    #: Number of deadlines missed in each period, by ticks that came before the `wait`; int64.
     missed: NDArray[np.int64]
-    #: Periods that came to their end: of a batch, int64 of shape (runs,).
+    #: Number of completed periods; for a batch, int64 of shape (runs,).
     completed: int | NDArray[np.int64]
-    #: The exception flags raised since reset, among `invalid`, `divide-by-zero`, `overflow`: of a batch a list.
+    #: Exception flags raised since reset: `invalid`, `divide-by-zero`, `overflow`; for a batch, a list.
     flags: frozenset[str] | list[frozenset[str]]
-    #: What ended runs early, by run.
+    #: Events that ended runs early, by run.
     faults: list[_takt.Fault]
-    #: Output ports that a period ended with before anything was written there, and how many periods.
+    #: Output ports with the number of periods that ended before the port was ever written.
     unwritten: dict[str, int]
-    #: NaNs written to output ports.
+    #: Number of NaNs written to output ports.
     nan_writes: int
 
     def __init__(

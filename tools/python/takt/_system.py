@@ -19,12 +19,12 @@ from takt._progress import progress
 class CorePeriods:
     """Figures of a core's periods so far."""
 
-    #: Periods that ended.
+    #: Number of completed periods.
     count: int
-    #: Cycles of the shortest and the longest; 0 if there was none.
+    #: Cycles of the shortest and of the longest period; 0 if there was none.
     shortest: int
     longest: int
-    #: Ticks for which the core took no snapshot, because it did not wait in time.
+    #: Ticks for which the core took no snapshot because it did not reach its `wait` in time.
     skipped: int
 
 
@@ -49,10 +49,10 @@ class System:
         ValueError: no core comes to a tick.
     """
 
-    #: Inputs and outputs by name: `w` of a wire, `seen.peak` of a snapshot. The fields of FIFOs are in `fifos`.
+    #: Inputs and outputs by name: `w` for a wire, `seen.peak` for a snapshot. Fields of FIFOs are in `pushes` and `pops`.
     inputs: dict[str, Port]
     outputs: dict[str, Port]
-    #: FIFOs from the host and to it, with their fields.
+    #: FIFOs from the host and to the host, with their fields.
     pushes: dict[str, dict[str, Port]]
     pops: dict[str, dict[str, Port]]
 

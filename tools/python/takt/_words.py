@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-#: An option, alone or with its command: quoted with a value or without, or bare. Other commands that are quoted stay whole.
+#: An option, alone or with its command: quoted with or without a value, or bare. Other quoted commands are kept whole.
 _OPTION = re.compile(
     r"`(?:takt [a-z]+ )?--(?P<quoted>[a-z][a-z-]*)(?: (?P<value>[^\s`]+))?`"
     r"|`takt live PORT (?P<method>[a-z]+)`"
@@ -12,12 +12,12 @@ _OPTION = re.compile(
     r"|(?<![\w`-])--(?P<bare>[a-z][a-z-]*)"
 )
 
-#: A line of a source, as messages show it.
+#: A source line, as shown in messages.
 _SOURCE = re.compile(r"\s*\d+ │")
 
-#: Options that are arguments of the same name.
+#: Options that correspond to arguments of the same name.
 _ARGUMENTS = {"base", "contract", "effort", "exact", "floating", "include", "output", "range", "schedule", "tip"}
-#: Options and commands that Python has in another way.
+#: Options and commands that have a different form in Python.
 _OTHERS = {"deadline": "`program.bound()`", "status": "`board.status`"}
 
 

@@ -75,7 +75,7 @@ def problem(
     for key, value in {"x_min": x_min, "x_max": x_max, "u_min": u_min, "u_max": u_max}.items():
         if value is not None:
             array = np.asarray(value, dtype=float)
-            # The infinity of the other side would be a limit that nothing keeps.
+            # Infinity of the wrong sign would be a limit that nothing can meet.
             _checked(key, array, np.isfinite(array) | (array == (-np.inf if key.endswith("min") else np.inf)))
             found[key] = [None if np.isinf(x) else float(x) for x in array] if array.ndim else float(array)
             if array.ndim == 0 and np.isinf(array):

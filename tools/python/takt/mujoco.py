@@ -30,7 +30,7 @@ from takt._program import DEFAULT_MACHINE, Program
 
 __all__ = ["CLOCK", "Controller", "Encoder", "program"]
 
-#: The machine's clock unless it is stated, Hz.
+#: Default clock of the machine, Hz.
 CLOCK = 125e6
 
 _mujoco: Any = importlib.import_module("mujoco")
@@ -45,9 +45,9 @@ def program(robot: Any, function: str, machine: str = DEFAULT_MACHINE, **options
 class Encoder:
     """Joint positions as an encoder counts them, and velocities as differences of counts."""
 
-    #: Counts in a turn, or in a metre of a joint that slides.
+    #: Encoder counts per turn, or per metre for a sliding joint.
     counts: float
-    #: The corner frequency of the filter of first order behind the differences, Hz; None is no filter.
+    #: Corner frequency of the first-order filter after the differences, Hz; None disables the filter.
     cutoff: float | None = None
 
     def __post_init__(self) -> None:
@@ -118,7 +118,7 @@ class Controller:
             if name not in known_inputs:
                 raise ValueError(f"sensors: the program has no input `{name}`{near(name, known_inputs)}")
             self._sensors[name] = _places(model, wanted)
-        # The places in `ctrl`, and the force of a motor for a `ctrl` of 1.
+        # Indices in `ctrl`, and the force of a motor at a `ctrl` of 1.
         self._actuators: dict[str, tuple[NDArray[np.int64], NDArray[np.float64] | float]] = {}
         for name, wanted in (actuators or {}).items():
             if name not in known_outputs:
@@ -144,7 +144,7 @@ class Controller:
         self._start: float | None = None
         self._position: NDArray[np.float64] | None = None
         self._velocity = np.zeros((self.runs, len(self._joints)))
-        # What will act, by robot: cycles since the first tick, and `ctrl`.
+        # Pending actuation of each robot: cycles since the first tick, and `ctrl`.
         self._pending: list[list[tuple[int, NDArray[np.float64]]]] = [[] for _ in range(self.runs)]
 
     @property
@@ -190,7 +190,7 @@ class Controller:
             read = {name: measured[name] for name in self._moving}
         for name, places in self._sensors.items():
             read[name] = np.stack([data.sensordata[places] for data in datas])
-        # One value for a port that is no array.
+        # Pass a single value for a port that is not an array.
         inputs: dict[str, ArrayLike] = {name: value[:, 0] if name in self._single else value for name, value in read.items()}
         if self.reference is not None:
             inputs.update(self.reference(float(datas[0].time)))
@@ -240,7 +240,7 @@ class Controller:
                     self.model.opt.timestep = time / steps
                     _mujoco.mj_step(self.model, one, steps)
                     now = until
-                # Sums of steps would drift against the cycles.
+                # Adding up steps would drift relative to the cycles.
                 one.time = self._start + end / self.clock
         finally:
             self.model.opt.timestep = longest

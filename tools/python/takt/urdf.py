@@ -19,7 +19,7 @@ from takt._ports import AnyPath, path_of
 from takt._program import DEFAULT_MACHINE, Program, modelled
 from takt._words import in_python
 
-#: Angles this close to a multiple of a quarter turn are rounded to it, rad.
+#: Angles within this distance of a multiple of a quarter turn are rounded to it, rad.
 SNAP = 1e-6
 
 

@@ -45,7 +45,7 @@ def _expanded(function):
     try:
         return function.expand()
     except RuntimeError as error:
-        # CasADi's own message begins with the place in its sources.
+        # CasADi's own message begins with a place in CasADi's sources.
         reason = str(error).splitlines()[-1].rsplit(": ", 1)[-1]
         raise ValueError(f"`{function.name()}` cannot be expanded to scalar operations: {reason}") from None
 
@@ -126,7 +126,7 @@ def _of_reals(sp, e, real, taken):
 class _Sympy:
     """Expressions to instructions, in places that are written once."""
 
-    # What is not here keeps its name: `takt model` knows it, or says with the expression that it has no meaning.
+    # Functions missing here keep their names: `takt model` supports them, or reports the expression as unsupported.
     FUNCTIONS = {"ceiling": "ceil", "Abs": "fabs", "ITE": "if_else"}
     FOLDED = {"Add": "add", "Mul": "mul", "Min": "fmin", "Max": "fmax", "And": "and", "Or": "or", "Xor": "xor"}
     RELATIONS = {
@@ -167,7 +167,7 @@ class _Sympy:
                 return self.step("inv", [self.place(base)])
             return self.step("pow", [self.place(base), self.place(power)])
         if name == "Mod":
-            # It has the sign of the divisor, as Python's `%`.
+            # The result has the sign of the divisor, like Python's `%`.
             a, b = (self.place(a) for a in e.args)
             return self.step("sub", [a, self.step("mul", [b, self.step("floor", [self.step("div", [a, b])])])])
         if name == "Not":
@@ -207,7 +207,7 @@ def sympy_text(name, inputs, outputs):
     import sympy as sp
 
     def shaped(name, value):
-        # A list is none of SymPy's matrices, which have no truth values.
+        # Unlike SymPy's matrices, a list has a truth value; handle it separately.
         flat = list(value) if isinstance(value, (list, tuple)) else [value]
         if not isinstance(value, sp.MatrixBase) and not any(isinstance(e, (list, tuple, sp.MatrixBase)) for e in flat):
             return {"name": name, "rows": len(flat), "columns": 1}, flat

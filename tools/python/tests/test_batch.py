@@ -30,7 +30,7 @@ loop:
  fsub u, e, d
  wait loop
 """
-#: Calls without end above 2: the return stack overflows.
+#: Calls endlessly if n is above 2, so that the return stack overflows.
 STOPS = """
 .input n:int
 .output y:int
@@ -76,7 +76,7 @@ def test_loops_are_those_of_single_machines():
             assert u == loops.outputs["u"][run, period] and sim.cycles == loops.cycles[run, period]
             assert np.float32(q) == loops.inputs["q"][run, period]
             q, v = plant(q, v, u)
-    # Gains matter, and so does what was recorded.
+    # Runs have different gains, and hence different outputs.
     assert len(np.unique(loops.outputs["u"][:, 10])) == runs
 
 
@@ -103,7 +103,7 @@ def test_what_does_not_fit_is_said():
         batch.step({**given, "q": [0, 0, np.nan, 0]})
     with pytest.raises(ValueError, match="`q` of period 0: 1e\\+39 does not fit binary32"):
         batch.step({**given, "q": 1e39})
-    # What was refused has not been taken.
+    # Values from rejected calls have not been stored.
     with pytest.raises(ValueError, match="no value for `q`, `qr`, `kp`, `kd`"):
         batch.step()
     with pytest.raises(ValueError, match="record: there is no input or output `w`"):
@@ -135,7 +135,7 @@ def test_arrays_of_ports_keep_their_elements():
     program = takt.urdf.program(Path(__file__).parents[3] / "asm/front/tests/data/ur5.urdf", "gravity")
     q = np.random.default_rng(4).uniform(-3, 3, (20, 6))
     outputs = program.batch(20).step({"q": q})["tau"]
-    # As in runs from arrays; the first joint's torque is constant, and its angle has no port.
+    # The result equals that of runs over arrays; the first joint's torque is constant, and its angle has no port.
     np.testing.assert_array_equal(outputs, program.run({"q": q[:, None]}).outputs["tau"][:, 0])
     loops = program.batch(20).close(lambda outputs, period: {}, 2, {"q": q}, record=["q", "tau"])
     np.testing.assert_array_equal(loops.outputs["tau"][:, 1], outputs)

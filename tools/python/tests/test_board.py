@@ -47,7 +47,7 @@ class FakeBoard(threading.Thread):
         tty.setraw(slave)
         self.port = os.ttyname(slave)
         self.slave = slave
-        # The last write's number and the status of its answer; input ports that a peripheral drives.
+        # Number of the last write, and status of its answer; input ports that a peripheral drives.
         self.last, self.status, self.driven = None, 0, set()
 
     def run(self):
@@ -75,7 +75,7 @@ class FakeBoard(threading.Thread):
         (at,) = struct.unpack("<H", frame[4:6])
         if command == 1:
             self.words.setdefault(STATUS, 0)
-            # In reset while it does not run.
+            # The core is in reset while it does not run.
             self.words[STATUS] = self.words[STATUS] & ~0x400 | (0 if self.words[CONTROL] & RUN else 0x400)
             words = [self.words.get(at + i, at + i if at >= REGISTERS else 0) for i in range(count)]
             return self.send(0x5A, number, words)
@@ -133,7 +133,7 @@ def test_ports_are_read_and_set(fake):
     assert board.step({"x": -2.5}) == {"y": -1.25, "m": -6}
     assert board.read() == {"x": -2.5, "n": -7, "y": -1.25, "m": -6}
     assert board.status.periods == 1
-    # What is not a port has a place of its own: here, a number that is its address.
+    # Registers without a port have addresses of their own: here, the address is a number.
     simulated.words |= {REGISTERS + 3: 0x3F800000, DATA + 9: 0x40000000}
     assert board.read("@r3", "[9]") == {"@r3": 1.0, "[9]": 2.0}
     board.go()
@@ -157,7 +157,7 @@ def test_a_program_is_loaded_and_compared(fake):
     board.load()
     records = simulated.words[RECORDS]
     assert records > 0 and all(IMAGE + 4 * i + 2 in simulated.words for i in range(records))
-    # Behind noise an answer is still found.
+    # An answer is found even after noise.
     simulated.noise = b"\x00\x5a\x01\xff\xa5"
     assert board.status.state == "stopped"
     simulated.words |= {STATUS: 4 | 3 << 12, 3: 2 << 16 | 17}

@@ -34,7 +34,7 @@ def test_results_are_in_the_order_of_the_cases(here):
     results = takt.distribute(functools.partial(scaled, takt.assemble(GAIN)), [1.0, 2.0, 3.0], jobs=2)
     assert [value for _, value in results] == [0.5, 1.0, 1.5]
     assert os.getpid() not in {process for process, _ in results}
-    # Nothing is left.
+    # No files are left.
     assert [path.name for path in here.iterdir()] == ["bin"]
 
 

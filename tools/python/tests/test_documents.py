@@ -96,7 +96,7 @@ def test_a_board(here, monkeypatch):
     simulated.start()
     try:
         code = PYTHON["A board"].replace('"/dev/ttyUSB0"', "port")
-        # The law of the document has other ports than the board of the tests.
+        # The law of the document and the board of the tests have different ports.
         for own, other in {'"qr"': '"x"', '"u"': '"y"', '"q"': '"x"', "@m12": "@r3"}.items():
             code = code.replace(own, other)
         exec(compile(code.replace("count=100", "count=3"), "python.md", "exec"), {"takt": takt, "law": program, "port": simulated.port})

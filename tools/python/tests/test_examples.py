@@ -12,7 +12,7 @@ import takt.mpc
 import takt.mujoco
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
-# A script's own folder, from which it imports; `runpy` does not add it.
+# Add the script's own folder, from which it imports; `runpy` does not.
 sys.path.insert(0, str(EXAMPLES))
 
 
@@ -20,7 +20,7 @@ def test_the_acrobot_follows_its_reference(capsys):
     names = runpy.run_path(str(EXAMPLES / "acrobot.py"))
     said = capsys.readouterr().out
     assert len(names["cycles"]) == 1 and max(names["cycles"]) <= names["bound"].worst_period
-    # A period late, at 2 rad/s: what remains is the delay, not the model.
+    # The torque is a period late at 2 rad/s: the remaining error comes from the delay, not from the model.
     error = float(re.search(r"within ([0-9.]+) mrad", said)[1])
     assert 0 < error < 5, said
     assert len((EXAMPLES / "acrobot.py").read_text().splitlines()) <= 40
@@ -35,7 +35,7 @@ def test_the_panda_is_as_near_its_circle_as_the_document_says(capsys):
     for name, result in every.items():
         (cycles,) = result.cycles
         assert f"{cycles} cycles on t3" in document
-        # Another processor's sines may differ in the last place.
+        # The sine of another processor may differ in the last digit.
         figures = [float(x) for x in rows[name].split("|")[2:5]]
         computed = [float(x) for x in names["row"](name, result).split("|")[2:5]]
         for one, other in zip(computed, figures):
@@ -57,7 +57,7 @@ def test_the_ur5e_keeps_its_limits_as_the_document_says(capsys):
             continue
         result = names["drive"](model, controller, dynamics, **options)
         assert f"{result.cycles} cycles on t3" in document
-        # Another processor's sines may differ in the last place, and encoders round either way.
+        # The sine of another processor may differ in the last digit, and encoders may round differently.
         for one, other in zip(names["row"](name, result).split("|")[2:6], rows[name].split("|")[2:6]):
             one, other = float(one.strip(" %")), float(other.strip(" %"))
             assert abs(one - other) <= 0.05 * other, (name, one, other)
@@ -72,7 +72,7 @@ def test_the_policy_swings_the_pendulum_up_in_mujoco(capsys):
     assert set(rows) == set(results) == set(names["CASES"])
     for name, result in results.items():
         assert result.distance[0] > 3 and result.distance[-40:].max() < 0.1, name
-        # Another processor's sines may differ in the last place.
+        # The sine of another processor may differ in the last digit.
         assert abs(result.upright() - float(rows[name][2])) <= 0.5, (name, rows[name])
     assert "upright after" in capsys.readouterr().out
 
@@ -91,7 +91,7 @@ def test_the_policy_swings_the_acrobot_up_in_mujoco():
         result = names["swing"](100 if full else 10, **options)
         assert abs(result.cycles - stated) <= 0.02 * stated
         assert (result.distance[:, 0] > 2.5).all(), name
-        # Another processor's sines may differ in the last place.
+        # The sine of another processor may differ in the last digit.
         if full:
             assert abs(result.upright().sum() - int(rows[name][2])) <= 2, (name, rows[name])
         else:
@@ -114,7 +114,7 @@ def test_the_acrobot_was_trained_on_the_plant_of_mujoco():
 
 def test_a_thousand_gains_are_tried_in_one_call(capsys):
     names = runpy.run_path(str(EXAMPLES / "sweep.py"))
-    # The call did what runs of the same inputs do, which share none of its code in Python.
+    # The call gives the same results as runs with the same inputs, which share none of its Python code.
     assert (names["loops"].cycles == names["run"].cycles).all() and names["loops"].cycles.shape == (1000, 1500)
     assert 0.2 < names["settled"][names["best"]] < 1 < names["settled"].max()
     assert f"{names['settled'][names['best']]:.3f} s" in capsys.readouterr().out
@@ -145,6 +145,6 @@ def test_pictures_are_small_and_the_same_in_every_run(tmp_path):
     text = files[0].read_text()
     assert files[1].read_text() == text and text.count("\n") < 100
     assert ET.fromstring(text).tag.endswith("svg")
-    # Two equal points are one, and coordinates have one digit after the point.
+    # Equal neighbouring points are merged, and coordinates have one decimal place.
     [line] = re.findall(r'<g id="line2d_\d+"><path d="(M[^"]*)" clip-path', text)
     assert re.fullmatch(r"M[\d.]+ [\d.]+( [\d.]+ [\d.]+){2}", line) and all(len(part.partition(".")[2]) < 2 for part in line[1:].split())

@@ -16,7 +16,7 @@ import takt.urdf
 
 UR5 = Path(__file__).parents[3] / "asm/front/tests/data/ur5.urdf"
 PANDA = Path(__file__).parents[3] / "programs/examples/panda/panda.urdf"
-# Relative to the largest output of a state; docs/models.md has the errors that were measured.
+# Tolerance relative to the largest output of a state; docs/models.md lists the measured errors.
 CLOSE = 1e-5
 
 
@@ -85,9 +85,9 @@ def test_functions_of_the_library(machine):
     run = program.run({"x": values[0], "y": values[1]}).check()
     expected = np.array([[float(v) for v in f(*pair)] for pair in values.T.astype(float)]).T
     for (name, computed), right in zip(run.outputs.items(), expected):
-        # `fmod` and `floor` jump where the operand, rounded, is on the other side; sums before them round.
+        # `fmod` and `floor` jump if rounding moves the operand across a boundary; sums before them round.
         np.testing.assert_allclose(computed, right, rtol=2e-6, atol=1e-6, err_msg=name)
-    # What would overflow in 1 + exp(-x) does not.
+    # No overflow where 1 + exp(-x) would overflow.
     far = program.run({"x": np.array([-90.0, 90.0]), "y": 0.5})
     np.testing.assert_allclose(far.outputs["sigmoid"], [np.exp(-90), 1], rtol=1e-5)
     a, b = sp.symbols("a b")
@@ -118,7 +118,7 @@ def test_a_robot_against_pinocchio():
     assert dynamics.model.joints == tuple(model.names[1:])
     tau = np.array([pin.rnea(model, data, *state).copy() for state in zip(q, qd, qdd)])
     assert_close(dynamics.run({"q": q, "qd": qd, "qdd": qdd}).outputs["tau"], tau)
-    # The first joint's angle has no effect, and so no port.
+    # The first joint's angle has no effect, and hence no port.
     assert dynamics.input_arrays[0].elements[0] is None and "q_shoulder_pan" not in dynamics.inputs
 
     def inertia(state):
@@ -153,13 +153,13 @@ def test_outputs_beyond_the_ports_lie_in_data_memory():
     run = program.run({"q": q})
     assert run.outputs["J"].shape == (30, 6, 7)
     assert_close(run.outputs["J"], np.array([jacobian(state) for state in q]))
-    # Each way of running has them: period by period, in a batch, in a pickled program.
+    # All ways of running have these outputs: period by period, in a batch, in a pickled program.
     sim, lanes = program.sim(), program.batch(30)
     np.testing.assert_array_equal(sim.step({"q": q[0]})["J"], run.outputs["J"][0])
     np.testing.assert_array_equal(lanes.step({"q": q})["J"], run.outputs["J"])
     again = pickle.loads(pickle.dumps(program)).run({"q": q[:, None]})
     np.testing.assert_array_equal(again.outputs["J"][:, 0], run.outputs["J"])
-    # The mass matrix of seven axes has ports, of which a vector of 40 takes all; it is a whole matrix in memory, too.
+    # A vector of 40 takes all ports, including those of the 7-axis mass matrix; the matrix is also in memory as a whole.
     x = ca.SX.sym("x", 3)
     f = ca.Function("f", [x], [ca.mtimes(x, x.T), ca.vertcat(*[x[0] * k for k in range(2, 42)])], ["x"], ["outer", "many"])
     program = takt.casadi.program(f)

@@ -88,7 +88,7 @@ def test_voltages_stay_within_the_circle(machine):
     rest = np.sqrt(81 - first.astype(float) ** 2)
     scaled = (d + 1j * q) * np.minimum(1, 9 / np.abs(d + 1j * q))
     near(out, 2e-5, d1=first, d2=scaled.real, q2=scaled.imag)
-    # Near the radius the root loses half of the digits.
+    # Close to the radius, the root loses half of the digits.
     near(out, 2e-3, q1=np.clip(q, -rest, rest))
     assert (out["d1"] ** 2 + out["q1"] ** 2 <= 81 * (1 + 1e-6)).all()
 
@@ -115,7 +115,7 @@ def test_space_vectors_give_the_voltage_between_phases(machine):
     out = run(machine, ".output da, db, dc", " space_vectors da, db, dc, al, be, udc", al=u.real, be=u.imag, udc=udc)
     duties = np.array([out[name] for name in ("da", "db", "dc")])
     assert duties.min() >= -1e-6 and duties.max() <= 1 + 1e-6
-    # Equal distances to both rails: what a bridge of this voltage reaches.
+    # Equal distances to both rails: the full range of the bridge.
     assert np.abs(duties.max(0) + duties.min(0) - 1).max() < 1e-6
     between = [u.real * 1.5 - np.sqrt(3) / 2 * u.imag, np.sqrt(3) * u.imag]
     assert np.abs((duties[0] - duties[1]) * udc - between[0]).max() < 2e-5
@@ -181,7 +181,7 @@ def test_pll_follows_position_and_speed(machine):
     turned = out["part"] - part
     assert np.abs(turned - np.rint(turned)).max() < 1e-5
     near(out, 2e-2, speed=estimate)
-    # Settled at constant speed, the observer has no error.
+    # Once settled at constant speed, the observer has no error.
     assert abs(out["speed"][1990] - 30) < 0.05
 
 
@@ -198,7 +198,7 @@ def test_trapezoid_arrives_exactly_within_its_limits(machine):
     assert np.abs(v).max() <= 4 and np.abs(np.diff(v, prepend=0)).max() <= 0.03 * (1 + 1e-3)
     for end in (899, 2699, 5399):
         assert p[end] == goal[end] and out["y"][end] == goal[end], end
-    # Time-optimal to a period: 1 at up to 4/s with 30/s² takes 1/4 + 4/30 s.
+    # Time-optimal to within a period: 1 at up to 4/s with 30/s² takes 1/4 + 4/30 s.
     assert np.flatnonzero(p[:900] == 1)[0] == pytest.approx((1 / 4 + 4 / 30) * 1000, abs=3)
     # The S-curve is the mean of the last 16 positions.
     padded = np.concatenate([np.zeros(15), p])
@@ -236,5 +236,5 @@ def test_notch_is_the_prewarped_filter(machine):
         return y[2:]
 
     near(out, 1e-5, y=filtered(2 * np.pi * 60, 0.2))
-    # Poles close to the circle keep rounding errors longer.
+    # Poles close to the unit circle retain rounding errors longer.
     near(out, 3e-5, z=filtered(2 * np.pi * 11, 0.05))

@@ -94,7 +94,7 @@ def test_the_quadrotor_returns_and_keeps_its_limits(capsys):
     trajectory, inputs, hover = names["trajectory"], np.array(names["inputs"]), names["HOVER"]
     assert np.linalg.norm(trajectory[-1, :3]) < 0.02 < 0.5 < np.linalg.norm(trajectory[0, :3])
     assert (inputs >= -hover - 1e-6).all() and (inputs <= 1 - hover + 1e-6).all()
-    # A motor is at its limit for some time; angles and speeds keep theirs but for the linearisation.
+    # A motor is at its limit for some time; angles and speeds stay within theirs, apart from the linearisation error.
     assert (inputs.max(axis=1) > 1 - hover - 1e-4).any() or (inputs.min(axis=1) < -hover + 1e-4).any()
     assert np.abs(trajectory[:, 3:6]).max() < 0.4 and np.abs(trajectory[:, 6:9]).max() < 0.9
     assert 0 < int(re.search(r"(\d+) cycles a period", said)[1]) <= 56000, said

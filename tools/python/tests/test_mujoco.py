@@ -12,12 +12,12 @@ import takt.mujoco
 from takt.mujoco import Controller, Encoder
 
 ROOT = Path(__file__).parents[3]
-#: A mass of 1 kg that slides without friction: its velocity is the integral of the force.
+#: A mass of 1 kg that slides without friction, so that its velocity is the integral of the force.
 SLIDE = """<mujoco><option gravity="0 0 0" timestep="0.001"/>
 <worldbody><body name="mass"><joint name="x" type="slide" axis="1 0 0"/><geom size="0.1" mass="1"/></body></worldbody>
 <actuator><motor name="push" joint="x" gear="2"/></actuator>
 <sensor><jointvel name="speed" joint="x"/><jointpos name="place" joint="x"/></sensor></mujoco>"""
-#: Pushes with the period's number, after some cycles.
+#: Program that pushes with the period's number as force, after some cycles.
 LATE = """
 .schedule on
 .input q
@@ -55,7 +55,7 @@ def test_forces_act_from_the_cycle_on():
         for k in range(1, 6):
             loop.step(data)
             late = int(loop.cycles[0]) if latency is None else latency
-            # The force is the number of the period, from `late` cycles after the tick on.
+            # The force is the number of the period, starting `late` cycles after the tick.
             forces = [(number, (number - 1) * loop.tick + late) for number in range(1, k + 1)]
             now, begin = k * loop.tick, (k - 1) * loop.tick
             edges = [(0 if not i else forces[i - 1][0], 0 if not i else forces[i - 1][1]) for i in range(len(forces) + 1)]
@@ -158,7 +158,7 @@ def test_robots_in_a_batch_move_as_alone():
 
 def test_sensors_and_actuators_have_names():
     model = mujoco.MjModel.from_xml_string(SLIDE)
-    # `place` is a sensor by its name; `v` is given one; push has no scale if it is named.
+    # `place` is the name of a sensor; `v` is assigned one; push has no scale if it is named.
     program = takt.assemble(".schedule on\n.input place, v, k\n.output u\n.reg x\n.period\nloop: fsub x, k, place\n fsub u, x, v\n wait loop\n")
     data = mujoco.MjData(model)
     data.qpos[0], data.qvel[0] = 0.25, 0.5

@@ -17,7 +17,7 @@ EXAMPLES = ROOT / "tools/python/examples"
 sys.path.insert(0, str(ROOT / "asm/front/tests"))
 import policies  # noqa: E402 (the models of takt-front's own tests)
 
-# Relative to the largest output, or to 1.
+# Tolerance relative to the largest output, or to 1.
 CLOSE = 1e-6
 
 
@@ -94,5 +94,5 @@ def test_the_pendulum_swings_up(capsys, monkeypatch):
     q, v = np.random.default_rng(3).uniform(-3, 3, (2, 40))
     state = np.stack([np.cos(q), np.sin(q), v], axis=1).astype(np.float32)
     found = names["policy"].run({"state": state}).outputs["torque"]
-    # Its weights are steep: an error of tanh in the first layer grows tenfold.
+    # The weights are steep: an error of tanh in the first layer is amplified tenfold.
     np.testing.assert_allclose(found, session.run(None, {"state": state})[0], rtol=0, atol=1e-5)

@@ -12,7 +12,7 @@ import pytest
 import takt
 from test_programs import GAIN, HALTS, LAW, TABLE, states
 
-#: After which a process that does not end is taken to hang, s.
+#: Time after which a process is considered hung, s.
 PATIENCE = 60
 
 INPUTS = [{"q": k / 7, "qr": k / 3, "n": k} for k in range(8)]
@@ -57,7 +57,7 @@ def test_a_pickled_machine_goes_on_where_it_was():
             for rest in INPUTS[before:]:
                 assert other.step(rest) == original.step(rest)
                 assert (other.now, other.cycles) == (original.now, original.cycles)
-        # Inputs that keep their values are known, too.
+        # Inputs that keep their values are also known.
         sim.step(inputs if before == 0 else {"q": inputs["q"]})
     sim.reset()
     with pytest.raises(ValueError, match="the first step needs every input"):
@@ -123,7 +123,7 @@ def test_signals_are_heard_between_and_within_periods():
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, before)
-    # Every 64 periods would be once.
+    # A check every 64 periods would give a single call.
     assert calls > 5
 
 
@@ -166,7 +166,7 @@ def test_a_forked_child_runs_batches():
     program = takt.assemble(GAIN)
     expected = batch(program)
     assert in_a_child(lambda: batch(program)) == expected
-    # And its children, and the parent afterwards.
+    # Children of a child also work, and so does the parent afterwards.
     assert in_a_child(lambda: [batch(program), in_a_child(lambda: batch(program)), batch(program)]) == [expected] * 3
     assert batch(program) == expected
 

@@ -8,7 +8,7 @@ import pytest
 
 import takt
 
-# A PD law with a state, integers and bits, whose results NumPy gives in binary32.
+# A PD law with a state, integers and bits; NumPy computes its results in binary32.
 LAW = """
 .input  q, qr, n:int
 .output u, count:int, mask:bits
@@ -32,7 +32,7 @@ law:    fsub    e, qr, q
 
 GAIN = ".input x\n.output y\n.period\nloop: fmul y, x, 0.5\n wait loop\n"
 
-# Of x and of memory: a load outside of it faults.
+# Function of x and of memory: a load outside the table faults.
 TABLE = """
 .input  i:int
 .output y
@@ -84,7 +84,7 @@ def test_a_run_has_numpys_bits(machine):
 
 def test_a_batch_is_many_runs():
     program = takt.assemble(LAW)
-    # More than run together at once, and no multiple of a vector's lanes.
+    # More runs than fit into one group, and not a multiple of a vector's lanes.
     inputs = states((4099, 3))
     batch = program.run(inputs)
     same(batch, law(**inputs))
@@ -113,7 +113,7 @@ def test_a_loop_steps_as_a_run_does():
         out = sim.step({name: values[k] for name, values in inputs.items()})
         assert {name: values[k] for name, values in run.outputs.items()} == out
         assert sim.cycles == run.cycles[k] and sim.periods == k + 1 and sim.outputs == out
-    # What is not given keeps its value.
+    # Inputs that are not given keep their values.
     again = sim.step({"n": 7})
     assert again["count"] == 8 and again["u"] == np.float32(40) * (np.float32(inputs["qr"][-1]) - np.float32(inputs["q"][-1]))
     now = sim.now
@@ -131,7 +131,7 @@ def test_flags_deadlines_and_unwritten_outputs():
     assert np.isnan(run.outputs["z"]).all() and run.unwritten == {"z": 3}
     sim = program.sim()
     assert sim.step({"x": 0.0}) == {"y": np.inf, "z": None} and sim.flags == {"divide-by-zero"}
-    # A tick every eight cycles is too often for a division.
+    # With a tick every eight cycles, a division misses its deadline.
     assert run.missed.sum() == 0 and program.run({"x": np.ones(5)}, tick=8).missed.sum() > 0
     batch = program.run({"x": [[1.0], [0.0]]})
     assert batch.flags == [frozenset(), {"divide-by-zero"}]
@@ -332,7 +332,7 @@ def test_the_accuracy_is_that_of_binary64():
     program = takt.assemble(LAW, name="law.s")
     inputs = states(100)
     found = program.accuracy(inputs)["u"]
-    # The same in binary64: inputs are rounded, then nothing is.
+    # The same law in binary64, with inputs rounded to binary32.
     q, qr = (np.float64(np.float32(inputs[name])) for name in ("q", "qr"))
     e = qr - q
     exact = e * 40 + np.diff(e, prepend=0.0) * 3

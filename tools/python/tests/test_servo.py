@@ -9,7 +9,7 @@ import takt
 
 FOLDER = Path(__file__).parents[3] / "programs" / "servo"
 PAIRS, R, LD, LQ, PSI, J = 4, 0.35, 0.9e-3, 1.1e-3, 0.012, 6e-5
-#: Period in s, and counts of the encoder in a turn.
+#: Period in s, and encoder counts per turn.
 T, COUNTS = 1e-5, 2**17
 OVERCURRENT, VOLTAGE, FOLLOWING, ENCODER = 1, 2, 4, 8
 
@@ -60,7 +60,7 @@ def closed_loop(machine, periods, **inputs):
         ia, ib = motor.currents()
         measured = {"ia": ia, "ib": ib, "count": motor.count()} | now
         outputs = sim.step(measured)
-        # Duties of a period act in the next one.
+        # Duties computed in a period act in the next one.
         motor.step(duties, drive, load)
         duties, drive = (outputs["da"], outputs["db"], outputs["dc"]), outputs["drive"]
         rows.append(outputs | {"turns": motor.turns(), "d": motor.d, "q": motor.q, "ia": ia, "speed": motor.speed / (2 * np.pi)})
@@ -74,7 +74,7 @@ def test_an_axis_goes_to_its_goal_and_holds_it_against_a_load(machine):
     assert np.abs(run["d"]).max() < 0.5 and np.abs(run["q"]).max() < 20
     assert run["speed"].max() == pytest.approx(40, abs=2)
     assert run["turns"][6900] == pytest.approx(1, abs=1e-3)
-    # A load of 0.05 N·m displaces the axis by less than 2 mrev, and its current is the torque's.
+    # A load of 0.05 N·m displaces the axis by less than 2 mrev, and the current matches the torque.
     assert np.abs(run["turns"][6900:] - 1).max() < 2e-3
     assert run["q"][9900] == pytest.approx(0.05 / (1.5 * PAIRS * PSI), rel=0.03)
     assert np.abs(run["position"][100:] - run["turns"][99:-1]).max() < 5e-3
@@ -118,7 +118,7 @@ def test_an_overcurrent_switches_the_bridge_off_in_its_period():
     for _ in range(30):
         outputs = sim.step(rest | {"ia": 0.0, "ib": 0.0})
     assert outputs["drive"] == 1
-    # The third phase is the sum of the other two.
+    # The third phase current is the negative sum of the other two, and exceeds the limit.
     outputs = sim.step(rest | {"ia": 16.0, "ib": 16.0})
     assert (outputs["drive"], outputs["faults"]) == (0, OVERCURRENT)
 
@@ -133,7 +133,7 @@ def test_six_axes_do_what_one_axis_does(machine):
         currents = [motor.currents() for motor in motors]
         inputs = {f"ia[{i + 1}]": currents[i][0] for i in range(6)} | {f"ib[{i + 1}]": currents[i][1] for i in range(6)}
         inputs |= {f"count[{i + 1}]": motors[i].count() for i in range(6)} | {f"goal[{i + 1}]": goals[i] for i in range(6)}
-        # The fourth encoder reports an error once its axis has arrived.
+        # The fourth encoder reports an error after its axis has arrived.
         outputs = sim.step(inputs | {"udc": 48.0, "error": (period == 4000) << 3, "enable": 0b111111})
         for motor, (duties, drive) in zip(motors, bridges):
             motor.step(duties, drive)
@@ -144,7 +144,7 @@ def test_six_axes_do_what_one_axis_does(machine):
     assert outputs["drive"] == 0b110111
     assert [outputs[f"faults[{i + 1}]"] for i in range(6)] == [0, 0, 0, ENCODER, 0, 0]
     assert turns[3999] == pytest.approx(goals, abs=2e-3)
-    # Beside one axis alone: the same goal, the same path. Its motion loop begins in another period of ten.
+    # Compared with a single axis: the same goal gives the same path. Its motion loop begins in another period of ten.
     alone = closed_loop(machine, 4000, goal=goals[1])["turns"]
     assert np.abs(np.array(turns)[:3999, 1] - alone[:3999]).max() < 2e-3
 

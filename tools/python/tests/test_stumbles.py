@@ -35,7 +35,7 @@ def test_a_plant_without_return_is_an_error():
         batch.close(forgetful, 5, {"x": 1.0})
     with pytest.raises(TypeError, match="inputs are None"):
         batch.step(None)
-    # None of the inputs keeps all.
+    # Without new inputs, all values are kept.
     assert batch.close(lambda outputs, period: {}, 5, {"x": 1.0}).cycles.shape == (3, 5)
 
 
@@ -91,7 +91,7 @@ def test_messages_name_arguments_not_options():
         "a body (--body) has its inputs in registers": "a body (`--body` on the command line) has its inputs in registers",
         "bound the period instead: `takt bound --deadline`": "bound the period instead: `program.bound()`",
         "`takt live PORT stop` stops it; `takt live PORT status` says which": "`board.stop()` stops it; `board.status` says which",
-        # Neither minus signs nor lines of a source are options.
+        # Minus signs and source lines are not options.
         "a - b -- c, x--y": "a - b -- c, x--y",
         " 12 │ mov a, b ; as --tip": " 12 │ mov a, b ; as --tip",
         "`takt machines t3 --toml` prints a file": "`takt machines t3 --toml` prints a file",
@@ -194,7 +194,7 @@ def test_building_shows_a_line_where_somebody_looks(monkeypatch, kind):
     with progress("building c.s"):
         time.sleep(1.3)
     line = "\rbuilding c.s … 1 s"
-    # The line is gone in the end.
+    # The line is cleared at the end.
     assert errors.getvalue() == ("" if kind is io.StringIO else line + "\r" + " " * (len(line) - 1) + "\r")
     with progress("building d.s"):
         pass
@@ -214,11 +214,11 @@ def test_what_was_built_is_kept(tmp_path, monkeypatch):
     assert again.listing() == first.listing() and again.image() == first.image() and again.sources == first.sources
     np.testing.assert_array_equal(again.run(inputs).outputs["z"], first.run(inputs).outputs["z"])
     assert again.bound() == first.bound() and len(again.analyse(inputs).data) == len(first.analyse(inputs).data)
-    # A damaged one is made anew.
+    # A damaged entry is assembled again.
     whole = kept[0].read_bytes()
     kept[0].write_bytes(whole[:-20] + bytes([whole[-20] ^ 4]) + whole[-19:])
     assert takt.assemble(source, effort=4).image() == first.image()
     assert kept[0].read_bytes() == whole
-    # Another effort is another program.
+    # A different effort gives a different program.
     takt.assemble(source, effort=5)
     assert len(list((tmp_path / "takt/python").iterdir())) == 2

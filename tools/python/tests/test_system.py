@@ -11,7 +11,7 @@ import takt
 
 ROOT = Path(__file__).parents[3]
 SPEED = ROOT / "programs/systems/speed.toml"
-#: Sums what comes, and halves it; both read in every tick what was there when it began.
+#: One core sums its input, another halves the sum; in each tick both read the values present at the tick.
 SUM = ".input x\n.output s\n.state a\n.preset a = 0\n.schedule on\n.period\np: a = a + x\n s = a\n wait p\n"
 HALF = ".input s\n.output y\n.schedule on\n.period\np: y = 0.5*s\n wait p\n"
 SYSTEM = """tick = 1000
@@ -55,10 +55,10 @@ def test_cores_compute_and_pass_on(folder):
         x = 0.25 * (k + 1)
         out = system.step({"x": x})
         total += x
-        # The half runs in every second tick, 200 cycles after the sum is there.
+        # The half runs in every second tick, 200 cycles after the sum is ready.
         half = total / 2 if k % 2 == 0 else half
         assert out == {"s": total, "y": half} == system.values
-    # An input that is not given keeps its value.
+    # An input that is not set keeps its value.
     assert system.step()["s"] == total + 2.0
     assert system.ticks == 9 and system.periods["sum"].count == 9 and system.periods["half"].count == 5
     assert 0 < system.periods["sum"].longest < 100 and system.periods["sum"].skipped == 0
@@ -78,10 +78,10 @@ def test_the_motor_follows_its_commands():
     for k in range(1500):
         out = system.step({"w": w})
         reached.append(w)
-        # A motor of first order.
+        # First-order model of a motor.
         w += 1e-3 * (20.0 * out["u"] - 5.0 * w)
     assert abs(np.mean(reached[-100:]) - 10.0) < 0.1, reached[-1]
-    # The servo by itself, from the state that it has at the beginning, puts out what its core in the system did.
+    # The servo alone, started in the same state, gives the same outputs as its core in the system.
     system.reset()
     first = system.step({"w": 2.0})["u"]
     assert first == alone.step({"w": 2.0, **{name: 0.0 for name in alone.program.inputs if name != "w"}})["u"] != 0

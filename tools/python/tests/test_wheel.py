@@ -25,10 +25,10 @@ def test_a_wheel_needs_no_rust(tmp_path):
     venv.create(tmp_path / "env", with_pip=False)
     python = tmp_path / "env/bin/python3"
     bare = {"PATH": str(tmp_path), "HOME": str(tmp_path), "PIP_CONFIG_FILE": os.devnull}
-    # The pip of this environment installs into the other one: from the file alone.
+    # This environment's pip installs into the other one, from the file alone.
     install = [sys.executable, "-I", "-m", "pip", "--python", str(python), "install", "--no-deps", "--no-index", "--no-cache-dir"]
     subprocess.run([*install, "--disable-pip-version-check", str(wheels[-1])], env=bare, check=True, capture_output=True)
-    # NumPy, the one thing that the package needs, is the one of this environment.
+    # Use NumPy, the package's only dependency, from this environment.
     (packages,) = (tmp_path / "env/lib").glob("python3*/site-packages")
     for path in Path(np.__file__).parents[1].glob("numpy*"):
         (packages / path.name).symlink_to(path)

@@ -8,11 +8,11 @@ use std::sync::OnceLock;
 use takt_isa::MACHINES;
 use takt_programs::{EXAMPLES, SOURCES};
 
-/// Examples of `programs/examples` at the top of the list, in this order; all others follow.
+/// Examples from `programs/examples` that come first in the list, in this order; all others follow.
 const FIRST: [&str; 3] = ["pi.s", "foc.s", "blink.s"];
-/// Number of periods that shows an example without inputs at work.
+/// Number of periods after which an example without inputs shows an effect.
 const PERIODS_OF: [(&str, usize); 1] = [("blink.s", 2000)];
-/// Controller program of the robot.
+/// Program that controls the robot.
 pub(crate) const TRACKING: &str = "hybrid/tracking.s";
 
 /// Sources that a program can include by name: parts of the shipped programs.
@@ -25,7 +25,7 @@ fn file_name(path: &'static str) -> &'static str {
     path.rsplit_once('/').map_or(path, |(_, name)| name)
 }
 
-/// Request for a file's text.
+/// Request for the text of a file.
 #[derive(Deserialize)]
 pub(crate) struct Source {
     name: String,
@@ -40,12 +40,12 @@ pub(crate) fn source(wanted: Source) -> Result<Value, String> {
     text.ok_or_else(|| format!("there is no file `{name}` to be shown"))
 }
 
-/// Description of an example: its first comment.
+/// Description of an example: the first comment.
 fn title(source: &str) -> &str {
     source.lines().find_map(|line| line.strip_prefix(';')).map_or("", str::trim)
 }
 
-/// Initial data of the page.
+/// Data that the page needs at its start.
 pub(crate) fn about() -> Value {
     let text = |name: &str| EXAMPLES.iter().find(|(known, _)| *known == name).map(|(_, text)| *text);
     let rest =

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use takt_rtl::header::{Header, Language};
 use takt_rtl::{Library, bench, export};
 
-/// Maximal number of input rows in the test bench.
+/// Maximum number of input rows in the test bench.
 const BENCH_PERIODS: usize = 100;
 
 pub(crate) fn image(loaded: &LoadedProgram) -> Result<Vec<u8>, String> {
@@ -16,7 +16,7 @@ pub(crate) fn image(loaded: &LoadedProgram) -> Result<Vec<u8>, String> {
         .map_err(|error| error.to_string())
 }
 
-/// Verilog of the machine with a test bench that runs the program: file names and texts.
+/// Verilog of the machine, with a test bench that runs the program: file names and texts.
 pub(crate) fn verilog(loaded: &LoadedProgram) -> Result<Value, String> {
     let program = &loaded.assembled.program;
     let design = export(program.machine, &Library::builtin()).map_err(|error| error.to_string())?;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! WebAssembly exports of the playground: bytes in, bytes out, with a dozen lines of JavaScript on the other side.
+//! WebAssembly exports of the playground: bytes in, bytes out, called by a dozen lines of JavaScript.
 //!
-//! The page requests a buffer with [`takt_input`], writes a method, a line feed and JSON parameters, and calls [`takt_call`] or
-//! [`takt_image`]. The result is the answer's length in bytes; the answer is at [`takt_output`], as `{"ok": …}` or `{"error": "…"}`. The
-//! only unsafe part is the export of names.
+//! The page requests a buffer with [`takt_input`], writes a method, a line feed and JSON parameters to it, and calls [`takt_call`] or
+//! [`takt_image`]. The result is the length of the answer in bytes; the answer is at [`takt_output`], as `{"ok": …}` or `{"error": "…"}`.
+//! The only unsafe part is the export of symbol names.
 #![allow(
     unsafe_code,
     unreachable_pub,
@@ -50,7 +50,7 @@ pub extern "C" fn takt_call() -> usize {
     })
 }
 
-/// Writes the program's image; returns its length in bytes, 0 without a program.
+/// Writes the program's image; returns its length in bytes, or 0 if there is no program.
 #[unsafe(no_mangle)]
 pub extern "C" fn takt_image() -> usize {
     EXCHANGE.with_borrow_mut(|exchange| {

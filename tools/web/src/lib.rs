@@ -1,21 +1,21 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Playground: Takt's services for a web page.
+//! Playground: the services that Takt provides to a web page.
 //!
-//! [`Playground::call`] takes a method with JSON parameters and answers in JSON, so that all of it is testable without a browser. In a
-//! browser, `exports` passes the texts. The page in `page/` knows nothing of the language: colours, diagnostics and completion come from
-//! [`takt_editor::lsp`], the pipeline diagram from [`takt_analysis::picture`].
+//! [`Playground::call`] takes a method with JSON parameters and answers in JSON, so that everything can be tested without a browser. In a
+//! browser, `exports` passes the texts. The page in `page/` contains no knowledge of the language: colours, diagnostics and completion
+//! come from [`takt_editor::lsp`], the pipeline diagram from [`takt_analysis::picture`].
 //!
-//! | method | what it does |
+//! | method | effect |
 //! |---|---|
 //! | `about` | machines, examples, limits |
 //! | `lsp`, `lsp.check`, `lsp.schedule` | messages to and from the language server |
 //! | `assemble` | assembles, bounds the cycles, opens a debug session |
-//! | `execute` | a command of the debugger's console |
-//! | `run` | periods on the emulator, so many at a call |
-//! | `track` | periods of the closed loop along the AGH path |
-//! | `source` | the text of a file that a program includes |
-//! | `picture` | the pipeline's picture as data |
-//! | `listing`, `header`, `verilog`, `image` | what can be taken away |
+//! | `execute` | executes a command of the debugger's console |
+//! | `run` | runs periods on the emulator, a slice per call |
+//! | `track` | runs periods of the closed loop along the AGH path |
+//! | `source` | text of a file that a program includes |
+//! | `picture` | pipeline diagram as data |
+//! | `listing`, `header`, `verilog`, `image` | downloads |
 //!
 //! The crate has no clock and never waits: the caller divides long work into calls.
 
@@ -39,11 +39,11 @@ use takt_editor::lsp::Inline;
 use takt_isa::Machine;
 use takt_isa::timing::Cycle;
 
-/// Maximal number of cycles of a period or of a debugger command: about a second in a browser.
+/// Cycle limit of a period or of a debugger command: about a second in a browser.
 pub const CYCLES: Cycle = 20_000_000;
-/// Maximal number of input rows, and of periods in a run.
+/// Maximum number of input rows, and of periods in a run.
 pub const PERIODS: usize = 100_000;
-/// Maximal size of a source in bytes.
+/// Maximum size of a source in bytes.
 pub const SOURCE_BYTES: usize = 4 << 20;
 
 /// State of the page: language server, loaded program, debug session, and runs.
@@ -76,7 +76,7 @@ impl Playground {
     /// Answers a request from the page.
     ///
     /// # Errors
-    /// A message for the user on an invalid request.
+    /// If the request is invalid; the message is for the user.
     pub fn call(&mut self, method: &str, params: Value) -> Result<Value, String> {
         #[derive(Deserialize)]
         struct MachineParameters {
@@ -108,7 +108,7 @@ impl Playground {
     /// Image of the loaded program, with debug information.
     ///
     /// # Errors
-    /// If no program is loaded, or the image format cannot hold it.
+    /// If no program is loaded, or if the image format cannot hold it.
     pub fn image(&self) -> Result<Vec<u8>, String> {
         export::image(self.loaded()?)
     }

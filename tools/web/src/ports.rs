@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Units and limits of ports, for the axes of plots. The language has no units; by convention a declaration's comment begins with them, as
-//! in `.output u ; V`.
+//! Units and limits of ports, for the axes of plots. The language has no units; by convention, the comment of a declaration begins with
+//! them, as in `.output u ; V`.
 
 use takt_isa::{BundleAddress, Instruction, Program, Register, SlotIndex};
 
-/// Maximal length of a unit in characters.
+/// Maximum length of a unit in characters.
 const UNIT: usize = 12;
-/// Maximal number of copies followed between a limiting operation and a port.
+/// Maximum number of copies to follow from a port back to a limiting operation.
 const COPIES: usize = 8;
 
-/// Unit at the beginning of a port declaration's comment; `None` if the comment begins otherwise. `directive` is `.input` or `.output`.
+/// Unit at the beginning of the comment on a port's declaration; `None` if the comment does not begin with one. `directive` is `.input`
+/// or `.output`.
 pub(crate) fn unit(sources: &[(String, String)], directive: &str, port: &str) -> Option<String> {
     let lines = sources.iter().flat_map(|(_, text)| text.lines());
     let declared = lines.filter_map(|line| line.trim_start().strip_prefix(directive));
@@ -17,7 +18,7 @@ pub(crate) fn unit(sources: &[(String, String)], directive: &str, port: &str) ->
         let at = names.split(',').map(|name| name.trim()).position(|name| names_it(name, port))?;
         let comment = comment.trim();
         let units: Vec<&str> = comment.split([':', ';']).next()?.split(',').map(str::trim).collect();
-        // Equally many units and names correspond one to one; otherwise the first unit applies to all names.
+        // If there are as many units as names, they correspond one to one; otherwise the first unit applies to all names.
         let own = units.len() > 1
             && units.len() == names.split(',').count()
             && units.iter().all(|one| is_unit(one));
@@ -26,7 +27,7 @@ pub(crate) fn unit(sources: &[(String, String)], directive: &str, port: &str) ->
     })
 }
 
-/// A declared name, such as `x:int`, `y[3]` or `x{i}`, declares the port.
+/// A declared name, such as `x:int`, `y[3]` or `x{i}`, includes the port.
 fn names_it(declared: &str, port: &str) -> bool {
     let name = declared.split([':', ' ', '[', '{']).next().unwrap_or_default();
     let whole = declared.split([':', ' ']).next() == Some(name);
@@ -39,7 +40,7 @@ fn names_it(declared: &str, port: &str) -> bool {
     })
 }
 
-/// Product or quotient of powers of known unit symbols, at most [`UNIT`] characters long.
+/// The word is a product or quotient of powers of known unit symbols, at most [`UNIT`] characters long.
 fn is_unit(word: &str) -> bool {
     const BASE: [&str; 22] = [
         "m", "mm", "um", "µm", "s", "ms", "µs", "g", "kg", "A", "mA", "V", "mV", "W", "N", "J", "Hz", "rad",
@@ -54,9 +55,9 @@ fn is_unit(word: &str) -> bool {
         })
 }
 
-/// Limit ± of an output port: the constant limit of the `fsat` that writes it, directly or through copies.
+/// Symmetric limit of an output port: the constant limit of the `fsat` that writes it, directly or through copies.
 pub(crate) fn limit(program: &Program, port: Register) -> Option<f32> {
-    // If several operations write the port, for example one in `.once`, take the limit of the first that limits.
+    // If several operations write the port, one of them perhaps in `.once`, take the first limit found.
     let writers = writers(program, port);
     writers.iter().find_map(|(address, instruction)| saturated(program, *address, instruction, COPIES))
 }
@@ -86,7 +87,7 @@ fn saturated(
         }
         "mov" if copies > 0 => {
             let source = *instruction.reads().first()?;
-            // Follow the nearest preceding write in code order.
+            // Follow the nearest preceding write, in code order.
             let (before, writer) = writers(program, source).into_iter().rfind(|(at, _)| *at < address)?;
             saturated(program, before, &writer, copies - 1)
         }

@@ -33,7 +33,7 @@ pub(crate) struct AssembleRequest {
     name: String,
     source: String,
     machine: String,
-    /// Input table (CSV) with a column for each input port. If it is blank or belongs to other ports, all ports are 0.
+    /// Input table in CSV with a column for each input port. If it is blank or made for other ports, all ports are 0.
     #[serde(default)]
     inputs: String,
     /// Cycles between ticks; 0: a tick comes as soon as the program waits.
@@ -41,7 +41,7 @@ pub(crate) struct AssembleRequest {
     tick: u64,
 }
 
-/// Machine by name, or by the text of a machine file, which has several lines.
+/// Machine given by its name, or by the text of a machine file, which has several lines.
 pub(crate) fn machine(wanted: &str) -> Result<&'static Machine, String> {
     match wanted.contains('\n') {
         true => takt_asm::machine::read("machine.toml", wanted).map_err(|mistakes| mistakes.render(false)),
@@ -76,7 +76,7 @@ impl Playground {
         let empty = program.bundles() == 0;
         let table = wanted.inputs.as_bytes();
         let is_blank = wanted.inputs.trim().is_empty();
-        // A table with other ports belongs to a previous program: ignore it.
+        // A table with other ports belongs to a previous program, and is ignored.
         let others =
             Table::new(INPUTS.to_owned(), Box::new(Cursor::new(table.to_vec())), &program.inputs).err();
         let others = others.filter(|_| !is_blank);

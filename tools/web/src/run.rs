@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Runs of periods on the emulator with the values of all ports, and the pipeline diagram of a period.
+//! Runs of periods on the emulator that record the values of all ports, and the pipeline diagram of a period.
 
 use crate::program::LoadedProgram;
 use crate::{CYCLES, PERIODS, Playground};
@@ -14,15 +14,15 @@ use takt_isa::{Program, Register, Type};
 
 /// Default number of periods without recorded inputs.
 const ZERO_PERIODS: usize = 20;
-/// Maximal number of cycles in a call.
+/// Maximum number of cycles in a call.
 const SLICE: u64 = 1_000_000;
-/// Maximal number of periods in a call.
+/// Maximum number of periods in a call.
 const SLICE_PERIODS: u64 = 2000;
 
 /// A run in progress.
 pub(crate) struct Run {
     emulator: Emulator,
-    /// Periods done, and periods in total.
+    /// Number of completed periods, and of all periods.
     done: u64,
     all: u64,
 }
@@ -30,10 +30,10 @@ pub(crate) struct Run {
 /// Request to run periods.
 #[derive(Deserialize)]
 pub(crate) struct RunRequest {
-    /// Restart from the beginning instead of continuing.
+    /// Start again from the beginning, instead of continuing.
     #[serde(default)]
     begin: bool,
-    /// Number of periods without recorded inputs.
+    /// Number of periods, if there are no recorded inputs.
     #[serde(default)]
     periods: Option<usize>,
 }
@@ -45,7 +45,7 @@ impl LoadedProgram {
         Ok(emulator)
     }
 
-    /// Message of a fault or another end of a period, at its source line.
+    /// Message for a fault, or another event that ended a period, with its source line.
     pub(crate) fn fault(&self, error: &PeriodError) -> String {
         match error {
             PeriodError::Fault(fault) => {
@@ -56,7 +56,7 @@ impl LoadedProgram {
     }
 }
 
-/// Sets a period's inputs (periods count from 0) and its limit of [`CYCLES`].
+/// Sets the inputs of a period (from 0), and limits it to [`CYCLES`].
 fn prepare(emulator: &mut Emulator, rows: Option<&Rows>, period: u64) -> Result<(), String> {
     let zeros: Vec<(Register, u32)>;
     let row = match rows {
@@ -73,7 +73,7 @@ fn prepare(emulator: &mut Emulator, rows: Option<&Rows>, period: u64) -> Result<
     Ok(())
 }
 
-/// Value of a port as a JSON number; null without a value, and `"NaN"`, `"inf"`, `"-inf"` for values that JSON lacks.
+/// Value of a port as a JSON number; null if it has none, and `"NaN"`, `"inf"`, `"-inf"` for values that JSON cannot represent.
 fn number(ty: Type, bits: Option<u32>) -> Value {
     match (ty, bits) {
         (_, None) => Value::Null,
@@ -91,7 +91,7 @@ fn has_periods(program: &Program) -> bool {
 }
 
 impl Playground {
-    /// Runs a slice of periods; returns the port values of each period.
+    /// Runs a slice of periods; returns the values of the ports in each period.
     pub(crate) fn run(&mut self, wanted: RunRequest) -> Result<Value, String> {
         if wanted.begin {
             let loaded = self.loaded()?;
@@ -168,7 +168,7 @@ impl Playground {
 /// Request for the diagram of a period.
 #[derive(Deserialize)]
 pub(crate) struct PeriodRequest {
-    /// Period from 1; 0 is the code from reset to the first `wait`.
+    /// Period, from 1; 0 stands for the code from reset to the first `wait`.
     period: u64,
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Closed loop of a tracking program and the robot along the AGH path.
+//! Closed loop of a tracking program with the robot along the AGH path.
 
 use crate::program::LoadedProgram;
 use crate::{CYCLES, Playground};
@@ -12,9 +12,9 @@ use takt_programs::hybrid::params;
 use takt_programs::hybrid::{Binding, LoopError, Outputs, UnwrittenOutput};
 use takt_programs::trajectory::Trajectory;
 
-/// Maximal number of periods in a call.
+/// Maximum number of periods in a call.
 const SLICE: u64 = 20_000;
-/// Distance in periods between two poses kept for drawing.
+/// Number of periods between two poses that are kept for drawing.
 const EVERY: u64 = 100;
 
 /// Plan of the AGH path, computed once.
@@ -28,13 +28,13 @@ fn trajectory() -> Result<&'static Trajectory, String> {
     TRAJECTORY.get_or_init(plan).as_ref().map_err(Clone::clone)
 }
 
-/// Errors that end the loop early.
+/// Errors that end the closed loop early.
 pub(crate) enum LoopFailure {
     Period(PeriodError),
     Unwritten(UnwrittenOutput),
 }
 
-/// The program on the emulator, as the loop's controller.
+/// Program on the emulator as controller of the closed loop.
 struct EmulatorController {
     emulator: Emulator,
     binding: Binding,
@@ -64,10 +64,10 @@ pub(crate) struct Track {
     longest: u64,
 }
 
-/// Request to drive on.
+/// Request to continue the drive.
 #[derive(Deserialize)]
 pub(crate) struct DriveRequest {
-    /// Restart from the beginning instead of continuing.
+    /// Start again from the beginning, instead of continuing.
     #[serde(default)]
     begin: bool,
     periods: u64,
@@ -91,7 +91,7 @@ impl LoadedProgram {
 }
 
 impl Playground {
-    /// Continues the drive; returns the poses on the way.
+    /// Continues the drive; returns the poses passed.
     pub(crate) fn track(&mut self, wanted: DriveRequest) -> Result<Value, String> {
         let trajectory = trajectory()?;
         if wanted.begin {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! JSON view of the debug session for the page.
+//! JSON representation of the debug session, for the page.
 
 use crate::Playground;
 use serde::Deserialize;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Playground methods as the page calls them, without a browser.
+//! Playground methods as the page calls them, but without a browser.
 
 use serde_json::{Value, json};
 use takt_web::{CYCLES, Playground};
@@ -43,7 +43,7 @@ fn every_example_assembles_and_runs() {
             let all = numbers.iter().all(Value::is_number);
             assert!(all && !numbers.is_empty(), "{}: {port} is {values}", example["name"]);
         }
-        // An example without inputs must change its lamp within its number of periods.
+        // An example without inputs must change its lamp within its default number of periods.
         if !has_inputs {
             let mut lit = Vec::new();
             for begin in [true, false] {
@@ -144,7 +144,7 @@ fn reports_mistakes() {
     assert_eq!(error, "no program is assembled yet");
     let told = assemble(&mut playground, DOUBLE, "x\n1\ntwo\n");
     assert_eq!(told["inputs_error"], "inputs:3: column x: `two` is no number");
-    // A table for other ports belongs to another program: the program runs with zeros.
+    // The table was made for other ports, so it belongs to another program: the program runs with zeros.
     let told = assemble(&mut playground, DOUBLE, "a,b\n1,2\n");
     assert_eq!((&told["inputs_error"], &told["rows"]), (&Value::Null, &Value::Null));
     assert_eq!(told["inputs_of_others"], "inputs: no column for the input port x");
@@ -154,7 +154,7 @@ fn reports_mistakes() {
     );
     assert_eq!(assemble(&mut playground, DOUBLE, " \n")["inputs_of_others"], Value::Null);
     assert_eq!(assemble(&mut playground, DOUBLE, "x\n1\n")["inputs_of_others"], Value::Null);
-    // Messages must not suggest command-line options: a page has none.
+    // Messages must not suggest command-line options, which a page does not have.
     let told = assemble(&mut playground, ".include \"no.s\"\n", "");
     let text = told["text"].as_str().unwrap_or_default();
     assert!(text.contains("robot.s") && !text.contains("-I"), "{text}");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! HyperQueue server and workers on this computer, each in its own process.
+//! HyperQueue server and workers on this computer, each in a separate process.
 
 use crate::program::Server;
 use crate::{Client, WorkError, at};
@@ -8,13 +8,13 @@ use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
-/// Python script that drives the package.
+/// Python script that calls the package.
 pub(crate) const fn script() -> &'static str {
     include_str!("takt_hq.py")
 }
 
-/// Keeps a program running: starts it, with its process number on standard output, and again when it has ended. The end of standard
-/// input, which comes when whoever started this is gone, ends it all.
+/// Shell script that keeps a program running: starts it, prints its process number, and restarts it when it ends. At the end of standard
+/// input, which comes when the parent process is gone, the script ends the program and exits.
 const KEEPER: &str = r#"
 trap '' PIPE
 (while :; do "$@" </dev/null >&2 & echo $!; wait $!; sleep 0.5; done) &
@@ -27,7 +27,7 @@ kill -9 0
 
 /// A server with its workers; dropping it ends them.
 pub struct Cluster {
-    /// The script, or the keepers of server and workers.
+    /// Python script, or the keepers of server and workers.
     keepers: Vec<Child>,
     server: PathBuf,
     processes: Processes,
@@ -91,7 +91,7 @@ impl Cluster {
         Ok(())
     }
 
-    /// Keeps `hq` running; the number of its process.
+    /// Starts a keeper of `hq`; returns the process number of `hq`.
     fn keeper(&mut self, program: &Path, arguments: &[&str], messages: &File) -> Result<u32, WorkError> {
         let mut command = Command::new("sh");
         command
@@ -100,7 +100,7 @@ impl Cluster {
             .arg("--server-dir")
             .arg(&self.server)
             .args(arguments);
-        // A group of its own: the keeper ends all of it, and Ctrl-C ends this program first.
+        // A separate process group: the keeper can end the whole group, and Ctrl-C reaches only this program.
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut command, 0);
         command.stdin(Stdio::piped());
@@ -108,7 +108,7 @@ impl Cluster {
         line.trim().parse().map_err(|_| WorkError::Queue(String::new()))
     }
 
-    /// Starts a process; its first line.
+    /// Starts a process; returns the first line that it prints.
     fn spawn(&mut self, mut command: Command, messages: &File) -> Result<String, WorkError> {
         let program = PathBuf::from(command.get_program());
         let messages = messages.try_clone().map_err(at(&self.server))?;
@@ -120,7 +120,7 @@ impl Cluster {
         if matches!(read, Some(Ok(1..))) { Ok(line) } else { Err(WorkError::Queue(String::new())) }
     }
 
-    /// Process numbers at the start.
+    /// Process numbers from the start of the cluster; a restarted process has another.
     pub fn processes(&self) -> &Processes {
         &self.processes
     }
@@ -130,13 +130,13 @@ impl Cluster {
         &self.server
     }
 
-    /// Waits for the end of the cluster, by an interrupt.
+    /// Waits until the cluster ends, for instance by an interrupt.
     ///
     /// # Errors
     /// If the process is lost.
     pub fn wait(&mut self) -> Result<(), WorkError> {
         for keeper in &mut self.keepers {
-            // `wait` would close its input.
+            // `wait` would close the child's standard input, which ends the cluster.
             let input = keeper.stdin.take();
             keeper.wait().map_err(at(&self.server))?;
             drop(input);
@@ -148,7 +148,7 @@ impl Cluster {
 impl Drop for Cluster {
     fn drop(&mut self) {
         for keeper in &mut self.keepers {
-            // A keeper ends with its input; without the script, server and workers see that their parent is gone.
+            // Closing its input ends a keeper. Server and workers of the Python script notice that their parent is gone.
             if keeper.stdin.take().is_none() {
                 let _ = keeper.kill();
             }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Units of work: commands that each write one file, run on this computer or through HyperQueue on others.
+//! Units of work: commands that each write one file, run on this computer or, through HyperQueue, on others.
 //!
 //! A unit is done when its file exists. An interrupted run can thus be resumed, a lost unit is repeated, and concurrent runs of a unit are
 //! harmless. A command writes its file under another name and renames it ([`write`]). Files carry all data: across computers, the folder of
@@ -21,11 +21,11 @@ use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 use thiserror::Error;
 
-/// Number of attempts at a unit before it counts as failed.
+/// Attempts at a unit before it counts as failed.
 pub const ATTEMPTS: u32 = 3;
-/// Bytes kept from the end of a failed unit's messages.
+/// Number of bytes kept from the end of a failed unit's messages.
 const KEPT: usize = 8192;
-/// Environment variable that keeps a unit to its CPUs.
+/// Environment variable that limits a unit to its CPUs.
 const THREADS: &str = "RAYON_NUM_THREADS";
 
 /// A unit of work: a command that writes one file.
@@ -62,20 +62,20 @@ impl Unit {
 /// Place where units run.
 #[derive(Clone, Debug)]
 pub enum Place {
-    /// This computer, on so many CPUs.
+    /// This computer, with this number of CPUs.
     Here(usize),
     /// The workers of a HyperQueue server.
     Queue {
-        /// HyperQueue on this computer.
+        /// HyperQueue installation on this computer.
         client: Client,
-        /// Folder of the server.
+        /// Folder of the server's files.
         server: PathBuf,
     },
 }
 
 impl Place {
-    /// The workers of a HyperQueue server: of the server that runs with the folder `server`, or else of a cluster started with the folder
-    /// `fresh`, whose workers end when the cluster is dropped.
+    /// Connects to the workers of a HyperQueue server: of the running server with the folder `server`, or else of a new cluster with the
+    /// folder `fresh`, which ends when it is dropped.
     ///
     /// # Errors
     /// If the cluster does not start.
@@ -97,9 +97,9 @@ impl Place {
 /// Progress event of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event<'a> {
-    /// Number of units done so far, out of those given to [`run`].
+    /// Number of units done so far, of those passed to [`run`].
     Done(u64),
-    /// Another message, as one line.
+    /// Other message, on one line.
     Note(&'a str),
 }
 

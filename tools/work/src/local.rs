@@ -23,7 +23,7 @@ pub(crate) fn run(
             scope.spawn(move || {
                 while !stop.load(Ordering::Relaxed) {
                     let Some(unit) = units.get(next.fetch_add(1, Ordering::Relaxed)) else { break };
-                    // A send error means that the run is abandoned.
+                    // Sending fails only if the run was abandoned.
                     let _ = sender.send(attempts(unit, stop));
                 }
             });
@@ -33,7 +33,7 @@ pub(crate) fn run(
         for outcome in ended {
             match outcome {
                 Ok(()) => done += 1,
-                // Units ended by `stop` have not failed.
+                // A unit stopped by `stop` has not failed.
                 Err(_) if stop.load(Ordering::Relaxed) => {}
                 Err(failure) => failures.push(failure),
             }
@@ -43,7 +43,7 @@ pub(crate) fn run(
     })
 }
 
-/// Runs a unit up to [`ATTEMPTS`] times, until it is done.
+/// Runs a unit until it is done, at most [`ATTEMPTS`] times.
 fn attempts(unit: &Unit, stop: &AtomicBool) -> Result<(), Failure> {
     let mut reason = String::new();
     for _ in 0..ATTEMPTS {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! HyperQueue by its own program, `hq`.
+//! HyperQueue through its program `hq`.
 
 use crate::queue::{JobEnd, PATIENCE, no_server};
 use crate::{Unit, WorkError, at};
@@ -12,19 +12,19 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-/// Between two looks at a job, at first and later on.
+/// Polling interval for a job: initial, and longest.
 const LOOK: (Duration, Duration) = (Duration::from_millis(100), Duration::from_secs(2));
-/// Between two looks for a server.
+/// Polling interval for a server.
 const AGAIN: Duration = Duration::from_millis(300);
 
-/// A server, as `hq` reaches it.
+/// A HyperQueue server, queried through `hq`.
 pub(crate) struct Server<'a> {
     pub(crate) program: &'a Path,
     pub(crate) folder: &'a Path,
 }
 
 impl Server<'_> {
-    /// Runs `hq`; its result, or its words.
+    /// Runs `hq`; returns its result, or its error message.
     fn ask(&self, arguments: &[&str]) -> Result<Value, String> {
         let mut command = Command::new(self.program);
         command.arg("--server-dir").arg(self.folder).args(["--output-mode", "json"]).args(arguments);
@@ -38,12 +38,12 @@ impl Server<'_> {
         }
         let words = value["error"].as_str().map(str::to_owned);
         let words = words.unwrap_or_else(|| String::from_utf8_lossy(&output.stderr).into_owned());
-        // A stack follows.
+        // Drop the stack trace.
         let words = words.split("\n\nStack backtrace").next().unwrap_or_default().trim().replace('\n', " ");
         Err(if words.is_empty() { format!("`hq` ended with {}", output.status) } else { words })
     }
 
-    /// Waits until the server answers, which has perhaps only begun to start.
+    /// Waits until the server answers; `begins`: it may still be starting.
     pub(crate) fn connect(&self, begins: bool) -> Result<(), WorkError> {
         let begin = Instant::now();
         loop {
@@ -65,7 +65,7 @@ impl Server<'_> {
         }
     }
 
-    /// Submits units as one job, and waits until each has ended.
+    /// Submits units as one job, and waits until every unit has ended.
     pub(crate) fn submit(
         &self,
         units: &[&Unit],
@@ -114,7 +114,7 @@ impl Server<'_> {
     }
 }
 
-/// A job's definition, as `hq job submit-file` reads it. A string of JSON is one of TOML, too.
+/// Job definition for `hq job submit-file`, in TOML; a JSON string is also a valid TOML string.
 fn definition(units: &[&Unit]) -> String {
     let string = |text: &str| Value::from(text).to_string();
     let mut text = "name = \"takt\"\n".to_owned();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Units on the workers of a HyperQueue server, submitted as one job; what failed or was lost is submitted again.
+//! Runs units on the workers of a HyperQueue server, as one job; submits failed and lost units again.
 
 use crate::cluster::script;
 use crate::program::Server;
@@ -13,20 +13,20 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-/// The time without a server, and until a result that was written elsewhere is seen: a shared file system shows it late.
+/// Longest wait for a server, and for a result written on another computer: a shared file system may show it late.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
 
-/// The end of a job.
+/// Outcome of a job.
 #[derive(Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum JobEnd {
-    /// Every unit has ended; of those that failed, by their places in the list, the reason.
+    /// Every unit has ended. Maps the index of each failed unit to the reason.
     Whole(BTreeMap<usize, String>),
-    /// The server is gone, for a reason.
+    /// The server was lost, with the reason.
     Lost(String),
 }
 
-/// A line of the script's output.
+/// Message from the Python script, one JSON line each.
 #[derive(Deserialize)]
 #[serde(rename_all = "snake_case")]
 enum Line {
@@ -34,7 +34,7 @@ enum Line {
     Ended(JobEnd),
 }
 
-/// Ends the script if its caller gives up.
+/// Kills the script when dropped.
 struct Guard(Child);
 
 impl Drop for Guard {
@@ -66,10 +66,10 @@ pub(crate) fn run(
     result
 }
 
-/// Submits units, and reports how many are done while it waits.
+/// Function that submits units, and reports the number done while it waits.
 type Submit<'s> = dyn FnMut(&[&Unit], &mut dyn FnMut(u64)) -> Result<JobEnd, WorkError> + 's;
 
-/// Submits units, as a job or several, until each is done or has failed a few times.
+/// Submits units in one or more jobs, until each is done or has failed [`ATTEMPTS`] times.
 fn rounds(
     units: &[&Unit],
     stop: &AtomicBool,
@@ -117,7 +117,7 @@ fn rounds(
     Ok(failures)
 }
 
-/// True once a unit's file is there, for which it waits.
+/// Waits for the unit's file; true once it exists.
 fn is_seen(unit: &Unit) -> bool {
     let begin = Instant::now();
     while !unit.is_done() {

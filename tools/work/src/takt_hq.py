@@ -25,8 +25,8 @@ from hyperqueue.ffi.cluster import Cluster
 from hyperqueue.ffi.protocol import ResourceRequest
 from hyperqueue.output import StdioDef
 
-PATIENCE = 60  # seconds without a server, as in queue.rs
-THREADS = "RAYON_NUM_THREADS"  # as in lib.rs
+PATIENCE = 60  # seconds; PATIENCE in queue.rs
+THREADS = "RAYON_NUM_THREADS"  # THREADS in lib.rs
 CURRENT = "hq-current"
 
 
@@ -80,7 +80,7 @@ def serve(folder, own, cores=1):
         try:
             idle.add_worker(cores)
             serves = current
-        except Exception as error:  # the server is starting, or gone
+        except Exception as error:  # the server is still starting, or it is gone
             sys.stderr.write(f"worker: {reason(error)}\n")
 
 

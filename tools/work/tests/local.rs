@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Units on this computer: completion, repetition and failure, checked against counters that the units write.
+//! Units on this computer: completion, retries and failure, checked against counters that the units write.
 
 use crate::units::{folder, unit};
 use std::fs;

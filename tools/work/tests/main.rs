@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Tests of `takt-work` in one binary: one module for each topic.
+//! Tests of `takt-work` in one binary, one module per topic.
 
 mod local;
 mod program;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Units through HyperQueue's own program, for which a script stands in that records its calls.
+//! Units through the program `hq`, which a script replaces that records its calls.
 
 use crate::units::{folder, unit};
 use std::path::{Path, PathBuf};
@@ -46,7 +46,7 @@ fn units_state_cpus_and_time() {
     drop(cluster);
     let (calls, jobs) = (text(server.join("calls")), text(server.join("jobs.toml")));
     assert_eq!(calls.matches("worker start --cpus 1 --on-server-lost stop\n").count(), 2, "{calls}");
-    // Three times: what fails is tried again.
+    // A failed unit is submitted three times.
     assert_eq!(calls.matches("submit-file").count(), 3, "{calls}");
     assert!(jobs.contains("resources = { cpus = 3 }\ntime_request = \"90s\""), "{jobs}");
     assert!(jobs.contains("resources = { cpus = 1 }\ntime_request = \"5s\""), "{jobs}");
@@ -73,7 +73,7 @@ fn a_lost_server_gets_the_rest_again() {
     assert!(failures.is_empty(), "{failures:?}");
     let lost = "the server is lost (the connection is gone); what is not done is submitted again";
     assert_eq!(notes, [lost]);
-    // The unit that was done is not run again.
+    // Finished units are not run again.
     assert!(units.iter().all(|unit| text(unit.result.with_extension("count")) == "x\n"));
 }
 

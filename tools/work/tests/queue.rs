@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Units on a HyperQueue server with two workers, with a worker and then the server killed in mid-run: results equal a local run's.
+//! Units on a HyperQueue server with two workers; kills a worker and then the server in mid-run. Results must equal those of a local run.
 //!
-//! HyperQueue is in the Python environment made by `cargo xtask test` (`TAKT_VENV`, or `.venv`).
+//! HyperQueue is in the Python environment that `cargo xtask test` creates (`TAKT_VENV`, or `.venv`).
 
 #![allow(clippy::print_stdout)]
 
@@ -69,14 +69,14 @@ fn reports_a_folder_without_a_server() {
     assert!(text.contains("no server has its files in") && text.contains("--hq-server"), "{text}");
 }
 
-/// CPU time of a process without its children, in s (`proc_pid_stat(5)`: fields 14 and 15, in hundredths of a second).
+/// CPU time of a process without its children, in seconds (`proc_pid_stat(5)`: fields 14 and 15, in hundredths of a second).
 fn taken(process: u32) -> f64 {
     let text = std::fs::read_to_string(format!("/proc/{process}/stat")).expect("it runs");
     let fields = text.rsplit_once(')').expect("its name is in parentheses").1.split_whitespace();
     fields.skip(11).take(2).map(|ticks| ticks.parse::<f64>().expect("a number") / 100.0).sum()
 }
 
-/// Figure of docs/campaigns.md: the scheduler's own time for 10,000 units.
+/// Figure of docs/campaigns.md: overhead of the scheduler for 10,000 units.
 ///
 /// ```text
 /// cargo test --release -p takt-work --test suite -- --ignored --nocapture queue::ten_thousand_units

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Documentation site: `docs/` in mdbook, the crates' documentation, and the playground, in which every listing opens.
+//! Documentation site: `docs/` in mdbook, the crates' API documentation, and the playground, in which every listing opens.
 
 mod colour;
 
@@ -37,12 +37,12 @@ impl Arguments {
     /// The whole site, without browser tests.
     pub(crate) const WHOLE: Arguments =
         Arguments { no_rustdoc: false, no_web: false, no_playground: false, test: false };
-    /// Documents alone, with a check of their links.
+    /// Documents alone, with a check of links.
     pub(crate) const DOCUMENTS: Arguments =
         Arguments { no_rustdoc: true, no_web: false, no_playground: true, test: false };
 }
 
-/// mdbook version that the site is written for.
+/// mdbook version that the site supports.
 const MDBOOK: &str = "0.5.4";
 /// Installation folder of mdbook.
 const TOOLS: &str = "target/tools";
@@ -50,7 +50,7 @@ const TOOLS: &str = "target/tools";
 const SOURCE: &str = "target/book/source";
 pub(crate) const SITE: &str = "target/book/site";
 
-/// Documents in the order of a reader, by part; every document has its place.
+/// Documents in reading order, by part; every document must be listed.
 const PARTS: &[(&str, &[&str])] = &[
     ("Start", &["first-controller", "tour", "what-fits", "examples", "figures"]),
     ("Writing programs", &["language", "library", "fast-code", "scheduling", "editors", "playground"]),
@@ -87,7 +87,7 @@ pub(crate) fn book(arguments: &Arguments) -> Result<()> {
         copy(&root().join(web::PAGE), &site.join("playground"))?;
     }
     if !arguments.no_rustdoc {
-        // Document the libraries; packages for work on the project itself have no readers.
+        // Document the libraries only; packages for work on the project itself have no external users.
         let excluded = ["xtask", "unify", "takt-benches", "takt"];
         let excluded = excluded.iter().flat_map(|package| ["--exclude", package]);
         run(cargo().args(["doc", "--workspace", "--no-deps", "--lib", "--release"]).args(excluded))?;
@@ -100,7 +100,7 @@ pub(crate) fn book(arguments: &Arguments) -> Result<()> {
     if arguments.test { web::in_browser("test/book.test.mjs", &[("TAKT_BOOK", &site)]) } else { Ok(()) }
 }
 
-/// Inputs of the documents' check.
+/// Inputs of the documentation check.
 pub(crate) fn inputs() -> Result<Inputs> {
     let files = ["docs", "tools/xtask/src/book.rs", "tools/xtask/src/book/colour.rs"];
     files.iter().try_fold(Inputs::default().and(MDBOOK), |inputs, path| inputs.files(path))
@@ -121,7 +121,7 @@ fn mdbook() -> Result<PathBuf> {
         }
     }
     eprintln!("mdbook {MDBOOK} is missing: installing it into {TOOLS}");
-    // A debug build: mdbook runs for a second, so compile time dominates.
+    // A debug build: mdbook runs for only a second, so compile time dominates.
     let install = ["install", "mdbook", "--version", MDBOOK, "--locked", "--debug", "--root", TOOLS];
     run(cargo().args(install).args(["--no-default-features", "--features", "search"]))?;
     Ok(own)
@@ -135,7 +135,7 @@ fn write_source(docs: &Path, folder: &Path) -> Result<()> {
     for entry in std::fs::read_dir(docs).context("cannot read docs/")? {
         let path = entry?.path();
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        // The folder's index is left out: the book has its own.
+        // Skip the folder's index: the book has its own.
         let Some(stem) = name.strip_suffix(".md").filter(|stem| *stem != "README") else { continue };
         let text = std::fs::read_to_string(&path).with_context(|| format!("cannot read docs/{name}"))?;
         let title = text.lines().find_map(|line| line.strip_prefix("# ")).unwrap_or(stem).to_owned();
@@ -146,7 +146,7 @@ fn write_source(docs: &Path, folder: &Path) -> Result<()> {
         std::fs::write(chapters.join(&name), titled(&chapter(&name, &text, &chapters)?, &titles))?;
     }
     copy(&docs.join("pictures"), &chapters.join("pictures"))?;
-    // The site opens with the first chapter, which is for new readers.
+    // The site opens with the first chapter, which addresses new readers.
     let mut summary = "# Summary\n".to_owned();
     let mut contents = String::new();
     let mut put = |part: &str, chapters: Vec<(String, String)>| {
@@ -244,7 +244,7 @@ fn titled(text: &str, titles: &BTreeMap<String, String>) -> String {
     titles.iter().fold(text.to_owned(), link)
 }
 
-/// URL fragment with the program, as unpacked by `tools/web/page/src/link.js`.
+/// URL fragment that contains the program, unpacked by `tools/web/page/src/link.js`.
 fn fragment(program: &str) -> String {
     const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_";
     let mut text = "p1=".to_owned();

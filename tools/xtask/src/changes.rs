@@ -8,21 +8,21 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use takt_automation::command::root;
 
-/// Kinds of changes, by the beginning of a fragment's name, with their heading in the changelog.
+/// Kinds of changes: prefix of the fragment's name, and heading in the changelog.
 const KINDS: [(&str, &str); 3] = [("added", "Added"), ("changed", "Changed"), ("fixed", "Fixed")];
 const FOLDER: &str = "docs/changes";
 const CHANGELOG: &str = "CHANGELOG.md";
 /// Releases are inserted below this heading.
 const UNRELEASED: &str = "## Unreleased\n";
 
-/// A change since the last release, as a file.
+/// File that describes a change since the last release.
 struct Fragment {
     path: PathBuf,
     heading: &'static str,
     text: String,
 }
 
-/// Reads the fragments, sorted by name; a name without a kind and an empty fragment are errors.
+/// Reads the fragments, sorted by name; a name without a kind, or an empty fragment, is an error.
 fn fragments(root: &Path) -> Result<Vec<Fragment>> {
     let folder = root.join(FOLDER);
     let mut found = Vec::new();
@@ -49,7 +49,7 @@ pub(crate) fn check() -> Result<()> {
     fragments(&root()).map(drop)
 }
 
-/// Lists a release's changes by heading. A fragment that is no list becomes an entry.
+/// Lists a release's changes by heading. A fragment that is not a list becomes one entry.
 fn section(version: &str, date: &str, fragments: &[Fragment]) -> String {
     let mut text = format!("## {version} – {date}\n");
     for (_, heading) in KINDS {
@@ -69,7 +69,7 @@ fn section(version: &str, date: &str, fragments: &[Fragment]) -> String {
     text
 }
 
-/// Moves all fragments into the changelog, as the section of a version of today.
+/// Moves all fragments into a section of the changelog for `version`, dated today.
 pub(crate) fn release(version: &str) -> Result<()> {
     let date = Command::new("date").arg("+%Y-%m-%d").output().context("cannot start date")?;
     release_in(&root(), version, String::from_utf8_lossy(&date.stdout).trim())

@@ -18,12 +18,12 @@ use takt_rtl::{Library, axi, export, wishbone};
 
 /// Tools for the data sheet: pandoc as a wheel, and typst.
 const DATA_SHEET: [&str; 2] = ["pypandoc-binary==1.17", "typst==0.15.2"];
-/// Tools that read the core description.
+/// Tools that check the core description.
 const FUSESOC: [&str; 2] = ["edalize==0.6.8", "fusesoc==2.4.7"];
 
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
-/// Writes the archive of one machine, or of each, into a folder.
+/// Writes the archive of one machine, or of all machines, into a folder.
 pub(crate) fn archives(out: &Path, machine: Option<&str>) -> Result<()> {
     let is_wanted = |candidate: &&&Machine| machine.is_none_or(|name| name == candidate.name);
     let machines: Vec<&Machine> = MACHINES.iter().filter(is_wanted).copied().collect();
@@ -61,7 +61,7 @@ fn data_sheet(folder: &Path) -> Result<PathBuf> {
     Ok(sheet)
 }
 
-/// Writes the folder of one machine.
+/// Assembles the folder of one machine.
 fn package(machine: &'static Machine, folder: &Path, sheet: &Path) -> Result<PathBuf> {
     let package = folder.join(format!("takt-{}-{VERSION}", machine.name));
     if package.exists() {
@@ -159,7 +159,7 @@ targets:
     )
 }
 
-/// Writes the smallest machine's folder, runs its targets with FuseSoC, and compares its forces with binary64.
+/// Assembles the smallest machine's folder, runs its targets with FuseSoC, and compares the forces with binary64.
 pub(crate) fn test() -> Result<()> {
     let machine = MACHINES.iter().copied().min_by_key(|machine| machine.slots.len()).context("a machine")?;
     let folder = root().join("target/dist/test");

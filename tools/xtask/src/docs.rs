@@ -9,9 +9,9 @@ use takt_family::REFERENCE;
 
 /// TextMate grammar for editors without the language server.
 const GRAMMAR: &str = "tools/editors/vscode/syntaxes/takt.tmLanguage.json";
-/// Grammar from which tree-sitter's parser is generated.
+/// Grammar from which the tree-sitter parser is generated.
 const TREE_SITTER: &str = "tools/editors/tree-sitter-takt/src/grammar.json";
-/// The page of capacities, in block RAMs of the family that machines are measured on.
+/// Document of capacities, in block RAMs of the reference FPGA family.
 fn capacities() -> String {
     let parts = REFERENCE.parts.iter().rev();
     let devices: Vec<String> =
@@ -32,11 +32,11 @@ fn generated() -> [(&'static str, String); 7] {
     ]
 }
 
-/// Writes every generated file, or checks that it is current.
+/// Writes every generated file; with `check`, fails if one is stale.
 pub(crate) fn run(root: &Path, check: bool) -> Result<()> {
     let generated = generated().into_iter().map(|(path, contents)| (PathBuf::from(path), contents));
     let mut generated: BTreeMap<PathBuf, String> = generated.collect();
-    // Generated documents contain figures, too.
+    // Generated documents contain figures as well.
     generated.extend(crate::figures::documents(root, &generated)?);
     let stale = documents::update(generated, check)?;
     documents::fresh(&stale, "cargo xtask docs")

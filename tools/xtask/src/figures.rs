@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Measured figures in documents, each named by the comment after it: `112<!-- =tracking.t3.cycles -->`.
 //!
-//! The comment is invisible when rendered. Values are measured here: cycles, bounds and latencies by assembler, analysis and tables in this
-//! process; clocks and sizes are from the record of place and route. `cargo xtask docs` writes the figures; `--check` fails if one is
+//! The comment is invisible when rendered. Cycles, bounds and latencies are measured here, by assembler, analysis and tables in this
+//! process; clocks and sizes come from the record of place and route. `cargo xtask docs` writes the figures; `--check` fails if one is
 //! wrong.
 
 use anyhow::{Context, Result, bail, ensure};
@@ -17,10 +17,10 @@ use takt_rtl::synthesis;
 const OPEN: &str = "<!-- =";
 const CLOSE: &str = " -->";
 
-/// Clock for times in documents, MHz, equal to the clock of the founding paper's processor.
+/// Clock for times in documents, in MHz: that of the founding paper's processor.
 const CLOCK: f64 = 125.0;
 
-/// Programs with figures: name, and path from the project's folder.
+/// Programs with figures: name, and path relative to the project's folder.
 const PROGRAMS: [(&str, &str); 12] = [
     ("tracking", "programs/hybrid/tracking.s"),
     ("contracted", "programs/hybrid/tracking.s"),
@@ -39,7 +39,7 @@ const PROGRAMS: [(&str, &str); 12] = [
 /// Prefix of the program variant with contracted products and sums.
 const CONTRACTED: &str = "contracted";
 
-/// Documents with figures: path, and updated text. Some were generated before.
+/// Documents with figures: path, and updated text. Documents in `generated` are taken from there instead of from disk.
 pub(crate) fn documents(
     root: &Path,
     generated: &BTreeMap<PathBuf, String>,
@@ -68,7 +68,7 @@ pub(crate) fn documents(
     Ok(documents)
 }
 
-/// Measurements of a program on a machine.
+/// Measurements of one program on one machine.
 struct ProgramMeasurement {
     assembled: AssembledProgram,
     bounds: takt_analysis::Bounds,
@@ -96,7 +96,7 @@ impl Figures<'_> {
         Ok(filled + rest)
     }
 
-    /// Value of a figure: `PROGRAM.MACHINE.QUANTITY`, `MNEMONIC.MACHINE.latency`, or `circuit.DESIGN.QUANTITY`.
+    /// Looks up a figure: `PROGRAM.MACHINE.QUANTITY`, `MNEMONIC.MACHINE.latency`, or `circuit.DESIGN.QUANTITY`.
     fn value(&mut self, name: &str) -> Result<String> {
         let mut parts = name.splitn(3, '.');
         let [Some(what), Some(of), Some(quantity)] = [parts.next(), parts.next(), parts.next()] else {
@@ -126,7 +126,7 @@ impl Figures<'_> {
     }
 }
 
-/// Assembles a program as `takt asm` does, and bounds it as `takt bound` does.
+/// Assembles a program with the options of `takt asm`, and computes bounds as `takt bound` does.
 fn measure(
     root: &Path,
     path: &str,
@@ -148,7 +148,7 @@ fn quantity_of(measured: &ProgramMeasurement, quantity: &str) -> Result<String> 
     let section = bounds.sections.iter().find(|section| section.name == "period");
     let cycles = match section {
         Some(section) => section.cycles.worst,
-        // A program that halts, without periods.
+        // The program halts and has no periods.
         None => bounds.sections.iter().map(|section| section.cycles.worst).max().context("no section")?,
     };
     let late = || {
@@ -158,7 +158,7 @@ fn quantity_of(measured: &ProgramMeasurement, quantity: &str) -> Result<String> 
     Ok(match quantity {
         "cycles" => grouped(cycles),
         "us" => format!("{:.2}", cycles as f64 / CLOCK),
-        // Includes the refill after the `wait`, during which a tick may come.
+        // Includes the refill after the `wait`, during which a tick may arrive.
         "in_time" => grouped(section.context("it has no period")?.in_time.worst),
         "worst" => grouped(bounds.worst_period().context("it has no period")?),
         "once" => {
@@ -166,7 +166,7 @@ fn quantity_of(measured: &ProgramMeasurement, quantity: &str) -> Result<String> 
             grouped(once.context("it has no code that runs once")?.cycles.worst)
         }
         "best" => grouped(section.context("it has no period")?.cycles.best),
-        // Bound of the scheduled block, plus the section's cycles outside it.
+        // Bound of the scheduled block, plus the cycles of the section outside the block.
         "bound" => {
             let blocks = assembled.blocks.iter();
             let block = blocks.max_by_key(|block| block.cycles).context("no block is scheduled")?;
@@ -185,7 +185,7 @@ fn quantity_of(measured: &ProgramMeasurement, quantity: &str) -> Result<String> 
     })
 }
 
-/// Latency and initiation interval of the unit that executes an instruction.
+/// Latency or initiation interval of the unit that executes an instruction.
 fn unit(machine: &Machine, op: Op, quantity: &str) -> Result<String> {
     let (_, unit) = machine.host(op.row().function).context("the machine has no unit for it")?;
     match quantity {
@@ -233,7 +233,7 @@ fn grouped(number: u64) -> String {
 mod tests {
     use super::*;
 
-    /// A figure is replaced and all other text stays; a missing figure or an unknown name is an error.
+    /// Figures are replaced and all other text is kept; a missing figure or an unknown name is an error.
     #[test]
     fn figures_are_filled_in() {
         let mut figures = Figures { root: Path::new("."), measured: HashMap::new() };

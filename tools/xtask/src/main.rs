@@ -89,7 +89,7 @@ enum Task {
     Other(Vec<OsString>),
 }
 
-/// Commands that have moved, with their replacements.
+/// Commands that were moved, with their replacements.
 const MOVED: [(&str, &str); 11] = [
     ("formal", "cargo evidence formal"),
     ("mutants", "cargo evidence mutants"),
@@ -104,7 +104,7 @@ const MOVED: [(&str, &str); 11] = [
     ("spdx", "cargo xtask lint --fix"),
 ];
 
-/// Error of an unknown command.
+/// Error message for an unknown command.
 fn no_such(words: &[OsString]) -> Result<()> {
     let name = words.first().map(|word| word.display().to_string()).unwrap_or_default();
     match MOVED.iter().find(|(old, _)| *old == name) {
@@ -116,7 +116,7 @@ fn no_such(words: &[OsString]) -> Result<()> {
 fn main() -> ExitCode {
     match task(Arguments::parse().task) {
         Ok(()) => ExitCode::SUCCESS,
-        // Print the error chain only; locations in this program do not help users.
+        // Print only the error chain; source locations in this program do not help users.
         Err(error) => {
             eprintln!("error: {error:#}");
             ExitCode::FAILURE
@@ -149,7 +149,7 @@ fn task(task: Task) -> Result<()> {
     }
 }
 
-/// Writes or checks the generated documents.
+/// Writes the generated documents, or checks that they are current.
 fn docs(check: bool) -> Result<()> {
     progress::step("generated documents", || docs::run(&root(), check))
 }
@@ -165,8 +165,8 @@ fn extension() -> Result<()> {
     Ok(())
 }
 
-/// Tests the extension in VS Code's workbench, in the package code-server. Of its native modules only the terminal's is compiled, since
-/// tasks run in a terminal; all others would take minutes.
+/// Tests the extension in VS Code's workbench, provided by the package code-server. Of code-server's native modules, only the terminal's
+/// is compiled, which tasks need; the others would take minutes.
 fn workbench(screenshots: Option<&Path>) -> Result<()> {
     let folder = root().join("tools/editors/vscode/workbench");
     npm_install(&folder)?;
@@ -194,7 +194,7 @@ fn workbench(screenshots: Option<&Path>) -> Result<()> {
     run(&mut tests)
 }
 
-/// Runs the checks outside cargo's tests, and installs the packages that they need.
+/// Runs the checks outside cargo's tests, after installing the packages that they need.
 fn beside_tests(full: bool) -> Result<()> {
     progress::step("extension for VS Code", extension)?;
     check_cache::once("book", &book::inputs()?, full, || book::book(&book::Arguments::DOCUMENTS))?;
@@ -217,7 +217,7 @@ fn test(full: bool, rest: &[String]) -> Result<()> {
         install_for_tests()?;
         return run(cargo().arg("test").args(WORKSPACE).args(rest).envs(environment));
     }
-    // Compilation needs only a C compiler; installation and the checks outside cargo's tests run meanwhile.
+    // Compilation needs only a C compiler. Meanwhile, install programs and run the checks outside cargo's tests.
     if !works("cc", "--version") {
         install()?;
     }
@@ -248,7 +248,7 @@ fn lint() -> Result<()> {
     subjects()?;
     run(cargo().args(["fmt", "--all", "--check"]))?;
     run(cargo().arg("clippy").args(WORKSPACE).args(["--all-targets", "--", "-D", "warnings"]))?;
-    // `cargo run` compiles takt with fewer commands. Lint it without any feature, which also shows that isa, asm and emu build without C
+    // `cargo run` compiles takt with fewer commands. Lint it also without any feature, which shows that isa, asm and emu build without C
     // code (Berkeley SoftFloat).
     run(cargo().args(["clippy", "--release", "-p", "takt", "--", "-D", "warnings"]))?;
     deny()?;
@@ -256,7 +256,7 @@ fn lint() -> Result<()> {
     docs(true)
 }
 
-/// Checks the dependencies by deny.toml; prints the checks that are impossible here.
+/// Checks the dependencies against deny.toml; prints which checks cannot run here.
 fn deny() -> Result<()> {
     if !works("cargo-deny", "--version") {
         eprintln!(
@@ -278,9 +278,9 @@ fn deny() -> Result<()> {
     run(&mut deny(&["check", "advisories"]))
 }
 
-/// Maximal length of a commit's subject in columns.
+/// Maximum length of a commit's subject, in columns.
 const SUBJECT: usize = 72;
-/// Date from which the rule applies.
+/// Commits before this date are exempt.
 const SINCE: &str = "--since=2026-11-25T03:00:00Z";
 
 /// Checks the length of commits' subjects.

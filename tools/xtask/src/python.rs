@@ -8,16 +8,16 @@ use takt_automation::command::{Report, output};
 use takt_automation::command::{root, run};
 use takt_automation::venv::{MODELS, Venv};
 
-/// Wheel builder. (In the environment, `pip install .` would fetch another one.)
+/// Wheel builder, pinned. (`pip install .` would fetch another version.)
 pub(crate) const MATURIN: &str = "maturin==1.16.0";
-/// Packages of the tests in addition to [`MODELS`].
+/// Packages of the Python tests, in addition to [`MODELS`].
 const TESTS: [&str; 5] = [
     "numpy==2.4.6",
     "pytest==9.2.0",
     "mypy==2.4.1",
     // Used by the examples for plots.
     "matplotlib==3.11.2",
-    // Its motor, bridge and carrier close the loop of `programs/servo`.
+    // Provides motor, bridge and carrier for the closed loop of `programs/servo`.
     "motulator==0.5.0",
 ];
 
@@ -28,7 +28,7 @@ pub(crate) struct Arguments {
     out: PathBuf,
 }
 
-/// Builds the wheel in the profile of takt and the tests, so that common crates are compiled once.
+/// Builds the wheel in the cargo profile of takt and the tests, so that shared crates are compiled once.
 pub(crate) fn wheel(arguments: &Arguments) -> Result<()> {
     let wheel = build(&Venv::with(&[MATURIN])?, &root().join(&arguments.out), &[])?;
     println!("{}", wheel.display());

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Targets other than x86-64 Linux: tests of the core crates on aarch64 Linux in qemu, and compilation for all others.
+//! Targets other than x86-64 Linux: tests the core crates on aarch64 Linux in qemu, and compiles for all other targets.
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
@@ -24,7 +24,7 @@ struct Target {
     packages: &'static [&'static str],
 }
 
-/// The command with all its dependencies.
+/// The command `takt` with all its dependencies.
 const WHOLE: &[&str] = &["takt"];
 /// Packages that need no operating system.
 const LIBRARIES: &[&str] = &[
@@ -52,14 +52,14 @@ pub(crate) const WASM: &str = "wasm32-unknown-unknown";
 const AARCH64: &str = "aarch64-unknown-linux-gnu";
 /// Crates whose results must be bit-identical on every host.
 const TESTED: [&str; 4] = ["takt-isa", "takt-syntax", "takt-asm", "takt-emu"];
-/// Share of the random operands of a release test; qemu takes about fifty times as long for each.
+/// Share of a release test's random operands to run; qemu takes about fifty times as long for each.
 const SCALE: &str = "0.002";
 
-/// Origin of the targets' standard libraries.
+/// Source of the targets' standard libraries.
 pub(crate) enum Toolchain {
     /// Precompiled libraries from rustup.
     Rustup,
-    /// Library source of Debian, built with its compiler.
+    /// Debian's library source, built with Debian's compiler.
     Debian,
 }
 
@@ -67,7 +67,7 @@ const DEBIAN_RUSTC: &str = "/usr/bin/rustc";
 const DEBIAN_SOURCE: &str = "/usr/lib/rustlib/src/rust/library/std";
 
 impl Toolchain {
-    /// Selects the toolchain for these targets.
+    /// Selects a toolchain that supports these targets.
     pub(crate) fn find(triples: &[&str]) -> Result<Toolchain> {
         let mut rustup = Command::new("rustup");
         rustup.args(["target", "add"]).args(triples);
@@ -84,7 +84,7 @@ impl Toolchain {
         Ok(Toolchain::Debian)
     }
 
-    /// Cargo for a target. Output goes to a separate folder, since the compiler may differ from the project's.
+    /// Cargo command for a target. Output goes to a separate folder, since the compiler may differ from the project's.
     pub(crate) fn cargo(&self, subcommand: &str, triple: &str, folder: &str) -> Command {
         let mut command = cargo();
         command.args([subcommand, "--target", triple, "--target-dir", folder]);
@@ -92,7 +92,7 @@ impl Toolchain {
             // `-Zbuild-std` is unstable; RUSTC_BOOTSTRAP enables it on the stable compiler.
             command.env("RUSTC", DEBIAN_RUSTC).env("RUSTC_BOOTSTRAP", "1");
             command.arg("-Zbuild-std=std,panic_abort");
-            // Debian's compiler expects a linker that Debian lacks; use rustup's.
+            // Debian's compiler is configured for a linker that Debian lacks; use rustup's.
             if triple == WASM
                 && let Some(linker) = rust_lld()
             {
@@ -110,7 +110,7 @@ fn rust_lld() -> Option<PathBuf> {
     Some(folder.parent()?.join("bin/rust-lld")).filter(|path| path.exists())
 }
 
-/// Unoptimised compilation for a target: checks need no speed, and the standard library is compiled in any case.
+/// Compilation for a target without optimisation: checks need no speed, and the standard library may have to be compiled as well.
 fn plain(toolchain: &Toolchain, subcommand: &str, triple: &str) -> Command {
     let mut command = toolchain.cargo(subcommand, triple, "target/reach");
     command.env("CARGO_PROFILE_DEV_OPT_LEVEL", "0").env("CARGO_PROFILE_DEV_DEBUG", "0");
@@ -124,7 +124,7 @@ pub(crate) fn reach(arguments: &Arguments) -> Result<()> {
         let packages = packages.iter().flat_map(|package| ["-p", package]);
         let mut check = plain(&toolchain, "check", triple);
         if triple == AARCH64 && !arguments.check {
-            // The tests' profile: shares the standard library.
+            // Use the tests' profile, to share the compiled standard library.
             check.args(["--profile", "test"]);
         }
         run(check.args(packages)).with_context(|| triple.to_owned())?;

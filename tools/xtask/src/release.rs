@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Release: all downloads in one folder, with checksums.
+//! Release: collects all downloads in one folder, with checksums.
 
 use crate::book::{self, SITE};
 use crate::python;
@@ -11,9 +11,9 @@ use std::process::Command;
 use takt_automation::command::{EVERYTHING, apt_install, cargo, root, run, works};
 use takt_automation::venv::Venv;
 
-/// Python packages: cross-compilation with Zig, and a check of the wheel by the package index's rules.
+/// Packages for the wheel: cross-compilation with Zig, and a check against the package index's rules.
 const TOOLS: [&str; 4] = ["cargo-zigbuild==0.24.1", "ziglang==0.17.1", python::MATURIN, "twine==7.0.0"];
-/// maturin options for a wheel on glibc 2.17 and later, the oldest that Rust supports; Zig has its symbols.
+/// maturin options for a wheel on glibc 2.17 and later, the oldest that Rust supports; Zig ships its symbols.
 const MANYLINUX: [&str; 5] =
     ["--zig", "--compatibility", "manylinux2014", "--target", "x86_64-unknown-linux-gnu"];
 /// Targets of `takt` with a static C library, for any Linux.
@@ -42,7 +42,7 @@ pub(crate) struct Arguments {
     machine: Option<String>,
 }
 
-/// Part of a release: its name, and the function that writes its files into a folder.
+/// Part of a release: name, and the function that writes its files into a folder.
 type Artefact = (&'static str, fn(&Venv, &Path) -> Result<()>);
 
 const PARTS: [Artefact; 7] = [
@@ -80,7 +80,7 @@ pub(crate) fn release(arguments: &Arguments) -> Result<()> {
     sums(&out)
 }
 
-/// Builds `takt` for each target whose standard library rustup has.
+/// Builds `takt` for each target whose standard library is installed through rustup.
 fn binaries(venv: &Venv, out: &Path) -> Result<()> {
     for target in TARGETS {
         if run(Command::new("rustup").args(["target", "add", target])).is_err() {
@@ -111,7 +111,7 @@ fn binaries(venv: &Venv, out: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Builds the wheel, and checks its description as the package index does.
+/// Builds the wheel, and checks its description by the package index's rules.
 fn wheel(venv: &Venv, out: &Path) -> Result<()> {
     let wheel = python::build(venv, out, &MANYLINUX)?;
     run(Command::new(venv.tool("python3")).args(["-I", "-m", "twine", "check", "--strict"]).arg(wheel))
@@ -124,7 +124,7 @@ fn vsix(_: &Venv, out: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Archives the configurations of other editors, with tree-sitter's parser, which it generates.
+/// Archives the configurations of other editors, with the generated tree-sitter parser.
 fn editors(_: &Venv, out: &Path) -> Result<()> {
     let from = root().join("tools/editors");
     let mut generate = cargo();
@@ -145,7 +145,7 @@ fn editors(_: &Venv, out: &Path) -> Result<()> {
     dist::archive(&folder, &out.join(format!("takt-{VERSION}-editors.tar.gz")))
 }
 
-/// Builds the documentation site, and the playground by itself.
+/// Builds the documentation site, and the standalone playground.
 fn pages(_: &Venv, out: &Path) -> Result<()> {
     book::book(&book::Arguments::WHOLE)?;
     dist::archive(&root().join(SITE), &out.join(format!("takt-{VERSION}-book.tar.gz")))?;
@@ -157,8 +157,8 @@ fn circuit(_: &Venv, out: &Path) -> Result<()> {
     dist::archives(out, None)
 }
 
-/// Packages the libraries as for crates.io, without upload. Without compilation, too: Berkeley SoftFloat would then be built by CMake,
-/// which `isa/c99` avoids in the workspace.
+/// Packages the libraries as for crates.io, without upload. Skips compilation: it would build Berkeley SoftFloat by CMake, which
+/// `isa/c99` avoids in the workspace.
 fn crates(_: &Venv, _: &Path) -> Result<()> {
     run(cargo().args(["publish", "--workspace", "--dry-run", "--no-verify"]))
 }

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Checks `tools/unify`: the tests must find every crate compiled by takt with all features, by xtask, evidence and the wheel.
+//! Checks `tools/unify`: the tests must reuse every crate that takt with all features, xtask, evidence and the wheel compile.
 //!
-//! cargo-hakari generates such crates, but leaves out the workspace's own, whose features differ too, and takes minutes to install; cargo's
-//! build plan shows both kinds in a second.
+//! cargo-hakari generates such crates, but leaves out the workspace's own crates, whose features also differ, and takes minutes to
+//! install; cargo's build plan shows both kinds in a second.
 
 use anyhow::{Context, Result, bail};
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 use takt_automation::command::{EVERYTHING, cargo};
 
-/// Units of cargo's build plan, by package, target and mode, with their features.
+/// Units of cargo's build plan with their features, by package, target and mode.
 fn units(arguments: &[&str]) -> Result<BTreeMap<String, BTreeSet<String>>> {
     let mut command = cargo();
     command.args(arguments).args(["--release", "--unit-graph", "-Zunstable-options"]);
@@ -28,7 +28,7 @@ fn units(arguments: &[&str]) -> Result<BTreeMap<String, BTreeSet<String>>> {
 }
 
 /// # Errors
-/// If the tests would compile a crate again with other features: all its dependents would then be compiled twice.
+/// If the tests would compile a crate again with other features, and hence all its dependents.
 pub(crate) fn check() -> Result<()> {
     let tests = units(&["test", "--workspace", "--features", EVERYTHING])?;
     let mut again = Vec::new();
@@ -36,7 +36,7 @@ pub(crate) fn check() -> Result<()> {
         [("takt", &["--features", "full"][..]), ("xtask", &[]), ("evidence", &[]), ("takt-python", &[])]
     {
         for (unit, features) in units(&[&["build", "--package", package], features].concat())? {
-            // Intended difference: the wheel has no full-screen view.
+            // Intended difference: the wheel has no full-screen debugger.
             let is_meant =
                 package == "takt-python" && ["takt-debug", "unify"].iter().any(|name| unit.contains(name));
             let with = tests.get(&unit);

@@ -7,10 +7,10 @@ use std::process::Command;
 use takt_automation::SPDX;
 use takt_automation::command::{cargo, root};
 
-/// Files that must have the line. Test inputs of the assembler are exempt.
+/// Files that must have the licence line. Test inputs of the assembler are exempt.
 const FILES: [&str; 5] = ["*.rs", "*.v", "*.vh", "*.sv", "programs/*.s"];
 
-/// Files without the line.
+/// Lists the files without the line.
 fn lacking() -> Result<Vec<String>> {
     let mut git = Command::new("git");
     git.current_dir(root()).args(["ls-files", "-z", "--"]).args(FILES);
@@ -31,7 +31,7 @@ fn lacking() -> Result<Vec<String>> {
     Ok(lacking)
 }
 
-/// Inserts the line into a text: as the first, or in a program as the last, so that quoted line numbers stay valid.
+/// Inserts the line into a text: as the first line, or as the last line of a program, so that quoted line numbers stay valid.
 fn with_line(path: &str, text: &str) -> String {
     if !path.ends_with(".s") {
         return format!("// {SPDX}\n{text}");

@@ -2,8 +2,8 @@
 //! Test driver: one `cargo test --no-run` compiles all test binaries; their modules then run as jobs, each in its own process, in parallel
 //! on all cores, longest first.
 //!
-//! Cargo runs one binary after another, so that cores idle at the end of each. Here a crate's tests form one binary, because linking takes
-//! seconds, and several jobs, because running takes minutes.
+//! Cargo runs one binary after another, so that cores idle at the end of each. Here a crate's tests form one binary, because linking
+//! takes seconds, and several jobs, because running takes minutes.
 
 use anyhow::{Context, Result, bail, ensure};
 use serde_json::Value;
@@ -16,7 +16,7 @@ use takt_automation::command::{Report, cargo, output};
 use takt_automation::progress::{self, words};
 use takt_automation::test_program::{Program, WORKSPACE};
 
-/// Long jobs, longest first; started late, they would extend the whole run.
+/// Long jobs, longest first; if started late, they would extend the whole run.
 const FIRST: [&str; 16] = [
     "takt-board top",
     "takt-board system",
@@ -36,10 +36,10 @@ const FIRST: [&str; 16] = [
     "takt-programs library",
 ];
 
-/// Number of jobs listed with their times at the end.
+/// Number of slowest jobs listed at the end.
 const LISTED: usize = 12;
 
-/// A check with a textual report, whose tests can be counted.
+/// A check that returns a textual report, in which tests are counted.
 pub(crate) struct Job<'a> {
     name: String,
     run: Box<dyn FnOnce() -> Result<Report> + Send + 'a>,
@@ -82,7 +82,7 @@ pub(crate) fn compile(environment: &[(&'static str, &'static str)]) -> Result<Ve
     Ok(jobs)
 }
 
-/// Numbers of tests by outcome.
+/// Number of tests by outcome.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Count {
     passed: u64,
@@ -91,7 +91,7 @@ struct Count {
 }
 
 impl Count {
-    /// Sum over the summary lines of libtest and pytest.
+    /// Sums the summary lines of libtest and pytest.
     fn of(text: &str) -> Count {
         let is_number = |line: &str| line.split(' ').next().is_some_and(|word| word.parse::<u64>().is_ok());
         let is_count =
@@ -129,7 +129,7 @@ struct FinishedJob {
     is_passed: bool,
 }
 
-/// Jobs still to finish, for an estimate of the remaining time.
+/// Unfinished jobs, for an estimate of the remaining time.
 struct RemainingJobs {
     /// Previous duration of each job in seconds; `None` for a new job.
     jobs: BTreeMap<String, Option<f64>>,
@@ -158,13 +158,13 @@ impl RemainingJobs {
     }
 }
 
-/// Runs a job, and prints its outcome and the remaining work: a line, or on failure its whole output.
+/// Runs a job, and prints its outcome and the remaining work: one line, or on failure the whole output.
 fn finish(Job { name, run }: Job<'_>, to_go: &Mutex<RemainingJobs>) -> FinishedJob {
     let start = Instant::now();
     let report = run().unwrap_or_else(|error| Report { text: format!("{error:#}\n"), is_passed: false });
     let (time, mut count) = (start.elapsed(), Count::of(&report.text));
     if !report.is_passed && count.failed == 0 {
-        // The binary ended before its summary line.
+        // The binary crashed before its summary line.
         count.failed = 1;
     }
     let Count { passed, failed, .. } = count;
@@ -178,14 +178,14 @@ fn finish(Job { name, run }: Job<'_>, to_go: &Mutex<RemainingJobs>) -> FinishedJ
     to_go.jobs.remove(&name);
     println!("{said}");
     if !to_go.jobs.is_empty() {
-        // Standard error, so that standard output stays machine-readable.
+        // Print to standard error, so that standard output stays machine-readable.
         eprintln!("           {}", to_go.text());
     }
     drop(to_go);
     FinishedJob { name, time, count, is_passed }
 }
 
-/// Runs all jobs; the last line has the total numbers of tests.
+/// Runs all jobs; the last line states the total numbers of tests.
 ///
 /// # Errors
 /// If a job failed; the message lists the failed jobs.
@@ -247,7 +247,7 @@ mod tests {
         };
         let passes = || Job::command("one", shell("echo 'test result: ok. 3 passed; 0 failed; 0 ignored'"));
         assert!(run(vec![passes()]).is_ok());
-        // A crashed binary prints no summary.
+        // A crashed binary prints no summary line.
         let one = Job::command("two", shell("exit 3"));
         let to_go = Mutex::new(RemainingJobs::new(std::slice::from_ref(&one), 1));
         let crash = finish(one, &to_go);
@@ -271,7 +271,7 @@ mod tests {
         assert_eq!(of(&[("a", Some(500.0)), ("b", Some(2.0))]), "2 jobs, about 8 min to go");
     }
 
-    /// With `autotests = false` cargo finds no tests itself, and the compiler does not miss a file without a `mod`.
+    /// With `autotests = false`, cargo does not discover tests, and a file without a `mod` line is silently left out.
     #[test]
     fn every_test_file_is_a_module_of_its_crates_program() {
         let files =

@@ -27,7 +27,7 @@ pub(crate) const PAGE: &str = "target/playground";
 /// Build folder of the page.
 const TARGET: &str = "target/web";
 
-/// Cargo settings for a small page: optimisation for size, and link-time optimisation.
+/// Cargo settings for a small download: optimisation for size, and link-time optimisation.
 const SMALL: [&str; 9] = [
     "profile.release.opt-level=\"s\"",
     "profile.release.lto=\"fat\"",
@@ -52,7 +52,7 @@ pub(crate) fn web(arguments: &Arguments) -> Result<()> {
 pub(crate) fn build() -> Result<()> {
     let mut compile = Toolchain::find(&[WASM])?.cargo("build", WASM, TARGET);
     compile.args(["--release", "-p", "takt-web"]);
-    // The project's profile favours compile time; a page favours size. Hot crates keep their optimisation level.
+    // The project's profile favours compile time; the page favours size. Hot crates keep their optimisation level.
     for small in SMALL {
         compile.args(["--config", small]);
     }
@@ -67,7 +67,7 @@ pub(crate) fn build() -> Result<()> {
     Ok(())
 }
 
-/// Folder of the page, with its npm packages in pinned versions.
+/// Folder of the page, with npm packages in pinned versions.
 fn packages() -> Result<PathBuf> {
     if !works("node", "--version") || !works("npm", "--version") {
         apt_install(&["nodejs", "npm"])?;

@@ -12,17 +12,17 @@ use takt_benches::{DEEP, source};
 /// Argument that turns this program into a bare assembler: [`assemble`].
 pub(crate) const ALONE: &str = "assemble";
 
-/// Another assembler, with [`source`]'s mix of lines in its language: comments, blank lines, labels, constants, uses of a macro.
+/// Another assembler, and the mix of lines of [`source`] in its language: comments, blank lines, labels, constants, uses of a macro.
 struct OtherAssembler {
     command: &'static str,
-    /// Name in the document, before the version.
+    /// Name in the document, printed before the version.
     name: &'static str,
-    /// Description of the source's language.
+    /// Description of the source language.
     language: &'static str,
     arguments: &'static [&'static str],
-    /// Beginning of every source: definitions that the blocks use.
+    /// Start of every source: definitions that the blocks use.
     head: &'static str,
-    /// Twelve lines of a block, from its number.
+    /// Writes the twelve lines of a block, given the block's number.
     block: fn(usize) -> String,
     comment: &'static str,
     /// Lengths of the compared sources, in lines.
@@ -71,21 +71,21 @@ const OTHERS: [OtherAssembler; 2] = [
             )
         },
         comment: "; rest\n",
-        // About ten microseconds a line rule out a longer source.
+        // A longer source would take too long: this assembler needs about ten microseconds per line.
         lines: &[10_000, 100_000],
         is_here: true,
     },
 ];
 
 impl OtherAssembler {
-    /// First line of its `--version`; `None` if it is not installed or does not run here.
+    /// First line of the `--version` output; `None` if the assembler is not installed or does not run here.
     fn version(&self) -> Option<String> {
         let output = Command::new(self.command).arg("--version").output();
         let output = output.ok().filter(|output| output.status.success() && self.is_here)?;
         Some(String::from_utf8_lossy(&output.stdout).lines().next()?.to_owned())
     }
 
-    /// A source of this many lines.
+    /// A source with `lines` lines.
     fn source(&self, lines: usize) -> String {
         let mut text = self.head.to_owned();
         let (before, block) = (text.lines().count(), (self.block)(0).lines().count());

@@ -11,7 +11,7 @@ use takt_emu::Emulator;
 use takt_programs::hybrid::closed_loop::Inputs;
 use takt_rtl::{Library, export};
 
-/// Number of periods in lockstep.
+/// Periods in lockstep.
 const PERIODS: usize = 300;
 
 pub(crate) fn measure(text: &mut String) -> Outcome<()> {

@@ -9,12 +9,12 @@ use std::hint::black_box;
 use takt_emu::{Batch, Emulator};
 use takt_programs::hybrid::Controller;
 
-/// Number of samples of each side in a round.
+/// Samples of each side in a round.
 const SAMPLES: usize = 40;
 /// Periods in a sample: few, so that some samples are free of interruptions.
 const STRETCH: usize = 100;
 
-/// Measures the emulator, in turns with another build if given.
+/// Measures the emulator, alternating with another build if given.
 pub(crate) fn measure(text: &mut String, mut other: Option<&mut OtherBuild>) -> Outcome<()> {
     let inputs = recorded()?;
     let (program, registers) = tracking()?;

@@ -15,13 +15,13 @@ mod tracking;
 use std::time::Instant;
 
 type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
-/// A measurement that appends its part of the document.
+/// A measurement; appends its part of the document.
 type Measurement<'a> = &'a mut dyn FnMut(&mut String) -> Outcome<()>;
 
-/// Number of rounds of each comparison.
+/// Rounds of each comparison.
 const ROUNDS: usize = 5;
 
-/// Fastest sample of `work` in seconds; `work` receives the sample's number.
+/// Fastest of `samples` runs of `work`, in seconds; `work` receives the sample number.
 fn fastest(samples: usize, mut work: impl FnMut(usize)) -> f64 {
     let mut fastest = f64::INFINITY;
     for sample in 0..samples {
@@ -32,7 +32,7 @@ fn fastest(samples: usize, mut work: impl FnMut(usize)) -> f64 {
     fastest
 }
 
-/// Ratios, one per round.
+/// Ratios of a comparison, one per round.
 #[derive(Default)]
 struct Ratios(Vec<f64>);
 

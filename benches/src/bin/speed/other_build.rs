@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Comparison with another build of this program, which takes turns in measuring the emulator: shows a loss since the last release at once.
+//! Comparison with another build of this program: both measure the emulator in turn, which reveals a slowdown since the last release.
 
 use crate::{Outcome, Ratios};
 use std::path::{Path, PathBuf};
@@ -11,7 +11,7 @@ pub(crate) const AGAINST: &str = "--against";
 /// Emulator measurements of another build.
 pub(crate) struct OtherBuild {
     program: PathBuf,
-    /// Per row of the other build, by name: this build's ratios as multiples of the other's.
+    /// Rows that both builds measure, by name: this build's ratio divided by the other build's, one per round.
     rows: Vec<(String, Ratios)>,
 }
 
@@ -20,7 +20,7 @@ impl OtherBuild {
         OtherBuild { program: program.to_owned(), rows: Vec::new() }
     }
 
-    /// Lets the other build measure, and compares its rows with this build's rows of the round.
+    /// Runs the other build's measurement, and divides this build's rows of the round by it.
     ///
     /// # Errors
     /// If the other build cannot be started, fails, or lacks a row.
@@ -48,7 +48,7 @@ impl OtherBuild {
         Ok(())
     }
 
-    /// Comparison of a row as table cells: median and range.
+    /// Cells of a row: median and range of the comparison.
     pub(crate) fn text(&self, name: &str) -> String {
         let row = self.rows.iter().find(|(other, _)| other == name);
         row.map_or_else(String::new, |(_, ratios)| ratios.text())

@@ -9,7 +9,7 @@ use takt_programs::hybrid::{Controller, ports};
 use takt_programs::trajectory::Trajectory;
 use takt_programs::{AGH, SOURCES, gcode};
 
-/// Number of recorded periods.
+/// Recorded periods.
 pub(crate) const PERIODS: usize = 4000;
 
 /// Inputs recorded in closed loop with the binary64 controller.

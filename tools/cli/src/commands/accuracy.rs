@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The command `takt accuracy`: measured errors of the outputs against binary64 by source line, or proved bounds.
+//! The command `takt accuracy`: errors of the outputs against binary64, measured by source line or proved as bounds.
 
 mod bound_report;
 mod lines;
@@ -83,7 +83,7 @@ pub(crate) fn run(arguments: &Accuracy, color: bool, out: &mut Out) -> Result<()
     }
 }
 
-/// Proved error bounds of each core, from the ranges in its source.
+/// Prints proved error bounds of each core, from the ranges in its source.
 fn bounded(arguments: &Accuracy, application: &Application, out: &mut Out) -> Result<()> {
     let mut safe = true;
     let mut cores = Vec::new();
@@ -115,7 +115,7 @@ fn bounded(arguments: &Accuracy, application: &Application, out: &mut Out) -> Re
     if safe { Ok(()) } else { Err(Failure::Reported.into()) }
 }
 
-/// Measured errors of each core.
+/// Prints measured errors of each core.
 fn measured(
     arguments: &Accuracy,
     application: &Application,
@@ -137,7 +137,7 @@ fn measured(
     Ok(())
 }
 
-/// Heading of a core's results in a system.
+/// Prints the heading of a core's results in a system.
 fn title(application: &Application, core: usize, out: &mut Out) -> Result<()> {
     let Some(system) = application.system() else { return Ok(()) };
     let core_of = &system.description.cores[core];
@@ -146,7 +146,7 @@ fn title(application: &Application, core: usize, out: &mut Out) -> Result<()> {
     Ok(())
 }
 
-/// JSON of a program; of a system, an object of its cores' results by name.
+/// JSON of a program's results; for a system, an object with each core's results by name.
 fn whole_json(arguments: &Accuracy, application: &Application, cores: Vec<Value>) -> Value {
     let file = files::input_name(&arguments.file);
     match application.system() {
@@ -182,7 +182,7 @@ impl TableApplication for Shadowed<'_> {
         for &(register, bits) in row {
             self.emulator.set_input_bits(register, bits)?;
         }
-        // The code before the first `wait` reads the first period's inputs.
+        // The code before the first `wait` also reads the first period's inputs.
         for _ in 0..if self.once { 2 } else { 1 } {
             self.emulator.set_cycle_limit(self.emulator.now() + PERIOD_LIMIT);
             let goes_on = self.shadow.run_period(&mut self.emulator);
@@ -207,7 +207,7 @@ fn measure(arguments: &Accuracy, inputs: &Path, program: &Program) -> Result<Vec
     Ok(vec![shadowed.shadow])
 }
 
-/// Runs a system, then replays each core alone on its recorded inputs, with a binary64 shadow.
+/// Runs a system, then replays each core alone, with its recorded inputs and a binary64 shadow.
 fn measure_cores(arguments: &Accuracy, inputs: &Path, description: &Description) -> Result<Vec<Shadow>> {
     let mut run = SystemRun::new(description)?;
     run.observer = Observer::Recording(Recording::new(&mut run.system));

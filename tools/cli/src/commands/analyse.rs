@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The command `takt analyse`: cycle account of one period, bundle by bundle, with changes that would shorten it; of a system, the cycle
+//! The command `takt analyse`: cycle account of one period, bundle by bundle, and changes that would shorten it; for a system, the cycle
 //! account of each core.
 
 use crate::commands::accuracy::MeasurementReport;
@@ -119,7 +119,7 @@ fn of_program(arguments: &Analyse, loaded: &LoadedProgram, color: bool, out: &mu
     // With --html, print only after the page is written, so that its errors come first.
     let is_early = prints && arguments.html.is_none();
     if is_early {
-        // Print the account now: trying other machines takes far longer.
+        // Print the account first: trying other machines takes far longer.
         out.write_all(picture.account().as_bytes())?;
         out.flush()?;
     }
@@ -149,7 +149,7 @@ fn of_program(arguments: &Analyse, loaded: &LoadedProgram, color: bool, out: &mu
     Ok(())
 }
 
-/// Source text for --reassemble, if requested.
+/// Reads the source text for --reassemble, if requested.
 fn source_again(arguments: &Analyse) -> Result<Option<Vec<u8>>> {
     match arguments.reassemble {
         true if files::is_live(&arguments.file) => {
@@ -178,19 +178,19 @@ fn candidates(
     machines.par_iter().filter_map(candidate).collect()
 }
 
-/// Key of a machine: its address, since machines are unique.
+/// Address of a machine, which identifies it.
 fn address(machine: &'static Machine) -> usize {
     std::ptr::from_ref(machine).addr()
 }
 
-/// Inputs up to the analysed period.
+/// Reads the inputs up to the analysed period.
 fn read_inputs(arguments: &Analyse, program: &Program) -> Result<Rows> {
     let wanted = arguments.periods;
     if let Some(wanted) = wanted.filter(|wanted| *wanted > MOST_PERIODS) {
         bail!("{wanted} periods: at most {MOST_PERIODS} are run to reach the selected period");
     }
     let path = arguments.inputs.as_deref();
-    // The code before the first `wait` reads the first period's inputs.
+    // The code before the first `wait` also reads the first period's inputs.
     let most = wanted.map(|wanted| wanted.max(1)).or(path.map(|_| MOST_PERIODS));
     let rows = ports::rows(path, most, PERIODS, &program.inputs)?;
     if let (Some(path), Some(wanted)) = (path, wanted)

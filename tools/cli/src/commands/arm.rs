@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The command `takt arm`: kinematics of the six-axis arm on the paper's examples, random poses and a path.
+//! The command `takt arm`: kinematics of the six-axis arm for the paper's examples, random poses and a path.
 
 use crate::run::account::{fused_operations, rounding};
 use crate::run::fault;
@@ -69,7 +69,7 @@ Examples:
   takt arm --poses 1000000                      a million: the figures of the README
   takt arm --csv square.csv --plot square.svg   the tool along a square in space, through the inverse kinematics";
 
-/// Figures of the paper's circuits: steps at 50 MHz, and errors against Matlab.
+/// Figures of the paper's circuits: steps at 50 MHz, and errors relative to Matlab.
 const PAPER_FORWARD_STEPS: u64 = 215;
 const PAPER_INVERSE_STEPS: u64 = 269;
 const PAPER_FORWARD_MM: f64 = 0.0054;
@@ -77,7 +77,7 @@ const PAPER_FORWARD_DEG: f64 = 0.011;
 const PAPER_INVERSE_DEG: f64 = 0.022;
 const PAPER_ARM_CLOCK: f64 = 50.0;
 
-/// A program with its ports in the order of the kinematics' arguments.
+/// A program, with its ports in the order of the kinematics' arguments.
 struct PortedProgram {
     loaded: LoadedProgram,
     color: bool,
@@ -135,7 +135,7 @@ impl EmulatedKinematics {
             ([&POSE[..], &CONFIGURATION, &["status"]].concat(), [&JOINTS[..], &["status"]].concat());
         let ported = |path, inputs: &[&str], outputs: &[&str]| {
             let mut ported = PortedProgram::new(load.builtin(path)?, load.color, inputs, outputs)?;
-            // Run the code before the first `wait`, which belongs to no period.
+            // Run the code before the first `wait`, which is not part of a period.
             let zeros = vec![0; inputs.len()];
             ported.period(zeros.into_iter())?;
             anyhow::Ok(ported)
@@ -184,10 +184,10 @@ fn narrow_pose(pose: &Pose<f64>) -> Pose<f32> {
     Pose { position: narrow(pose.position), orientation: narrow(pose.orientation) }
 }
 
-/// Result of the square: joint angles computed by the program, and the tool's path.
+/// Result for the square: joint angles from the program, and the path of the tool.
 struct SquareResult {
     joints: Vec<[f32; 6]>,
-    /// Tool positions for these angles, mm.
+    /// Tool positions at these joint angles, mm.
     tool: Vec<[f64; 3]>,
     /// Largest deviation from the square, mm.
     deviation: f64,
@@ -267,7 +267,7 @@ pub(crate) fn run(arguments: &Arm, color: bool, out: &mut Out) -> Result<()> {
     Ok(())
 }
 
-/// Results of the paper's examples, by the programs and in binary64.
+/// Results of the paper's examples: from the programs, and in binary64.
 struct Examples {
     forward: ForwardResult,
     inverse: InverseResult,
@@ -289,7 +289,7 @@ struct Report<'a> {
     found: Sweep,
     examples: Examples,
     drawn: Option<SquareResult>,
-    /// Numbers of fused operations in the forward and the inverse program.
+    /// Number of fused operations in the forward and in the inverse program.
     fused: [usize; 2],
 }
 

@@ -125,7 +125,7 @@ impl From<TransformMode> for Schedule {
 }
 
 impl Asm {
-    /// Path of the image; `None` if no image is written.
+    /// Path of the image; `None` if no image is to be written.
     fn image_path(&self) -> Result<Option<PathBuf>> {
         let others = self.listing.is_some()
             || self.symbols.is_some()
@@ -264,14 +264,14 @@ pub(crate) fn run(arguments: &Asm, color: bool, out: &mut Out) -> Result<()> {
     Ok(())
 }
 
-/// Header of a program for a host, named after its source.
+/// Header of a program for a host, with a name derived from the source file.
 fn header(program: &Program, source: &Path) -> Header {
     let stem = source.file_stem().filter(|_| !files::is_dash(source));
     let name = stem.map_or_else(|| "program".into(), |stem| stem.to_string_lossy());
     Header::new(program, &name, takt_analysis::section_cycles(program))
 }
 
-/// Table of the schedules of all blocks with their bounds.
+/// Prints a table of all scheduled blocks with cycles and bounds.
 fn write_blocks(assembled: &AssembledProgram, out: &mut Out) -> Result<()> {
     let program = &assembled.program;
     let names: Vec<String> = assembled.blocks.iter().map(|block| block_name(program, block)).collect();
@@ -289,7 +289,7 @@ fn write_blocks(assembled: &AssembledProgram, out: &mut Out) -> Result<()> {
         left(3 + text, 4),
     ];
     let columns = Columns::new(&columns, out.page());
-    // If the terminal is too narrow for all bounds, show the decisive one with the cycles.
+    // If the terminal is too narrow for all bounds, show only the tightest, with the cycles.
     let is_short = columns.leave_out_some();
     let titles = ["scheduled", "operations", "bundles", "cycles", "bound", "above it", "   bounds"];
     let title = columns.row(&titles, None);
@@ -318,7 +318,7 @@ fn write_blocks(assembled: &AssembledProgram, out: &mut Out) -> Result<()> {
     Ok(())
 }
 
-/// Report on a pipelined loop: initiation interval and its bounds.
+/// Describes a pipelined loop: initiation interval, and its lower bounds.
 fn loop_text(report: &LoopReport, program: &Program) -> String {
     let place = report.location.map_or_else(|| "a loop".to_owned(), |at| program.place_text(at));
     let LoopReport { iterations, interval, stages, .. } = report;
@@ -331,13 +331,13 @@ fn loop_text(report: &LoopReport, program: &Program) -> String {
     )
 }
 
-/// Bounds of a loop's initiation interval in cycles: the most demanding slots and unit, and the longest chain from one iteration to the
-/// next.
+/// Lower bounds of a loop's initiation interval in cycles: from the most heavily used slots and unit, and from the longest dependence
+/// chain between iterations.
 fn loop_bounds(report: &LoopReport, program: &Program) -> Vec<(String, u32)> {
     let slots = report.bound.slots.iter().map(|&(slots, cycles)| (Resources::Slots(slots), cycles));
     let units =
         report.bound.units.iter().enumerate().map(|(unit, &cycles)| (Resources::Units(vec![unit]), cycles));
-    // Take the first of equal maxima.
+    // Of equal maxima, take the first.
     let slots = slots.rev().max_by_key(|(_, cycles)| *cycles);
     let units = units.rev().max_by_key(|(_, cycles)| *cycles);
     let resources =
@@ -345,7 +345,7 @@ fn loop_bounds(report: &LoopReport, program: &Program) -> Vec<(String, u32)> {
     resources.chain([("recurrence".to_owned(), report.bound.recurrence)]).collect()
 }
 
-/// Report on the demands on ports. All are met; an unmet demand is an error.
+/// Reports the demands on ports. All are met: an unmet demand is an error of the assembler.
 fn write_timing(assembled: &AssembledProgram, out: &mut Out) -> Result<()> {
     for report in &assembled.timing {
         let cycles = |(name, first, last): &(String, u32, u32)| match first == last {
@@ -359,7 +359,7 @@ fn write_timing(assembled: &AssembledProgram, out: &mut Out) -> Result<()> {
     Ok(())
 }
 
-/// Numbers of contracted products and sums, by instruction.
+/// Reports the numbers of contracted products and sums, by instruction.
 fn write_contractions(assembled: &AssembledProgram, out: &mut Out) -> Result<()> {
     let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
     for contraction in &assembled.contractions {
@@ -378,7 +378,7 @@ fn write_contractions(assembled: &AssembledProgram, out: &mut Out) -> Result<()>
     Ok(())
 }
 
-/// Operations whose slot does not write the bank of their destination, with the assembler's remedy.
+/// Reports operations whose slot does not write the bank of their destination, with the assembler's remedy.
 fn write_adjustments(assembled: &AssembledProgram, out: &mut Out) -> Result<()> {
     let adjustments = &assembled.adjustments;
     let Some(longest) = adjustments.iter().map(|one| one.register.chars().count()).max() else {
@@ -393,7 +393,7 @@ fn write_adjustments(assembled: &AssembledProgram, out: &mut Out) -> Result<()> 
     Ok(())
 }
 
-/// A demand, and by how much it is met.
+/// Describes a demand, and the margin by which it is met.
 fn timing_text(report: &TimingReport) -> (String, String) {
     match (report.kind, report.window) {
         (DemandKind::Deadline(cycle), _) => (format!("deadline {cycle}"), "met".to_owned()),
@@ -406,10 +406,10 @@ fn timing_text(report: &TimingReport) -> (String, String) {
     }
 }
 
-/// Bounds of a block: its critical path, and the most demanding slot, unit, and group of slots and units that share functions.
+/// Lower bounds of a block: its critical path, and the most heavily used slot, unit, and group of slots and units with shared functions.
 fn bounds_text(block: &BlockReport, program: &Program) -> String {
     let resources = resources(block);
-    // Take the first of equal maxima.
+    // Of equal maxima, take the first.
     let most = |kind: fn(&Resources) -> bool| {
         let found = resources.iter().rev().filter(|(of, _)| kind(of)).max_by_key(|(_, cycles)| *cycles);
         found.map_or(String::new(), |(of, cycles)| format!(", {} {cycles}", of.text(program.machine)))
@@ -427,7 +427,7 @@ fn bounds_text(block: &BlockReport, program: &Program) -> String {
     format!("chain {}{}{together}", block.bound.critical_path, kinds.map(most).concat())
 }
 
-/// Bound of each resource on a block: slots, units, then groups.
+/// Lower bound that each resource imposes on a block: slots, units, then groups.
 fn resources(block: &BlockReport) -> Vec<(Resources, u32)> {
     let bound = &block.bound;
     let slots = SlotIndex::all().zip(&bound.slots);
@@ -437,7 +437,7 @@ fn resources(block: &BlockReport) -> Vec<(Resources, u32)> {
     slots.chain(units).chain(shared).collect()
 }
 
-/// Description of the bound that decides.
+/// Description of the tightest bound.
 fn bound_text(block: &BlockReport, program: &Program) -> String {
     let bound = block.bound.cycles();
     if block.bound.critical_path == bound {

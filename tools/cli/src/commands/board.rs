@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The command `takt board`: boards, their pins, and builds of a program or system for them.
+//! The command `takt board`: boards and their pins, and builds of a program or a system for a board.
 
 #[cfg(unix)]
 mod external_host;
@@ -95,7 +95,7 @@ Example:
   takt board build --board ulx3s-85f --wiring axis.toml --program system.toml -o out   several cores
   openFPGALoader --board ulx3s out/takt.bit";
 
-/// Python environment with the tools: the folder `TAKT_VENV`, or one in the user's cache.
+/// Folder of the Python environment with the tools: `TAKT_VENV`, or a folder in the user's cache.
 pub(crate) fn tools_folder() -> Result<PathBuf> {
     Ok(match std::env::var_os("TAKT_VENV") {
         Some(folder) => PathBuf::from(folder),
@@ -122,7 +122,7 @@ pub(crate) struct Target {
     pub(crate) source: SourceArguments,
 }
 
-/// Maximal size of a board file or a wiring in bytes.
+/// Maximum size of a board file or a wiring in bytes.
 const LIMIT: usize = 1 << 20;
 
 /// Name and text of a file.
@@ -132,7 +132,7 @@ fn text(path: &Path) -> Result<(String, String)> {
     Ok((name, text))
 }
 
-/// Unwraps a result; the error prints all mistakes.
+/// Unwraps a result; the error contains all mistakes.
 fn right<T>(result: Result<T, Vec<Mistake>>, color: bool) -> Result<T> {
     result.map_err(|mistakes| {
         mistakes.iter().for_each(|mistake| output::error(&mistake.to_string(), color));
@@ -140,7 +140,7 @@ fn right<T>(result: Result<T, Vec<Mistake>>, color: bool) -> Result<T> {
     })
 }
 
-/// Board by name, or from a file.
+/// Finds a board by name, or reads it from a file.
 pub(crate) fn find(name: &str, color: bool) -> Result<Board> {
     if let Some(board) = Board::from_name(name) {
         return right(board, color);
@@ -155,7 +155,7 @@ pub(crate) fn find(name: &str, color: bool) -> Result<Board> {
 }
 
 impl Target {
-    /// Reads board, wiring and application, and checks that they match. For a simulation, missing every tick is no error.
+    /// Reads board, wiring and application, and checks that they match. In a simulation, a program that misses every tick is not an error.
     pub(crate) fn read(
         &self,
         color: bool,
@@ -183,7 +183,8 @@ impl Target {
     }
 }
 
-/// Checks that the numbers of a wiring match each other and the application's periods. `name` and `text` are the wiring's file.
+/// Checks that the numbers of a wiring are consistent with each other and with the application's periods. `name` and `text` are the
+/// wiring's file.
 fn fits(
     wiring: &Wiring,
     (name, text): (&str, &str),
@@ -204,7 +205,7 @@ fn fits(
     right(if mistakes.is_empty() { Ok(()) } else { Err(mistakes) }, color)
 }
 
-/// Parses a wiring, and finds its board by the given name, or else by the name in the wiring.
+/// Parses a wiring, and finds its board: the given one, or else the one that the wiring names.
 fn placed(name: &str, text: &str, board: Option<&str>, color: bool) -> Result<(Board, Wiring)> {
     let board = match board {
         Some(board) => board.to_owned(),
@@ -221,7 +222,7 @@ fn placed(name: &str, text: &str, board: Option<&str>, color: bool) -> Result<(B
     Ok((board, wiring))
 }
 
-/// Wiring from a file with its board, as in [`placed`].
+/// Reads a wiring file, and finds its board as [`placed`] does.
 pub(crate) fn wired(
     path: &Path,
     board: Option<&str>,
@@ -290,7 +291,7 @@ fn list(arguments: &List, color: bool, out: &mut Out) -> Result<()> {
             "",
             board.text,
             "",
-            // Each source gets a line, so that a terminal breaks none.
+            // Put each source on its own line, so that a terminal does not wrap them.
             board.source.replace("; ", &format!(",\n{:<19} ", ""))
         )?;
     }

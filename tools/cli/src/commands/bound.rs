@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The command `takt bound`: best and worst case of each section of each core, by static analysis; of a system, also the latencies from the
-//! host's inputs to its outputs.
+//! The command `takt bound`: best and worst case of each section of each core, by static analysis; for a system, also the latencies from
+//! the host's inputs to its outputs.
 
 mod groups;
 pub(crate) mod paths;
@@ -81,7 +81,7 @@ struct Verdict {
 }
 
 impl Verdict {
-    /// The tick of the next period must come after the issue of the `wait`.
+    /// The next period's tick comes after the `wait` has issued, even in the worst case.
     fn keeps_tick(&self) -> bool {
         self.worst < self.deadline
     }
@@ -111,7 +111,7 @@ pub(crate) fn run(arguments: &Bound, color: bool, out: &mut Out) -> Result<()> {
     if kept { Ok(()) } else { Err(Failure::Reported.into()) }
 }
 
-/// Writes the bounds of a program; returns whether they keep the deadline, if given.
+/// Writes the bounds of a program; returns whether they meet the deadline, if one is given.
 fn of_program(
     arguments: &Bound,
     program: &Program,
@@ -134,7 +134,7 @@ fn of_program(
     Ok(verdict.is_none_or(|verdict| verdict.keeps_tick()))
 }
 
-/// Writes the bounds of a system; returns whether every first response keeps the deadline, if given.
+/// Writes the bounds of a system; returns whether every first response meets the deadline, if one is given.
 fn of_system(
     arguments: &Bound,
     description: &Description,
@@ -148,7 +148,7 @@ fn of_system(
         bail!("a deadline, and no way leads from an input of the system to an output");
     }
     if !arguments.json {
-        // Bounds of the cores are printed even if the system has none.
+        // Print the bounds of the cores even if the system has none.
         write_cores(description, bounds, arguments.clock, out)?;
     }
     let ways = ways?;
@@ -161,7 +161,7 @@ fn of_system(
     Ok(deadline.is_none_or(kept))
 }
 
-/// Bounds of the sections, as JSON.
+/// Section bounds as JSON.
 pub(crate) fn sections_json(program: &Program, bounds: &Bounds) -> Value {
     let span = |span: Span| json!({ "best": span.best, "worst": span.worst });
     let section = |section: &SectionBounds| {
@@ -227,7 +227,7 @@ fn system_json(
     })
 }
 
-/// Bounds of the sections, as a table.
+/// Writes section bounds as a table.
 pub(crate) fn write_sections(program: &Program, bounds: &Bounds, clock: f64, out: &mut Out) -> Result<()> {
     let text = |span: Span| match span.best == span.worst {
         true => span.worst.to_string(),
@@ -255,7 +255,7 @@ pub(crate) fn write_sections(program: &Program, bounds: &Bounds, clock: f64, out
     Ok(())
 }
 
-/// Table of the sections of each core in a system.
+/// Writes a table of the sections of each core in a system.
 fn write_cores(description: &Description, bounds: &[Bounds], clock: f64, out: &mut Out) -> Result<()> {
     writeln!(out, "cycles, whatever the inputs")?;
     for (core, bounds) in description.cores.iter().zip(bounds) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The command `takt cc`: translates a step function in C to a program.
+//! The command `takt cc`: translates a step function in C into a program.
 
 use crate::terminal::files::{self, OptionPath, Out};
 use crate::terminal::output::Failure;

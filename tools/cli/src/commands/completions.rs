@@ -18,7 +18,7 @@ pub(crate) struct Completions {
 }
 
 pub(crate) fn run(completions: &Completions, out: &mut Out) -> Result<()> {
-    // clap_complete panics on write errors; a vector has none.
+    // clap_complete panics on write errors; writing to a vector cannot fail.
     let mut script = Vec::new();
     clap_complete::generate(completions.shell, &mut Arguments::command(), "takt", &mut script);
     Ok(out.write_all(&script)?)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The command `takt cosim`: a program or a system on circuit and emulator in lockstep.
+//! The command `takt cosim`: runs a program or a system on circuit and emulator in lockstep.
 
 use crate::run::application::Application;
 use crate::run::fault;
@@ -71,7 +71,7 @@ Examples:
   takt cosim --programs 10000 --machine t1         random programs
   takt cosim --seed 4711                           one of them again";
 
-/// Cycles in the waveform before and after a difference.
+/// Cycles shown in the waveform before and after a difference.
 const SHOWN: (u64, u64) = (64, 16);
 
 /// Default number of periods or base ticks without `--inputs`.
@@ -88,7 +88,7 @@ pub(crate) fn run(arguments: &Cosim, color: bool, out: &mut Out) -> Result<()> {
     }
 }
 
-/// A simulated circuit, and the application to run on it and on the emulator.
+/// A simulated circuit, and the application that runs on it and on the emulator.
 enum Pair<'a> {
     Program { program: &'a Program, design: Design },
     System { system: &'a LoadedSystem, design: Box<SystemDesign>, host: Host },
@@ -96,17 +96,17 @@ enum Pair<'a> {
 
 /// Result of a run without a difference.
 struct EqualRun {
-    /// Number of periods or base ticks.
+    /// Number of periods or of base ticks.
     rows: u64,
     cycles: u64,
     compared: u64,
-    /// Reason for an early end of the run.
+    /// Reason why the run ended early.
     stopped: Option<RunEnd>,
 }
 
 enum RunEnd {
     Halt,
-    /// A fault, with its core.
+    /// A fault, with the number of its core.
     Fault(usize, Fault),
 }
 
@@ -130,7 +130,7 @@ impl<'a> Pair<'a> {
             Pair::Program { design, .. } => core_simulation(design, waveform)?,
             Pair::System { design, .. } => {
                 let model = SystemModel::build(design, &takt_cache::folder()?, trace)?;
-                // The simulation runs in another folder: make the path absolute.
+                // The simulation runs in another folder, so make the path absolute.
                 let path = waveform.map(std::path::absolute).transpose()?;
                 let arguments: Vec<_> = path.iter().map(|path| path.as_os_str()).collect();
                 model.start(&design.image.text, &arguments)?
@@ -138,7 +138,7 @@ impl<'a> Pair<'a> {
         })
     }
 
-    /// Inputs of each period or base tick.
+    /// Inputs for each period or base tick.
     fn rows(&self, arguments: &Cosim) -> Result<Vec<Row>> {
         let (inputs, periods) = (arguments.inputs.as_deref(), arguments.periods);
         match self {
@@ -256,7 +256,7 @@ fn one(arguments: &Cosim, file: &Path, color: bool, out: &mut Out) -> Result<()>
             }
         }
     });
-    // Rows of a program are periods, rows of a system are base ticks.
+    // For a program, a row is a period; for a system, a base tick.
     let (of, name, rows, unit, compared) = match &pair {
         Pair::Program { program, .. } => {
             ("machine", program.machine.name.to_owned(), "periods", "periods", "events")
@@ -370,14 +370,14 @@ fn many(arguments: &Cosim, out: &mut Out) -> Result<()> {
 /// A run with a difference.
 struct DifferingRun<'a> {
     arguments: &'a Cosim,
-    /// Machine or system, as a key and value of the JSON.
+    /// Machine or system, as key and value in the JSON.
     of: (&'static str, Value),
     /// Seed of a random program.
     seed: Option<u64>,
 }
 
 impl DifferingRun<'_> {
-    /// Reports the difference. `again` repeats the run for a waveform of these cycles.
+    /// Reports the difference. `again` repeats the run to write a waveform of these cycles.
     fn report(
         self,
         error: anyhow::Error,

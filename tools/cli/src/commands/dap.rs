@@ -34,13 +34,13 @@ pub(crate) fn run(arguments: &Dap, _color: bool, _out: &mut Out) -> Result<()> {
         return Ok(());
     };
     let listener = TcpListener::bind(address).with_context(|| format!("cannot listen on {address}"))?;
-    // With port 0 the system chooses a port.
+    // With port 0, the operating system chooses a port.
     message(&format!("listening on {}", listener.local_addr()?));
     loop {
         let (stream, _) = listener.accept().context("cannot take a client")?;
         let reader = stream.try_clone().context("cannot take a client")?;
         client(reader, &stream);
-        // Ends the reader of the other half, too.
+        // Also ends the reader of the other half.
         let _ = stream.shutdown(std::net::Shutdown::Both);
     }
 }
@@ -51,7 +51,7 @@ fn client(input: impl Read + Send + 'static, mut output: impl Write + Send) {
     let (requests, received) = unbounded::<Value>();
     let (sender, sent) = unbounded::<Option<Message>>();
     let (heard, complaints) = (Arc::clone(&control), sender.clone());
-    // Not joined: it may block on standard input forever.
+    // Do not join this thread: it may block on standard input forever.
     std::thread::spawn(move || {
         let mut input = BufReader::new(input);
         let lost = loop {
@@ -73,7 +73,7 @@ fn client(input: impl Read + Send + 'static, mut output: impl Write + Send) {
                 Err(WireError::Lost(text)) => break Some(text),
             }
         };
-        // End a run whose client is gone.
+        // Stop a run whose client is gone.
         heard.interrupt();
         if let Some(text) = lost {
             message(&format!("takt dap: {text}"));
@@ -81,7 +81,7 @@ fn client(input: impl Read + Send + 'static, mut output: impl Write + Send) {
     });
     std::thread::scope(|scope| {
         scope.spawn(move || {
-            // `None` is the last message.
+            // `None` ends the messages.
             for message in sent.iter().map_while(|message| message) {
                 if wire::write(&mut output, &message).is_err() {
                     return;
@@ -89,7 +89,7 @@ fn client(input: impl Read + Send + 'static, mut output: impl Write + Send) {
             }
         });
         dap::serve(&received, &sender, &control, &mut CommandLine);
-        // The reader still has a sender and may block on a silent client; end the writer explicitly.
+        // The reader still has a sender and may block on a silent client, so end the writer explicitly.
         let _ = sender.send(None);
     });
 }
@@ -104,7 +104,7 @@ struct Launch {
     debug: Debug,
 }
 
-/// Fields of a configuration with their options of `takt debug`, and their types.
+/// Fields of a configuration, with the corresponding options of `takt debug` and their types.
 const FIELDS: [(&str, &str, Kind); 8] = [
     ("machine", "--machine", Kind::Text),
     ("inputs", "--inputs", Kind::Text),
@@ -124,7 +124,7 @@ enum Kind {
     Switch,
 }
 
-/// Fields that editors add, or that the adapter reads itself.
+/// Fields that editors add, or that the adapter itself reads.
 const OTHERS: [&str; 17] = [
     "program",
     "cwd",
@@ -138,7 +138,7 @@ const OTHERS: [&str; 17] = [
     "preLaunchTask",
     "postDebugTask",
     "internalConsoleOptions",
-    // Address of an adapter on a socket: VS Code's field, and Emacs's with the host.
+    // Address of an adapter on a socket: VS Code's field, and Emacs's, which includes the host.
     "debugServer",
     "host",
     "serverReadyAction",
@@ -146,13 +146,13 @@ const OTHERS: [&str; 17] = [
     "suppressMultipleSessionWarning",
 ];
 
-/// Arguments of `takt debug` that correspond to a configuration.
+/// Translates a configuration to arguments of `takt debug`.
 fn arguments(configuration: &Value, folder: Option<&Path>) -> Result<Vec<String>, String> {
     let Some(fields) = configuration.as_object() else {
         return Err("a launch configuration is an object with `program`, or with `track`".to_owned());
     };
     let wrong = |name: &str, what: &str| format!("`{name}` in the launch configuration is {what}");
-    // Paths are relative to `cwd`, if given.
+    // Paths are relative to `cwd`, if it is given.
     let path = |text: &str| match folder {
         Some(folder) if track::builtin_names().all(|name| name != text) => {
             folder.join(text).display().to_string()
@@ -209,7 +209,7 @@ impl Launcher for CommandLine {
         let cwd = configuration["cwd"].as_str().map(PathBuf::from);
         let list = arguments(configuration, cwd.as_deref())?;
         let parsed = Launch::try_parse_from(&list).map_err(|error| {
-            // Only the first line applies; the rest refers to a command line that the user never typed.
+            // Keep the first line; the rest refers to a command line that the user never typed.
             let text = error.to_string();
             let text =
                 text.lines().take_while(|line| !line.starts_with("Usage:")).collect::<Vec<_>>().join("\n");

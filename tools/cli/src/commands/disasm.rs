@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The command `takt disasm`: source text of an image.
+//! The command `takt disasm`: writes an image as source text.
 
 use crate::run::load::Load;
 use crate::terminal::files;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The command `takt eval`: one operation on operands from standard input, in TestFloat's line format.
+//! The command `takt eval`: applies one operation to operands from standard input, in TestFloat's line format.
 
 use crate::commands::left_out;
 use crate::terminal::files::Out;
@@ -36,7 +36,7 @@ Examples:
   echo 3F800000 00000000 | takt eval fdiv   1 / 0: prints 7F800000 08, divide by zero
   testfloat_gen f32_mul | takt eval fmul    TestFloat's operands";
 
-/// Maximal length of a line in bytes.
+/// Maximum length of a line in bytes.
 const LINE_LIMIT: usize = 1 << 20;
 const CHUNK: usize = 1 << 16;
 
@@ -60,7 +60,7 @@ pub(crate) fn run(arguments: &Eval, out: &mut Out) -> Result<()> {
     stream(row, |[a, b, c]| evaluate(row.op, a, b, c), out)
 }
 
-/// Applies `evaluate` to each line of standard input. Each chunk of input is answered at once, as a chunk.
+/// Applies `evaluate` to each line of standard input. Answers are written as soon as each chunk of input is processed.
 fn stream(row: &Row, evaluate: impl Fn([u32; 3]) -> Value, out: &mut Out) -> Result<()> {
     let mut input = std::io::stdin().lock();
     let (mut buffer, mut filled, mut line) = (vec![0; 2 * CHUNK], 0, 1u64);
@@ -74,7 +74,7 @@ fn stream(row: &Row, evaluate: impl Fn([u32; 3]) -> Value, out: &mut Out) -> Res
         };
         filled += read;
         let is_end = read == 0;
-        // Process whole lines; at the end of input, the rest is a line.
+        // Process complete lines; at the end of input, the remainder counts as a line.
         let (mut done, mut text) = (0, Vec::with_capacity(CHUNK));
         while done < filled {
             let rest = &buffer[done..filled];
@@ -93,7 +93,7 @@ fn stream(row: &Row, evaluate: impl Fn([u32; 3]) -> Value, out: &mut Out) -> Res
                     text.push(b'\n');
                 }
                 Err(reason) => {
-                    // Answer the preceding lines first.
+                    // Write the answers to preceding lines first.
                     out.write_all(&text)?;
                     return Err(anyhow!("standard input:{line}: {reason}"));
                 }

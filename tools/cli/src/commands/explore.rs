@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The command `takt explore`: searches machines on which given programs are fast and whose circuits are small.
+//! The command `takt explore`: searches for machines on which given programs run fast and whose circuits are small.
 
 mod front;
 mod moves;
@@ -98,9 +98,9 @@ Examples:
   takt explore a.s --route 3 --seeds 5         place and route the three fastest
   takt explore a.s --hq-server ~/server        on the workers of a HyperQueue server";
 
-/// Maximal number of rows in a search: each has a few dozen neighbours, and a process holds 16,384 rows.
+/// Maximum number of rows in a search: each has a few dozen neighbours, and one process can hold 16,384 rows.
 const MOST: u64 = 5000;
-/// Maximal number of rows whose neighbours are tried, some 60 each.
+/// Maximum number of rows whose neighbours are evaluated, about 60 each.
 const EXPANDED: usize = 200;
 
 /// Resource limits of a machine.
@@ -111,7 +111,7 @@ struct Budget {
     multipliers: Option<u64>,
 }
 
-/// Parses a budget, for clap.
+/// Parses a budget, as a value parser for clap.
 fn budget(text: &str) -> Result<Budget, String> {
     let mut budget = Budget::default();
     for part in text.split(',').map(str::trim).filter(|part| !part.is_empty()) {
@@ -139,7 +139,7 @@ impl Budget {
     }
 }
 
-/// Set by Ctrl-C: end the search.
+/// Set by Ctrl-C to end the search.
 static STOPPED: AtomicBool = AtomicBool::new(false);
 
 /// State of a search.
@@ -148,14 +148,14 @@ struct Search<'a> {
     estimator: Estimator,
     /// Contents of the program files.
     programs: Vec<(&'a Path, Vec<u8>)>,
-    /// Hash key of everything but the row that results depend on.
+    /// Hash key of everything that results depend on, except the row.
     key: String,
     workers: Workers,
     kept: Mutex<ResultCache>,
     bar: DelayedProgress,
-    /// Number of rows tried.
+    /// Number of rows evaluated.
     tried: u64,
-    /// Minima over the machines that run the programs: LUT4, block RAMs, multipliers, and the cycles of the longest period.
+    /// Minima over the machines that run all programs: LUT4, block RAMs, multipliers, and cycles of the longest period.
     least: Option<[u64; 4]>,
     all: Vec<Candidate>,
 }
@@ -199,7 +199,7 @@ pub(crate) fn run(arguments: &Explore, color: bool, out: &mut Out) -> Result<()>
 }
 
 impl Search<'_> {
-    /// Tries the initial machines, then their neighbours, then the neighbours of machines in the front, first found first.
+    /// Evaluates the initial machines, then their neighbours, then the neighbours of machines on the front, in the order found.
     fn run(&mut self, start: &[&'static Machine], color: bool) -> Result<()> {
         let mut seen: HashSet<&'static str> = start.iter().map(|machine| machine.name).collect();
         for machine in start {
@@ -229,7 +229,7 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// Tries machines in parallel. Those within budget and deadline become candidates; returns all that run the programs.
+    /// Evaluates machines in parallel. Those within budget and deadline become candidates; returns all that run the programs.
     fn evaluate(&mut self, machines: Vec<&'static Machine>) -> Result<Vec<Candidate>> {
         if self.workers.uses_processes() {
             self.ask(&machines)?;
@@ -254,19 +254,19 @@ impl Search<'_> {
         Ok(good)
     }
 
-    /// Lets workers compute the unknown cycles of rows, and stores them.
+    /// Computes the unknown cycles of rows on the workers, and stores them.
     fn ask(&mut self, machines: &[&'static Machine]) -> Result<()> {
         let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         let rows: Vec<String> = machines.iter().map(|machine| machine.to_toml()).collect();
         let rows: Vec<String> = rows.into_iter().filter(|row| kept.find(row).is_none()).collect();
         let bar = &self.bar;
-        // Progress counts rows when they become candidates.
+        // The progress bar counts rows when they become candidates.
         let found = units::cycles(&self.workers, &self.key, &rows, &STOPPED, &mut |_| bar.add(0))?;
         rows.into_iter().zip(found).for_each(|(row, cycles)| kept.add(row, cycles));
         Ok(())
     }
 
-    /// Machine with its cycles; `None` if a program does not fit, or the search is stopped.
+    /// Candidate for a machine, with its cycles; `None` if a program does not fit, or the search was stopped.
     fn candidate(&self, machine: &'static Machine) -> Option<Candidate> {
         if is_stopped() {
             return None;
@@ -283,7 +283,7 @@ impl Search<'_> {
         Some(Candidate::new(machine, cycles?, self.estimator.estimate(machine).ok()?))
     }
 
-    /// Error that explains why no initial machine runs the programs.
+    /// Error that states why no initial machine runs the programs.
     fn misfit(&self, machine: &'static Machine, color: bool) -> anyhow::Error {
         for (path, bytes) in &self.programs {
             let name = files::input_name(path);
@@ -371,7 +371,7 @@ impl Search<'_> {
     }
 
     fn table(&self, front: &[&Candidate], out: &mut Out) -> Result<()> {
-        // Cycles of several programs are shown side by side.
+        // Show the cycles of several programs side by side.
         let cycles = |one: &&Candidate| one.cycles.iter().map(u64::to_string).collect::<Vec<_>>().join("+");
         let widest = front.iter().map(|one| cycles(one).len() + 2).max().unwrap_or(0).max(8);
         let columns = [
@@ -419,7 +419,7 @@ impl Search<'_> {
     fn csv(&self, front: &[&Candidate]) -> String {
         let mut text = "machine,time_us".to_owned();
         for name in self.names() {
-            // A quoted name may contain commas.
+            // Quote the name, which may contain commas.
             text += &format!(",\"cycles of {}\"", name.replace('"', "\"\""));
         }
         text += ",mhz,luts,block_rams,multipliers,slots\n";
@@ -440,7 +440,7 @@ fn load(arguments: &Explore, machine: &'static Machine, color: bool) -> Load {
     Load { effort: arguments.effort, ..Load::new(machine, color).with(&arguments.source) }
 }
 
-/// Cycles of the second period, as in `takt analyse`; without a second period, from reset to the end.
+/// Cycles of the second period, as in `takt analyse`; if there is none, cycles from reset to the end.
 fn cycles(arguments: &Explore, (path, bytes): &(&Path, Vec<u8>), machine: &'static Machine) -> Option<u64> {
     let program = load(arguments, machine, false).assemble_quietly(path, bytes.clone()).ok()?.program;
     let has_period = program.sections.iter().any(|section| section.name == "period");
@@ -456,7 +456,7 @@ fn is_stopped() -> bool {
     STOPPED.load(Ordering::Relaxed)
 }
 
-/// Relative errors of the estimates on placed and routed machines.
+/// Prints the relative errors of the estimates for placed and routed machines.
 fn errors(calibration: &[Calibration], out: &mut Out) -> Result<()> {
     let off = |placed: f64, estimate: f64| format!("{:+.0} %", (estimate / placed - 1.0) * 100.0);
     writeln!(

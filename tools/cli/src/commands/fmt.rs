@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The command `takt fmt`: lays out sources.
+//! The command `takt fmt`: formats sources.
 
 use crate::run::load::Load;
 use crate::terminal::files::{self, Out};
@@ -35,7 +35,7 @@ pub(crate) fn run(arguments: &Fmt, out: &mut Out) -> Result<()> {
         return Err(Failure::Usage("standard input cannot be among other files".to_owned()).into());
     }
     let mut sources = Vec::with_capacity(arguments.files.len());
-    // Read all files before any is written.
+    // Read all files before writing any.
     for path in &arguments.files {
         let name = files::input_name(path);
         let Ok(text) = String::from_utf8(Load::source(path)?) else { bail!("{name} is not UTF-8 text") };

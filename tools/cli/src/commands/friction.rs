@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The option `takt track --fit-friction`: friction identified in a run, as a table and as source lines.
+//! The option `takt track --fit-friction`: friction identified from a run, as a table and as source lines.
 
 use anyhow::{Result, bail};
 use serde_json::{Value, json};
@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 use takt_programs::hybrid::identify::{FEWEST, Fit, RANGE, SETTLE, WINDOW};
 use takt_programs::hybrid::params::SAMPLE_TIME;
 
-/// Per axis: name, units, and the registers of friction and velocity in tracking_friction.s.
+/// For each axis: name, units, and the registers of friction and velocity in tracking_friction.s.
 const AXES: [(&str, &str, &str, &str); 5] = [
     ("arm 1", "N, m/s", "f1", "v1d"),
     ("arm 2", "N, m/s", "f2", "v2d"),
@@ -23,7 +23,7 @@ pub(crate) struct Friction {
 }
 
 impl Friction {
-    /// Collects the fits; fails if an axis moved too little along the path for a fit.
+    /// Collects the fits; fails if an axis moved too little along the path to be fitted.
     pub(crate) fn new(windows: usize, fits: [Option<Fit>; 5], path: &str) -> Result<Friction> {
         let ms = |periods: u32| f64::from(periods) * SAMPLE_TIME * 1e3;
         let mut all = Vec::new();
@@ -44,7 +44,7 @@ impl Friction {
         }
     }
 
-    /// Table of the parameters, and the source lines.
+    /// Writes a table of the parameters, and the source lines.
     pub(crate) fn text(&self, of: &str, out: &mut String) {
         let _ = writeln!(
             out,
@@ -81,14 +81,14 @@ impl Friction {
     }
 }
 
-/// Parameters Fc, Fs, vs, v0, Fv.
+/// Values of the parameters Fc, Fs, vs, v0, Fv.
 fn parameters(fit: &Fit) -> [String; 5] {
     let friction = fit.friction;
     let vs = if friction.stribeck == 0.0 { 1.0 } else { friction.stribeck_speed };
     [friction.coulomb, friction.stribeck, vs, friction.sign_speed, friction.viscous].map(short)
 }
 
-/// Number with four significant digits.
+/// Formats a number with four significant digits.
 fn short(value: f64) -> String {
     if value == 0.0 {
         return "0".to_owned();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The command `takt isa`: instructions of the specification, as text and as JSON.
+//! The command `takt isa`: lists the instructions of the specification, as text or JSON.
 
 use crate::terminal::files::{self, Out};
 use crate::terminal::options;

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Commands left out of this build to halve its compile time. Each remains in the help, with the feature that adds it.
+//! Commands left out of this build to halve its compile time. The help still lists them, with the feature that adds each.
 
 use crate::terminal::output::Failure;
 use anyhow::Result;
 
-/// Error of a command whose feature is not in this build.
+/// Error of a command whose feature is missing in this build.
 pub(crate) fn left_out(feature: &str) -> Result<()> {
     let text = format!(
         "this build of takt has no feature `{feature}`: `cargo install --path tools/cli --all-features` installs takt with all of \
@@ -13,7 +13,7 @@ pub(crate) fn left_out(feature: &str) -> Result<()> {
     Err(Failure::Usage(text).into())
 }
 
-/// Substitute for a module of a missing feature: accepts any arguments, and reports the feature when run.
+/// Replaces the module of a missing feature: accepts any arguments, and names the feature when run.
 macro_rules! module {
     ($feature:literal, $module:ident, $($arguments:ident by $run:ident),+) => {
         #[cfg(not(feature = $feature))]

@@ -36,7 +36,7 @@ pub(crate) struct Lsp {
     stdio: bool,
 }
 
-/// Folder for copies of library files that an editor opens.
+/// Folder for copies of library files that are opened in an editor.
 fn library_folder() -> Option<PathBuf> {
     Some(takt_cache::folder().ok()?.join("library"))
 }
@@ -55,10 +55,10 @@ pub(crate) fn run(arguments: &Lsp, _color: bool, _out: &mut Out) -> Result<()> {
     let (to_server, from_client) = crossbeam_channel::unbounded();
     let (to_client, from_server) = crossbeam_channel::unbounded();
     let connection = Connection { sender: to_client, receiver: from_client };
-    // Two threads write: answers, and complaints about malformed messages.
+    // Two threads write here: answers, and reports of malformed messages.
     let out = std::sync::Arc::new(Mutex::new(io::stdout()));
     let for_reader = std::sync::Arc::clone(&out);
-    // The reader ends with its stream, or with the process.
+    // The reader ends with its stream or with the process.
     std::thread::spawn(move || {
         let mut stdin = io::stdin().lock();
         loop {
@@ -101,7 +101,7 @@ pub(crate) fn run(arguments: &Lsp, _color: bool, _out: &mut Out) -> Result<()> {
     });
     let in_order = lsp::serve(&connection, settings);
     drop(connection);
-    // Let the writer finish the last answer.
+    // Let the writer finish the last answer before the process ends.
     let _ = writer.join();
     let _ = io::stdout().flush();
     if in_order { Ok(()) } else { Err(Failure::Reported.into()) }

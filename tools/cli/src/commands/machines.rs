@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The command `takt machines`: machines of the specification, as text and as JSON.
+//! The command `takt machines`: lists the machines of the specification, as text or JSON.
 
 use crate::terminal::files::{self, Out};
 use crate::terminal::options;

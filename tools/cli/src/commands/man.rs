@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The command `takt man`: manual pages.
+//! The command `takt man`: writes manual pages.
 
 use crate::Arguments;
 use crate::terminal::files::Out;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Commands with their options, one module each; code shared by several commands is in `run` and `terminal`.
+//! Commands with their options, one module each; code that several commands share is in `run` and `terminal`.
 
 pub(crate) mod accuracy;
 pub(crate) mod analyse;

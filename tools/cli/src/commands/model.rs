@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The command `takt model`: generates a program in equations from a robot's description, another tool's expressions, or a control problem.
+//! The command `takt model`: generates a program in equations from a robot description, expressions of another tool, or a control problem.
 
 mod memory_sizes;
 mod mpc;
@@ -205,9 +205,9 @@ fn angle(text: &str) -> Result<f64, String> {
 /// Cycles of a period, as in `takt bound`.
 #[derive(Clone, Copy)]
 struct Cycles {
-    /// Worst case with a timely tick, even right after the `wait`.
+    /// Worst case if the tick comes in time, possibly right after the `wait`.
     worst: Cycle,
-    /// Worst case if the machine already waits for the tick, which comes at least `refill` cycles after the `wait`.
+    /// Worst case if the machine is already waiting for the tick, which comes at least `refill` cycles after the `wait`.
     waiting: Cycle,
     refill: u32,
 }
@@ -219,7 +219,7 @@ impl Cycles {
         Cycles { worst: bounds.worst_period().unwrap_or(0), waiting, refill: program.machine.refill }
     }
 
-    /// Text with both numbers, for a machine of this name.
+    /// Describes both numbers, for a machine of this name.
     fn on(self, machine: &str) -> String {
         let Cycles { worst, waiting, refill } = self;
         match worst == waiting {
@@ -233,7 +233,7 @@ impl Cycles {
     }
 }
 
-/// Figures of the source on the machine.
+/// Figures of a source on its machine.
 struct SourceFigures {
     cycles: Cycles,
     bound: Cycle,
@@ -294,7 +294,7 @@ pub(crate) fn run(arguments: &Model, color: bool, out: &mut Out) -> Result<()> {
     let name = name.unwrap_or_else(|| PathBuf::from("model.s"));
     let load = Load::new(machine, color);
     let assembled = |source: String| built(&load.finish(load.assemble(&name, source.into_bytes()))?);
-    // A body has the cycles of the equivalent program, if the machine can have that program.
+    // A body takes the cycles of the equivalent program, provided that the machine can run it.
     let built = match Layout::program(&function, machine) {
         Ok(alone) if arguments.body => Some(assembled(sink::source(&function, &alone))?),
         Err(_) => None,
@@ -314,12 +314,12 @@ pub(crate) fn run(arguments: &Model, color: bool, out: &mut Out) -> Result<()> {
     Ok(())
 }
 
-/// Decoded text of a file.
+/// Reads a file and decodes its text.
 fn decoded(path: &Path, most: usize) -> Result<DecodedText> {
     decode(files::read(path, most)?).map_err(|why| anyhow!("{}: {why}", files::input_name(path)))
 }
 
-/// Loader of files named in a file, relative to its folder.
+/// Loader for files that another file names, relative to its folder.
 fn folder_loader(path: &Path, most: usize) -> impl Fn(&str) -> Result<String, String> {
     let folder = path.parent().unwrap_or(Path::new("")).to_owned();
     move |name| {
@@ -327,12 +327,12 @@ fn folder_loader(path: &Path, most: usize) -> impl Fn(&str) -> Result<String, St
     }
 }
 
-/// Extension of a file in lower case.
+/// Lower-case extension of a file.
 fn ending(path: &Path) -> Option<String> {
     path.extension().map(|ending| ending.to_string_lossy().to_lowercase())
 }
 
-/// Rejects --body for models that become whole programs with arrays, sections and their own machine.
+/// Rejects --body for models that become complete programs, with arrays, sections and a machine.
 fn no_body(arguments: &Model, content: &str) -> Result<()> {
     if !arguments.body {
         return Ok(());
@@ -363,7 +363,7 @@ fn for_robots(arguments: &Model, content: &str) -> Result<()> {
     }
 }
 
-/// The function that the arguments request.
+/// Function to generate, from the arguments.
 fn function(arguments: &Model, delays: &Delays) -> Result<Function> {
     let path = &arguments.file;
     let name = files::input_name(path);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The option `takt track --monte-carlo`: many varied robots, each with the tracking program as its controller.
+//! The option `takt track --monte-carlo`: many varied robots, each controlled by the tracking program.
 
 use crate::commands::report::variant;
 use crate::run::cache::SELF;
@@ -30,13 +30,13 @@ use takt_programs::hybrid::ports::INPUTS;
 use takt_programs::hybrid::{Binding, Outputs, Robot, Spread};
 use takt_programs::trajectory::Trajectory;
 
-/// Maximal size of a spread file in bytes.
+/// Maximum size of a spread file in bytes.
 const SPREAD_LIMIT: usize = 1 << 20;
-/// Requirement of the paper on the tool error, m.
+/// The paper's requirement on the tool error, m.
 const REQUIREMENT: f64 = 10e-6;
-/// Number of robots in the list of the worst.
+/// Number of robots in the list of the worst ones.
 const WORST: usize = 5;
-/// Quantiles shown, in percent.
+/// Reported quantiles, in percent.
 const QUANTILES: [f64; 6] = [5.0, 25.0, 50.0, 75.0, 95.0, 99.0];
 /// Number of periods between updates of the progress bar.
 const STEP: u64 = 1024;
@@ -54,7 +54,7 @@ pub(crate) struct SpreadArguments {
 }
 
 impl SpreadArguments {
-    /// Spread from the file, or the default spread.
+    /// Reads the spread from its file, or returns the default spread.
     pub(crate) fn spread(&self) -> Result<Spread> {
         let Some(path) = &self.spread else { return Ok(Spread::default()) };
         let name = files::input_name(path);
@@ -68,7 +68,7 @@ impl SpreadArguments {
         Ok(spread)
     }
 
-    /// Robot for a single drive, by its seed.
+    /// Robot for a single drive, from its seed.
     pub(crate) fn robot(&self, trajectory: &Trajectory) -> Result<Robot> {
         let start = trajectory.start();
         Ok(match self.seed {
@@ -78,27 +78,27 @@ impl SpreadArguments {
     }
 }
 
-/// A robot's run.
+/// Result of a robot's run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct Drive {
     seed: u64,
-    /// Largest tool error while cutting and over everything, m.
+    /// Largest tool error while cutting, and over the whole run, m.
     #[serde(with = "bits")]
     cutting: f64,
     #[serde(with = "bits")]
     overall: f64,
-    /// Period of the largest error.
+    /// Period with the largest error.
     period: u64,
     missed: u64,
     /// Error that ended the drive early.
     failure: Option<String>,
 }
 
-/// Numbers as their bits: between processes as exact as within one.
+/// Serialises floating-point numbers as bits, so that they are transferred exactly between processes.
 mod bits {
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-    #[allow(clippy::trivially_copy_pass_by_ref)] // as serde calls it
+    #[allow(clippy::trivially_copy_pass_by_ref)] // signature that serde requires
     pub(super) fn serialize<S: Serializer>(value: &f64, serializer: S) -> Result<S::Ok, S::Error> {
         value.to_bits().serialize(serializer)
     }
@@ -108,19 +108,19 @@ mod bits {
     }
 }
 
-/// A unit of a run on several computers: robots, from one on.
+/// A unit of a run on several computers: consecutive robots.
 #[derive(Debug, Serialize, Deserialize)]
 pub(crate) struct Job {
     first: u64,
     robots: u64,
 }
 
-/// Robots of a unit, a quarter of a minute's work for the letters AGH.
+/// Number of robots in a unit: about 15 s of work for the letters AGH.
 const ROBOTS: u64 = 64;
-/// The time that a period of a robot takes, or more.
+/// Upper bound of the time to simulate one period of a robot.
 const PERIOD: Duration = Duration::from_micros(3);
 
-/// Drives, and the periods in which robots of a group differed in their way.
+/// Drives, and the number of periods in which robots of a group took different branches.
 type Group = (Vec<Drive>, u64);
 
 impl Drive {
@@ -129,7 +129,7 @@ impl Drive {
     }
 }
 
-/// Parameters of the drives: robots, program, path.
+/// Parameters shared by all drives: robots, program, path.
 pub(crate) struct MonteCarlo<'a> {
     /// Names of program and path.
     pub(crate) name: &'a str,
@@ -151,7 +151,7 @@ pub(crate) struct Drives<'a> {
 }
 
 impl<'a> MonteCarlo<'a> {
-    /// Drives every robot, on all cores, or on the workers of a HyperQueue server.
+    /// Runs all robots, on the local cores or on the workers of a HyperQueue server.
     pub(crate) fn run(&'a self, quiet: bool, work: &WorkArguments) -> Result<Drives<'a>> {
         let bar = progress(self.robots.saturating_mul(self.periods), "periods", quiet);
         let (all, apart) = if work.uses_server() {
@@ -163,7 +163,7 @@ impl<'a> MonteCarlo<'a> {
         Ok(Drives { of: self, all, apart })
     }
 
-    /// Does a unit of [`MonteCarlo::run`] in this process.
+    /// Performs a unit of [`MonteCarlo::run`] in this process.
     pub(crate) fn unit(&self, job: &Job, result: &Path) -> Result<()> {
         let robots = job.first..job.first.saturating_add(job.robots);
         workers::write(result, &self.run_on_threads(robots, &ProgressBar::hidden())?)
@@ -203,7 +203,7 @@ impl<'a> MonteCarlo<'a> {
         Ok(joined(groups))
     }
 
-    /// Drives a group in lanes of one batch.
+    /// Runs a group of robots in the lanes of one batch.
     fn group(&self, robots: Range<u64>, binding: &Binding, bar: &ProgressBar) -> Result<Group> {
         let start = self.trajectory.start();
         let mut drives: Vec<Drive> = robots
@@ -291,14 +291,14 @@ fn joined(groups: Vec<Group>) -> Group {
     (groups.into_iter().flat_map(|(drives, _)| drives).collect(), apart)
 }
 
-/// The forces that a lane commands, and the ticks that it missed.
+/// Forces that a lane commands, and the ticks that it has missed.
 fn outputs(batch: &Batch, lane: usize, binding: &Binding) -> Result<(Outputs<f64>, u64), ControllerError> {
     let report = batch.outcome(lane).unwrap_or(Err(PeriodError::Halted))?;
     let outputs = binding.outputs(|register| batch.output_bits(lane, register))?;
     Ok((outputs, u64::from(report.missed) + report.lost))
 }
 
-/// Quantile of ascending values by nearest rank.
+/// Nearest-rank quantile of ascending values.
 fn quantile(sorted: &[f64], percent: f64) -> Option<f64> {
     let rank = (percent / 100.0 * sorted.len() as f64).ceil() as usize;
     sorted.get(rank.saturating_sub(1)).copied()
@@ -312,7 +312,7 @@ impl Drives<'_> {
         values
     }
 
-    /// Failed robots, then those with the largest errors while cutting.
+    /// The worst robots: failed ones, then those with the largest errors while cutting.
     fn worst(&self) -> Vec<&Drive> {
         let mut all: Vec<&Drive> = self.all.iter().collect();
         all.sort_by(|a, b| {
@@ -426,7 +426,7 @@ impl Drives<'_> {
         Ok(())
     }
 
-    /// Histogram of the robots' errors, as SVG.
+    /// Histogram of the robots' errors as SVG.
     pub(crate) fn draw(&self) -> Result<String> {
         let microns: Vec<f64> = self.sorted(|drive| drive.cutting).iter().map(|error| error * 1e6).collect();
         let title = format!("{} along {}: {} robots", self.of.name, self.of.path, microns.len());
@@ -446,7 +446,7 @@ impl Drives<'_> {
     }
 }
 
-/// The file leaves standard output to the table.
+/// The output goes to a file, which leaves standard output for the table.
 pub(crate) fn leaves_stdout(path: Option<&Path>) -> bool {
     !path.is_some_and(files::is_dash)
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Tables of `takt track`: results compared with the founding paper's.
+//! Tables of `takt track`: results compared with those of the founding paper.
 
 use crate::commands::friction::Friction;
 use crate::run::account::{Account, fused_operations, rounding};
@@ -28,13 +28,13 @@ pub(crate) struct Tracking {
     pub(crate) program: Program,
     /// Name of the tool path.
     pub(crate) path: String,
-    /// Clock in MHz, for times.
+    /// Clock in MHz, for conversion to time.
     pub(crate) clock: f64,
     pub(crate) totals: Totals,
     pub(crate) nan_writes: u64,
     /// Cycle account of the last period.
     pub(crate) account: Account,
-    /// Encoder-to-force latency in the last period; `None` if it read no encoder or wrote no force.
+    /// Encoder-to-force latency in the last period; `None` if the period read no encoder or wrote no force.
     pub(crate) latency: Option<Latency>,
     /// Identified friction, for --fit-friction.
     pub(crate) friction: Option<Friction>,
@@ -44,12 +44,12 @@ pub(crate) struct Tracking {
 /// Figures over all periods.
 pub(crate) struct Totals {
     pub(crate) periods: u64,
-    /// Shortest and longest period, cycles.
+    /// Cycles of the shortest and of the longest period.
     pub(crate) shortest: u64,
     pub(crate) longest: u64,
-    /// Missed deadlines, and lost ticks.
+    /// Number of missed deadlines, including lost ticks.
     pub(crate) missed: u64,
-    /// Errors of the joint reference: l, v, a of the arms, θ, ω, ε of the table.
+    /// Errors of the joint reference: l, v, a of the arms; θ, ω, ε of the table.
     pub(crate) accuracy: Accuracy<REFERENCE_LEN>,
     pub(crate) error: TrackingError,
 }
@@ -71,13 +71,13 @@ impl Totals {
     }
 }
 
-/// Short name of a program for tables: the end of its path, without the common extension.
+/// Short name of a program for tables: the last part of its path, without the common extension.
 pub(crate) fn variant(name: &str) -> &str {
     let file = name.rsplit(['/', '\\']).next().unwrap_or(name);
     file.strip_suffix(".s").unwrap_or(file)
 }
 
-/// Table 2 of the paper: platform, clock in MHz, time of one period in µs.
+/// Table 2 of the paper: platform, clock in MHz, period in µs.
 const PLATFORMS: [(&str, f64, f64); 4] = [
     ("FPGA1: Nios II, vendor's FPU", 100.0, 218.0),
     ("FPGA2: Nios II, custom FP instructions", 100.0, 82.0),
@@ -96,7 +96,8 @@ const OPERATIONS: [(&str, u64, &[&str]); 7] = [
     ("saturation", 5, &["fsat"]),
 ];
 
-/// Table 3 of the paper: output, unit, largest errors on PC, DSP and FPGA1,2,3. The paper gives one figure for both axes of the table.
+/// Table 3 of the paper: output, unit, largest errors on PC, DSP and FPGA1,2,3. The paper gives a single figure for both axes of the
+/// table.
 const ERRORS: [(&str, &str, [f64; 3]); 15] = [
     ("l1", "m", [1.8651e-6, 1.8651e-6, 1.8651e-6]),
     ("l2", "m", [1.1658e-6, 2.2893e-8, 2.2165e-8]),
@@ -115,18 +116,18 @@ const ERRORS: [(&str, &str, [f64; 3]); 15] = [
     ("ep5", "rad/s²", [3.2011e-7; 3]),
 ];
 
-/// Requirement of the paper on the tool error, m.
+/// The paper's requirement on the tool error, m.
 const REQUIREMENT: f64 = 10e-6;
 
-/// Output ranges by kind. The paper's arm lengths are unknown, so maxima over the three arms are compared.
+/// Ranges of outputs by kind. The paper's arm lengths are unknown, so maxima over the three arms are compared.
 const KINDS: [(&str, std::ops::Range<usize>); 3] = [("l", 0..3), ("v", 3..6), ("a", 6..9)];
 
-/// Largest error; a NaN exceeds all others.
+/// Largest error; a NaN counts as the largest.
 fn largest(errors: impl Iterator<Item = f64>) -> f64 {
     errors.fold(0.0, |largest, error| if error > largest || error.is_nan() { error } else { largest })
 }
 
-/// Decimal number with thousands separators.
+/// Formats a number with thousands separators.
 fn digits(value: u64) -> String {
     let digits = value.to_string();
     let mut out = String::new();
@@ -162,7 +163,7 @@ pub(crate) fn text(tracking: &Tracking, out: &mut Out) -> Result<()> {
         ("  while cutting", totals.error.cutting, Some(1)),
         ("  over everything", totals.error.overall, None),
     ] {
-        // Zero means that no period was of that kind.
+        // Zero means that there was no period of that kind.
         let figure = if error > 0.0 { format!("{:.3}", error * 1e6) } else { "-".to_owned() };
         out.lines(&columns.row(&[name, &figure], strong.filter(|_| error > 0.0)))?;
     }
@@ -178,7 +179,7 @@ pub(crate) fn text(tracking: &Tracking, out: &mut Out) -> Result<()> {
     Ok(())
 }
 
-/// Program whose source paths are relative to the user's folder: the given path's folder, then the path within the project.
+/// Program with source paths relative to the user's folder: the folder of the given path, then the path within the project.
 fn located(program: &Program, given: &str) -> Program {
     let mut program = program.clone();
     let folder = program.files.first().and_then(|first| given.strip_suffix(first.as_str()));
@@ -190,7 +191,7 @@ fn located(program: &Program, given: &str) -> Program {
     program
 }
 
-/// Table 2 of the paper with Takt's times.
+/// Prints table 2 of the paper with Takt's times.
 fn time_table(tracking: &Tracking, of: &str, out: &mut Out) -> Result<()> {
     let (machine, clock, totals) = (tracking.program.machine.name, tracking.clock, &tracking.totals);
     let columns = [left(40, 0), right(9, 0), right(10, 0), right(12, 0)];
@@ -239,7 +240,7 @@ fn time_table(tracking: &Tracking, of: &str, out: &mut Out) -> Result<()> {
     Ok(())
 }
 
-/// Table 1 of the paper with Takt's counts.
+/// Prints table 1 of the paper with Takt's counts.
 fn operation_table(account: &Account, of: &str, out: &mut Out) -> Result<()> {
     writeln!(out, "\nOperations of one period: {of}\n{:>34}{:>10}", "paper", "Takt")?;
     let operations = &account.operations;
@@ -263,8 +264,8 @@ fn operation_table(account: &Account, of: &str, out: &mut Out) -> Result<()> {
     Ok(())
 }
 
-/// Proved bounds of the outputs in [`ERRORS`], if the program's ranges yield one (as in `takt accuracy`): the outputs after forces and
-/// torques, in order.
+/// Proved bounds of the outputs in [`ERRORS`], where the program's ranges yield one (as in `takt accuracy`): of the outputs after forces
+/// and torques, in order.
 fn bounds(program: &Program) -> Vec<Option<f64>> {
     let enclosure = enclose(program).ok();
     let bound = |output: &Port| {
@@ -275,7 +276,7 @@ fn bounds(program: &Program) -> Vec<Option<f64>> {
     program.outputs[first..].iter().map(bound).collect()
 }
 
-/// Table 3 of the paper with Takt's errors.
+/// Prints table 3 of the paper with Takt's errors.
 fn error_table(
     errors: &[MaxError],
     bounds: &[Option<f64>],
@@ -321,7 +322,7 @@ fn error_table(
     Ok(())
 }
 
-/// A bound in its column. An output that copies an input has no rounding error: its measured error is the input's.
+/// Formats a bound for its column. An output that copies an input has no rounding error; its measured error is that of the input.
 fn at_most(bound: f64) -> String {
     if bound == 0.0 { "input's".to_owned() } else { format!("{bound:.4e}") }
 }

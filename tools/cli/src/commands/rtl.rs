@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The command `takt rtl`: Verilog of a machine or a system.
+//! The command `takt rtl`: writes the Verilog of a machine or a system.
 
 use crate::run::load::{self, Load};
 use crate::run::ports;
@@ -59,7 +59,7 @@ Examples:
   takt rtl system.toml -o system                 several cores and their links (docs/system.md)
   cd t1 && iverilog -g2005 -f takt_t1_bench.f -o bench && ./bench";
 
-/// Default number of periods without `--inputs`.
+/// Default number of periods, without `--inputs`.
 const PERIODS: u64 = 3;
 
 pub(crate) fn run(arguments: &Rtl, color: bool, out: &mut Out) -> Result<()> {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The command `takt run`: a program or a system on the emulator, with inputs and outputs in CSV.
+//! The command `takt run`: runs a program or a system on the emulator, with inputs and outputs in CSV.
 
 use crate::run::application::{Application, refuse};
 use crate::run::batch;
@@ -93,7 +93,7 @@ Examples:
 pub(crate) fn run(arguments: &Run, color: bool, out: &mut Out) -> Result<()> {
     let mut reads = vec![("FILE", arguments.file.as_path())];
     reads.extend(arguments.inputs.as_deref().map(|path| ("--inputs", path)));
-    // A folder cannot be overwritten by accident.
+    // An output folder is not checked: it cannot be overwritten by accident.
     let batch = arguments.batch.as_deref();
     reads.extend(batch.filter(|path| !path.is_dir()).map(|path| ("--batch", path)));
     let mut writes = Vec::new();
@@ -135,7 +135,7 @@ pub(crate) fn run(arguments: &Run, color: bool, out: &mut Out) -> Result<()> {
     };
     trace.map_or(Ok(()), Out::finish)?;
     let rows = match result.map_err(|error| application.located_error(error, color)) {
-        // A closed output needs no summary; denied events still count.
+        // A closed output needs no summary, but denied events still count.
         Err(error) if output::is_closed_pipe(&error) => return ran.verdict(),
         result => result?,
     };
@@ -150,7 +150,7 @@ impl Run {
         self.inputs.is_some() || self.periods.is_some() || self.batch.is_some()
     }
 
-    /// Executes the run; returns the number of rows, if any, and the outcome. A run error does not discard the rest.
+    /// Executes the run; returns the number of rows, if any, and the outcome. An error of the run does not discard the other results.
     fn execute<'a>(
         &self,
         mut run: impl Execution<'a>,
@@ -161,7 +161,7 @@ impl Run {
             true => Tables { inputs, outputs, most: self.periods }.drive(&mut run).map(Some),
             false => run.run_to_halt().map(|()| None),
         };
-        // A trace shows the events before a fault, so keep it.
+        // Keep the trace: it shows the events before a fault.
         Ok((result, run.end(&self.trace, color)?))
     }
 
@@ -198,7 +198,7 @@ const NO_PERIODS: CorePeriods = CorePeriods { count: 0, shortest: 0, longest: 0,
 /// A run of a program.
 struct ProgramRun<'a, 't> {
     program: &'a Program,
-    /// Data words to show.
+    /// Data words to show in the results.
     words: Vec<memory::Word>,
     emulator: Emulator,
     max_cycles: Option<u64>,
@@ -211,7 +211,7 @@ struct ProgramRun<'a, 't> {
 }
 
 impl ProgramRun<'_, '_> {
-    /// Last values of the output ports (`None` before the first write), and of the shown data words.
+    /// Last values of the output ports (`None` if never written), and of the data words to show.
     fn outputs(&self) -> impl Iterator<Item = (&str, Type, Option<u32>)> {
         let ports = self.program.outputs.iter();
         let ports = ports.map(|port| (port.name.as_str(), port.ty, self.emulator.output_bits(port.register)));

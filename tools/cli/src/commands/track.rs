@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The command `takt track`, Takt's main purpose: the tracking program in closed loop with the robot along a tool path.
+//! The command `takt track`, Takt's main purpose: runs the tracking program in closed loop with the robot along a tool path.
 
 use crate::commands::bound::paths::paths;
 use crate::commands::friction::Friction;
@@ -119,16 +119,16 @@ Examples:
   takt track --monte-carlo 100000 --hq-server ~/server   on the workers of a HyperQueue server";
 
 impl Track {
-    /// File of the plot.
+    /// Output file of the plot.
     fn picture(&self) -> Option<&Path> {
         self.plot.as_ref()?.as_deref()
     }
 }
 
-/// Maximal size of G-code in bytes; a longer file would consist of moves of micrometres.
+/// Maximum size of G-code in bytes; a longer file would consist of micrometre moves.
 const GCODE_LIMIT: usize = 16 << 20;
 
-/// Cycles in the sampling period at a clock in MHz.
+/// Cycles per sampling period, at a clock in MHz.
 pub(crate) fn period_cycles(clock: f64) -> Option<NonZeroU64> {
     NonZeroU64::new((clock * 1e6 * SAMPLE_TIME).round() as u64)
 }
@@ -195,7 +195,7 @@ struct Drive<'a> {
     color: bool,
 }
 
-/// Runs a closed loop for a number of periods along a path; `each` receives every record, and returns false to end early.
+/// Runs a closed loop for a number of periods along a path; `each` receives every record and returns false to end the run early.
 fn run_loop<C: TrackingController<Error: std::error::Error + Send + Sync + 'static>>(
     closed_loop: &mut ClosedLoop<'_, C>,
     path: &str,
@@ -220,13 +220,13 @@ fn run_loop<C: TrackingController<Error: std::error::Error + Send + Sync + 'stat
 
 /// Observers of a drive that do not depend on the controller.
 struct DriveObservers {
-    /// Plot, with its file unless it is drawn on the terminal.
+    /// Plot, with its output file unless it is drawn on the terminal.
     drawing: Option<(Option<Out>, Plot)>,
     identification: Option<Identification>,
 }
 
 impl DriveObservers {
-    /// Opens the files before the run, so that path errors come first.
+    /// Opens the files before the run, so that errors in paths come first.
     fn new(drive: &Drive<'_>) -> Result<DriveObservers> {
         let Track { plot, fit_friction, .. } = drive.arguments;
         let drawing = match plot {
@@ -248,7 +248,7 @@ impl DriveObservers {
         }
     }
 
-    /// Writes the plot of path and controller; returns the friction, if requested.
+    /// Writes the plot of path and controller; returns the identified friction, if requested.
     fn finish(self, path: &str, name: &str, out: &mut Out) -> Result<Option<Friction>> {
         if let Some((file, plot)) = self.drawing {
             let title = format!("{path} with {name}");
@@ -266,7 +266,7 @@ impl DriveObservers {
 }
 
 impl Drive<'_> {
-    /// Standard output is used by a file.
+    /// Standard output is used for a file.
     fn writes_stdout(&self) -> bool {
         [self.arguments.csv.as_deref(), self.arguments.picture()].into_iter().flatten().any(files::is_dash)
     }
@@ -315,13 +315,13 @@ impl Drive<'_> {
             }
             Ok(!closed)
         });
-        // Keep the periods before a fault.
+        // Keep the rows of periods before a fault.
         let table = ports::finish(table.map(|Table(file)| file), totals.periods, result);
         closed |=
             output::unless_closed(table.map_err(|error| fault::located_error(error, &loaded, self.color)))?;
         let denials = closed_loop.controller().denials();
         if closed {
-            // A closed output needs no tables; denied events still count.
+            // A closed output needs no tables, but denied events still count.
             return Denials::verdict([denials]);
         }
         let friction = observed.finish(&self.path, variant(&name), out)?;
@@ -362,7 +362,7 @@ impl Drive<'_> {
         }
         let ways = paths(description, &application.bounds()?)?;
         let robot = arguments.robot.robot(&self.trajectory)?;
-        // The first block, which places the robot, takes a tick of its own at rest.
+        // The first block places the robot, and takes one tick at rest.
         let counts = robot.plant().counts().context("the robot stands where its encoders reach")?;
         let watch = arguments.deny.watch();
         let mut controller = SystemController::new(description, blocks(&self.trajectory)?, watch)?;
@@ -431,19 +431,19 @@ pub(crate) struct ClosedLoopArguments {
     pub(crate) spread: Option<PathBuf>,
 }
 
-/// Recorded inputs of a closed loop, and the period of interest.
+/// Recorded inputs of a closed loop, and a period of interest.
 pub(crate) struct Recording {
     pub(crate) loaded: LoadedProgram,
     pub(crate) inputs: Rows,
     pub(crate) tick: Option<NonZeroU64>,
     /// Number of the period of interest.
     pub(crate) period: u64,
-    /// Reason for this period, in one line.
+    /// Reason why this period is of interest, in one line.
     pub(crate) why: String,
 }
 
 impl ClosedLoopArguments {
-    /// Records a closed loop over at most `most` periods, with a program by name or from a file; by default the loop's own.
+    /// Records a closed loop over at most `most` periods, with a program given by name or file, or else the loop's default program.
     pub(crate) fn record(&self, file: Option<&Path>, load: Load, most: usize) -> Result<Recording> {
         let color = load.color;
         let (name, loaded) = program(file.unwrap_or(Path::new("tracking")), load)?;
@@ -479,7 +479,7 @@ impl ClosedLoopArguments {
     }
 }
 
-/// CSV table with a row for each period.
+/// CSV table with one row per period.
 struct Table(Out);
 
 impl Table {
@@ -508,12 +508,12 @@ type BuiltinPath = (&'static str, &'static str);
 const AGH_PATH: BuiltinPath = ("agh.ngc", takt_programs::AGH);
 const FRICTION_PATH: BuiltinPath = ("friction.ngc", takt_programs::FRICTION);
 
-/// Name and plan of a tool path; by default the letters AGH.
+/// Name and plan of a tool path; the default is the letters AGH.
 pub(crate) fn trajectory(file: Option<&Path>) -> Result<(String, Trajectory)> {
     trajectory_or(file, AGH_PATH)
 }
 
-/// Name and plan of a tool path, by default a built-in one.
+/// Name and plan of a tool path; the default is `builtin`.
 fn trajectory_or(file: Option<&Path>, builtin: BuiltinPath) -> Result<(String, Trajectory)> {
     let (name, source) = match file {
         Some(file) => (files::input_name(file), files::read(file, GCODE_LIMIT)?),
@@ -537,7 +537,7 @@ pub(crate) fn builtin_names() -> impl Iterator<Item = &'static str> {
     names.filter(|name| name.starts_with("tracking"))
 }
 
-/// Program by built-in name, or from a file.
+/// Loads a program by its built-in name, or from a file.
 pub(crate) fn program(path: &Path, load: Load) -> Result<(String, LoadedProgram)> {
     let name = files::input_name(path);
     let builtin = format!("hybrid/{name}.s");

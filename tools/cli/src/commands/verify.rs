@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The command `takt verify`, and the check of `takt asm --verify`.
+//! The command `takt verify`, and the check performed by `takt asm --verify`.
 
 use crate::run::cache::SELF;
 use crate::run::load::Load;
@@ -54,10 +54,10 @@ pub(crate) struct Verify {
     work: WorkArguments,
 }
 
-/// The time of a unit, or more: one image.
+/// Upper bound of the time to check one image.
 const TIME: Duration = Duration::from_secs(600);
 
-/// The result of an image, as it is printed.
+/// Printable result for an image.
 #[derive(Serialize, Deserialize)]
 struct Report {
     is_proved: bool,
@@ -96,7 +96,7 @@ pub(crate) fn run(arguments: &Verify, color: bool, out: &mut Out) -> Result<()> 
 }
 
 impl Verify {
-    /// The results of several images, by threads of this process or by units; the reason where an image cannot be checked.
+    /// Checks several images, in threads of this process or in units; a result is the reason where an image cannot be checked.
     fn all(&self, pairs: &[(PathBuf, PathBuf)], color: bool) -> Result<Vec<Result<Report, String>>> {
         static STOPPED: AtomicBool = AtomicBool::new(false);
         if !self.work.uses_server() {
@@ -107,7 +107,7 @@ impl Verify {
         let build = SELF.as_deref().unwrap_or_default();
         let units = pairs.iter().map(|pair| {
             let image = files::read(&pair.0, IMAGE_BYTES).unwrap_or_default();
-            // With its includes, whatever its machine is.
+            // Include texts count, whatever the machine.
             let load = Load::new(MACHINES[0], color).with(&self.arguments);
             let texts = Load::source(&pair.1).map(|text| load.texts(&pair.1, text)).ok();
             let name = files::input_name(&pair.0);
@@ -122,7 +122,7 @@ impl Verify {
         Ok(results)
     }
 
-    /// Prints the results of several images.
+    /// Prints the results for several images.
     fn print(
         &self,
         pairs: &[(PathBuf, PathBuf)],
@@ -152,7 +152,7 @@ impl Verify {
         if are_proved { Ok(()) } else { Err(Failure::Reported.into()) }
     }
 
-    /// The check of an image, or the reason for which there is none.
+    /// Checks an image; the error is the reason why it cannot be checked.
     fn report(&self, pair: &(PathBuf, PathBuf), color: bool) -> Result<Report, String> {
         self.checked(pair, color).map_err(|error| format!("{error:#}"))
     }
@@ -175,10 +175,10 @@ impl Verify {
     }
 }
 
-/// Result of a check.
+/// Outcome of a check.
 pub(crate) struct CheckOutcome {
     plain: PlainProgram,
-    /// Result, with the number of sections whose cycles `takt bound` states.
+    /// Equivalence, and the number of sections whose cycles `takt bound` states; or the first difference.
     outcome: Result<(EquivalenceReport, usize), Difference>,
 }
 

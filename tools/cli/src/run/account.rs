@@ -14,7 +14,7 @@ pub(crate) fn fused_operations(program: &Program) -> usize {
     bundles.flatten().filter(|instruction| instruction.op.row().function == Function::Fused).count()
 }
 
-/// Note on rounding, to follow "of the program".
+/// Note on rounding, worded to follow "of the program".
 pub(crate) fn rounding(fused: usize) -> String {
     match fused {
         0 => "no operation rounds a product and a sum together".to_owned(),
@@ -23,12 +23,12 @@ pub(crate) fn rounding(fused: usize) -> String {
     }
 }
 
-/// Counts of a run or a period. `cycles = bundles + Σ stalls`.
+/// Counts over a run or a period. `cycles = bundles + Σ stalls`.
 #[derive(Clone, Debug)]
 pub(crate) struct Account {
     pub(crate) cycles: u64,
     pub(crate) bundles: u64,
-    /// Executed operations by mnemonic; unused mnemonics are omitted.
+    /// Executed operations by mnemonic, without unused mnemonics.
     pub(crate) operations: BTreeMap<&'static str, u64>,
     /// Stall cycles by kind of cause, including zeros.
     stalls: BTreeMap<&'static str, u64>,
@@ -41,12 +41,12 @@ impl Account {
         Account::new(statistics, |count| count(statistics))
     }
 
-    /// Counts from `before` to `after`.
+    /// Counts between two statistics.
     pub(crate) fn between(before: &Statistics, after: &Statistics) -> Account {
         Account::new(after, |count| count(after) - count(before))
     }
 
-    /// Builds the counts for all keys of the statistics; `difference` computes each.
+    /// Computes the counts for all keys of the statistics; `difference` yields each count.
     fn new(after: &Statistics, difference: impl Fn(&dyn Fn(&Statistics) -> u64) -> u64) -> Account {
         let operations = ROWS
             .iter()
@@ -64,12 +64,12 @@ impl Account {
         Account { cycles, bundles, operations, stalls, causes }
     }
 
-    /// Number of operations in total.
+    /// Total number of operations.
     pub(crate) fn total_operations(&self) -> u64 {
         self.operations.values().sum()
     }
 
-    /// Stall cycles by kind of cause; spaces in names become underscores, for JSON keys.
+    /// Stall cycles by kind of cause; blanks in names become underscores, as JSON keys.
     pub(crate) fn stalls_json(&self) -> Value {
         self.stalls.iter().map(|(kind, count)| (kind.replace(' ', "_"), Value::from(*count))).collect()
     }
@@ -79,14 +79,14 @@ impl Account {
         self.stalls.get(kind).copied().unwrap_or(0)
     }
 
-    /// The `most` costliest stalls with their places, without waits for the tick.
+    /// The `most` costliest stalls with their places, excluding waits for the tick.
     pub(crate) fn longest(&self, most: usize) -> impl Iterator<Item = (BundleAddress, Cause, u64)> {
         let mut causes: Vec<_> = self.causes.iter().filter(|((_, cause), _)| *cause != Cause::Wait).collect();
         causes.sort_by_key(|((address, _), count)| (std::cmp::Reverse(*count), *address));
         causes.into_iter().take(most).map(|&((address, cause), count)| (address, cause, count))
     }
 
-    /// Share of each kind of stall, then the `most` costliest with their places; without waits for the tick.
+    /// Share of each kind of stall, then the `most` costliest stalls with their places, excluding waits for the tick.
     pub(crate) fn stall_table(&self, program: &Program, most: usize) -> String {
         let mut out = String::new();
         let waiting = self.stall(Cause::Wait.name());

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Application of a command: one program, or a system of several programs, each on its own core.
+//! Application that a command runs: one program, or a system of several programs, each on its own core.
 
 use crate::run::fault;
 use crate::run::load::{Load, is_system};
@@ -19,7 +19,7 @@ pub(crate) enum Application {
     System(Box<LoadedSystem>),
 }
 
-/// Rejects options that systems lack: each with its name, whether it is given, and the reason.
+/// Rejects options that systems lack. Each is given as name, whether it is present, and reason.
 pub(crate) fn refuse(options: &[(&str, bool, &str)]) -> Result<()> {
     match options.iter().find(|(_, given, _)| *given) {
         Some((option, _, why)) => Err(Failure::Usage(format!("{option} with a system: {why}")).into()),
@@ -43,7 +43,7 @@ impl Application {
         Ok(Application::Program(Box::new(load.with_source(file)?)))
     }
 
-    /// The application in `takt_board`'s type.
+    /// The application as the type that `takt_board` expects.
     #[cfg(feature = "board")]
     pub(crate) fn on_board(&self) -> takt_board::Application<'_> {
         let application: takt_board::Application<'_> = match self {
@@ -74,13 +74,13 @@ impl Application {
         }
     }
 
-    /// Prefix of messages about a core; empty for a program.
+    /// Prefix for messages about a core; empty for a program.
     pub(crate) fn core_note(&self, core: usize) -> String {
         let system = self.system();
         system.map_or(String::new(), |system| format!("core {}", system.description.cores[core].name))
     }
 
-    /// Bounds of the sections of each core.
+    /// Section bounds of each core.
     pub(crate) fn bounds(&self) -> Result<Vec<Bounds>> {
         let bound = |(core, loaded): (usize, &LoadedProgram)| {
             takt_analysis::bound(&loaded.program).map_err(|error| match self.core_note(core) {
@@ -91,7 +91,7 @@ impl Application {
         self.programs().iter().enumerate().map(bound).collect()
     }
 
-    /// Converts an error of a run for the user: a fault gets its source line.
+    /// Converts an error of a run for display: a fault gets its source line.
     pub(crate) fn located_error(&self, error: anyhow::Error, color: bool) -> anyhow::Error {
         let fault = error.chain().find_map(|cause| cause.downcast_ref::<SystemFault>()).cloned();
         match (self, fault) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The option `takt run --batch`: many runs of one program, each with its own inputs.
+//! The option `takt run --batch`: many runs of one program, each with separate inputs.
 
 use crate::run::fault;
 use crate::run::loaded_program::LoadedProgram;
@@ -16,13 +16,13 @@ use takt_analysis::period::PERIOD_LIMIT;
 use takt_emu::{Batch, PeriodError, Rows};
 use takt_isa::fp::Flags;
 
-/// Limits: number of runs (about 9 kB each), and of periods in all runs together.
+/// Limits on the number of runs (about 9 kB each), and on the total number of periods.
 const RUNS: usize = 16_384;
 const PERIODS: usize = 10_000_000;
-/// Number of faults shown with their source lines; further faults only name the run.
+/// Number of faults shown with their source lines; further ones only name the run.
 const SHOWN: usize = 3;
 
-/// A run: its name, and the inputs of each period.
+/// Name of a run, and its inputs in each period.
 struct Inputs {
     name: String,
     rows: Rows,
@@ -39,7 +39,7 @@ struct BatchRun {
     flags: Flags,
     /// Error that ended the run early.
     error: Option<PeriodError>,
-    /// Per period, the values of the output ports, and the cycles.
+    /// Values of the output ports and cycles, for each period.
     outputs: Vec<Vec<String>>,
 }
 
@@ -51,7 +51,7 @@ pub(crate) struct Arguments<'a> {
     pub(crate) inputs: &'a Path,
     pub(crate) outputs: Option<&'a Path>,
     pub(crate) tick: Option<NonZeroU64>,
-    /// Cycle limit of a run; beyond it the run fails.
+    /// Cycle limit of a run; a run that exceeds it fails.
     pub(crate) max_cycles: Option<u64>,
     pub(crate) json: bool,
 }
@@ -91,7 +91,7 @@ pub(crate) fn run(
     verdict(&runs, loaded, color)
 }
 
-/// Runs of a folder, one per `.csv` in order of name; or of a file, in order of first appearance.
+/// Reads the runs: from a folder, one per `.csv`, sorted by name; or from a file, in order of first appearance.
 fn read(path: &Path, ports: &[takt_isa::program::Port]) -> Result<Vec<Inputs>> {
     let name = files::input_name(path);
     let runs = if !files::is_dash(path) && path.is_dir() {
@@ -133,7 +133,7 @@ fn too_many() -> String {
     format!("a batch has at most {PERIODS} periods in all runs together")
 }
 
-/// Runs every period of every run. A finished or failed run stays in its lane, unobserved.
+/// Runs every period of every run. A run that has finished or failed stays in its lane, but is ignored.
 fn drive(batch: &mut Batch, inputs: &[Inputs], keep: bool) -> Result<Vec<BatchRun>> {
     let ports = batch.program().outputs.clone();
     let registers: Vec<_> = batch.program().inputs.iter().map(|port| port.register).collect();
@@ -248,7 +248,7 @@ fn text(runs: &[BatchRun], batch: &Batch, out: &mut impl Write) -> Result<()> {
     Ok(())
 }
 
-/// Reports the failed runs; any failure gives exit status 1.
+/// Reports the failed runs; if there are any, the exit status is 1.
 fn verdict(runs: &[BatchRun], loaded: &LoadedProgram, color: bool) -> Result<()> {
     let failed: Vec<&BatchRun> = runs.iter().filter(|run| run.error.is_some()).collect();
     for run in failed.iter().take(SHOWN) {

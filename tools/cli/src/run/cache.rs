@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Cache of assembled programs: scheduling takes seconds for some hundred operations, and the result depends only on sources, options and
+//! Cache of assembled programs: scheduling several hundred operations takes seconds, and the result depends only on sources, options and
 //! this binary.
 //!
-//! An entry contains the image and the data that an image lacks. On any cache error the program is assembled anew, silently.
+//! An entry contains the image and the data that images lack. If the cache cannot be used, the program is assembled silently.
 
 use crate::run::loaded_program::LoadedProgram;
 use crate::run::spills::spilled;
@@ -16,12 +16,12 @@ use takt_cache::CacheLocation;
 use takt_isa::timing::Cycle;
 use takt_isa::{BundleAddress, Machine};
 
-/// Minimal assembly time of a cached program.
+/// Minimum assembly time for a program to be cached.
 const SLOW: Duration = Duration::from_millis(100);
-/// Maximal number of cached programs; the newest are kept.
+/// Maximum number of cached programs; the newest are kept.
 const MOST: usize = 400;
 
-/// A program, and for each scheduled block its first bundle and its cycles above the lower bound.
+/// A program with, for each scheduled block, its first bundle and the cycles above the lower bound.
 pub(crate) struct CacheEntry {
     pub(crate) loaded: LoadedProgram,
     pub(crate) spare: Vec<(BundleAddress, Cycle)>,
@@ -35,7 +35,7 @@ impl CacheEntry {
     }
 }
 
-/// First source in memory, with a loader for the other files of its project.
+/// First source, in memory, with a loader for the project's other files.
 pub(crate) struct First {
     pub(crate) name: String,
     pub(crate) bytes: Vec<u8>,
@@ -48,14 +48,14 @@ impl Loader for First {
     }
 }
 
-/// Assembles the program that begins with the source at `path`, or takes it from the cache. Warnings go to `warn`.
+/// Assembles the program that starts with the source at `path`, or loads it from the cache. Warnings go to `warn`.
 pub(crate) fn assembled(
     path: &str,
     loader: &dyn Loader,
     options: &Options,
     warn: impl FnOnce(&Diagnostics),
 ) -> Result<CacheEntry, Diagnostics> {
-    // Reading and checking takes milliseconds, and determines the files of the program.
+    // Reading and checking takes milliseconds, and determines which files belong to the program.
     let checked = takt_asm::check(path, loader, options);
     let key = SELF.as_ref().map(|build| checked.key(build, options));
     let place = key.and_then(|key| CacheLocation::of("programs", key));
@@ -81,7 +81,7 @@ pub(crate) fn assembled(
     Ok(kept)
 }
 
-/// Identity of this binary: another build may assemble differently.
+/// Identification of this binary: another build may assemble differently.
 pub(crate) static SELF: LazyLock<Option<String>> = LazyLock::new(|| {
     let build = takt_cache::build(&std::env::current_exe().ok()?)?;
     Some(format!("{} {build}", env!("CARGO_PKG_VERSION")))
@@ -92,7 +92,7 @@ fn read(place: &CacheLocation, machine: &'static Machine) -> Option<CacheEntry> 
     let [known, image] = &parts[..] else { return None };
     let (spilled, spare): (Vec<String>, Vec<(u32, Cycle)>) = serde_json::from_slice(known).ok()?;
     let (mut program, debug) = image::read_with(image).ok()?;
-    // An image stores its machine's name; an analysis variant with a faster unit has the name of its original.
+    // An image stores only its machine's name, and a variant with a faster unit, used in analyses, has the name of its original.
     if machine.name == program.machine.name {
         program.machine = machine;
     }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Hybrid robot's controller: a program on the emulator.
+//! Controller of the hybrid robot: a program on the emulator.
 
 use crate::run::deny::{Denials, Watch};
 use crate::terminal::options::suggest;
@@ -11,7 +11,7 @@ use takt_programs::hybrid::closed_loop::{Inputs, TrackingController};
 use takt_programs::hybrid::ports::INPUTS;
 use takt_programs::hybrid::{Binding, BindingError, Outputs, UnwrittenOutput};
 
-/// Number of encoders (the first inputs), and of forces and torques (the first outputs).
+/// Number of encoders (the first inputs), equal to the number of forces and torques (the first outputs).
 const AXES: usize = 5;
 
 /// Binds a tracking program to the algorithm's ports; the error for a missing port suggests a similar name.
@@ -27,9 +27,9 @@ pub(crate) fn bind(program: &Program) -> Result<Binding> {
 /// Latency from encoder to force, in cycles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 pub(crate) struct Latency {
-    /// From the first bundle that reads an encoder.
+    /// Counted from the first bundle that reads an encoder.
     pub(crate) from_first_read: u64,
-    /// From the first read of the last encoder to be read.
+    /// Counted from the last encoder's first read.
     pub(crate) from_last_encoder: u64,
 }
 
@@ -43,12 +43,12 @@ pub(crate) struct Detail {
     pub(crate) latency: Option<Latency>,
 }
 
-/// Program on the emulator, run one period at a time.
+/// A program on the emulator that is run period by period.
 pub(crate) struct EmulatorController {
     emulator: Emulator,
     binding: Binding,
     watch: Watch,
-    /// Periods before the observed one, which is the last.
+    /// Number of periods before the observed one, which is the last.
     until_detail: u64,
     /// Report of the last period.
     pub(crate) report: Option<PeriodReport>,
@@ -56,13 +56,14 @@ pub(crate) struct EmulatorController {
 }
 
 impl EmulatorController {
-    /// A controller from a program with the tracking algorithm's ports; `detail` is the number of the observed period, from 0.
+    /// Creates a controller from a program with the ports of the tracking algorithm; `detail` is the number of the observed period, from
+    /// 0.
     pub(crate) fn new(emulator: Emulator, watch: Watch, detail: u64) -> Result<EmulatorController> {
         let binding = bind(emulator.program())?;
         Ok(EmulatorController { emulator, binding, watch, until_detail: detail, report: None, detail: None })
     }
 
-    /// Denied events of the run.
+    /// Denied events that occurred in the run.
     pub(crate) fn denials(&self) -> Denials {
         self.watch.end(&self.emulator, "")
     }
@@ -72,7 +73,7 @@ impl EmulatorController {
         self.binding.inputs
     }
 
-    /// Runs a period under observation.
+    /// Runs a period and records its details.
     fn observed_period(&mut self) -> Result<PeriodReport, PeriodError> {
         let before = self.emulator.statistics();
         let program = self.emulator.program().clone();
@@ -104,7 +105,7 @@ impl EmulatorController {
     }
 }
 
-/// Errors after which the program cannot control the robot further.
+/// Errors after which the program cannot continue to control the robot.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum ControllerError {
     /// The program has stopped, or a port cannot be set.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The option `--deny`: a run fails if a named event happens in it; each is reported at its first place.
+//! The option `--deny`: a run fails if a named event occurs; each event is reported where it first occurred.
 
 use crate::terminal::options::suggest;
 use crate::terminal::output::Failure;
@@ -15,9 +15,9 @@ use takt_isa::{BundleAddress, Program, Register, SlotIndex, Type};
 /// An event that --deny can name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum DeniedEvent {
-    /// A tick before the `wait`, remembered or lost.
+    /// A tick that comes before the `wait`, whether it is remembered or lost.
     Missed,
-    /// An exception flag, even if cleared later.
+    /// An exception flag, even if it is cleared later.
     Flag(Flags, &'static str),
     /// A NaN on an output port.
     Nan,
@@ -78,9 +78,9 @@ struct First {
     /// Period, from 0; `None` in a run without periods.
     period: Option<u64>,
     cycle: Cycle,
-    /// Bundle of the event; for a missed deadline, the last bundle issued.
+    /// Bundle in which the event occurred; for a missed deadline, the last bundle issued.
     address: BundleAddress,
-    /// Operation of the event, if any: its slot and its destination.
+    /// Operation that caused the event, if any: slot and destination.
     operation: Option<(SlotIndex, Option<Register>)>,
 }
 
@@ -92,20 +92,20 @@ struct Finding {
     first: Option<First>,
 }
 
-/// Observer of a run for denied events. Without any, the run is not observed and keeps its full speed.
+/// Watches a run for denied events. If no event is denied, the run is not observed and keeps its full speed.
 #[derive(Clone)]
 pub(crate) struct Watch {
     findings: Vec<Finding>,
-    /// Number of the present period.
+    /// Number of the current period.
     period: Option<u64>,
-    /// Bundle that was issued last.
+    /// Bundle issued last.
     at: BundleAddress,
     /// A core of a system has reached its first `wait`.
     has_waited: bool,
 }
 
 impl DenyArguments {
-    /// Some event is denied.
+    /// At least one event is denied.
     pub(crate) fn is_given(&self) -> bool {
         !self.deny.is_empty()
     }
@@ -122,7 +122,7 @@ impl Finding {
         Finding { what, count: 0, first: None }
     }
 
-    /// Operation of the event, with its place.
+    /// Operation that caused the event, with its place.
     fn place(&self, first: &First, program: &Program) -> String {
         let place = location(program, first).map_or_else(String::new, |place| format!(" ({place})"));
         let bundle = format!("bundle {}{place}", first.address);
@@ -137,7 +137,7 @@ impl Finding {
         }
     }
 
-    /// Message on an event; `core` names the core in a system.
+    /// Message about an event; `core` is the name of the core in a system.
     fn message(&self, first: &First, program: &Program, core: &str) -> String {
         let what = self.what.text();
         let place = if core.is_empty() { String::new() } else { format!(" in {core}") };
@@ -147,14 +147,14 @@ impl Finding {
     }
 }
 
-/// Source place `file:line`, with columns inside an equation: of the operation, otherwise of its bundle.
+/// Source place `file:line` of the operation, or else of its bundle; within an equation, with columns.
 fn location(program: &Program, first: &First) -> Option<String> {
     let own = first.operation.and_then(|(slot, _)| program.operation_place(first.address, slot));
     own.or_else(|| program.bundle_place(first.address))
 }
 
 impl Watch {
-    /// No event is denied: the run need not be observed.
+    /// No event is denied, so the run need not be observed.
     pub(crate) fn denies_nothing(&self) -> bool {
         self.findings.is_empty()
     }
@@ -164,8 +164,8 @@ impl Watch {
         Watch { findings: Vec::new(), period: None, at: BundleAddress::RESET, has_waited: false }
     }
 
-    /// Runs a period as [`Emulator::run_period`] does, with unchanged inputs; `also` receives every event too. All commands with --deny run
-    /// their periods here.
+    /// Runs a period as [`Emulator::run_period`] does, with unchanged inputs; `also` receives every event as well. All commands with
+    /// --deny run their periods through this function.
     pub(crate) fn run_period(
         &mut self,
         emulator: &mut Emulator,
@@ -187,7 +187,7 @@ impl Watch {
         }
     }
 
-    /// Records an event of a core in a system, whose periods are counted by waits: the first ends the code that runs once.
+    /// Records an event of a core in a system. Waits count the periods: the first wait ends the code that runs once.
     pub(crate) fn hear_core(&mut self, event: &Event) {
         self.period.get_or_insert(0);
         self.hear(event);
@@ -245,8 +245,8 @@ impl Watch {
         }
     }
 
-    /// Result of the watch, including operations that issued with the last `wait` and are still in flight; `core` names the core in a
-    /// system.
+    /// Result of the watch, including operations that issued with the last `wait` and are still in flight; `core` is the name of the core
+    /// in a system.
     pub(crate) fn end(&self, emulator: &Emulator, core: &str) -> Denials {
         let program = emulator.program();
         let mut watch = self.clone();
@@ -285,7 +285,7 @@ pub(crate) struct Denials {
 }
 
 impl Denials {
-    /// Verdict on a run, from the denials of all its cores.
+    /// Verdict on a run, from the denied events of all cores.
     ///
     /// # Errors
     /// If a denied event occurred.

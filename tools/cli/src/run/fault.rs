@@ -6,7 +6,7 @@ use crate::terminal::output::Failure;
 use takt_debug::fault::diagnose;
 use takt_emu::{Fault, FaultKind};
 
-/// Converts an error of a run for the user: a fault gets its source line, and the error's context (`period 3`) as a note.
+/// Converts an error of a run for display: a fault gets its source line, and the error's context (`period 3`) becomes a note.
 pub(crate) fn located_error(error: anyhow::Error, loaded: &LoadedProgram, color: bool) -> anyhow::Error {
     let mut said: Vec<String> = Vec::new();
     for cause in error.chain() {
@@ -20,7 +20,7 @@ pub(crate) fn located_error(error: anyhow::Error, loaded: &LoadedProgram, color:
     error
 }
 
-/// A fault with its source line, as text.
+/// Renders a fault with its source line.
 pub(crate) fn rendered(fault: &Fault, loaded: &LoadedProgram, note: &str, color: bool) -> String {
     let mut diagnostics = diagnose(fault, &loaded.program, &loaded.sources);
     for diagnostic in &mut diagnostics.list {

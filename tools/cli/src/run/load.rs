@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Loading of programs from files, built-in names or standard input.
+//! Loads programs from files, by built-in names, or from standard input.
 
 use crate::run::cache::{self, CacheEntry, First};
 use crate::run::loaded_program::LoadedProgram;
@@ -18,34 +18,34 @@ use takt_asm::{
 };
 use takt_isa::{MACHINES, Machine, Program};
 
-/// Loading options: presentation of diagnostics, and target machine.
+/// Options for loading: presentation of diagnostics, and target machine.
 #[derive(Clone)]
 pub(crate) struct Load {
-    /// Machine given by the user.
+    /// Machine that the user specified.
     pub(crate) machine: Option<&'static Machine>,
     /// Messages on standard error are coloured.
     pub(crate) color: bool,
-    /// Choice of the bundles to schedule.
+    /// Selection of the bundles to schedule.
     pub(crate) schedule: Schedule,
     /// Effort of the scheduler.
     pub(crate) effort: u32,
-    /// Source options of the command line.
+    /// Source options from the command line.
     pub(crate) source: SourceArguments,
 }
 
-/// The file describes a system, not a program: its name ends in `.toml`, for every command.
+/// The file describes a system instead of a program: in every command, its name ends in `.toml`.
 pub(crate) fn is_system(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"))
 }
 
 impl Load {
-    /// Options with the source's own scheduler settings.
+    /// Default options: the scheduler settings are those of the source.
     pub(crate) fn new(machine: impl Into<Option<&'static Machine>>, color: bool) -> Load {
         let Options { schedule, effort, .. } = Options::default();
         Load { machine: machine.into(), color, schedule, effort, source: SourceArguments::default() }
     }
 
-    /// Adds the source options of the command line.
+    /// Adds source options from the command line.
     pub(crate) fn with(mut self, source: &SourceArguments) -> Load {
         self.source = source.clone();
         self
@@ -61,7 +61,7 @@ impl Load {
         }
     }
 
-    /// Contents of a program file.
+    /// Reads a program file.
     fn bytes(path: &Path) -> Result<Vec<u8>> {
         if is_system(path) {
             let name = files::input_name(path);
@@ -72,7 +72,7 @@ impl Load {
         files::read(path, IMAGE_BYTES)
     }
 
-    /// Contents of a source file; an image is an error.
+    /// Reads a source file; an image is an error.
     pub(crate) fn source(path: &Path) -> Result<Vec<u8>> {
         let bytes = Load::bytes(path)?;
         if image::is_image(&bytes) {
@@ -81,7 +81,7 @@ impl Load {
         Ok(bytes)
     }
 
-    /// Program in a file: an image, or a source, which is assembled.
+    /// Loads a program: from an image, or from a source, which is assembled.
     pub(crate) fn program(&self, path: &Path) -> Result<Program> {
         Ok(self.with_source(path)?.program)
     }
@@ -107,7 +107,7 @@ impl Load {
         Ok(loaded)
     }
 
-    /// Rejects a program for another machine than the user's.
+    /// Rejects a program for a machine other than the one that the user specified.
     fn is_for(&self, program: &Program, name: &str) -> Result<()> {
         match self.machine.filter(|machine| **machine != *program.machine) {
             Some(machine) => bail!("{name} is for {}, not for {}", program.machine.name, machine.name),
@@ -115,13 +115,13 @@ impl Load {
         }
     }
 
-    /// Search path of sources: the project, the folders of the command line, and Takt's library.
+    /// Search path of sources: the project, the folders from the command line, and Takt's library.
     fn sources<L: Loader>(&self, project: L) -> Search<L> {
         let folders = self.source.folders.iter();
         folders.fold(Search::new(project), Search::folder).library(takt_programs::LIBRARY)
     }
 
-    /// Name and folder of a source file. Its includes are searched in that folder, then as in [`Load::sources`].
+    /// Name of a source file, and a loader for its folder. Includes are searched there first, then as in [`Load::sources`].
     fn project(path: &Path) -> (String, FileLoader) {
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
         let loader = FileLoader::new(folder.map_or(PathBuf::from("."), Path::to_owned));
@@ -139,7 +139,7 @@ impl Load {
         takt_asm::assemble_bytes(&name, bytes, &self.sources(folder), &self.options())
     }
 
-    /// Unscheduled program of a source read from a file, with the contractions in it.
+    /// Assembles a source read from a file without scheduling; also returns the contractions.
     pub(crate) fn plain(
         &self,
         path: &Path,
@@ -152,7 +152,7 @@ impl Load {
         Ok((plain, checked.contractions().to_vec()))
     }
 
-    /// Assembles the program for one of many machines, without messages.
+    /// Assembles a program for one of many machines, without messages.
     pub(crate) fn assemble_quietly(
         &self,
         path: &Path,
@@ -162,7 +162,7 @@ impl Load {
         takt_asm::assemble_bytes(&name, bytes, &self.sources(folder), &self.options())
     }
 
-    /// Names and texts of all files of a program on a machine.
+    /// Names and texts of all files that a program on a machine consists of.
     pub(crate) fn texts(&self, path: &Path, bytes: Vec<u8>) -> Vec<(String, String)> {
         let (name, others) = Load::project(path);
         let first = First { name: name.clone(), bytes, others };
@@ -171,7 +171,7 @@ impl Load {
         files.iter().map(|file| (file.name.to_string(), file.text.to_string())).collect()
     }
 
-    /// Assembled program, possibly from the cache. Shows warnings and waiting times unless `is_quiet`.
+    /// Assembles a program, or loads it from the cache. Shows warnings and progress unless `is_quiet`.
     pub(crate) fn assembled_program(
         &self,
         path: &Path,
@@ -201,7 +201,7 @@ impl Load {
         Ok(loaded)
     }
 
-    /// Prints warnings to standard error; converts errors.
+    /// Prints warnings to standard error, and converts errors.
     pub(crate) fn finish(&self, result: Result<AssembledProgram, Diagnostics>) -> Result<AssembledProgram> {
         match result {
             Ok(assembled) => {

@@ -7,12 +7,12 @@ use takt_asm::expr::Value;
 use takt_asm::names::{DebugInfo, Names};
 use takt_isa::Program;
 
-/// A program; if it was assembled here or its image has them, with constants, sources and names.
+/// A program with constants, sources and names, if it was assembled here or its image contains them.
 pub(crate) struct LoadedProgram {
     pub(crate) program: Program,
-    /// Named constants of the source.
+    /// Named constants in the source.
     pub(crate) constants: Vec<(String, Value)>,
-    /// Source texts, under the names that the program has for them.
+    /// Source texts, keyed by the program's file names.
     pub(crate) sources: Vec<(String, String)>,
     /// Meanings of names in the source.
     pub(crate) names: Names,

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Mistakes in a machine file that only the circuit generator detects, at their places in the file.
+//! Mistakes in a machine file that only the circuit generator detects, shown at their places in the file.
 
 use takt_asm::diag::Diagnostics;
 use takt_rtl::{ExportError, PlanError, SystemError};
 
-/// Mistake behind an error; `None` if the error is not about a machine file.
+/// Extracts the mistake from an error; `None` if the error does not concern a machine file.
 pub(crate) fn of(error: &anyhow::Error) -> Option<Diagnostics> {
     #[cfg(feature = "board")]
     let of_board = of_board(error);
@@ -16,7 +16,7 @@ pub(crate) fn of(error: &anyhow::Error) -> Option<Diagnostics> {
         .and_then(in_file)
 }
 
-/// Plan error inside an error of a board's top level, build or simulation.
+/// Plan error that caused an error of a board's top level, build or simulation.
 #[cfg(feature = "board")]
 fn of_board(error: &anyhow::Error) -> Option<&PlanError> {
     use takt_board::build::BuildError;
@@ -46,7 +46,7 @@ fn of_system(error: &SystemError) -> Option<&PlanError> {
     }
 }
 
-/// An error of the generator at its place in the machine file.
+/// Shows an error of the generator at its place in the machine file.
 pub(crate) fn in_file(error: &PlanError) -> Option<Diagnostics> {
     let (machine, place, mend) = error.place();
     takt_asm::machine::about(machine, place, &error.to_string(), &mend)

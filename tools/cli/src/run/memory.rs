@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Words of data memory by name: elements of arrays as the source writes them, and words behind a label, counted as a load's address
-//! is. `takt debug` and `takt live` name them alike.
+//! Words of data memory by name: array elements in the notation of the source, and words from a label on, with indices counted like
+//! addresses. `takt debug` and `takt live` use the same names.
 
 use crate::run::loaded_program::LoadedProgram;
 use crate::terminal::options::suggest;
@@ -14,18 +14,18 @@ use takt_isa::text::element_names;
 /// A word of data memory.
 #[derive(Clone, Debug)]
 pub(crate) struct Word {
-    /// Name: `P[2,3]` of an array, `table[3]` of a label.
+    /// Name: `P[2,3]` for an array, `table[3]` for a label.
     pub(crate) title: String,
-    /// Type of the value; words behind a label are binary32.
+    /// Type of the value; words after a label are binary32.
     pub(crate) ty: Type,
     /// Address in data memory.
     pub(crate) address: u32,
 }
 
-/// The words that a name stands for: all elements of an array, or one; all words from a label to the next one, or one.
+/// Words that a name denotes: all elements of an array, or one of them; all words from a label up to the next label, or one of them.
 ///
 /// # Errors
-/// If there are none.
+/// If the name denotes no words.
 pub(crate) fn words(loaded: &LoadedProgram, name: &str) -> Result<Vec<Word>> {
     let arrays = &loaded.names.arrays;
     let program = &loaded.program;
@@ -62,7 +62,7 @@ pub(crate) fn words(loaded: &LoadedProgram, name: &str) -> Result<Vec<Word>> {
     }
 }
 
-/// The elements of an array, in the order of their words.
+/// Elements of an array, in memory order.
 fn elements(array: &NamedArray) -> Vec<Word> {
     let titles = element_names(&array.name, &array.sizes).into_iter();
     titles.zip(array.base..).map(|(title, address)| Word { title, ty: array.ty, address }).collect()

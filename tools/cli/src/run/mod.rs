@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Programs and systems: loading, running from tables, and results of runs.
+//! Loading of programs and systems, runs with input tables, and results of runs.
 
 pub(crate) mod account;
 pub(crate) mod application;

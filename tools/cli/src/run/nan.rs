@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Warnings of NaNs on output ports.
+//! Warnings about NaNs on output ports.
 
 use crate::terminal::output::warning;
 use takt_emu::PortWrite;
 use takt_isa::Program;
 
-/// NaNs written to output ports: the first few, and their number.
+/// NaNs written to output ports: the first few.
 #[derive(Default)]
 pub(crate) struct NanWrites {
     first: Vec<PortWrite>,
 }
 
-/// Maximal number of individual warnings.
+/// Maximum number of warnings for single NaNs.
 const SHOWN: usize = 5;
 
 impl NanWrites {
@@ -20,7 +20,7 @@ impl NanWrites {
         self.first.extend(writes.iter().take(SHOWN - self.first.len()));
     }
 
-    /// Prints the warnings; `total` is the number of all NaN writes.
+    /// Prints the warnings; `total` is the number of NaN writes overall.
     pub(crate) fn warn(&self, program: &Program, total: u64, color: bool) {
         for write in &self.first {
             let port = program.register_text(write.register);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Outcome of `takt run` as text and as JSON: of each core, and of the links in a system.
+//! Outcome of `takt run`, as text and as JSON: for each core, and for the links of a system.
 
 use crate::run::account::Account;
 use crate::run::deny::Denials;
@@ -22,7 +22,7 @@ use takt_system::{CorePeriods, Description, FifoCounts};
 
 /// Execution of an application, from reset to its end.
 pub(crate) trait Execution<'a>: TableApplication {
-    /// Runs until all cores halt, without rows of inputs.
+    /// Runs without input rows until all cores halt.
     fn run_to_halt(&mut self) -> Result<()>;
 
     /// Completes the trace; returns the outcome.
@@ -57,25 +57,25 @@ pub(crate) struct CoreOutcome<'a> {
     denials: Denials,
 }
 
-/// Outcome of a system beyond its cores.
+/// Outcome of a system apart from its cores.
 pub(crate) struct SystemOutcome<'a> {
     pub(crate) description: &'a Description,
     pub(crate) first_tick: Option<Cycle>,
     pub(crate) cycles: Cycle,
     pub(crate) fifos: Vec<(&'a str, FifoCounts)>,
-    /// Number of entries that a full FIFO refused.
+    /// Number of entries that full FIFOs rejected.
     pub(crate) refused: u64,
 }
 
 /// Outcome of a run.
 pub(crate) struct RunOutcome<'a> {
     pub(crate) cores: Vec<CoreOutcome<'a>>,
-    /// Last value of each output; `None` if it was never written.
+    /// Last value of each output; `None` if never written.
     pub(crate) outputs: Vec<(String, Option<(Type, u32)>)>,
-    /// The application has inputs, and no input table was given.
+    /// The application has inputs, but no input table was given.
     pub(crate) zeros: bool,
     pub(crate) nans: NanWrites,
-    /// Outcome of the system beyond its cores; `None` for a single program.
+    /// Outcome of a system apart from its cores; `None` for a single program.
     pub(crate) system: Option<SystemOutcome<'a>>,
 }
 
@@ -126,7 +126,7 @@ impl<'a> CoreOutcome<'a> {
         if shortest == longest { shortest.to_string() } else { format!("{shortest} to {longest}") }
     }
 
-    /// Line with periods and cycles of the core, after its name in a system.
+    /// Writes a line with periods and cycles of the core, preceded by its name in a system.
     fn line(&self, out: &mut impl Write) -> Result<()> {
         let (machine, count, cycles) = (self.program.machine.name, self.periods.count, self.account.cycles);
         let (periods, each) = if count == 1 { ("period", "cycles") } else { ("periods", "cycles each") };
@@ -154,7 +154,7 @@ impl<'a> CoreOutcome<'a> {
 }
 
 impl RunOutcome<'_> {
-    /// Warns of NaNs on a program's output ports.
+    /// Warns about NaNs on a program's output ports.
     pub(crate) fn warn(&self, color: bool) {
         if let ([core], None) = (&self.cores[..], &self.system) {
             self.nans.warn(core.program, core.nan_writes, color);
@@ -257,7 +257,7 @@ impl RunOutcome<'_> {
         Ok(())
     }
 
-    /// Lines about a system: ticks, each core, each FIFO.
+    /// Writes lines about a system: ticks, each core, each FIFO.
     fn system_lines(
         &self,
         system: &SystemOutcome<'_>,

@@ -14,7 +14,7 @@ use takt_system::SystemFault;
 /// Formats of a value in CSV and JSON.
 pub(crate) use takt_debug::value::{json, text as format};
 
-/// Writes a CSV row. A field with a comma, the name of an element with several indices, stands in quotes; fields contain no quotes.
+/// Writes a CSV row. Quotes fields with a comma, such as the name of an element with several indices; fields contain no quotes.
 pub(crate) fn write_row(out: &mut impl Write, fields: impl IntoIterator<Item = String>) -> io::Result<()> {
     let mut row = String::new();
     for (i, field) in fields.into_iter().enumerate() {
@@ -30,15 +30,15 @@ pub(crate) fn write_row(out: &mut impl Write, fields: impl IntoIterator<Item = S
     out.write_all(row.as_bytes())
 }
 
-/// Inputs period by period: rows of a CSV file, or zeros. Shared by all commands.
+/// Inputs of each period: rows of a CSV file, or zeros. All commands use this type.
 pub(crate) enum Inputs {
-    /// All ports are 0, for any number of periods.
+    /// All ports are 0, for an unlimited number of periods.
     Zero(Row),
     Table(Box<Table>),
 }
 
 impl Inputs {
-    /// Opens a CSV file (`-` is standard input), and reads its header.
+    /// Opens a CSV file (`-` for standard input) and reads its header.
     pub(crate) fn open(path: Option<&Path>, ports: &[Port]) -> Result<Inputs> {
         match path {
             Some(path) => Ok(Inputs::Table(Box::new(open(path, ports)?))),
@@ -46,7 +46,7 @@ impl Inputs {
         }
     }
 
-    /// Inputs of the next period; `None` at the end of the file, which must have at least one row.
+    /// Inputs of the next period; `None` at the end of the file. A file must have at least one row.
     pub(crate) fn next(&mut self) -> Result<Option<&Row>> {
         match self {
             Inputs::Zero(row) => Ok(Some(row)),
@@ -55,8 +55,8 @@ impl Inputs {
     }
 }
 
-/// Opens inputs with `open`, and outputs with their titles. A plant connected to both may wait for the titles before it sends: they are
-/// then written before anything is read. Otherwise nothing is written before the inputs are valid.
+/// Opens inputs with `open`, and outputs with their titles. A plant connected to both may wait for the titles before it sends anything,
+/// so they are then written before any input is read. Otherwise nothing is written until the inputs are known to be valid.
 pub(crate) fn open_both<I>(
     inputs: Option<&Path>,
     open: impl FnOnce() -> Result<I>,
@@ -75,21 +75,21 @@ pub(crate) fn open_both<I>(
     Ok((inputs, outputs))
 }
 
-/// Finishes the outputs of a run that ended with `result` after some rows. After a fault the rows before it are kept, as evidence; without
-/// rows, and after any other error, the file stays unchanged.
+/// Finishes the outputs of a run that ended with `result` after some rows. After a fault, the preceding rows are kept as evidence;
+/// without rows, and after any other error, the file is left unchanged.
 pub(crate) fn finish(outputs: Option<Out>, rows: u64, result: Result<()>) -> Result<()> {
     let is_fault =
         |error: &anyhow::Error| error.chain().any(|cause| cause.is::<Fault>() || cause.is::<SystemFault>());
     let keeps = result.as_ref().err().is_none_or(|error| rows > 0 && is_fault(error));
     let finished = outputs.filter(|_| keeps).map_or(Ok(()), Out::finish);
-    // The first error decides.
+    // The first error takes precedence.
     result.and(finished)
 }
 
-/// Maximal number of periods generated without a CSV file.
+/// Maximum number of periods generated without a CSV file.
 const MOST_PERIODS: u64 = 10_000_000;
 
-/// Inputs of each period, at most `periods`; without a CSV file, `periods` rows of zeros, by default `otherwise`.
+/// Inputs of each period, at most `periods`. Without a CSV file: `periods` rows of zeros, or `otherwise` rows by default.
 pub(crate) fn rows(
     path: Option<&Path>,
     periods: Option<u64>,
@@ -110,10 +110,10 @@ pub(crate) fn rows(
     Ok(rows)
 }
 
-/// Name of the column with the run of a row.
+/// Name of the column that identifies the run.
 const RUN: &str = "run";
 
-/// Inputs of many runs from a CSV file with a column `run`, in order of first appearance: names and rows.
+/// Reads the inputs of many runs from a CSV file with a column `run`: names and rows, in order of first appearance.
 pub(crate) fn runs(
     path: &Path,
     ports: &[Port],

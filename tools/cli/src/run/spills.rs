@@ -5,7 +5,7 @@ use takt_asm::schedule::BlockReport;
 use takt_asm::{AssembledProgram, SpilledValue};
 use takt_isa::Program;
 
-/// Cost of blocks with more live values than registers, as lines of text.
+/// Cost of blocks that have more live values than registers, as lines of text.
 pub(crate) fn spilled(assembled: &AssembledProgram) -> Vec<String> {
     let lines = assembled.spills.iter().flat_map(|spills| {
         let block = block_name(&assembled.program, &assembled.blocks[spills.block]);
@@ -18,7 +18,7 @@ pub(crate) fn spilled(assembled: &AssembledProgram) -> Vec<String> {
     lines.collect()
 }
 
-/// Name of a block: its label, otherwise the place of its first operation.
+/// Name of a block: its label, or else the place of its first operation.
 pub(crate) fn block_name(program: &Program, block: &BlockReport) -> String {
     let place = || block.location.map(|at| program.place_text(at));
     block.label.clone().or_else(place).unwrap_or_else(|| format!("bundle {}", block.address))

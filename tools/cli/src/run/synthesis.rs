@@ -15,7 +15,7 @@ pub(crate) struct PlacedClock {
     pub(crate) date: String,
 }
 
-/// Committed result for a machine, if it was placed and routed.
+/// Committed result for a machine; `None` if it has not been placed and routed.
 pub(crate) fn placed(machine: &str) -> Option<PlacedClock> {
     let found = takt_rtl::synthesis::of_machine(machine)?;
     let device = format!("{}-{}", found.device, found.grade?);

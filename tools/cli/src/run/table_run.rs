@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Run loop of all commands that run an application from a table: rows of inputs in, rows of outputs out.
+//! Run loop for all commands that run an application from a table: rows of inputs in, rows of outputs out.
 
 use crate::run::ports::{self, Inputs};
 use crate::terminal::files;
@@ -10,9 +10,9 @@ use std::path::Path;
 use takt_emu::Row;
 use takt_isa::program::Port;
 
-/// An application that runs for a fixed time with each row of inputs: a program for a period, a system for a base tick.
+/// An application that runs for a fixed time per row of inputs: a program for a period, a system for a base tick.
 pub(crate) trait TableApplication {
-    /// Noun for the time of a row, for a progress bar.
+    /// Plural noun for the rows, for a progress bar.
     const ROWS: &'static str;
 
     /// Columns of the input table.
@@ -23,12 +23,12 @@ pub(crate) trait TableApplication {
         Vec::new()
     }
 
-    /// Runs to the time of the first row.
+    /// Runs up to the time of the first row.
     fn begin(&mut self) -> Result<()> {
         Ok(())
     }
 
-    /// Runs with a row; returns false if the run ends.
+    /// Runs with a row of inputs; returns false when the run ends.
     fn row(&mut self, row: &Row) -> Result<bool>;
 
     /// Output values after the last row.
@@ -37,18 +37,18 @@ pub(crate) trait TableApplication {
     }
 }
 
-/// Tables of a run.
+/// Input and output tables of a run.
 #[derive(Clone, Copy)]
 pub(crate) struct Tables<'a> {
-    /// Input table; `None`: every input is 0.
+    /// Input table; `None` sets every input to 0.
     pub(crate) inputs: Option<&'a Path>,
     pub(crate) outputs: Option<&'a Path>,
-    /// Maximal number of rows.
+    /// Maximum number of rows.
     pub(crate) most: Option<u64>,
 }
 
 impl Tables<'_> {
-    /// Runs an application with each row; returns the number of rows.
+    /// Runs an application once per row; returns the number of rows.
     pub(crate) fn drive<D: TableApplication>(&self, driven: &mut D) -> Result<u64> {
         let live = self.inputs.is_some_and(files::is_live);
         let (columns, titles) = (driven.inputs(), driven.titles());
@@ -56,7 +56,7 @@ impl Tables<'_> {
         let (mut inputs, mut outputs) =
             ports::open_both(self.inputs, open, self.outputs, titles.into_iter())?;
         driven.begin()?;
-        // Rows printed in each period replace a progress bar.
+        // If rows are printed in each period, they replace the progress bar.
         let shows_rows = self.outputs.is_some_and(files::is_dash);
         let all = self.most.or_else(|| progress::rows(self.inputs)).filter(|_| !live && !shows_rows);
         let bar = DelayedProgress::new(all, D::ROWS);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The option `takt run --trace`: events of a run, cycle by cycle, in a file for other tools.
+//! The option `takt run --trace`: writes the events of a run, cycle by cycle, to a file for other tools.
 
 use crate::terminal::files::{OptionPath, Out};
 use crate::terminal::number;
@@ -40,12 +40,12 @@ fn cycles(text: &str) -> Result<Range<u64>, String> {
 }
 
 impl TraceArguments {
-    /// Trace file with its option.
+    /// Path of the trace file, with its option.
     pub(crate) fn file_with_option(&self) -> Option<OptionPath<'_>> {
         Some(("--trace", self.trace.as_deref()?))
     }
 
-    /// Trace format by file extension.
+    /// Trace format, from the file extension.
     fn format(path: &Path) -> Result<Format> {
         let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
         Format::of_extension(extension).ok_or_else(|| {
@@ -55,7 +55,7 @@ impl TraceArguments {
         })
     }
 
-    /// Opens the file before the run, so that path errors come first.
+    /// Opens the file before the run, so that errors in the path come first.
     pub(crate) fn create(&self) -> Result<Option<Out>> {
         let Some(path) = self.trace.as_deref() else { return Ok(None) };
         Self::format(path)?;
@@ -71,14 +71,14 @@ impl TraceArguments {
         })
     }
 
-    /// Begins the trace of a program.
+    /// Starts the trace of a program.
     pub(crate) fn begin<'o>(&self, emulator: &Emulator, file: &'o mut Out) -> Result<Tracer<'o>> {
         let options = self.options(&self.path())?;
         Tracer::new(emulator, Box::new(file), options)
             .map_err(|error| Failure::Usage(format!("--trace-signals: {error}")).into())
     }
 
-    /// Begins the trace of a system, a waveform.
+    /// Starts the trace of a system, which is a waveform.
     pub(crate) fn begin_system<'o>(&self, system: &System, file: &'o mut Out) -> Result<SystemTracer<'o>> {
         let path = self.path();
         let options = self.options(&path)?;
@@ -90,9 +90,9 @@ impl TraceArguments {
             .map_err(|error| Failure::Usage(format!("--trace-signals: {error}")).into())
     }
 
-    /// Warns of an incomplete or empty trace; `passed` is the run's length in cycles.
+    /// Warns about an incomplete or empty trace; `passed` is the length of the run in cycles.
     pub(crate) fn finish(&self, summary: std::io::Result<Summary>, passed: Cycle, color: bool) -> Result<()> {
-        // `Out` names the file in its errors.
+        // The error from `Out` already names the file.
         let summary = summary.map_err(|error| anyhow!(error))?;
         let path = self.path();
         let name = path.display();

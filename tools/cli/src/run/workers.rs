@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Work in units, on this computer or on the workers of a HyperQueue server. A unit is this command again, with a file that says what to
-//! do: it runs in a process of its own, wherever the same files are seen.
+//! Work divided into units, for this computer or for the workers of a HyperQueue server. A unit is a call of this command with a job
+//! file; it runs in a separate process, wherever the same file system is mounted.
 
 use crate::terminal::files::{self, OptionPath};
 use anyhow::{Context, Result, bail};
@@ -13,7 +13,7 @@ use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 use takt_work::{Client, Cluster, Event, Failure, HYPERQUEUE, Place, Unit};
 
-/// Bytes of a unit's file.
+/// Maximum size of a unit's job file, in bytes.
 const UNIT_LIMIT: usize = 1 << 20;
 
 /// The computers that do the work.
@@ -33,12 +33,12 @@ pub(crate) struct WorkArguments {
 }
 
 impl WorkArguments {
-    /// True if the work is for a HyperQueue server.
+    /// The work goes to a HyperQueue server.
     pub(crate) fn uses_server(&self) -> bool {
         self.hq || self.hq_server.is_some()
     }
 
-    /// Refuses what only one process can read.
+    /// Rejects inputs that only one process can read.
     pub(crate) fn check(&self, reads: &[OptionPath<'_>]) -> Result<()> {
         if self.uses_server() && reads.iter().any(|(_, path)| files::is_dash(path)) {
             bail!("units read programs from files, not from standard input");
@@ -46,7 +46,7 @@ impl WorkArguments {
         Ok(())
     }
 
-    /// The unit that this process does, if it is for a unit: the job, and the file of its result.
+    /// Job of this process and the path for its result; `None` if the process does not run a unit.
     pub(crate) fn job<J: DeserializeOwned>(&self) -> Result<Option<(J, &Path)>> {
         let (Some(file), Some(result)) = (&self.unit, &self.result) else { return Ok(None) };
         let text = files::read(file, UNIT_LIMIT)?;
@@ -61,9 +61,9 @@ pub(crate) fn write(result: &Path, value: &impl Serialize) -> Result<()> {
     Ok(takt_work::write(result, &takt_cache::seal(serde_json::to_vec(value)?))?)
 }
 
-/// The place where units run, and a server that ends with it.
+/// Place where units run, and the server to stop at the end.
 pub(crate) struct Workers {
-    /// The command; units of one command are kept together.
+    /// Name of the command; units of one command share a folder.
     command: &'static str,
     place: Place,
     cluster: Option<Cluster>,
@@ -74,14 +74,14 @@ impl Drop for Workers {
         if let Some(cluster) = self.cluster.take() {
             let folder = cluster.server().to_owned();
             drop(cluster);
-            // If it stays, it is in nobody's way.
+            // A folder that cannot be removed does no harm.
             let _ = std::fs::remove_dir_all(folder);
         }
     }
 }
 
 impl Workers {
-    /// This computer's cores, or those of a HyperQueue server.
+    /// Uses the cores of this computer, or the workers of a HyperQueue server.
     pub(crate) fn new(command: &'static str, arguments: &WorkArguments) -> Result<Workers> {
         let cores = std::thread::available_parallelism().map_or(2, usize::from);
         if !arguments.uses_server() {
@@ -93,13 +93,13 @@ impl Workers {
         Ok(Workers { command, place, cluster })
     }
 
-    /// True if work is for other processes, rather than threads of this process.
+    /// Units run in other processes, rather than in threads of this process.
     pub(crate) fn uses_processes(&self) -> bool {
         matches!(self.place, Place::Queue { .. })
     }
 
-    /// The unit that does a job in `time`, or less; `result` has a name of its own, or else one by content: `key` is all that the result
-    /// depends on beside the job.
+    /// Creates the unit that performs a job within `time`. The result's path is `result`, or else is derived from the contents: `key`
+    /// covers everything that the result depends on, apart from the job.
     pub(crate) fn unit(
         &self,
         name: String,
@@ -115,13 +115,13 @@ impl Workers {
         takt_cache::copy(&file, text.as_bytes())
             .with_context(|| format!("cannot write {}", file.display()))?;
         let result = result.unwrap_or(file.with_extension("result"));
-        // A result that is damaged, or no result at all, is made anew.
+        // Remove a damaged result, so that the unit runs again.
         if takt_cache::read(&result).is_none() {
             takt_cache::discard(&result);
         }
         let own = std::env::current_exe().context("this program has no path")?;
         let mut command = vec![own.display().to_string()];
-        // The programs and how they are assembled; paths are relative to the folder.
+        // Pass on the programs and assembler options; their paths are relative to the folder.
         command.extend(std::env::args().skip(1));
         command.extend(["--unit".to_owned(), file.display().to_string()]);
         command.extend(["--result".to_owned(), result.display().to_string()]);
@@ -129,7 +129,7 @@ impl Workers {
         Ok(Unit { name, command, folder, result, cpus: 1, time })
     }
 
-    /// Runs units; those that failed.
+    /// Runs units; returns those that failed.
     pub(crate) fn run(
         &self,
         units: &[Unit],
@@ -146,8 +146,8 @@ impl Workers {
         })?)
     }
 
-    /// Runs units, and takes their results in the order of the units; they are not kept. Where a unit failed, an error; fewer results
-    /// after `stop`.
+    /// Runs units, and returns their results in the same order, without keeping the files. If a unit failed, returns an error; after
+    /// `stop`, fewer results.
     pub(crate) fn results<R: DeserializeOwned>(
         &self,
         units: &[Unit],
@@ -182,17 +182,17 @@ impl Workers {
     }
 }
 
-/// The message for a unit's result that is not what the unit wrote.
+/// Error message for a damaged result file.
 pub(crate) fn damaged(unit: &Unit) -> String {
     format!("{} is damaged and was removed; the same command makes it anew", unit.result.display())
 }
 
-/// The folder of a command's units and their results.
+/// Folder for the units of a command and their results.
 fn folder(command: &str) -> Result<PathBuf> {
     Ok(takt_cache::folder()?.join(command).join("units"))
 }
 
-/// Python with HyperQueue, where `PATH` has neither `hq` nor the package: in the folder of tools, installed there with a message.
+/// Python with HyperQueue, if `PATH` has neither `hq` nor the package: installed, with a message, in the folder of tools.
 #[cfg(feature = "board")]
 fn install() -> Result<PathBuf> {
     use takt_board::tools::Venv;

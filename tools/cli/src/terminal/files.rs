@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Files that commands read and write. `-` is standard input or output.
+//! Files that commands read and write; `-` is standard input or output.
 
 use crate::terminal::output::Failure;
 use crate::terminal::page::Page;
@@ -10,12 +10,12 @@ use std::io::{self, BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 use takt_isa::text::visible;
 
-/// The path means standard input or output.
+/// The path denotes standard input or output.
 pub(crate) fn is_dash(path: &Path) -> bool {
     path.as_os_str() == "-"
 }
 
-/// Data may still be on its way, as on standard input or a pipe. (A regular file is complete.)
+/// Data may still arrive, as on standard input or a pipe. (A regular file is complete.)
 pub(crate) fn is_live(path: &Path) -> bool {
     is_dash(path) || fs::metadata(path).is_ok_and(|about| !about.is_file())
 }
@@ -54,30 +54,30 @@ pub(crate) fn read(path: &Path, limit: usize) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Standard output, or an output file, buffered.
+/// Buffered standard output or output file.
 ///
-/// A file is written under a temporary name beside its target and renamed in [`Out::finish`]: before that, and after any failure, the
-/// target is unchanged. Anything but a regular file (a device, a pipe) is written directly.
+/// A file is written under a temporary name in the same folder and renamed in [`Out::finish`]: until then, and after any failure, the
+/// target is unchanged. Files other than regular ones (devices, pipes) are written directly.
 pub(crate) struct Out {
     writer: Box<dyn Write>,
     name: String,
     partial: Option<PartialFile>,
-    /// Formatting state, for results for people.
+    /// Formatting state, if the output is meant for people.
     shown: Option<DisplayState>,
 }
 
-/// Formatting state of results for people.
+/// Formatting state of output meant for people.
 #[derive(Default)]
 struct DisplayState {
-    /// Leading bytes of an incomplete character.
+    /// First bytes of an incomplete character.
     begun: Vec<u8>,
     page: Page,
-    /// The line so far, if the page has a width.
+    /// Current line so far, if the page has a width.
     line: String,
 }
 
 impl DisplayState {
-    /// Adds text; returns complete lines, and keeps the rest until its line ends.
+    /// Adds text; returns complete lines and keeps the remainder.
     fn add(&mut self, text: &str) -> String {
         if self.page.width.is_none() {
             return text.to_owned();
@@ -103,7 +103,7 @@ struct PartialFile {
 
 impl Drop for PartialFile {
     fn drop(&mut self) {
-        // After the rename the temporary file does not exist.
+        // After the rename, the temporary file no longer exists.
         let _ = fs::remove_file(&self.temporary);
     }
 }
@@ -117,24 +117,25 @@ impl Out {
         Out { writer: Box::new(writer), name: "standard output".to_owned(), partial: None, shown: None }
     }
 
-    /// Standard output, for results. Names and texts from outside are escaped, so that a terminal executes no commands in them.
+    /// Standard output, for results. Names and texts from outside are escaped, so that a terminal does not execute control sequences in
+    /// them.
     pub(crate) fn results() -> Out {
         Out { shown: Some(DisplayState::default()), ..Out::stdout() }
     }
 
-    /// Sets the format of further results.
+    /// Sets the format of subsequent results.
     pub(crate) fn set_page(&mut self, page: Page) {
         if let Some(shown) = &mut self.shown {
             shown.page = page;
         }
     }
 
-    /// Format of further results.
+    /// Format of subsequent results.
     pub(crate) fn page(&self) -> Page {
         self.shown.as_ref().map_or(Page::default(), |shown| shown.page)
     }
 
-    /// Writes lines that may contain bold text, made by [`Page::strong`]; all other control characters are escaped.
+    /// Writes lines that may contain bold text from [`Page::strong`]; all other control characters are escaped.
     pub(crate) fn lines(&mut self, text: &str) -> io::Result<()> {
         let text = crate::terminal::output::coloured(text);
         let result = match &mut self.shown {
@@ -144,7 +145,7 @@ impl Out {
         self.named(result)
     }
 
-    /// Writes lines that form a paragraph: filled to the page's width, or unchanged if it has none.
+    /// Writes lines as a paragraph: filled to the page's width, or unchanged if the page has none.
     pub(crate) fn paragraph(&mut self, text: &str) -> io::Result<()> {
         let indent = &text[..text.len() - text.trim_start_matches(' ').len()];
         match self.page().width {
@@ -156,7 +157,7 @@ impl Out {
         }
     }
 
-    /// Begins a file. Errors of the path are detected here, before any work.
+    /// Creates a file. Errors in the path are detected here, before any work.
     pub(crate) fn create(path: &Path) -> Result<Out> {
         if is_dash(path) {
             return Ok(Out::stdout());
@@ -167,7 +168,7 @@ impl Out {
         Ok(Out { writer, name, partial, shown: None })
     }
 
-    /// Completes the file and moves it to its target.
+    /// Completes the file and renames it to its target.
     pub(crate) fn finish(mut self) -> Result<()> {
         self.flush()?;
         let Out { writer, name, partial, .. } = self;
@@ -201,7 +202,7 @@ impl Write for Out {
     }
 }
 
-/// Escaped text of result bytes. `begun` holds the leading bytes of an incomplete character, from the previous call and for the next.
+/// Escapes the text of results. `begun` holds the first bytes of an incomplete character, from the previous call and for the next.
 fn escaped_text(begun: &mut Vec<u8>, bytes: &[u8]) -> String {
     begun.extend_from_slice(bytes);
     let mut text = String::with_capacity(begun.len());
@@ -224,7 +225,7 @@ fn escaped_text(begun: &mut Vec<u8>, bytes: &[u8]) -> String {
 }
 
 fn begin(path: &Path) -> Result<(File, Option<PartialFile>)> {
-    // Write the target of a symbolic link.
+    // Replace the target of a symbolic link, not the link.
     let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
     let existing = fs::metadata(&target).ok();
     match &existing {
@@ -246,25 +247,25 @@ fn begin(path: &Path) -> Result<(File, Option<PartialFile>)> {
     Ok((file, Some(partial)))
 }
 
-/// Writes a whole file.
+/// Writes a complete file.
 pub(crate) fn write(path: &Path, contents: &[u8]) -> Result<()> {
     let mut out = Out::create(path)?;
     out.write_all(contents)?;
     out.finish()
 }
 
-/// Writes a value as indented JSON with unfolded lines.
+/// Writes a value as indented JSON; lines are not folded.
 pub(crate) fn json(value: &impl serde::Serialize, out: &mut Out) -> Result<()> {
     out.set_page(Page::default());
-    // Via a string, so that a write error stays an `io::Error`.
+    // Format to a string first, so that a write error stays an `io::Error`.
     let text = serde_json::to_string_pretty(value)?;
     Ok(writeln!(out, "{text}")?)
 }
 
-/// A path with the option that gave it.
+/// A path, with the option that specified it.
 pub(crate) type OptionPath<'a> = (&'static str, &'a Path);
 
-/// Rejects a command line that reads standard input twice, writes a file twice, or writes one of its inputs.
+/// Rejects a command line that reads standard input twice, writes a file twice, or overwrites an input.
 pub(crate) fn check(reads: &[OptionPath<'_>], writes: &[OptionPath<'_>]) -> Result<()> {
     let usage = |text: String| Err(Failure::Usage(text).into());
     if let [(first, _), (second, _), ..] =
@@ -288,7 +289,7 @@ pub(crate) fn check(reads: &[OptionPath<'_>], writes: &[OptionPath<'_>]) -> Resu
     Ok(())
 }
 
-/// Key that is equal for two paths of the same file; `None` for files that may be written twice, such as /dev/null.
+/// Key that is equal for two paths of one file; `None` for files that may be written twice, such as /dev/null.
 fn identity(path: &Path) -> Option<PathBuf> {
     if is_dash(path) {
         return Some(path.to_owned());

@@ -6,10 +6,10 @@ use rustyline::history::{FileHistory, History};
 use std::env;
 use std::path::{Path, PathBuf};
 
-/// Maximal number of commands in the history.
+/// Maximum number of commands in the history.
 const COMMANDS: usize = 1000;
 
-/// Configuration of line editor and history.
+/// Configuration of the line editor and its history.
 pub(crate) fn config() -> Config {
     Config::builder()
         .auto_add_history(true)
@@ -18,14 +18,14 @@ pub(crate) fn config() -> Config {
         .map_or_else(|_| Config::default(), |builder| builder.build())
 }
 
-/// History of commands. A missing or unwritable file is no error.
+/// Command history. A missing or unwritable file is not an error.
 pub(crate) struct CommandHistory {
     pub(crate) history: FileHistory,
     pub(crate) file: Option<PathBuf>,
 }
 
 impl CommandHistory {
-    /// History from earlier sessions, in the file of this name.
+    /// Loads the history of earlier sessions from the file of this name.
     pub(crate) fn load(name: &str) -> CommandHistory {
         let mut history = FileHistory::with_config(&config());
         let file = file(name);
@@ -51,7 +51,7 @@ impl CommandHistory {
     }
 }
 
-/// Writes new commands to the file at once, so that they survive any end of the session.
+/// Appends new commands to the file at once, so that they survive however the session ends.
 pub(crate) fn append(history: &mut FileHistory, file: Option<&Path>) {
     if let Some(file) = file {
         let _ = file.parent().map(std::fs::create_dir_all);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Handling of Ctrl-C. A process can have a single handler; it executes the action set last.
+//! Handling of Ctrl-C. A process has a single handler, which executes the action set last.
 
 use anyhow::{Context, Result};
 use indicatif::ProgressBar;
@@ -11,14 +11,14 @@ static ACTION: Mutex<Option<Action>> = Mutex::new(None);
 /// Progress bars, including finished ones.
 static BARS: Mutex<Vec<ProgressBar>> = Mutex::new(Vec::new());
 
-/// Exit status after Ctrl-C, by the shells' convention.
+/// Exit status after Ctrl-C, as is the convention of shells.
 pub(crate) const INTERRUPTED: i32 = 130;
 
 fn held<T>(what: &Mutex<T>) -> MutexGuard<'_, T> {
     what.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Sets the action of Ctrl-C; the process then continues.
+/// Sets the action for Ctrl-C; after it, the process continues.
 pub(crate) fn on_interrupt(action: impl FnMut() + Send + 'static) -> Result<()> {
     let before = held(&ACTION).replace(Box::new(action));
     if before.is_some() {
@@ -28,7 +28,7 @@ pub(crate) fn on_interrupt(action: impl FnMut() + Send + 'static) -> Result<()> 
     ctrlc::set_handler(heard).context("cannot catch Ctrl-C")
 }
 
-/// Registers a progress bar. Unless a command handles Ctrl-C itself, it clears the bar before the process ends.
+/// Registers a progress bar, which Ctrl-C clears before the process ends, unless a command handles Ctrl-C itself.
 pub(crate) fn takes_away(bar: &ProgressBar) {
     let mut bars = held(&BARS);
     bars.retain(|bar| !bar.is_finished());
@@ -42,7 +42,7 @@ pub(crate) fn takes_away(bar: &ProgressBar) {
 
 fn end() {
     held(&BARS).iter().for_each(ProgressBar::finish_and_clear);
-    // End by the signal, as without a handler, so that a shell's loop ends, too.
+    // End by the signal, as without a handler, so that a loop in a shell also ends.
     #[cfg(unix)]
     let _ = signal_hook::low_level::emulate_default_handler(signal_hook::consts::SIGINT);
     std::process::exit(INTERRUPTED)

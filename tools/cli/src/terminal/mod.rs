@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The command line and the terminal: options, numbers, files, messages, progress, pictures.
+//! Command line and terminal: options, numbers, files, messages, progress, plots.
 
 pub(crate) mod files;
 pub(crate) mod history;

@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Parser of numbers on the command line, with and without units, with uniform error messages.
+//! Parsers for numbers on the command line, with and without units, with uniform error messages.
 //!
-//! Numeric options allow a leading `-`, so that `--tick -5us` is reported as a wrong number, not as an unknown option.
+//! Numeric options accept a leading `-`, so that `--tick -5us` is reported as a wrong number instead of an unknown option.
 
 use std::num::NonZeroU64;
 use std::ops::RangeInclusive;
 use takt_emu::LONGEST_TICK;
 
-/// Default baud rate, if the wiring states none.
+/// Default baud rate, if the wiring does not state one.
 pub(crate) const BAUD: u32 = 115_200;
 
-/// Splits a leading number from the rest of a text. Words such as `nan` and `inf` are not numbers.
+/// Splits a text into a leading number and the rest. Words such as `nan` and `inf` are not numbers.
 fn split(text: &str) -> (&str, &str) {
     let text = text.trim();
     let sign = usize::from(text.starts_with(['+', '-']));
@@ -25,7 +25,7 @@ fn split(text: &str) -> (&str, &str) {
 /// Bound below which binary64 represents all integers exactly.
 const EXACT: f64 = 9_007_199_254_740_992.0;
 
-/// Parses an integer in a range.
+/// Parses an integer within a range.
 fn whole(text: &str, range: RangeInclusive<u64>) -> Result<u64, String> {
     let (number, rest) = split(text);
     if number.is_empty() {
@@ -59,7 +59,7 @@ pub(crate) fn natural(text: &str) -> Result<u64, String> {
     whole(text, 0..=u64::MAX)
 }
 
-/// Maximal number of robots in `takt track --monte-carlo`.
+/// Maximum number of robots in `takt track --monte-carlo`.
 const ROBOTS: u64 = 1_000_000;
 
 /// Parses a number of robots, for clap.
@@ -77,7 +77,7 @@ type Units = &'static [(&'static str, f64)];
 const FREQUENCY: Units = &[("MHz", 1.0), ("Hz", 1e-6), ("kHz", 1e-3), ("GHz", 1e3)];
 const TIME: Units = &[("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("µs", 1e-6), ("ns", 1e-9)];
 
-/// Parses a number with a unit, converted to the first of `units`; `bare` permits to omit that unit.
+/// Parses a number with a unit, and converts it to the first of `units`; with `bare`, that unit may be omitted.
 fn quantity(text: &str, units: Units, bare: bool, range: RangeInclusive<f64>) -> Result<f64, String> {
     let base = units[0].0;
     let names = || units.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
@@ -104,18 +104,18 @@ pub(crate) fn clock(text: &str) -> Result<f64, String> {
     quantity(text, FREQUENCY, true, 0.01..=100_000.0)
 }
 
-/// A duration in cycles, or in seconds, convertible to cycles at a clock.
+/// A duration in cycles or in seconds, which can be converted to cycles at a clock.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Time {
     Cycles(u64),
     Seconds(f64),
 }
 
-/// Time in the largest unit in which it is at least one.
+/// Formats a time in the largest unit in which it is at least one.
 fn with_unit(seconds: f64) -> String {
     let (name, size) = TIME.iter().find(|(_, size)| seconds >= *size).unwrap_or(&TIME[TIME.len() - 1]);
     let value = seconds / size;
-    // Rounds away the error of the division.
+    // Round off the error of the division.
     let value = format!("{value:.9}");
     format!("{}{name}", value.trim_end_matches('0').trim_end_matches('.'))
 }
@@ -143,7 +143,7 @@ pub(crate) fn time(text: &str) -> Result<Time, String> {
 }
 
 impl Time {
-    /// Whole cycles at a clock in MHz. A time within rounding error of a whole number is rounded to it.
+    /// Number of cycles at a clock in MHz, rounded to a whole number if it is within rounding error of one.
     pub(crate) fn cycles(self, clock: f64) -> u64 {
         match self {
             Time::Cycles(cycles) => cycles,

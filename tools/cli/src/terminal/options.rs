@@ -79,7 +79,7 @@ fn folder(path: &str) -> Result<PathBuf, String> {
     }
 }
 
-/// Parses a machine's name, for clap.
+/// Parses the name of a machine, for clap.
 pub(crate) fn machine(name: &str) -> Result<&'static Machine, String> {
     takt_asm::machine(name)
 }

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Messages on standard error, and error types with special presentation.
+//! Messages on standard error, and errors that are presented in special ways.
 
 use crate::terminal::page::Page;
 use anyhow::Result;
 use std::io::{self, IsTerminal, Write};
 use takt_isa::text::visible;
 
-/// Prints text to standard error, with colours but no other terminal commands. Write errors are ignored.
+/// Prints text to standard error, without terminal control sequences except colours. Write errors are ignored.
 pub(crate) fn message(text: &str) {
     let text = text.trim_end();
     if !text.is_empty() {
@@ -14,7 +14,7 @@ pub(crate) fn message(text: &str) {
     }
 }
 
-/// Escapes all terminal commands of a text except colours.
+/// Escapes all terminal control sequences in a text except colours.
 pub(crate) fn coloured(text: &str) -> String {
     let mut shown = String::with_capacity(text.len());
     let mut rest = text;
@@ -32,7 +32,7 @@ pub(crate) fn coloured(text: &str) -> String {
     shown + &visible(rest)
 }
 
-/// Folds a text to the terminal width of standard error.
+/// Folds a text to the width of the terminal on standard error.
 fn folded(text: &str) -> String {
     let page = Page::of_stderr();
     text.lines().map(|line| page.folded(line)).collect::<Vec<_>>().join("\n")
@@ -50,12 +50,13 @@ pub(crate) fn warning(text: &str, color: bool) {
     message(&folded(&format!("{on}warning{off}: {}", visible(text))));
 }
 
-/// Prints a note: no error, but an assumption that the user may not expect.
+/// Prints a note about an assumption that the user may not expect.
 pub(crate) fn note(text: &str) {
     message(&folded(&format!("note: {}", visible(text))));
 }
 
-/// An error with its causes in one line. A cause repeated in its parent's text appears once, and system error numbers are removed.
+/// An error with its causes, on one line. A cause that the text of its parent repeats appears once, and numbers of system errors are
+/// removed.
 pub(crate) fn describe(error: &anyhow::Error) -> String {
     let mut text = String::new();
     for cause in error.chain().map(ToString::to_string) {
@@ -74,13 +75,13 @@ pub(crate) fn describe(error: &anyhow::Error) -> String {
     text
 }
 
-/// The error is a closed pipe: nobody reads standard output any more.
+/// The error is a closed pipe: nothing reads standard output any more.
 pub(crate) fn is_closed_pipe(error: &anyhow::Error) -> bool {
     let is_pipe = |cause: &io::Error| cause.kind() == io::ErrorKind::BrokenPipe;
     error.chain().any(|cause| cause.downcast_ref().is_some_and(is_pipe))
 }
 
-/// Converts a closed pipe to `true`: it ends the work, but is no error.
+/// Converts a closed pipe to `true`: it ends the work, but is not an error.
 pub(crate) fn unless_closed(result: Result<()>) -> Result<bool> {
     match result {
         Err(error) if is_closed_pipe(&error) => Ok(true),
@@ -88,16 +89,16 @@ pub(crate) fn unless_closed(result: Result<()>) -> Result<bool> {
     }
 }
 
-/// Failures with a special presentation.
+/// Failures that are presented in special ways.
 #[derive(Debug)]
 pub(crate) enum Failure {
     /// Rendered diagnostics of the assembler, which include the word `error`.
     Diagnostics(String),
     /// Conflicting options: an error in the command line.
     Usage(String),
-    /// Events denied by --deny: one message each.
+    /// Events denied by --deny, one message each.
     Denied(Vec<String>),
-    /// Already reported in the results.
+    /// Failure that the results already report.
     Reported,
 }
 
@@ -125,7 +126,7 @@ pub(crate) enum Color {
 }
 
 impl Color {
-    /// Explicit choice of the user; `None`: depends on the terminal.
+    /// Explicit choice of the user; `None` if the terminal decides.
     pub(crate) fn explicit_choice(self) -> Option<bool> {
         match self {
             Color::Always => Some(true),

@@ -1,28 +1,28 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Format of results on a terminal: lines are folded between words at its width, and important figures are bold. Output to a pipe or a file
-//! is plain and unfolded.
+//! Format of results on a terminal: lines are folded between words at the terminal's width, and important figures are bold. Output to a
+//! pipe or a file is plain and not folded.
 
 use std::io::{IsTerminal, stderr, stdout};
 use takt_isa::text::visible;
 use textwrap::core::display_width;
 use textwrap::{Options, WordSplitter, WrapAlgorithm};
 
-/// Terminal sequences for bold text: begin and end.
+/// Terminal sequences that begin and end bold text.
 const BOLD: (&str, &str) = ("\x1b[1m", "\x1b[0m");
 
-/// Minimal width in columns of a comment beside an example.
+/// Minimum width of a comment beside an example, in columns.
 const BESIDE: usize = 24;
 
 /// Format of printed results.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct Page {
-    /// Width of the terminal in columns; `None`: do not fold.
+    /// Width of the terminal in columns; `None`: lines are not folded.
     pub(crate) width: Option<usize>,
     pub(crate) is_bold: bool,
 }
 
 impl Page {
-    /// Format for standard output; `colors` is the user's choice, which applies to bold text, too.
+    /// Format for standard output; `colors` is the user's choice, which also applies to bold text.
     pub(crate) fn of_stdout(colors: Option<bool>) -> Page {
         let is_terminal = stdout().is_terminal();
         let refused = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
@@ -36,19 +36,19 @@ impl Page {
         Page { width: width.filter(|_| stderr().is_terminal()), is_bold: false }
     }
 
-    /// Bold text; it must not contain control characters.
+    /// Makes a text bold; it must not contain control characters.
     pub(crate) fn strong(self, text: &str) -> String {
         if self.is_bold { format!("{}{text}{}", BOLD.0, BOLD.1) } else { text.to_owned() }
     }
 
-    /// Folds a line. Continuation lines are indented to the last column of the first line, or slightly beyond its indentation if room is
-    /// short.
+    /// Folds a line. Continuation lines are aligned with the last column of the first line, or, if space is short, slightly to the right
+    /// of its indentation.
     pub(crate) fn folded(self, line: &str) -> String {
         self.folded_under(line, |width| width / 2)
     }
 
-    /// Folds the text below a command's help. Clap folds prose; the comment beside an example continues under its own beginning, not under
-    /// the example.
+    /// Folds the text below a command's help. Clap folds prose; a comment beside an example continues under its own start, not under the
+    /// example.
     pub(crate) fn below_help(self, text: &str) -> String {
         let lines = text.lines().map(|line| match line.starts_with("  ") {
             true => self.folded_under(line, |width| width.saturating_sub(BESIDE)),
@@ -57,7 +57,7 @@ impl Page {
         lines.collect::<Vec<_>>().join("\n")
     }
 
-    /// Folds a line; `furthest` gives, for a width, the maximal indentation of continuation lines.
+    /// Folds a line; `furthest` is the maximum indentation of continuation lines as a function of the width.
     fn folded_under(self, line: &str, furthest: fn(usize) -> usize) -> String {
         let Some(width) = self.width.filter(|width| display_width(line) > *width) else {
             return line.to_owned();
@@ -72,7 +72,7 @@ impl Page {
     }
 }
 
-/// Placeholder of a space at which a line must not break.
+/// Placeholder for a space at which lines must not break.
 const TIED: char = '\u{a0}';
 
 /// Protects code in backticks from line breaks.
@@ -101,10 +101,10 @@ fn indent(line: &str, width: usize, furthest: usize) -> usize {
 /// A column of a table.
 #[derive(Clone, Copy)]
 pub(crate) struct Column {
-    /// Minimal width in characters.
+    /// Minimum width in characters.
     pub(crate) width: usize,
     pub(crate) side: Side,
-    /// Priority for removal on a narrow page: highest rank first, rank 0 never.
+    /// Rank for omission on a narrow page: highest rank first, rank 0 never.
     pub(crate) rank: u8,
 }
 
@@ -124,11 +124,11 @@ pub(crate) const fn left(width: usize, rank: u8) -> Column {
     Column { width, side: Side::Left, rank }
 }
 
-/// Columns that fit the page.
+/// Columns that fit on the page.
 pub(crate) struct Columns<'c> {
     all: &'c [Column],
     page: Page,
-    /// Columns of a higher rank are left out.
+    /// Columns of higher rank are omitted.
     most: u8,
 }
 
@@ -143,12 +143,12 @@ impl<'c> Columns<'c> {
         Columns { all, page, most }
     }
 
-    /// Some columns are left out.
+    /// Some columns are omitted.
     pub(crate) fn leave_out_some(&self) -> bool {
         self.all.iter().any(|column| column.rank > self.most)
     }
 
-    /// A table row; the cell with index `strong` is bold.
+    /// Formats a table row; the cell with index `strong` is bold.
     pub(crate) fn row<S: AsRef<str>>(&self, cells: &[S], strong: Option<usize>) -> String {
         let mut row = String::new();
         for (index, (column, cell)) in self.all.iter().zip(cells).enumerate() {
@@ -187,7 +187,7 @@ mod tests {
         assert_eq!(page(36).folded(line), folded);
         assert_eq!(page(80).folded(line), line);
         assert_eq!(Page::default().folded(line), line);
-        // Bold sequences take no width, and a word longer than the line stays whole.
+        // Bold sequences have no width, and a word longer than the line is not broken.
         assert_eq!(page(8).folded("a \x1b[1mbold\x1b[0m b"), "a \x1b[1mbold\x1b[0m b");
         assert_eq!(page(10).folded("to https://example.org/path it"), "to\n  https://example.org/path\n  it");
         for width in 1..60 {
@@ -203,7 +203,7 @@ mod tests {
         let folded = "A sentence that is longer than that.\n\nExamples:\n  takt robot --check   whether it can run at\n                       all\n  takt robot";
         assert_eq!(page(47).below_help(text), folded);
         assert_eq!(Page::default().below_help(text), text);
-        // A word without room at the indentation begins further left.
+        // A word that does not fit at the indentation starts further left.
         let long = "  takt robot --check   and programs/controller.toml is run";
         let under = "  takt robot --check   and\n    programs/controller.toml is run";
         assert_eq!(page(46).below_help(long), under);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! SVG plots: the tool path and the tracking error over time; an arm's tool path in space, and its joint angles over time.
+//! SVG plots: tool path and tracking error over time; an arm's tool path in space, and joint angles over time.
 
 mod terminal;
 
@@ -10,17 +10,17 @@ use std::ops::Range;
 use takt_programs::hybrid::closed_loop::Record;
 use takt_programs::hybrid::params::SAMPLE_TIME;
 
-/// Maximal number of points of a curve; all periods would make hundreds of thousands.
+/// Maximum number of points in a curve; one per period would give hundreds of thousands.
 pub(crate) const POINTS: u64 = 1000;
 /// Size of a plot in pixels.
 pub(crate) const SIZE: u32 = 1000;
-/// Drawing units per pixel. plotters has integer coordinates, in which slanted lines at pixel resolution would be jagged.
+/// Drawing units per pixel. plotters uses integer coordinates, so slanted lines at pixel resolution would be jagged.
 pub(crate) const FINE: u32 = 8;
 const CUT: RGBColor = RGBColor(0x1f, 0x4e, 0x9c);
 const RAPID: RGBColor = RGBColor(0xa8, 0xa8, 0xa8);
 const LIMIT: RGBColor = RGBColor(0xc0, 0x30, 0x20);
 const DEVIATION: RGBColor = RGBColor(0xd0, 0x88, 0x10);
-/// Magnification of deviations beside the path.
+/// Magnification of the deviations drawn beside the path.
 const MAGNIFIED: f64 = 1000.0;
 const DEVIATES: &str = "tool, deviation × 1,000";
 /// Colours of θ1 to θ6.
@@ -35,23 +35,23 @@ pub(crate) const JOINT_COLORS: [RGBColor; 6] = [
 /// Heights of the arm's plots: tool path, and joint angles.
 const SPACE_HEIGHT: u32 = 620;
 const JOINTS_HEIGHT: u32 = 400;
-/// Colour of the tool path's shadow.
+/// Colour of the shadow of the tool path.
 const SHADOW: RGBColor = RGBColor(0xe2, 0xe4, 0xe8);
-/// Requirement of the paper on the tool error, µm.
+/// The paper's requirement on the tool error, µm.
 const REQUIRED: f64 = 10.0;
 
 pub(crate) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 pub(crate) type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
 
-/// Data of a plot, collected during the loop.
+/// Data of a plot, collected during the closed loop.
 pub(crate) struct Plot {
-    /// Periods per point of a curve.
+    /// Number of periods per point of a curve.
     every: u64,
     path: Vec<Run>,
-    /// Move and place of the tool in the last period.
+    /// Move and position of the tool in the last period.
     last: Option<(usize, (f64, f64))>,
     errors: Vec<StretchErrors>,
-    /// Largest deviation of the present stretch, and its place in the plot; cutting moves only.
+    /// Largest deviation in the current stretch, and its place in the plot; for cutting moves only.
     farthest: Option<(f64, (f64, f64))>,
 }
 
@@ -59,15 +59,15 @@ pub(crate) struct Plot {
 struct Run {
     cutting: bool,
     points: Vec<(f64, f64)>,
-    /// Largest deviation of the tool in each stretch of time, drawn magnified beside the path.
+    /// Largest deviation of the tool in each stretch of time, drawn beside the path with magnification.
     deviating: Vec<(f64, f64)>,
 }
 
-/// Largest errors in a stretch of time, µm, of rapid and of cutting moves.
+/// Largest errors in a stretch of time in µm, for rapid and for cutting moves.
 #[derive(Clone, Copy, Default)]
 struct StretchErrors {
     errors: [Option<f64>; 2],
-    /// A period of the stretch wrote a NaN.
+    /// A NaN was written in a period of the stretch.
     has_nan: bool,
 }
 
@@ -82,11 +82,11 @@ impl Plot {
         }
     }
 
-    /// Adds a period; `has_nan`: it wrote a NaN.
+    /// Adds a period; `has_nan`: the period wrote a NaN.
     pub(crate) fn add(&mut self, record: &Record, has_nan: bool) {
         let cutting = record.sample.cutting;
         let point = (record.position[0] * 1e3, record.position[1] * 1e3);
-        // Ends of moves are points of the path, so that corners stay sharp; a run begins at the end of the previous one.
+        // Ends of moves are points of the path, so that corners stay sharp; a run starts where the previous one ended.
         let corner = self.last.filter(|(index, _)| *index != record.sample.move_index).map(|(_, end)| end);
         if let (Some(run), Some(corner)) = (self.path.last_mut(), corner) {
             run.points.push(corner);
@@ -147,7 +147,7 @@ impl Plot {
         let area = headed(area, &path_title(title), &lines)?;
         let ends = self.last.iter().map(|(_, end)| end);
         let (x, y) = self.ranges();
-        // Equal scales on both axes, so that letters keep their shape; only a chart knows the size left by its axes.
+        // Use equal scales on both axes, so that letters keep their shape. Only a chart knows the size that its axes leave.
         let (width, height) =
             chart(&area).build_cartesian_2d(0.0..1.0, 0.0..1.0)?.plotting_area().dim_in_pixel();
         let scale = ((x.end - x.start) / f64::from(width)).max((y.end - y.start) / f64::from(height));
@@ -157,7 +157,7 @@ impl Plot {
         };
         let mut chart = chart(&area).build_cartesian_2d(widen(x, width), widen(y, height))?;
         mesh(&mut chart, "x, mm", "y, mm")?;
-        // Draw deviations under the path, which hides small ones.
+        // Draw deviations below the path, which hides small ones.
         for run in &self.path {
             chart.draw_series(LineSeries::new(run.deviating.iter().copied(), deviation))?;
         }
@@ -188,7 +188,7 @@ impl Plot {
         self.every as f64 * SAMPLE_TIME
     }
 
-    /// Upper end of the error axis, µm: the largest error or the requirement.
+    /// Upper end of the error axis in µm: the larger of worst error and requirement.
     fn worst(&self) -> f64 {
         self.errors.iter().flat_map(|stretch| stretch.errors).flatten().fold(REQUIRED, f64::max)
     }
@@ -223,7 +223,7 @@ impl Plot {
         Ok(())
     }
 
-    /// Outlines of the errors of one kind, over adjacent stretches. (Separate bars would show seams.)
+    /// Outlines of the errors of one kind of move over adjacent stretches. (Separate bars would show seams.)
     fn skylines(&self, kind: usize, stretch: f64) -> Vec<Vec<(f64, f64)>> {
         let errors: Vec<Option<f64>> = self.errors.iter().map(|of| of.errors[kind]).collect();
         let mut outlines = Vec::new();
@@ -243,7 +243,7 @@ impl Plot {
     }
 }
 
-/// Texts common to SVG and terminal plots.
+/// Texts shared by SVG and terminal plots.
 const WRITES_NAN: &str = "the program wrote NaN";
 
 fn path_title(title: &str) -> String {
@@ -310,7 +310,7 @@ fn histogram_into(title: &str, microns: &[f64], svg: &mut String) -> Outcome<()>
     Ok(())
 }
 
-/// Motion of an arm in every period: tool positions in mm, joint angles in degrees; the period in seconds.
+/// Motion of an arm: tool positions in mm and joint angles in degrees for every period, and the period in seconds.
 pub(crate) struct ArmPlot<'a> {
     pub(crate) tool: &'a [[f64; 3]],
     pub(crate) joints: &'a [[f32; 6]],
@@ -339,7 +339,7 @@ impl ArmPlot<'_> {
     fn draw_space(&self, title: &str, area: &Area<'_>) -> Outcome<()> {
         let (path, shadow) = (CUT.stroke_width(px(2)), SHADOW.filled());
         let area = headed(area, title, &[("tool", path), ("its shadow from above", shadow)])?;
-        // Equal scales on all axes, to preserve the shape.
+        // Equal scales on all axes preserve the shape.
         let extent = |axis: usize| {
             let values = self.tool.iter().map(|position| position[axis]);
             values.fold((f64::MAX, f64::MIN), |(low, high), value| (low.min(value), high.max(value)))
@@ -351,7 +351,7 @@ impl ArmPlot<'_> {
             centre - half..centre + half
         });
         let floor = z.start;
-        // plotters' second axis points up.
+        // The second axis of plotters points up.
         let at = |x: f64, y: f64, z: f64| (y, z, x);
         let mut chart = ChartBuilder::on(&area).margin(px(4)).margin_bottom(px(24)).build_cartesian_3d(
             y.start..y.end,
@@ -405,7 +405,7 @@ impl ArmPlot<'_> {
         for (joint, (_, style)) in lines.into_iter().enumerate() {
             let point =
                 |(index, angles): (usize, &[f32; 6])| (index as f64 * self.period, f64::from(angles[joint]));
-            // Corners, at quarters of the way, coincide with points of the curve.
+            // The corners, at quarters of the path, coincide with points of the curve.
             let points = self.joints.iter().enumerate().step_by(every).map(point);
             chart.draw_series(LineSeries::new(points, style))?;
         }
@@ -413,13 +413,13 @@ impl ArmPlot<'_> {
     }
 }
 
-/// Sets the size of an SVG, drawn in fine units, in pixels.
+/// Sets the size in pixels of an SVG that was drawn in fine units.
 pub(crate) fn in_pixels(svg: &str, width: u32, height: u32) -> String {
     let size = |unit: u32| format!("width=\"{}\" height=\"{}\"", width * unit, height * unit);
     svg.replacen(&size(FINE), &size(1), 1)
 }
 
-/// Drawing units of a number of pixels.
+/// Converts pixels to drawing units.
 pub(crate) fn px(pixels: u32) -> u32 {
     pixels * FINE
 }

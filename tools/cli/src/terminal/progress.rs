@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Progress of long commands, on standard error if that is a terminal.
+//! Progress of long commands, shown on standard error if it is a terminal.
 
 use crate::terminal::files;
 use crate::terminal::interrupt;
@@ -12,20 +12,20 @@ use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-/// Delay before progress appears.
+/// Delay before progress is shown.
 const SOON: Duration = Duration::from_secs(1);
-/// Interval between updates of progress without a known end.
+/// Interval between updates of progress whose end is unknown.
 const FRAME: Duration = Duration::from_millis(100);
 
-/// End of a bar's line: leaves room for a terminal's `^C`, which would otherwise wrap and leave the bar behind.
+/// End of a bar's line: leaves room for the `^C` of a terminal, which would otherwise wrap and leave the bar behind.
 const ROOM: &str = "  \x1b[2D";
 
-/// Progress bar for `count` items; `what` is their noun.
+/// Progress bar for `count` items; `what` is a plural noun for them.
 pub(crate) fn progress(count: u64, what: &str, quiet: bool) -> ProgressBar {
     if quiet {
         return ProgressBar::hidden();
     }
-    // indicatif draws on standard error, and only on a terminal.
+    // indicatif draws on standard error, if that is a terminal.
     let style = ProgressStyle::with_template(&format!(
         "{{wide_bar}} {{human_pos}}/{{human_len}} {what}{{to_go}}{ROOM}"
     ))
@@ -48,12 +48,12 @@ fn to_go(state: &ProgressState, out: &mut dyn fmt::Write) {
 /// Progress bar that appears only after a delay.
 pub(crate) struct DelayedProgress {
     bar: Option<ProgressBar>,
-    /// Timer that shows the bar, unless its sender is dropped first.
+    /// Timer that shows the bar, unless the sender is dropped first.
     timer: Option<(Sender<()>, JoinHandle<()>)>,
 }
 
 impl DelayedProgress {
-    /// Delayed bar for `count` items; no bar without a count.
+    /// Delayed bar for `count` items; without a count there is no bar.
     pub(crate) fn new(count: Option<u64>, what: &str) -> DelayedProgress {
         let count = count.filter(|_| stderr().is_terminal());
         let bar = count.map(|count| {
@@ -90,7 +90,7 @@ impl Drop for DelayedProgress {
     }
 }
 
-/// Number of rows in a regular CSV file without its header, for a bar; `None` without a terminal.
+/// Number of rows in a regular CSV file, excluding the header, for a bar; `None` if there is no terminal.
 pub(crate) fn rows(path: Option<&Path>) -> Option<u64> {
     let path = path.filter(|path| stderr().is_terminal() && !files::is_live(path))?;
     let mut lines = 0u64;
@@ -104,8 +104,8 @@ pub(crate) fn rows(path: Option<&Path>) -> Option<u64> {
     }
 }
 
-/// Progress without a known end: after a delay, shows the activity, the elapsed time and, from an earlier run, the expected time, until it
-/// is dropped.
+/// Progress of an activity whose end is unknown: after a delay, shows the activity, the elapsed time and, from an earlier run, the
+/// expected time, until it is dropped.
 pub(crate) struct DelayedActivity(Option<(Sender<()>, JoinHandle<()>)>);
 
 impl DelayedActivity {
@@ -156,7 +156,7 @@ fn remember(what: &str, time: Duration) {
     let _ = memory(what).map(|path| takt_cache::keep(&path, text.into_bytes()));
 }
 
-/// Cache file with the duration.
+/// Cache file that stores the duration.
 fn memory(what: &str) -> Option<PathBuf> {
     let mut hasher = DefaultHasher::new();
     what.hash(&mut hasher);

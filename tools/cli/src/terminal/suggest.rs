@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Command names that users try from other tools or by meaning, with Takt's own commands. Misspelt names are handled by clap.
+//! Suggestions for command names that users expect from other tools or by meaning. clap handles misspelt names.
 
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 
-/// Names, the command to use instead, and its purpose.
+/// Names that users try, the command to use instead, and its purpose.
 const INSTEAD: &[(&[&str], &str, &str)] = &[
     (
         &["simulate", "sim", "emulate", "emu", "exec", "execute", "start", "go"],
@@ -54,7 +54,7 @@ pub(crate) fn suggest(answer: &mut clap::Error) {
         return;
     }
     let Some(ContextValue::String(name)) = answer.get(ContextKind::InvalidSubcommand) else { return };
-    // Only at the top level: some commands have subcommands.
+    // Only at the top level: some commands have subcommands of their own.
     let usage = answer.get(ContextKind::Usage).map(ToString::to_string);
     let is_first = usage.is_some_and(|usage| usage.contains("takt [OPTIONS] <COMMAND>"));
     if let Some((command, what)) = instead(name).filter(|_| is_first) {

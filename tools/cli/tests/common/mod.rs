@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The binary under test, and temporary folders.
+//! Binary under test, and temporary folders.
 
 pub(crate) mod protocol;
 
@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// Sums a table, with a call for each element.
+/// Program that sums a table, with a call for each element.
 pub(crate) const SUM: &str = "\
 .output sum, count:int
 .reg    i:int n:int x
@@ -34,7 +34,7 @@ pub(crate) fn source(name: &str) -> String {
     format!("{}/../../programs/hybrid/{name}", env!("CARGO_MANIFEST_DIR"))
 }
 
-/// A temporary folder of a test.
+/// A test's temporary folder.
 pub(crate) struct Folder(PathBuf);
 
 impl Folder {
@@ -71,8 +71,8 @@ impl Folder {
         names
     }
 
-    /// `takt` in this folder, limited to 1 GiB of address space and 60 s of processor time: a runaway process is killed by a signal, which
-    /// is no exit status.
+    /// A `takt` command in this folder, limited to 1 GiB of address space and 60 s of CPU time: a runaway process is killed by a signal,
+    /// and so has no exit status.
     pub(crate) fn command(&self, arguments: &[impl AsRef<OsStr>]) -> Command {
         let mut command = Command::new("/bin/sh");
         command
@@ -92,7 +92,7 @@ impl Folder {
         RunOutput::of(self.command(arguments))
     }
 
-    /// Runs `takt`; arguments are separated by blanks.
+    /// Runs `takt` with the arguments in `line`, separated by blanks.
     pub(crate) fn line(&self, line: &str) -> RunOutput {
         self.takt(&line.split_whitespace().collect::<Vec<_>>())
     }
@@ -100,12 +100,12 @@ impl Folder {
     /// Runs `takt` with these bytes on standard input.
     pub(crate) fn fed(&self, line: &str, input: &[u8]) -> RunOutput {
         self.fed_by(line, |stdin| {
-            // The process may end before it has read everything.
+            // The process may end before it has read all input.
             let _ = stdin.write_all(input);
         })
     }
 
-    /// Runs `takt` with `feed` as the writer of standard input.
+    /// Runs `takt`; `feed` writes its standard input.
     pub(crate) fn fed_by(&self, line: &str, feed: impl FnOnce(&mut dyn Write) + Send) -> RunOutput {
         let mut command = self.command(&line.split_whitespace().collect::<Vec<_>>());
         let mut child = command.stdin(Stdio::piped()).spawn().unwrap();
@@ -137,7 +137,7 @@ impl RunOutput {
         RunOutput::from(command.output().unwrap())
     }
 
-    /// Standard output of a run that must succeed without messages.
+    /// Standard output of a run, which must succeed without messages.
     #[track_caller]
     pub(crate) fn ok(self) -> String {
         assert_eq!((self.status, self.stderr.as_str()), (Some(0), ""));
@@ -170,7 +170,7 @@ impl SimulatedBoard {
     pub(crate) fn start(line: &str, folder: &Path) -> SimulatedBoard {
         let mut command = Command::new(env!("CARGO_BIN_EXE_takt"));
         command.args(line.split_whitespace()).current_dir(folder);
-        // What it tells on standard error is kept beside its files.
+        // Standard error of the simulation is kept in a file of the folder.
         let told = std::fs::File::create(folder.join("told.txt")).unwrap();
         let mut process = command.stdout(Stdio::piped()).stderr(told).spawn().unwrap();
         let mut said = String::new();

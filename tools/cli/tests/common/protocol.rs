@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Client of a server on standard input and output with framed JSON messages.
+//! Client for a server that exchanges framed JSON messages on standard input and output.
 
 use super::Folder;
 use serde_json::{Value, json};
@@ -36,7 +36,7 @@ impl Client {
         self.raw(format!("Content-Length: {}\r\n\r\n{text}", text.len()).as_bytes());
     }
 
-    /// The next message; earlier unread ones come first.
+    /// Next message; unread earlier ones come first.
     #[track_caller]
     pub(crate) fn receive(&mut self) -> Value {
         self.read().expect("the server has not ended")
@@ -60,7 +60,7 @@ impl Client {
         Some(serde_json::from_slice(&bytes).unwrap())
     }
 
-    /// Waits for a message with this property, including earlier unread ones.
+    /// Waits for a message with a property, considering unread earlier ones first.
     #[track_caller]
     pub(crate) fn wait(&mut self, wanted: impl Fn(&Value) -> bool) -> Value {
         if let Some(at) = self.other.iter().position(&wanted) {

@@ -35,7 +35,7 @@ fn each_core_of_a_system_is_a_thread() {
         threads.iter().map(|thread| (thread["id"].as_u64(), thread["name"].as_str())).collect();
     assert_eq!(names, [(Some(1), Some("profile")), (Some(2), Some("servo")), (Some(3), Some("watch"))]);
 
-    // Each core has its own source, in any folder.
+    // Each core has its own source, in an arbitrary folder.
     let mut sources = Vec::new();
     for thread in 1..=3 {
         let frames = ok(&mut client, "stackTrace", json!({ "threadId": thread }));
@@ -45,7 +45,7 @@ fn each_core_of_a_system_is_a_thread() {
     }
     assert!(sources[1].ends_with("pi.s") && sources[2].ends_with("watch.s"), "{sources:?}");
 
-    // A breakpoint in any core's source stops all cores, and names the core.
+    // A breakpoint in any core's source stops all cores, and the stop names the core.
     let breakpoints =
         json!({ "source": { "path": sources[2] }, "breakpoints": [{ "line": 19 }, { "line": 1 }] });
     let answer = ok(&mut client, "setBreakpoints", breakpoints);
@@ -57,14 +57,14 @@ fn each_core_of_a_system_is_a_thread() {
     assert_eq!(stop["hitBreakpointIds"][0], answer["breakpoints"][0]["id"]);
     let frames = ok(&mut client, "stackTrace", json!({ "threadId": 3 }));
     assert_eq!(frames["stackFrames"][0]["line"], 19);
-    // All cores are in the same cycle; each has its own names.
+    // All cores are in the same cycle; each resolves its own names.
     let cycle = of_core(&mut client, 1, "cycle");
     assert_eq!(of_core(&mut client, 3, "cycle"), cycle);
     assert_eq!(of_core(&mut client, 3, "values"), "0");
     let none = client.command("evaluate", json!({ "expression": "values", "frameId": 0 }));
     assert_eq!(none["success"], false, "core `profile` has none: {none}");
 
-    // A step of one core lets the others run along; a step back returns.
+    // A step of one core moves the others along; a step back returns.
     let now = |client: &mut Client| of_core(client, 1, "cycle").parse::<u64>().unwrap();
     let here = now(&mut client);
     for (command, thread) in [("next", 2), ("stepIn", 1), ("next", 3)] {
@@ -84,7 +84,7 @@ fn each_core_of_a_system_is_a_thread() {
     client.event("stopped");
     assert_eq!(now(&mut client), here);
 
-    // Variables of each core are separate: setting one does not affect other cores.
+    // Each core has separate variables: setting one does not affect other cores.
     for thread in [2, 3] {
         let frames = ok(&mut client, "stackTrace", json!({ "threadId": thread }));
         let scopes = ok(&mut client, "scopes", json!({ "frameId": frames["stackFrames"][0]["id"] }));
@@ -137,7 +137,7 @@ fn a_system_stops_at_events_on_links_and_in_any_core() {
         "{answer}"
     );
     start(&mut client);
-    // A label that exists in every core stops in every core, first within a base tick.
+    // A label that exists in every core stops the run in each of them.
     let mut met = std::collections::BTreeSet::new();
     for _ in 0..12 {
         ok(&mut client, "continue", json!({ "threadId": 1 }));
@@ -148,7 +148,7 @@ fn a_system_stops_at_events_on_links_and_in_any_core() {
     assert!(said(1, "period") && said(3, "period") && said(2, "servo.period"), "{met:?}");
     assert!(met.iter().any(|(_, text)| text == "link moves pushed"), "{met:?}");
 
-    // Data breakpoints behave alike: on a link, and on a value of a core.
+    // Data breakpoints on a link and on a value of a core behave alike.
     ok(&mut client, "setFunctionBreakpoints", json!({ "breakpoints": [] }));
     let link = ok(&mut client, "dataBreakpointInfo", json!({ "name": "moves", "variablesReference": 7 }));
     let frames = ok(&mut client, "stackTrace", json!({ "threadId": 2 }));
@@ -168,13 +168,13 @@ fn a_system_stops_at_events_on_links_and_in_any_core() {
     }
     assert!(texts.contains("link moves popped") && texts.contains("u: "), "{texts}");
 
-    // Periods are counted on the request's thread.
+    // Periods are those of the request's thread.
     ok(&mut client, "takt/gotoPeriod", json!({ "period": 2, "threadId": 3 }));
     assert_eq!(client.event("stopped")["body"]["reason"], "goto");
     assert_eq!(of_core(&mut client, 3, "period"), "2");
     assert!(of_core(&mut client, 1, "period").parse::<u64>().unwrap() > 2);
 
-    // Read-only console commands: of the system, and of the frame's core.
+    // Read-only console commands: on the system, and on the frame's core.
     let say = |client: &mut Client, line: &str| {
         let answer =
             client.command("evaluate", json!({ "expression": line, "frameId": frame, "context": "repl" }));
@@ -190,7 +190,7 @@ fn a_system_stops_at_events_on_links_and_in_any_core() {
     }
     let help = say(&mut client, "help").1;
     assert!(help.contains("links") && !help.contains("reverse"), "{help}");
-    // End of the recorded inputs.
+    // The recorded inputs end.
     ok(&mut client, "setDataBreakpoints", json!({ "breakpoints": [] }));
     ok(&mut client, "continue", json!({ "threadId": 1 }));
     assert_eq!(client.event("stopped")["body"]["text"], "the recorded inputs end here");
@@ -199,7 +199,7 @@ fn a_system_stops_at_events_on_links_and_in_any_core() {
     end(client);
 }
 
-/// Exceptions of a core stop the system where they are raised, even if the flag is cleared in the same cycle.
+/// Exceptions of a core stop the system where they occur, even if the flag is cleared in the same cycle.
 #[test]
 fn exceptions_of_a_core_stop_a_system() {
     let folder = Folder::new();
@@ -215,7 +215,7 @@ fn exceptions_of_a_core_stop_a_system() {
     ok(&mut client, "continue", json!({ "threadId": 1 }));
     let stop = client.event("stopped")["body"].clone();
     assert_eq!((&stop["reason"], &stop["threadId"]), (&json!("exception"), &json!(2)), "{stop}");
-    // A halted core makes no steps; the other one does.
+    // A halted core does not step; the other one does.
     for (thread, reason) in [(2, "step"), (2, "pause"), (1, "step")] {
         ok(&mut client, "next", json!({ "threadId": thread }));
         let stop = client.event("stopped")["body"].clone();

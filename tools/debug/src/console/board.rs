@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Console commands on a board: hold the machine, run single periods, let it run, and leave it as it was found.
+//! Console commands on a board: hold the machine, run single periods, let it run freely, and restore its original state at the end.
 
 use super::inspector::Inspector;
 use super::moves::End;
@@ -9,19 +9,19 @@ use crate::panes;
 use crate::remote::{Activity, RemoteError, RemoteSession};
 use crate::session::{Move, Place, Session, StopReason, Unit};
 
-/// Final state of the machine when the session ends.
+/// State in which the session leaves the machine.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum FinalState {
     Running,
     AsItIs,
 }
 
-/// A machine that runs elsewhere, with the console's settings.
+/// A remote machine, with the console's settings.
 pub(super) struct Board {
     session: RemoteSession,
-    /// A user at a terminal can press Ctrl-C.
+    /// A user at a terminal is present, and can press Ctrl-C.
     interactive: bool,
-    /// State in which to leave the machine; `None` after `release`.
+    /// State in which to leave the machine; `None` once `release` has run.
     leave: Option<FinalState>,
 }
 
@@ -36,7 +36,7 @@ impl Board {
         if self.session.state().drives { "outputs drive" } else { "outputs are safe" }
     }
 
-    /// Position of the program, as far as the board reports it.
+    /// Position of the program, as precisely as the board reports it.
     pub(super) fn place(&self, view: &mut Inspector) -> String {
         let (state, drive, program) = (self.session.state(), self.drive(), self.session.program());
         let (periods, issued) = (state.periods, program.bundle_text(state.issued));
@@ -59,7 +59,7 @@ impl Board {
         }
     }
 
-    /// Checks that values can be read; the error gives the obstacle.
+    /// Checks that values can be read; the error explains why not.
     pub(super) fn needs_values(&self) -> Result<(), String> {
         let why = match &self.session.state().activity {
             Activity::Runs => "the program runs: `hold` first",
@@ -72,7 +72,7 @@ impl Board {
         Err(why.to_owned())
     }
 
-    /// Checks that a period can be run; the error gives the obstacle.
+    /// Checks that a period can be run; the error explains why not.
     fn needs_held(&self) -> Result<(), String> {
         self.needs_values()?;
         let state = match self.session.state().activity {
@@ -131,7 +131,7 @@ impl Board {
         self.moved(view, moved)
     }
 
-    /// Shows the machine after a move; the error reports its actual state.
+    /// Shows the machine after a move; on an error, reports the state that the machine is in.
     fn moved(
         &mut self,
         view: &mut Inspector,
@@ -170,7 +170,7 @@ impl Board {
         Ok(())
     }
 
-    /// Leaves the machine as it was found, or as the last `hold` or `go` demands; returns its final state in words.
+    /// Leaves the machine in its original state, or in the state that the last `hold` or `go` demands; returns that state in words.
     ///
     /// # Errors
     /// If the board does not answer.
@@ -194,7 +194,7 @@ impl Board {
     }
 }
 
-/// A session that ends in any way, even by a panic, does not leave the machine held.
+/// However a session ends, even by a panic, the machine is not left held.
 impl Drop for Board {
     fn drop(&mut self) {
         let _ = self.release();
@@ -209,13 +209,13 @@ impl Console {
         }
     }
 
-    /// Holds a board, or restarts it; returns the first message.
+    /// Holds or restarts the board; returns the first message.
     pub(super) fn begin(&mut self, restart: bool) -> Result<String, String> {
         let (board, view) = self.board()?;
         let begun = board.stop(view, restart).and_then(|why| self.arrive(End { core: 0, why }));
         let (board, _) = self.board()?;
         begun.or_else(|said| {
-            // The session continues after a difference, or with a program that does not reach its `wait`.
+            // The session continues after a difference, or if the program does not reach its `wait`.
             let goes_on = board.session.is_settled() || board.session.state().activity == Activity::InPeriod;
             if goes_on { Ok(format!("{said}\n")) } else { Err(said) }
         })

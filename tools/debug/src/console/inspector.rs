@@ -11,7 +11,7 @@ use takt_isa::timing::Cycle;
 pub(super) struct Inspector {
     pub(super) session: Session,
     displays: Vec<WatchExpression>,
-    /// Values of named registers before the last command that moved or changed something.
+    /// Values of named registers before the last command that moved the run or changed a value.
     before: Vec<Option<u32>>,
 }
 
@@ -21,12 +21,12 @@ impl Inspector {
         Inspector { session, displays: Vec::new(), before }
     }
 
-    /// Cycle and values of the named registers.
+    /// Current cycle, and values of the named registers.
     pub(super) fn position(&self) -> (Cycle, Vec<Option<u32>>) {
         (self.session.cycle(), panes::values(&self.session))
     }
 
-    /// Takes the values from before a command as the reference for change marks, if the position or a value differs.
+    /// Makes the values from before a command the reference for change marks, if the position or a value differs.
     pub(super) fn moved_from(&mut self, before: (Cycle, Vec<Option<u32>>)) {
         if self.position() != before {
             self.before = before.1;
@@ -61,7 +61,7 @@ impl Inspector {
         format!("{}\n{}", panes::head(&mut self.session), self.at_hand())
     }
 
-    /// Source line and bundle at this position, with the active calls.
+    /// Current source line and next bundle, with the active calls.
     pub(super) fn at_hand(&self) -> String {
         let (session, mut text) = (&self.session, String::new());
         if let Some(location) = session.location()
@@ -134,7 +134,7 @@ impl Inspector {
     }
 }
 
-/// A computed value: with its hexadecimal notation if it is a binary32 number, otherwise with the nearest binary32.
+/// Text of a computed value: a binary32 number with its hexadecimal notation, any other number with the nearest binary32.
 pub(super) fn number(value: Value) -> String {
     let Value::Real(real) = value else { return value.to_string() };
     let near = real as f32;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Console: commands in, text out. A prompt, a script, an editor and the full-screen view share it, for a program, a system's cores, and a
-//! board alike.
+//! Console: commands in, text out. Shared by prompt, scripts, editors and the full-screen view, for programs, systems and boards.
 
 mod board;
 mod inspector;
@@ -22,21 +21,21 @@ use board::Board;
 use inspector::Inspector;
 use table::{CommandEffect, find, split};
 
-/// The run under the console's control. Each of its cores has an [`Inspector`].
+/// The run that the console controls. Each of its cores has an [`Inspector`].
 enum Engine {
-    /// A program: the inspector's session is the run.
+    /// A program; the inspector's session executes it.
     Program,
     /// A system; the inspectors' sessions show its cores.
     System(Box<SystemSession>),
-    /// A board; the inspector's session shows it.
+    /// A board; the inspector's session shows its state.
     Board(Box<Board>),
 }
 
-/// The console: a run, the sessions that show its cores, and the state of the command language.
+/// A console: a run, a session for each of its cores, and the state of the command language.
 pub struct Console {
     engine: Engine,
     cores: Vec<Inspector>,
-    /// Selected core: commands refer to it, and a core that stops becomes the selected one.
+    /// Selected core, to which commands refer. A core that stops becomes the selected one.
     selected: usize,
     /// The user entered `quit`.
     pub quit: bool,
@@ -50,23 +49,23 @@ impl Console {
         Console { engine, cores, selected: 0, quit: false, last: String::new() }
     }
 
-    /// A console on a program's session.
+    /// A console for the session of a program.
     pub fn new(session: Session) -> Console {
         Console::with(Engine::Program, vec![session])
     }
 
-    /// A console on a system's session. `cores` has a session of each core's program, with its names and sources.
+    /// A console for the session of a system. `cores` has a session of each core's program, with names and sources.
     pub fn of_system(session: SystemSession, cores: Vec<Session>) -> Console {
         let mut console = Console::with(Engine::System(Box::new(session)), cores);
         console.look_at_cores();
         console
     }
 
-    /// A console on a machine that runs elsewhere. The machine is held, or restarted if `restart`; `view` is a session of its program, with
-    /// its names and sources. `interactive`: a user can press Ctrl-C. Also returns the first message.
+    /// A console for a remote machine, which is held, or restarted if `restart`. `view` is a session of the machine's program, with names
+    /// and sources. `interactive`: a user can press Ctrl-C. Also returns the first message.
     ///
     /// # Errors
-    /// If the machine does not answer. A program that does not reach its `wait` is no error.
+    /// If the machine does not answer. A program that does not reach its `wait` is not an error.
     pub fn of_board(
         session: RemoteSession,
         view: Session,
@@ -106,7 +105,7 @@ impl Console {
         self.selected
     }
 
-    /// Selects a core; no effect if the core does not exist.
+    /// Selects a core; does nothing if the core does not exist.
     pub fn select(&mut self, core: usize) {
         if core < self.cores.len() {
             self.selected = core;
@@ -126,7 +125,7 @@ impl Console {
         &self.inspector().session
     }
 
-    /// Session of the selected core, to change it. Use [`Console::go`] and [`Console::set`] to move and change a system.
+    /// Mutable session of the selected core. Use [`Console::go`] and [`Console::set`] to move and change a system.
     pub fn session_mut(&mut self) -> &mut Session {
         &mut self.inspector_mut().session
     }
@@ -141,7 +140,7 @@ impl Console {
         self.cores.get_mut(core).map(|core| &mut core.session)
     }
 
-    /// Session of the system, if the run is a system's.
+    /// Session of the system; `None` for other runs.
     pub fn system(&self) -> Option<&SystemSession> {
         match &self.engine {
             Engine::System(system) => Some(system),
@@ -155,7 +154,7 @@ impl Console {
         }
     }
 
-    /// Sets the maximal number of cycles of a command; returns the previous limit.
+    /// Sets the maximum number of cycles of a command; returns the previous limit.
     pub fn set_run_limit(&mut self, cycles: u64) -> u64 {
         let limit = match &mut self.engine {
             Engine::System(system) => &mut system.run_limit,
@@ -233,7 +232,7 @@ impl Console {
         Ok(text)
     }
 
-    /// Sets a register or a data word of a core. Records of the run after this position are dropped.
+    /// Sets a register or a data word of a core. Discards records of the run after this position.
     ///
     /// # Errors
     /// If the place does not exist, or cannot be set.
@@ -252,7 +251,7 @@ impl Console {
         Ok(())
     }
 
-    /// Ends the session; returns a message about the state in which the board is left.
+    /// Ends the session; returns a message about the final state of the board.
     ///
     /// # Errors
     /// If the board cannot be brought to its final state.

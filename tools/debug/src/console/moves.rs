@@ -11,7 +11,7 @@ use std::fmt::Write as _;
 use takt_analysis::accuracy::Shadow;
 use takt_asm::nearest;
 
-/// End of a move: the core, and the reason.
+/// End of a move: core and reason.
 #[derive(Clone, Debug, PartialEq)]
 pub struct End {
     /// Index of the core that ended the move.
@@ -32,7 +32,7 @@ impl Console {
         let now = self.cores[0].session.cycle();
         Ok(match to {
             Move::Back(Unit::Cycle, _) if now == 0 => End { core, why: StopReason::Start },
-            // Cycles are stepped in one move, in any number.
+            // A step by any number of cycles is a single move.
             Move::Back(Unit::Cycle, count) => self.go_once(core, &Move::Cycle(now.saturating_sub(*count))),
             Move::Step(Unit::Cycle, count) => self.go_once(core, &Move::Cycle(now.saturating_add(*count))),
             Move::Step(_, count) | Move::Back(_, count) => {
@@ -49,7 +49,7 @@ impl Console {
         })
     }
 
-    /// Makes a single move or step of an emulated run, and selects the core in which it ends.
+    /// Executes a single move or step of an emulated run, and selects the core in which it ends.
     fn go_once(&mut self, core: usize, to: &Move) -> End {
         let Engine::System(system) = &mut self.engine else {
             return End { core: 0, why: self.cores[0].session.go(to) };
@@ -68,14 +68,14 @@ impl Console {
         self.arrive(end)
     }
 
-    /// Breakpoints that the last move passed because their conditions could not be decided, one line each.
+    /// Breakpoints that the last move passed because their conditions could not be evaluated, one line each.
     pub fn doubts(&self) -> Vec<String> {
         let doubts = self.cores.iter().flat_map(|core| core.session.control().take_doubts());
         let line = |(id, doubt)| format!("stop {id} was passed, its condition reads an old value: {doubt}");
         doubts.map(line).collect()
     }
 
-    /// Message at the end of a move: reason, position, and displayed values. A difference is an error, so that a script fails.
+    /// Message at the end of a move: reason, position, and displayed values. A difference is returned as an error, so that a script fails.
     pub(super) fn arrive(&mut self, end: End) -> Result<String, String> {
         let mut text: String = self.doubts().iter().map(|doubt| format!("{doubt}\n")).collect();
         text.push_str(&self.render(&end));
@@ -89,7 +89,7 @@ impl Console {
         }
     }
 
-    /// Reason for the end of a move, in whole lines.
+    /// Reason for the end of a move, as complete lines.
     fn render(&self, End { core, why }: &End) -> String {
         match why {
             StopReason::Done | StopReason::Differs(_) => String::new(),
@@ -167,7 +167,7 @@ impl Console {
     }
 }
 
-/// Core and reason at the end of a system's move.
+/// Core in which a system's move ended, and the reason.
 fn end(system: &SystemSession, why: SystemStopReason) -> (Option<usize>, StopReason) {
     let why = match why {
         SystemStopReason::Core(core, StopReason::Halted) => {

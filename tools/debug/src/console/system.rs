@@ -7,7 +7,7 @@ use crate::system::{link_named, link_text};
 use std::fmt::Write as _;
 
 impl Console {
-    /// A status line for each core of a system.
+    /// Status line of each core of a system.
     pub(super) fn core_lines(&mut self) -> Vec<CoreLine> {
         let Some(system) = self.system() else { return Vec::new() };
         let names: Vec<String> =
@@ -54,8 +54,8 @@ impl Console {
         Ok(shown.map(|(link, row)| format!("{}: {}\n", row.name, link_text(system, link))).collect())
     }
 
-    /// Executes a command on the selected core, or on another core that the arguments name as `core.name`. The answer is then prefixed with
-    /// the core's name, and the selection changes only if the session moves.
+    /// Executes a command on the selected core, or on another core if the arguments name it as `core.name`. In the second case the answer
+    /// is prefixed with the core's name, and the selection changes only if the command moves the run.
     pub(super) fn about_a_core(
         &mut self,
         arguments: &str,
@@ -65,7 +65,7 @@ impl Console {
             Err(error) if self.system().is_some() => error,
             result => return result,
         };
-        // Names of the selected core's own program take precedence: the command failed there.
+        // Names in the selected core's program take precedence; the command has failed there.
         let names: Vec<&str> = (0..self.cores()).map(|core| self.name(core)).collect();
         let (cores, own) = core_names(arguments, &names);
         let core = match cores[..] {
@@ -88,7 +88,7 @@ impl Console {
     }
 }
 
-/// Core names that precede a dot in a text, without repetition, and the text without them: `outer.p` is `p` of core `outer`.
+/// Finds core names before a dot. Returns the cores without repetition, and the text without the names: `outer.p` is `p` of core `outer`.
 fn core_names(text: &str, names: &[&str]) -> (Vec<usize>, String) {
     let is_name = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '.';
     let (mut cores, mut own, mut rest) = (Vec::new(), String::new(), text);
@@ -107,7 +107,7 @@ fn core_names(text: &str, names: &[&str]) -> (Vec<usize>, String) {
             }
             None => own.push_str(word),
         }
-        // Separators up to the next word.
+        // Skip separators up to the next word.
         let next = behind.find(is_name).unwrap_or(behind.len());
         own.push_str(&behind[..next]);
         rest = &behind[next..];

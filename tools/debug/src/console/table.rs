@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Command table, shared by all targets: source of dispatch, help and completion.
+//! Command table, shared by all targets: basis of dispatch, help and completion.
 
 use super::Console;
 use crate::session::Unit;
@@ -11,11 +11,11 @@ use takt_asm::nearest;
 #[derive(Clone, Copy)]
 enum Availability {
     All,
-    /// Every target; on a board with this limitation.
+    /// Every target; the text states the limitation on boards.
     Limited(&'static str),
-    /// Every target but a board; the text is the reason.
+    /// Every target except boards; the text states the reason.
     Emulator(&'static str),
-    /// This target only; the text is the reason.
+    /// This target only; the text states the reason.
     Only(Target, &'static str),
 }
 
@@ -26,9 +26,9 @@ pub(super) enum CommandEffect {
     Steps,
     /// Moves the run, or changes a value.
     Changes,
-    /// Shows values of a core, and changes nothing.
+    /// Shows values of a core without changing the run.
     Shows,
-    /// Prints static facts, without values of a core.
+    /// Prints static facts, independent of the state of a core.
     Tells,
 }
 
@@ -55,13 +55,13 @@ pub(super) struct Command {
     text: &'static str,
 }
 
-/// Error message for commands that go back, on a board.
+/// Error message on boards for commands that go back.
 pub(super) const BACK: &str =
     "a circuit does not go back; `goto start` starts it again, and `takt debug` without --board goes back";
 const ONE_CORE: &str = "it is for the cores of a system, and this is one program";
 const NOT_HELD: &str = "it is for a board, which runs by itself; here only commands move the run";
 const PLACES: &[&str] = &["cycle", "period", "start"];
-/// Position words that a board accepts.
+/// Positions that can be reached on a board.
 const BETWEEN_PERIODS: &[&str] = &["period", "start"];
 
 macro_rules! commands {
@@ -123,7 +123,7 @@ pub fn keys(target: Target) -> impl Iterator<Item = (char, &'static str)> {
 }
 
 impl Command {
-    /// Reason why the command is not available on a target; `None` if it is.
+    /// Reason why the command is unavailable on a target; `None` if it is available.
     fn refusal(&self, target: Target) -> Option<&'static str> {
         match self.on {
             Availability::Emulator(why) if target == Target::Board => Some(why),
@@ -159,7 +159,7 @@ fn of(target: Target) -> impl Iterator<Item = &'static Command> {
     COMMANDS.iter().filter(move |command| command.refusal(target).is_none())
 }
 
-/// Command by its name, short name, or an unambiguous prefix.
+/// Looks up a command by name, short name, or unambiguous prefix.
 pub(super) fn find(name: &str, target: Target) -> Result<&'static Command, String> {
     let begins = |command: &&Command| command.name.starts_with(name);
     let exact = COMMANDS.iter().find(|command| command.is(name));
@@ -213,7 +213,7 @@ pub fn commands(target: Target) -> impl Iterator<Item = (String, String, String)
     })
 }
 
-/// Command and arguments of a line; `None` for a blank line or a comment.
+/// Splits a line into command and arguments; `None` for a blank line or a comment.
 pub(super) fn split(line: &str) -> Option<(&str, &str)> {
     let line = line.trim();
     if line.is_empty() || line.starts_with('#') || line.starts_with(';') {
@@ -222,14 +222,14 @@ pub(super) fn split(line: &str) -> Option<(&str, &str)> {
     Some(line.split_once(char::is_whitespace).map_or((line, ""), |(name, rest)| (name, rest.trim())))
 }
 
-/// The first line of a script that is no valid command of a target, with the reason.
+/// First line of a script that is not a valid command of the target, with the reason.
 pub fn first_mistake(script: &str, target: Target) -> Option<(usize, String)> {
     let mistake = |line| find(split(line)?.0, target).err();
     script.lines().enumerate().find_map(|(i, line)| Some((i + 1, mistake(line)?)))
 }
 
 impl Console {
-    /// Completions of the last word of a line, and the word's start.
+    /// Completions of the last word of a line, and the column at which the word starts.
     pub fn complete(&self, line: &str) -> (usize, Vec<String>) {
         let target = self.target();
         let start =
@@ -251,8 +251,8 @@ impl Console {
         (start, found)
     }
 
-    /// Executes a line if it is a command without effect on the run, for an editor's console; otherwise `None`. Only full and short names
-    /// are accepted, since the line may also be an expression.
+    /// For an editor's console: executes a line if it is a command that does not affect the run, otherwise returns `None`. Only full and
+    /// short command names are accepted, since the line may also be an expression.
     pub fn look(&mut self, line: &str) -> Option<Result<String, String>> {
         let (name, arguments) = split(line)?;
         let target = self.target();
@@ -274,7 +274,7 @@ impl Console {
     }
 }
 
-/// Error message for a stop or a step within a period, on a board.
+/// Error message on boards for a stop or a step within a period.
 pub(super) fn inside(what: &str) -> String {
     format!("`{what}`: a board stops only between two periods; `takt debug` without --board stops anywhere")
 }

@@ -32,7 +32,7 @@ impl Inspector {
         Ok(text)
     }
 
-    /// Note on a value: its own name if the name has several, and the operands that are stale.
+    /// Note on a value: which value of the name it is, if the name has several, and which operands are stale.
     fn note(&self, live: &WatchExpression, place: Option<Place>) -> String {
         let label = self.session.label(live).map(|label| {
             let at = match place {
@@ -49,7 +49,7 @@ impl Inspector {
         info::info(&self.session, arguments)
     }
 
-    /// Parses an assignment: its destination, the new bits, and the answer to print.
+    /// Parses an assignment: destination, new bits, and the answer to print.
     ///
     /// # Errors
     /// If the assignment is malformed, or its destination cannot be set.
@@ -147,7 +147,7 @@ impl Inspector {
     }
 }
 
-/// Splits a list at the commas outside brackets.
+/// Splits a list at commas outside brackets.
 fn parts(text: &str) -> Vec<&str> {
     let (mut depth, mut start, mut parts) = (0i32, 0, Vec::new());
     for (at, byte) in text.bytes().enumerate() {

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Registers and data words that a program uses: the state to read from its machine.
+//! Registers and data words that a program uses, and that must be read from a remote machine.
 
 use std::collections::BTreeSet;
 use takt_isa::{Effect, Program, Register};
 
-/// Registers and data words, in ascending order. Input ports are not among the registers.
+/// Registers and data words, in ascending order. Input ports are excluded.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Extent {
     /// Registers that the program writes.

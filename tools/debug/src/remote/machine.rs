@@ -1,24 +1,24 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Interface to a machine that runs elsewhere: its state and its commands.
+//! Interface to a remote machine: state and commands.
 
 use takt_emu::LoadError;
 use takt_isa::fp::Flags;
 use takt_isa::{BundleAddress, Register};
 
-/// Activity of a machine that runs elsewhere.
+/// Activity of a remote machine.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Activity {
-    /// In reset: the program does not run.
+    /// In reset; the program does not run.
     Stopped,
-    /// Executes period after period.
+    /// Executing one period after another.
     Runs,
-    /// At its `wait`, without ticks.
+    /// Held at its `wait`, without ticks.
     Held,
-    /// Without ticks, before its `wait`.
+    /// In a period: the `wait` has not been reached, and ticks are off.
     InPeriod,
     /// Stopped by the program's `halt`.
     Halted,
-    /// Stopped by a fault in this bundle, for this reason.
+    /// Stopped by a fault in this bundle, with the reason.
     Faulted(BundleAddress, String),
 }
 
@@ -29,22 +29,22 @@ pub struct State {
     pub activity: Activity,
     /// Bundle that issued last.
     pub issued: BundleAddress,
-    /// Number of periods ended since the start.
+    /// Periods completed since the start.
     pub periods: u64,
     /// Sticky exception flags of the machine.
     pub flags: Flags,
-    /// Output pins drive; otherwise they are at their safe levels.
+    /// The output pins are driven by the program; otherwise they are at their safe levels.
     pub drives: bool,
 }
 
 impl State {
-    /// Values can be read, and stay unchanged until a command moves the machine.
+    /// Values can be read, and remain unchanged until a command moves the machine.
     pub(super) fn is_still(&self) -> bool {
         !matches!(self.activity, Activity::Runs | Activity::InPeriod)
     }
 }
 
-/// Errors of a machine that runs elsewhere.
+/// Errors of a remote machine.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum RemoteError {
     /// The program does not reach its `wait`.
@@ -61,7 +61,7 @@ impl From<LoadError> for RemoteError {
     }
 }
 
-/// A machine that runs elsewhere. Each method fails if the machine does not answer.
+/// A remote machine. Each method fails if the machine does not answer.
 #[allow(clippy::missing_errors_doc, reason = "said above, once")]
 pub trait Remote {
     /// Queries the state without delay.
@@ -70,30 +70,30 @@ pub trait Remote {
     /// Queries the state after a short delay, which limits the rate of queries in a waiting loop.
     fn poll(&mut self) -> Result<State, RemoteError>;
 
-    /// Stops the ticks. On return the machine waits between two periods, or has stopped.
+    /// Stops the ticks. Afterwards the machine waits between two periods, or has stopped.
     fn hold(&mut self) -> Result<(), RemoteError>;
 
     /// Resumes the ticks after `hold`.
     fn go(&mut self) -> Result<(), RemoteError>;
 
-    /// Runs one period of a held machine. On return it waits again, or has stopped.
+    /// Runs one period of a held machine. Afterwards the machine waits again, or has stopped.
     fn step(&mut self) -> Result<(), RemoteError>;
 
-    /// Restarts the program up to its first `wait`, where the machine is held, or to an earlier stop.
+    /// Restarts the program and holds it at its first `wait`, unless it stops earlier.
     fn restart(&mut self) -> Result<(), RemoteError>;
 
     /// Sets an input port for all later periods.
     fn set_input(&mut self, port: Register, bits: u32) -> Result<(), RemoteError>;
 
-    /// Input ports with their values during the last period, in the program's order.
+    /// Values of the input ports during the last period, in the program's port order.
     fn inputs(&mut self) -> Result<Vec<u32>, RemoteError>;
 
-    /// Output ports as visible outside the core, in the program's order.
+    /// Values of the output ports as visible outside the core, in the program's port order.
     fn outputs(&mut self) -> Result<Vec<u32>, RemoteError>;
 
-    /// Values of registers, which are given in ascending order.
+    /// Values of the given registers, which must be in ascending order.
     fn registers(&mut self, registers: &[Register]) -> Result<Vec<u32>, RemoteError>;
 
-    /// Values of data words, which are given in ascending order.
+    /// Values of the given data words, which must be in ascending order.
     fn words(&mut self, words: &[u32]) -> Result<Vec<u32>, RemoteError>;
 }

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Debug session on a machine that runs elsewhere, such as a board. The machine can be held at the end of a period, inspected, and run for
-//! single periods.
+//! Debug session on a remote machine, such as a board. The machine can be held at the end of a period, inspected, and run for single
+//! periods.
 //!
 //! **State.** The session reads the machine's state into an emulator ([`RemoteSession::show`]), so that all code for a [`Session`] works.
-//! Unknown data is left out: operations in flight (none exist between two periods), cycles, the return stack.
+//! Unknown state is left out: operations in flight (none exist between two periods), cycles, and the return stack.
 //!
-//! **Shadow.** A second emulator runs in step with the machine on the same inputs, which are read back after each period. A difference is
-//! reported, and the shadow continues from the machine's values.
+//! **Shadow.** A second emulator runs in step with the machine on the same inputs, which are read back after each period. If the two
+//! differ, the difference is reported, and the shadow continues from the machine's values.
 
 mod extent;
 mod machine;
@@ -22,35 +22,35 @@ use takt_emu::{Emulator, MachineState, Position};
 use takt_isa::fp::Flags;
 use takt_isa::{Program, Register};
 
-/// Maximal number of periods of one command.
+/// Maximum number of periods of one command.
 pub const PERIODS: u64 = 1_000_000;
 
-/// End condition of a command, with the registers and memory that it reads.
+/// End condition of a command, with the registers and memory words that it reads.
 pub(crate) struct Goal {
     search: Search,
     registers: Vec<Register>,
     memory: bool,
 }
 
-/// Debug session on a machine that runs elsewhere, with an emulator in step as its shadow.
+/// Debug session on a remote machine, with an emulator in step as its shadow.
 pub struct RemoteSession {
     remote: Box<dyn Remote + Send>,
     control: Arc<Control>,
     extent: Extent,
-    /// Program after a reset; copies of it are placed in the machine's state.
+    /// Program after reset; copies of this emulator take over the machine's state.
     base: Emulator,
     state: State,
-    /// State that was read last.
+    /// Machine state that was read last.
     seen: MachineState,
     shadow: Shadow,
-    /// `seen` equals the machine's state.
+    /// `seen` matches the machine's current state.
     settled: bool,
-    /// Search with the last known values of watched expressions.
+    /// Search that has the last known values of watched expressions.
     watched: Option<Search>,
 }
 
 impl RemoteSession {
-    /// A session on a machine that carries this program. Call [`RemoteSession::hold`] or [`RemoteSession::restart`] next.
+    /// Starts a session on a machine that runs this program. Call [`RemoteSession::hold`] or [`RemoteSession::restart`] next.
     ///
     /// # Errors
     /// If the machine does not answer, or the emulator cannot hold the program. A program that does not reach its `wait` is no error.
@@ -84,7 +84,7 @@ impl RemoteSession {
         &self.state
     }
 
-    /// Values on display equal the machine's.
+    /// Displayed values match the machine's.
     pub fn is_settled(&self) -> bool {
         self.settled
     }
@@ -103,7 +103,7 @@ impl RemoteSession {
         view.look_afar(emulator, self.state.periods);
     }
 
-    /// A register without any write has no value to show. Input ports always have one.
+    /// A register has a value once it is written. Input ports always have one.
     fn has_value(&self, register: Register) -> bool {
         self.program().machine.is_input(register) || self.shadow.register(register).is_some()
     }
@@ -126,7 +126,7 @@ impl RemoteSession {
         let extent = self.extent.clone();
         self.read(&extent.registers, &extent.words)?;
         self.synchronise()?;
-        // After the start, registers and words that the program does not write must still have their loaded values.
+        // Registers and words that the program does not write must still have their loaded values.
         let started = self.state.activity != Activity::Stopped;
         let loaded = if started { reference_run::loaded(&self.base, &self.seen, &self.extent) } else { None };
         self.settled = true;
@@ -241,7 +241,8 @@ impl RemoteSession {
         }
     }
 
-    /// Ends a command after all written state was read. After a difference, the shadow continues from the machine's state.
+    /// Ends a command: reads everything that the program writes, and compares it. After a difference, the shadow continues from the
+    /// machine's state.
     fn end_of_move(
         &mut self,
         different: Option<String>,
@@ -268,7 +269,7 @@ impl RemoteSession {
         }
     }
 
-    /// Runs one period of machine and shadow; returns the first difference at their outputs, and the event that stopped the shadow.
+    /// Runs one period on machine and shadow; returns the first difference at the outputs, and the event that stopped the shadow.
     fn period(&mut self) -> Result<(Option<String>, Option<End>), RemoteError> {
         let before = self.state.periods;
         let stepped = self.remote.step();
@@ -329,7 +330,7 @@ impl RemoteSession {
         ports.filter_map(|port| Some((port, *self.seen.registers.get(&port)?))).collect()
     }
 
-    /// Records the machine's position in `seen`.
+    /// Updates the machine's position in `seen`.
     fn record_position(&mut self) -> Result<(), RemoteError> {
         let State { activity, issued, flags, .. } = &self.state;
         self.seen.flags = *flags;
@@ -346,7 +347,7 @@ impl RemoteSession {
         Err(RemoteError::Other(text))
     }
 
-    /// Places the shadow in the machine's state.
+    /// Copies the machine's state into the shadow.
     fn synchronise(&mut self) -> Result<(), RemoteError> {
         self.record_position()?;
         self.shadow = Shadow::placed(&self.base, &self.seen);
@@ -355,7 +356,7 @@ impl RemoteSession {
 
     // ---- Comparing.
 
-    /// First difference in the way the period ended, or at the outputs.
+    /// First difference in the outcome of the period, or at the outputs.
     fn compare(&self, outputs: &[u32], end: Option<&End>) -> Option<String> {
         let different = self.shadow.ended(&self.state, end, self.program()).or_else(|| {
             let inputs = self.inputs();
@@ -370,14 +371,14 @@ impl RemoteSession {
         Some(format!("after period {}: {different}", self.state.periods))
     }
 
-    /// Goal of a wait: an expression, or the session's stops if there is no expression. `None` without stops.
+    /// Goal of a run: the expression, or without one the session's stops. `None` if there are no stops.
     pub(crate) fn goal(&self, view: &Session, live: Option<WatchExpression>) -> Option<Goal> {
         let reads = view.reads(live.as_ref());
         let search = match live {
             Some(live) => Search::value(live, view),
             None => {
                 let mut search = Search::stops(view)?;
-                // The search cannot look back for previous values, since the machine does not go back; take them from the last command.
+                // A remote machine cannot go back to find previous values; take them from the last command.
                 self.watched.iter().for_each(|watched| search.complete(watched));
                 search
             }

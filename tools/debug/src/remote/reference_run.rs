@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The shadow: an emulator in step with a machine that runs elsewhere, and the comparison of the two.
+//! Shadow: an emulator in step with a remote machine, and their comparison.
 
 use super::extent::Extent;
 use super::{Activity, State};
@@ -10,7 +10,7 @@ use takt_isa::program::Port;
 use takt_isa::timing::Cycle;
 use takt_isa::{Program, Register, Type};
 
-/// Cycle limit of a period on the emulator, far beyond any sensible period of the machine.
+/// Cycle limit of a period on the emulator, far above any realistic period.
 const PERIOD: Cycle = 1 << 26;
 
 /// Event that stopped the emulator.
@@ -24,7 +24,7 @@ impl From<PeriodError> for End {
     fn from(error: PeriodError) -> End {
         match error {
             PeriodError::Fault(fault) => End::Fault(fault),
-            // `Port` cannot occur: no port is set by name.
+            // `Port` cannot occur: ports are not set by name.
             PeriodError::Halted | PeriodError::Port(_) => End::Halted,
         }
     }
@@ -32,19 +32,19 @@ impl From<PeriodError> for End {
 
 pub(super) struct Shadow {
     emulator: Emulator,
-    /// The emulator was placed in the machine's state, and so has no return stack.
+    /// The emulator's state was copied from the machine, and so has no return stack.
     placed: bool,
 }
 
 impl Shadow {
-    /// A shadow in the machine's state.
+    /// A shadow that starts from the machine's state.
     pub(super) fn placed(base: &Emulator, seen: &MachineState) -> Shadow {
         let mut emulator = base.clone();
         emulator.restore(seen);
         Shadow { emulator, placed: true }
     }
 
-    /// A shadow after its run from reset to the first `wait`, and the event that stopped it, if any.
+    /// A shadow that has run from reset to the first `wait`, and the event that stopped it, if any.
     pub(super) fn started(base: &Emulator, inputs: &[(Register, u32)]) -> (Shadow, Option<End>) {
         let mut shadow = Shadow { emulator: base.clone(), placed: false };
         shadow.set(inputs);
@@ -59,7 +59,7 @@ impl Shadow {
 
     fn set(&mut self, inputs: &[(Register, u32)]) {
         for (port, bits) in inputs {
-            // Cannot fail: the ports are the program's.
+            // Cannot fail: the ports belong to the program.
             let _ = self.emulator.set_input_bits(*port, *bits);
         }
         self.emulator.set_cycle_limit(self.emulator.now() + PERIOD);
@@ -71,13 +71,13 @@ impl Shadow {
         self.emulator.run_period(&[]).err().map(End::from)
     }
 
-    /// Value of a register after all writebacks; `None` before its first write.
+    /// Value of a register after all writebacks; `None` if it has never been written.
     pub(super) fn register(&self, register: Register) -> Option<u32> {
         let in_flight = self.emulator.in_flight().find(|retire| retire.register == Some(register));
         in_flight.map(|retire| retire.value).or_else(|| self.emulator.register(register))
     }
 
-    /// Difference in the way the period ended, in words.
+    /// Difference in the outcome of the period, in words.
     pub(super) fn ended(&self, state: &State, end: Option<&End>, program: &Program) -> Option<String> {
         let board = match (&state.activity, end) {
             (Activity::Held, None) | (Activity::Halted, Some(End::Halted)) => return None,
@@ -105,7 +105,7 @@ impl Shadow {
         })
     }
 
-    /// First difference at an output port. Ports never written are not compared.
+    /// First difference at an output port. Ports that were never written are not compared.
     pub(super) fn outputs(
         &self,
         outputs: &[u32],
@@ -138,7 +138,7 @@ impl Shadow {
     }
 }
 
-/// First difference from the loaded value, in a register or data word that the program does not write.
+/// First register or data word that the program does not write and that differs from its loaded value.
 pub(super) fn loaded(base: &Emulator, seen: &MachineState, extent: &Extent) -> Option<String> {
     let registers = extent.registers.iter().copied();
     let registers: Vec<Register> =
@@ -150,7 +150,7 @@ pub(super) fn loaded(base: &Emulator, seen: &MachineState, extent: &Extent) -> O
     Some(format!("{text}, and the program does not write it"))
 }
 
-/// The first of these registers and data words that differs from the emulator's.
+/// First of these registers and data words that differs from the emulator's.
 fn first(
     seen: &MachineState,
     program: &Program,

@@ -3,7 +3,7 @@
 //!
 //! | written | means |
 //! |---|---|
-//! | `x` | what the source line at hand would read: the port or register of that name, or the label's address, or the constant |
+//! | `x` | the value that the current source line would read: a port or register of that name, a label's address, or a constant |
 //! | `P[2,3]` | the element of an array, in registers or in data memory; its indices count from 1 |
 //! | `@m12` | the register at that place (`m12` too, if nothing else is named so) |
 //! | `table[i]`, `4[i]`, `[i]` | the data word at that offset and index from 0, as binary32 |
@@ -21,18 +21,18 @@ use takt_asm::nearest;
 use takt_isa::program::Space;
 use takt_isa::{BundleAddress, Program, Register, Type};
 
-/// Maximal number of variants of a watched expression.
+/// Maximum number of variants of a watched expression.
 const VARIANTS: usize = 64;
-/// Maximal depth of nested brackets.
+/// Maximum nesting depth of brackets.
 const NESTING: usize = 16;
 
 /// Meaning of an operand.
 #[derive(Clone, Debug)]
 enum Operand {
     Register(Register, Type),
-    /// A name whose meaning depends on the position, with the type in which it is read, if given.
+    /// A name whose meaning depends on the position, with the type in which it is read if one is given.
     Name(Box<Name>, Option<Type>),
-    /// A particular value of a name that has several.
+    /// One specific value of a name that has several.
     Held(Box<NameValue>, Option<Type>),
     Memory {
         offset: Box<WatchExpression>,
@@ -46,7 +46,7 @@ enum Operand {
     Depth,
 }
 
-/// Parts of the machine that an expression reads.
+/// State that an expression reads.
 #[derive(Default)]
 pub(crate) struct ReadSet {
     pub(crate) registers: BTreeSet<Register>,
@@ -55,7 +55,8 @@ pub(crate) struct ReadSet {
     pub(crate) clock: bool,
     /// An operand can change at every event.
     pub(crate) every: bool,
-    /// Address ranges of the next bundle in which the operands' values are in their registers ([`Held::range`]).
+    /// Address ranges of the next bundle within which the operands' values are in their registers
+    /// ([`NameValue::range`](super::meaning::NameValue::range)).
     pub(crate) ranges: Vec<(BundleAddress, BundleAddress)>,
 }
 
@@ -64,7 +65,7 @@ pub(crate) struct ReadSet {
 pub struct WatchExpression {
     text: String,
     expression: Expression,
-    /// Operands: the placeholder in `expression`, the meaning, and the text that the user wrote.
+    /// Operands: placeholder in `expression`, meaning, and the user's text.
     operands: Vec<(String, Operand, String)>,
 }
 
@@ -104,7 +105,7 @@ impl WatchExpression {
         parse(text, LookupTables { program, constants, names }, NESTING)
     }
 
-    /// Source text of the expression.
+    /// Text of the expression, as the user wrote it.
     pub fn text(&self) -> &str {
         &self.text
     }
@@ -118,7 +119,7 @@ impl WatchExpression {
                 }
                 Operand::Name(name, _) => {
                     reads.registers.extend(name.values().map(|value| value.register));
-                    // The name's value depends on the line at hand.
+                    // The value depends on the current line.
                     reads.every = true;
                 }
                 Operand::Held(value, _) => {
@@ -132,13 +133,14 @@ impl WatchExpression {
                 }
                 Operand::Cycle => reads.clock = true,
                 Operand::Address | Operand::Depth => reads.every = true,
-                // Every search visits the ends of periods.
+                // Every search visits the ends of periods anyway.
                 Operand::Constant(_) | Operand::Period => {}
             }
         }
     }
 
-    /// Every value in the expression is in its register. A register that several values share holds each only in a range of addresses.
+    /// Every value of the expression is in its register. A register shared by several values holds each of them only in a range of
+    /// addresses.
     pub(crate) fn is_there(&self, machine: &Machine<'_>, program: &Program) -> bool {
         self.operands.iter().all(|(_, operand, _)| match operand {
             Operand::Name(name, _) => match name.at(machine) {
@@ -154,7 +156,7 @@ impl WatchExpression {
         })
     }
 
-    /// Registers that an evaluation reads, with the text of each operand.
+    /// Registers that an evaluation reads, each with the operand's text.
     fn registers(&self, machine: &Machine<'_>) -> Vec<(&str, Register)> {
         let mut read = Vec::new();
         for (_, operand, written) in &self.operands {
@@ -176,7 +178,7 @@ impl WatchExpression {
         read
     }
 
-    /// Note on the operands that are stale at the line at hand; `None` if all are current.
+    /// Note on operands that are stale at the current line; `None` if all are current.
     pub(crate) fn note(&self, machine: &Machine<'_>, program: &Program) -> Option<String> {
         let is_alone = matches!(self.only(), Some(operand) if !matches!(operand, Operand::Memory { .. }));
         let mut notes: Vec<String> = Vec::new();
@@ -191,7 +193,7 @@ impl WatchExpression {
         (!notes.is_empty()).then(|| notes.join("; "))
     }
 
-    /// The first operand that is unknown on a machine that runs elsewhere.
+    /// First operand that is unknown on a remote machine.
     pub(crate) fn hidden(&self) -> Option<&str> {
         self.operands.iter().find_map(|(_, operand, written)| match operand {
             Operand::Cycle | Operand::Depth => Some(written.as_str()),
@@ -200,7 +202,7 @@ impl WatchExpression {
         })
     }
 
-    /// Registers and data words that the expression reads, as written.
+    /// Registers and data words that the expression reads, in the user's notation.
     pub(crate) fn places(&self) -> Vec<&str> {
         let is_place = |operand: &Operand| {
             matches!(
@@ -217,7 +219,7 @@ impl WatchExpression {
         places
     }
 
-    /// All variants of the expression: one for each choice of a value for each name that has several.
+    /// All variants of the expression: one for each combination of values of names that have several.
     ///
     /// # Errors
     /// If their number exceeds [`VARIANTS`].
@@ -272,15 +274,15 @@ impl WatchExpression {
         }
     }
 
-    /// The operand, if the expression consists of a single operand.
+    /// The operand, if the expression consists of exactly one.
     fn only(&self) -> Option<&Operand> {
         let [(name, operand, _)] = &self.operands[..] else { return None };
-        // Placeholders have the length of the text that they replace.
+        // A placeholder is as long as the text that it replaces.
         let mut names = self.expression.names();
         (names.next() == Some(name) && self.text.len() == name.len()).then_some(operand)
     }
 
-    /// Registers that the expression may stand for, if it is a name of any.
+    /// Registers that the expression may denote, if it is the name of registers.
     pub(crate) fn lives(&self, machine: &Machine<'_>, program: &Program) -> Vec<LiveRange> {
         let life = |value: &NameValue, at_hand| LiveRange {
             label: value.label.clone(),
@@ -306,7 +308,7 @@ impl WatchExpression {
         }
     }
 
-    /// Name of the value at hand, if the expression is a name with several values.
+    /// Name of the current value, if the expression is a name with several values.
     pub(crate) fn label(&self, machine: &Machine<'_>) -> Option<String> {
         match self.only()? {
             Operand::Name(name, _) => match name.at(machine).ok()? {
@@ -317,7 +319,7 @@ impl WatchExpression {
         }
     }
 
-    /// Register or data word that the expression consists of, and the type in which it is read.
+    /// Register or data word that the expression denotes, and the type in which it is read.
     pub(crate) fn place(
         &self,
         machine: &Machine<'_>,
@@ -366,7 +368,7 @@ impl WatchExpression {
                 Operand::Address => Ok(Value::Int(machine.emulator.next_address().get().into())),
                 Operand::Depth => Ok(Value::Int(machine.emulator.stack().len() as i64)),
             };
-            // The value is arbitrary after a fault: only the fault is reported.
+            // After a fault the value is arbitrary: report only the fault.
             Some(read.unwrap_or_else(|error| {
                 fault.get_or_insert(error);
                 Value::Int(1)
@@ -411,7 +413,7 @@ struct LookupTables<'k> {
     names: &'k Names,
 }
 
-/// Register at a place of the machine, such as `m12`.
+/// Register at a place of the machine, such as `@m12`.
 fn machine_register(place: &str, known: LookupTables<'_>) -> Result<Register, String> {
     let machine = known.program.machine;
     machine.register_address(place).ok_or_else(|| {
@@ -420,7 +422,7 @@ fn machine_register(place: &str, known: LookupTables<'_>) -> Result<Register, St
     })
 }
 
-/// Parses an element of an array or a data word at the start of a text; `head` precedes the bracket. Also returns the end of the match.
+/// Parses an array element or a data word at the start of a text; `head` precedes the bracket. Also returns the end of the match.
 fn element(
     text: &str,
     head: &str,
@@ -447,7 +449,7 @@ fn element(
     Ok((Operand::Memory { offset, index, ty: Type::F }, close + 1))
 }
 
-/// Offset and index of an array's element, as expressions of its subscripts.
+/// Offset and index of an array element, as expressions over its subscripts.
 fn place(array: &NamedArray, subscripts: &str) -> Result<(String, String), String> {
     let NamedArray { name, base, sizes, .. } = array;
     let mut parts = vec![String::new()];
@@ -516,7 +518,7 @@ fn parse(text: &str, known: LookupTables<'_>, depth: usize) -> Result<WatchExpre
             at += 1 + length;
         }
         let is_name = head.starts_with(|first: char| first.is_ascii_alphabetic() || first == '_');
-        // A function, or a part of a name in braces, belongs to the assembler's language.
+        // Functions, and names with parts in braces, belong to the assembler's language.
         let own = !is_name || matches!(bytes.get(at), Some(b'(' | b'{'));
         if operand.is_none() && own {
             plain.push_str(&text[start..at]);
@@ -533,7 +535,7 @@ fn parse(text: &str, known: LookupTables<'_>, depth: usize) -> Result<WatchExpre
                 _ => return Err(format!("`{head}` is no register: it has no type")),
             }
         }
-        // The placeholder has the length of the text, so that columns in messages stay right.
+        // The placeholder is as long as the text, which keeps the columns in messages correct.
         let length = at - start;
         let placeholder = if head.len() == length && !head.starts_with('@') {
             head.to_owned()
@@ -547,7 +549,7 @@ fn parse(text: &str, known: LookupTables<'_>, depth: usize) -> Result<WatchExpre
     Ok(WatchExpression { text: text.to_owned(), expression, operands })
 }
 
-/// Rendered diagnostics without `error:`, which the caller prints.
+/// Renders diagnostics without `error:`, which the caller prints.
 fn rendered(diagnostics: &Diagnostics) -> String {
     let text = diagnostics.render(false);
     text.split_once("]: ").map_or(text.as_str(), |(_, text)| text).trim_end().to_owned()
@@ -567,7 +569,7 @@ fn closing(bytes: &[u8], open: usize) -> Option<usize> {
     None
 }
 
-/// The session's own counters: cycle, period, address, depth.
+/// Counters of the session itself: cycle, period, address, depth.
 fn counter(name: &str) -> Option<Operand> {
     Some(match name {
         "cycle" => Operand::Cycle,
@@ -606,7 +608,7 @@ fn name(name: &str, known: LookupTables<'_>) -> Result<Operand, String> {
     Err(format!("nothing is named `{name}`{near}"))
 }
 
-/// Meanings of a name of the source.
+/// Meanings of a name in the source.
 fn meanings(name: &str, known: LookupTables<'_>) -> Option<Name> {
     let LookupTables { program, constants, names } = known;
     let constant = |value| Some(Meaning::Constant(value));
@@ -614,7 +616,7 @@ fn meanings(name: &str, known: LookupTables<'_>) -> Option<Name> {
         let mut ports = program.inputs.iter().chain(&program.outputs).chain(&program.registers);
         Some(Meaning::Values(vec![NameValue::always(ports.find(|port| port.name == name)?)]))
     });
-    // Many programs have a label `period`; in `until period == 3` the counter is meant.
+    // Many programs have a label `period`, but `until period == 3` means the counter.
     let symbol =
         || program.symbols.iter().find(|symbol| symbol.name == name).filter(|_| counter(name).is_none());
     let named = || constants.iter().find(|constant| constant.0 == name);
@@ -637,7 +639,7 @@ pub(crate) fn names<'p>(
         .chain(names.values.iter().flat_map(|value| [value.name.as_str(), value.label.as_str()]))
 }
 
-/// Address of a code place such as `loop+3`.
+/// Address of a place in the code, such as `loop+3`.
 pub(crate) fn code_address(text: &str, program: &Program) -> Option<u32> {
     let (label, distance) = match text.split_once('+') {
         Some((label, distance)) => (label.trim(), distance.trim().parse().ok()?),

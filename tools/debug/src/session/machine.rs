@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The machine at a position: registers as the next bundle reads them, data words, and the source line at hand.
+//! Machine at a position: registers as the next bundle reads them, data words, and the current source line.
 
 use super::stale::Writers;
 use takt_asm::names::{Names, Position};
@@ -22,14 +22,14 @@ pub(crate) struct Machine<'e> {
     pub(crate) periods: u64,
     pub(crate) names: &'e Names,
     pub(super) writers: &'e Writers,
-    /// Line at hand, if it differs from the next bundle's line.
+    /// Current source line, if it differs from that of the next bundle.
     pub(crate) line: Option<Location>,
-    /// Registers are read as by the line at hand, with results still in flight.
+    /// Registers include results still in flight, as the current line will read them.
     pub(crate) ahead: bool,
 }
 
 impl Machine<'_> {
-    /// Value that a bundle would read if it issued in the cycle to come.
+    /// Value that a bundle would read if it issued in the next cycle.
     pub(crate) fn register(&self, register: Register) -> Option<u32> {
         if let Some(coming) = self.coming(register).filter(|_| self.ahead) {
             return Some(coming);
@@ -42,7 +42,7 @@ impl Machine<'_> {
             .or_else(|| self.emulator.register(register))
     }
 
-    /// Position of the line at hand in the source order.
+    /// Position of the current line in the source order.
     pub(crate) fn at_hand(&self) -> Position {
         let (slots, next) = (self.emulator.machine().slots.len(), self.emulator.next_address());
         let start = next.index() * slots;

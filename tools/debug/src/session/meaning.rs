@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Meaning of a source's name at a position: the value that the line at hand would read.
+//! Meaning of a name in the source at a position: the value that the current line would read.
 //!
-//! The assembler allots separate registers to the values of one name, shares a register between successive values, and renames a macro's
-//! names in each use: see [`takt_asm::names`].
+//! The assembler allocates separate registers to the values of one name, shares a register between successive values, and renames a
+//! macro's names in each use: see [`takt_asm::names`].
 
 use super::machine::Machine;
 use std::collections::HashMap;
@@ -16,14 +16,14 @@ use takt_isa::{BundleAddress, Program, Register, Type};
 pub(super) enum Meaning {
     /// A constant or an address.
     Constant(Value),
-    /// Registers: a single one, or one for each value of the name.
+    /// Registers: one for all values of the name, or one for each.
     Values(Vec<NameValue>),
 }
 
 /// A value of a name, with its register.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct NameValue {
-    /// Name of this value alone (`t.1`), or the source's name if it has one value.
+    /// Unique name of the value (`t.1`), or the name in the source if that has only one value.
     pub(crate) label: String,
     pub(crate) register: Register,
     pub(crate) ty: Type,
@@ -31,7 +31,7 @@ pub(crate) struct NameValue {
     pub(crate) orders: Option<(u32, u32)>,
     /// First and last bundle of the value's life; see [`NamedValue::bundles`].
     pub(crate) bundles: Option<(BundleAddress, BundleAddress)>,
-    /// Bundles that first write the register for another value, with that value's name.
+    /// Bundles that write another value to the register first, with that value's name.
     rivals: Vec<(BundleAddress, String)>,
 }
 
@@ -55,22 +55,23 @@ impl NameValue {
         }
     }
 
-    /// The register holds no other value of the program.
+    /// The register never holds another value.
     pub(crate) fn is_alone(&self) -> bool {
         self.rivals.is_empty()
     }
 
-    /// Address range of the next bundle in which the register holds the value: above the first, up to the second. `None`: everywhere.
+    /// Range of addresses of the next bundle within which the register holds the value: after the first, up to and including the second.
+    /// `None`: everywhere.
     pub(crate) fn range(&self) -> Option<(BundleAddress, BundleAddress)> {
         let (first, _) = self.bundles.filter(|_| self.orders.is_some() || !self.is_alone())?;
         let rivals = self.rivals.iter().map(|(at, _)| *at).filter(|at| first < *at);
         Some((first, rivals.min().unwrap_or(BundleAddress::new(u32::MAX))))
     }
 
-    /// Checks that the register holds the value, or is about to.
+    /// Checks that the register holds the value, or that the value is about to arrive.
     ///
     /// # Errors
-    /// If the register holds another value; the message says which.
+    /// If the register holds another value; the message names it.
     pub(crate) fn is_there(&self, machine: &Machine<'_>, program: &Program) -> Result<(), String> {
         let Some((first, _)) = self.bundles else { return Ok(()) };
         let next = machine.emulator.next_address();
@@ -85,7 +86,7 @@ impl NameValue {
                 Err(format!("{} is gone: its register {place} has {rival} since {at}", self.label))
             }
             None if self.is_alone() || machine.ahead => Ok(()),
-            // Before its arrival the register still holds the previous value.
+            // Until the value arrives, the register holds the previous one.
             None => match machine.arrives(self.register) {
                 None => Ok(()),
                 Some(left) => Err(format!("{} is in flight: it arrives in {left} cycles", self.label)),
@@ -94,18 +95,18 @@ impl NameValue {
     }
 }
 
-/// A register that a name stands for, with the value's range.
+/// A register that a name may denote, with the range of the value.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LiveRange {
-    /// Name of this value alone: the source's name, or `t.1`.
+    /// Unique name of the value: `t.1`, or the name in the source.
     pub label: String,
     /// Register that holds the value.
     pub register: Register,
     /// Type in which the bits are interpreted.
     pub ty: Type,
-    /// First writing and last reading bundle of the value; `None` if the value lives everywhere.
+    /// Bundle of the first write, and of the last read; `None` if the value lives everywhere.
     pub bundles: Option<(BundleAddress, BundleAddress)>,
-    /// The line at hand would read this value.
+    /// The current line would read this value.
     pub at_hand: bool,
 }
 
@@ -113,7 +114,7 @@ pub struct LiveRange {
 #[derive(Clone, Debug)]
 pub(super) struct Name {
     name: String,
-    /// Meaning in scopes without a meaning of their own.
+    /// Meaning in scopes that do not redefine the name.
     global: Option<Meaning>,
     /// Meanings by scope number, ascending.
     scoped: Vec<(u32, Meaning)>,
@@ -156,7 +157,7 @@ impl Name {
         (name.global.is_some() || !name.scoped.is_empty()).then_some(name)
     }
 
-    /// The name's meaning, if it is the same at every position.
+    /// The name's meaning, if it is the same at all positions.
     pub(super) fn fixed(&self) -> Option<&Meaning> {
         match &self.global {
             Some(Meaning::Values(values)) if !matches!(&values[..], [only] if only.is_alone()) => None,
@@ -198,7 +199,7 @@ impl Name {
         }
     }
 
-    /// All values that the name may stand for.
+    /// All values that the name may denote.
     pub(super) fn values(&self) -> impl Iterator<Item = &NameValue> {
         let all = self.global.iter().chain(self.scoped.iter().map(|(_, meaning)| meaning));
         all.flat_map(|meaning| match meaning {
@@ -215,7 +216,7 @@ pub(super) enum NameMeaning<'n> {
     Value(&'n NameValue),
 }
 
-/// Values of a name that has several or shares its register; also the single value whose own name this is.
+/// Values of a name that has several values or a shared register; also the single value that has this unique name.
 pub(super) fn held(name: &str, names: &Names) -> Option<Vec<NameValue>> {
     let of = |wanted: &dyn Fn(&NamedValue) -> bool| {
         let values = names.values.iter().filter(|value| wanted(value));
@@ -223,7 +224,7 @@ pub(super) fn held(name: &str, names: &Names) -> Option<Vec<NameValue>> {
         (!values.is_empty()).then_some(values)
     };
     of(&|value| value.name == name).or_else(|| {
-        // A value's own name has the same meaning everywhere.
+        // The unique name of a value means the same everywhere.
         let mut values = of(&|value| value.label == name)?;
         values.truncate(1);
         values[0].orders = None;

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Debug session: a cycle-accurate run with breakpoints, inspection, edits, and steps forward and back.
 //!
-//! **Positions.** The session stands between two cycles: at position *n*, cycles 0 to *n* - 1 have passed. Registers show the values that a
-//! bundle would read if it issued in cycle *n*. A breakpoint stops just before its bundle issues, so that the bundle reads values set
-//! there.
+//! **Positions.** A session is positioned between two cycles: at position *n*, cycles 0 to *n* - 1 have passed. Registers show the values
+//! that a bundle would read if it issued in cycle *n*. A breakpoint stops just before its bundle issues, so that the bundle reads values
+//! set there.
 //!
 //! **Going back.** The machine is deterministic, and external events (inputs of each period, edits by the user) are recorded. The session
-//! keeps at most [`CHECKPOINTS`] checkpoints, at growing distances, and goes back by a restore and a run forward.
+//! keeps at most [`CHECKPOINTS`] checkpoints, at growing distances; to go back, it restores one and runs forward.
 //!
-//! **Inputs.** Without recorded inputs, period follows period with constant inputs. With a recording, each period takes the next row when
-//! the previous `wait` issues, as in `takt run --inputs`; after the last row the run ends.
+//! **Inputs.** Without recorded inputs, one period follows another with constant inputs. With recorded inputs, each period takes the next
+//! row when the previous `wait` issues, as in `takt run --inputs`; the run ends after the last row.
 
 mod expression;
 mod machine;
@@ -49,31 +49,31 @@ use takt_isa::text::element_names;
 use takt_isa::timing::{Cause, Cycle};
 use takt_isa::{BundleAddress, Program, Register, SlotIndex, Type};
 
-/// Maximal number of checkpoints. At 10⁸ cycles their distance is at most 2¹⁹ cycles.
+/// Maximum number of checkpoints. At 10⁸ cycles, they are at most 2¹⁹ cycles apart.
 pub const CHECKPOINTS: usize = samples::MOST;
 /// Initial distance between checkpoints, in cycles.
 const INTERVAL: Cycle = 1 << 12;
-/// Maximal number of cycles between two polls for an interrupt.
+/// Maximum number of cycles between two polls for an interrupt.
 const SLICE: Cycle = 1 << 20;
-/// Initial number of positions examined in a search back; it grows.
+/// Initial number of positions examined in a backward search; it grows.
 const WINDOW: Cycle = 1 << 6;
-/// Default for the maximal number of cycles of a command.
+/// Default limit on the cycles of a command.
 pub const RUN_LIMIT: Cycle = 1_000_000_000;
 
 /// Options of a session.
 #[derive(Clone, Default)]
 pub struct Options {
-    /// Input ports as pairs of register and bits, one row for each period; `None`: they start at 0 and change only by edits.
+    /// Input ports as pairs of register and bits, one row for each period. `None`: inputs start at 0 and change only by edits.
     pub inputs: Option<Arc<Rows>>,
     /// Cycles between ticks; `None`: a tick comes as soon as the program waits.
     pub tick: Option<NonZeroU64>,
     /// Named constants of the source.
     pub constants: Vec<(String, Value)>,
-    /// Source texts, under the names that the program has for them.
+    /// Source texts, keyed by the program's file names.
     pub sources: Vec<(String, String)>,
-    /// Meanings of the source's names, from the assembler.
+    /// Meanings of names in the source, from the assembler.
     pub names: Names,
-    /// State shared with an observer of long commands.
+    /// State shared with an observer of running commands.
     pub control: Arc<Control>,
 }
 
@@ -82,7 +82,7 @@ pub struct Options {
 pub struct Control {
     interrupt: AtomicBool,
     cycle: AtomicU64,
-    /// Breakpoints passed although their conditions read stale values, by number, with the reason.
+    /// Breakpoints that were passed although their conditions read stale values: number, and reason.
     doubts: Mutex<BTreeMap<u32, String>>,
 }
 
@@ -103,12 +103,12 @@ impl Control {
         self.interrupt.load(Ordering::Relaxed)
     }
 
-    /// Records that a breakpoint was passed although its condition could not be decided.
+    /// Records that a breakpoint was passed because its condition could not be evaluated.
     fn doubt(&self, id: u32, reason: String) {
         self.doubts.lock().unwrap_or_else(PoisonError::into_inner).entry(id).or_insert(reason);
     }
 
-    /// Takes the breakpoints that were passed undecided, by number, with the first reason of each.
+    /// Takes the breakpoints that were passed although undecided: number, and first reason.
     pub fn take_doubts(&self) -> BTreeMap<u32, String> {
         std::mem::take(&mut self.doubts.lock().unwrap_or_else(PoisonError::into_inner))
     }
@@ -138,7 +138,7 @@ pub(crate) fn put(emulator: &mut Emulator, place: Place, bits: u32) {
 pub enum StopReason {
     /// The command is complete.
     Done,
-    /// A breakpoint or watchpoint; for a watchpoint, with the values before and after the change.
+    /// A breakpoint or watchpoint was hit.
     Stop {
         /// Number of the stop.
         id: u32,
@@ -147,13 +147,13 @@ pub enum StopReason {
         /// Values before and after the change, for a watchpoint.
         change: Option<(String, String)>,
     },
-    /// The expression of [`Move::Until`] is not zero.
+    /// The expression of [`Move::Until`] is nonzero.
     Holds,
-    /// The run is back at its beginning.
+    /// The run has returned to its beginning.
     Start,
     /// The program has halted.
     Halted,
-    /// The recorded inputs end with this period.
+    /// The recorded inputs have ended with this period.
     InputsEnd,
     /// A fault stopped the program.
     Fault(Fault),
@@ -161,7 +161,7 @@ pub enum StopReason {
     Limit(Cycle),
     /// The user interrupted the command.
     Interrupted,
-    /// A machine that runs elsewhere differs from its emulator; the text is the first difference.
+    /// A remote machine differs from its emulator; the text describes the first difference.
     Differs(String),
     /// Another error, in words.
     Other(String),
@@ -178,7 +178,7 @@ pub enum Move {
     Resume,
     /// Back to a breakpoint or watchpoint.
     ResumeBack,
-    /// Forward to a position at which an expression is not zero.
+    /// Forward to a position at which an expression is nonzero.
     Until(Box<WatchExpression>),
     /// To the position after this number of cycles.
     Cycle(Cycle),
@@ -191,17 +191,17 @@ pub enum Move {
 /// Unit of a step.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Unit {
-    /// A single clock cycle.
+    /// One clock cycle.
     Cycle,
-    /// To a position just before a bundle issues.
+    /// To the position just before the next bundle issues.
     Bundle,
-    /// To a position just before the first bundle of another source line issues.
+    /// To the position just before the first bundle of another source line issues.
     Line,
     /// To the position after a period's `wait`.
     Period,
-    /// A bundle, or a subroutine call with its whole body.
+    /// One bundle, or a whole subroutine call.
     Call,
-    /// To the continuation in the subroutine's caller.
+    /// To the return of the current subroutine to its caller.
     Out,
 }
 
@@ -210,12 +210,12 @@ impl Unit {
     pub const NAMES: [&str; 6] = ["cycle", "bundle", "line", "period", "call", "out"];
     const ALL: [Unit; 6] = [Unit::Cycle, Unit::Bundle, Unit::Line, Unit::Period, Unit::Call, Unit::Out];
 
-    /// Name of the unit in commands.
+    /// Name of the unit, as in commands.
     pub fn name(self) -> &'static str {
         Unit::NAMES[self as usize]
     }
 
-    /// Unit with this name in commands.
+    /// Unit with this name, as in commands.
     pub fn named(name: &str) -> Option<Unit> {
         Unit::ALL.into_iter().find(|unit| unit.name() == name)
     }
@@ -233,12 +233,12 @@ struct Edit {
 #[derive(Clone)]
 struct Core {
     emulator: Emulator,
-    /// Number of ended periods.
+    /// Number of completed periods.
     periods: u64,
     /// A period ended in the previous cycle.
     boundary: bool,
     report: Option<PeriodReport>,
-    /// Number of edits already made.
+    /// Number of edits already applied.
     edits: usize,
 }
 
@@ -252,14 +252,14 @@ pub struct Session {
     /// Edits, by ascending cycle.
     edits: Vec<Edit>,
     stops: Vec<(u32, Stop)>,
-    /// Watchers with their known values, along the run.
+    /// Watchers with their known values, sampled along the run.
     known: ThinnedSeries<Watcher>,
     next_id: u32,
-    /// Line of the breakpoint that stopped the run, and the cycle at which it did.
+    /// Line of the breakpoint that stopped the run, and the cycle of the stop.
     line: Option<(Cycle, Location)>,
-    /// The machine runs elsewhere: cycles and calls are not known.
+    /// The session shows a remote machine: cycles and calls are unknown.
     afar: bool,
-    /// Maximal number of cycles of a command.
+    /// Maximum number of cycles of a command.
     pub run_limit: Cycle,
 }
 
@@ -267,7 +267,7 @@ pub struct Session {
 type End = StopReason;
 
 impl Session {
-    /// A session at the start of a program.
+    /// Starts a session at reset of a program.
     ///
     /// # Errors
     /// If the machine cannot hold the program.
@@ -304,7 +304,7 @@ impl Session {
         self.core.emulator.program()
     }
 
-    /// Machine at this position. (Read registers through [`Session::register`].)
+    /// State of the machine at this position. (Read registers through [`Session::register`].)
     pub fn emulator(&self) -> &Emulator {
         &self.core.emulator
     }
@@ -314,23 +314,23 @@ impl Session {
         self.core.emulator.now()
     }
 
-    /// Number of ended periods.
+    /// Number of completed periods.
     pub fn period(&self) -> u64 {
         self.core.periods
     }
 
-    /// Report on the last ended period.
+    /// Report on the last completed period.
     pub fn report(&self) -> Option<&PeriodReport> {
         self.core.report.as_ref()
     }
 
-    /// Next bundle, and the cycle of its issue if the program runs on.
+    /// Next bundle, and the cycle in which it issues if the program runs on.
     pub fn next_issue(&mut self) -> (BundleAddress, Option<Cycle>) {
         let issue = self.core.emulator.upcoming().map(|upcoming| upcoming.issue.cycle);
         (self.core.emulator.next_address(), issue)
     }
 
-    /// Stall cause of the cycle to come; `None` if a bundle issues, or the machine has stopped.
+    /// Stall cause of the next cycle; `None` if a bundle issues, or the machine has stopped.
     pub fn stall(&mut self) -> Option<Cause> {
         let now = self.cycle();
         match self.core.emulator.status() {
@@ -340,7 +340,7 @@ impl Session {
         }
     }
 
-    /// Source line at hand: the line that a breakpoint stopped at, otherwise the line of the next bundle.
+    /// Current source line: that of the breakpoint at which the run stopped, otherwise that of the next bundle.
     pub fn location(&self) -> Option<Location> {
         if let Some(line) = self.machine().line {
             return Some(line);
@@ -392,13 +392,13 @@ impl Session {
         Machine { emulator, periods: *periods, names, writers, line, ahead: false }
     }
 
-    /// Value of a register for a bundle that would issue in the cycle to come.
+    /// Value of a register as read by a bundle that issues in the next cycle.
     pub fn register(&self, register: Register) -> Option<u32> {
         self.machine().register(register)
     }
 
-    /// Operations before their writeback, in the order of writebacks, each with its remaining cycles: 1 if the bundle after the next can
-    /// read the result. Results that the next bundle can read are left out.
+    /// Operations in flight, in order of writeback, each with the remaining cycles: 1 if the bundle after the next can read the result.
+    /// Results that the next bundle can read are left out.
     pub fn in_flight(&self) -> Vec<(Retire, Cycle)> {
         let now = self.cycle();
         let pending = self.core.emulator.in_flight().filter(|retire| retire.cycle > now);
@@ -435,7 +435,7 @@ impl Session {
         live.evaluate(&self.machine(), self.program())
     }
 
-    /// Register or data word that an expression denotes, with its type and bits; `None` if it is a computed value.
+    /// Register or data word that an expression denotes, with type and bits; `None` for a computed value.
     ///
     /// # Errors
     /// If the value is not in its register here, or an index has no value; the message says why.
@@ -450,17 +450,17 @@ impl Session {
         Ok(Some((place, ty, bits)))
     }
 
-    /// Name of the value at hand (`t.1`), if the expression is a name with several values.
+    /// Name of the current value (`t.1`), if the expression is a name with several values.
     pub fn label(&self, live: &WatchExpression) -> Option<String> {
         live.label(&self.machine())
     }
 
-    /// Reason why a register's value is older than the line at hand would read; `None` if it is current.
+    /// Reason why a register's value is older than the current line would read; `None` if it is up to date.
     pub fn stale(&self, register: Register) -> Option<StaleReason> {
         self.machine().stale(register)
     }
 
-    /// Note on the stale operands of an expression; `None` if all are current.
+    /// Note on stale operands of an expression; `None` if all are up to date.
     pub fn note(&self, live: &WatchExpression) -> Option<String> {
         live.note(&self.machine(), self.program())
     }
@@ -470,18 +470,18 @@ impl Session {
         &self.options.control
     }
 
-    /// Registers that an expression may stand for, with their ranges, if it is a name of any.
+    /// Registers that an expression may denote, with ranges, if it is the name of registers.
     pub fn lives(&self, live: &WatchExpression) -> Vec<LiveRange> {
         live.lives(&self.machine(), self.program())
     }
 
-    /// Elements of an array, as expressions name them, in index order; `None` if the name is no array's.
+    /// Elements of an array, in the notation of expressions, in index order; `None` if the name is not an array.
     pub fn elements(&self, name: &str) -> Option<Vec<String>> {
         let names = &self.options.names;
         if let Some(array) = names.arrays.iter().find(|array| array.name == name) {
             return Some(element_names(&array.name, &array.sizes));
         }
-        // An array in registers: each element is a separate value.
+        // An array in registers: each element is a value of its own.
         let mut all: Vec<&str> = names.values.iter().map(|value| value.name.as_str()).collect();
         all.extend(self.program().registers.iter().map(|port| port.name.as_str()));
         let is_element = |other: &str| other.strip_prefix(name).is_some_and(|rest| rest.starts_with('['));
@@ -494,15 +494,15 @@ impl Session {
         (!elements.is_empty()).then_some(elements)
     }
 
-    /// Names with this prefix.
+    /// Names that begin with this prefix.
     pub fn names(&self, beginning: &str) -> Vec<String> {
         let names = expression::names(self.program(), &self.options.constants, &self.options.names);
         let found: BTreeSet<&str> = names.filter(|name| name.starts_with(beginning)).collect();
         found.into_iter().map(str::to_owned).collect()
     }
 
-    /// Shows the state of a machine that another party runs with this program; this session does not move it. `boundary`: a period has just
-    /// ended.
+    /// Shows the state of a machine that another component runs with this program; this session does not move it. `boundary`: a period
+    /// has just ended.
     pub(crate) fn look(&mut self, emulator: Emulator, periods: u64, boundary: bool) {
         self.core = Core { emulator, periods, boundary, report: None, edits: 0 };
         self.checkpoints.clear();
@@ -510,13 +510,13 @@ impl Session {
         self.known.clear();
     }
 
-    /// Shows the state of a machine that runs elsewhere, between two periods.
+    /// Shows the state of a remote machine, between two periods.
     pub(crate) fn look_afar(&mut self, emulator: Emulator, periods: u64) {
         self.afar = true;
         self.look(emulator, periods, true);
     }
 
-    /// Time of this position: the cycle, or the period if the machine runs elsewhere.
+    /// Time of this position: the cycle, or the period if the machine is remote.
     pub(crate) fn time(&self) -> String {
         match self.afar {
             true => format!("period {}", self.period()),
@@ -529,7 +529,7 @@ impl Session {
         if self.afar { self.time() } else { format!("{}, period {}", self.time(), self.period()) }
     }
 
-    /// Registers and memory that an expression reads; without an expression, the union over all stops.
+    /// Registers and memory that an expression reads; without an expression, those of all stops.
     pub(crate) fn reads(&self, live: Option<&WatchExpression>) -> ReadSet {
         let mut reads = ReadSet::default();
         match live {
@@ -541,7 +541,7 @@ impl Session {
 
     // ---- Changing.
 
-    /// Sets a register or a data word. Records of the run after this position are dropped.
+    /// Sets a register or a data word. Discards records of the run after this position.
     ///
     /// # Errors
     /// If the register or data word does not exist, or is `zero`.
@@ -565,7 +565,7 @@ impl Session {
         Ok(())
     }
 
-    /// Makes the pending edits of this position.
+    /// Applies the pending edits of this position.
     fn make_edits(&mut self) {
         let now = self.core.emulator.now();
         while let Some(edit) = self.edits.get(self.core.edits).filter(|edit| edit.cycle == now) {
@@ -574,11 +574,11 @@ impl Session {
         }
     }
 
-    /// Sets the inputs of the next period from the recording.
+    /// Sets the inputs of the next period from the recorded rows.
     fn set_row(&mut self) {
         let Some(rows) = &self.options.inputs else { return };
         for &(register, bits) in rows.get(self.core.periods as usize).into_iter().flatten() {
-            // Cannot fail: rows are made for the program's ports.
+            // Cannot fail: the rows match the program's ports.
             let _ = self.core.emulator.set_input_bits(register, bits);
         }
     }
@@ -593,7 +593,7 @@ impl Session {
         id
     }
 
-    /// Counter for the number of the next stop.
+    /// Counter that numbers the stops.
     pub(crate) fn next_stop(&mut self) -> &mut u32 {
         &mut self.next_id
     }

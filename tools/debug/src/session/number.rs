@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Notations of numbers in the debugger.
+//! Number formats of the debugger.
 
 use crate::value;
 use takt_isa::Type;
@@ -7,20 +7,20 @@ use takt_isa::Type;
 /// A value in all notations.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ValueNotations {
-    /// Text in the notation of the type: the shortest decimal that reads back as the same binary32, an integer, or hexadecimal.
+    /// Value in the notation of the type: the shortest decimal that reads back as the same binary32, an integer, or hexadecimal.
     pub text: String,
     /// Hexadecimal notation of the binary32 value, in the assembler's syntax.
     pub hex_float: String,
-    /// Value as a binary32 number.
+    /// Bits interpreted as binary32.
     pub float: f32,
-    /// Value as a signed integer.
+    /// Bits interpreted as a signed integer.
     pub integer: i32,
     /// Raw bits, from which all other fields are derived.
     pub bits: u32,
 }
 
 impl ValueNotations {
-    /// Bits as a value of a type, in all notations.
+    /// Interprets bits in a type, in all notations.
     pub fn new(ty: Type, bits: u32) -> ValueNotations {
         let (float, integer) = (f32::from_bits(bits), bits.cast_signed());
         let text = value::text(ty, bits);
@@ -62,7 +62,7 @@ pub fn hex_float(value: f32) -> String {
 pub struct UlpDistance {
     /// Number of binary32 steps between the rounded values; `None` if one is a NaN.
     pub steps: Option<u64>,
-    /// Exact difference of the unrounded values, in ulp of the second.
+    /// Exact difference of the unrounded values, in ulp of the second value.
     pub error: f64,
 }
 
@@ -75,7 +75,7 @@ pub fn ulp_distance(a: f64, b: f64) -> UlpDistance {
     };
     let (near_a, near_b) = (a as f32, b as f32);
     let steps = (!near_a.is_nan() && !near_b.is_nan()).then(|| order(near_a).abs_diff(order(near_b)));
-    // The ulp of this exponent; subnormals have the ulp of the smallest normal number.
+    // Exponent of the ulp; subnormals share the ulp of the smallest normal number.
     let exponent = (near_b.to_bits() >> 23 & 0xff).max(1) as i32;
     UlpDistance { steps, error: (a - b) / 2f64.powi(exponent - 150) }
 }

@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Previous values of watched expressions: a search looks back to the last position at which each value existed, so that its result does
-//! not depend on where it begins. Known states are kept along the run, like checkpoints.
+//! Previous values of watched expressions: a search looks back to the last position at which each value existed, so that the result does
+//! not depend on where the search begins. Known states are recorded along the run, like checkpoints.
 
 use super::search_positions::Interest;
 use super::stops::Watcher;
 use super::{End, Session, StopReason, WINDOW};
 use takt_isa::timing::Cycle;
 
-/// Number of positions before the start of a search that are examined first.
+/// Number of positions before the start of a search to examine first.
 const NEAR: Cycle = 1 << 12;
 
 impl Session {
-    /// A watcher for this position that has the last value of every watched expression, even of one that is not in its register now. The
-    /// session stays where it is.
+    /// A watcher for this position that has the last value of every watched expression, even of those whose value is currently not in its
+    /// register. The session's position does not change.
     ///
     /// # Errors
     /// If the user interrupted the search.
@@ -31,7 +31,7 @@ impl Session {
         result.map(|()| watcher)
     }
 
-    /// Completes this position's watcher from a known watcher, from nearby positions, or from the whole run.
+    /// Completes a watcher for this position from a recorded one, from nearby positions, or from the whole run.
     fn look_back(&mut self, watcher: &mut Watcher) -> Result<(), End> {
         let here = self.cycle();
         let interest = Interest::stops(&self.stops, self.program());
@@ -69,20 +69,20 @@ impl Session {
         }
     }
 
-    /// Runs forward to a known position, and shows the watcher each position on the way.
+    /// Runs forward to a known position, and passes each position on the way to the watcher.
     fn watch_until(&mut self, until: Cycle, interest: &Interest, watcher: &mut Watcher) -> Result<(), End> {
         let mut visit = |session: &Session, issuing| {
             watcher.visit(session, issuing);
             None
         };
         match self.scan(until, interest, &mut visit) {
-            // The run has reached the position.
+            // The target position is reached.
             Ok(_) | Err(StopReason::Limit(_)) => Ok(()),
             Err(end) => Err(end),
         }
     }
 
-    /// Records a watcher for this position.
+    /// Records a watcher at this position.
     pub(super) fn keep_watcher(&mut self, watcher: Watcher) {
         self.known.add(self.cycle(), watcher);
     }

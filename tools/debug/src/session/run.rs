@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Movement along a run: to a cycle or a period, by steps, and to the hit of a search.
+//! Moves along a run: to a cycle or a period, by steps, or to a search hit.
 
 use super::machine::Machine;
 use super::search_positions::Interest;
@@ -11,7 +11,7 @@ use takt_isa::program::Location;
 use takt_isa::{BundleAddress, Flow};
 
 impl Session {
-    /// Runs forward to a cycle, or to an earlier end or interrupt.
+    /// Runs forward to a cycle; an end of the run or an interrupt may come earlier.
     fn advance(&mut self, target: Cycle) -> Result<(), End> {
         self.make_edits();
         while self.cycle() < target {
@@ -46,7 +46,7 @@ impl Session {
                 self.set_row();
             }
             Err(PeriodError::Fault(fault)) => return Err(StopReason::Fault(fault)),
-            // The position after the last cycle belongs to the run; only the next move reports the halt.
+            // The position after the last cycle is part of the run; only the next move reports the halt.
             Err(PeriodError::Halted) if self.cycle() > begin => {}
             // A port error cannot occur: this loop names no ports.
             Err(PeriodError::Halted | PeriodError::Port(_)) => return Err(StopReason::Halted),
@@ -59,10 +59,11 @@ impl Session {
         Ok(())
     }
 
-    /// Repeats the run from reset to this position, and shows the machine after each issue, with the bundle. The session stays where it is.
+    /// Repeats the run from reset to this position, and calls `visit` with machine and bundle after each issue. The session's position
+    /// does not change.
     ///
     /// # Returns
-    /// [`Why::Done`], or [`Why::Interrupted`].
+    /// [`StopReason::Done`], or [`StopReason::Interrupted`].
     pub fn replay(&mut self, visit: &mut dyn FnMut(&Emulator, BundleAddress)) -> StopReason {
         let here = self.cycle();
         let Some(beginning) = self.checkpoints.first().cloned() else { return StopReason::Start };
@@ -92,13 +93,13 @@ impl Session {
     /// Goes to a cycle, forward or back.
     ///
     /// # Returns
-    /// [`Why::Done`], or the reason why the run ends earlier.
+    /// [`StopReason::Done`], or the reason why the run ends earlier.
     pub fn go_to(&mut self, cycle: Cycle) -> StopReason {
         self.approach(|core| core.emulator.now() <= cycle);
         self.advance(cycle).err().unwrap_or(StopReason::Done)
     }
 
-    /// Restores the last checkpoint at which `is_before` holds, unless the present position satisfies it and is later.
+    /// Restores the last checkpoint for which `is_before` holds, unless it also holds for the current position, which is later.
     fn approach(&mut self, is_before: impl Fn(&Core) -> bool) {
         let Some(checkpoint) = self.checkpoints.last_while(&is_before) else { return };
         if checkpoint.emulator.now() > self.cycle() || !is_before(&self.core) {
@@ -131,7 +132,7 @@ impl Session {
         Ok(())
     }
 
-    /// Visits the relevant positions after this one, up to `until`, until `visit` returns a hit.
+    /// Visits relevant positions from here up to `until`, and stops when `visit` returns a hit.
     pub(super) fn scan(
         &mut self,
         until: Cycle,
@@ -178,8 +179,8 @@ impl Session {
         self.scan(until, interest, &mut visit).unwrap_or_else(|end| end)
     }
 
-    /// Goes to the last earlier position at which `visit` returns a hit; `begin` is called at the start of each stretch. An interrupt
-    /// leaves the session in place.
+    /// Goes to the last earlier position at which `visit` returns a hit; calls `begin` at the start of each stretch. On an interrupt, the
+    /// position does not change.
     fn backward<V: FnMut(&Session, Option<BundleAddress>) -> Option<StopReason>>(
         &mut self,
         interest: &Interest,
@@ -189,8 +190,8 @@ impl Session {
         // Positions from `end` on have been searched, or are out of range.
         let (mut end, mut window) = (from, WINDOW);
         while end >= 2 {
-            // A hit lies after the start of its stretch, so that the previous state is known. Search a short window first, as a hit may be
-            // near; later stretches begin at checkpoints.
+            // A hit must come after the start of its stretch, so that the previous state is known. Search a short window first, since a
+            // hit may be near; later stretches begin at checkpoints.
             let near = (end - 1).saturating_sub(window);
             let start = near.max(self.checkpoints.before(end - 2).map_or(0, |(cycle, _)| cycle));
             window = window.saturating_mul(8);
@@ -227,7 +228,7 @@ impl Session {
         StopReason::Start
     }
 
-    /// Makes one move of the run; for steps, a single step.
+    /// Executes one move; for steps, a single step.
     pub fn go(&mut self, to: &Move) -> StopReason {
         match to {
             Move::Step(unit, _) => self.step(*unit),
@@ -252,7 +253,7 @@ impl Session {
         let (depth, caller) = (stack.len(), stack.last().copied());
         let next = self.core.emulator.next_address();
         let interest = match unit {
-            // A completed call ends in no other place.
+            // A completed call can only end here.
             Unit::Call if self.calls(next) => Interest::bundles([next, next.next()]),
             Unit::Out => Interest::bundles(caller),
             _ => Interest::everything(),
@@ -286,7 +287,7 @@ impl Session {
         })
     }
 
-    /// End of a step by `unit` that began at call depth `depth`, if it ends at this position, where `issuing` is about to issue.
+    /// Tells whether a step by `unit` that began at call depth `depth` ends at this position, where `issuing` is about to issue.
     pub(super) fn ends_step(
         &self,
         unit: Unit,
@@ -322,7 +323,7 @@ impl Session {
         self.stopped(why)
     }
 
-    /// Makes the line of the breakpoint that stopped the run the line at hand.
+    /// Makes the line of the breakpoint that stopped the run the current line.
     pub(crate) fn stopped(&mut self, why: StopReason) -> StopReason {
         let stop = match &why {
             StopReason::Stop { id, .. } => self.stops.iter().find(|(known, _)| known == id),
@@ -344,9 +345,9 @@ impl Session {
         self.stopped(why)
     }
 
-    /// Runs forward to the next position at which an expression is not zero. An expression without a value does not hold.
+    /// Runs forward to the next position at which an expression is nonzero. An expression without a value counts as zero.
     pub fn run_until(&mut self, live: &WatchExpression) -> StopReason {
-        // An expression that already holds may hold in the next cycle too, without any change that the search would visit.
+        // An expression that holds now may still hold in the next cycle, without a change that the search would visit.
         if self.holds(live) {
             match self.go_to(self.cycle() + 1) {
                 StopReason::Done if self.holds(live) => return StopReason::Holds,
@@ -358,8 +359,8 @@ impl Session {
         self.forward(&interest, |session, _| session.holds(live).then_some(StopReason::Holds))
     }
 
-    /// Evaluates a breakpoint's condition as the line at hand would read it, with results in flight. Returns whether it holds, and the
-    /// operands that no bundle has computed yet, in words.
+    /// Evaluates a breakpoint's condition as the current line would read it, with results in flight. Returns whether it holds, and a
+    /// description of operands that no bundle has computed yet.
     pub(super) fn judge(
         &self,
         line: Option<Location>,
@@ -373,7 +374,7 @@ impl Session {
         (value.as_ref().is_ok_and(|value| !value.is_zero()), doubt)
     }
 
-    /// The condition of a breakpoint holds here. An operand that is not computed yet is recorded as a doubt
+    /// The condition of a breakpoint holds here. An operand that has not been computed is recorded as a doubt
     /// ([`Control::take_doubts`](super::Control::take_doubts)).
     pub fn meets(&self, id: u32, condition: &WatchExpression) -> bool {
         let (holds, doubt) = self.judge(None, condition);
@@ -381,7 +382,7 @@ impl Session {
         holds
     }
 
-    /// Records that a breakpoint was passed here with a doubt.
+    /// Records the doubt with which a breakpoint was passed here.
     pub(super) fn remember(&self, id: u32, doubt: Option<String>) {
         if let Some(doubt) = doubt {
             let first = doubt.lines().next().unwrap_or_default();
@@ -394,7 +395,7 @@ impl Session {
         live.is_there(&self.machine(), self.program())
     }
 
-    /// The expression has a value other than zero.
+    /// The expression is nonzero.
     pub(crate) fn holds(&self, live: &WatchExpression) -> bool {
         self.evaluate(live).is_ok_and(|value| !value.is_zero())
     }

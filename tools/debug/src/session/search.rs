@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Searches in a machine that another party runs: the core of a system, which shows its state ([`Session::look`]) at the positions of
-//! interest.
+//! Searches on a machine that another component runs, such as a core of a system. The machine is shown ([`Session::look`]) at each
+//! relevant position.
 
 use super::search_positions::Interest;
 use super::stops::Watcher;
@@ -11,31 +11,31 @@ use takt_isa::BundleAddress;
 use takt_isa::timing::{Cycle, INPUT_DELAY};
 use takt_system::InputEvent;
 
-/// A search forward from the position at which it was made.
+/// A forward search from the position at which it was created.
 #[derive(Clone)]
 pub(crate) struct Search {
     interest: Interest,
     goal: Goal,
-    /// Relevant positions beyond the last range, due to events in it; `None` before the first range.
+    /// Relevant positions beyond the last range, caused by events within it; `None` before the first range.
     ahead: Option<BTreeSet<Cycle>>,
 }
 
-/// Number of positions for which an event stays relevant. Results in flight are reported on their arrival.
+/// Number of positions for which an event stays relevant. (Results in flight are reported on arrival.)
 const AHEAD: Cycle = if INPUT_DELAY + 1 > 3 { INPUT_DELAY + 1 } else { 3 };
 
 #[derive(Clone)]
 enum Goal {
     /// Breakpoints and watchpoints of the session.
     Stops(Watcher),
-    /// A value of this expression other than zero.
+    /// A nonzero value of this expression.
     Holds(Box<WatchExpression>),
     /// The end of a step that began at this call depth.
     Step { unit: Unit, depth: usize },
 }
 
 impl Search {
-    /// A search for the session's stops; `None` without stops. Previous values of watched expressions are those at the session's position;
-    /// [`Search::is_complete`] tells whether any is missing.
+    /// A search for the session's stops; `None` without stops. Previous values of watched expressions are those at the session's
+    /// position; [`Search::is_complete`] is false if one is missing.
     pub(crate) fn stops(session: &Session) -> Option<Search> {
         let goal = Goal::Stops(Watcher::new(session));
         let interest = Interest::stops(&session.stops, session.program());
@@ -47,12 +47,12 @@ impl Search {
         self.watcher().is_none_or(Watcher::is_complete)
     }
 
-    /// The search has the session's current stops.
+    /// The search is for the session's current stops.
     pub(crate) fn is_of(&self, session: &Session) -> bool {
         self.watcher().is_some_and(|watcher| watcher.is_of(session))
     }
 
-    /// Copies missing previous values from a search of an earlier position.
+    /// Copies missing previous values from a search at an earlier position.
     pub(crate) fn complete(&mut self, earlier: &Search) {
         if let (Goal::Stops(watcher), Some(earlier)) = (&mut self.goal, earlier.watcher()) {
             watcher.complete(earlier);
@@ -66,20 +66,20 @@ impl Search {
         }
     }
 
-    /// A search for a position at which the expression is not zero.
+    /// A search for a position at which the expression is nonzero.
     pub(crate) fn value(live: WatchExpression, session: &Session) -> Search {
         let interest = Interest::value(&live, session.program());
         Search { interest, goal: Goal::Holds(Box::new(live)), ahead: None }
     }
 
-    /// A search for the end of a step from the session's position: by a bundle, a line, a call, or out of a subroutine.
+    /// A search for the end of a step from the session's position: by bundle, line or call, or out of a subroutine.
     pub(crate) fn step(unit: Unit, session: &Session) -> Search {
         let depth = session.core.emulator.stack().len();
         Search { interest: Interest::default(), goal: Goal::Step { unit, depth }, ahead: None }
     }
 
-    /// Relevant positions from `begin` to `end`, given the machine's events in the range. Ranges are consecutive. Events before the first
-    /// range are unknown, so its first few positions are relevant.
+    /// Relevant positions from `begin` to `end`, given the machine's events in that range. Ranges are consecutive. Events before the
+    /// first range are unknown, so its first few positions are all relevant.
     pub(crate) fn positions(
         &mut self,
         events: &[&Event],
@@ -100,18 +100,18 @@ impl Search {
                 Event::Issue { cycle, address } if self.interest.is_of(*address) => {
                     positions.extend([*cycle, cycle + 1]);
                 }
-                // Bundles read a result from its writeback on.
+                // Bundles can read a result from its writeback on.
                 Event::Retire(retire) if self.interest.is_of(retire.address) => {
                     positions.extend([retire.cycle, retire.cycle + 1]);
                 }
-                // A period ends, and latched output ports take their values.
+                // A period ends, and latched output ports change.
                 Event::Wait { cycle, .. } => positions.extend(cycle + 1..=cycle + 3),
-                // Latched input ports take new values.
+                // Latched input ports change.
                 Event::Tick { cycle } => positions.extend(*cycle..=cycle + 2),
                 _ => {}
             }
         }
-        // The core reads an input a few cycles after its arrival at the pins.
+        // The core sees an input a few cycles after it arrives at the pins.
         let seen = inputs.iter().flat_map(|input| input.cycle..=input.cycle + INPUT_DELAY + 1);
         positions.extend(seen);
         positions.extend(self.interest.cycles(begin, end));

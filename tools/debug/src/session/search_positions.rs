@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Positions that a search must visit. Between them the searched values cannot change, and the machine runs at full speed.
+//! Positions that a search must visit. Between them no searched value can change, so the machine runs at full speed.
 
 use super::WatchExpression;
 use super::expression::ReadSet;
@@ -9,16 +9,16 @@ use takt_emu::Emulator;
 use takt_isa::timing::Cycle;
 use takt_isa::{BundleAddress, Effect, Flow, Program};
 
-/// Set of positions to visit. Ends of periods, changes of inputs and edits are always in it.
+/// Set of positions to visit. Always includes ends of periods, input changes and edits.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Interest {
     /// Every position, including the program's waits.
     clock: bool,
     /// Every position at which something can happen.
     every: bool,
-    /// Bundles around whose issue a position matters: from just before it until its results have arrived.
+    /// Bundles whose issue makes positions relevant: from just before the issue until the results have arrived.
     bundles: BTreeSet<BundleAddress>,
-    /// Positions named by their number of cycles.
+    /// Individual positions, by number of cycles.
     cycles: BTreeSet<Cycle>,
 }
 
@@ -80,7 +80,7 @@ impl Interest {
                 instruction.writes(slot).is_some_and(|register| reads.registers.contains(&register))
                     || reads.memory && instruction.op.row().effect == Effect::Store
             });
-            // A value that returns without a write may differ from its value when last seen.
+            // If a value can return without a write, it may differ from when it was last seen.
             let flow = Flow::of(&instructions);
             let enters = reads.ranges.iter().any(|(after, through)| {
                 let is_in = |address| *after < address && address <= *through;
@@ -97,25 +97,25 @@ impl Interest {
         self.bundles.iter().copied().filter(|_| !self.every && !self.clock)
     }
 
-    /// Every position at which something can happen matters.
+    /// The set contains every position at which something can happen.
     pub(super) fn is_each(&self) -> bool {
         self.every || self.clock
     }
 
-    /// Positions around the issue of this bundle matter.
+    /// The set contains the positions around the issue of this bundle.
     pub(super) fn is_of(&self, address: BundleAddress) -> bool {
         self.bundles.contains(&address)
     }
 
-    /// Positions named by number of cycles, within a range.
+    /// Individual positions within a range, by number of cycles.
     pub(super) fn cycles(&self, begin: Cycle, end: Cycle) -> impl Iterator<Item = Cycle> {
         self.cycles.iter().copied().filter(move |cycle| (begin..=end).contains(cycle))
     }
 
-    /// The next position to visit, pauses aside; `until` at the latest. `issuing` is about to issue.
+    /// Next position to visit, disregarding pauses; at most `until`. `issuing` is about to issue.
     pub(super) fn next(&self, emulator: &Emulator, issuing: Option<BundleAddress>, until: Cycle) -> Cycle {
         let now = emulator.now();
-        // During a wait without results in flight, nothing changes before the tick.
+        // During a wait with nothing in flight, nothing changes until the tick.
         let idle = emulator.due_tick().filter(|_| emulator.in_flight().next().is_none());
         let mut in_flight = emulator.in_flight().filter(|retire| retire.cycle > now);
         let each = self.clock

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Stale values: registers whose newer value, as the line at hand would read it, is in flight or not yet computed.
+//! Stale values: registers whose newer value, which the current line would read, is in flight or not yet computed.
 
 use super::machine::Machine;
 use std::collections::HashMap;
@@ -12,7 +12,7 @@ use takt_isa::{BundleAddress, Program, Register};
 pub enum StaleReason {
     /// The newer value arrives in this number of cycles.
     InFlight(Cycle),
-    /// This bundle has yet to compute the newer value.
+    /// This bundle will compute the newer value.
     NotComputed(BundleAddress),
 }
 
@@ -30,7 +30,7 @@ impl StaleReason {
     }
 }
 
-/// Writing bundles of each register, ascending, with the position of the writing operation in source order.
+/// Bundles that write each register, in ascending order, with the source position of the writing operation.
 #[derive(Default)]
 pub(super) struct Writers(HashMap<Register, Vec<(BundleAddress, u32)>>);
 
@@ -55,28 +55,28 @@ impl Writers {
 }
 
 impl Machine<'_> {
-    /// Reason why a register's value is older than the line at hand would read; `None` if it is current.
+    /// Reason why a register's value is older than the current line would read; `None` if it is up to date.
     pub(crate) fn stale(&self, register: Register) -> Option<StaleReason> {
-        // A view that reads ahead includes results in flight.
+        // If the view reads ahead, it already includes results in flight.
         let flying = self.arrives(register).filter(|_| !self.ahead);
         flying.map(StaleReason::InFlight).or_else(|| self.writes_yet(register).map(StaleReason::NotComputed))
     }
 
-    /// A bundle that has yet to write the register although it precedes the line at hand in the source.
+    /// A bundle that will still write the register although it precedes the current line in the source.
     fn writes_yet(&self, register: Register) -> Option<BundleAddress> {
         let (next, order) = (self.emulator.next_address(), self.at_hand().order);
         let writers = self.writers.0.get(&register)?;
         writers.iter().find(|(address, of)| next <= *address && *of < order).map(|(address, _)| *address)
     }
 
-    /// Cycles to the arrival of a result in flight to a register.
+    /// Cycles until a result in flight arrives in a register.
     pub(crate) fn arrives(&self, register: Register) -> Option<Cycle> {
         let now = self.emulator.now();
         let flying = self.emulator.in_flight().filter(|retire| retire.register == Some(register));
         flying.map(|retire| retire.cycle.saturating_sub(now)).filter(|left| *left > 0).max()
     }
 
-    /// Last result in flight to a register among the operations that precede the line at hand in the source.
+    /// Last result in flight to a register, of the operations that precede the current line in the source.
     pub(super) fn coming(&self, register: Register) -> Option<u32> {
         let slots = self.emulator.machine().slots.len();
         let order = self.at_hand().order;

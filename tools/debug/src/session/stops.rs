@@ -18,18 +18,18 @@ pub enum BreakpointLocation {
     Line(Location, Vec<BundleAddress>),
     /// A number of cycles since reset.
     Cycle(Cycle),
-    /// A number of ended periods.
+    /// A number of completed periods.
     Period(u64),
 }
 
-/// Test of a watchpoint: triggers when it begins to hold.
+/// Condition of a watchpoint, which triggers when the condition becomes true.
 #[derive(Clone, Debug)]
 pub enum Test {
     /// The value differs from the previous one.
     Changed,
-    /// The value equals another expression's.
+    /// The value equals that of another expression.
     Equals(Box<WatchExpression>),
-    /// The value is above another expression's.
+    /// The value is above that of another expression.
     Above(Box<WatchExpression>),
     /// The value is a NaN.
     Nan,
@@ -40,7 +40,7 @@ pub enum Test {
 /// A breakpoint or a watchpoint.
 #[derive(Clone, Debug)]
 pub enum Stop {
-    /// Stops at a place, if the optional condition holds.
+    /// Stops at a place, if the condition holds or is absent.
     Break {
         /// Place in the program or time in the run.
         at: BreakpointLocation,
@@ -49,7 +49,7 @@ pub enum Stop {
         /// Text of the breakpoint, as the user wrote it.
         text: String,
     },
-    /// Stops when the test begins to hold for a value.
+    /// Stops when the test becomes true for a value.
     Watch {
         /// Expression whose value is tested.
         what: Box<WatchExpression>,
@@ -83,7 +83,7 @@ impl Stop {
 }
 
 impl BreakpointLocation {
-    /// The session is at this place, where `issuing` is about to issue.
+    /// The session is at this location, where `issuing` is about to issue.
     fn is_here(&self, session: &Session, issuing: Option<BundleAddress>) -> bool {
         match self {
             BreakpointLocation::Bundle(address) => issuing == Some(*address),
@@ -93,10 +93,10 @@ impl BreakpointLocation {
         }
     }
 
-    /// Parses a place: `label`, `label+2`, `file.s:12` or `:12`, `bundle 3`, `cycle 100`, `period 5`.
+    /// Parses a location: `label`, `label+2`, `file.s:12` or `:12`, `bundle 3`, `cycle 100`, `period 5`.
     ///
     /// # Errors
-    /// If the text is not a place of this program.
+    /// If the text is not a location in this program.
     pub fn parse(text: &str, program: &Program) -> Result<BreakpointLocation, String> {
         let text = text.trim();
         let number = |rest: &str, what: &str| {
@@ -140,7 +140,7 @@ fn bundle(number: u64, program: &Program) -> Result<BreakpointLocation, String> 
 /// Bundles with an operation of a source line, ascending.
 fn line_bundles(file: &str, line: u64, program: &Program) -> Result<BreakpointLocation, String> {
     let names = || program.files.iter().map(String::as_str);
-    // Match the file's name alone, in any folder or library.
+    // Match the file name alone, in any folder or library.
     let alone =
         |name: &str| name.trim_start_matches('<').trim_end_matches('>').rsplit('/').next() == Some(file);
     let ends = |name: &str| name == file || alone(name);
@@ -167,12 +167,12 @@ fn line_bundles(file: &str, line: u64, program: &Program) -> Result<BreakpointLo
 
 /// Tests the stops at each position.
 ///
-/// A value that is not in its register everywhere (shared register, or one of several values of a name) is compared with its last
-/// occurrence, which may lie long before the search's beginning. A watcher with unknown previous values is incomplete, and
-/// [`Session::watcher`] completes it.
+/// A value that is only temporarily in its register (shared register, or one of several values of a name) is compared with its last
+/// occurrence, possibly long before the start of the search. A watcher with unknown previous values is incomplete; [`Session::watcher`]
+/// completes it.
 #[derive(Clone)]
 pub(super) struct Watcher {
-    /// Per stop: its number, and its watched expression in all variants of its names.
+    /// Stops with watched expressions: number, and all variants of the expression.
     watched: Vec<(u32, Vec<Watchpoint>)>,
 }
 
@@ -183,7 +183,7 @@ struct Watchpoint {
     last: Option<WatchState>,
 }
 
-/// State of a watched expression: its value, and whether the test holds.
+/// State of a watched expression: value, and outcome of the test.
 #[derive(Clone, Copy, Default)]
 struct WatchState {
     value: Option<Value>,
@@ -191,7 +191,7 @@ struct WatchState {
 }
 
 impl Watcher {
-    /// A watcher whose previous values are those at the session's position.
+    /// A watcher that takes the values at the session's position as previous values.
     pub(super) fn new(session: &Session) -> Watcher {
         let each = |stop: &Stop| match stop {
             Stop::Break { .. } => Vec::new(),
@@ -211,12 +211,12 @@ impl Watcher {
         self.watched.iter().flat_map(|(_, each)| each).all(|watched| watched.last.is_some())
     }
 
-    /// The watcher has the session's current stops.
+    /// The watcher is for the session's current stops.
     pub(super) fn is_of(&self, session: &Session) -> bool {
         self.watched.iter().map(|(id, _)| id).eq(session.stops.iter().map(|(id, _)| id))
     }
 
-    /// Copies missing previous values from a watcher of an earlier position.
+    /// Copies missing previous values from a watcher at an earlier position.
     pub(super) fn complete(&mut self, earlier: &Watcher) {
         for (id, each) in &mut self.watched {
             let Some((_, known)) = earlier.watched.iter().find(|(known, _)| known == id) else { continue };
@@ -240,7 +240,7 @@ impl Watcher {
                 }
                 Stop::Watch { test, text, .. } => {
                     for Watchpoint { live, last } in each {
-                        // The absence of a value is not a change.
+                        // A missing value is not a change.
                         let Some(now) = see(session, live, test) else { continue };
                         let before = last.replace(now).unwrap_or_default();
                         let hit = match test {
@@ -286,7 +286,7 @@ fn passes_condition(
     Some(noted(doubt))
 }
 
-/// A note in parentheses, to follow another text.
+/// A note in parentheses, to append to other text.
 pub(crate) fn noted(note: Option<String>) -> String {
     note.map_or(String::new(), |note| format!("  ({note})"))
 }
@@ -301,7 +301,7 @@ fn same(a: Option<Value>, b: Option<Value>) -> bool {
     bits(a) == bits(b)
 }
 
-/// Shortest decimal of a value that identifies it in its format.
+/// Shortest decimal that identifies a value in its format.
 fn shortest_decimal(value: Option<Value>) -> String {
     match value {
         None => "(no value)".to_owned(),
@@ -311,7 +311,7 @@ fn shortest_decimal(value: Option<Value>) -> String {
     }
 }
 
-/// State of a watched expression; `None` if an operand of it, or of the comparison, is not in its register.
+/// State of a watched expression; `None` if an operand of the expression or of the comparison is not in its register.
 fn see(session: &Session, what: &WatchExpression, test: &Test) -> Option<WatchState> {
     let compared = match test {
         Test::Equals(other) | Test::Above(other) => Some(&**other),

@@ -54,7 +54,7 @@ pub(crate) fn link_named(name: &str, description: &Description) -> Result<usize,
     })
 }
 
-/// Contents of a link: last arrived values, a snapshot's set, or FIFO entries.
+/// Contents of a link: values that arrived last, values of a snapshot, or FIFO entries.
 pub fn link_text(system: &System, number: usize) -> String {
     let Some(link) = system.description().links.get(number) else { return String::new() };
     let value = |bits: u32, field: usize| ValueNotations::new(link.fields[field].ty, bits).text;
@@ -74,7 +74,7 @@ pub fn link_text(system: &System, number: usize) -> String {
             counts.underflows
         );
     }
-    // Values at the receiver.
+    // Values that the receiver sees.
     let seen: Vec<u32> = link
         .fields
         .iter()

@@ -2,13 +2,13 @@
 //! Debug session on a system of several cores: one global time, forward and back.
 //!
 //! **Positions** are as in a session of one core, for all cores at once: at position *n*, cycles 0 to *n* - 1 have passed in each core. A
-//! link event of cycle *c* is visible at position *c* + 1; a bundle that issues in *c* is about to issue at position *c*.
+//! link event in cycle *c* is visible at position *c* + 1; a bundle that issues in *c* is about to issue at position *c*.
 //!
-//! **Going back** restores a checkpoint and runs forward. **The host** acts as in `takt run`: at each base tick it writes a row of inputs,
-//! early enough for the periods that begin there, and takes one entry from each of its FIFOs.
+//! **Going back** restores a checkpoint and runs forward. **The host** acts as in `takt run`: at each base tick it writes a row of
+//! inputs, early enough for the periods that begin there, and takes one entry from each FIFO to it.
 //!
-//! A search records the events of a stretch, and then moves to the first or last hit. Conditional breakpoints and watchpoints belong to the
-//! core's session, which is shown the core at each position of interest.
+//! A search records the events of a stretch, and then moves to the first or last hit. Conditional breakpoints and watchpoints belong to a
+//! core's session, which is shown the core at each relevant position.
 
 mod links;
 mod seek;
@@ -28,7 +28,7 @@ use takt_system::{
 
 /// Number of cycles recorded at a time.
 const STRETCH: Cycle = 1 << 12;
-/// Largest delay, in cycles, of the report of a link event: the latency of values under way, and a margin.
+/// Upper bound, in cycles, on the delay with which link events are reported: latency of values in transit, plus a margin.
 const LATE: Cycle = MAX_LATENCY + 8;
 
 /// Host actions at a base tick.
@@ -45,11 +45,11 @@ pub struct TickActions {
 /// Options of a session on a system.
 #[derive(Clone, Default)]
 pub struct SystemOptions {
-    /// Host turn of each base tick; `None`: `idle` at each.
+    /// Host turn at each base tick; `None`: `idle` at each.
     pub turns: Option<Arc<Vec<TickActions>>>,
     /// Turn that writes zeros.
     pub idle: TickActions,
-    /// FIFOs to the host from which it takes an entry in each turn.
+    /// FIFOs to the host, from which it takes one entry per turn.
     pub pops: Vec<usize>,
     /// State shared with an observer.
     pub control: Arc<Control>,
@@ -60,15 +60,15 @@ pub struct SystemOptions {
 pub enum SystemStopReason {
     /// The command is complete.
     Done,
-    /// Stop at an event on a link, by its number.
+    /// A stop at a link event, by number.
     Stop(u32),
-    /// A core's session stopped, for this reason.
+    /// The session of a core stopped, with the reason.
     Core(usize, StopReason),
     /// The run is back at its beginning.
     Start,
     /// Every core has halted.
     Halted,
-    /// The recorded inputs end with this turn.
+    /// The recorded inputs have ended with this turn.
     InputsEnd,
     /// A core faulted, which stops the system.
     Fault(SystemFault),
@@ -76,11 +76,11 @@ pub enum SystemStopReason {
     Limit(Cycle),
     /// The user interrupted the command.
     Interrupted,
-    /// The system refused an action of the host.
+    /// The system rejected an action of the host.
     Host(HostError),
 }
 
-/// A stop at events of a link: of one kind, or of any. (Stops at events of a core belong to the core's session.)
+/// A stop at link events of one kind, or of any kind. (Stops at events of a core belong to the core's session.)
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SystemStop {
     /// Index of the link.
@@ -95,9 +95,9 @@ struct Point {
     system: System,
     /// Number of host turns taken.
     turns: u64,
-    /// Link events that may lie ahead of the position.
+    /// Link events that may not have been reported at this position.
     links: Vec<LinkEvent>,
-    /// Number of edits already made.
+    /// Number of edits already applied.
     edits: usize,
 }
 
@@ -127,14 +127,14 @@ pub struct SystemSession {
     next_id: u32,
     /// Edits, by ascending cycle.
     edits: Vec<Edit>,
-    /// Searches for the stops of the cores' sessions, as of positions along the run.
+    /// Searches for the stops of the cores' sessions, recorded along the run.
     known: ThinnedSeries<seek::Searches>,
-    /// Maximal number of cycles of a command.
+    /// Maximum number of cycles of a command.
     pub run_limit: Cycle,
 }
 
 impl SystemSession {
-    /// A session at the start of a system's run.
+    /// Starts a session at reset of a system.
     ///
     /// # Errors
     /// If a core's memories cannot hold its program.
@@ -181,7 +181,7 @@ impl SystemSession {
         id
     }
 
-    /// Counter for the number of the next stop, common to links and all cores' sessions.
+    /// Counter that numbers the stops of links and of all cores' sessions.
     pub(crate) fn next_stop(&mut self) -> &mut u32 {
         &mut self.next_id
     }
@@ -217,11 +217,11 @@ impl SystemSession {
         }
     }
 
-    /// Repeats the run from reset to this position, and shows a core after each of its issues, with the bundle. The session stays where it
-    /// is.
+    /// Repeats the run from reset to this position, and calls `visit` with the core and the bundle after each issue of one core. The
+    /// session's position does not change.
     ///
     /// # Returns
-    /// [`SystemWhy::Done`], or [`SystemWhy::Interrupted`].
+    /// [`SystemStopReason::Done`], or [`SystemStopReason::Interrupted`].
     pub fn replay(
         &mut self,
         core: usize,
@@ -250,7 +250,7 @@ impl SystemSession {
         why
     }
 
-    /// Sets a register or a data word of a core. Records of the run after this position are dropped.
+    /// Sets a register or a data word of a core. Discards records of the run after this position.
     pub fn set(&mut self, core: usize, place: Place, bits: u32) {
         let now = self.cycle();
         self.edits.truncate(self.point.edits);
@@ -271,7 +271,7 @@ impl SystemSession {
         }
     }
 
-    /// Runs the system up to this cycle, with the host's turns and the edits on the way. Events of the cores go to `seen`.
+    /// Runs the system up to this cycle, with the host's turns and the edits on the way. Events of the cores are added to `seen`.
     fn advance(&mut self, cycle: Cycle, mut seen: Option<&mut StretchEvents>) -> SystemStopReason {
         let point = &mut self.point;
         make_edits(&self.edits, point);
@@ -320,7 +320,7 @@ impl SystemSession {
     }
 }
 
-/// Makes the pending edits of this position.
+/// Applies the pending edits of this position.
 fn make_edits(edits: &[Edit], point: &mut Point) {
     while let Some(edit) = edits.get(point.edits).filter(|edit| edit.cycle == point.system.now()) {
         session::put(point.system.core_mut(edit.core), edit.place, edit.bits);
@@ -334,7 +334,7 @@ fn turn(system: &System, turns: u64) -> Option<Cycle> {
     Some(system.start()? - description.lead() + turns * description.tick)
 }
 
-/// Takes the host's turn; false if no turns are left.
+/// Executes the host's turn; returns false if no turns are left.
 fn take_turn(options: &SystemOptions, point: &mut Point) -> Result<bool, HostError> {
     let turn = match &options.turns {
         None => &options.idle,
@@ -355,7 +355,7 @@ fn take_turn(options: &SystemOptions, point: &mut Point) -> Result<bool, HostErr
         point.system.publish(link)?;
     }
     for &link in &turn.push {
-        // A full FIFO refuses the entry and counts the refusal.
+        // A full FIFO rejects the entry and counts the rejection.
         point.system.push(link)?;
     }
     point.turns += 1;

@@ -8,17 +8,17 @@ use takt_emu::{Event, Status};
 use takt_isa::timing::Cycle;
 use takt_system::{InputEvent, LinkEvent};
 
-/// A hit in a core's session: the cycle, the core, and the reason.
+/// Hit in a core's session: cycle, core, and reason.
 type Hit = (Cycle, usize, StopReason);
 
-/// Positions at which to stop, with the number of the stop, if any.
+/// Positions at which to stop, each with the number of the stop if there is one.
 type Hits = Vec<(Cycle, Option<u32>)>;
 
 /// Search in the session of each core.
 pub(super) type Searches = Vec<Option<Search>>;
 
 impl SystemSession {
-    /// Makes one move of the run; a step counts on this core. `views` has a session for each core.
+    /// Executes one move; steps are counted on this core. `views` has a session for each core.
     pub fn go(&mut self, views: &mut [&mut Session], core: usize, to: &Move) -> SystemStopReason {
         match to {
             Move::Step(unit, _) => self.step(views, core, *unit),
@@ -32,11 +32,11 @@ impl SystemSession {
         }
     }
 
-    /// Steps one core forward, and all others along with it. `views` has a session for each core; it may be empty for steps by cycle,
-    /// bundle or period.
+    /// Steps one core forward, together with all others. `views` has a session for each core; it may be empty for steps by cycle, bundle
+    /// or period.
     ///
     /// # Returns
-    /// [`SystemWhy::Done`]; the halt of this core; or the reason why the system stopped earlier.
+    /// [`SystemStopReason::Done`]; the halt of this core; or the reason why the system stopped earlier.
     pub fn step(&mut self, views: &mut [&mut Session], core: usize, unit: Unit) -> SystemStopReason {
         let why = match unit {
             Unit::Cycle => return self.go_to(self.cycle() + 1),
@@ -66,7 +66,7 @@ impl SystemSession {
                 self.seek_back(&mut [], |_, _| Ok(Vec::new()), |cores, _| ends(unit, core, cores))
             }
             (Unit::Line | Unit::Call | Unit::Out, _) => {
-                // The call depth of this position decides, not that at the start of the search.
+                // The call depth at this position counts, not the depth at the start of the search.
                 let wanted = self.step_searches(views, core, unit);
                 self.seek_back(views, |_, _| Ok(wanted.clone()), |_, _| Hits::new())
             }
@@ -116,7 +116,7 @@ impl SystemSession {
         SystemStopReason::Done
     }
 
-    /// Runs forward to a stop: a link event, or a stop of a core's session. `views` has a session for each core, or is empty.
+    /// Runs forward to a stop: at a link event, or in a core's session. `views` has a session for each core, or is empty.
     pub fn resume(&mut self, views: &mut [&mut Session]) -> SystemStopReason {
         let stops = self.stops.clone();
         let mut searches = match self.stop_searches(views) {
@@ -134,7 +134,7 @@ impl SystemSession {
         self.arrived(views, why)
     }
 
-    /// Makes the line of the breakpoint that stopped a core's session the line at hand.
+    /// Makes the line of the breakpoint that stopped a core's session the current line.
     fn arrived(&self, views: &mut [&mut Session], why: SystemStopReason) -> SystemStopReason {
         if let SystemStopReason::Core(core, found) = &why
             && let Some(view) = views.get_mut(*core)
@@ -145,7 +145,7 @@ impl SystemSession {
         why
     }
 
-    /// Runs forward to the next position at which an expression over a core is not zero.
+    /// Runs forward to the next position at which an expression on a core is nonzero.
     pub fn run_until(
         &mut self,
         views: &mut [&mut Session],
@@ -153,7 +153,7 @@ impl SystemSession {
         live: WatchExpression,
     ) -> SystemStopReason {
         let Some(view) = views.get_mut(core) else { return SystemStopReason::Done };
-        // An expression that already holds may still hold in the next cycle, as in a session of one core.
+        // An expression that holds now may still hold in the next cycle, as in a session of one core.
         if view.holds(&live) {
             let why = self.go_to(self.cycle() + 1);
             if why != SystemStopReason::Done {
@@ -169,8 +169,8 @@ impl SystemSession {
         self.seek(views, &mut searches, |_, _| Hits::new())
     }
 
-    /// Searches for the stops of all cores' sessions from this position on, with the last value of every watched expression, even of one
-    /// that is not in its register now. The session stays where it is.
+    /// Searches for the stops of all cores' sessions from this position on, with the last value of every watched expression, even of
+    /// those whose value is currently not in its register. The session's position does not change.
     ///
     /// # Errors
     /// If the user interrupted the search.
@@ -187,7 +187,7 @@ impl SystemSession {
         result.map(|()| searches)
     }
 
-    /// Completes this position's searches from the positions since the last checkpoint, or from the whole unknown part of the run.
+    /// Completes the searches at this position, from the positions since the last checkpoint, or from all of the run that is unknown.
     fn look_back(
         &mut self,
         views: &mut [&mut Session],
@@ -238,7 +238,7 @@ impl SystemSession {
         }
     }
 
-    /// Runs forward to a known position, and shows the searches each position on the way.
+    /// Runs forward to a known position, and passes each position on the way to the searches.
     fn watch_until(
         &mut self,
         until: Cycle,
@@ -261,7 +261,7 @@ impl SystemSession {
         Ok(())
     }
 
-    /// Puts each core's state into its session.
+    /// Copies each core's state into its session.
     pub(crate) fn show(&self, views: &mut [&mut Session]) {
         for (core, view) in views.iter_mut().enumerate() {
             self.show_core(core, view, false);
@@ -316,7 +316,8 @@ impl SystemSession {
         }
     }
 
-    /// Goes to the last hit before this position: of `wanted`, or of one of the searches that `begin` makes at the start of each stretch.
+    /// Goes to the last hit before this position: of `wanted`, or of one of the searches that `begin` creates at the start of each
+    /// stretch.
     fn seek_back(
         &mut self,
         views: &mut [&mut Session],
@@ -336,7 +337,7 @@ impl SystemSession {
             let looks = searches.iter().any(Option::is_some);
             let mut hits = Hits::new();
             let mut found: Option<Hit> = None;
-            // Record `LATE` further cycles: events are reported late.
+            // Record `LATE` more cycles, since events are reported with a delay.
             while self.cycle() < end + LATE {
                 let from = self.cycle().max(start + 1);
                 let begin = (looks && from < end).then(|| self.point.clone());
@@ -375,8 +376,8 @@ impl SystemSession {
         SystemStopReason::Start
     }
 
-    /// Repeats a stretch whose events are known, and shows each core to its session at each position of a range that matters to its search.
-    /// Returns the first hit or all hits, in order. The session stays where it was.
+    /// Repeats a stretch whose events are known, and shows each core to its session at the positions of a range that are relevant to its
+    /// search. Returns the first hit or all hits, in order. The session's position does not change.
     fn walk(
         &mut self,
         begin: Point,
@@ -406,7 +407,7 @@ impl SystemSession {
             let edits = self.edits.iter().filter(|edit| edit.core == core).map(|edit| edit.cycle);
             own.extend(edits.filter(|cycle| (from..=end).contains(cycle)));
             if from == 1 {
-                // Input ports have their first values from the first cycle on.
+                // Input ports get their first values in the first cycle.
                 own.insert(1);
             }
             for position in own {
@@ -434,7 +435,7 @@ impl SystemSession {
     }
 }
 
-/// Copies missing previous values from searches of an earlier position.
+/// Copies missing previous values from searches at an earlier position.
 fn complete(searches: &mut [Option<Search>], earlier: &[Option<Search>]) {
     for (search, earlier) in searches.iter_mut().zip(earlier) {
         if let (Some(search), Some(earlier)) = (search, earlier) {
@@ -443,7 +444,7 @@ fn complete(searches: &mut [Option<Search>], earlier: &[Option<Search>]) {
     }
 }
 
-/// Ends of a core's step that its events alone decide: bundles, periods, and `halt`.
+/// Ends of a core's step that depend only on its events: bundles, periods, and `halt`.
 fn ends(unit: Unit, core: usize, cores: &[(usize, Event)]) -> Hits {
     let own = cores.iter().filter(|(own, _)| *own == core);
     own.filter_map(|(_, event)| match event {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Retire log in JSON lines: one object for each completed operation and each event of a period.
+//! Retire log as JSON lines: one object per completed operation and per event of a period.
 
 use super::signal::{Signal, Source};
 use super::{CompletedCycle, Writer};
@@ -15,7 +15,7 @@ pub(super) struct JsonLines<'w> {
     target: Box<dyn Write + 'w>,
     /// Registers whose writes are logged; empty for all.
     registers: Vec<Register>,
-    /// Operations that write no register are written too.
+    /// Also log operations that write no register.
     rest: bool,
 }
 
@@ -29,7 +29,7 @@ impl<'w> JsonLines<'w> {
             })
             .collect();
         let ports = program.inputs.len() + program.outputs.len() + program.registers.len();
-        // With all named registers selected, log registers without a name as well.
+        // If all named registers are selected, also log unnamed registers.
         let rest = named.len() == ports;
         JsonLines { target, registers: if rest { Vec::new() } else { named }, rest }
     }
@@ -61,7 +61,7 @@ impl<'w> JsonLines<'w> {
     }
 }
 
-/// A line of the log, with its keys in order; inapplicable keys are omitted.
+/// A line of the log, with keys in order; keys that do not apply are omitted.
 #[derive(Default, Serialize)]
 struct LogLine {
     cycle: Cycle,

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Writer of Kanata 0004, the log format of the pipeline viewer Konata. Each operation is a row; its stages:
+//! Writer of Kanata 0004, the log format of the pipeline viewer Konata. Each operation is a row, with these stages:
 //!
 //! | stage | cycles |
 //! |---|---|
-//! | `Fr` `Op` `De` `Un` `Dr` `Wp` | its bundle waits: front end, operand, destination, unit, drain, write port |
-//! | `Is` | of its issue |
+//! | `Fr` `Op` `De` `Un` `Dr` `Wp` | while the bundle waits: front end, operand, destination, unit, drain, write port |
+//! | `Is` | issue |
 //! | `Ex` | between issue and writeback |
-//! | `Wb` | of its writeback |
+//! | `Wb` | writeback |
 //!
-//! Arrows lead from an operation to the operations that wait for its result or are forwarded it.
+//! Arrows lead from an operation to those that wait for its result or receive it by forwarding.
 
 use super::{CompletedCycle, Writer};
 use std::collections::{BTreeMap, HashMap};
@@ -18,20 +18,20 @@ use takt_emu::{Emulator, Event};
 use takt_isa::timing::{Cause, Cycle};
 use takt_isa::{BundleAddress, Function, Instruction, Program, Register, SlotIndex};
 
-/// Names of the waiting stages, in the order of [`Cause::KINDS`]. (A bundle that waits for the tick has issued already.)
+/// Names of the stall stages, in the order of [`Cause::KINDS`]. (A bundle that waits for the tick has already issued.)
 const WAITING: [&str; 7] = ["Fr", "Op", "De", "Un", "Dr", "Wp", "Ti"];
 
 pub(super) struct Kanata<'w> {
     target: Box<dyn Write + 'w>,
-    /// Cycle up to which the file is written.
+    /// Cycle up to which the file has been written.
     at: Cycle,
-    /// Lines of later cycles.
+    /// Lines queued for later cycles.
     ahead: BTreeMap<Cycle, String>,
     next_id: u64,
     retired: u64,
-    /// Bundle that waits to issue: its rows with their slots, and the present stage with its first cycle.
+    /// Bundle that waits to issue: rows with their slots, and the current stage with its first cycle.
     front: Option<Front>,
-    /// Last writer of each register: its row, and the cycle of the writeback.
+    /// Last writer of each register: row, and cycle of the writeback.
     writers: HashMap<Register, (u64, Cycle)>,
 }
 
@@ -76,7 +76,7 @@ impl<'w> Kanata<'w> {
         Ok(())
     }
 
-    /// Begins the rows of a bundle that waits to issue from `cycle` on.
+    /// Begins the rows of a bundle that waits to issue, starting in `cycle`.
     fn enter(
         &mut self,
         program: &Program,
@@ -191,7 +191,7 @@ impl Writer for Kanata<'_> {
                 self.front = Some(front);
             }
         }
-        // A bundle that never issues ends as flushed.
+        // A bundle that never issues is logged as flushed.
         if record.events.iter().any(|event| matches!(event, Event::Fault(_)))
             && let Some(front) = self.front.take()
         {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Traces: the events of a run, cycle by cycle, in file formats of other tools. `docs/traces.md` specifies the contents of each.
+//! Traces: the events of a run, cycle by cycle, in the file formats of other tools. `docs/traces.md` specifies their contents.
 //!
-//! [`Tracer`] replaces the emulator's own `run` and `run_period`. Outside the window of traced cycles the machine runs at full speed;
-//! within it every cycle is recorded. A trace that reaches its size limit ends there as a complete file.
+//! [`Tracer`] replaces `run` and `run_period` of the emulator. Outside the window of traced cycles the machine runs at full speed; within
+//! it every cycle is recorded. A trace that reaches its size limit ends there, as a complete file.
 
 mod jsonl;
 mod kanata;
@@ -46,36 +46,36 @@ impl Format {
         ("jsonl", Format::JsonLines),
     ];
 
-    /// Format with this file extension.
+    /// Format that uses this file extension.
     pub fn of_extension(extension: &str) -> Option<Format> {
         Format::ALL.iter().find(|(known, _)| *known == extension).map(|(_, format)| *format)
     }
 }
 
-/// Extent of the trace to write.
+/// Format, window and contents of a trace.
 #[derive(Clone, Debug)]
 pub struct Options {
     /// Format of the file.
     pub format: Format,
     /// Window of traced cycles.
     pub cycles: Range<Cycle>,
-    /// Patterns of signal names, alone or with their groups as in `outputs.F1`; `*` stands for any characters. Empty: all signals.
+    /// Patterns for signal names, with or without the group as in `outputs.F1`; `*` stands for any characters. Empty: all signals.
     pub signals: Vec<String>,
     /// Approximate size limit in bytes: the trace ends in the cycle that exceeds it.
     pub limit: u64,
 }
 
-/// Events of one cycle of a core, in the form that all formats read.
+/// Events in one cycle of a core, in the form that all formats read.
 struct Record {
     /// Bundle that issued in the cycle.
     issued: Option<BundleAddress>,
-    /// In a stall, the bundle that could not issue, with the cause. For [`Cause::Wait`] the bundle of the `wait`.
+    /// On a stall, the bundle that could not issue, and the cause. For [`Cause::Wait`], the bundle of the `wait`.
     stall: Option<(BundleAddress, Cause)>,
     events: Vec<Event>,
 }
 
 impl Record {
-    /// Record of the cycle to come: a bundle issues, or stalls. Its events are not known yet.
+    /// Record of the next cycle: a bundle issues or stalls. The events are not known yet.
     fn to_come(emulator: &mut Emulator) -> Record {
         let cycle = emulator.now();
         let (stall, issued) = match *emulator.status() {
@@ -104,13 +104,13 @@ trait Writer {
     fn cycle(&mut self, cycle: Cycle, passed: CompletedCycle<'_>) -> io::Result<()>;
     /// Ends the trace before `cycle`.
     fn finish(self: Box<Self>, cycle: Cycle) -> io::Result<()>;
-    /// Size in bytes of buffered output.
+    /// Size of buffered output in bytes.
     fn buffered_bytes(&self) -> u64 {
         0
     }
 }
 
-/// Counts the bytes written through it.
+/// Counts the bytes that are written through it.
 struct CountingWriter<'w> {
     inner: Box<dyn Write + 'w>,
     bytes: Rc<Cell<u64>>,
@@ -141,7 +141,7 @@ pub struct Summary {
 struct Log<'w> {
     options: Options,
     bytes: Rc<Cell<u64>>,
-    /// Destination; moves to `writer` in the window's first cycle.
+    /// Output; moves to `writer` in the window's first cycle.
     target: Option<Box<dyn Write + 'w>>,
     writer: Option<Box<dyn Writer + 'w>>,
     summary: Summary,
@@ -159,19 +159,19 @@ impl<'w> Log<'w> {
         Log { options, bytes, target: Some(target), writer: None, summary, error: None }
     }
 
-    /// The cycle to come is traced.
+    /// The next cycle lies in the traced window.
     fn looks(&self, now: Cycle) -> bool {
         self.options.cycles.contains(&now) && !self.summary.cut && self.error.is_none()
     }
 
-    /// Cycle up to which the run may go at full speed; `None` if the present cycle must be recorded.
+    /// Cycle up to which the run may proceed at full speed; `None` if the current cycle must be recorded.
     fn next(&self, now: Cycle) -> Option<Cycle> {
         let start = self.options.cycles.start;
         let until = if now < start { start } else { Cycle::MAX };
         (!self.looks(now)).then_some(until)
     }
 
-    /// Begins the file, unless it is begun already.
+    /// Begins the file, unless that has been done.
     fn begin(
         &mut self,
         now: Cycle,
@@ -185,7 +185,7 @@ impl<'w> Log<'w> {
         }
     }
 
-    /// Writes a cycle; only a complete one (`whole`) extends the trace.
+    /// Writes a cycle; the trace grows only by complete cycles (`whole`).
     fn record(&mut self, cycle: Cycle, passed: CompletedCycle<'_>, whole: bool) {
         let Some(writer) = &mut self.writer else { return };
         if let Err(error) = writer.cycle(cycle, passed) {
@@ -215,7 +215,7 @@ pub type ExtraObserver<'a> = Option<&'a mut dyn FnMut(&Event)>;
 pub struct Tracer<'w>(Log<'w>);
 
 impl<'w> Tracer<'w> {
-    /// A trace of the program in `emulator`, written to `target`.
+    /// Starts a trace of the program in `emulator`, written to `target`.
     ///
     /// # Errors
     /// If a pattern matches no signal.
@@ -224,12 +224,13 @@ impl<'w> Tracer<'w> {
         target: Box<dyn Write + 'w>,
         options: Options,
     ) -> Result<Tracer<'w>, SignalError> {
-        // Report unknown names now, not at the window's start.
+        // Report unknown names now, before the window starts.
         signal::select(emulator.program(), options.format, &options.signals)?;
         Ok(Tracer(Log::new(target, options)))
     }
 
-    /// Runs a period as [`Emulator::run_period`] does, with unchanged inputs. `also` receives every event, inside the window or not.
+    /// Runs a period as [`Emulator::run_period`] does, with unchanged inputs. `also` receives all events, including those outside the
+    /// window.
     ///
     /// # Errors
     /// Errors of the emulator. [`Tracer::finish`] returns write errors.
@@ -248,7 +249,7 @@ impl<'w> Tracer<'w> {
         }
     }
 
-    /// Runs as [`Emulator::run`] does. `also` receives every event, inside the window or not.
+    /// Runs as [`Emulator::run`] does. `also` receives all events, including those outside the window.
     ///
     /// # Errors
     /// Errors of the emulator. [`Tracer::finish`] returns write errors.
@@ -264,7 +265,7 @@ impl<'w> Tracer<'w> {
                     Some(sink) => emulator.observed(sink).run_until(until)?,
                     None => emulator.run_until(until)?,
                 };
-                // Without a tick to come, a waiting program would let cycles pass forever.
+                // If no tick is due, a waiting program would run forever.
                 let idle =
                     matches!(emulator.status(), Status::Waiting { .. }) && emulator.next_tick().is_none();
                 let reached = stop == Stop::Reached;
@@ -276,7 +277,7 @@ impl<'w> Tracer<'w> {
         }
     }
 
-    /// Runs up to the window, or one cycle within it, or beyond it.
+    /// Runs up to the window, by one cycle within it, or beyond it.
     fn advance<T>(
         &mut self,
         emulator: &mut Emulator,
@@ -321,7 +322,7 @@ impl<'w> Tracer<'w> {
         });
     }
 
-    /// Writing has failed; nothing more is written.
+    /// A write has failed, and nothing more is written.
     pub fn has_failed(&self) -> bool {
         self.0.error.is_some()
     }
@@ -331,7 +332,7 @@ impl<'w> Tracer<'w> {
     /// # Errors
     /// The first write error.
     pub fn finish(mut self, emulator: &Emulator) -> io::Result<Summary> {
-        // A run that never reached the window yields an empty trace.
+        // If the run never reached the window, the trace is empty.
         self.begin(emulator);
         self.0.finish()
     }

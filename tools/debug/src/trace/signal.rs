@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Signals of a waveform: their names, types and values.
+//! Signals of a waveform: names, types and values.
 
 use super::{CompletedCycle, Format, Record};
 use crate::matches;
@@ -13,19 +13,19 @@ use takt_system::{End, LinkKind};
 /// Origin of a signal's value.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Source {
-    /// 1 in a cycle in which a bundle issued.
+    /// 1 if a bundle issued in the cycle.
     Issue,
     /// Address of the bundle that issued or waits to issue.
     Bundle,
-    /// 1 in a cycle with a tick.
+    /// 1 if a tick came in the cycle.
     Tick,
-    /// 1 in a cycle with a missed deadline or a lost tick.
+    /// 1 if a deadline was missed or a tick lost in the cycle.
     Missed,
-    /// 1 in a cycle charged to a cause of this kind.
+    /// 1 if the cycle is charged to a cause of this kind.
     Stall(usize),
     /// Value of a register.
     Register(Register),
-    /// Last arrival on a link of a system: link and field.
+    /// Value that arrived last on a link of a system: link and field.
     Arrived(usize, usize),
     /// Number of entries in a FIFO.
     Count(usize),
@@ -60,8 +60,8 @@ impl Signal {
         format!("{TOP}.{}{}{}", group(self.part.as_deref()), group(self.scope), self.name)
     }
 
-    /// The pattern matches the name, the group and name, or the whole path. A name may contain points, and `*` before the first point
-    /// stands for one group.
+    /// The pattern matches the name, group and name, or the whole path. Names may contain dots; a `*` before the first dot stands for one
+    /// group.
     fn is(&self, pattern: &str) -> bool {
         let grouped = |(group, name): (&str, &str)| {
             self.scope.is_some_and(|scope| matches(group, scope)) && matches(name, &self.name)
@@ -132,7 +132,7 @@ impl Signal {
 /// Errors of the selection of signals.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SignalError {
-    /// A name without a matching signal.
+    /// The pattern matches no signal.
     #[error("no signal is named `{name}`{}", near.as_ref().map_or(String::new(), |near| format!("; did you mean `{near}`?")))]
     Unknown {
         /// Name that matches no signal.
@@ -140,10 +140,10 @@ pub enum SignalError {
         /// Closest existing name, as a suggestion.
         near: Option<String>,
     },
-    /// A name of signals that are no registers, in a format that selects by registers.
+    /// The name selects signals other than registers, in a format that selects by register.
     #[error("`{0}` is no register: a retire log has the operations that write the registers selected")]
     NoRegister(String),
-    /// Signals requested for a format that has none.
+    /// Signals were requested in a format that has none.
     #[error("a Kanata trace shows operations; it has no signals to select")]
     None,
 }
@@ -181,7 +181,7 @@ pub(super) fn all(program: &Program) -> Vec<Signal> {
     signals
 }
 
-/// Signals of a program that match the patterns; all signals if there are no patterns.
+/// Signals of a program that match the patterns; all signals if there are none.
 pub(super) fn select(
     program: &Program,
     format: Format,
@@ -190,7 +190,7 @@ pub(super) fn select(
     select_of(all(program), format, patterns)
 }
 
-/// Signals that match the patterns, out of `signals`.
+/// Subset of `signals` that matches the patterns.
 pub(super) fn select_of(
     signals: Vec<Signal>,
     format: Format,
@@ -206,7 +206,7 @@ pub(super) fn select_of(
         let mut meant = signals.iter().filter(|signal| signal.is(pattern)).peekable();
         if meant.peek().is_none() {
             let paths: Vec<String> = signals.iter().map(Signal::path).collect();
-            // Suggestions have as many path components as the pattern.
+            // Suggest names with as many path components as the pattern.
             let grouped =
                 |path: &'_ str| path.split_once('.').map_or(String::new(), |(_, rest)| rest.to_owned());
             let groups: Vec<String> = paths.iter().map(|path| grouped(path)).collect();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Traces of a system: the signals of all cores and links on one axis of time.
+//! Traces of a system: signals of all cores and links on one time axis.
 
 use super::signal::{self, Signal, SignalType, Source};
 use super::{CompletedCycle, Format, Log, Options, Record, SignalError, Summary, Timeline, wave};
@@ -35,7 +35,7 @@ fn all(system: &System) -> Vec<Signal> {
         }
         for (field, names) in link.fields.iter().enumerate() {
             let ty = if names.ty == Type::F { SignalType::Real } else { SignalType::Bits(32) };
-            // Names in waveforms have no blanks.
+            // Replace blanks, which names in waveforms cannot contain.
             let from = description.core(link.from).map_or("host", |core| &core.name);
             put(format!("{from}.{}_to_{}", names.from, names.to), Source::Arrived(number, field), ty);
         }
@@ -46,12 +46,12 @@ fn all(system: &System) -> Vec<Signal> {
 /// Runs a system and writes a trace of it.
 pub struct SystemTracer<'w> {
     log: Log<'w>,
-    /// Destination instead of a file.
+    /// Output other than a file.
     timeline: Option<Timeline>,
 }
 
 impl<'w> SystemTracer<'w> {
-    /// A trace of a system, written to `target`. Other formats than waveforms cannot show a system.
+    /// Starts a trace of a system, written to `target`. Only waveform formats can show a system.
     ///
     /// # Errors
     /// If a pattern matches no signal.
@@ -75,18 +75,18 @@ impl<'w> SystemTracer<'w> {
         Ok(SystemTracer { log, timeline: None })
     }
 
-    /// Collects a timeline of these cycles instead of a trace; [`SystemTracer::finish_timeline`] returns it.
+    /// Starts a timeline of these cycles instead of a trace; [`SystemTracer::finish_timeline`] returns it.
     pub fn timeline(cycles: Range<Cycle>) -> SystemTracer<'static> {
         let options = Options { format: Format::Vcd, cycles, signals: Vec::new(), limit: u64::MAX };
         SystemTracer { log: Log::new(Box::new(io::sink()), options), timeline: Some(Timeline::default()) }
     }
 
-    /// The collected timeline; `None` after [`SystemTracer::new`].
+    /// Recorded timeline; `None` for a trace started with [`SystemTracer::new`].
     pub fn finish_timeline(self) -> Option<Timeline> {
         self.timeline
     }
 
-    /// Runs and traces as [`System::run_to_start`] does.
+    /// Runs as [`System::run_to_start`] does, and records a trace.
     ///
     /// # Errors
     /// If a core faults.
@@ -97,7 +97,7 @@ impl<'w> SystemTracer<'w> {
         Ok(system.start())
     }
 
-    /// Runs and traces as [`System::run_until`] does.
+    /// Runs as [`System::run_until`] does, and records a trace.
     ///
     /// # Errors
     /// If a core faults.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Timeline of a system: all cores and link events in a window of cycles on one axis, as JSON and as an HTML page.
+//! Timeline of a system: all cores and link events in a window of cycles on one time axis, as JSON and as an HTML page.
 //! [`SystemTracer`](super::SystemTracer) fills it.
 
 use super::Record;
@@ -12,27 +12,27 @@ use takt_isa::text::in_script;
 use takt_isa::timing::{Cause, Cycle};
 use takt_system::{Core, Description, End, Link, LinkEvent, LinkEventKind, LinkKind, System};
 
-/// Maximal number of stretches and events; the timeline ends in the cycle that exceeds it.
+/// Maximum number of stretches and events; the timeline ends in the cycle that exceeds it.
 const MOST: usize = 1 << 18;
 
-/// A stretch of consecutive cycles of a core in which bundles issue, or one bundle stalls.
+/// Consecutive cycles of a core in which bundles issue, or in which one bundle stalls.
 struct Stretch {
     at: Cycle,
     cycles: Cycle,
-    /// Cause of the stall; `None` where bundles issue.
+    /// Cause of the stall; `None` while bundles issue.
     stall: Option<Cause>,
     first: BundleAddress,
     last: BundleAddress,
 }
 
-/// Timeline of a system, as recorded by [`SystemTracer`](super::SystemTracer).
+/// Timeline of a system, recorded by [`SystemTracer`](super::SystemTracer).
 #[derive(Default)]
 pub struct Timeline {
     cycles: Range<Cycle>,
     /// Stretches of each core.
     cores: Vec<Vec<Stretch>>,
     events: Vec<LinkEvent>,
-    /// Number of entries of each link's FIFO at the beginning.
+    /// Initial number of FIFO entries of each link.
     entries: Vec<usize>,
     size: usize,
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Waveforms in VCD and FST, from the same samples. The time unit is one cycle.
+//! Waveforms in VCD and FST, from the same samples. One time unit is one cycle.
 
 use super::signal::{Signal, SignalType};
 use super::{CompletedCycle, Writer};
@@ -11,7 +11,7 @@ use std::fmt::Write as _;
 use std::io::{self, Cursor, Write};
 use takt_isa::timing::Cycle;
 
-/// A waveform file: accepts value changes in order of time.
+/// A waveform file; accepts value changes in chronological order.
 trait File {
     fn time(&mut self, cycle: Cycle) -> io::Result<()>;
     fn real(&mut self, signal: usize, value: f64) -> io::Result<()>;
@@ -76,9 +76,9 @@ fn wave<'w>(file: Box<dyn File + 'w>, signals: Vec<Signal>) -> Box<Wave<'w>> {
     Box::new(Wave { file, last: vec![None; signals.len()], signals, digits: String::new() })
 }
 
-/// Visits each signal, and the begin and end of each group.
+/// Visits each signal, and the beginning and end of each group.
 fn hierarchy<E>(signals: &[Signal], mut visit: impl FnMut(ScopeItem<'_>) -> Result<(), E>) -> Result<(), E> {
-    // Open groups: the system's core, and the group in it.
+    // Open groups: core of the system, and group within it.
     let mut inside: (Option<&str>, Option<&str>) = (None, None);
     visit(ScopeItem::Begin(super::signal::TOP))?;
     for (i, signal) in signals.iter().enumerate() {
@@ -155,7 +155,7 @@ impl File for Vcd<'_> {
     }
 
     fn real(&mut self, signal: usize, value: f64) -> io::Result<()> {
-        // The standard takes the notation of C's printf.
+        // The standard specifies the notation of C's printf.
         let text = if value.is_nan() { "nan".to_owned() } else { format!("{value:e}") };
         writeln!(self.target, "r{text} {}", self.identifiers[signal])
     }
@@ -180,7 +180,7 @@ struct Fst<'w> {
     target: Box<dyn Write + 'w>,
 }
 
-/// An FST writer for these signals. The file is built in memory: the format needs seeks, and the target may be a pipe.
+/// An FST writer for these signals. The file is built in memory, because the format needs seeks and the target may be a pipe.
 pub(super) fn fst<'w>(
     start: Cycle,
     signals: Vec<Signal>,

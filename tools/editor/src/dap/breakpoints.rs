@@ -14,18 +14,18 @@ use takt_debug::system::SystemStop;
 use takt_isa::BundleAddress;
 use takt_isa::Program;
 
-/// Hit condition: the hits at which a breakpoint stops.
+/// Hit condition: hits of a breakpoint at which the run stops.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Hits {
     /// Every hit from this number on.
     AtLeast(u64),
-    /// Only the hit of this number.
+    /// Only the hit with this number.
     Exactly(u64),
-    /// Each hit whose number is a multiple.
+    /// Every hit whose number is a multiple of this one.
     Every(u64),
 }
 
-/// A stop requested by a breakpoint.
+/// A stop that a breakpoint requests.
 enum RequestedStop {
     /// A stop in a core's session.
     Core(usize, Stop),
@@ -33,7 +33,7 @@ enum RequestedStop {
     Link(SystemStop, String),
 }
 
-/// Turns a request's entry into at least one stop, and the actual line if it is known.
+/// Converts a breakpoint of a request to at least one stop, and to the actual line if it is known.
 type Make<'m> =
     &'m dyn Fn(&DebuggedSession, &BreakpointRequest) -> Result<(Vec<RequestedStop>, Option<u64>), String>;
 
@@ -61,7 +61,7 @@ impl Hits {
     }
 }
 
-/// Features of a stop beyond the session's.
+/// Features of a stop that the session lacks.
 #[derive(Clone, Debug, Default)]
 pub(super) struct StopFeatures {
     pub(super) reason: &'static str,
@@ -74,25 +74,25 @@ pub(super) struct StopFeatures {
 }
 
 impl StopFeatures {
-    /// The additional condition holds, or is absent.
+    /// The additional condition is true or absent.
     pub(super) fn holds(&self, id: u32, session: &Session) -> bool {
         let meets = |condition: &String| session.parse(condition).is_ok_and(|live| session.meets(id, &live));
         self.condition.as_ref().is_none_or(meets)
     }
 }
 
-/// Breakpoints, numbered by their first stop, in groups that a request replaces together: one group per source or per kind.
+/// Breakpoints, identified by their first stop, in groups that a request replaces as a whole: one group per source or per kind.
 #[derive(Debug, Default)]
 pub(super) struct Breakpoints {
-    /// Stops of each group.
+    /// Stops in each group.
     groups: BTreeMap<String, Vec<u32>>,
-    /// Breakpoint of each stop: a source on several cores has a stop in each.
+    /// Breakpoint that each stop belongs to: a breakpoint in a source of several cores has one stop in each.
     stops: BTreeMap<u32, u32>,
     more: BTreeMap<u32, StopFeatures>,
 }
 
 impl Breakpoints {
-    /// Breakpoint to which a stop belongs.
+    /// Breakpoint that a stop belongs to.
     pub(super) fn of(&self, stop: u32) -> u32 {
         self.stops.get(&stop).copied().unwrap_or(stop)
     }
@@ -132,7 +132,7 @@ impl DebuggedSession {
         answer(Body::Breakpoints(answers))
     }
 
-    /// Adds a breakpoint: its stops, and its actual line if known.
+    /// Adds a breakpoint with its stops, and with its actual line if it is known.
     fn add(
         &mut self,
         reason: &'static str,
@@ -168,12 +168,12 @@ impl DebuggedSession {
         Ok((stops, line))
     }
 
-    /// Number of a source in the program of each core that contains it.
+    /// Core and file name of a source, for each core whose program contains it.
     fn files(&self, path: &str, reference: u64) -> Vec<(usize, String)> {
         let cores = || 0..self.console.cores();
         let files = |core: usize| self.session(core).program().files.iter();
         if reference > 0 {
-            // A source without a file: match name and text.
+            // A source without a file is matched by name and text.
             let Some(core) = self.checked(reference / CORE) else { return Vec::new() };
             let number = (reference % CORE).wrapping_sub(1);
             let text = |core: usize, number: usize| self.session(core).source(number as u32);
@@ -187,7 +187,7 @@ impl DebuggedSession {
         let path = Path::new(path);
         let whole = |path: &Path| -> Option<PathBuf> { path.canonicalize().ok() };
         let wanted = whole(path);
-        // Sources on this disk are compared as files; others, for example in an image from elsewhere, by name.
+        // Sources on this disk are compared as files; others, such as those in an image from elsewhere, by name.
         let on_disk = |core: usize| {
             let is = |name: &&String| wanted.is_some() && whole(&self.folders[core].join(name)) == wanted;
             Some((core, files(core).find(is)?.clone()))
@@ -232,7 +232,7 @@ impl DebuggedSession {
             if let Some(stop) = debugged.console.link_stop(name) {
                 return Ok((vec![no_condition(stop?, one, name)?], None));
             }
-            // `servo.period` names a place in one core, `period` a place in each core that has it.
+            // `servo.period` names a place in one core; `period`, a place in each core that has it.
             let (cores, place) = match debugged.split(name, '.') {
                 Some((core, place)) => (core..core + 1, place),
                 None => (0..debugged.console.cores(), name),
@@ -262,7 +262,7 @@ impl DebuggedSession {
         self.replace("instructions".to_owned(), "instruction breakpoint", arguments.breakpoints, &make)
     }
 
-    /// Answers whether a value can be watched: an expression over a core, or a link.
+    /// Tells whether a value can be watched: an expression over a core, or a link.
     pub(super) fn data_info(&mut self, NamedArguments { name, of }: NamedArguments) -> Answer {
         let info = |id: String, conditions: String| {
             let description = format!("{id} ({conditions})");
@@ -273,7 +273,7 @@ impl DebuggedSession {
             return answer(info(format!("link {name}"), conditions));
         }
         let core = self.core_of(&of)?;
-        // Expressions without a present value can be watched too.
+        // Expressions that currently have no value can also be watched.
         if let Err(description) = self.session(core).parse(&name) {
             return answer(DataBreakpointInfo {
                 data_id: None,
@@ -319,7 +319,7 @@ impl DebuggedSession {
     }
 }
 
-/// The stops that can be made; if none, the first error.
+/// Collects the stops that can be set; if there are none, returns the first error.
 fn any(stops: impl Iterator<Item = Result<RequestedStop, String>>) -> Result<Vec<RequestedStop>, String> {
     let (made, refused): (Vec<_>, Vec<_>) = stops.partition(Result::is_ok);
     match refused.into_iter().next() {
@@ -328,7 +328,7 @@ fn any(stops: impl Iterator<Item = Result<RequestedStop, String>>) -> Result<Vec
     }
 }
 
-/// Rejects conditions on a link's event: no core's expressions apply there.
+/// Rejects conditions on a link event: there is no core for whose expressions they could be evaluated.
 fn no_condition(stop: SystemStop, one: &BreakpointRequest, text: &str) -> Result<RequestedStop, String> {
     match one.condition() {
         Some(_) => {
@@ -339,7 +339,7 @@ fn no_condition(stop: SystemStop, one: &BreakpointRequest, text: &str) -> Result
     }
 }
 
-/// The test in a data breakpoint's condition; `None` if the condition is an expression.
+/// Parses the test in a data breakpoint's condition; `None` if the condition is an expression.
 fn test(session: &Session, condition: &str) -> Option<Result<Test, String>> {
     let with = |rest: &str, make: fn(Box<takt_debug::session::WatchExpression>) -> Test| {
         Some(session.parse(rest).map(|live| make(Box::new(live))))
@@ -363,7 +363,7 @@ fn break_at(
     Ok(Stop::Break { at, condition, text })
 }
 
-/// The program's name of a file: the longest name with which the path ends.
+/// Name of a file in the program: the longest name that the path ends with.
 fn file_of(program: &Program, path: &Path) -> Option<String> {
     let parts: Vec<Component<'_>> = path.components().collect();
     let ends = |name: &&String| {
@@ -375,7 +375,7 @@ fn file_of(program: &Program, path: &Path) -> Option<String> {
     program.files.iter().filter(ends).max_by_key(|name| name.len()).cloned()
 }
 
-/// Address of a bundle or word in a memory reference, decimal or `0x15`, with the core in the upper 32 bits.
+/// Parses a memory reference of a bundle or word, decimal or `0x15`, with the core in the upper 32 bits.
 pub(super) fn address(text: &str) -> Option<(u64, BundleAddress)> {
     let text = text.trim();
     let number: u64 = match text.strip_prefix("0x") {
@@ -390,7 +390,7 @@ pub(super) fn reference(core: usize, address: u64) -> String {
     format!("0x{:x}", (core as u64) << 32 | address)
 }
 
-/// Splits a log message into text and expressions in braces.
+/// Splits a log message into text and the expressions in braces.
 fn pieces(log: &str) -> impl Iterator<Item = Result<&str, &str>> {
     log.split_inclusive(['{', '}']).scan(false, |inside, piece| {
         let is = *inside;

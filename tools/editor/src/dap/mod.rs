@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Debug adapter: serves the protocol's requests from a reversible debug session of a program or a system. Each core is a thread.
 //!
-//! A single thread answers the requests in order. Only `pause` and the like are handled by the stream's reader at once ([`interrupts`]).
+//! A single thread answers the requests in order. Only `pause` and similar requests are handled immediately, by the reader of the stream
+//! ([`interrupts`]).
 
 mod breakpoints;
 mod protocol;
@@ -24,12 +25,12 @@ use std::sync::Arc;
 use takt_debug::console::{Console, Target};
 use takt_debug::session::{Control, Move, Session, Unit};
 
-/// Range of frame and variable-list numbers of a core; the core's number occupies the bits above.
+/// Number of frame and variable-list numbers per core; the core's number occupies the higher bits.
 const CORE: u64 = 1 << 16;
 
-/// Creates a session from the arguments of a `launch` or `attach` request.
+/// Creates sessions from the arguments of `launch` and `attach` requests.
 pub trait Launcher {
-    /// Creates the session of a request.
+    /// Creates the session that a request describes.
     ///
     /// # Errors
     /// If an argument is invalid, or the program cannot be loaded.
@@ -40,13 +41,13 @@ pub trait Launcher {
 pub struct LaunchedSession {
     /// Console of the session, at its beginning or at a position of interest.
     pub console: Console,
-    /// Note for the user.
+    /// Note to show to the user.
     pub note: Option<String>,
     /// Folder of each core's sources.
     pub folders: Vec<PathBuf>,
 }
 
-/// The message interrupts a running command: handle it before its turn.
+/// The message interrupts a running command and must be handled immediately.
 pub fn interrupts(message: &Value) -> bool {
     matches!(message["command"].as_str(), Some("pause" | "disconnect" | "terminate"))
 }
@@ -57,17 +58,17 @@ struct Server<'c> {
     control: Arc<Control>,
     debugged: Option<DebuggedSession>,
     filters: Filters,
-    /// Lines and columns count from 1 (otherwise from 0).
+    /// Lines and columns are counted from 1 (otherwise from 0).
     from_one: (bool, bool),
     stop_on_entry: bool,
-    /// Run without stops; the end of the run ends the session.
+    /// Run without stops; the session ends with the run.
     no_debug: bool,
-    /// Action to take after the answer is sent.
+    /// Action to take once the answer has been sent.
     then: FollowUp,
     ended: bool,
 }
 
-/// Session under debugging, with the client's view of it.
+/// Session being debugged, with the state that the client sees.
 struct DebuggedSession {
     console: Console,
     breakpoints: Breakpoints,
@@ -87,13 +88,13 @@ enum FollowUp {
     Enter,
     Continue,
     Back,
-    /// Step of a core; `true` steps over calls.
+    /// Step of a core; with `true`, over calls.
     Step(usize, Unit, bool),
-    /// Another move of a core, with the stop reason for the client.
+    /// Other move of a core, with the stop reason to report to the client.
     Move(usize, Move, &'static str),
 }
 
-/// Serves a client until it disconnects or its stream ends. The reader of the client's stream interrupts via `control`.
+/// Serves a client until it disconnects or its stream ends. The reader of the client's stream uses `control` to interrupt commands.
 pub fn serve(
     receiver: &Receiver<Value>,
     sender: &Sender<Option<Message>>,
@@ -120,7 +121,7 @@ pub fn serve(
     }
 }
 
-/// First line of a message with its place; many clients show only one line.
+/// First line of a message, with its place: many clients show only one line.
 fn brief(text: &str) -> String {
     let first = text.lines().next().unwrap_or("");
     match text.lines().find_map(|line| line.trim_start().strip_prefix("┌─ ")) {
@@ -132,7 +133,7 @@ fn brief(text: &str) -> String {
 impl Server<'_> {
     fn send(&mut self, kind: Kind) {
         self.sent += 1;
-        // Without a receiver the client is gone, and the loop ends.
+        // If the receiver is gone, so is the client, and the loop ends.
         let _ = self.sender.send(Some(Message { seq: self.sent, kind }));
     }
 
@@ -188,7 +189,7 @@ impl Server<'_> {
                 }
                 return Ok(Value::Null);
             }
-            // No command runs at this point: a running one was interrupted already.
+            // No command is running at this point: it has already been interrupted.
             "pause" => return Ok(Value::Null),
             _ => {}
         }
@@ -228,7 +229,7 @@ impl Server<'_> {
 }
 
 impl DebuggedSession {
-    /// The move that a request demands, if any.
+    /// Move that a request asks for, if any.
     fn moves(
         &self,
         command: &str,
@@ -300,7 +301,7 @@ impl DebuggedSession {
         }
     }
 
-    /// Session of a valid core number.
+    /// Session of a core; the number must be valid.
     fn session(&self, core: usize) -> &Session {
         self.console.core(core).unwrap_or_else(|| self.console.session())
     }
@@ -317,7 +318,7 @@ impl DebuggedSession {
         }
     }
 
-    /// Splits a text at a separator if a core's name precedes it; only in systems.
+    /// In systems, splits a text at a separator that follows a core's name.
     fn split<'t>(&self, text: &'t str, separator: char) -> Option<(usize, &'t str)> {
         let (name, rest) = text.split_once(separator)?;
         let core = self.console.system()?.system().description().core_named(name.trim())?;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Messages of the debug adapter protocol, restricted to the fields in use. Names are the protocol's own:
+//! Messages of the debug adapter protocol, restricted to the fields in use, with the names of the specification:
 //! <https://microsoft.github.io/debug-adapter-protocol/specification>.
 
 use serde::de::DeserializeOwned;
@@ -38,7 +38,7 @@ pub(super) struct InitializeArguments {
     pub(super) columns_start_at1: Option<bool>,
 }
 
-/// Launch arguments of the protocol. All others belong to the [`Launcher`](super::Launcher).
+/// Launch arguments defined by the protocol. All others are for the [`Launcher`](super::Launcher).
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct LaunchArguments {
@@ -98,7 +98,7 @@ impl BreakpointRequest {
     }
 }
 
-/// Nonblank text; some clients send an empty string for an absent one.
+/// Text that is not blank; some clients send an empty string for an absent text.
 fn filled(text: Option<&String>) -> Option<&str> {
     text.map(|text| text.trim()).filter(|text| !text.is_empty())
 }
@@ -230,7 +230,7 @@ pub struct Message {
 }
 
 impl Message {
-    /// An error of the stream, as output to the client's console.
+    /// Error in the stream, as output on the client's console.
     pub fn complaint(text: &str) -> Message {
         let output = Output { category: "stderr", output: format!("{text}\n") };
         Message { seq: 0, kind: Kind::Event(Event::Output(output)) }
@@ -283,7 +283,7 @@ pub(super) struct StoppedEvent {
     pub(super) hit_breakpoint_ids: Vec<u32>,
 }
 
-/// Body of an error answer. The text is a variable of `format`, so that braces in it are literal.
+/// Body of an error response. The text is a variable of `format`, so that braces in it are literal.
 #[derive(Serialize)]
 pub(super) struct Refusal {
     error: ErrorMessage,
@@ -349,7 +349,7 @@ pub(super) struct ExceptionFilter {
     pub(super) default: bool,
 }
 
-/// Answers that consist of one list or one value, keyed by its name.
+/// Responses that consist of a single list or value, keyed by its name.
 #[derive(Serialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) enum Body {
@@ -381,7 +381,7 @@ pub(super) struct Breakpoint {
     pub(super) line: Option<u64>,
 }
 
-/// Identifier for watching a value; `None` if the value cannot be watched.
+/// Response to a request for watching a value; the identifier is `None` if the value cannot be watched.
 #[derive(Serialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct DataBreakpointInfo {

@@ -11,7 +11,7 @@ use takt_isa::fp::Flags;
 use takt_isa::timing::Cycle;
 use takt_isa::{Effect, Instruction};
 
-/// Cycles between two checks for exceptions.
+/// Cycles between two checks for exceptions and requests.
 const SLICE: Cycle = 1 << 14;
 
 /// Exceptions that stop a run.
@@ -50,7 +50,7 @@ impl Filters {
         Ok(filters)
     }
 
-    /// Filters offered to the client.
+    /// Filters that are offered to the client.
     pub(super) fn described() -> Vec<ExceptionFilter> {
         let filter =
             |(filter, label, description)| ExceptionFilter { filter, label, description, default: false };
@@ -68,7 +68,7 @@ impl Filters {
     }
 }
 
-/// Exceptions of a core up to a position.
+/// Exceptions that a core has raised up to a position.
 #[derive(Clone, PartialEq, Debug)]
 struct ExceptionCounts {
     flags: Vec<(&'static str, bool)>,
@@ -80,7 +80,7 @@ impl ExceptionCounts {
     fn now(session: &Session, filters: Filters) -> ExceptionCounts {
         let emulator = session.emulator();
         let statistics = emulator.statistics();
-        // Include flags raised in the cycle to come: the operation that clears the flags may issue in that cycle.
+        // Include flags that are raised in the next cycle: an operation that clears the flags may issue in that cycle.
         let raised = emulator.in_flight().filter(|retire| retire.cycle <= emulator.now());
         let flags = raised.fold(emulator.flags(), |flags, retire| flags | retire.flags);
         ExceptionCounts {
@@ -90,7 +90,7 @@ impl ExceptionCounts {
         }
     }
 
-    /// First exception that was not present before.
+    /// First exception that is missing in `before`.
     fn since(&self, before: &ExceptionCounts) -> Option<(String, String)> {
         for ((name, now), (_, before)) in self.flags.iter().zip(&before.flags) {
             if *now && !before {
@@ -105,19 +105,19 @@ impl ExceptionCounts {
     }
 }
 
-/// Exceptions so far, core by core.
+/// Exceptions so far, by core.
 fn exception_counts(console: &Console, filters: Filters) -> Vec<ExceptionCounts> {
     let sessions = (0..console.cores()).filter_map(|core| console.core(core));
     sessions.map(|session| ExceptionCounts::now(session, filters)).collect()
 }
 
-/// First core with an exception that was not present before.
+/// First core with an exception that is missing in `before`.
 fn since(now: &[ExceptionCounts], before: &[ExceptionCounts]) -> Option<Exception> {
     let mut cores = now.iter().zip(before).enumerate();
     cores.find_map(|(core, (now, before))| now.since(before).map(|(id, text)| (core, id, text)))
 }
 
-/// An exception: core, name and description.
+/// Exception: core, name and description.
 type Exception = (usize, String, String);
 
 impl Server<'_> {
@@ -127,7 +127,7 @@ impl Server<'_> {
         match then {
             FollowUp::Nothing | FollowUp::Initialized | FollowUp::Enter => {}
             _ => {
-                // Clear an interrupt of a command that has ended.
+                // Clear an interrupt that was meant for a command that has ended.
                 self.control.clear();
                 debugged.exception = None;
             }
@@ -152,7 +152,7 @@ impl Server<'_> {
         }
     }
 
-    /// Runs forward to a stop, past log messages and hits before the hit condition.
+    /// Runs forward to a stop; continues past log messages, and past hits that do not meet the hit condition.
     fn resume(&mut self) {
         loop {
             let filters = if self.no_debug { Filters::default() } else { self.filters };
@@ -190,7 +190,7 @@ impl Server<'_> {
         }
     }
 
-    /// Runs back to a stop, past log messages and breakpoints whose condition fails. Hits are counted only forward.
+    /// Runs back to a stop; continues past log messages, and past breakpoints whose condition is false. Hits are counted only forward.
     fn resume_back(&mut self) {
         loop {
             let Some(debugged) = &mut self.debugged else { return };
@@ -206,7 +206,7 @@ impl Server<'_> {
         }
     }
 
-    /// Reports the stop and its reason to the client.
+    /// Reports a stop and its reason to the client.
     fn report_stop(&mut self, End { core, why }: End, reason: &'static str) {
         let Some(debugged) = &mut self.debugged else { return };
         let over = std::mem::take(&mut debugged.over);
@@ -231,7 +231,7 @@ impl Server<'_> {
                 }
                 self.stopped(core, "exception", Some(text), None);
             }
-            // The first stop at the end of a run allows steps back; the second ends the session.
+            // The first stop at the end of a run still allows steps back; the second ends the session.
             StopReason::Halted | StopReason::InputsEnd if over => self.event(Event::Terminated),
             StopReason::Halted | StopReason::InputsEnd => {
                 debugged.over = true;
@@ -284,8 +284,8 @@ impl DebuggedSession {
     fn step(&mut self, core: usize, unit: Unit, over: bool) -> End {
         let depth = |debugged: &DebuggedSession| debugged.session(core).emulator().stack().len();
         let mut end = End { core, why: StopReason::Done };
-        // The client shows the next bundle. If it is not about to issue, as before the first bundle, begin the step here; otherwise the
-        // step would end at that same bundle and seem to have no effect.
+        // The client shows the next bundle. If it is not about to issue, as before the first bundle, begin the step there; otherwise the
+        // step would end at the same bundle and appear to have no effect.
         let now = self.session(core).cycle();
         let issues = self.console.core_mut(core).and_then(|session| session.next_issue().1) == Some(now);
         if unit != Unit::Out && !issues {
@@ -295,14 +295,14 @@ impl DebuggedSession {
         if end.why == StopReason::Done {
             end = self.go(core, &Move::Step(unit, 1));
         }
-        // A step over a line with a call ends after the subroutine's return.
+        // A step over a line with a call ends after the return of the subroutine.
         while over && end.why == StopReason::Done && depth(self) > begin {
             end = self.go(core, &Move::Step(Unit::Out, 1));
         }
         end
     }
 
-    /// Runs to a stop, an exception or the end, or for a slice, so that requests are heard.
+    /// Runs to a stop, an exception or the end, or for a slice, so that requests are noticed.
     fn run(&mut self, filters: Filters) -> (End, Option<Exception>) {
         let clears = self.clears_flags() && !filters.flags().is_empty();
         let core = self.console.selected();
@@ -311,7 +311,7 @@ impl DebuggedSession {
         }
         loop {
             let (start, before) = (self.session(core).cycle(), exception_counts(&self.console, filters));
-            // A program that clears flags may hide an exception within a slice.
+            // A program that clears flags could hide an exception within a slice.
             let limit = self.console.set_run_limit(if clears { 1 } else { SLICE });
             let end = self.go(core, &Move::Resume);
             self.console.set_run_limit(limit);
@@ -325,8 +325,8 @@ impl DebuggedSession {
         }
     }
 
-    /// Finds the first position with a new exception by bisection. It is present at the range's end and absent at its start, and the run
-    /// has passed both.
+    /// Finds the first position with a new exception by bisection. The exception is present at the end of the range and absent at its
+    /// start; the run has already passed both.
     fn first(
         &mut self,
         filters: Filters,
@@ -347,7 +347,7 @@ impl DebuggedSession {
         since(&exception_counts(&self.console, filters), before)
     }
 
-    /// An operation of a program clears the flags.
+    /// The program contains an operation that clears the flags.
     fn clears_flags(&self) -> bool {
         let programs = (0..self.console.cores()).map(|core| self.session(core).program());
         programs

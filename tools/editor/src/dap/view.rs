@@ -15,13 +15,13 @@ use takt_debug::system::link_text;
 use takt_isa::program::{Location, Port};
 use takt_isa::{BundleAddress, Register, Type};
 
-/// Maximal number of variables in one list.
+/// Maximum number of variables in one list.
 const VARIABLES: usize = 4096;
-/// Maximal number of completions in an answer.
+/// Maximum number of completions in an answer.
 const COMPLETIONS: usize = 200;
-/// Maximal number of bundles in an answer.
+/// Maximum number of bundles in an answer.
 const BUNDLES: u64 = 4096;
-/// Maximal number of memory bytes in an answer.
+/// Maximum number of memory bytes in an answer.
 const BYTES: u64 = 1 << 20;
 
 /// Numbers of a core's variable lists.
@@ -31,13 +31,13 @@ const NAMED: u64 = 3;
 const FLIGHT: u64 = 4;
 const STALLS: u64 = 5;
 const MACHINE: u64 = 6;
-/// Links of a system, the same list for each core.
+/// Links of a system: the same list for every core.
 const LINKS: u64 = 7;
-/// Registers of each bank, from this number on; the notations of each register follow.
+/// First of the banks' register lists; the lists of each register's notations follow.
 const BANKS: u64 = 16;
 const VIEWS: u64 = 64;
 
-/// Bits of a register as text.
+/// Text of a register's bits.
 fn value_text(ty: Type, bits: Option<u32>, hex: bool) -> String {
     match bits {
         None => "(never written)".to_owned(),
@@ -57,7 +57,7 @@ fn plain(name: impl Into<String>, value: String) -> Variable {
 }
 
 impl DebuggedSession {
-    /// A source in the protocol's form: its path, or a number for requesting its text.
+    /// A source in the form of the protocol: a path, or a number with which its text can be requested.
     pub(super) fn source(&self, core: usize, file: u32) -> Source {
         let session = self.session(core);
         let name = session.program().files.get(file as usize).cloned().unwrap_or_default();
@@ -206,7 +206,7 @@ impl DebuggedSession {
         flight(self.session(core)).into_iter().map(row).collect()
     }
 
-    /// State of the machine other than registers.
+    /// State of the machine apart from its registers.
     fn machine(&mut self, core: usize) -> Vec<Variable> {
         let stall = self.console.core_mut(core).and_then(|session| session.stall());
         let session = self.session(core);
@@ -230,7 +230,7 @@ impl DebuggedSession {
         let Some(bits) = self.session(core).register(register) else { return Vec::new() };
         let views = ValueNotations::new(Type::F, bits);
         let float = views.float;
-        // The ulp: distance to the next binary32 number.
+        // The ulp is the distance to the next binary32 number.
         let ulp = f64::from(f32::from_bits(float.abs().to_bits().saturating_add(1))) - f64::from(float.abs());
         vec![
             plain("float", views.text.clone()),
@@ -278,7 +278,7 @@ impl DebuggedSession {
             Ok(EvaluateResponse { result: Some(value), ty: Some(ty), variables_reference, value: None })
         });
         match evaluated {
-            // The console also accepts the debugger's read-only commands.
+            // The console also accepts read-only commands of the debugger.
             Err(error) if context.as_deref() == Some("repl") => {
                 self.console.select(core);
                 let text = self.console.look(expression).unwrap_or(Err(error))?;
@@ -314,7 +314,7 @@ impl DebuggedSession {
         answer(Body::Instructions(rows.collect()))
     }
 
-    /// Disassembly of a bundle, or a placeholder beyond the program.
+    /// Disassembly of a bundle; beyond the program, a placeholder.
     fn instruction(&self, core: usize, number: i64, from_one: bool) -> DisassembledInstruction {
         let session = self.session(core);
         let program = session.program();
@@ -350,7 +350,7 @@ impl DebuggedSession {
         Some((self.checked(core)?, address))
     }
 
-    /// Reads data memory: `memoryReference` is a word address; bytes are little-endian.
+    /// Reads data memory: `memoryReference` is a word address; the bytes are little-endian.
     pub(super) fn read_memory(&mut self, arguments: &ReadMemoryArguments) -> Answer {
         let asked = &arguments.memory_reference;
         let (core, word) = self.address(asked).ok_or_else(|| format!("`{asked}` is no word's address"))?;
@@ -368,7 +368,7 @@ impl DebuggedSession {
     }
 }
 
-/// Number of a register's list of notations.
+/// Number of the list that contains a register's notations.
 fn views(core: usize, register: Register) -> u64 {
     core as u64 * CORE + VIEWS + u64::from(register.get())
 }

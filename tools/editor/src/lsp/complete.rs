@@ -15,7 +15,7 @@ use takt_asm::source::Span;
 use takt_asm::tokens::{self, Token, TokenKind};
 use takt_isa::{Machine, Op, Operand, ROWS, Row, Type};
 
-/// Options of a completion request.
+/// Properties of a completion request.
 struct CompletionOptions<'a> {
     /// The client supports snippets with placeholders.
     snippets: bool,
@@ -36,7 +36,7 @@ impl CompletionOptions<'_> {
         }
     }
 
-    /// An operation with placeholders for its operands, aligned to their column.
+    /// Item for an operation, with placeholders for the operands, aligned to their column.
     fn with_operands(
         &self,
         label: &str,
@@ -58,7 +58,7 @@ impl CompletionOptions<'_> {
         if self.snippets {
             item.insert_text_format = Some(InsertTextFormat::SNIPPET);
         } else {
-            // Without placeholders, the user would have to delete the operands.
+            // Without placeholders, insert no operands, which the user would have to delete.
             item.text_edit = Some(CompletionTextEdit::Edit(TextEdit {
                 range: self.range,
                 new_text: format!("{label}{}", " ".repeat(blanks)),
@@ -80,7 +80,7 @@ impl CompletionOptions<'_> {
     }
 }
 
-/// Completions at a byte of a file.
+/// Completions at a byte offset of a file.
 pub(crate) fn complete(
     settings: &Settings,
     front: &Front,
@@ -94,7 +94,7 @@ pub(crate) fn complete(
     let lines = tokens::lines(before);
     let Some(tokens) = lines.first() else { return Vec::new() };
     let touches = |token: &&Token| token.range.end == before.len();
-    // Split off the partial word under the cursor.
+    // Split off the partial word before the cursor.
     let written = tokens.last().filter(touches).filter(|token| {
         matches!(
             token.kind,
@@ -111,7 +111,7 @@ pub(crate) fn complete(
     let range = file.text.range(line.start + start..byte, encoding);
     let wanted = CompletionOptions { snippets, range, settings, machine: front.machine };
 
-    // Operation around the cursor.
+    // Operation that contains the cursor.
     let begin = tokens.iter().rposition(|token| token.kind == TokenKind::Bars).map_or(0, |bars| bars + 1);
     let operation = &tokens[begin..];
     let operation = match operation {
@@ -139,10 +139,10 @@ pub(crate) fn complete(
             None => Vec::new(),
         };
     }
-    // Index of the operand at the cursor.
+    // Index of the operand that contains the cursor.
     let number = operands.iter().filter(|token| token.kind == TokenKind::Comma).count();
     let Some(op) = Op::from_mnemonic(word(head)) else {
-        // Arguments of a macro are unrestricted.
+        // A macro accepts arguments of any kind.
         let mut items = named(&wanted, front, file, byte, &ANY);
         items.extend(functions(&wanted));
         return items;
@@ -180,7 +180,7 @@ fn of_directive(
     }
 }
 
-/// Completions of an operand; `brackets`: it is an address, and its bracket is open.
+/// Completions of an operand. `brackets`: the operand is an address whose bracket is open.
 fn of_operand(
     wanted: &CompletionOptions<'_>,
     front: &Front,
@@ -235,7 +235,7 @@ const ANY: [SymbolKind; 11] = [
     SymbolKind::Count,
 ];
 
-/// Words that can begin a line, or an operation of a bundle.
+/// Words that can begin a line or an operation of a bundle.
 fn beginnings(wanted: &CompletionOptions<'_>, front: &Front) -> Vec<CompletionItem> {
     let here =
         |row: &&Row| row.function == takt_isa::Function::Idle || wanted.machine.host(row.function).is_some();
@@ -265,7 +265,7 @@ fn beginnings(wanted: &CompletionOptions<'_>, front: &Front) -> Vec<CompletionIt
     items
 }
 
-/// Last line (from 0) and first line of the macro around a byte of a file.
+/// First and last line, from 0, of the macro that contains a byte of a file.
 fn macro_around(front: &Front, file: &File, byte: usize) -> Option<(usize, usize)> {
     let line = file.text.line_of(byte);
     front.index.blocks.iter().filter(|block| block.directive == Directive::Macro).find_map(|block| {
@@ -292,7 +292,7 @@ fn repeats(front: &Front, file: &File, byte: usize, span: Span) -> bool {
     })
 }
 
-/// Names of some kinds that are visible at a place.
+/// Names of the given kinds that are visible at a place.
 fn named(
     wanted: &CompletionOptions<'_>,
     front: &Front,
@@ -309,7 +309,7 @@ fn named(
         if symbol.kind == SymbolKind::Count && !repeats(front, file, byte, symbol.span) {
             continue;
         }
-        // Names of a macro are visible only in its body.
+        // Names in a macro are visible only within its body.
         if within.is_some() && (within != around || !std::ptr::eq(of, file)) {
             continue;
         }
@@ -328,7 +328,7 @@ fn named(
     items.into_values().collect()
 }
 
-/// Names with a value: constants, data labels, functions.
+/// Names of values: constants, data labels, functions.
 fn values(wanted: &CompletionOptions<'_>, front: &Front, file: &File, byte: usize) -> Vec<CompletionItem> {
     let kinds = [SymbolKind::Constant, SymbolKind::Data, SymbolKind::Parameter, SymbolKind::Count];
     let mut items = named(wanted, front, file, byte, &kinds);
@@ -354,7 +354,7 @@ fn functions(wanted: &CompletionOptions<'_>) -> Vec<CompletionItem> {
 /// Files that can be included.
 fn includes(wanted: &CompletionOptions<'_>, file: &File, before: &str, head: &Token) -> Vec<CompletionItem> {
     let rest = before[head.range.end..].trim_start();
-    // The partial path may contain characters that end a token.
+    // The partial path may contain characters that would end a token.
     let typed = rest.trim_start_matches(['<', '"']);
     let start = wanted.range.end.character
         - typed.encode_utf16().count().min(wanted.range.end.character as usize) as u32;

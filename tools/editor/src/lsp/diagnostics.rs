@@ -15,16 +15,16 @@ use takt_asm::Directive;
 use takt_asm::diag::{self, Diagnostics, Severity};
 use takt_asm::tokens::{self, Token, TokenKind};
 
-/// Data attached to a diagnostic for its fixes.
+/// Data attached to a diagnostic, from which fixes are made.
 #[derive(Serialize, Deserialize)]
 struct Data {
-    /// Replacement of the faulty text.
+    /// Replacement for the faulty text.
     replacement: Option<String>,
-    /// Alternative lines; the source lacks such a line.
+    /// Alternative lines, one of which the source lacks.
     missing: Vec<String>,
 }
 
-/// Diagnostics by file; a diagnostic without a place appears at the beginning of `root`.
+/// Diagnostics by file; a diagnostic without a place is shown at the beginning of `root`.
 pub(crate) fn by_file(
     files: &Files,
     diagnostics: &Diagnostics,
@@ -40,7 +40,7 @@ pub(crate) fn by_file(
                 shown.range = range;
                 path
             }
-            // In the library: the place of use is among the other places.
+            // In the library: show the diagnostic at the place of use, which is among the other places.
             Some((None, _)) => {
                 let mut others =
                     diagnostic.labels.iter().filter_map(|label| files.range(label.span, encoding));
@@ -95,7 +95,7 @@ fn convert(files: &Files, diagnostic: &diag::Diagnostic, encoding: Encoding) -> 
 pub(crate) fn fixes(uri: &Uri, text: &Text, range: Range, diagnostics: &[Diagnostic]) -> Vec<CodeAction> {
     let touches = |other: &Range| other.start <= range.end && range.start <= other.end;
     let fix = |diagnostic: &Diagnostic, title: String, preferred: bool, edit: TextEdit| {
-        // `Uri` has interior mutability in its parsed form; the protocol's own type demands it as a key.
+        // `Uri` caches its parsed form through interior mutability; the protocol's types require it as a key.
         #[allow(clippy::mutable_key_type)]
         let changes = HashMap::from([(uri.clone(), vec![edit])]);
         CodeAction {
@@ -124,8 +124,8 @@ pub(crate) fn fixes(uri: &Uri, text: &Text, range: Range, diagnostics: &[Diagnos
     found
 }
 
-/// Line, from 0, before which a missing line is inserted: an `.include` after the leading comment, a declaration before the section with
-/// the mistake.
+/// Line, from 0, before which to insert a missing line: an `.include` goes after the leading comment, a declaration before the section
+/// that contains the mistake.
 fn home(text: &Text, missing: &str, mistake: u32) -> u32 {
     let lines = tokens::lines(&text.text);
     let is_one_of = |line: &Vec<Token>, directives: &[Directive]| {

@@ -95,7 +95,7 @@ impl Server {
                 self.touch_all();
                 Ok(())
             }
-            // The protocol asks servers to ignore unknown notifications.
+            // The protocol requires servers to ignore unknown notifications.
             _ => Ok(()),
         };
         if let Err(Failed(_, message)) = result {
@@ -124,7 +124,7 @@ impl Server {
 
     fn closed(&mut self, params: &DidCloseTextDocumentParams) {
         let path = uri::path(&params.text_document.uri);
-        // After closing, the text on disk applies again.
+        // Once a document is closed, the text on disk applies again.
         self.touch(&path);
         self.workspace.close(&path);
         self.workspace.scan();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Hover texts in Markdown for the item under the cursor. Texts for instructions, directives and functions come from the tables.
+//! Hover texts in Markdown for the item under the cursor. Texts for instructions, directives and functions are taken from the tables.
 
 use crate::lsp::program::{CountedProgram, File, Front};
 use crate::lsp::{plural, timing};
@@ -13,10 +13,10 @@ use takt_debug::session::{ValueNotations, ulp_distance};
 use takt_isa::program::Space;
 use takt_isa::{BundleAddress, Machine, Op, Register, Row, Type, manual};
 
-/// Maximal number of symbols listed for one place in a macro or a repetition.
+/// Maximum number of symbols listed for one place in a macro or a repetition.
 const TOLD: usize = 8;
 
-/// Hover text at a byte of a file, with the range it describes.
+/// Hover text at a byte offset of a file, with the range that it describes.
 pub(crate) fn hover(
     front: &Front,
     counted: Option<&CountedProgram>,
@@ -71,7 +71,7 @@ pub(crate) fn hover(
     Some((place, text))
 }
 
-/// Manual entry of an instruction.
+/// Text for an instruction, from the manual.
 pub(crate) fn instruction(row: &Row, machine: &'static Machine) -> String {
     let manual = manual::manual();
     let Some(entry) = manual.instructions.iter().find(|entry| entry.mnemonic == row.mnemonic) else {
@@ -91,7 +91,7 @@ pub(crate) fn instruction(row: &Row, machine: &'static Machine) -> String {
     let head = format!("{} {}", entry.mnemonic, entry.syntax);
     let head = head.trim_end();
     let said = [head, entry.summary, entry.text];
-    // Rest of the manual's entry, without lines already shown.
+    // Rest of the manual's entry, without the lines shown above.
     let more = manual::entry_text(entry);
     let more: Vec<&str> = more.lines().map(str::trim).filter(|line| !said.contains(line)).collect();
     format!(
@@ -102,7 +102,7 @@ pub(crate) fn instruction(row: &Row, machine: &'static Machine) -> String {
     )
 }
 
-/// Table entry of a directive.
+/// Text for a directive, from the table.
 pub(crate) fn directive(directive: &Directive) -> String {
     format!(
         "```takt\n{}\n```\n{}",
@@ -111,7 +111,7 @@ pub(crate) fn directive(directive: &Directive) -> String {
     )
 }
 
-/// Description of a register given by its place.
+/// Text for a register named by its place.
 fn place_text(machine: &Machine, counted: Option<&CountedProgram>, word: &str) -> Option<String> {
     let address = machine.register_address(word)?;
     let mut text = format!("`{word}`, register {address} of {}", machine.name);
@@ -194,7 +194,7 @@ fn symbol_text(front: &Front, counted: Option<&CountedProgram>, symbol: &Symbol)
     text
 }
 
-/// Places of an array's elements.
+/// Appends the places of an array's elements.
 fn elements(counted: Option<&CountedProgram>, name: &str, text: &mut String) {
     let Some(program) = counted.map(|counted| &counted.assembled.program) else { return };
     let of = |port: &&takt_isa::program::Port| {
@@ -206,7 +206,7 @@ fn elements(counted: Option<&CountedProgram>, name: &str, text: &mut String) {
     }
 }
 
-/// Place of a register, and the ranges of the values that it holds.
+/// Appends the place of a register, and the ranges of the values that it holds.
 fn register(machine: &Machine, counted: Option<&CountedProgram>, symbol: &Symbol, text: &mut String) {
     let place = |address: Register| {
         let name = machine.register_name(address).unwrap_or_default();
@@ -251,7 +251,7 @@ fn register(machine: &Machine, counted: Option<&CountedProgram>, symbol: &Symbol
     }
 }
 
-/// Bundles that write and read a register.
+/// Lists the bundles that write and read a register.
 fn uses(program: &takt_isa::Program, register: Register) -> String {
     let (mut written, mut read) = (Vec::new(), Vec::new());
     for address in program.addresses() {
@@ -273,7 +273,7 @@ fn uses(program: &takt_isa::Program, register: Register) -> String {
     list("written", &written) + &list("read", &read)
 }
 
-/// A constant's value, its bits, and its rounding error.
+/// Text for a constant: value, bits, and rounding error.
 fn value_text(value: Value) -> String {
     match value {
         Value::Int(value) => {
@@ -310,7 +310,7 @@ fn rounding(value: f64) -> String {
     }
 }
 
-/// Line of a declaration, if short enough.
+/// Source line of a declaration, if it is short enough.
 fn declaration_line(front: &Front, span: Span) -> Option<String> {
     let (file, bytes) = front.files.place(span)?;
     let file = &front.files.0[file];

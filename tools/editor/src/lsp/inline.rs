@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Language server without threads and clock, for hosts that have neither, such as a web page.
+//! Language server without threads or a clock, for hosts that have neither, such as web pages.
 
 use crate::lsp::worker::JobResult;
 use crate::lsp::{Phase, Server, Settings, program};
 use crossbeam_channel::{Receiver, unbounded};
 use lsp_server::Message;
 
-/// A server that works only within calls. The host calls [`Inline::check`] after a pause of the client, and [`Inline::schedule`] after a
+/// A server that works only when called. The host calls [`Inline::check`] after a pause of the client, and [`Inline::schedule`] after a
 /// longer pause.
 pub struct Inline {
     server: Server,
@@ -14,7 +14,7 @@ pub struct Inline {
 }
 
 impl Inline {
-    /// A server that awaits `initialize`.
+    /// Creates a server that waits for `initialize`.
     pub fn new(settings: Settings) -> Inline {
         let (sender, sent) = unbounded();
         Inline { server: Server::new(settings, sender, || None, None), sent }
@@ -38,7 +38,7 @@ impl Inline {
         self.messages()
     }
 
-    /// Schedules one changed program and counts its cycles; returns the server's messages, and whether more programs wait.
+    /// Schedules one changed program and counts its cycles; returns the server's messages, and whether more programs are waiting.
     pub fn schedule(&mut self) -> (Vec<Message>, bool) {
         let mut said = self.check();
         if let Some(root) = self.server.unscheduled.pop_first()
@@ -96,7 +96,7 @@ mod tests {
         published.collect()
     }
 
-    /// Calls alone replace both threads of [`crate::lsp::serve`]: diagnostics after the pause, cycles after the longer one.
+    /// Calls alone replace both threads of [`crate::lsp::serve`]: diagnostics come after the pause, cycles after the longer one.
     #[test]
     fn works_when_called() {
         let mut server = Inline::new(settings());
@@ -119,11 +119,11 @@ mod tests {
         let rename = |name: &str, line: u32, character: u32| json!({ "textDocument": { "uri": "main.s" }, "position": { "line": line, "character": character }, "newName": name });
         let here = ask(&mut server, "textDocument/rename", rename("other", 7, 12));
         assert_eq!(here["changes"]["main.s"].as_array().map(Vec::len), Some(3), "{here}");
-        // `part.s` is not open in the client, so names declared there cannot be renamed.
+        // `part.s` is not open in the client, so names that it declares cannot be renamed.
         let there = ask(&mut server, "textDocument/rename", rename("whole", 7, 15));
         assert_eq!(there, Value::Null);
 
-        // A document without a file has a name.
+        // A document without a file still has a name.
         notify(
             &mut server,
             "textDocument/didOpen",

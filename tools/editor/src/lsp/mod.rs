@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Language server of the assembly language.
 //!
-//! A single thread answers: it drains the client's messages, reads and checks the changed programs ([`program::check`] takes a fraction of
-//! the time between two keystrokes), and answers from the result. A second thread schedules and counts cycles; a result for an outdated
-//! text is dropped, and a newer job replaces a waiting one.
+//! A single thread answers: it drains the client's messages, reads and checks the changed programs ([`program::check`] takes a fraction
+//! of the time between two keystrokes), and answers from the result. A second thread schedules programs and counts cycles; results for
+//! outdated text are dropped, and a newer job replaces one that is waiting.
 //!
-//! Every diagnostic is the assembler's own: from [`takt_asm::check`] at once, from the scheduler when it finishes.
+//! All diagnostics come from the assembler: immediately from [`takt_asm::check`], later from the scheduler.
 
 mod complete;
 mod diagnostics;
@@ -40,9 +40,9 @@ use text::Encoding;
 use worker::{Job, JobResult, Worker};
 use workspace::Workspace;
 
-/// Lower and upper bound of the client's pause before changes are read.
+/// Lower and upper bound of the client's pause after which changes are read.
 const PAUSE: (Duration, Duration) = (Duration::from_millis(10), Duration::from_secs(1));
-/// Pause of the client before a program is scheduled.
+/// Pause of the client after which a program is scheduled.
 const LONG_PAUSE: Duration = Duration::from_millis(150);
 
 /// Settings of the server, fixed at its start.
@@ -50,19 +50,19 @@ const LONG_PAUSE: Duration = Duration::from_millis(150);
 pub struct Settings {
     /// Machine of programs without a `.machine`.
     pub machine: &'static Machine,
-    /// Levels of the assembler's warnings.
+    /// Warning levels of the assembler.
     pub levels: Levels,
-    /// Additional search folders of `.include`.
+    /// Additional folders in which `.include` searches.
     pub folders: Vec<PathBuf>,
     /// Names and texts of the library's files.
     pub library: &'static [(&'static str, &'static str)],
-    /// Names and texts of sources that a document without a file can include.
+    /// Names and texts of sources that documents without a file can include.
     pub beside: &'static [(&'static str, &'static str)],
-    /// Folder for copies of library files that an editor opens; `None`: they cannot be opened.
+    /// Folder for copies of library files opened in an editor; `None`: library files cannot be opened.
     pub library_folder: Option<PathBuf>,
     /// The client opens library files by name: the URI of `<math.s>` is `%3Cmath.s%3E`.
     pub library_by_name: bool,
-    /// Cycle limit of a period, for warnings.
+    /// Cycle limit of a period; exceeding it causes a warning.
     pub deadline: Option<Cycle>,
 }
 
@@ -86,7 +86,7 @@ impl Default for Settings {
 struct Program {
     front: Front,
     full: Option<AssemblyResult>,
-    /// Number of times the program was read.
+    /// Number of times that the program has been read.
     generation: u64,
 }
 
@@ -97,7 +97,7 @@ struct Client {
     snippets: bool,
     refreshes_hints: bool,
     refreshes_lenses: bool,
-    /// The client draws the pipeline itself and wants a notification when a program's cycles are counted.
+    /// The client draws the pipeline itself, and is notified when a program's cycles have been counted.
     wants_counted: bool,
 }
 
@@ -110,42 +110,42 @@ enum Phase {
     Ending,
 }
 
-/// Source of time, where the host has one.
+/// Source of time; returns `None` if the host has none.
 type Clock = fn() -> Option<Instant>;
 
 struct Server {
     settings: Settings,
     sender: Sender<Message>,
-    /// Clock for delays; without one nothing is delayed.
+    /// Clock for delays; without one, nothing is delayed.
     clock: Clock,
     client: Client,
     phase: Phase,
     workspace: Workspace,
-    /// Programs by the path of their first source.
+    /// Programs, keyed by the path of their first source.
     programs: BTreeMap<PathBuf, Program>,
-    /// Programs to read again, and the time of the reading.
+    /// Programs to read again, and the time at which to do so.
     stale: BTreeSet<PathBuf>,
     read_at: Option<Instant>,
     /// Programs to schedule again.
     unscheduled: BTreeSet<PathBuf>,
     schedule_at: Option<Instant>,
-    /// Duration of the last reading.
+    /// Duration of the last read.
     took: Duration,
-    /// Published diagnostics: by file, then by program.
+    /// Published diagnostics, by file and by program.
     published: BTreeMap<PathBuf, BTreeMap<PathBuf, Vec<Diagnostic>>>,
     /// Scheduling thread, if any.
     worker: Option<Worker>,
-    /// Number of requests sent by the server.
+    /// Number of requests that the server has sent.
     asked: i32,
 }
 
-/// Serves a client until `exit` or the end of its stream. Returns whether it exited in order.
+/// Serves a client until `exit` or the end of its stream. Returns whether the client exited properly.
 pub fn serve(connection: &Connection, settings: Settings) -> bool {
     let (done_sender, done): (_, Receiver<JobResult>) = unbounded();
     let worker = Worker::new(settings.clone(), done_sender.clone());
     let clock = || Some(Instant::now());
     let mut server = Server::new(settings, connection.sender.clone(), clock, Some(worker));
-    // Keeps the channel open beyond the thread's end.
+    // Keep the channel open even if the thread ends.
     let _kept = done_sender;
     let mut queue: VecDeque<Message> = VecDeque::new();
     loop {
@@ -189,7 +189,7 @@ fn is_cancelled(queue: &VecDeque<Message>, id: &RequestId) -> bool {
     })
 }
 
-/// A number and a noun in the right form.
+/// Formats a number with a noun in singular or plural.
 fn plural(number: u64, noun: &str) -> String {
     format!("{number} {noun}{}", if number == 1 { "" } else { "s" })
 }
@@ -216,7 +216,7 @@ impl Server {
     }
 
     fn send(&self, message: impl Into<Message>) {
-        // Without a receiver the client is gone; the loop will notice.
+        // If the receiver is gone, so is the client; the loop will notice.
         let _ = self.sender.send(message.into());
     }
 
@@ -232,17 +232,17 @@ impl Server {
         self.send(Request::new(format!("takt-{}", self.asked).into(), method.to_owned(), Value::Null));
     }
 
-    /// Marks the programs of a changed document for reading after the client's pause.
+    /// Schedules the programs of a changed document for reading after the client's pause.
     fn touch(&mut self, path: &Path) {
         let mut roots = self.workspace.roots(path);
-        // A change of includes may remove the document from a program.
+        // A changed include may remove the document from a program.
         let of = |(root, program): (&PathBuf, &Program)| program.front.files.of(path).map(|_| root.clone());
         roots.extend(self.programs.iter().filter_map(of));
         self.stale.extend(roots);
         self.read_at = (self.clock)().map(|now| now + self.took.clamp(PAUSE.0, PAUSE.1));
     }
 
-    /// Marks all programs for reading.
+    /// Schedules all programs for reading.
     fn touch_all(&mut self) {
         self.workspace.scan();
         let open: Vec<PathBuf> = self.workspace.open.keys().cloned().collect();
@@ -266,7 +266,7 @@ impl Server {
         }
     }
 
-    /// Determines which included files are programs of their own: they open a section and assemble alone. Such files show their own cycles,
+    /// Determines which included files are programs by themselves: they open a section and assemble alone. They show their own cycles,
     /// not those of a program that includes them.
     fn find_programs(&mut self) {
         for path in self.workspace.candidates() {
@@ -305,7 +305,7 @@ impl Server {
             let generation = before.as_ref().map_or(0, |before| before.generation) + 1;
             self.worker.iter().for_each(|worker| worker.is_at(&root, generation));
             let by_file = diagnostics::by_file(&front.files, &front.diagnostics, &root, self.client.encoding);
-            // A program with errors is not scheduled; the results for its previous text remain.
+            // A program with errors is not scheduled; the results for its previous text are kept.
             if front.diagnostics.has_errors() {
                 self.unscheduled.remove(&root);
             } else {
@@ -319,7 +319,7 @@ impl Server {
         self.took = started.map_or(Duration::ZERO, |started| started.elapsed());
     }
 
-    /// Takes over a result of the scheduling thread.
+    /// Handles a result of the scheduling thread.
     fn scheduled(&mut self, done: JobResult) {
         let JobResult { root, generation, full } = done;
         let Some(program) = self.programs.get_mut(&root).filter(|program| program.generation == generation)
@@ -341,13 +341,13 @@ impl Server {
         }
     }
 
-    /// Publishes a program's diagnostics for its files.
+    /// Publishes the diagnostics of a program for each of its files.
     fn publish(&mut self, root: &Path, mut by_file: BTreeMap<PathBuf, Vec<Diagnostic>>) {
         let before =
             self.published.iter().filter(|(_, by)| by.contains_key(root)).map(|(path, _)| path.clone());
         let mut paths: BTreeSet<PathBuf> = before.collect();
         paths.extend(by_file.keys().cloned());
-        // A document without mistakes gets an empty list once it is read.
+        // A document without mistakes gets an empty list once it has been read.
         paths.extend(self.workspace.open.keys().filter(|path| !self.published.contains_key(*path)).cloned());
         for path in paths {
             let new = by_file.remove(&path).unwrap_or_default();
@@ -357,7 +357,7 @@ impl Server {
             if known && old.unwrap_or_default() == new {
                 continue;
             }
-            // A diagnostic that several programs report for a file is published once.
+            // If several programs report the same diagnostic for a file, publish it once.
             let mut all: Vec<Diagnostic> = Vec::new();
             for one in by.values().flatten() {
                 if !all.contains(one) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Definitions and references of names, and renaming.
+//! Definitions and references of names, and renames.
 
 use crate::lsp::Settings;
 use crate::lsp::program::{self, Front};
@@ -21,8 +21,8 @@ fn halves(name: &str) -> (&str, &str) {
     name.split_at(name.find('{').unwrap_or(name.len()))
 }
 
-/// Text of a reference after renaming its declaration from `old` to `new`: equal text is replaced, as is the common beginning of a name
-/// with braces. `None` if the reference is composed in another way.
+/// Text of a reference after its declaration is renamed from `old` to `new`: an identical text is replaced, and so is the common
+/// beginning of a name with braces. `None` if the reference is composed differently.
 fn renamed(reference: &str, old: &str, new: &str) -> Option<String> {
     if reference == old {
         return Some(new.to_owned());
@@ -34,7 +34,7 @@ fn renamed(reference: &str, old: &str, new: &str) -> Option<String> {
     Some(format!("{new}{}", reference.strip_prefix(old)?))
 }
 
-/// The name at a place as its declaration spells it, for the start of a rename.
+/// Name at a place, as spelled in its declaration: start of a rename.
 pub(crate) fn renamable(front: &Front, offset: u32) -> Result<(Span, String), String> {
     let (span, symbols) = front.at(offset).ok_or("there is no name here that the program declares")?;
     let declared = front.symbol(symbols[0]).span;
@@ -51,9 +51,9 @@ pub(crate) fn renamable(front: &Front, offset: u32) -> Result<(Span, String), St
     }
 }
 
-/// Edits that rename a name in all programs of a file.
+/// Edits that rename a name in all programs that contain a file.
 ///
-/// The edited programs are read again: each must declare and reference the same names as before, and have no new mistake.
+/// The edited programs are read again: each must declare and reference the same names as before, and have no new mistakes.
 pub(crate) fn rename(
     settings: &Settings,
     fronts: &[(&Path, &Front)],
@@ -140,8 +140,8 @@ fn check_name(name: &str) -> Result<(), String> {
     }
 }
 
-/// Occurrences of a name in code that is never assembled: the body of an unused macro, or an untaken branch. Names that such a body
-/// declares itself are excluded.
+/// Occurrences of a name in code that is not assembled: the body of an unused macro, or a branch not taken. Names that such a body
+/// declares are excluded.
 fn unresolved(front: &Front, name: &str, symbols: &[u32]) -> Vec<Span> {
     let is_macro = symbols.iter().any(|symbol| front.symbol(*symbol).kind == SymbolKind::Macro);
     let local = symbols.iter().any(|symbol| front.symbol(*symbol).kind == SymbolKind::Parameter);
@@ -152,7 +152,7 @@ fn unresolved(front: &Front, name: &str, symbols: &[u32]) -> Vec<Span> {
         if !text.contains(name) {
             continue;
         }
-        // Inside a macro: its name, and its local names.
+        // Within a macro: its name, and its local names.
         let mut within: Option<(String, BTreeSet<String>)> = None;
         for tokens in tokens::lines(text) {
             let word = |index: usize| {
@@ -201,7 +201,7 @@ fn unresolved(front: &Front, name: &str, symbols: &[u32]) -> Vec<Span> {
     found
 }
 
-/// Reads the edited programs, and compares their declarations and references.
+/// Reads the edited programs again, and compares their declarations and references.
 fn verify(settings: &Settings, fronts: &[(&Path, &Front)], edits: &Edits, open: &Open) -> Result<(), String> {
     let mut texts = (**open).clone();
     for (path, edits) in edits {
@@ -237,7 +237,7 @@ fn verify(settings: &Settings, fronts: &[(&Path, &Front)], edits: &Edits, open: 
     Ok(())
 }
 
-/// Text with the edits applied.
+/// Text after the edits.
 fn apply(text: &str, edits: &BTreeMap<(usize, usize), String>) -> String {
     let mut out = String::with_capacity(text.len());
     let mut end = 0;
@@ -249,7 +249,7 @@ fn apply(text: &str, edits: &BTreeMap<(usize, usize), String>) -> String {
     out + &text[end..]
 }
 
-/// Edits in the protocol's form.
+/// Edits in the form of the protocol.
 pub(crate) fn as_edits(
     fronts: &[(&Path, &Front)],
     edits: &Edits,

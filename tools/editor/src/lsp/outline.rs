@@ -16,7 +16,7 @@ use takt_isa::Op;
 /// Directives that open a section.
 const SECTIONS: [Directive; 3] = [Directive::Once, Directive::Period, Directive::Data];
 
-/// Sections of a file: name, byte range of the directive, and the line of the next section or the last line.
+/// Sections of a file: name, byte range of the directive, and the line where the next section starts, or the last line.
 fn sections(file: &File, lines: &[Vec<Token>]) -> Vec<(&'static str, std::ops::Range<usize>, usize)> {
     let text = &file.text.text;
     let named =
@@ -32,7 +32,7 @@ fn sections(file: &File, lines: &[Vec<Token>]) -> Vec<(&'static str, std::ops::R
     found.into_iter().zip(ends).map(|((name, range, _), end)| (name, range, end)).collect()
 }
 
-/// Line, from 0, of a label, or of the directive that opens a section of that name.
+/// Line, from 0, of a label, or of the directive that opens a section with that name.
 pub(crate) fn head_line(file: &File, name: &str) -> Option<u32> {
     let text = &file.text.text;
     let lines = tokens::lines(text);
@@ -44,7 +44,7 @@ pub(crate) fn head_line(file: &File, name: &str) -> Option<u32> {
     line.map(|line| line as u32)
 }
 
-/// Declared symbols of a file, and its sections.
+/// Symbols that a file declares, and its sections.
 #[allow(deprecated, reason = "the protocol's type has the field")]
 pub(crate) fn symbols(front: &Front, file: &File, encoding: Encoding) -> Vec<DocumentSymbol> {
     let lines = tokens::lines(&file.text.text);
@@ -65,7 +65,7 @@ pub(crate) fn symbols(front: &Front, file: &File, encoding: Encoding) -> Vec<Doc
         let whole = file.text.range(range.start..line_end(end), encoding);
         out.push(symbol(name.to_owned(), String::new(), ValueNotations::NAMESPACE, whole, selection));
     }
-    // Declarations appear once, for any number of expansions.
+    // A declaration appears once, whatever the number of expansions.
     let mut declared = BTreeMap::new();
     for symbol in &front.index.symbols {
         let Some((number, bytes)) = front.files.place(symbol.span) else { continue };
@@ -111,7 +111,7 @@ pub(crate) fn symbols(front: &Front, file: &File, encoding: Encoding) -> Vec<Doc
     out
 }
 
-/// Foldable lines: blocks, sections, comments of several lines.
+/// Foldable lines: blocks, sections, and comments of several lines.
 pub(crate) fn folds(front: &Front, file: &File) -> Vec<FoldingRange> {
     let lines = tokens::lines(&file.text.text);
     let fold = |start: usize, end: usize, kind| FoldingRange {
@@ -147,7 +147,7 @@ pub(crate) fn folds(front: &Front, file: &File) -> Vec<FoldingRange> {
     out
 }
 
-/// Types and modifiers of semantic tokens, as announced to the client.
+/// Types and modifiers of semantic tokens, in the order announced to the client.
 pub(crate) fn legend() -> (Vec<SemanticTokenType>, Vec<SemanticTokenModifier>) {
     let types = [
         SemanticTokenType::KEYWORD,
@@ -169,7 +169,7 @@ pub(crate) fn legend() -> (Vec<SemanticTokenType>, Vec<SemanticTokenModifier>) {
 const DECLARATION: u32 = 1;
 const READONLY: u32 = 2;
 
-/// Type and modifiers of a kind of symbol.
+/// Token type and modifiers for a kind of symbol.
 fn colour(kind: SymbolKind) -> (u32, u32) {
     match kind {
         SymbolKind::Macro => (2, 0),
@@ -183,7 +183,7 @@ fn colour(kind: SymbolKind) -> (u32, u32) {
     }
 }
 
-/// Semantic tokens of some lines of a file, in the protocol's relative encoding.
+/// Semantic tokens of a range of lines, in the protocol's relative encoding.
 pub(crate) fn colours(
     front: &Front,
     file: &File,

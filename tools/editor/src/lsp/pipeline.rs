@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Pipeline diagram for a view beside the source: the operations of each bundle, their cycles, and their source lines. Cycles equal those
-//! of the inlay hints.
+//! Pipeline diagram for a view beside the source: operations of each bundle with cycles and source lines. The cycles equal those of the
+//! inlay hints.
 
 use crate::lsp::program::CountedProgram;
 use crate::lsp::timing::cycle_from;
@@ -13,19 +13,19 @@ use takt_isa::program::Location;
 use takt_isa::timing::Cycle;
 use takt_isa::{BundleAddress, Instruction, Program, SlotIndex};
 
-/// Maximal number of bundles in a diagram.
+/// Maximum number of bundles in a diagram.
 const BUNDLES: usize = 4096;
 
-/// Diagram of a program, as JSON for the client.
+/// Diagram of a program, sent to the client as JSON.
 #[derive(Serialize)]
 pub(crate) struct Pipeline {
     machine: &'static str,
-    /// No source of the program, including its included files, has changed since.
+    /// No source of the program, including included files, has changed since.
     #[serde(rename = "current")]
     is_current: bool,
-    /// Cycles of each section in words, periods first.
+    /// Cycles of each section as text, periods first.
     sections: Vec<String>,
-    /// Files of the operations; `None` for a file that editors cannot open.
+    /// URIs of the operations' files; `None` for a file that editors cannot open.
     files: Vec<Option<Uri>>,
     bundles: Vec<Bundle>,
     /// Longest dependence chain of each straight-line block.
@@ -37,14 +37,14 @@ pub(crate) struct Pipeline {
 #[derive(Serialize)]
 struct Bundle {
     address: BundleAddress,
-    /// Origin of the cycle count: a section, a label, or a bundle.
+    /// Point from which the cycles are counted: a section, a label, or a bundle.
     from: String,
     cycle: Cycle,
     stalls: Vec<Stall>,
     operations: Vec<Operation>,
 }
 
-/// Reason why a bundle waited, as in `takt analyse`: indices of bundles, and slots where a single operation is the reason.
+/// Reason why a bundle waited, as in `takt analyse`: indices of bundles, and slots if a single operation is the reason.
 #[derive(Serialize)]
 struct Link {
     from: usize,
@@ -57,7 +57,7 @@ struct Link {
 
 #[derive(Serialize)]
 struct Stall {
-    /// Kind of the delay, as `takt analyse` names it.
+    /// Kind of delay, as named by `takt analyse`.
     cause: &'static str,
     cycles: u32,
     text: String,
@@ -72,18 +72,18 @@ struct Operation {
     latency: Option<u32>,
     /// The operation is on the longest chain.
     critical: bool,
-    /// Index of the operation's file, and the line in it, from 0.
+    /// Index of the operation's file, and the line number in it, from 0.
     file: Option<usize>,
     line: Option<u32>,
 }
 
-/// Facts about the program as a whole, for the diagram.
+/// Facts about the whole program that the diagram needs.
 pub(crate) struct ProgramFacts {
     pub(crate) is_current: bool,
     pub(crate) sections: Vec<String>,
 }
 
-/// Diagram of a program. `line` maps a line (from 0) of the scheduled text to its present place; `uri` maps files.
+/// Diagram of a program. `line` maps a line (from 0) of the scheduled text to its current place; `uri` maps files.
 pub(crate) fn pipeline(
     counted: &CountedProgram,
     whole: ProgramFacts,
@@ -143,7 +143,7 @@ pub(crate) fn pipeline(
     Pipeline { machine: program.machine.name, is_current, sections, files, bundles, chain, more }
 }
 
-/// Longest chain of each straight-line block, and its operations as pairs of bundle index and slot.
+/// Longest chain of each straight-line block, and the operations on it as pairs of bundle index and slot.
 fn chains(program: &Program, issues: &[StaticIssue]) -> (Vec<Link>, BTreeSet<(usize, SlotIndex)>) {
     let (mut chain, mut critical, mut first) = (Vec::new(), BTreeSet::new(), 0);
     for line in issues.chunk_by(|one, next| one.from == next.from) {

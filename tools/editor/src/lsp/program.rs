@@ -19,7 +19,7 @@ pub(crate) struct File {
     pub(crate) path: Option<PathBuf>,
     /// Name of the file in the program.
     pub(crate) name: Arc<str>,
-    /// Offset of the file's first byte in the common space of all sources.
+    /// Offset of the file's first byte in the address space shared by all sources.
     pub(crate) base: u32,
     pub(crate) text: Text,
 }
@@ -33,7 +33,7 @@ impl Files {
         let folder = root.parent().unwrap_or(Path::new(""));
         let file = |source: &takt_asm::source::Source| {
             let name = &*source.name;
-            // Name forms as in `Search`: library, additional folder, project.
+            // Name forms are those of `Search`: library, additional folder, project.
             let path = match name.as_bytes().first() {
                 Some(b'<') => None,
                 Some(b'.' | b'/') => {
@@ -52,7 +52,7 @@ impl Files {
         Files(sources.files().iter().map(file).collect())
     }
 
-    /// File that contains a span, with the byte range in the file.
+    /// Index of the file that contains a span, with the byte range in that file.
     pub(crate) fn place(&self, span: Span) -> Option<(usize, std::ops::Range<usize>)> {
         let file = self.0.partition_point(|file| file.base <= span.start).checked_sub(1)?;
         let File { base, text, .. } = &self.0[file];
@@ -70,12 +70,12 @@ impl Files {
         self.place(span).and_then(|(file, bytes)| self.0[file].text.text.get(bytes)).unwrap_or("")
     }
 
-    /// File with this path.
+    /// Finds a file by its path.
     pub(crate) fn of(&self, path: &Path) -> Option<&File> {
         self.0.iter().find(|file| file.path.as_deref() == Some(path))
     }
 
-    /// Every file has the same name and text as its counterpart.
+    /// Both lists contain the same names and texts.
     pub(crate) fn are(&self, others: &Files) -> bool {
         let same = |(one, other): (&File, &File)| one.name == other.name && one.text.text == other.text.text;
         self.0.len() == others.0.len() && self.0.iter().zip(&others.0).all(same)
@@ -87,7 +87,7 @@ impl Files {
 }
 
 impl File {
-    /// Span of a byte range of the file.
+    /// Span of a byte range in the file.
     pub(crate) fn span(&self, bytes: std::ops::Range<usize>) -> Span {
         Span::new(self.base + bytes.start as u32, self.base + bytes.end as u32)
     }
@@ -103,7 +103,7 @@ pub(crate) struct Front {
 }
 
 impl Front {
-    /// Symbols referenced at a place in the source, with the span of the name.
+    /// Symbols referenced at a source offset, with the span of the name.
     pub(crate) fn at(&self, offset: u32) -> Option<(Span, Vec<u32>)> {
         let found = self.index.at(offset);
         Some((found.first()?.span, found.iter().map(|reference| reference.symbol).collect()))
@@ -123,7 +123,7 @@ impl Front {
     }
 }
 
-/// Result of assembling a program, or the obstacle.
+/// Result of assembling a program, or the error that prevented it.
 pub(crate) struct AssemblyResult {
     pub(crate) files: Files,
     pub(crate) diagnostics: Diagnostics,
@@ -137,7 +137,7 @@ pub(crate) struct CountedProgram {
     pub(crate) bounds: Result<Bounds, BoundError>,
 }
 
-/// Reads and checks the program whose first source is at `root`.
+/// Reads and checks the program that starts with the source at `root`.
 pub(crate) fn check(settings: &Settings, root: &Path, open: &Open) -> (Front, CheckedProgram) {
     let (folder, name) = match (root.parent(), root.file_name()) {
         (Some(folder), Some(name)) if root.is_absolute() => {
@@ -167,11 +167,11 @@ pub(crate) fn check(settings: &Settings, root: &Path, open: &Open) -> (Front, Ch
     (front, checked)
 }
 
-/// Name in messages of a document without a file: `Untitled-1` for the URI `untitled:Untitled-1`.
+/// Name used in messages for a document without a file: `Untitled-1` for the URI `untitled:Untitled-1`.
 fn bare_name(root: &Path) -> String {
     let uri = root.to_string_lossy();
     let name = uri.rsplit(['/', '\\', ':']).next().unwrap_or_default();
-    // Names with such a beginning denote library files or files of an additional folder.
+    // Names that begin in this way denote files of the library or of an additional folder.
     if name.is_empty() || name.starts_with(['<', '.']) { "untitled.s".to_owned() } else { name.to_owned() }
 }
 
@@ -180,7 +180,7 @@ fn search<L: Loader>(settings: &Settings, project: L, open: &Open) -> Search<L> 
     folders.fold(Search::new(project), Search::folder).with_open(open).library(settings.library)
 }
 
-/// Completes a checked program: schedules it, emits it, and counts its cycles.
+/// Completes a checked program: schedules and emits it, and counts its cycles.
 pub(crate) fn finish(root: &Path, checked: CheckedProgram) -> AssemblyResult {
     let files = Files::new(root, checked.sources());
     match checked.finish() {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Handlers of the requests on a document.
+//! Handlers of requests that concern a document.
 
 use crate::lsp::pipeline::{self, Pipeline, ProgramFacts};
 use crate::lsp::program::{AssemblyResult, CountedProgram, File, Front};
@@ -20,7 +20,7 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use takt_asm::source::{Span, line_feeds};
 
-/// Error answer to a request.
+/// Error response: code and message.
 pub(crate) struct Failed(pub(crate) ErrorCode, pub(crate) String);
 
 /// Deserialises the parameters of a message.
@@ -52,7 +52,7 @@ impl RequestContext<'_> {
 }
 
 impl Server {
-    /// Answers a request on the present texts.
+    /// Answers a request, based on the current texts.
     pub(crate) fn answer(&mut self, method: &str, params: Value) -> Result<Value, Failed> {
         if !self.stale.is_empty() {
             self.read();
@@ -110,7 +110,7 @@ impl Server {
         Ok(document.uri)
     }
 
-    /// Document of a URI with its first program, as of the last reading.
+    /// Document that a URI denotes, with its first program, as last read.
     fn request_context(&self, uri: &Uri) -> Result<RequestContext<'_>, Failed> {
         let path = uri::path(uri);
         if !self.workspace.open.contains_key(&path) {
@@ -144,7 +144,7 @@ impl Server {
         let Some((bytes, mut text)) = hover::hover(here.front, here.counted(), here.file, byte) else {
             return Ok(None);
         };
-        // On an instruction, add the timing of its line.
+        // For an instruction, add the timing of its line.
         let is_fresh = here
             .full
             .and_then(|full| full.files.of(&here.path))
@@ -179,7 +179,7 @@ impl Server {
         Some(Location { uri: uri?, range })
     }
 
-    /// Copy of a library file, for an editor to open.
+    /// Copy of a library file that an editor can open.
     fn library_copy(&self, file: &File) -> Option<PathBuf> {
         let folder = self.settings.library_folder.as_deref()?;
         let path = folder.join(file.name.trim_matches(['<', '>']));
@@ -306,7 +306,7 @@ impl Server {
             return Ok(None);
         };
         let path = |name: &str| here.full?.files.named(name)?.path.as_deref().and_then(uri::of_path);
-        // Lines of this document follow its edits; lines of other files stay as scheduled.
+        // Lines of this document follow edits; lines of other files stay as scheduled.
         let line = |name: &str, line| if *here.file.name == *name { moved.line(line) } else { Some(line) };
         let is_current = here.full.is_some_and(|full| full.files.are(&here.front.files));
         let whole = ProgramFacts { is_current, sections: timing::sections(counted, &self.settings) };
@@ -324,7 +324,7 @@ impl Server {
             let command = Command { title, command: String::new(), arguments: None };
             Some(CodeLens { range: Range::new(position, position), command: Some(command), data: None })
         };
-        // Lines refer to the scheduled text; a label's line is known as long as it has not moved.
+        // Lines refer to the scheduled text; the line of a label is known as long as it has not moved.
         let old = here.full.and_then(|full| full.files.named(&here.file.name));
         let head = |name: &str| old.and_then(|file| outline::head_line(file, name));
         let lenses = timing::lenses(counted, &self.settings, &here.file.name, &head);
@@ -339,7 +339,7 @@ impl Server {
         diagnostics::fixes(&params.text_document.uri, text, params.range, &sent)
     }
 
-    /// Edits that lay the document out.
+    /// Edits that format the document.
     fn format(&self, uri: &Uri, range: Option<Range>) -> Result<Vec<TextEdit>, Failed> {
         let path = uri::path(uri);
         let text = self
@@ -350,7 +350,7 @@ impl Server {
         let laid = Text::new(takt_asm::format::format(&text.text));
         let mut edits = Vec::new();
         let mut line = 0;
-        // Layout preserves line numbers, except that it removes empty lines at the end.
+        // Formatting preserves line numbers, except that it removes empty lines at the end.
         while let (Some(old), Some(new)) = (text.line(line), laid.line(line)) {
             let wanted =
                 range.is_none_or(|range| (range.start.line..=range.end.line).contains(&(line as u32)));
@@ -375,13 +375,13 @@ impl Server {
     }
 }
 
-/// Mapping of an older text's lines to a newer text: a common head and a common tail.
+/// Maps lines of an older text to a newer one, by a common head and a common tail.
 struct LineMapping {
     /// Number of equal lines at the beginning.
     head: u32,
     /// First line of the common tail, in the older text.
     tail: u32,
-    /// Displacement of the tail.
+    /// Offset of the tail's lines.
     by: i64,
 }
 
@@ -395,7 +395,7 @@ impl LineMapping {
 }
 
 impl RequestContext<'_> {
-    /// Line mapping since the program was scheduled.
+    /// Mapping from the lines at the time of scheduling to the current lines.
     fn moved(&self) -> Option<LineMapping> {
         let old = &self.full?.files.named(&self.file.name)?.text.text;
         let (old, new) = (&*line_feeds(old), &*line_feeds(&self.file.text.text));

@@ -25,7 +25,7 @@ impl Text {
         Text::shared(Arc::new(text.into()))
     }
 
-    /// A text that shares its string with the assembler's sources.
+    /// Creates a text that shares its string with the assembler's sources.
     pub(crate) fn shared(text: Arc<String>) -> Text {
         let lines = Lines::of(&text);
         Text { text, lines }
@@ -46,7 +46,7 @@ impl Text {
         Range::new(self.position(bytes.start, encoding), self.position(bytes.end, encoding))
     }
 
-    /// Byte offset of a position; clamped to the line and the text.
+    /// Byte offset of a position, clamped to the line and to the text.
     pub(crate) fn byte(&self, position: Position, encoding: Encoding) -> usize {
         let Some(range) = self.lines.range(position.line as usize) else { return self.text.len() };
         let line = self.text[range.clone()].trim_end_matches(['\n', '\r']);
@@ -63,7 +63,7 @@ impl Text {
         range.start + line.len()
     }
 
-    /// Byte range of a line (from 0) without its line break.
+    /// Byte range of a line (from 0), without the line break.
     pub(crate) fn line(&self, line: usize) -> Option<std::ops::Range<usize>> {
         let range = self.lines.range(line)?;
         let text = self.text[range.clone()].trim_end_matches(['\n', '\r']);
@@ -75,7 +75,7 @@ impl Text {
         self.lines.index(byte as u32)
     }
 
-    /// Text after changes, which apply in order, each to the previous result.
+    /// Text after changes, each applied to the result of the previous one.
     pub(crate) fn changed(&self, changes: Vec<TextDocumentContentChangeEvent>, encoding: Encoding) -> Text {
         let mut text = self.clone();
         for change in changes {
@@ -92,7 +92,7 @@ impl Text {
     }
 }
 
-/// Width of a text in columns.
+/// Width of a text, in columns of the encoding.
 pub(crate) fn width(text: &str, encoding: Encoding) -> u32 {
     match encoding {
         Encoding::Utf8 => text.len() as u32,
@@ -111,7 +111,7 @@ mod tests {
             let byte = text.text.find('b').expect("it is there");
             assert_eq!(text.position(byte, encoding), Position::new(1, column));
             assert_eq!(text.byte(Position::new(1, column), encoding), byte);
-            // A position beyond the line is clamped to its end before the line break; beyond the text, to the text's end.
+            // A position beyond a line is clamped to the line's end before the line break; beyond the text, to its end.
             assert_eq!(text.byte(Position::new(1, 99), encoding), byte + 1);
             assert_eq!(text.byte(Position::new(99, 0), encoding), text.text.len());
         }
@@ -127,7 +127,7 @@ mod tests {
         let text = Text::new("one\ntwo\n");
         let changes = vec![change(0, 0, 1, "µ\nO"), change(1, 0, 1, "o"), change(9, 9, 9, "end")];
         assert_eq!(&*text.changed(changes, Encoding::Utf16).text, "µ\none\ntwo\nend");
-        // A reversed range, and a range within a character, are applied as far as possible.
+        // A reversed range, and a range inside a character, are applied as far as possible.
         let back = TextDocumentContentChangeEvent {
             range: Some(Range::new(Position::new(1, 2), Position::new(0, 1))),
             range_length: None,

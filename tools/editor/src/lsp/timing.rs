@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Timing hints: beside a line, the issue cycles of its operations and the causes of their delays; above a section, its cycles.
+//! Timing hints: beside a line, issue cycles of its operations and causes of delays; above a section, its cycles.
 
 use crate::lsp::program::CountedProgram;
 use crate::lsp::{Settings, plural};
@@ -10,9 +10,9 @@ use takt_asm::schedule::BlockReport;
 use takt_isa::program::Location;
 use takt_isa::{BundleAddress, Instruction, Program, SlotIndex};
 
-/// Maximal number of cycles listed for a line; if there are more, the first and the last.
+/// Maximum number of cycles listed for a line; if there are more, only the first and the last are shown.
 const LISTED: usize = 4;
-/// Maximal number of operations explained for a line.
+/// Maximum number of operations explained for a line.
 const EXPLAINED: usize = 12;
 
 /// Inlay hint beside a line.
@@ -25,10 +25,10 @@ pub(crate) struct Hint {
     pub(crate) more: String,
 }
 
-/// A program word: its bundle and its slot.
+/// A program word, given by bundle and slot.
 type Word = (BundleAddress, SlotIndex);
 
-/// Words of each line of a file, in the order of their bundles.
+/// Words of each line of a file, ordered by bundle.
 fn words(program: &Program, file: &str) -> BTreeMap<u32, Vec<Word>> {
     let mut words: BTreeMap<u32, Vec<Word>> = BTreeMap::new();
     let Some(number) = program.files.iter().position(|name| name == file) else { return words };
@@ -62,7 +62,7 @@ fn issue(counted: &CountedProgram, address: BundleAddress) -> Option<&StaticIssu
     counted.issues.get(address.index())
 }
 
-/// An issue cycle, with its origin unless it counts from the beginning of a section.
+/// Text for an issue cycle; states the origin unless cycles are counted from the beginning of a section.
 fn cycle(program: &Program, issue: &StaticIssue) -> String {
     if program.sections.iter().any(|section| section.start == issue.from) {
         return issue.cycle.to_string();
@@ -70,7 +70,7 @@ fn cycle(program: &Program, issue: &StaticIssue) -> String {
     format!("{} {}", cycle_from(program, issue.from), issue.cycle)
 }
 
-/// Origin of a cycle count: the name of a section or label, or a bundle as `@12`.
+/// Origin from which cycles are counted: name of a section or label, or a bundle as `@12`.
 pub(crate) fn cycle_from(program: &Program, from: BundleAddress) -> String {
     if let Some(section) = program.sections.iter().find(|section| section.start == from) {
         return section.name.to_string();
@@ -94,7 +94,7 @@ fn short(counted: &CountedProgram, words: &[Word]) -> String {
         let ends: Vec<String> = ends.into_iter().flatten().filter_map(shown).collect();
         format!("{} ({} operations)", ends.join(" … "), words.len())
     };
-    // A single operation is delayed by the cause of its bundle.
+    // A single operation shares the delay of its bundle.
     if let [(address, _)] = words
         && let Some(issue) = issue(counted, *address)
         && let Some(&(cause, cycles)) = issue.stalls.iter().max_by_key(|(_, cycles)| *cycles)
@@ -139,7 +139,7 @@ fn explained(counted: &CountedProgram, words: &[Word]) -> String {
     text
 }
 
-/// Cycle texts of all sections, periods first, for clients without a source view.
+/// Cycles of all sections as text, periods first, for clients without a source view.
 pub(crate) fn sections(counted: &CountedProgram, settings: &Settings) -> Vec<String> {
     let Ok(bounds) = &counted.bounds else { return Vec::new() };
     let (once, periods): (Vec<_>, Vec<_>) = bounds.sections.iter().partition(|section| section.once);
@@ -147,7 +147,7 @@ pub(crate) fn sections(counted: &CountedProgram, settings: &Settings) -> Vec<Str
     periods.into_iter().chain(once).map(text).collect()
 }
 
-/// Cycles of a section, and its block number if it is a single block.
+/// Cycles of a section as text, with its block number if the section is a single block.
 fn section_text(
     section: &SectionBounds,
     blocks: &[BlockReport],
@@ -162,7 +162,7 @@ fn section_text(
         text.push_str(" from reset");
         return (text, None);
     }
-    // The section is a single block.
+    // Block that makes up the whole section.
     let whole = |block: &BlockReport| {
         block.address == section.address
             && section.ends.contains(&block.address.offset(block.bundles.saturating_sub(1)))
@@ -171,7 +171,7 @@ fn section_text(
     if let Some(number) = block {
         let _ = write!(text, ", bound {}", blocks[number].bound.cycles());
     }
-    // Same computation as in `takt bound --deadline`.
+    // The same computation as in `takt bound --deadline`.
     let worst = section.in_time.worst + 1;
     if let Some(deadline) = settings.deadline {
         let (what, by) = match deadline.checked_sub(worst) {
@@ -183,7 +183,7 @@ fn section_text(
     (text, block)
 }
 
-/// Code lenses above lines of a file, from 0. `head` maps labels and section directives to their lines.
+/// Code lenses above lines of a file, from 0. `head` gives the lines of labels and section directives.
 pub(crate) fn lenses(
     counted: &CountedProgram,
     settings: &Settings,
@@ -229,7 +229,7 @@ pub(crate) fn lenses(
     lenses.into_iter().map(|(line, texts)| (line, texts.join(" · "))).collect()
 }
 
-/// Decimal digits in groups of three.
+/// Decimal number with digits in groups of three.
 fn grouped(number: u64) -> String {
     let digits = number.to_string();
     let groups: Vec<&str> =

@@ -5,11 +5,11 @@ use lsp_types::Uri;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-/// Path of a `file:` URI; any other URI itself serves as the path of a document without a file.
+/// Path of a `file:` URI. For a document without a file, the URI itself serves as path.
 pub(crate) fn path(uri: &Uri) -> PathBuf {
     let text = uri.as_str();
     let Some(rest) = text.strip_prefix("file://") else { return PathBuf::from(text) };
-    // The host precedes the path.
+    // Skip the host, which precedes the path.
     let path = rest.find('/').map_or("", |at| &rest[at..]);
     let path = decoded(path);
     // On Windows, `/c:/x` means `c:/x`.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Thread that schedules programs and counts their cycles, work too slow for every keystroke.
+//! Thread that schedules programs and counts their cycles, which is too slow for every keystroke.
 
 use crate::lsp::Settings;
 use crate::lsp::program::{self, AssemblyResult};
@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use takt_asm::Open;
 
-/// A scheduling job: the program's first source, and the open texts.
+/// Scheduling job: first source of the program, and the open texts.
 pub(crate) struct Job {
     pub(crate) root: PathBuf,
     pub(crate) generation: u64,
@@ -24,7 +24,7 @@ pub(crate) struct JobResult {
     pub(crate) full: AssemblyResult,
 }
 
-/// Current generation of each program's text; results of other generations are dropped.
+/// Current generation of each program's text; results for other generations are dropped.
 type Generations = Arc<Mutex<BTreeMap<PathBuf, u64>>>;
 
 pub(crate) struct Worker {
@@ -33,7 +33,7 @@ pub(crate) struct Worker {
 }
 
 fn lock(wanted: &Generations) -> MutexGuard<'_, BTreeMap<PathBuf, u64>> {
-    // Plain numbers stay consistent even if a holder panicked.
+    // A panic of another holder cannot leave plain numbers inconsistent.
     wanted.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
@@ -46,7 +46,7 @@ impl Worker {
         Worker { jobs, wanted }
     }
 
-    /// Sets the current generation of a program's text; work on earlier ones becomes obsolete.
+    /// Sets the current generation of a program's text, which makes work on earlier ones obsolete.
     pub(crate) fn is_at(&self, root: &Path, generation: u64) {
         lock(&self.wanted).insert(root.to_owned(), generation);
     }
@@ -56,7 +56,7 @@ impl Worker {
     }
 
     pub(crate) fn start(&self, job: Job) {
-        // The thread outlives this sender, so sending cannot fail.
+        // Cannot fail: the thread outlives this sender.
         let _ = self.jobs.send(job);
     }
 }

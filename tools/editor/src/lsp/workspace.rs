@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Mapping of files to programs: the include graph of open files and files in their folders.
+//! Maps files to programs: include graph of open files and of the files in their folders.
 
 use crate::lsp::text::Text;
 use std::collections::{BTreeMap, BTreeSet};
@@ -10,13 +10,13 @@ use takt_asm::source::line_feeds;
 use takt_asm::tokens::{self, TokenKind};
 use takt_asm::{Directive, Open};
 
-/// Maximal number of files scanned for `.include`s.
+/// Maximum number of files scanned for `.include`s.
 const FILES: usize = 2000;
-/// Maximal depth of nested folders scanned.
+/// Maximum depth of nested folders to scan.
 const DEPTH: usize = 6;
-/// Maximal size in bytes of a scanned file.
+/// Maximum size in bytes of a scanned file.
 const FILE_BYTES: u64 = 4 << 20;
-/// Maximal number of programs assembled for one file.
+/// Maximum number of programs assembled for one file.
 pub(crate) const ROOTS: usize = 8;
 
 /// Open documents, and the files in their folders.
@@ -28,14 +28,14 @@ pub(crate) struct Workspace {
     pub(crate) open: BTreeMap<PathBuf, Text>,
     /// Includes of each source on disk, with the file's time stamp.
     on_disk: BTreeMap<PathBuf, (Option<SystemTime>, Vec<PathBuf>)>,
-    /// Includes of each open source.
+    /// Includes of each open document.
     of_open: BTreeMap<PathBuf, Vec<PathBuf>>,
-    /// Open sources that open a section, and whether each is known to assemble alone.
+    /// Open documents that open a section, and whether each is known to assemble alone.
     sections: BTreeMap<PathBuf, bool>,
 }
 
 impl Workspace {
-    /// Sets the text of an open document. Returns whether its includes changed.
+    /// Sets the text of an open document; returns whether its includes have changed.
     pub(crate) fn set(&mut self, path: &Path, text: Text) -> bool {
         let includes = includes(path, &text.text);
         if opens_section(&text.text) {
@@ -54,22 +54,22 @@ impl Workspace {
         self.sections.remove(path);
     }
 
-    /// Open files that are included elsewhere and open a section, but are not known to assemble alone.
+    /// Open files that other files include and that open a section, but are not known to assemble alone.
     pub(crate) fn candidates(&self) -> Vec<PathBuf> {
         self.sections.iter().filter(|(_, known)| !**known).map(|(path, _)| path.clone()).collect()
     }
 
-    /// Records that a file assembles alone. It stays a program even if later edits break it.
+    /// Records that a file assembles alone. It stays a program even if a later edit breaks it.
     pub(crate) fn is_program(&mut self, path: &Path) {
         self.sections.insert(path.to_owned(), true);
     }
 
-    /// Texts of open documents, in the assembler's form.
+    /// Texts of open documents, in the form that the assembler expects.
     pub(crate) fn texts(&self) -> Open {
         Arc::new(self.open.iter().map(|(path, text)| (path.clone(), Arc::clone(&text.text))).collect())
     }
 
-    /// Scans the sources on disk again: in the client's folders and beside open documents.
+    /// Scans the sources on disk again, in the client's folders and beside open documents.
     pub(crate) fn scan(&mut self) {
         let mut found = BTreeMap::new();
         let mut folders: Vec<(PathBuf, usize)> =
@@ -110,8 +110,8 @@ impl Workspace {
         self.on_disk = found;
     }
 
-    /// Programs of a file: the file itself if it is a program; then the files that include it directly or through others and are included
-    /// by none. If there are none, the file itself.
+    /// Programs that contain a file: the file itself, if it is a program, and the files that include it directly or indirectly and are
+    /// not included themselves. If there are none, the file itself.
     pub(crate) fn roots(&self, path: &Path) -> Vec<PathBuf> {
         let mut roots = Vec::new();
         let mut seen = BTreeSet::from([path.to_owned()]);
@@ -122,14 +122,14 @@ impl Workspace {
             let all = open.chain(on_disk.map(|(from, (_, to))| (from, to)));
             let by = all.filter(|(_, to)| to.contains(&file));
             let by: Vec<PathBuf> = by.map(|(from, _)| from.clone()).collect();
-            // All files of a program lie in or below the folder of its first file.
+            // All files of a program are in or below the folder of its first file.
             if by.is_empty() && file.parent().is_some_and(|folder| path.starts_with(folder)) {
                 roots.push(file);
             }
             left.extend(by.into_iter().filter(|from| seen.insert(from.clone())));
         }
         if roots.is_empty() {
-            // Cyclic includes, or no includer: treat the file as a program.
+            // If includes are cyclic, or no file includes this one, treat it as a program.
             roots.push(path.to_owned());
         }
         roots.sort();
@@ -163,7 +163,7 @@ fn includes(path: &Path, text: &str) -> Vec<PathBuf> {
     files
 }
 
-/// The source opens a section of code, as programs do and most included files do not.
+/// The source opens a code section, as programs do and most included files do not.
 fn opens_section(text: &str) -> bool {
     let names = [Directive::Once, Directive::Period].map(|directive| directive.name());
     let is_one = |line: &&str| names.iter().any(|name| line.contains(name));

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Combinators of a tree-sitter grammar, in the form of `grammar.json`.
+//! Combinators for a tree-sitter grammar in the form of `grammar.json`.
 
 use serde_json::{Value, json};
 
-/// A grammar rule, or a part of one.
+/// A grammar rule or a part of one.
 #[derive(Clone, PartialEq)]
 pub(super) struct Rule(pub(super) Value);
 
-/// The rule that matches the empty text.
+/// Rule that matches the empty text.
 pub(super) fn blank() -> Rule {
     Rule(json!({ "type": "BLANK" }))
 }
@@ -16,17 +16,17 @@ pub(super) fn symbol(name: impl AsRef<str>) -> Rule {
     Rule(json!({ "type": "SYMBOL", "name": name.as_ref() }))
 }
 
-/// A token with fixed text.
+/// Token with fixed text.
 pub(super) fn text(value: &str) -> Rule {
     Rule(json!({ "type": "STRING", "value": value }))
 }
 
-/// A token by regular expression.
+/// Token given by a regular expression.
 pub(super) fn pattern(value: &str) -> Rule {
     Rule(json!({ "type": "PATTERN", "value": value }))
 }
 
-/// A token that must follow without a blank.
+/// Token that must follow without a blank.
 pub(super) fn immediate(rule: Rule) -> Rule {
     Rule(json!({ "type": "IMMEDIATE_TOKEN", "content": rule.0 }))
 }
@@ -53,27 +53,27 @@ pub(super) fn repeat1(rule: Rule) -> Rule {
     Rule(json!({ "type": "REPEAT1", "content": rule.0 }))
 }
 
-/// A list of at least one element with separators.
+/// Nonempty list of elements with separators.
 pub(super) fn separated(separator: Rule, rule: Rule) -> Rule {
     seq([rule.clone(), repeat(seq([separator, rule]))])
 }
 
-/// A list of at least one element, separated by commas.
+/// Nonempty list, separated by commas.
 pub(super) fn commas(rule: Rule) -> Rule {
     separated(text(","), rule)
 }
 
-/// A list of at least one element, separated by blanks or commas.
+/// Nonempty list, separated by blanks or commas.
 pub(super) fn blanks(rule: Rule) -> Rule {
     separated(optional(text(",")), rule)
 }
 
-/// A part with a field name in its node.
+/// Rule with a field name in its node.
 pub(super) fn field(name: &str, rule: Rule) -> Rule {
     Rule(json!({ "type": "FIELD", "name": name, "content": rule.0 }))
 }
 
-/// A part with another node name in the tree.
+/// Rule with a different node name in the tree.
 pub(super) fn alias(rule: Rule, name: &str) -> Rule {
     Rule(json!({ "type": "ALIAS", "content": rule.0, "named": true, "value": name }))
 }

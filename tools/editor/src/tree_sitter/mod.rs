@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! tree-sitter grammar for colours and folds in editors, generated from the assembler's tables.
 //!
-//! Directives, functions, operators and instructions come from tables. `rules.rs` restates their syntax for tree-sitter, which generates
-//! its own parser; `tests/tree_sitter.rs` compares that parser with `takt-asm`'s.
+//! Directives, functions, operators and instructions come from the tables. `rules.rs` restates their syntax for tree-sitter, which
+//! generates its own parser; `tests/tree_sitter.rs` compares that parser with that of `takt-asm`.
 
 mod build;
 mod queries;
@@ -13,8 +13,8 @@ pub use queries::{folds, helix_highlights, highlights};
 use build::Rule;
 use serde_json::json;
 
-/// Text of `grammar.json`, the input of tree-sitter's parser generator, with a line for each rule: the first is the start symbol, and of
-/// two tokens of equal length the earlier wins.
+/// Text of `grammar.json`, the input of tree-sitter's parser generator, with one rule per line: the first is the start symbol, and of two
+/// tokens of equal length the earlier one takes precedence.
 pub fn grammar_text() -> String {
     let line = |(name, Rule(rule)): &(String, Rule)| format!("    {}: {rule}", json!(name));
     let rules: Vec<String> = rules::rules().iter().map(line).collect();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Highlighting and folding queries over tree-sitter's nodes. Each node is captured once, since editors disagree on the precedence of
+//! Highlighting and folding queries over tree-sitter nodes. Each node is captured once, since editors disagree on the precedence of
 //! captures.
 
 use takt_asm::Directive;

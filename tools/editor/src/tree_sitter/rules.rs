@@ -1,23 +1,23 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Grammar rules: `takt_asm`'s syntax of lines, and the blocks that lines form.
+//! Grammar rules: syntax of lines as in `takt_asm`, and the blocks that lines form.
 //!
-//! tree-sitter's lexer tries only tokens that are valid at a place, the assembler's always takes the longest of all. Where the two differ,
-//! the longer token is added as valid, followed by a token that never matches ([`NEVER`]).
+//! tree-sitter's lexer tries only tokens that are valid at a place, while the assembler's takes the longest of all tokens. Where the two
+//! differ, the longer token is declared valid, but followed by a token that never matches ([`NEVER`]).
 
 use super::build::*;
 use takt_asm::{Directive, Operator};
 
-/// Kind of line: each has its own expressions.
+/// Kind of line. Each kind has its own syntax of expressions.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum In {
-    /// Operations and directives: a bracket after an expression opens a memory operand.
+    /// Operations and directives, in which a bracket after an expression opens a memory operand.
     Line,
-    /// Equations: a bracket after a name opens an array index.
+    /// Equations, in which a bracket after a name opens an array index.
     Equation,
 }
 
 impl In {
-    /// Name of a rule in this kind of line.
+    /// Name of a rule for this kind of line.
     fn name(self, rule: &str) -> String {
         match self {
             In::Line => format!("_line_{rule}"),
@@ -25,7 +25,7 @@ impl In {
         }
     }
 
-    /// A rule of this kind of line, under its common node name in the tree.
+    /// Rule for this kind of line, with the node name that both kinds share.
     fn node(self, rule: &str) -> Rule {
         alias(symbol(self.name(rule)), rule)
     }
@@ -34,30 +34,30 @@ impl In {
         symbol(self.name("expression"))
     }
 
-    /// A name, plain or with braces. Inlined, so that a plain name is the same in both kinds of line.
+    /// A name, with or without braces. Inlined, so that a plain name is the same symbol in both kinds of line.
     fn any_name(self) -> Rule {
         choice([symbol("identifier"), self.node("template")])
     }
 }
 
-/// A token that never matches: all letters and digits, then one more digit.
+/// Token that never matches: all letters and digits, followed by one more digit.
 const NEVER: &str = "_never";
 
 const NEWLINE: &str = "_newline";
 
-/// Conflicts: pairs of rules that only a later token tells apart.
+/// Conflicts: pairs of rules that only a later token distinguishes.
 pub(super) fn conflicts() -> Vec<Vec<String>> {
     let both = |rule: &str| vec![In::Line.name(rule), In::Equation.name(rule)];
     vec![
         // A line that begins with `p[i` or `l{i` may be an equation or an operation.
         both("atom"),
         both("call"),
-        // `t[b` begins an array element, or an offset with a register.
+        // `t[b` starts an array element, or an offset with a register.
         vec!["_line_element".into(), "_line_atom".into()],
     ]
 }
 
-/// Rules inlined at their uses.
+/// Rules that are inlined where they are used.
 pub(super) fn inlined() -> Vec<String> {
     vec!["_label".into()]
 }
@@ -80,13 +80,13 @@ pub(super) fn rules() -> Vec<(String, Rule)> {
     rules
 }
 
-/// Rule name of a directive: `loop_bound_directive`.
+/// Name of a directive's rule, such as `loop_bound_directive`.
 fn directive_rule(directive: Directive) -> String {
     format!("{}_directive", &directive.name()[1..])
 }
 
-/// Operands of a directive with a rule of its own. Excluded are directives that open, divide or close a block, and `.raw`, which stands in
-/// bundles.
+/// Operands of a directive that has its own rule. Directives that open, divide or close a block have none, nor has `.raw`, which occurs
+/// in bundles.
 fn operands(directive: Directive) -> Option<Rule> {
     use Directive::*;
     let expression = || In::Line.expression();
@@ -113,7 +113,7 @@ fn operands(directive: Directive) -> Option<Rule> {
         Include => choice([
             symbol("text"),
             symbol("library"),
-            // `<<` and `<=` are operators, not the beginning of a library file's name.
+            // `<<` and `<=` are operators, and do not start the name of a library file.
             seq([choice([Operator::Shl, Operator::Le].map(|operator| text(operator.text()))), symbol(NEVER)]),
         ]),
         Error => symbol("text"),
@@ -138,7 +138,7 @@ fn operands(directive: Directive) -> Option<Rule> {
 fn lines(add: &mut impl FnMut(&str, Rule)) {
     let end = |directive: Directive| text(directive.name());
     let expression = || In::Line.expression();
-    // Macros are defined at top level or in branches; the bodies of macros and repetitions have rules without them.
+    // Macros are defined at top level or in branches. Bodies of macros and repetitions have separate rules without definitions.
     for (suffix, macros) in [("", true), ("_within", false)] {
         let rule = |name: &str| format!("{name}{suffix}");
         let mut blocks = vec!["_conditional", "_repetition", "_counted_loop"];
@@ -234,7 +234,7 @@ fn lines(add: &mut impl FnMut(&str, Rule)) {
             seq([optional(label), symbol("equation")]),
         ]),
     );
-    // A label without braces is the same before either kind of line.
+    // A label without braces is the same symbol before either kind of line.
     add("_label", choice([symbol("label"), In::Line.node("label")]));
     add("label", seq([field("name", symbol("identifier")), text(":")]));
     for kind in [In::Line, In::Equation] {
@@ -246,7 +246,7 @@ fn lines(add: &mut impl FnMut(&str, Rule)) {
 fn operations(add: &mut impl FnMut(&str, Rule)) {
     let (line, equation) = (In::Line, In::Equation);
     let name = || line.any_name();
-    // Neither `.rawx` nor `.raw` with a name attached is a directive; this holds for every directive.
+    // `.rawx`, or `.raw` joined to a name, is not a directive; the same holds for every directive.
     let unknown = seq([symbol("directive_name"), symbol(NEVER)]);
     let operation = choice([symbol("operation"), symbol("raw_operation"), unknown]);
     add("bundle", separated(symbol("_bars"), operation));
@@ -273,7 +273,7 @@ fn operations(add: &mut impl FnMut(&str, Rule)) {
         ]),
     );
     add("_base_cast", cast(base()));
-    // With one index, a memory operand takes precedence.
+    // A memory operand takes precedence over an array element with one index.
     add(
         &line.name("element"),
         seq([
@@ -310,7 +310,7 @@ fn operations(add: &mut impl FnMut(&str, Rule)) {
     );
 }
 
-/// Expressions of one kind of line.
+/// Rules for expressions in one kind of line.
 fn expressions(kind: In, add: &mut impl FnMut(&str, Rule)) {
     let expression = || kind.expression();
     add(
@@ -340,7 +340,7 @@ fn expressions(kind: In, add: &mut impl FnMut(&str, Rule)) {
         &kind.name("call"),
         seq([field("function", symbol("identifier")), text("("), optional(commas(expression())), text(")")]),
     );
-    // Precedence ascends from the conditional over binary to unary operators; only the power binds tighter.
+    // Precedence ascends from the conditional over binary to unary operators; only the power operator binds tighter.
     let operator = |operator: &Operator| field("operator", text(operator.text()));
     let highest = Operator::Power.precedence();
     add(
@@ -380,7 +380,7 @@ fn expressions(kind: In, add: &mut impl FnMut(&str, Rule)) {
 /// Tokens of the assembler's lexer.
 fn tokens(add: &mut impl FnMut(&str, Rule)) {
     let operators = || Operator::ALL.iter().map(|operator| text(operator.text()));
-    // The name of a library file may consist of any of these tokens.
+    // The name of a library file may contain any of these tokens.
     let tokens = ["identifier", "number", "text", "template_begin", "template_middle", "template_end"];
     let tokens = tokens.into_iter().chain(["directive_name"]).map(|token| alias(symbol(token), "path"));
     let signs = [",", ":", "(", ")", "[", "]", "@", "=", "?"].map(text);
@@ -408,7 +408,7 @@ fn tokens(add: &mut impl FnMut(&str, Rule)) {
                 format!("[0-9][0-9_]*\\.[0-9_]*({exponent})?"),
                 format!("[0-9][0-9_]*{exponent}"),
                 format!("\\.[0-9][0-9_]*({exponent})?"),
-                // At least one digit among the separators.
+                // At least one digit, with any number of separators.
                 format!("0[xX]_*{digit}{digits}"),
                 "0[bB]_*[01][01_]*".to_owned(),
                 format!("0[xX]_*({digit}{digits}(\\.{digits})?|\\._*{digit}{digits})[pP][+-]?[0-9]+"),
@@ -416,7 +416,7 @@ fn tokens(add: &mut impl FnMut(&str, Rule)) {
             .join("|"),
         ),
     );
-    // Declared after `number`: for equal lengths `number` wins.
+    // Declared after `number`, which takes precedence if lengths are equal.
     add("_no_number", pattern("[0-9][0-9A-Za-z_.]*"));
     add(NEVER, seq([symbol("_no_number"), immediate(pattern("[0-9]"))]));
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Random well-formed but meaningless sources from the grammar, and mutations of sources.
+//! Random sources that are well-formed but meaningless, generated from the grammar, and mutations of sources.
 
 #[path = "../../../../asm/tests/random_source/mod.rs"]
 pub(crate) mod random_source;
@@ -13,7 +13,7 @@ const NUMBERS: [&str; 16] = [
     "0", "12", "1_000", "0x1f", "0xF_", "0b1_0", "2.", ".5", "0.25e-6", "1e3", "1_.5", "0x1.8p-3", "0x.8P+1",
     "0x1p0", "0x_1", "7_e+1",
 ];
-/// Tokens of every kind, and some invalid ones.
+/// Tokens of every kind, including invalid ones.
 const TOKENS: [&str; 66] = [
     "a",
     "fadd",
@@ -83,7 +83,7 @@ const TOKENS: [&str; 66] = [
     "\u{c}",
 ];
 
-/// Context of an expression: decides whether array elements are allowed.
+/// Context of an expression, which decides whether array elements are allowed.
 #[derive(Clone, Copy, PartialEq)]
 enum In {
     Line,
@@ -101,14 +101,14 @@ impl Writer<'_> {
         self.random.below(of) == 0
     }
 
-    /// Writes a token, sometimes with optional blanks around it.
+    /// Writes a token, sometimes surrounded by optional blanks.
     fn put(&mut self, token: &str) {
         let word = |c: char| c.is_ascii_alphanumeric() || "_.{}".contains(c);
         let joins = |a: Option<char>, b: Option<char>| match (a, b) {
             (Some(a), Some(b)) => word(a) && word(b) || "<>=!|/".contains(a) && "<>=|/".contains(b),
             _ => false,
         };
-        // Inside a name with braces, no blank may follow the closing brace.
+        // Inside a name with braces, no blank may follow a closing brace.
         if joins(self.text.chars().last(), token.chars().next()) || self.chance(3) {
             let blank = self.random.pick(&[" ", " ", "  ", "\t", "\u{c}"]);
             self.text.push_str(blank);
@@ -208,7 +208,7 @@ impl Writer<'_> {
         self.put(token);
     }
 
-    /// Array indices, in some of the cases.
+    /// Writes array indices, in some of the cases.
     fn indices(&mut self) {
         if self.chance(3) {
             self.put("[");
@@ -351,7 +351,7 @@ impl Writer<'_> {
         }
     }
 
-    /// A directive with its operands; a block directive with its whole block.
+    /// Writes a directive with its operands; a block directive, with the whole block.
     fn directive(&mut self, within: bool, depth: u32) {
         use Directive::*;
         let choice = Directive::ALL[self.random.below(Directive::ALL.len() as u64) as usize];
@@ -478,7 +478,7 @@ impl Writer<'_> {
         }
     }
 
-    /// End of the opening line, the block's lines, and optionally a label before the closing directive.
+    /// Writes the end of the opening line, the lines of the block, and optionally a label before the closing directive.
     fn body(&mut self, within: bool, depth: u32) {
         self.put("\n");
         self.lines(within, depth - 1);
@@ -517,7 +517,7 @@ impl Writer<'_> {
     }
 }
 
-/// Lines that the assembler's parser accepts.
+/// Random lines that the assembler's parser accepts.
 pub(crate) fn valid(random: &mut Random) -> String {
     let mut writer = Writer { random, text: String::new() };
     if writer.chance(20) {
@@ -530,7 +530,7 @@ pub(crate) fn valid(random: &mut Random) -> String {
     writer.text
 }
 
-/// A text with one or two random mutations: a token deleted, doubled, replaced or inserted.
+/// Text after one or two random mutations: a token is deleted, doubled, replaced or inserted.
 pub(crate) fn mutated(random: &mut Random, text: &str) -> String {
     let mut text = text.to_owned();
     for _ in 0..1 + random.below(2) {
@@ -549,7 +549,7 @@ pub(crate) fn mutated(random: &mut Random, text: &str) -> String {
             3 => text.insert_str(range.start, &format!(" {new} ")),
             4 => text.replace_range(range, &other),
             5 => text.insert_str(range.start, &other),
-            // Two tokens merge, or two lines.
+            // Merge two tokens or two lines.
             _ => {
                 let blanks = text[range.end..].len() - text[range.end..].trim_start().len();
                 text.replace_range(range.end..range.end + blanks, "");

@@ -1,18 +1,18 @@
-// The view beside the source: which document it shows, and what is said between the two.
+// View beside the source: the document that it shows, and the messages between view and extension.
 import * as vscode from 'vscode';
 import { page } from './page';
 import { fromView, kept, type Pipeline, type ToView } from './pipeline';
 
-/** Milliseconds from a change of the text to a new question about lines that have moved. */
+/** Milliseconds from a change of the text to a new request, since lines may have moved. */
 const PAUSE = 200;
 
-/** Asks the language server for a document's picture. */
+/** Requests the pipeline diagram of a document from the language server. */
 export type Ask = (document: vscode.Uri) => Promise<Pipeline | null>;
 
-/** The kind of view, as VS Code keeps it. */
+/** Type of the view, under which VS Code restores it. */
 const VIEW = 'takt.pipeline';
 
-/** A document, and where the editor is that shows it. */
+/** A document, and the editor column that shows it. */
 interface Shown { document: vscode.TextDocument; viewColumn?: vscode.ViewColumn | undefined; selection?: vscode.Selection }
 
 export class Beside implements vscode.Disposable, vscode.WebviewPanelSerializer {
@@ -29,7 +29,7 @@ export class Beside implements vscode.Disposable, vscode.WebviewPanelSerializer 
       vscode.window.onDidChangeTextEditorSelection(({ textEditor }) => {
         if (textEditor === this.shown) this.follow();
       }),
-      // An included file that is wrong makes the picture old, and one that is mended makes it new.
+      // A mistake in an included file makes the diagram stale; correcting it makes the diagram current.
       vscode.languages.onDidChangeDiagnostics(() => this.later()),
       vscode.window.registerWebviewPanelSerializer(VIEW, this),
       vscode.workspace.onDidChangeTextDocument(({ document }) => {
@@ -50,14 +50,14 @@ export class Beside implements vscode.Disposable, vscode.WebviewPanelSerializer 
     await this.show(editor);
   }
 
-  /** Fills the view that was open when the window was closed or loaded again. */
+  /** Restores the view that was open when the window was closed or reloaded. */
   async deserializeWebviewPanel(panel: vscode.WebviewPanel, state: unknown) {
     const document = kept(state);
     try {
       const uri = document === undefined ? undefined : vscode.Uri.parse(document);
       if (uri) this.shown = this.editor(uri) ?? { document: await vscode.workspace.openTextDocument(uri) };
     } catch {
-      // The document is gone: the view shows that of the next editor.
+      // The document no longer exists: show that of the next editor.
     }
     this.fill(panel);
   }
@@ -66,7 +66,7 @@ export class Beside implements vscode.Disposable, vscode.WebviewPanelSerializer 
     return vscode.window.visibleTextEditors.find((one) => one.document.uri.toString() === document.toString());
   }
 
-  /** The view asks for its picture when it is ready. */
+  /** Loads the page of the view, which requests its diagram when it is ready. */
   private fill(panel: vscode.WebviewPanel) {
     const resources = vscode.Uri.joinPath(this.folder, 'dist');
     const { webview } = panel;
@@ -78,7 +78,7 @@ export class Beside implements vscode.Disposable, vscode.WebviewPanelSerializer 
     webview.html = page(script.toString(), webview.cspSource);
   }
 
-  /** The server has counted a program anew. */
+  /** Called when the server has counted a program's cycles again. */
   counted() {
     this.later();
   }
@@ -97,9 +97,9 @@ export class Beside implements vscode.Disposable, vscode.WebviewPanelSerializer 
     try {
       picture = await this.ask(document.uri);
     } catch {
-      // The server has not read the document yet, or is gone, which the client tells.
+      // The server has not read the document yet; or it has ended, which the client reports.
     }
-    // Another document may be shown by now.
+    // The view may show another document by now.
     if (this.shown !== editor || !this.panel) return;
     const stale = version !== document.version || picture?.current === false;
     this.send({ type: 'picture', document: document.uri.toString(), picture, stale });

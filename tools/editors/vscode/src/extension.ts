@@ -1,5 +1,4 @@
-// Takt in VS Code: `takt lsp` and `takt dap`, started and asked, and the view of the pipeline. What there is to know of the
-// language, they know.
+// Takt in VS Code: starts `takt lsp` and `takt dap`, and shows the pipeline view. All knowledge of the language is in these two.
 import * as vscode from 'vscode';
 import { LanguageClient } from 'vscode-languageclient/node';
 import { Beside } from './beside';
@@ -25,7 +24,7 @@ async function start() {
     { command: program, args: ['lsp', ...options] },
     {
       documentSelector: [{ language: 'takt' }],
-      // The problem matcher's owner: what a task says of a file makes way for what the server says of it, and is not said twice.
+      // Owner of the problem matcher: diagnostics of the server replace those of a task for the same file, so that none appears twice.
       diagnosticCollectionName: 'takt',
       synchronize: { fileEvents: vscode.workspace.createFileSystemWatcher('**/*.s') },
     },
@@ -58,7 +57,7 @@ async function restart() {
   await start();
 }
 
-/** Asks for a number and sends it to the session that is debugged. */
+/** Asks the user for a number, and sends it to the active debug session. */
 function goTo(what: 'cycle' | 'period') {
   return async () => {
     const session = vscode.debug.activeDebugSession;
@@ -100,7 +99,7 @@ const tasks: vscode.TaskProvider = {
 };
 
 const configurations: vscode.DebugConfigurationProvider = {
-  // Without a launch.json: the file at hand.
+  // Without a launch.json, debug the file in the active editor.
   resolveDebugConfiguration(_, configuration) {
     if (configuration.type) return configuration;
     const document = vscode.window.activeTextEditor?.document;

@@ -1,7 +1,7 @@
-// The page of the view.
+// HTML page of the view.
 import STYLE from '../../../../emu/analysis/src/pipeline.css';
 
-// The picture's colours are those of the editor; what a theme is for it, VS Code says and not the system.
+// Use the editor's colours; VS Code's theme, not the system's, decides between light and dark.
 const THEME = `
 :root { --bg: var(--vscode-editor-background); --fg: var(--vscode-foreground); --dim: var(--vscode-descriptionForeground); --edge: var(--vscode-panel-border); --panel: var(--vscode-editorWidget-background); --accent: var(--vscode-focusBorder); --select: var(--vscode-editor-selectionBackground); }
 body { padding: 0; margin: 0; height: 100vh; display: flex; flex-direction: column; color: var(--fg); background: var(--bg); font: 12px var(--vscode-font-family, sans-serif); }
@@ -9,7 +9,7 @@ body { padding: 0; margin: 0; height: 100vh; display: flex; flex-direction: colu
 body.vscode-light .tp { --crit:#d6115c; --run-l:78%; --issue-l:46%; } body.vscode-dark .tp { --crit:#ff5c98; --run-l:30%; --issue-l:60%; }
 `;
 
-/** The page; `script` is where its script can be loaded from, `source` what the policy allows it from. */
+/** HTML page of the view; `script` is the URL of its script, `source` the origin from which the policy allows scripts. */
 export function page(script: string, source: string): string {
   const policy = `default-src 'none'; style-src 'unsafe-inline'; script-src ${source}`;
   return `<!doctype html>

@@ -1,30 +1,30 @@
-// The picture of the pipeline as data: what the language server answers to `takt/pipeline`, what the view and the
-// extension say to one another, and where things stand. Nothing here knows VS Code or a page.
+// Pipeline diagram as data: the language server's response to `takt/pipeline`, the messages between view and extension, and functions on
+// them. Independent of VS Code and of the page.
 
-/** Cycles in which nothing issued, before a bundle. */
+/** Cycles before a bundle in which nothing issued. */
 export interface Stall { cause: string; cycles: number; text: string }
 
 export interface Operation {
   slot: string;
   unit: string;
   text: string;
-  /** Cycles to the result; none if it has none. */
+  /** Latency in cycles; null for an operation without a result. */
   latency: number | null;
-  /** It is on the longest chain of its straight line of code. */
+  /** The operation is on the longest dependence chain of its straight-line block. */
   critical: boolean;
-  /** Index of its file, and its line there, from 0. */
+  /** Index of the operation's file, and the line number in it, from 0. */
   file: number | null;
   line: number | null;
-  /** File and line as people name them. */
+  /** File and line for display. */
   place?: string | undefined;
 }
 
-/** What a bundle waited for: indices of bundles, and slots where one operation is the reason. */
+/** Reason why a bundle waited: indices of bundles, and slots if a single operation is the reason. */
 export interface Link { from: number; to: number; from_slot: string | null; to_slot: string | null; cycles: number; text: string }
 
 export interface Bundle {
   address: number;
-  /** Where its cycles count from. */
+  /** Point from which the cycles are counted: a section, a label, or a bundle. */
   from: string;
   cycle: number;
   stalls: Stall[];
@@ -33,37 +33,37 @@ export interface Bundle {
 
 export interface Pipeline {
   machine: string;
-  /** No source of the program, included files too, has changed since. */
+  /** No source of the program, including included files, has changed since. */
   current: boolean;
-  /** The cycles of each section in words, those of periods first. */
+  /** Cycles of each section as text, periods first. */
   sections: string[];
   files: (string | null)[];
   bundles: Bundle[];
   chain: Link[];
-  /** Bundles that are not shown. */
+  /** Number of bundles left out. */
   more: number;
 }
 
-/** What the extension tells the view. */
+/** Messages from the extension to the view. */
 export type ToView =
   | { type: 'picture'; document: string; picture: Pipeline | null; stale: boolean }
   | { type: 'cursor'; document: string; lines: [number, number] };
 
-/** What VS Code keeps of a view when its window is loaded again. */
+/** State of a view that VS Code restores when its window is reloaded. */
 export interface Kept { document: string }
 
-/** The document of a view that was kept, if it is what a view keeps. */
+/** Document in a view's restored state; undefined if the state is not that of a view. */
 export function kept(state: unknown): string | undefined {
   const document = typeof state === 'object' && state !== null ? (state as Record<string, unknown>).document : undefined;
   return typeof document === 'string' ? document : undefined;
 }
 
-/** What the view tells the extension. */
+/** Messages from the view to the extension. */
 export type FromView =
   | { type: 'ready' }
   | { type: 'reveal'; uri: string; line: number };
 
-/** A message of the view, if it is one. */
+/** Validates a message from the view. */
 export function fromView(message: unknown): FromView | undefined {
   if (typeof message !== 'object' || message === null) return undefined;
   const { type, uri, line } = message as Record<string, unknown>;
@@ -74,14 +74,14 @@ export function fromView(message: unknown): FromView | undefined {
   return undefined;
 }
 
-/** Whether an operation comes from some lines of a document, both ends included. */
+/** Whether an operation comes from a range of lines in a document, both ends included. */
 export function comesFrom(picture: Pipeline, operation: Operation, document: string, lines: [number, number]): boolean {
   if (operation.file === null || operation.line === null) return false;
   const here = sameDocument(picture.files[operation.file] ?? '', document);
   return here && operation.line >= lines[0] && operation.line <= lines[1];
 }
 
-/** Whether two URIs name one file: editors differ in which characters they escape. */
+/** Whether two URIs denote the same file: editors differ in which characters they escape. */
 export function sameDocument(a: string, b: string): boolean {
   const plain = (uri: string) => {
     try {
@@ -93,7 +93,7 @@ export function sameDocument(a: string, b: string): boolean {
   return plain(a) === plain(b);
 }
 
-/** A picture as it is drawn: operations with their places, as people name them. */
+/** Adds places for display to the operations of a diagram. */
 export function named(picture: Pipeline): Pipeline {
   const file = (index: number) => decodeURIComponent(picture.files[index] ?? '').replace(/^.*\//, '') || '?';
   const place = (one: Operation) => (one.file === null || one.line === null ? undefined : `${file(one.file)}:${one.line + 1}`);
@@ -105,7 +105,7 @@ export function plural(number: number, noun: string): string {
   return `${number} ${noun}${number === 1 ? '' : 's'}`;
 }
 
-/** What the status bar says of a program: the first period, and all sections to whoever points at it. */
+/** Text for a program in the status bar: the first period; as tooltip, all sections. */
 export function inStatus(picture: Pipeline | null): { text: string; more: string } {
   if (!picture?.sections.length) return { text: '$(graph) Takt', more: 'The cycles are not counted: the program does not assemble, or has no bound' };
   const { current, machine, sections } = picture;

@@ -1,9 +1,9 @@
-// The cycles of the program at hand in the status bar; a click shows its pipeline.
+// Cycles of the active editor's program in the status bar; a click opens the pipeline view.
 import * as vscode from 'vscode';
 import type { Ask } from './beside';
 import { inStatus } from './pipeline';
 
-/** Milliseconds from a change to a new question. */
+/** Milliseconds from a change to a new request. */
 const PAUSE = 300;
 
 export class Status implements vscode.Disposable {
@@ -18,13 +18,13 @@ export class Status implements vscode.Disposable {
       this.item,
       vscode.window.onDidChangeActiveTextEditor(() => this.update()),
       vscode.workspace.onDidChangeTextDocument(({ document }) => { if (document.languageId === 'takt') this.later(); }),
-      // A mistake in an included file, too.
+      // A mistake may also be in an included file.
       vscode.languages.onDidChangeDiagnostics(() => this.later()),
     );
     this.later();
   }
 
-  /** Something has changed, or the server has counted a program. */
+  /** Called when something has changed, or when the server has counted a program's cycles. */
   later() {
     clearTimeout(this.timer);
     this.timer = setTimeout(() => void this.update(), PAUSE);
@@ -34,7 +34,7 @@ export class Status implements vscode.Disposable {
     const document = vscode.window.activeTextEditor?.document;
     if (document?.languageId !== 'takt') return this.item.hide();
     const { text, more } = inStatus(await this.ask(document.uri).catch(() => null));
-    // Another document may be at hand by now.
+    // Another document may be active by now.
     if (vscode.window.activeTextEditor?.document !== document) return;
     this.item.text = text;
     this.item.tooltip = more;

@@ -1,12 +1,12 @@
-// Tasks: what `takt` does with the source at hand.
+// Tasks: commands of `takt` on a source.
 
-/** What a task of this type says. */
+/** Definition of a task of this type. */
 export interface Definition { type: 'takt'; command: string; file: string; arguments?: string[] }
 
-/** The commands that are offered for a source. */
+/** Commands that are offered for a source. */
 export const COMMANDS = ['asm', 'bound', 'analyse', 'run'] as const;
 
-/** The words of a task's command line, or what is wrong with it. */
+/** Words of a task's command line, or an error message. */
 export function words(program: string, definition: Partial<Definition>): string[] | string {
   const { command, file, arguments: more } = definition;
   if (typeof command !== 'string' || !/^[a-z][a-z-]*$/.test(command)) return '`command` is what `takt` is to do, as `asm`';

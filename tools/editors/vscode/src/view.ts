@@ -1,5 +1,5 @@
-// The script of the view: the picture that the playground and `takt analyse --html` draw, for the document beside it. It marks what
-// the cursor is on, and says which operation was clicked.
+// Script of the view: shows the diagram that the playground and `takt analyse --html` draw, for the document in the editor. Marks
+// operations at the cursor, and reports clicks on operations.
 import { Pipeline as Picture } from '../../../../emu/analysis/src/pipeline.js';
 import { comesFrom, named, plural, type FromView, type Kept, type Operation, type Pipeline, type ToView } from './pipeline';
 
@@ -15,14 +15,14 @@ const drawing = new Picture<Operation>(element('picture'), (operation) => {
   if (uri && operation.line !== null) api.postMessage({ type: 'reveal', uri, line: operation.line });
 });
 
-/** Marks the operations of the lines that the cursor is on, and with `show` brings the first into sight. */
+/** Marks operations whose lines the cursor is on; with `show`, scrolls to the first. */
 function mark(show: boolean) {
   drawing.mark((operation) => !!picture && !!cursor && comesFrom(picture, operation, cursor.document, cursor.lines), show);
 }
 
 window.addEventListener('message', ({ data }: MessageEvent<ToView>) => {
   if (data.type === 'picture') {
-    // When the window is loaded again, the extension shows this document here.
+    // After a reload of the window, the extension shows this document again.
     api.setState({ document: data.document });
     picture = data.picture && named(data.picture);
     const more = picture?.more ? `; ${plural(picture.more, 'bundle')} more` : '';

@@ -1,4 +1,4 @@
-// package.json against the sources: what it names is there, and every command has code.
+// package.json compared with the sources: files that it names exist, and every command is implemented.
 import assert from 'node:assert/strict';
 import { existsSync, readFileSync } from 'node:fs';
 import { test } from 'node:test';

@@ -1,4 +1,4 @@
-// The picture's data: rows, columns, what the cursor and a click mean.
+// Data of the diagram: rows, columns, and the effects of cursor and clicks.
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { explain, layout, stalls } from '../../../../emu/analysis/src/pipeline.js';
@@ -19,7 +19,7 @@ const picture: Pipeline = {
     bundle('once', 3, []),
     bundle('period', 1, [operation(4, null)]),
     bundle('period', 6, [operation(4, 3), operation(9, 1, 1)], [{ cause: 'operand', cycles: 4, text: 'x of bundle 2' }]),
-    // A second stretch of the same name begins anew.
+    // A second stretch with the same name starts anew.
     bundle('period', 1, [operation(null, 1, null)]),
   ],
   chain: [],

@@ -1,4 +1,4 @@
-// Command lines of tasks.
+// Command lines of tasks, and errors in their definitions.
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { words } from '../src/tasks';

@@ -1,4 +1,4 @@
-// The view's own script in a real browser: it draws, marks what the cursor is on, and tells what is clicked.
+// The view's own script in a real browser: it draws, marks operations at the cursor, and reports clicks.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
 import { mkdtempSync, rmSync, writeFileSync } from 'node:fs';
@@ -25,7 +25,7 @@ const picture: Pipeline = {
   more: 2,
 };
 
-// What stands in for VS Code: it collects what the view says, and speaks to it once it is ready.
+// Stand-in for VS Code: collects messages of the view, and sends messages once the view is ready.
 const host = `
 const said = [];
 window.acquireVsCodeApi = () => ({ postMessage: (message) => { said.push(message); if (message.type === 'ready') queueMicrotask(speak); }, setState: (state) => (document.body.dataset.kept = state.document) });

@@ -1,5 +1,5 @@
-// The extension in VS Code's own workbench, in a browser: `cargo xtask extension --workbench`. The workbench and its extension host
-// are those of the package code-server; of its native modules there is only the terminal's, which tasks run in.
+// The extension in VS Code's workbench, in a browser: `cargo xtask extension --workbench`. Workbench and extension host come from the
+// package code-server; of its native modules only the terminal's is present, in which tasks run.
 import assert from 'node:assert/strict';
 import { spawn, execFileSync } from 'node:child_process';
 import { cpSync, mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
@@ -12,7 +12,7 @@ const HERE = import.meta.dirname;
 const SERVER = join(HERE, 'node_modules/code-server/lib/vscode');
 const PACKAGE = join(HERE, '../dist/takt.vsix');
 const { TAKT, TAKT_SCREENSHOTS: SHOTS } = process.env;
-/** A browser on a busy machine; ms. */
+/** Time limit in a browser on a busy machine; ms. */
 const PATIENCE = 120_000;
 const limit = { timeout: 5 * PATIENCE };
 
@@ -43,7 +43,7 @@ function folders(name) {
   return ['--accept-server-license-terms', '--extensions-dir', join(folder, 'extensions'), '--server-data-dir', join(folder, name)];
 }
 
-/** A workbench on the project, with `takt` as its settings name it. */
+/** Opens a workbench on the project, with `takt` as the executable in its settings. */
 async function open(name, takt) {
   const machine = join(folder, name, 'data/Machine');
   mkdirSync(machine, { recursive: true });
@@ -76,7 +76,7 @@ async function shot(page, name) {
   await page.screenshot({ path: join(SHOTS, `vscode-${name}.png`) });
 }
 
-/** A part of a test, whose failure leaves a picture. */
+/** Runs a part of a test; takes a screenshot if it fails. */
 async function part(t, page, name, body) {
   await t.test(name, limit, async () => {
     try {
@@ -95,7 +95,7 @@ async function command(page, title) {
   await pick(page, title);
 }
 
-/** Types into the box that is open, and takes what stands first once that is what was meant: lists come late. */
+/** Types into the open box, and accepts the first entry once it matches; lists are filled late. */
 async function pick(page, text) {
   await page.keyboard.type(text);
   await page.locator('.quick-input-list .monaco-list-row.focused', { hasText: text }).waitFor();
@@ -104,9 +104,9 @@ async function pick(page, text) {
   await page.keyboard.press('Enter');
 }
 
-/** Puts the cursor at the beginning of a line. */
+/** Moves the cursor to the beginning of a line. */
 async function goTo(page, line) {
-  // The first group of editors has the source, whatever had the focus.
+  // The first editor group shows the source, wherever the focus was.
   await page.keyboard.press('Control+1');
   await page.keyboard.press('Control+g');
   await page.keyboard.type(`${line}`);
@@ -114,7 +114,7 @@ async function goTo(page, line) {
   await page.keyboard.press('Home');
 }
 
-/** Opens a file of the project by its name, with the cursor at its beginning. */
+/** Opens a file of the project by name, with the cursor at its beginning. */
 async function openFile(page, name) {
   await page.keyboard.press('Control+1');
   await page.locator('.explorer-folders-view .monaco-list-row', { hasText: name }).dblclick();
@@ -124,7 +124,7 @@ async function openFile(page, name) {
 
 const source = () => readFileSync(join(folder, 'project/pi.s'), 'utf8');
 const LINES = readFileSync(join(HERE, '../../../../programs/examples/pi.s'), 'utf8').split('\n');
-/** The first operation of the period, from 1. */
+/** Line number of the first operation in the period, from 1. */
 const FIRST = LINES.findIndex((line) => /^\s+fsub\s+e,/.test(line)) + 1;
 
 test('a server that does not start is told with the reason', limit, async () => {
@@ -148,14 +148,14 @@ test('cycles, a mistake and its fix, the pipeline beside the source, the debugge
     await page.keyboard.type('x');
     await page.waitForSelector('.squiggly-error');
     const fix = page.locator('.action-widget .monaco-list-row', { hasText: 'write `fsub`' });
-    // Asked for while the diagnostic is on its way, there is none yet.
+    // While the diagnostic is still on its way, no fix is offered.
     for (let asked = 0; asked < 10 && !(await fix.isVisible()); asked++) {
       await page.keyboard.press('Escape');
       await page.keyboard.press('Control+.');
       await page.waitForTimeout(2000);
     }
     await shot(page, 'fix');
-    // By the keyboard: a menu of VS Code's keeps the mouse off for a while.
+    // Use the keyboard: menus of VS Code ignore the mouse for a while.
     await page.keyboard.press('Enter');
     await page.locator('.view-line', { hasText: 'xfsub' }).waitFor({ state: 'detached' });
     await page.keyboard.press('Control+s');
@@ -178,7 +178,7 @@ test('cycles, a mistake and its fix, the pipeline beside the source, the debugge
   });
   await part(t, page, 'the status bar has the cycles, and the view comes back with the window', async () => {
     await page.locator('.statusbar-item', { hasText: 'period: 38 cycles, bound 38' }).waitFor();
-    // As people do it: VS Code keeps what is open when it ends.
+    // Reload the window as users do; VS Code restores what was open.
     await Promise.all([page.waitForEvent('load'), command(page, 'Developer: Reload Window')]);
     const picture = page.frameLocator('iframe.webview').frameLocator('#active-frame');
     await picture.locator('div[data-row]', { hasText: 'fsub e, w_ref, w' }).waitFor();
@@ -198,7 +198,7 @@ test('cycles, a mistake and its fix, the pipeline beside the source, the debugge
     await openFile(page, 'whole.s');
     const picture = page.frameLocator('iframe.webview').frameLocator('#active-frame');
     const note = (text) => picture.locator('#note', { hasText: text });
-    // It has been counted, and the picture is its own.
+    // The program has been counted, and the diagram belongs to it.
     await note('13 bundles on t3').waitFor();
     await openFile(page, part);
     await page.keyboard.type('x');
@@ -240,11 +240,11 @@ test('tasks, the problem matcher, snippets, the walkthrough', limit, async (t) =
   const assemble = { label: 'assemble the wrong one', type: 'takt', command: 'asm', file: 'wrong.s', problemMatcher: '$takt' };
   writeFileSync(join(folder, 'project/.vscode/tasks.json'), JSON.stringify({ version: '2.0.0', tasks: [assemble] }));
   const page = await open('tasks', TAKT);
-  // The extension is there when the cycles are.
+  // The extension is active once the cycles appear.
   await page.locator('.codelens-decoration', { hasText: 'period: 38 cycles' }).waitFor();
   const task = async (name) => {
     await page.keyboard.press('Control+p');
-    // First the kind of task, then the task.
+    // First select the type of the task, then the task.
     await page.keyboard.type('task takt');
     await page.locator('.quick-input-list .monaco-list-row.focused', { hasText: 'takt' }).waitFor();
     await page.keyboard.press('Enter');
@@ -263,7 +263,7 @@ test('tasks, the problem matcher, snippets, the walkthrough', limit, async (t) =
     await shot(page, 'task');
   });
   await part(t, page, 'what a task complains of stands among the problems, at its place', async () => {
-    // Of a file that is not open the language server says nothing: what is told is the task's.
+    // The language server does not report on a file that is not open, so the diagnostic is the task's.
     await page.keyboard.press('Control+p');
     await page.keyboard.type('task assemble');
     await page.locator('.quick-input-list .monaco-list-row.focused', { hasText: assemble.label }).waitFor();
@@ -275,7 +275,7 @@ test('tasks, the problem matcher, snippets, the walkthrough', limit, async (t) =
     await shot(page, 'problems');
     await problem.dblclick();
     await page.locator('.statusbar-item', { hasText: 'Ln 2,' }).waitFor();
-    // The file is open now: the language server says the same of it, in place of the task, also when the task runs again.
+    // The file is now open: the language server's diagnostic replaces the task's, even when the task runs again.
     await page.locator('.view-line', { hasText: 'fad' }).first().waitFor();
     await page.waitForTimeout(3000);
     assert.equal(await problem.count(), 1, 'it stands once');

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Figures of units, and their merger, which depends on the results alone and not on their order.
+//! Figures of units, and their merger, which depends only on the results and not on their order.
 
 use crate::campaign::plan::Plan;
 use anyhow::{Context, Result, bail};
@@ -12,18 +12,18 @@ use std::ops::Range;
 const LINE: &str = "figures: ";
 /// Reported quantiles, in percent.
 const QUANTILES: [f64; 6] = [5.0, 25.0, 50.0, 75.0, 95.0, 99.0];
-/// Number of extreme values listed at each end.
+/// Number of extreme values listed at each end of a distribution.
 const LISTED: usize = 5;
 
 /// A figure of a unit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 enum Figure {
-    /// Counted things; added in a merger.
+    /// A count; a merger adds counts.
     Count(u64),
-    /// Values with the seeds that they come from.
+    /// Values, each with its seed.
     Values(Vec<(u64, f64)>),
-    /// Set of names that occurred.
+    /// Set of names that occurred; a merger forms the union.
     Names(BTreeSet<String>),
 }
 
@@ -32,7 +32,7 @@ enum Figure {
 pub(super) struct Figures(BTreeMap<String, Figure>);
 
 impl Figures {
-    /// Figures with a single count.
+    /// Figures that consist of one count.
     pub(super) fn count(name: &str, count: u64) -> Figures {
         let mut figures = Figures::default();
         figures.add(name, Figure::Count(count));
@@ -61,16 +61,16 @@ impl Figures {
     }
 }
 
-/// Result file of a unit.
+/// Contents of a unit's result file.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Outcome {
     pub(super) figures: Figures,
-    /// CPU time in s, and the host: for the track record, not for the report.
+    /// CPU time in seconds, and host: for the track record, not for the report.
     pub(super) seconds: Option<f64>,
     pub(super) host: String,
 }
 
-/// Figures in a program's output; `None` without a line of figures.
+/// Parses the figures in a program's output; `None` without a line of figures.
 pub(super) fn of_output(output: &str) -> Option<Figures> {
     let mut figures = None;
     // libtest prints a test's name and its first output on the same line.
@@ -93,12 +93,12 @@ pub(super) fn of_output(output: &str) -> Option<Figures> {
     figures
 }
 
-/// Merged results of several units.
+/// Merged results of all finished units.
 #[derive(Debug, Default)]
 pub(super) struct MergedResults {
     /// Number of finished units.
     pub(super) units: u64,
-    /// CPU time in s with the number of units that report it, and the hosts.
+    /// CPU time in seconds, with the number of units that report it, and the hosts.
     pub(super) seconds: f64,
     pub(super) timed: u64,
     pub(super) hosts: BTreeSet<String>,
@@ -106,7 +106,7 @@ pub(super) struct MergedResults {
 }
 
 impl MergedResults {
-    /// Merges the results that exist.
+    /// Merges the results that exist so far.
     pub(super) fn of(plan: &Plan, units: Range<u64>) -> Result<MergedResults> {
         let mut merged = MergedResults::default();
         for unit in units {
@@ -151,7 +151,7 @@ impl MergedResults {
         text
     }
 
-    /// Counts and extremes in one line, for the track record.
+    /// Counts and extremes on one line, for the track record.
     pub(super) fn summary(&self) -> String {
         let figure = |(name, figure): (&String, &Figure)| {
             let name = name.replace('_', " ");
@@ -175,7 +175,7 @@ fn sorted(values: &[(u64, f64)]) -> Vec<(u64, f64)> {
     sorted
 }
 
-/// Quantile of ascending values by nearest rank.
+/// Nearest-rank quantile of ascending values.
 fn quantile(sorted: &[(u64, f64)], percent: f64) -> Option<(u64, f64)> {
     let rank = (percent / 100.0 * sorted.len() as f64).ceil() as usize;
     sorted.get(rank.max(1) - 1).copied()
@@ -231,7 +231,7 @@ mod tests {
         assert_eq!(of_output("test result: ok\n"), None);
     }
 
-    /// Units that end in a different order give the same report.
+    /// The order in which units end does not affect the report.
     #[test]
     fn the_order_of_results_does_not_show() {
         let units: Vec<Figures> = (0..40)

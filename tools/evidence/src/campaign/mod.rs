@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The command `cargo evidence campaign`: long tests and measurements, divided into units of fixed size that run here or on other
-//! computers.
+//! The command `cargo evidence campaign`: long tests and measurements, divided into units of fixed size that run on this computer or on
+//! others.
 //!
 //! A campaign's folder, `target/campaigns/NAME-HASH`, contains copies of the programs, `plan.json`, and one result per unit. The hash
-//! covers all inputs of the results: other programs start another folder, and an interrupted run resumes. The report is a function of the
-//! results, sorted by unit, without times and hosts; those are in `runs.jsonl`.
+//! covers everything that affects the results: changed programs start another folder, and an interrupted run resumes. The report depends
+//! only on the results, sorted by unit; times and hosts are in `runs.jsonl`.
 
 mod figures;
 mod outputs;
@@ -28,11 +28,11 @@ use takt_automation::progress;
 use takt_automation::venv::Venv;
 use takt_work::{Client, Cluster, Event, Failure, HYPERQUEUE, Place, Unit};
 
-/// Maximal number of units in a campaign.
+/// Maximum number of units in a campaign.
 const MOST: u64 = 1_000_000;
 /// Number of failed units whose messages a report shows.
 const SHOWN: usize = 5;
-/// Interval between progress lines when standard error is no terminal.
+/// Interval between progress lines when standard error is not a terminal.
 const QUIET: Duration = Duration::from_secs(60);
 
 #[derive(clap::Args)]
@@ -83,7 +83,7 @@ pub(crate) struct Queue {
     workers: Option<u16>,
 }
 
-/// Parses a range of units, for clap.
+/// Parses a range of units, as a value parser for clap.
 fn units(text: &str) -> Result<Range<u64>, String> {
     let number = |text: &str| text.parse::<u64>().map_err(|_| format!("`{text}` is no number of a unit"));
     let range = match text.split_once("..") {
@@ -185,7 +185,7 @@ fn run(arguments: &Arguments, campaign: &Campaign, plan: &Plan, todo: &[Unit]) -
         return Ok(Vec::new());
     }
     let jobs = arguments.jobs.map_or(cores(), usize::from);
-    // Workers that are started here end with the run.
+    // Workers started here end with the run.
     let (place, _cluster) = if arguments.hq || arguments.hq_server.is_some() {
         ensure!(campaign.jobs().is_none(), "units of {} run one after the other, here", campaign.name);
         Place::queue(hyperqueue()?, arguments.hq_server.as_deref(), &plan.folder().join("server"), jobs)?
@@ -194,7 +194,7 @@ fn run(arguments: &Arguments, campaign: &Campaign, plan: &Plan, todo: &[Unit]) -
     };
     let mut progress = Progress::new(campaign.name, left);
     let mut failures = Vec::new();
-    // The first unit compiles shared files for all others.
+    // The first unit compiles files that all others use.
     let (first, others) = todo.split_at(usize::from(campaign.compiles));
     for part in [first, others] {
         progress.base = progress.done;
@@ -209,7 +209,7 @@ struct Progress {
     name: &'static str,
     bar: ProgressBar,
     count: u64,
-    /// Number of units finished in earlier calls.
+    /// Number of units finished in earlier runs.
     base: u64,
     done: u64,
     begin: Instant,
@@ -284,7 +284,7 @@ fn report(
     text
 }
 
-/// HyperQueue on `PATH`; else the package in the environment, where its installation is announced.
+/// HyperQueue on `PATH`, or else the package in the environment; announces an installation.
 fn hyperqueue() -> Result<Client> {
     let client = Client::find(|| anyhow::Ok(Venv::with(&[HYPERQUEUE])?.tool("python3")))?;
     eprintln!("HyperQueue: {}", client.path().display());

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Figures from outputs that have other readers too: `takt track --monte-carlo --json`, libFuzzer.
+//! Figures from outputs that are also meant for other readers: `takt track --monte-carlo --json`, libFuzzer.
 
 use crate::campaign::figures::Figures;
 use anyhow::{Context, Result};

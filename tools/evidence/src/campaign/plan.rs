@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Plan of a campaign: copies of its programs as of its start, and the parameters of all units.
+//! Plan of a campaign: copies of the programs at its start, and the parameters of all units.
 
 use crate::campaign::figures::Outcome;
 use crate::campaign::record;
@@ -18,13 +18,13 @@ use takt_board::place;
 use takt_family::REFERENCE;
 use takt_work::Unit;
 
-/// Plan of a campaign, as `plan.json`.
+/// Plan of a campaign, stored as `plan.json`.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Plan {
     /// Folder of the campaign.
     folder: PathBuf,
     pub(super) campaign: String,
-    /// Number of things in a unit.
+    /// Size of a unit, in the campaign's `unit`.
     pub(super) size: u64,
     /// Additional arguments for the program.
     pub(super) rest: Vec<String>,
@@ -33,12 +33,12 @@ pub(super) struct Plan {
 }
 
 impl Plan {
-    /// Builds the programs, and creates the folder that programs and parameters determine, below `base`.
+    /// Builds the programs, and creates the campaign's folder below `base`; programs and parameters determine its name.
     pub(super) fn make(campaign: &Campaign, size: u64, rest: &[String], base: &Path) -> Result<Plan> {
         let mut inputs = Inputs::default().and((campaign.name, size, rest));
         if campaign.runs == Runs::Seed {
             inputs = inputs.and(place::packages(REFERENCE)?).files("rtl")?.files("isa/src")?;
-            // Hash the contents of arguments that are files, such as a machine.
+            // Hash the contents of arguments that are files, such as a machine description.
             for file in rest.iter().filter(|text| Path::new(text).is_file()) {
                 inputs = inputs.and(fs::read(file)?);
             }
@@ -71,7 +71,7 @@ impl Plan {
         Ok(plan)
     }
 
-    /// Reads the plan, in the process of a unit.
+    /// Reads the plan; called in the process of a unit.
     pub(super) fn read(path: &Path) -> Result<Plan> {
         let text = fs::read(path).with_context(|| format!("cannot read the plan {}", path.display()))?;
         serde_json::from_slice(&text).with_context(|| format!("{} is no plan of a campaign", path.display()))
@@ -102,7 +102,7 @@ impl Plan {
         self.folder.join("corpus").join(target)
     }
 
-    /// Command of a unit: this program, as copied when the plan was made.
+    /// Command of a unit: runs the copy of this program made with the plan.
     pub(super) fn unit(&self, campaign: &Campaign, unit: u64) -> Unit {
         let texts = [
             self.program("xtask").display().to_string(),
@@ -150,7 +150,7 @@ impl Plan {
     fn command(&self, call: &Call) -> Command {
         let folder = self.folders.get(&call.program).cloned().unwrap_or_else(root);
         let mut command = Command::new(self.program(&call.program));
-        // Set the environment that cargo gives to tests.
+        // Set the environment that cargo would set.
         command.env("CARGO_MANIFEST_DIR", &folder).env("CARGO_PKG_NAME", &call.program).current_dir(folder);
         command.args(&call.arguments).envs(call.variables.iter().map(|(name, value)| (name, value)));
         command
@@ -185,7 +185,7 @@ fn build(runs: Runs, name: &str) -> Result<(PathBuf, PathBuf)> {
     }
 }
 
-/// Copies a program under another name and renames it, since the old file may be running.
+/// Copies a program under another name and then renames it, since the old file may be running.
 fn copy(from: &Path, to: &Path) -> Result<()> {
     if from == to {
         return Ok(());

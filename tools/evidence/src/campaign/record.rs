@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Records of campaign runs: one line each in the folder's `runs.jsonl`, and the track record `tools/evidence/campaigns.json`, shown as a
-//! table in `docs/figures.md`.
+//! Records of campaign runs: one line per run in the folder's `runs.jsonl`, and the track record `tools/evidence/campaigns.json`, shown
+//! as a table in `docs/figures.md`.
 
 use crate::campaign::figures::MergedResults;
 use crate::campaign::plan::Plan;
@@ -22,7 +22,7 @@ pub(crate) const DOCUMENT: &str = "docs/figures.md";
 /// A run of a campaign: data that varies between runs, and hence is not in the report.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Run {
-    /// Start in UTC, date and time.
+    /// Start, date and time in UTC.
     pub(super) begun: String,
     pub(super) seconds: u64,
     /// Hosts of the run, in words.
@@ -49,7 +49,7 @@ struct Row {
     /// Figures of the campaign, in words.
     figures: String,
     failed: u64,
-    /// Hosts, and their CPU time.
+    /// Hosts, and the CPU time used.
     place: String,
     date: String,
 }
@@ -64,12 +64,12 @@ fn rows() -> Result<Vec<Row>> {
     serde_json::from_str(&text).with_context(|| format!("{} is no track record", path().display()))
 }
 
-/// Present date and time in UTC.
+/// Current date and time in UTC.
 pub(super) fn now() -> Result<String> {
     Ok(output_of(Command::new("date").args(["-u", "+%FT%TZ"]))?.trim().to_owned())
 }
 
-/// CPU time in s of this process and its waited-for children; `None` where the system has no /proc.
+/// CPU time in seconds of this process and its waited-for children; `None` on systems without /proc.
 pub(super) fn cpu_seconds() -> Option<f64> {
     // Fields 14 to 17 of proc_pid_stat(5), in hundredths of a second; skip the name, which may contain spaces.
     let text = std::fs::read_to_string("/proc/self/stat").ok()?;
@@ -85,7 +85,7 @@ pub(super) fn processor() -> String {
     format!("{} cores, {model}", super::cores())
 }
 
-/// Adds a campaign to the track record, in place of an earlier row of the same command.
+/// Adds a campaign to the track record; replaces an earlier row of the same command.
 pub(super) fn add(
     campaign: &Campaign,
     plan: &Plan,

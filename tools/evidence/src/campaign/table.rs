@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Table of campaigns: the contents of a unit, its program, and the arguments.
+//! Table of campaigns: contents of a unit, program to run, and arguments.
 
 use crate::campaign::figures::{Figures, of_output};
 use crate::campaign::outputs;
@@ -17,11 +17,11 @@ pub(super) const TARGETS: [&str; 2] = ["assemble", "image"];
 /// Program that a unit runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Runs {
-    /// A test of a crate: package, name, and the variable with the number of cases; `TAKT_SEED` has the first.
+    /// A test of a crate: package, name, and the environment variable for the number of cases; `TAKT_SEED` selects the first case.
     Test(&'static str, &'static str, &'static str),
-    /// libFuzzer on one of the fuzz targets.
+    /// libFuzzer on a fuzz target.
     Fuzz,
-    /// Simulated robots with `takt track --monte-carlo`.
+    /// Simulated robots, through `takt track --monte-carlo`.
     Robots,
     /// Place and route with a single seed.
     Seed,
@@ -33,19 +33,19 @@ pub(super) enum Runs {
 #[derive(Debug)]
 pub(super) struct Campaign {
     pub(super) name: &'static str,
-    /// Description in one line.
+    /// One-line description.
     pub(super) text: &'static str,
-    /// Noun for the things that a unit has `size` of.
+    /// Plural noun for the contents of a unit, such as programs; `size` counts them.
     pub(super) unit: &'static str,
     pub(super) size: u64,
     pub(super) size_is_free: bool,
     /// Default number of units.
     pub(super) units: u64,
-    /// Upper bound of the minutes of a unit of this size: a batch job with less time left does not begin it.
+    /// Upper bound of a unit's run time in minutes, at this size: a batch job with less time left does not start the unit.
     pub(super) minutes: u32,
-    /// Number of existing things, if finite.
+    /// Total number of cases, if finite.
     pub(super) most: Option<u64>,
-    /// The first unit compiles files for all others.
+    /// The first unit compiles files that all others use.
     pub(super) compiles: bool,
     pub(super) runs: Runs,
 }
@@ -210,7 +210,7 @@ pub(super) fn named(name: &str) -> Result<&'static Campaign> {
         .with_context(|| format!("there is no campaign `{name}`; there are {}", names()))
 }
 
-/// List of all campaigns in words.
+/// Text listing all campaigns.
 pub(super) fn listed() -> String {
     let mut text = String::new();
     for Campaign { name, text: what, unit, size, units, minutes, .. } in CAMPAIGNS {
@@ -223,7 +223,7 @@ pub(super) fn listed() -> String {
     text + "\n`cargo evidence campaign NAME` runs the units, `--units K..L` some of them; docs/campaigns.md tells more\n"
 }
 
-/// A program call with arguments and environment variables.
+/// A call of a program, with arguments and environment variables.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Call {
     pub(super) program: String,
@@ -247,12 +247,12 @@ impl Campaign {
         (self.runs == Runs::Mutants).then_some(1)
     }
 
-    /// Upper bound of the time of a unit of another size.
+    /// Upper bound of the run time of a unit of another size.
     pub(super) fn time(&self, size: u64) -> Duration {
         Duration::from_secs((u64::from(self.minutes) * 60).saturating_mul(size).div_ceil(self.size))
     }
 
-    /// Call that executes a unit.
+    /// Call that runs a unit.
     pub(super) fn call(&self, plan: &Plan, unit: u64) -> Result<Call> {
         let (size, first) = (plan.size, unit * plan.size);
         let texts = |arguments: &[&str]| arguments.iter().map(|&text| text.to_owned()).collect::<Vec<_>>();
@@ -275,7 +275,7 @@ impl Campaign {
                         plan.corpus(target).display().to_string(),
                         format!("-artifact_prefix={folder}/"),
                         format!("-runs={size}"),
-                        // libFuzzer takes seed 0 for the time of day.
+                        // libFuzzer replaces seed 0 by the time of day.
                         format!("-seed={}", unit + 1),
                         "-max_len=65536".to_owned(),
                         "-rss_limit_mb=4096".to_owned(),
@@ -310,7 +310,7 @@ impl Campaign {
         Ok(call)
     }
 
-    /// Figures in the output of a unit's program.
+    /// Parses the figures in the output of a unit's program.
     pub(super) fn figures(&self, unit: u64, output: &str) -> Result<Figures> {
         match self.runs {
             Runs::Test(..) => of_output(output).context("the test printed no line `figures: …`"),
@@ -327,7 +327,7 @@ mod tests {
     use super::*;
     use takt_automation::command::root;
 
-    /// The tests named in the table exist, and read the variables that select their share.
+    /// The tests named in the table exist, and read the environment variables that select their share.
     #[test]
     fn campaigns_name_existing_tests() {
         let read = |path: &str| {

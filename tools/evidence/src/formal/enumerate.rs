@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Exhaustive evaluation of a unit's function, as extracted by `rtl/formal/prove.py`, which calls `cargo evidence enumerate`.
+//! Exhaustive evaluation of a unit's function, extracted by `rtl/formal/prove.py`, which calls `cargo evidence enumerate`.
 
 use anyhow::{Context, Result, ensure};
 use std::fs;
@@ -19,7 +19,7 @@ pub(crate) struct Arguments {
     case: Option<u32>,
 }
 
-/// Entry of `cargo evidence enumerate`: prints the first operand at which function and specification differ, if any.
+/// Entry of `cargo evidence enumerate`: prints the first operand for which function and specification differ, if any.
 pub(crate) fn enumerate(arguments: &Arguments) -> Result<()> {
     let op = Op::from_mnemonic(&arguments.op)
         .with_context(|| format!("there is no instruction `{}`", arguments.op))?;

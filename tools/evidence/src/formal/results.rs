@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Generated parts of `docs/verification.md`: proved properties of the units, from `rtl/formal/results.json`, and the test modules with the
+//! Generated parts of `docs/verification.md`: proved properties of the units, from `rtl/formal/results.json`, and test modules with the
 //! first sentence of each.
 
 mod page;
@@ -18,7 +18,7 @@ const RESULTS: &str = "rtl/formal/results.json";
 /// Program folders that the document must mention.
 const PROGRAMS: [&str; 8] = ["arm", "examples", "hybrid", "kernels", "library", "systems", "three", "robot"];
 
-/// The document with the present results.
+/// Document updated with the current results.
 ///
 /// # Errors
 /// If the document does not mention a unit, a crate, or a folder of programs.
@@ -83,7 +83,7 @@ fn modules(members: &[&str]) -> Result<String> {
     Ok(text)
 }
 
-/// The module is a folder with tests in one of its files.
+/// The module is a folder, and one of its files contains tests.
 fn name_has_tests(file: &Path) -> bool {
     let files = file
         .ends_with("mod.rs")
@@ -104,7 +104,7 @@ fn first_sentence(source: &str) -> String {
     text[..end].replace('|', "\\|")
 }
 
-/// Table of the units with the proofs of each.
+/// Table of the units with their proofs.
 fn table(results: &Value) -> String {
     let mut text = String::from(
         "| unit | what is compared | cases proved | s of solving | on | timing | mutants refuted |\n|---|---|---|---|---|---|---|\n",

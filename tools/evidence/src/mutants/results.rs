@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Outcomes of mutants: in the target folder during the measurement of a part; scores and survivors committed in `mutants.json`.
+//! Outcomes of mutants: kept in the target folder while a part is measured; scores and survivors are committed in `mutants.json`.
 
 use anyhow::{Context, Result};
 use serde::{Deserialize, Serialize};
@@ -10,21 +10,21 @@ use std::path::PathBuf;
 use std::process::Command;
 use takt_automation::command::root;
 
-/// Committed scores and survivors.
+/// File of committed scores and survivors.
 pub(crate) const RESULTS: &str = "tools/evidence/mutants.json";
 
 /// Outcome of a mutant.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Outcome {
-    /// Found by this test, which failed or did not end.
+    /// Killed by this test, which failed or timed out.
     Found(String),
-    /// Shown to be equivalent, by this argument.
+    /// Proved equivalent, with the argument.
     Equivalent(String),
-    /// All tests passed that reach the mutant.
+    /// All tests that reach the mutant passed.
     Survived,
     /// No test reaches the mutant.
     Unreached,
-    /// The compiler rejects the mutant; it does not count.
+    /// Rejected by the compiler; excluded from the score.
     Stillborn,
 }
 
@@ -51,12 +51,12 @@ impl Outcome {
     }
 }
 
-/// Mutant that no test has found, as committed.
+/// A mutant that no test has killed, as committed.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Survivor {
-    /// Key: file, function, operator and ordinal in Rust; subject, wire, operator and ordinal in a circuit.
+    /// Key of the mutant: file, function, operator and ordinal in Rust; subject, wire, operator and ordinal in a circuit.
     pub(crate) key: String,
-    /// The change as text when the score was measured, or its place in a circuit's source.
+    /// Text of the change when the score was measured, or the place in a circuit's source.
     pub(crate) change: String,
     /// A test reaches the mutant.
     #[serde(default = "yes", skip_serializing_if = "Clone::clone")]
@@ -67,7 +67,7 @@ fn yes() -> bool {
     true
 }
 
-/// Known outcomes of a part's mutants.
+/// Outcomes of a part's mutants that are known so far.
 pub(super) struct KnownOutcomes {
     part: String,
     path: PathBuf,
@@ -75,7 +75,7 @@ pub(super) struct KnownOutcomes {
 }
 
 impl KnownOutcomes {
-    /// Outcomes from earlier runs; empty if `again`.
+    /// Reads outcomes of earlier runs; empty if `again`.
     pub(super) fn read(part: &str, again: bool) -> Result<KnownOutcomes> {
         let path = root().join("target/mutants").join(format!("{part}.json"));
         let text = if again { String::new() } else { fs::read_to_string(&path).unwrap_or_default() };
@@ -84,7 +84,7 @@ impl KnownOutcomes {
         Ok(KnownOutcomes { part: part.to_owned(), path, outcomes })
     }
 
-    /// The outcome is final. A survivor meets tests added since.
+    /// The outcome is final. A survivor is not: tests added since may kill it.
     pub(super) fn has(&self, key: &str) -> bool {
         !matches!(self.outcomes.get(key), None | Some(Outcome::Survived | Outcome::Unreached))
     }
@@ -93,7 +93,7 @@ impl KnownOutcomes {
         self.outcomes.insert(key, outcome);
     }
 
-    /// Records an outcome after some of the tests. A survivor stays one if none of them reaches it.
+    /// Records an outcome after some of the tests. If none of them reaches a survivor, it remains a survivor.
     pub(super) fn meet(&mut self, key: String, outcome: Outcome) {
         if outcome != Outcome::Unreached || self.outcomes.get(&key) != Some(&Outcome::Survived) {
             self.put(key, outcome);
@@ -110,7 +110,7 @@ impl KnownOutcomes {
             .with_context(|| format!("cannot write {}", self.path.display()))
     }
 
-    /// Writes the score of these mutants, by key and change, to the committed file; returns it in words.
+    /// Writes the score of these mutants, given by key and change, to the committed file; returns it in words.
     pub(super) fn record(&self, all: usize, mutants: &[(String, String)]) -> Result<String> {
         let (mut found, mut equivalent, mut stillborn) = (0, 0, 0);
         let mut survivors: Vec<Survivor> = Vec::new();
@@ -158,7 +158,7 @@ pub(crate) fn results() -> Result<Map<String, Value>> {
     serde_json::from_str(&text).with_context(|| format!("{RESULTS} is no JSON object"))
 }
 
-/// Present date in UTC.
+/// Current date in UTC.
 fn today() -> Result<String> {
     let output = Command::new("date").args(["-u", "+%F"]).output().context("cannot start date")?;
     Ok(String::from_utf8_lossy(&output.stdout).trim().to_owned())

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Execution of tests on mutants, each in its own process with a limit on processor time.
+//! Execution of tests on mutants, each in a separate process with a limit on CPU time.
 
 use anyhow::{Context, Result};
 use std::collections::BTreeSet;
@@ -8,7 +8,7 @@ use std::process::{Command, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-/// Environment variables: the selected mutant, and a file for the numbers of reached mutants.
+/// Environment variables: number of the selected mutant, and file in which reached mutants are recorded.
 pub(super) const CHOICE: &str = "TAKT_MUTANT";
 pub(super) const REACHED: &str = "TAKT_MUTANTS_REACHED";
 
@@ -20,11 +20,11 @@ pub(super) enum Verdict {
     TooLong,
 }
 
-/// Wall-clock limit for a test that waits without computing.
+/// Wall-clock limit, for a test that hangs without computing.
 const IDLE: Duration = Duration::from_secs(900);
 
-/// Processor time of a process, from Linux's count in hundredths of a second; `None` without /proc. Wall-clock time would misjudge mutants
-/// on a busy machine.
+/// CPU time of a process, which Linux counts in hundredths of a second; `None` without /proc. Wall-clock time would misjudge mutants on a
+/// busy machine.
 fn processor_time(process: u32) -> Option<Duration> {
     let text = std::fs::read_to_string(format!("/proc/{process}/stat")).ok()?;
     // Skip the name, which may contain spaces.
@@ -33,7 +33,7 @@ fn processor_time(process: u32) -> Option<Duration> {
     Some(Duration::from_millis(10 * (ticks(11)? + ticks(12)?)))
 }
 
-/// Runs a command without its output, up to a limit of processor time; also returns the time.
+/// Runs a command without its output, up to a limit on CPU time; also returns the time used.
 ///
 /// # Errors
 /// If the command cannot be started.
@@ -58,17 +58,17 @@ pub(super) fn verdict(command: &mut Command, most: Duration) -> Result<(Verdict,
     }
 }
 
-/// A test, its processor time without a mutant, and the mutants that it reaches.
+/// A test, its CPU time without a mutant, and the mutants that it reaches.
 #[derive(Debug)]
 pub(super) struct Test {
-    /// Index of the test's program.
+    /// Index of the program that contains the test.
     pub(super) program: usize,
     pub(super) name: String,
     pub(super) time: Duration,
     pub(super) reaches: BTreeSet<u32>,
 }
 
-/// Numbers in a file, one per line.
+/// Reads the numbers in a file, one per line.
 pub(super) fn numbers(path: &Path) -> BTreeSet<u32> {
     let text = std::fs::read_to_string(path).unwrap_or_default();
     text.lines().filter_map(|line| line.parse().ok()).collect()

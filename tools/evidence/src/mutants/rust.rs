@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Mutants of Rust sources as mutant schemata: one source contains all mutants, and a program selects one at its start.
+//! Mutant schemata for Rust sources: one source contains all mutants, and a program selects one at its start.
 //!
-//! A mutated place becomes `(if mutant(N) { the mutant } else { the original })`. Hundreds of mutants thus cost one compilation;
-//! cargo-mutants compiles each, which takes half a minute for the assembler and as long again for its tests.
+//! A mutated place becomes `(if mutant(N) { the mutant } else { the original })`. Hundreds of mutants thus need one compilation.
+//! cargo-mutants compiles each mutant, which takes half a minute for the assembler and another half for its tests.
 
 use anyhow::{Context, Result};
 use quote::ToTokens;
@@ -12,29 +12,29 @@ use syn::spanned::Spanned;
 use syn::visit::{self, Visit};
 use syn::{BinOp, Block, Expr, ImplItemFn, Item, ItemFn, Lit, Stmt, UnOp};
 
-/// A change of one place in a source.
+/// A change at one place in a source.
 #[derive(Clone, Debug)]
 pub(super) struct Mutant {
     /// Path of the function within the file, such as `Interval::new` or `Add for Interval::add`.
     function: String,
     /// Kind of the change, such as `< → <=`.
     operator: String,
-    /// Number among the mutants of the function with this operator, from 1, in the order of the text.
+    /// Number among the function's mutants with this operator, from 1, in source order.
     ordinal: usize,
-    /// Line of the place, from 1.
+    /// Line number of the place, from 1.
     pub(super) line: usize,
-    /// Original text, on one line.
+    /// Original text, joined to one line.
     pub(super) from: String,
-    /// Text that replaces it.
+    /// Replacement text.
     pub(super) to: String,
-    /// Byte range of the place, and the text around it that forms the choice; `#` stands for the mutant's condition.
+    /// Byte range of the place, and the template of the choice around it, in which `#` stands for the mutant's condition.
     range: Range<usize>,
     before: String,
     after: String,
 }
 
 impl Mutant {
-    /// Key of a mutant of a file: the same after a reformat, a renamed variable, or a change of another function.
+    /// Key of a mutant in a file: stable under reformatting, renamed variables, and changes of other functions.
     pub(super) fn key(&self, file: &str) -> String {
         format!("{file} {}: {} #{}", self.function, self.operator, self.ordinal)
     }
@@ -45,7 +45,7 @@ impl Mutant {
     }
 }
 
-/// All mutants of a source.
+/// Finds all mutants of a source.
 ///
 /// # Errors
 /// If the source cannot be parsed.
@@ -63,9 +63,9 @@ pub(super) fn mutants(source: &str) -> Result<Vec<Mutant>> {
     Ok(finder.found)
 }
 
-/// Source with mutants, each selected by `function(number)`.
+/// Plants mutants in a source; `function(number)` selects one.
 pub(super) fn planted(source: &str, mutants: &[(u32, &Mutant)], function: &str) -> String {
-    // At equal positions, ends precede begins, and the longer range begins first. All ends at one position have the same text.
+    // At equal positions, ends sort before begins, and the longer range begins first. All ends at one position have the same text.
     let mut pieces: Vec<((usize, bool, isize), String)> = Vec::new();
     for (number, mutant) in mutants {
         let Range { start, end } = mutant.range;
@@ -87,7 +87,7 @@ pub(super) fn planted(source: &str, mutants: &[(u32, &Mutant)], function: &str) 
 
 struct Finder<'s> {
     source: &'s str,
-    /// Modules, types and functions around the present place.
+    /// Modules, types and functions that enclose the current place.
     path: Vec<String>,
     found: Vec<Mutant>,
 }
@@ -112,7 +112,7 @@ fn binds(expression: &Expr) -> bool {
     }
 }
 
-/// An operand is text, for which only `+` is defined.
+/// The operand is text, for which only `+` is defined.
 fn is_text(expression: &Expr) -> bool {
     match expression {
         Expr::Reference(_) | Expr::Macro(_) => true,
@@ -160,7 +160,7 @@ impl Finder<'_> {
         self.found.push(Mutant {
             function: self.path.join("::"),
             operator: operator.to_owned(),
-            // Numbered when all are found.
+            // Assigned once all mutants are found.
             ordinal: 0,
             line,
             from,
@@ -176,7 +176,7 @@ impl Finder<'_> {
         self.put(place, operator, [text(place), to], [&before, " })"]);
     }
 
-    /// Visits what a name of the path encloses.
+    /// Visits the contents of an item that adds `name` to the path.
     fn within(&mut self, name: String, visit: impl FnOnce(&mut Self)) {
         self.path.push(name);
         visit(self);
@@ -218,7 +218,7 @@ impl Finder<'_> {
     }
 }
 
-/// The item is compiled for tests only.
+/// The item is compiled only for tests.
 fn is_test(attributes: &[syn::Attribute]) -> bool {
     attributes.iter().any(|attribute| {
         let text = text(attribute);
@@ -363,7 +363,7 @@ mod tests {
         let numbered: Vec<_> = (1..).zip(&found).collect();
         let all = planted(source, &numbered, "mutant");
         syn::parse_file(&all).unwrap_or_else(|error| panic!("{error}: {all}"));
-        // Line numbers are preserved, so that a compiler error identifies its mutant.
+        // Line numbers are preserved, so that compiler errors identify their mutants.
         assert_eq!(all.matches('\n').count(), source.matches('\n').count());
         assert_eq!(all.matches("mutant(").count(), found.len());
     }
@@ -375,7 +375,7 @@ mod tests {
         assert!(mutants(source).unwrap().is_empty());
     }
 
-    /// Keys of the mutants whose change begins so.
+    /// Keys of the mutants whose description begins with `change`.
     fn keys(source: &str, change: &str) -> Vec<String> {
         let all = mutants(source).unwrap();
         all.iter()

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Mutants of Rust sources: a copy of the project with all mutants is compiled once, and each mutant meets the tests that reach it.
+//! Mutants of Rust sources: compiles a copy of the project with all mutants once, and runs on each mutant the tests that reach it.
 
 use super::Arguments;
 use super::results::{KnownOutcomes, Outcome};
@@ -20,21 +20,22 @@ use takt_automation::command::{cargo, root};
 use takt_automation::progress;
 use takt_automation::test_program::Program;
 
-/// Sources mutated together, with their tests.
+/// Sources that are mutated together, with their tests.
 pub(super) struct Part {
     pub(super) name: &'static str,
     /// Source files, and folders with all their files.
     sources: &'static [&'static str],
-    /// Packages with test modules; `lib` stands for unit tests.
+    /// Packages with their test modules; `lib` stands for unit tests.
     tests: &'static [(&'static str, &'static [&'static str])],
-    /// Limits in seconds of processor time: a test beyond `longest` is left out; `budget` limits all tests of a mutant, shortest first.
+    /// Limits in seconds of CPU time: a test that takes more than `longest` is left out; `budget` limits all tests of a mutant, shortest
+    /// first.
     longest: u64,
     budget: u64,
 }
 
 const ANALYSIS: &str = "takt-analysis";
 
-/// Table of the parts. The emulator's compiler to host instructions is left out: tests compare it with the interpreter.
+/// Table of the parts. The emulator's JIT compiler is left out: tests compare it with the interpreter.
 pub(super) const PARTS: [Part; 5] = [
     Part {
         name: "timing",
@@ -109,12 +110,12 @@ pub(super) const PARTS: [Part; 5] = [
     },
 ];
 
-/// Default limits in seconds, for one test and for all tests of a mutant.
+/// Default limits in seconds: for one test, and for all tests of a mutant.
 const LONGEST: u64 = 12;
 const BUDGET: u64 = 30;
 
-/// Selection function, added to the copy of `takt-isa`, on which all other crates depend. It runs in innermost loops, so it is a single
-/// comparison once the selected mutant is known.
+/// Selection function, added to the copy of `takt-isa`, on which all other crates depend. It runs in innermost loops: once the selected
+/// mutant is known, it costs a single comparison.
 const FUNCTION: &str = r#"
 
 /// The chosen mutant; or that it is not known yet, or that all that are reached are written down.
@@ -162,11 +163,12 @@ struct Source {
     mutants: Vec<Mutant>,
 }
 
-/// Measures the scores of parts. Mutants of all parts are compiled together, so that no part makes another's programs stale.
+/// Measures the scores of parts. Mutants of all parts are compiled together, so that measuring one part does not make another's programs
+/// stale.
 pub(super) fn score(parts: &[&Part], arguments: &Arguments) -> Result<()> {
     let sources: Vec<Vec<Source>> = PARTS.iter().map(sources).collect::<Result<_>>()?;
     let every: Vec<&Source> = sources.iter().flatten().collect();
-    // All mutants; their numbers begin at 1.
+    // Number all mutants, from 1.
     let all: Vec<(&Source, &Mutant)> =
         every.iter().flat_map(|source| source.mutants.iter().map(|mutant| (*source, mutant))).collect();
     ensure!(all.len() < 1 << 14, "{} mutants are more than there is room for", all.len());
@@ -274,7 +276,7 @@ fn score_of(part: &Part, arguments: &Arguments, planted: &PlantedMutants<'_>) ->
     Ok(())
 }
 
-/// Sources of a part, without test modules.
+/// Sources of a part, without their test modules.
 fn sources(part: &Part) -> Result<Vec<Source>> {
     let mut paths = Vec::new();
     for place in part.sources {
@@ -284,7 +286,7 @@ fn sources(part: &Part) -> Result<Vec<Source>> {
         }
         for entry in fs::read_dir(root().join(place)).with_context(|| format!("cannot read {place}"))? {
             let name = entry?.file_name().display().to_string();
-            // Exclude random numbers for tests, and brute-force tests.
+            // Exclude random number generators and brute-force solvers, which serve tests only.
             if name.ends_with(".rs") && !["random.rs", "brute_force.rs"].contains(&name.as_str()) {
                 paths.push(format!("{place}/{name}"));
             }
@@ -299,7 +301,7 @@ fn sources(part: &Part) -> Result<Vec<Source>> {
     paths.into_iter().map(read).collect()
 }
 
-/// Copy of the project in the target folder.
+/// Copy of the project, in the target folder.
 struct Copy {
     folder: PathBuf,
     target: PathBuf,
@@ -307,7 +309,7 @@ struct Copy {
 }
 
 impl Copy {
-    /// Updates the copy, except for the mutated sources, which cargo would otherwise compile twice.
+    /// Updates the copy except for the mutated sources, which would be compiled twice otherwise.
     fn new(sources: &[&Source]) -> Result<Copy> {
         let own = root().join("target/mutants");
         let copy =
@@ -325,7 +327,7 @@ impl Copy {
         Ok(copy)
     }
 
-    /// Writes a file if its contents differ, since cargo compares time stamps.
+    /// Writes a file only if its contents differ, since cargo compares time stamps.
     fn put(&self, path: &str, bytes: &[u8]) -> Result<()> {
         let file = self.folder.join(path);
         if fs::read(&file).is_ok_and(|old| old == bytes) {
@@ -337,8 +339,8 @@ impl Copy {
         fs::write(&file, bytes).with_context(|| format!("cannot write {}", file.display()))
     }
 
-    /// Compiles the tests with all compilable mutants. Returns the programs, and the numbers of rejected mutants. Rejections are remembered
-    /// by source text, so that an unchanged project compiles nothing.
+    /// Compiles the tests with all compilable mutants. Returns the programs, and the numbers of rejected mutants. Rejections are
+    /// remembered by source text, so that an unchanged project is not compiled again.
     fn compile(&self, sources: &[&Source]) -> Result<(Vec<Program>, BTreeSet<u32>)> {
         let memory = self.folder.with_file_name("stillborn.json");
         let mut stillborn = remembered(&fs::read_to_string(&memory).unwrap_or_default(), sources);
@@ -388,7 +390,7 @@ impl Copy {
     }
 }
 
-/// Rejected mutants in stored form: per source its text, and their numbers in it from 0.
+/// Rejected mutants in the format of the stored file: for each source its text, and mutant numbers within it from 0.
 fn memories(stillborn: &BTreeSet<u32>, sources: &[&Source]) -> Value {
     let mut first = 1;
     let mut all = serde_json::Map::new();
@@ -417,7 +419,7 @@ fn remembered(text: &str, sources: &[&Source]) -> BTreeSet<u32> {
     stillborn
 }
 
-/// Mutants on lines with compiler errors.
+/// Mutants on lines for which the compiler reports errors.
 fn refused(messages: &[Value], sources: &[&Source], known: &BTreeSet<u32>) -> BTreeSet<u32> {
     let mut lines: BTreeMap<&str, BTreeSet<usize>> = BTreeMap::new();
     for message in messages.iter().filter(|message| message["message"]["level"] == "error") {
@@ -447,14 +449,14 @@ fn refused(messages: &[Value], sources: &[&Source], known: &BTreeSet<u32>) -> BT
     found
 }
 
-/// Calls `work` for each element with the number of its thread, on as many threads as cores. Tests are judged by processor time, so they
-/// may run side by side.
+/// Calls `work` for each element with the number of the thread, on as many threads as there are cores. Tests are judged by CPU time, so
+/// they may run concurrently.
 fn at_once<T: Sync>(all: &[T], work: impl Fn(usize, &T) -> Result<()> + Sync) -> Result<()> {
     let next = AtomicUsize::new(0);
     let threads = available_parallelism().map_or(1, NonZeroUsize::get);
     let thread = |own: usize| -> Result<()> {
         while let Some(one) = all.get(next.fetch_add(1, Ordering::Relaxed)) {
-            // On an error the other threads finish their present element and stop.
+            // On an error, the other threads finish their current element and stop.
             work(own, one).inspect_err(|_| next.store(all.len(), Ordering::Relaxed))?;
         }
         Ok(())
@@ -465,7 +467,7 @@ fn at_once<T: Sync>(all: &[T], work: impl Fn(usize, &T) -> Result<()> + Sync) ->
     })
 }
 
-/// Runs each test whose name contains `test_name` without a mutant, for its time and the mutants that it reaches.
+/// Runs each test whose name contains `test_name` without a mutant, to measure its time and the mutants that it reaches.
 fn baseline(part: &Part, test_name: &str, programs: &[Program], reached: &Path) -> Result<Vec<Test>> {
     let mut names = Vec::new();
     for (index, program) in programs.iter().enumerate() {
@@ -482,7 +484,7 @@ fn baseline(part: &Part, test_name: &str, programs: &[Program], reached: &Path) 
     let tests = Mutex::new(Vec::new());
     at_once(&names, |thread, (index, name)| {
         let program = &programs[*index];
-        // Another part may be measured concurrently.
+        // Another part may be measured at the same time.
         let reached = reached.with_extension(format!("{}.{thread}.txt", part.name));
         let _ = fs::remove_file(&reached);
         let (verdict, time) =
@@ -501,16 +503,16 @@ fn baseline(part: &Part, test_name: &str, programs: &[Program], reached: &Path) 
     Ok(tests)
 }
 
-/// Command of a single test, which must not accept new snapshots.
+/// Command of a single test, which must not update snapshots.
 fn test(program: &Program, name: &str) -> Command {
     let mut command = program.command();
     command.args(["--exact", name, "--test-threads=1"]).env("INSTA_UPDATE", "no");
-    // Fewer random programs, as most mutants are found by the first; and a fixed seed, for reproducible outcomes.
+    // Use few random programs, since the first ones kill most mutants, and a fixed seed for reproducible outcomes.
     command.env("TAKT_FEW", "1").env("PROPTEST_RNG_SEED", "1");
     command
 }
 
-/// Runs the tests that reach a mutant, shortest first.
+/// Runs the tests that reach a mutant, shortest first, until one fails.
 fn meet(number: u32, budget: Duration, tests: &[Test], programs: &[Program]) -> Result<Outcome> {
     let mut left = budget;
     let mut is_reached = false;

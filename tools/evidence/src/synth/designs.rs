@@ -11,11 +11,11 @@ use takt_family::{Family, Mapping, Resources};
 use takt_isa::{Machine, UNITS, Unit};
 use takt_rtl::{Circuit, Library, wishbone};
 
-/// Designs that the arguments select.
+/// Designs selected by the arguments.
 pub(super) fn designs(arguments: &Arguments) -> Result<Vec<Design>> {
     let mut library = Library::load(&root().join("rtl/units")).context("cannot read rtl/units")?;
     let family = arguments.family;
-    // Replace shared modules of the units by the family's versions; the core's files contain its own.
+    // Replace shared modules of the units by the family's versions. A core's files already contain them.
     for (name, text) in family.modules {
         let shared = format!("common/{name}");
         if library.text(&shared).is_some() {
@@ -55,13 +55,13 @@ fn core(machine: &'static Machine, library: &Library, family: &Family) -> Result
         has_pins: true,
         wrapper: wishbone::PINS,
         parts: Vec::new(),
-        // Record built-in machines with their own memory sizes only; a file's machine belongs to its author.
+        // Record only built-in machines with their original memory sizes; a machine from a file belongs to its author.
         recorded: machine == machine.row() && machine.is_builtin(),
     })
 }
 
-/// A unit between registers with few pins: operands come from a shift register and a second register, results go into a register and
-/// through an XOR tree.
+/// A unit between registers, with few pins: operands come from a shift register and a second register; results go to a register and an
+/// XOR tree.
 fn between_registers(library: &Library, circuit: &Circuit) -> Result<Design> {
     let text = |name: &String| Some((name.replace('/', "_"), library.text(name)?.to_owned()));
     let mut files: BTreeMap<_, _> = circuit.files.iter().filter_map(text).collect();
@@ -103,8 +103,8 @@ endmodule
 "
         ),
     );
-    // Size of the wrapper: 9 LUT4 for the groups of four, 3 for the rest. A constant output has no register, so flip-flops may be
-    // overestimated by two.
+    // Size of the wrapper: 9 LUT4 for the groups of four, 3 for the rest. A constant output needs no register, so the number of
+    // flip-flops may be overestimated by two.
     let wrapper = Resources { luts: 12, flip_flops: u64::from(2 * bits) + 46, ..Resources::default() };
     let (name, top) = (circuit.unit.name.to_owned(), "wrapper".to_owned());
     Ok(Design {

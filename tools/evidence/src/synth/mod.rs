@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Synthesis, place and route: clock and size of the circuit on available devices.
 //!
-//! yosys produces the netlist, nextpnr places and routes it once per seed. Measurements are recorded in `rtl/synthesis.json`, the source of
-//! `docs/synthesis.md` and of the clock in `takt track`.
+//! yosys produces the netlist; nextpnr places and routes it once per seed. Measurements are recorded in `rtl/synthesis.json`, from which
+//! `docs/synthesis.md` and the clock of `takt track` are derived.
 
 mod designs;
 mod system;
@@ -25,9 +25,9 @@ use takt_isa::UNITS;
 use takt_isa::spec::machines::MACHINES;
 use takt_rtl::synthesis::{self, Synthesis};
 
-/// Record of measurements, which [`takt_rtl::synthesis::committed`] includes.
+/// File of measurements, which [`takt_rtl::synthesis::committed`] includes.
 const RECORD: &str = "rtl/synthesis.json";
-/// Default number of seeds of a measurement.
+/// Default number of seeds per measurement.
 const SEEDS: u32 = 5;
 /// The designs to measure, and the options of the tools.
 #[derive(clap::Args)]
@@ -68,12 +68,12 @@ pub(crate) struct Arguments {
 }
 
 impl Arguments {
-    /// Numbers of the seeds to measure.
+    /// Seeds to measure.
     fn seeds(&self) -> Vec<u32> {
         self.seed.map_or_else(|| (1..=self.seeds).collect(), |seed| vec![seed])
     }
 
-    /// Device to measure: the given one, or the family's representative.
+    /// Device to measure: the given one, or the default of the family.
     fn part(&self) -> Result<&'static Part> {
         let family = self.family;
         let part = match &self.device {
@@ -84,12 +84,12 @@ impl Arguments {
         part.with_context(|| format!("{} has no such device; there are {}", family.text, parts()))
     }
 
-    /// Place and route of the family; `None` if only resources are counted.
+    /// Place-and-route tool of the family; `None` if resources are only counted.
     fn place(&self) -> Option<&'static Place> {
         self.family.place.as_ref().filter(|_| !self.count)
     }
 
-    /// Speed grade of the device; fails if the family lacks the given one.
+    /// Speed grade of the device; an error if the family lacks the given grade.
     fn grade(&self, place: &Place) -> Result<u8> {
         let grade = self.grade.unwrap_or(place.measured.grade);
         let (lowest, highest) = self.family.grades;
@@ -102,7 +102,7 @@ impl Arguments {
     }
 }
 
-/// Parser of a family's name, for clap.
+/// Value parser for the name of a family, for clap.
 fn family() -> impl TypedValueParser<Value = &'static Family> {
     let names = PossibleValuesParser::new(FAMILIES.iter().map(|family| family.name));
     names.map(|name| Family::from_name(&name).unwrap_or(REFERENCE))
@@ -114,10 +114,10 @@ struct Design {
     files: BTreeMap<String, String>,
     top: String,
     mapping: Mapping,
-    /// The design has the ports that the pin constraints of the measured device name; otherwise the tool must choose the pins.
+    /// The design has the ports that the pin constraints of the measured device name; otherwise nextpnr chooses the pins.
     has_pins: bool,
     wrapper: Resources,
-    /// Instances in a system's `system`, each with the part to which it is counted.
+    /// Instances in a system's module `system`, each with the part that its resources are counted for.
     parts: Vec<(String, String)>,
     /// The measurement may be recorded.
     recorded: bool,
@@ -135,7 +135,7 @@ pub(crate) fn synth(arguments: &Arguments) -> Result<()> {
         let row = tools::measure(&venv, design, arguments)?;
         println!("{}", text::in_words(&row, &arguments.seeds()));
         if let (Some(seed), [mhz]) = (arguments.seed, &row.mhz[..]) {
-            // Output for `cargo evidence campaign seeds`.
+            // Output in the format that `cargo evidence campaign seeds` reads.
             println!("figures: MHz@{seed}={mhz:.2} LUT4@{seed}={}", row.resources.luts);
         }
         if is_ours {
@@ -177,7 +177,7 @@ pub(crate) fn recorded() -> Result<Vec<Synthesis>> {
     synthesis::parse(&text).with_context(|| format!("cannot read {RECORD}"))
 }
 
-/// Order of the rows: machines, then units, each in table order, then systems.
+/// Sort key of the rows: machines, then units, each in table order, then systems.
 fn order(design: &str) -> usize {
     let machine = MACHINES.iter().position(|machine| machine.name == design);
     machine

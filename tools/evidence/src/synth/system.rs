@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A system of several cores as a design for synthesis, with the resources of each part.
+//! A system of several cores as a design for synthesis, with resources of each part.
 
 use super::Design;
 use anyhow::{Context, Result, anyhow};
@@ -19,10 +19,10 @@ use takt_rtl::verilog::{Direction, Net};
 use takt_rtl::{Library, export_system};
 use takt_system::{LinkKind, ProgramError, ReadError};
 
-/// Name of the part with everything but cores and links.
+/// Name of the part that contains everything except cores and links.
 const REST: &str = "loader and ticks";
 
-/// A system as written by `takt rtl`, with its host's pins behind a shift register and a parity.
+/// A system as written by `takt rtl`, with the host's pins behind a shift register and a parity.
 pub(super) fn system(file: &Path, library: &Library, family: &Family) -> Result<Design> {
     let text = fs::read_to_string(file).with_context(|| format!("cannot read {}", file.display()))?;
     let folder = file.parent().unwrap_or(Path::new(""));
@@ -53,7 +53,7 @@ pub(super) fn system(file: &Path, library: &Library, family: &Family) -> Result<
     for file in on_family(&design.files, family).iter().chain([&design.image]) {
         files.insert(file.base().to_owned(), file.text.clone());
     }
-    // All inputs come from a shift register; all outputs go into a register and a parity.
+    // A shift register feeds all inputs; a register and a parity collect all outputs.
     let pins = design.plan.pins();
     let of = |direction| pins.iter().filter(move |pin| pin.direction == direction);
     let status = design.plan.status_pins();
@@ -93,14 +93,14 @@ endmodule
 "
         ),
     );
-    // Size of the wrapper: an input and an output shift register, with a multiplexer before each flip-flop of the latter.
+    // Size of the wrapper: an input shift register, and an output shift register with a multiplexer before each flip-flop.
     let wrapper = Resources {
         luts: u64::from(outputs) + 1,
         flip_flops: u64::from(2 * inputs + outputs) + 2,
         ..Resources::default()
     };
     let parts = parts(&design.plan);
-    // A system of this repository is named by its path.
+    // Name a system of this repository by its path.
     let own = fs::canonicalize(file)?.strip_prefix(fs::canonicalize(root())?).map(Path::to_path_buf).ok();
     let (recorded, name) =
         own.map_or((false, name.into_owned()), |path| (true, path.to_string_lossy().replace('\\', "/")));
@@ -116,7 +116,7 @@ endmodule
     })
 }
 
-/// Instances in the top with their parts: each core with its gate, each snapshot and FIFO, and all wires as one part.
+/// Instances in the top module with their parts: each core with its gate, each snapshot and FIFO, and all wires as one part.
 fn parts(plan: &SystemPlan) -> Vec<(String, String)> {
     let cores = plan.description.cores.iter().enumerate().map(|(number, core)| {
         (plan.core_instance(number), format!("core {}, {}", core.name, core.program.machine.name))
@@ -134,7 +134,7 @@ fn parts(plan: &SystemPlan) -> Vec<(String, String)> {
     cores.chain(links).collect()
 }
 
-/// The counted items of yosys' netlist.
+/// Counted items of yosys' netlist.
 #[derive(Deserialize)]
 struct Netlist {
     modules: BTreeMap<String, Module>,
@@ -152,10 +152,10 @@ struct Cell {
     kind: String,
 }
 
-/// Resources of each part in yosys' netlist, whose cell names begin with the original instance.
+/// Resources of each part in yosys' netlist, where cell names begin with the original instance.
 ///
 /// # Errors
-/// If the text is not a netlist of yosys.
+/// If the text is not a netlist written by yosys.
 pub(super) fn count(
     netlist: &str,
     top: &str,
@@ -174,7 +174,7 @@ pub(super) fn count(
     for (cell, Cell { kind }) in &module.cells {
         let mut path = cell.split('.');
         if path.next() != Some("system") {
-            continue; // the wrapper's
+            continue; // belongs to the wrapper
         }
         let instance = path.next().unwrap_or("");
         let known = parts.iter().find(|(known, _)| known == instance);

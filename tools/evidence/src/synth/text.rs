@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Text forms of measurements, for the terminal and `docs/synthesis.md`.
+//! Text of measurements, for the terminal and `docs/synthesis.md`.
 
 use super::TARGET_MHZ;
 use std::collections::BTreeSet;
@@ -9,7 +9,7 @@ use takt_family::{FAMILIES, Family, MEASURED, Mapping, REFERENCE, Resources, lac
 use takt_isa::spec::machines::MACHINES;
 use takt_rtl::synthesis::{PartResources, Synthesis};
 
-/// A measurement in words, for the terminal.
+/// Formats a measurement for the terminal.
 pub(super) fn in_words(row: &Synthesis, seeds: &[u32]) -> String {
     let Resources { luts, carries, flip_flops, multipliers, block_rams } = row.resources;
     let mut text = format!("{} on {}", row.design, row.device);
@@ -48,7 +48,7 @@ pub(super) fn in_words(row: &Synthesis, seeds: &[u32]) -> String {
     text
 }
 
-/// Resources of each part of a system, one line each.
+/// Formats the resources of each part of a system, one line each.
 pub(super) fn parts_in_words(parts: &[PartResources]) -> String {
     let line = |part: &PartResources| {
         let Resources { luts, flip_flops, multipliers, block_rams, .. } = part.resources;
@@ -160,7 +160,7 @@ fn commands(family: &Family) -> String {
     if !files.is_empty() {
         let _ = write!(text, ", with {} of rtl/family", files.join(", "));
     }
-    // Show the small mapping as the fast one with additional words, if possible.
+    // If possible, show the small mapping as the fast one with additional options.
     let same = fast.bytes().zip(small.bytes()).take_while(|(a, b)| a == b).count();
     if let Some(more) =
         small.get(same..(same + small.len()).saturating_sub(fast.len())).filter(|more| !more.is_empty())

@@ -22,7 +22,7 @@ use takt_board::place::reports::{clock, critical_path, less, resources};
 use takt_family::{Place, Resources, lacks};
 use takt_rtl::synthesis::Synthesis;
 
-/// Synthesises and places a design, with several seeds in parallel.
+/// Synthesises a design, and places and routes it with several seeds in parallel.
 pub(super) fn measure(venv: &Venv, design: Design, arguments: &Arguments) -> Result<Synthesis> {
     let (family, part) = (arguments.family, arguments.part()?);
     let device = part.name;
@@ -108,7 +108,7 @@ pub(super) fn measure(venv: &Venv, design: Design, arguments: &Arguments) -> Res
     Ok(row)
 }
 
-/// Calls `work` for each seed in at most `jobs` threads; stops after an error.
+/// Calls `work` for each seed in at most `jobs` threads; stops at the first error.
 fn parallel<T: Send>(seeds: &[u32], jobs: usize, work: impl Fn(u32) -> Result<T> + Sync) -> Result<Vec<T>> {
     let (next, results) = (AtomicUsize::new(0), Mutex::new(BTreeMap::new()));
     thread::scope(|scope| {

@@ -21,7 +21,7 @@ from migen import ClockSignal, Instance, ResetSignal
 
 __all__ = ["REGION_SIZE", "Takt", "TaktError", "add_takt", "machine_of"]
 
-#: Bytes of the memory region: the slave decodes 16 bits of word addresses.
+#: Size of the memory region in bytes: the slave decodes 16 bits of word addresses.
 REGION_SIZE = 0x4_0000
 
 _STANDARDS = ("wishbone", "axi-lite")
@@ -100,7 +100,7 @@ class Takt(LiteXModule):
 
     def _wishbone(self, parameters):
         self.bus = bus = wishbone.Interface(data_width=32, address_width=32, addressing="word")
-        # The slave knows no byte enables.
+        # The slave does not support byte enables.
         refused = bus.we & (bus.sel != 0b1111)
         self.sync += bus.err.eq(bus.cyc & bus.stb & refused & ~bus.err)
         return Instance(

@@ -72,7 +72,7 @@ def compiled(soc, folder):
     cpu = Path(vexriscv.__file__).parent
     elf, image = folder / "firmware.elf", folder / "firmware.bin"
     flags = [*soc.cpu.gcc_flags.split(), "-Os", "-Wall", "-Werror", "-ffreestanding", "-nostdlib", "-fno-builtin-printf"]
-    # The compiler's headers are used by LiteX's, which say nothing to -Wall.
+    # LiteX's headers include those of the compiler and compile without warnings under -Wall.
     folders = [f"-I{HERE}", f"-I{folder}", f"-I{include}", f"-I{cpu}", f"-I{LITEX / 'software/include'}"]
     script = [f"-L{include}", "-T", str(LITEX / "software/bios/linker.ld"), "-lgcc"]
     sources = [str(cpu / "crt0.S"), str(HERE / "firmware.c")]
@@ -105,7 +105,7 @@ def compare(said, expected):
                 found = [line[len(start) :] for line in lines if line.startswith(start)]
                 if found != [f"{bits:08x}"]:
                     wrong.append(f"{name}, period {period}, output {output}: {found}, the emulator {bits:08x}")
-    # One interrupt for each wait, the first from the start; the byte changed nothing.
+    # One interrupt per wait, the first one from the start; the byte write changed nothing.
     for line in (f"interrupts {len(expected) + 1:08x}", "word 12345678"):
         if lines.count(line) != 2:
             wrong.append(f"not twice: {line}")

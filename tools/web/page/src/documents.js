@@ -6,7 +6,7 @@ const PREFIX = "takt-playground:";
 const OLD = "takt-playground";
 /** Key of the document that this page shows, for a reload. */
 const HERE = "takt-playground-here";
-/** Maximal number of unchanged documents; beyond it, the longest unused are dropped. */
+/** Maximum number of unchanged documents; beyond it, those unused for longest are dropped. */
 const MOST = 12;
 
 export class Documents {
@@ -16,7 +16,7 @@ export class Documents {
       this.write({ ...old, id: crypto.randomUUID?.() ?? `${Date.now()}`, from: "own", changed: true, used: Date.now() });
       localStorage.removeItem(OLD);
     }
-    /** Documents in memory, for a browser without storage. */
+    /** Documents in memory, for browsers without storage. */
     this.here = new Map();
   }
 
@@ -29,7 +29,7 @@ export class Documents {
     }
   }
 
-  /** Stores a document; returns false if the browser does not. */
+  /** Stores a document; returns false if the browser does not permit it. */
   write(document) {
     try {
       localStorage.setItem(PREFIX + document.id, JSON.stringify(document));
@@ -53,19 +53,19 @@ export class Documents {
         if (document) found.set(document.id, document);
       }
     } catch {
-      // The browser stores nothing.
+      // The browser has no storage.
     }
     return [...found.values()].sort((a, b) => a.made - b.made);
   }
 
-  /** Document for the page's start: this page's before a reload, otherwise the last used. */
+  /** Document to show at the start: after a reload, the page's previous document, otherwise the last used. */
   last() {
     const all = this.list();
     let here = null;
     try {
       here = sessionStorage.getItem(HERE);
     } catch {
-      // The browser stores nothing.
+      // The browser has no storage.
     }
     return { reloaded: all.find(({ id }) => id === here) ?? null, last: all.reduce((a, b) => (a && a.used > b.used ? a : b), null) };
   }
@@ -98,13 +98,13 @@ export class Documents {
     }));
   }
 
-  /** Records that a document is now on display. */
+  /** Records that a document is on display now. */
   use(document) {
     document.used = Date.now();
     try {
       sessionStorage.setItem(HERE, document.id);
     } catch {
-      // The browser stores nothing.
+      // The browser has no storage.
     }
     return this.write(document);
   }
@@ -114,7 +114,7 @@ export class Documents {
     try {
       localStorage.removeItem(PREFIX + id);
     } catch {
-      // The browser stores nothing.
+      // The browser has no storage.
     }
   }
 

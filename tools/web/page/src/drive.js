@@ -1,12 +1,12 @@
-// Panel of the robot: drives the robot along the path with the program, and replays the drive.
+// Robot panel: drives the robot along the path with the program, and replays the drive.
 import { chart } from "./plot.js";
 import { Robot } from "./robot.js";
 
 const el = (id) => document.getElementById(id);
 const plural = (count, noun) => `${count.toLocaleString("en")} ${noun}${count === 1 ? "" : "s"}`;
-/** Periods per call. */
+/** Number of periods per call. */
 const PERIODS = 2000;
-/** Error that the founding paper permits while cutting, µm. */
+/** Tool error that the founding paper permits while cutting, µm. */
 const LIMIT = 10;
 
 export class Drive {
@@ -27,25 +27,25 @@ export class Drive {
     this.robot.draw();
   }
 
-  /** Dims a drive of an earlier program. */
+  /** Dims the result of an earlier program's drive. */
   set old(on) {
     el("robot").classList.toggle("old", on && this.robot.poses.length > 0);
     if (on) this.robot.play(false);
   }
 
-  /** Nothing was driven since a program was opened. */
+  /** Whether nothing has been driven since a program was opened. */
   get idle() {
     return !this.driving && !this.tried;
   }
 
-  /** Tells before the first drive whether the program can drive the robot. */
+  /** Sets, before the first drive, whether the program can drive the robot. */
   set fits(on) {
     if (!this.idle) return;
     el("drove").replaceChildren(on ? "The program as the controller of the five-axis hybrid robot, in a closed loop." : "This program has other ports than a controller of the five-axis hybrid robot. The example ");
     if (!on) el("drove").append(Object.assign(document.createElement("a"), { href: "#example=tracking.s", textContent: "tracking.s" }), " is one.");
   }
 
-  /** Drops the drive. */
+  /** Discards the drive. */
   clear() {
     this.tried = this.driving = false;
     this.drives = (this.drives ?? 0) + 1;
@@ -87,7 +87,7 @@ export class Drive {
     });
   }
 
-  /** Drives along the path, until another drive begins. */
+  /** Drives along the path until another drive begins. */
   async along(mine) {
     const { robot } = this, begun = performance.now();
     for (let begin = true, over = false; !over; begin = false) {

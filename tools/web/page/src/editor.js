@@ -1,5 +1,4 @@
-// Editor: CodeMirror as a client of Takt's language server. All knowledge of the language, including colours, comes from the
-// server.
+// Editor: CodeMirror as a client of Takt's language server, which provides everything that depends on the language, including colours.
 import { autocompletion, closeBrackets, closeBracketsKeymap, completionKeymap } from "@codemirror/autocomplete";
 import { defaultKeymap, history, historyKeymap } from "@codemirror/commands";
 import { bracketMatching, foldGutter, foldKeymap, foldService } from "@codemirror/language";
@@ -14,9 +13,9 @@ import {
   LSPClient, LSPPlugin, findReferencesKeymap, formatKeymap, hoverTooltips, jumpToDefinitionKeymap, renameKeymap, serverCompletion,
 } from "@codemirror/lsp-client";
 
-/** Pause of the user before the program is read, and before it is scheduled; ms. */
+/** Pauses of the user after which the program is read, and after which it is scheduled; ms. */
 const PAUSE = 60, LONG_PAUSE = 350;
-/** Time limit of an answer, after which the server is restarted; ms. */
+/** Time limit for an answer, after which the server is restarted; ms. */
 export const LANGUAGE_LIMIT = 20_000;
 
 // ---- Colours, from semantic tokens.
@@ -46,7 +45,7 @@ function decorations(doc, data, legend) {
   return Decoration.set(marks, true);
 }
 
-// ---- Cycles: inlay hints behind lines, lenses above them.
+// ---- Cycles: inlay hints after lines, lenses above them.
 
 class Hint extends WidgetType {
   constructor(text, more, lens) {
@@ -93,14 +92,14 @@ const folds = StateField.define({
 const mark = Decoration.mark({});
 const folding = foldService.of((state, start, end) => {
   let found = null;
-  // Of several folds that begin on a line, take the longest.
+  // If several folds begin on a line, take the longest.
   state.field(folds).between(start, end, (from, to) => {
     if (from >= start && from <= end && to > end && to > (found?.to ?? 0)) found = { from: end, to };
   });
   return found;
 });
 
-/** CodeMirror's own parts. Folds are known once the server has answered. */
+/** CodeMirror's own extensions. Folds are known once the server has answered. */
 const base = [
   lineNumbers(), highlightActiveLineGutter(), highlightSpecialChars(), history(), drawSelection(), bracketMatching(), closeBrackets(),
   foldGutter({ foldingChanged: (update) => update.transactions.some((tr) => tr.effects.some((effect) => effect.is(setFolds))) }),
@@ -108,7 +107,7 @@ const base = [
   keymap.of([...closeBracketsKeymap, ...defaultKeymap, ...searchKeymap, ...historyKeymap, ...foldKeymap, ...completionKeymap, ...lintKeymap]),
 ];
 
-// ---- Breakpoints: lines that each new debugger receives.
+// ---- Breakpoints: lines that are passed to each new debugger.
 
 class Stop extends GutterMarker {
   toDOM() {
@@ -166,7 +165,7 @@ const theme = EditorView.theme({
   ".cm-lsp-documentation": { padding: "2px 8px" },
 });
 
-/** A read-only view in the editor's style. */
+/** Creates a read-only view in the editor's style. */
 export function reader(parent, text, about) {
   return new EditorView({
     parent,
@@ -254,7 +253,7 @@ export class Editor {
       ],
     });
     this.client = client;
-    // The URI of another file is its name in URI encoding: `%3Cmath.s%3E`.
+    // The URI of another file is its URI-encoded name: `%3Cmath.s%3E`.
     client.workspace.displayFile = async (uri) => (uri === this.name ? this.view : this.showFile(decodeURIComponent(uri)));
     await this.ask("lsp.start", { machine: this.machine });
     if (this.client !== client) return;
@@ -274,7 +273,7 @@ export class Editor {
     this.longPause = setTimeout(() => this.count(), 0);
   }
 
-  /** Passes server messages to a client, if it still exists. */
+  /** Passes messages of the server to a client, if it still exists. */
   said(client, messages) {
     if (this.client !== client) return;
     for (const message of messages ?? []) for (const handler of this.handlers) handler(JSON.stringify(message));
@@ -308,7 +307,7 @@ export class Editor {
     this.longPause = setTimeout(() => this.count(), LONG_PAUSE);
   }
 
-  /** Results without scheduling: diagnostics and colours. */
+  /** Fetches results that need no scheduling: diagnostics and colours. */
   async read() {
     const { client, version } = this;
     if (!client?.serverCapabilities) return;
@@ -330,7 +329,7 @@ export class Editor {
     }
   }
 
-  /** Results of scheduling: cycles. */
+  /** Fetches results of scheduling: cycles. */
   async count() {
     const { client, version } = this;
     if (!client?.serverCapabilities) return;
@@ -396,7 +395,7 @@ export class Editor {
     view.dispatch({ changes: edits.map((edit) => ({ from: plugin.fromPosition(edit.range.start), to: plugin.fromPosition(edit.range.end), insert: edit.newText })), userEvent: "input.fix" });
   }
 
-  /** Shows the debugger's position: the line that issues next, and the other lines of its bundle. */
+  /** Shows the debugger's position: the line that issues next, and the other lines of the same bundle. */
   stand(line, part = []) {
     const doc = this.view.state.doc;
     const exists = (number) => number >= 1 && number <= doc.lines;
@@ -419,7 +418,7 @@ export class Editor {
     return this.view.state.doc.lineAt(this.view.state.selection.main.head).number;
   }
 
-  /** Present lines of the breakpoints. */
+  /** Current lines of the breakpoints. */
   get stops() {
     const { doc } = this.view.state, lines = [];
     this.view.state.field(stops).between(0, doc.length, (from) => void lines.push(doc.lineAt(from).number));

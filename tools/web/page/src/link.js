@@ -1,8 +1,8 @@
-// A program in a URL's fragment: compressed, in base64url. Browsers do not send fragments to servers.
+// Links with a program in the URL's fragment: compressed, in base64url. Browsers do not send fragments to servers.
 
-/** Maximal length of a generated link, supported by browsers and mail programs. */
+/** Maximum length of a generated link, which browsers and mail programs support. */
 export const LINK_CHARACTERS = 100_000;
-/** Maximal size of an unpacked link in bytes. */
+/** Maximum size of an unpacked link, in bytes. */
 const UNPACKED_BYTES = 8 << 20;
 
 const through = (bytes, stream) => new Response(new Blob([bytes]).stream().pipeThrough(stream)).arrayBuffer();
@@ -19,7 +19,7 @@ export async function pack(program) {
   return fragment;
 }
 
-/** Program in a fragment; null if it contains none. */
+/** Unpacks the program in a fragment; null if there is none. */
 export async function unpack(fragment) {
   const text = fragment.replace(/^#/, "");
   if (text === "") return null;
@@ -35,7 +35,7 @@ export async function unpack(fragment) {
   }
   let bytes;
   try {
-    // The checksum of the compressed data detects any lost or changed character.
+    // The checksum of the compressed data detects lost or changed characters.
     bytes = await unpackBounded(packed);
   } catch (error) {
     throw new Error(error instanceof RangeError ? error.message : "a part of it is missing or was changed on the way");

@@ -12,18 +12,18 @@ import "./style.css";
 const el = (id) => document.getElementById(id);
 const text = (value) => (value === null || value === undefined ? "" : String(value));
 const plural = (count, noun) => `${count.toLocaleString("en")} ${noun}${count === 1 ? "" : "s"}`;
-/** Delay from a change to the next run, if a run takes at most the second number; ms. */
+/** Delay from a change to the next run, which is automatic only if a run takes at most the second number; ms. */
 const PAUSE = 400, SOON = 1000;
 /** Default number of periods of a program without inputs. */
 const PERIODS = 20;
 
-/** Reason for stopping a worker when another program is opened. */
+/** Reason given for stopping a worker when another program is opened. */
 const REPLACED = "another program was opened";
 
 const state = { works: 0, breaks: [], name: "main.s", about: null, program: null, stale: true, run: null, took: 0, document: null };
 let machine, editor, plots, pipeline, drive, documents;
 
-/** Shows an error; with `act` (a button's text and action), a notice. */
+/** Shows an error; with `act` (text and action of a button), a notice. */
 function notice(message, act) {
   el("notice").replaceChildren(message ?? "");
   if (act) el("notice").append(" ", Object.assign(document.createElement("button"), { textContent: act[0], onclick: () => (notice(), act[1]()) }));
@@ -34,7 +34,7 @@ function notice(message, act) {
   el("notice").hidden = !message;
 }
 
-/** Rows of a table: cells are texts, or objects with class and title. */
+/** Fills a table with rows; cells are texts, or objects with class and title. */
 function rows(id, list) {
   el(id).tBodies[0].replaceChildren(...list.map((cells) => {
     const row = document.createElement("tr");
@@ -72,18 +72,18 @@ function select(name, focus) {
   if (name === "pipeline") pipelineInStep();
 }
 
-/** Dims the diagram of an earlier program. A text in its place is not dimmed. */
+/** Dims the diagram of an earlier program, but not a text in its place. */
 function dimPipeline() {
   el("pipeline").classList.toggle("old", Boolean(state.drawn) && state.drawn !== state.program);
 }
 
-/** Draws the diagram if it is visible and not of the present program. */
+/** Draws the diagram if it is visible and outdated. */
 function pipelineInStep() {
   dimPipeline();
   if (state.drawn !== state.program && state.tab === "pipeline" && !state.stale && state.program?.assembled && !state.program.inputs_error) draw();
 }
 
-/** Drives the robot if its panel is visible, nothing was driven yet, and the program can drive it. */
+/** Drives the robot if its panel is visible, nothing has been driven yet, and the program can drive it. */
 function driveFirst() {
   if (state.tab === "robot" && !state.opening && !state.stale && state.program?.tracks && !state.program.inputs_error && drive.idle) drive.drive();
 }
@@ -109,11 +109,11 @@ function changed(event) {
   if (!state.document) return;
   state.stale = true;
   document.body.classList.add("stale");
-  // A reported mistake belongs to the previous text, too.
+  // A reported mistake also belongs to the previous text.
   el("cycles").classList.remove("now");
   if (!state.opening) {
     state.dirty = true;
-    // An example on another machine is still the example.
+    // An example remains the example on another machine.
     if (event !== "machine") state.document.changed = true;
     // The URL no longer describes the document.
     if (location.hash) history.replaceState(null, "", location.pathname + location.search);
@@ -137,7 +137,7 @@ function again() {
 
 function keep() {
   clearTimeout(state.keeping);
-  // Do not overwrite another page's changes with a document that is only on display here.
+  // Do not overwrite another page's changes with a document that is merely displayed here.
   if (!state.document || !state.dirty) return;
   state.dirty = false;
   Object.assign(state.document, { name: state.name, machine: el("machine").value, source: editor.text, inputs: table(), periods: periods() });
@@ -160,7 +160,7 @@ async function closeDocument(one) {
   if (one.changed) notice(`${one.name} was closed.`, ["Undo", () => (documents.write(one), openDocument(one))]);
 }
 
-/** Opens a stored document; the previous one stays stored as it is. */
+/** Opens a stored document; the previous one remains stored. */
 async function openDocument(one) {
   keep();
   one = documents.get(one.id) ?? one;
@@ -171,7 +171,7 @@ async function openDocument(one) {
   await open(one);
 }
 
-/** Menu entry of a machine file (docs/machines.md). Everywhere else its text takes the place of the name. */
+/** Menu entry for a machine file (docs/machines.md). Elsewhere, the text of the file takes the place of the machine's name. */
 const OWN = "own";
 
 /** Adds a machine file to the menu, and selects it. */
@@ -184,7 +184,7 @@ function offer(text) {
   select.value = text;
 }
 
-/** Uses the selected machine, or asks for its file. */
+/** Uses the selected machine, or asks the user for a machine file. */
 function useMachine() {
   if (el("machine").value === OWN) {
     el("machine").value = state.document?.machine ?? "t3";
@@ -214,7 +214,7 @@ async function open({ name, source, inputs, periods, machine: wanted }) {
   await opened;
 }
 
-/** Cycles and bound in the summary, which is always visible. */
+/** Shows cycles and bound in the summary, which is always visible. */
 function showCycles() {
   const { program, run } = state, out = el("cycles");
   out.replaceChildren();
@@ -236,7 +236,7 @@ function showCycles() {
     put(least === most ? `${most.toLocaleString("en")} cycles` : `${least.toLocaleString("en")} to ${most.toLocaleString("en")} cycles`, "b");
     put(` a period, in ${plural(run.cycles.length, "period")}${run.missed ? `, ${plural(run.missed, "deadline")} missed` : ""}`);
   } else if (run) put(`${plural(run.total, "cycle")}`, "b");
-  // A block that is a whole period has the scheduler's bound: no schedule takes fewer cycles.
+  // For a block that is a whole period, show the scheduler's bound: no schedule takes fewer cycles.
   const whole = program.blocks.filter((block) => periods.some((section) => section.name === block.label));
   const schedule = whole.reduce((most, block) => (most && most.cycles >= block.cycles ? most : block), null);
   if (schedule) put(` · no schedule takes fewer than ${schedule.bound}`);
@@ -246,7 +246,7 @@ function showCycles() {
   if (program.inputs_of_others) put(` · all inputs are 0: ${program.inputs_of_others}`, "em");
 }
 
-/** Shows an assembled program. While the text has errors, results of the previous text stay, dimmed. */
+/** Shows an assembled program. While the text has errors, results for the previous text remain, dimmed. */
 function showProgram(program) {
   state.program = program;
   const { inputs_error: wrong } = program, whole = program.assembled && !wrong;
@@ -279,14 +279,14 @@ function showProgram(program) {
 
 const asked = () => ({ name: state.name, source: editor.text, machine: el("machine").value, inputs: table(), tick: Number(el("tick").value) || 0 });
 
-/** Assembles, and sets the previous breakpoints again. */
+/** Assembles the program, and restores the breakpoints. */
 async function begin() {
   state.program = await machine.call("assemble", asked());
   await setStops();
   showProgram(state.program);
 }
 
-/** Runs a job on the machine's worker; reports a stop or an error. */
+/** Runs a job on the machine's worker; reports if it is stopped or fails. */
 async function work(doing) {
   const mine = ++state.works;
   notice();
@@ -308,7 +308,7 @@ async function work(doing) {
   }
 }
 
-/** Assembles and runs; `told`: on the user's request, so report obstacles. */
+/** Assembles and runs; `told`: the user requested it, so report obstacles. */
 const assemble = (told = true) => work(async () => {
   const begun = performance.now();
   clearTimeout(state.soon);
@@ -380,7 +380,7 @@ function showView(view) {
   editor.stops = view.breaks.filter(({ file }) => file === state.name).map(({ line }) => line);
 }
 
-/** Sets the breakpoints in a new debugger; drops those on lines without code. */
+/** Sets the breakpoints in a new debugger, and drops those on lines without code. */
 async function setStops() {
   const lines = editor.stops;
   if (!state.program?.view) return;
@@ -408,7 +408,7 @@ function toggleStop(line) {
   });
 }
 
-/** Shows a file that the program includes, read-only. */
+/** Shows a file that the program includes, as read-only. */
 async function showFile(name) {
   let source;
   try {
@@ -455,7 +455,7 @@ function draw() {
   });
 }
 
-/** File and line of a place, `pi.s:12` or `pi.s:12:3-9`. */
+/** Splits a place such as `pi.s:12` or `pi.s:12:3-9` into file and line. */
 const place = (text) => /^(.*?):(\d+)/.exec(text ?? "")?.slice(1, 3) ?? [null, 0];
 
 /** Marks the operations of a source line in the diagram. */
@@ -482,7 +482,7 @@ async function link() {
   try {
     const fragment = await pack({ name: state.name, machine: el("machine").value, source: editor.text, inputs: table(), periods: periods() });
     history.replaceState(null, "", `#${fragment}`);
-    // A reload shows this document.
+    // A reload shows this document again.
     state.document.key = fragment;
     state.dirty = true;
     keep();
@@ -499,10 +499,10 @@ async function link() {
   }
 }
 
-/** Opens the program or example in the URL as an additional document; without one, the last document. */
+/** Opens the program or example in the URL as an additional document; if there is none, the last document. */
 async function openAddress(first) {
   const examples = state.about.examples, { reloaded, last } = documents.last(), key = location.hash.slice(1);
-  // On a reload, show the page's document: it may have changed since it was opened.
+  // After a reload, show the page's document: it may have changed since it was opened.
   if (first && reloaded && (key === "" || reloaded.key === key)) return openDocument(reloaded);
   let program = null, complaint = null, from = "link";
   try {
@@ -538,7 +538,7 @@ const EDITOR_KEYS = [["Ctrl-Space", "complete"], ["F12", "to the definition"], [
 function pressed(event) {
   const name = [event.ctrlKey || event.metaKey ? "Mod" : "", event.altKey ? "Alt" : "", event.shiftKey ? "Shift" : "", event.key.length === 1 ? event.key.toLowerCase() : event.key].filter(Boolean).join("-");
   const found = KEYS.find(([key]) => key === name);
-  // A drive permits other work.
+  // Other work may proceed during a drive.
   if (!found || (el("assemble").disabled && !drive.driving)) return;
   event.preventDefault();
   event.stopPropagation();
@@ -569,7 +569,7 @@ async function start() {
     const [file] = el("own").files;
     el("own").value = "";
     if (!file) return;
-    // Without a line break, the text would be taken for a machine's name.
+    // Add a line break; without one, the text would be taken for the name of a machine.
     offer(`${await file.text()}\n`);
     useMachine();
   });
@@ -625,7 +625,7 @@ async function start() {
   document.body.dataset.ready = "";
 }
 
-// For tests: a benchmark of the closed loop without drawing.
+// For tests: benchmark of the closed loop without drawing.
 globalThis.takt = {
   async bench(periods) {
     await current();

@@ -1,11 +1,11 @@
-// Plots of port values over the periods, one chart below another, with synchronised cursors.
+// Plots of port values over periods, one chart below another, with synchronised cursors.
 import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
 
 const COLOURS = ["#2f6fbf", "#d9534f", "#5aa469", "#b07cd8", "#d98a1f", "#26a0a8", "#a3156b", "#8d6e63"];
-/** Number of curves shown initially. */
+/** Number of curves that are shown initially. */
 const SHOWN = 4;
-/** Minimal and maximal height of a chart in pixels. */
+/** Minimum and maximum height of a chart in pixels. */
 const LOW = 96, HIGH = 420;
 /** A limit is drawn if a value reaches this fraction of it. */
 const NEAR = 0.4;
@@ -16,7 +16,7 @@ const style = (name) => getComputedStyle(document.documentElement).getPropertyVa
 const plural = (count, noun) => `${count.toLocaleString("en")} ${noun}${count === 1 ? "" : "s"}`;
 const isNumber = (value) => typeof value === "number";
 
-/** Maximal runs of indices at which `holds` is true: first and last index of each. */
+/** Longest runs of indices for which `holds` is true: first and last index of each. */
 function runs(length, holds) {
   const found = [];
   for (let i = 0; i < length; i++) {
@@ -27,7 +27,7 @@ function runs(length, holds) {
   return found;
 }
 
-/** Indices of isolated numbers, which a line does not show. */
+/** Indices of isolated numbers, which a line would not show. */
 const alone = (values) => values.flatMap((value, i) => (isNumber(value) && !isNumber(values[i - 1]) && !isNumber(values[i + 1]) ? [i] : []));
 
 /**
@@ -43,7 +43,7 @@ export function chart(parent, { x, name: across, label, unit, curves, lines = []
   const numbers = curves.flatMap((curve) => curve.values.filter(isNumber));
   const most = numbers.reduce((a, b) => Math.max(a, Math.abs(b)), 0);
   const limits = isNumber(limit) && most >= NEAR * limit ? [{ at: limit, text: `limit ${limit}${of ? ` ${of}` : ""}`, signed: true }, { at: -limit, text: `limit −${limit}${of ? ` ${of}` : ""}`, signed: true }] : [];
-  // Of a symmetric limit, keep the sign that the values approach.
+  // Of a symmetric limit, draw the sign that the values approach.
   const near = ({ at, signed }) => !signed || numbers.some((value) => Math.sign(value) === Math.sign(at) && Math.abs(value) >= NEAR * Math.abs(at));
   const levels = [...lines, ...limits].filter(near);
   const lost = runs(x.length, (i) => curves.some(({ values }) => values[i] !== null && !isNumber(values[i])));
@@ -94,7 +94,7 @@ export function chart(parent, { x, name: across, label, unit, curves, lines = []
   };
 }
 
-/** Draws levels as lines, and marks periods with a saturated or non-finite value. */
+/** Draws levels as lines, and marks periods with saturated or non-finite values. */
 function mark(plot, { x, levels, lost, saturated }) {
   const { ctx, bbox: { left, top, width, height } } = plot, ratio = devicePixelRatio || 1;
   const half = x.length > 1 ? (x[1] - x[0]) / 2 : 0.5;
@@ -148,7 +148,7 @@ export class Plots {
     new ResizeObserver(() => this.size()).observe(parent.parentElement);
   }
 
-  /** Shows a run: columns of inputs and outputs by name, and cycles; units and limits come from the program. Without a run, shows `why`. */
+  /** Shows a run: columns of inputs and outputs by name, and cycles. Units and limits come from the program. Without a run, shows `why`. */
   show(run, program, why = "") {
     Object.assign(this, { run, program, why });
     // In declaration order.
@@ -166,10 +166,10 @@ export class Plots {
     this.draw();
   }
 
-  /** Height of a chart: the charts fill the panel, unless there are many. */
+  /** Height of a chart: the charts fill the panel, unless there are too many. */
   height(count) {
     const panel = this.parent.parentElement, above = this.parent.offsetTop - panel.offsetTop;
-    // Title of a chart, and the gap below it.
+    // Space for a chart's title, and the gap below it.
     const room = (panel.clientHeight - above - 16) / Math.max(1, count) - 32;
     return Math.round(Math.min(HIGH, Math.max(LOW, room)));
   }
@@ -197,13 +197,13 @@ export class Plots {
     this.charts.push(chart(this.parent, { x, name: "period", label: "period", curves: [{ name: "cycles", values: run.cycles, stepped: true }], lines: this.levels(), height, sync: "ports" }));
   }
 
-  /** Levels in the chart of cycles: bound and deadline. */
+  /** Horizontal lines in the chart of cycles: bound and deadline. */
   levels() {
     const { program, run } = this;
     const periods = program?.bounds?.filter((section) => !section.once) ?? [];
     const worst = periods.reduce((most, section) => Math.max(most, section.cycles.worst), 0);
     const lines = worst ? [{ at: worst, text: `at most ${worst}, whatever the inputs` }] : [];
-    // A distant deadline would flatten the curve.
+    // A deadline far above the curve would flatten it.
     const tick = program?.tick;
     if (tick && tick <= 4 * run.longest) lines.push({ at: tick, text: `deadline ${tick}` });
     return lines;

@@ -1,9 +1,9 @@
-// The robot: three arms of variable length from a base triangle to the tool, over a table that tilts and turns; beside it, enlarged,
-// the tool's path. Dragging turns the scene under the pointer, and the wheel zooms it.
+// The robot: three arms of variable length from a base triangle to the tool, above a table that tilts and turns; beside it, magnified,
+// the path of the tool. Dragging rotates the scene under the pointer, and the wheel zooms it.
 
 const style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 const MS = 1000;
-/** Fraction of the width for the path; radius of the table, m; margin of a scene, pixels; error that the founding paper permits while cutting, m. */
+/** Fraction of the width for the path; radius of the table, m; margin of a scene, pixels; permitted tool error while cutting, m. */
 const PATH = 0.62, TABLE = 0.3, MARGIN = 14, ALLOWED = 10e-6;
 /** Initial views: rotation about the vertical, elevation, zoom. The path faces the viewer, so that its letters are readable. */
 const VIEWS = { robot: { turn: 0.6, rise: 0.42, zoom: 1 }, path: { turn: 0, rise: -1.2, zoom: 1 } };
@@ -123,7 +123,7 @@ export class Robot {
     this.scenes = [];
     if (!this.base || !poses.length) return;
     this.look();
-    // The path is wider than high, and gets most of the room: beside the robot, or in a narrow panel the upper half.
+    // The path is wider than high and gets most of the space: beside the robot, or in a narrow panel the upper half.
     const beside = width >= 520, across = Math.round(width * PATH), down = height / 2;
     if (beside) {
       this.scene(g, "path", 0, 0, across, height);
@@ -170,7 +170,7 @@ export class Robot {
     g.restore();
   }
 
-  /** Outline of the whole robot, for any tilt of its table. */
+  /** Outline of the whole robot, for any tilt of the table. */
   whole() {
     return [...this.base.map(([x, y]) => [x, y, 0]), ...this.circle(0.5), ...this.circle(-0.5)];
   }
@@ -181,7 +181,7 @@ export class Robot {
     return [0, 1, 2, 3, 4, 5, 6, 7].map((i) => [0, 1, 2].map((axis) => ((i >> axis) & 1 ? high[axis] : low[axis])));
   }
 
-  /** The table: a disc below the lowest tool point so far, tilted about x and turned about its axis. */
+  /** Table: a disc below the lowest tool point so far, tilted about x and turned about its axis. */
   disc(r, a, tilt) {
     const [u, v] = [r * Math.cos(a), r * Math.sin(a)];
     return [u, v * Math.cos(tilt), this.box.high[2] + 0.03 + v * Math.sin(tilt)];
@@ -220,7 +220,7 @@ export class Robot {
     }
   }
 
-  /** Extends the box around the path by the new poses. */
+  /** Extends the box around the path to include the new poses. */
   look() {
     for (; this.looked < this.poses.length; this.looked++) {
       const [, ...pose] = this.poses[this.looked], { low, high } = this.box;
@@ -228,7 +228,7 @@ export class Robot {
     }
   }
 
-  /** Path so far: cutting moves strong, and in the error colour where the tool error exceeds the permitted one. */
+  /** Draws the path so far: cutting moves bold, and in the error colour where the tool error exceeds the permitted one. */
   path(g, at, weight) {
     const strokes = [[(pose) => pose[7] !== 1, style("--dim"), 1], [(pose) => pose[7] === 1, style("--accent"), weight], [(pose) => pose[7] === 1 && Math.abs(pose[6]) > ALLOWED, style("--bad"), weight + 2]];
     for (const [drawn, colour, wide] of strokes) {

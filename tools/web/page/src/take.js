@@ -9,7 +9,7 @@ function save(name, content, type) {
   setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
 }
 
-/** Function that saves a download by name; for the arguments see main.js. */
+/** Creates the function that saves a download by name; main.js describes the arguments. */
 export function taker({ machine, work, current, state, editor }) {
   const stem = () => state.name.replace(/\.s$/, "");
   return (what) => {

@@ -1,12 +1,12 @@
-// A worker with promises as answers, which can be stopped and restarted.
+// Worker whose answers are promises, and which can be stopped and restarted.
 
-/** The compiled WebAssembly: fetched once, shared by the workers. */
+/** Loads the compiled WebAssembly, which is fetched once and shared by the workers. */
 export async function load(url) {
   const answer = await fetch(url);
   if (!answer.ok) throw new Error(`${url} cannot be had: ${answer.status} ${answer.statusText}`);
   let bytes = await answer.arrayBuffer();
   const head = new Uint8Array(bytes, 0, 2);
-  // Decompress, unless the server declared the encoding and the browser has decompressed already.
+  // Decompress the data, unless the server declared the encoding and the browser has decompressed it.
   if (head[0] === 0x1f && head[1] === 0x8b) {
     const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
     bytes = await new Response(stream).arrayBuffer();

@@ -1,9 +1,9 @@
-// A playground in its own thread: answers requests in order. The page has two, for the language server and for the machine, so that
-// neither blocks the page or the other.
+// Worker that runs a playground and answers requests in order. The page has two, for the language server and for the machine, so that
+// neither blocks the other or the page.
 
 let takt;
 
-/** Calls the WebAssembly (`tools/web/src/exports.rs`), with bytes in and out. */
+/** Calls a function of the WebAssembly module (`tools/web/src/exports.rs`) with bytes as input and output. */
 function ask(request, call) {
   const bytes = new TextEncoder().encode(request);
   const at = takt.takt_input(bytes.length);
@@ -15,7 +15,7 @@ function ask(request, call) {
 const ready = new Promise((resolve, reject) => {
   self.addEventListener("message", async ({ data }) => {
     if (data.module) {
-      // The module has no imports: one would be a mistake of the build, and fails here.
+      // The module has no imports: if the build adds one by mistake, instantiation fails here.
       WebAssembly.instantiate(data.module, {}).then(({ exports }) => resolve((takt = exports)), reject);
       return;
     }

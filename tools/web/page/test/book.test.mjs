@@ -63,7 +63,7 @@ test("every listing opens in the playground by a click, and assembles there", li
   });
   assert.ok(listings.length > 5, `${listings.length} listings`);
   const done = () => page.waitForFunction(() => document.body.dataset.ready !== undefined && !document.getElementById("assemble").disabled);
-  // The first listing by its link, as a reader opens it; the others in the same page.
+  // Open the first listing by its link, as a reader does; the others in the same page.
   await page.goto(address + listings[0].name);
   const book = page;
   [page] = await Promise.all([book.context().waitForEvent("page"), book.locator(".playground-link").first().click()]);

@@ -18,7 +18,7 @@ let server, browser, address, requests = [];
 
 before(async () => {
   assert.ok(FOLDER, "TAKT_PAGE says where the page is: `cargo xtask web --test` sets it");
-  // A bare file server, without knowledge of WebAssembly or compression.
+  // A plain file server that supports neither WebAssembly types nor compression.
   server = createServer((request, response) => {
     const path = normalize(new URL(request.url, "http://x").pathname).replace(/^\/$/, "/index.html");
     const file = join(FOLDER, path);
@@ -37,7 +37,7 @@ after(async () => {
   server?.close();
 });
 
-// Work of one page would slow down the next.
+// Close pages after each test: a page that still works would slow down the next.
 const contexts = [];
 afterEach(async () => {
   for (const context of contexts.splice(0)) await context.close();
@@ -80,7 +80,7 @@ test("the integrator assembles and runs when the page opens, coloured by the lan
   const { page, errors } = await open();
   await done(page);
   assert.match(await cycles(page), /pi\.s on t3: 38 cycles a period, in \d+ periods · no schedule takes fewer than 38/);
-  // All colours come from the server; a second lexer in the page would fail here.
+  // All colours come from the server: if the page had a lexer of its own, this would fail.
   await page.waitForSelector(".tok-function");
   const instruction = await page.textContent(".tok-function");
   assert.match(instruction, /^[a-z]\w*$/);
@@ -89,7 +89,7 @@ test("the integrator assembles and runs when the page opens, coloured by the lan
   assert.match((await page.locator(".lens").allTextContents()).join("\n"), /38 cycles/);
   await page.click("#tab-plot");
   await page.waitForSelector("#charts canvas");
-  // The curve itself is drawn, not only its axes: look for pixels of its colour.
+  // The curve itself is drawn, not only the axes: look for pixels of its colour.
   await page.waitForFunction(() => {
     const canvas = document.querySelector("#charts canvas");
     const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
@@ -116,7 +116,7 @@ test("diagnostics, a fix, hover and completion are the language server's", limit
   await page.click("#assemble");
   await page.waitForFunction(() => /cycles a period/.test(document.getElementById("cycles").textContent));
   await page.waitForSelector(".tok-function");
-  // Move the pointer again until an answer comes: over a text that was just read there is none.
+  // Move the pointer repeatedly until an answer comes: just after a text was read, there is none.
   while (!(await page.locator(".cm-tooltip-hover").count())) {
     await page.mouse.move(0, 0);
     await page.hover(".tok-function");
@@ -153,7 +153,7 @@ test("keyboard only: step on and back, and a command", limit, async () => {
     await done(page);
     assert.equal(await head(), seen[i], "back is exactly where it was");
   }
-  // By Tab from the commands to the panel, by arrows between tabs.
+  // Tab moves from the commands to the panel, arrows move between tabs.
   await page.keyboard.press("Control+Alt+c");
   await page.keyboard.type("goto period 3");
   await page.keyboard.press("Enter");
@@ -181,7 +181,7 @@ test("breakpoints are set by a click and by F9, stay where they are written, and
   const [first] = await stops();
   await page.click(".cm-content");
   await page.keyboard.press("Control+Home");
-  // The first line is a comment: no code, and a message.
+  // The first line is a comment without code, so there is a message.
   await page.keyboard.press("F9");
   await page.waitForSelector("#notice:visible");
   assert.match(await page.textContent("#notice"), /line 1 of pi\.s has no instruction; the next line with one is \d+/);
@@ -210,7 +210,7 @@ test("sections fold, and a name leads to the file that declares it", limit, asyn
   await page.locator(".cm-foldGutter span[title='Fold line']").first().click();
   await page.waitForSelector(".cm-foldPlaceholder");
   assert.ok((await lines()) < before + 1);
-  // `ms` is declared in robot.s.
+  // robot.s declares `ms`.
   await page.evaluate(() => takt.goTo(10, 20));
   await page.keyboard.press("F12");
   await page.waitForSelector("#file-shown[open] .cm-content");
@@ -249,7 +249,7 @@ test("a loop without end stops at a named limit, and the page answers meanwhile"
   assert.equal(await page.evaluate(() => 1 + 1), 2);
   await done(page);
   // Stopping preserves the text.
-  // Run inside the page, so that the work does not end before a test on a busy machine stops it.
+  // Run inside the page: otherwise, on a busy machine, the work could end before the test stops it.
   assert.equal(await page.evaluate(async () => {
     document.querySelector("[data-step=continue]").click();
     await new Promise((resolve) => setTimeout(resolve, 30));
@@ -319,7 +319,7 @@ test("the pipeline is drawn for the machine that is chosen; a click leads to the
   await page.click("#tab-pipeline");
   await page.waitForFunction(() => /pi\.s on t3, period 2: 38 cycles/.test(document.getElementById("drawn").textContent));
   assert.ok((await page.locator(".tp-issue").count()) > 10);
-  // The longest chain consists of operations, not of whole bundles: others in its bundles are not on it.
+  // The longest chain consists of operations, not of whole bundles: other operations of its bundles are not on it.
   const [critical, all] = [await page.locator(".tp-on-chain").count(), await page.locator(".tp-label").count()];
   assert.ok(critical > 3 && critical < all, `${critical} of ${all}`);
   assert.match((await page.locator(".tp-legend span").allTextContents()).join("; "), /multiply \d+; .*longest chain/);
@@ -329,7 +329,7 @@ test("the pipeline is drawn for the machine that is chosen; a click leads to the
   assert.equal(await page.locator(".cm-activeLineGutter").first().textContent(), String(line));
   await page.evaluate((line) => takt.goTo(line), line - 1);
   await page.waitForFunction(() => /fadd v, p, s/.test(document.querySelector(".tp-marked")?.textContent ?? ""));
-  // The tab key stops at one row, and the arrows move from there.
+  // Tab stops at a single row, and arrows move from there.
   const stops = () => page.locator(".tp-label[tabindex='0']").evaluateAll((rows) => rows.map((row) => Number(row.dataset.row)));
   assert.equal((await stops()).length, 1);
   await page.locator(".tp-label[tabindex='0']").focus();
@@ -382,10 +382,10 @@ test("what no longer holds is dimmed at once, and computed again", limit, async 
   await page.keyboard.type("x");
   assert.ok((await opacity("#cycles")) < 0.5, "the cycles are of the text before");
   assert.ok((await opacity("#step .columns")) < 0.5);
-  // The page recomputes by itself.
+  // The page recomputes without a request.
   await page.waitForFunction(() => !document.body.classList.contains("stale"));
   assert.match(await cycles(page), /38 cycles a period/);
-  // With a mistake in the text, results stay dimmed, and the mistake is reported.
+  // While the text has a mistake, results remain dimmed, and the mistake is reported.
   await page.keyboard.press("Enter");
   await page.keyboard.type("  fad e, e, e");
   await page.waitForFunction(() => /does not assemble: line 2: .*fad/.test(document.getElementById("cycles").textContent));
@@ -398,7 +398,7 @@ test("what no longer holds is dimmed at once, and computed again", limit, async 
   await page.waitForFunction(() => document.getElementById("cycles").classList.contains("now"));
   await page.keyboard.press("Control+a");
   await page.keyboard.insertText(await example("foc.s"));
-  // The inputs belong to another program: the run uses zeros, and says so.
+  // The inputs belong to another program: the run uses zeros and reports it.
   await page.waitForFunction(() => /pi\.s on t3: \d.* · all inputs are 0: inputs: no column for the input ports ia/.test(document.getElementById("cycles").textContent) && !document.body.classList.contains("stale"));
   assert.match(await page.textContent("#text"), /table of inputs is for other ports/);
   await page.click("#tab-inputs");
@@ -426,7 +426,7 @@ test("the pipeline and its heading are dimmed once while they are of another pro
     for (const [i, part] of (await all()).entries()) assert.ok(part > 0.3 && part < 0.5, `${why}: ${parts[i]} has ${part}`);
     assert.equal(await seen("#draw"), 1, why);
   };
-  // In a single step, so that nothing is redrawn before the check.
+  // In one evaluation, so that nothing is redrawn before the check.
   const changed = await page.evaluate(() => {
     const machine = document.getElementById("machine");
     machine.value = "t1";
@@ -436,7 +436,7 @@ test("the pipeline and its heading are dimmed once while they are of another pro
   assert.ok(changed.every((opacity) => opacity < 0.5), `${changed}: the machine is another one`);
   await page.waitForFunction(() => /pi\.s on t1/.test(document.getElementById("drawn").textContent));
   assert.deepEqual(await all(), [1, 1, 1]);
-  // The diagram is hidden while the program changes, and then shown with a mistake in the text.
+  // The program changes while the diagram is hidden; the diagram is then shown with a mistake in the text.
   await page.click("#tab-step");
   await page.selectOption("#machine", "t3");
   await page.waitForFunction(() => takt.state.run && /on t3/.test(document.getElementById("cycles").textContent));
@@ -448,7 +448,7 @@ test("the pipeline and its heading are dimmed once while they are of another pro
   await page.click("#tab-pipeline");
   await dimmed("a mistake in the text, and a picture of the machine before");
   await shot(page, "pipeline-stale");
-  // A text that never assembled has no diagram, and the message is about this text.
+  // If a text has never assembled, there is no diagram, and the message refers to this text.
   await page.evaluate((hash) => (location.hash = hash), link({ name: "a.s", machine: "t3", source: "start:\n    fmull y, x, x\n" }));
   await page.waitForFunction(() => /The program does not assemble/.test(document.getElementById("drawn").textContent));
   assert.equal(await seen("#drawn"), 1);
@@ -511,7 +511,7 @@ test("a number between infinities is seen, and cycles have no halves", limit, as
     for (let i = 0; i < data.length; i += 4) if (data[i] === 0x2f && data[i + 1] === 0x6f && data[i + 2] === 0xbf) return true;
     return false;
   });
-  // The chart of cycles is the only one with two-digit values; periods are integers anyway.
+  // Only the chart of cycles has two-digit values; periods are always integers.
   const halves = await page.evaluate(() => [...window.written].filter((text) => /^\d\d\.\d/.test(text)));
   assert.deepEqual(halves, []);
   assert.deepEqual(errors, []);
@@ -523,7 +523,7 @@ test("links and examples open beside what one has written", limit, async () => {
   await write(page, ".output y\n.period\nmine:\n    mov y, one\n.const one = 1\n    wait mine\n");
   await page.waitForFunction(() => !document.body.classList.contains("stale") && takt.state.program?.assembled);
   const mine = await page.evaluate(() => takt.text);
-  // In another page of the same browser, as opened by the book.
+  // Open another page in the same browser, as the book does.
   const other = await context.newPage();
   other.setDefaultTimeout(PATIENCE);
   await other.goto(address + link({ name: "theirs.s", machine: "t1", source: await example("blink.s") }));
@@ -534,7 +534,7 @@ test("links and examples open beside what one has written", limit, async () => {
   await shot(other, "documents");
   await other.locator("#notice button", { hasText: "Back to" }).click();
   await other.waitForFunction((mine) => takt.text === mine, mine);
-  // The first page continues: neither overwrites the other.
+  // The first page continues: neither page overwrites the other's document.
   await page.click(".cm-content");
   await page.keyboard.press("Control+End");
   await page.keyboard.type("; more");
@@ -543,7 +543,7 @@ test("links and examples open beside what one has written", limit, async () => {
   await other.waitForFunction(() => /lamp/.test(takt.text));
   await other.locator("#documents button", { hasText: "pi.s" }).first().click();
   await other.waitForFunction(() => takt.text.endsWith("; more"));
-  // An example does not replace the document either; a reload shows the same document.
+  // An example does not replace the document either; a reload shows the example again.
   await page.selectOption("#example", "foc.s");
   await page.waitForFunction(() => /foc\.s on/.test(document.getElementById("cycles").textContent));
   await page.reload();
@@ -635,14 +635,14 @@ test("an example shows what it does when it is chosen, in the tab where one is",
   assert.equal(await page.evaluate(() => takt.state.tab), "robot");
   await page.waitForFunction(() => /^[1-9].* of path/.test(document.getElementById("drove").textContent));
   assert.ok((await page.evaluate(() => takt.drive.robot.poses.length)) > 10);
-  // Another machine in the middle of a drive ends it, without a restart.
+  // Selecting another machine during a drive ends it, without a restart.
   await page.selectOption("#machine", "t4");
   await page.waitForFunction(() => /tracking\.s on t4: \d/.test(document.getElementById("cycles").textContent) && takt.state.run);
   await done(page);
   assert.equal(await page.evaluate(() => takt.drive.driving), false);
   // The document is still the example.
   assert.match(await page.locator("#documents .here small").textContent(), /^example$/);
-  // A user who switches tabs meanwhile stays there.
+  // If the user switches tabs meanwhile, the page stays there.
   await page.evaluate(() => {
     const example = document.getElementById("example");
     example.value = "tracking.s";
@@ -652,7 +652,7 @@ test("an example shows what it does when it is chosen, in the tab where one is",
   await page.waitForFunction(() => /tracking\.s on t[34], period 2/.test(document.getElementById("drawn").textContent));
   await done(page);
   assert.equal(await page.evaluate(() => takt.state.tab), "pipeline");
-  // A blinking lamp blinks within the default number of periods.
+  // The blinking lamp changes within the default number of periods.
   await page.selectOption("#example", "blink.s");
   await page.waitForFunction(() => takt.state.name === "blink.s" && takt.state.run?.cycles.length > 20);
   const lit = await page.evaluate(() => takt.state.run.outputs.lamp);

@@ -12,7 +12,7 @@ use takt_analysis::accuracy::{
 use takt_isa::program::Location;
 use takt_isa::{Program, Register};
 
-/// Proved error bounds of a program, for output.
+/// Proved error bounds of a program, ready for output.
 pub(super) struct BoundReport<'a> {
     pub(super) program: &'a Program,
     pub(super) enclosure: &'a Enclosure,
@@ -35,7 +35,7 @@ impl BoundReport<'_> {
         named.map(|(register, range)| (self.operand_text(*register), *range)).collect()
     }
 
-    /// Name of an operand; of a literal, its value.
+    /// Name of an operand; for a literal, its value.
     fn operand_text(&self, register: Register) -> String {
         let bits = self.program.constants.iter().find(|(constant, _)| *constant == register);
         match bits {
@@ -44,7 +44,7 @@ impl BoundReport<'_> {
         }
     }
 
-    /// The register holds a literal of the source.
+    /// The register holds a literal from the source.
     fn is_literal(&self, register: Register) -> bool {
         let Program { constants, registers, inputs, outputs, .. } = self.program;
         let mut named = registers.iter().chain(inputs).chain(outputs);

@@ -6,9 +6,9 @@ use takt_analysis::accuracy::ErrorShare;
 use takt_isa::Program;
 use takt_isa::program::Location;
 
-/// Maximal number of lines in each list of the text; --json has all.
+/// Maximum number of lines in each list of the text output; --json lists all.
 pub(super) const SHOWN: usize = 12;
-/// Maximal number of lines shown as origins of an output's error.
+/// Maximum number of lines shown as origins of an output's error.
 pub(super) const SHOWN_PARTS: usize = 3;
 
 pub(super) fn location(program: &Program, word: u32) -> Option<Location> {
@@ -19,7 +19,7 @@ pub(super) fn line_text(program: &Program, location: Option<Location>) -> String
     location.map_or_else(|| "(no source line)".to_owned(), |location| program.place_text(location))
 }
 
-/// Error by source line, largest first: location, sum of the line's shares, and its fraction of the total.
+/// Errors by source line, largest first: location, sum over the line's operations, and fraction of the total.
 pub(super) fn by_line(program: &Program, parts: &[ErrorShare]) -> Vec<(Option<Location>, f64, f64)> {
     let mut lines: BTreeMap<_, (Option<Location>, f64)> = BTreeMap::new();
     for part in parts {

@@ -13,16 +13,16 @@ use takt_analysis::accuracy::{
 use takt_isa::Program;
 use takt_isa::program::Location;
 
-/// Accuracy of a source line: all its operations together.
+/// Accuracy of a source line, over all its operations.
 #[derive(Default)]
 pub(crate) struct LineAccuracy {
     accuracy: OperationAccuracy,
-    /// Largest share of the line in an output's worst error, and that output.
+    /// Largest contribution of the line to an output's worst error, and that output.
     share: f64,
     output: Option<String>,
 }
 
-/// Measured errors of a program, for output.
+/// Measured errors of a program, ready for output.
 pub(crate) struct MeasurementReport<'a> {
     program: &'a Program,
     shadow: &'a Shadow,
@@ -41,7 +41,7 @@ impl<'a> MeasurementReport<'a> {
         self.program.word_text(word as usize)
     }
 
-    /// Source lines with their accuracy, largest share in an output's error first.
+    /// Source lines with their accuracy, sorted by contribution to an output's error, largest first.
     pub(crate) fn lines(&self) -> Vec<(Location, LineAccuracy)> {
         let mut lines: BTreeMap<(u32, u32), (Location, LineAccuracy)> = BTreeMap::new();
         for (&word, operation) in self.shadow.operations() {
@@ -75,7 +75,7 @@ impl<'a> MeasurementReport<'a> {
         line_text(self.program, location)
     }
 
-    /// Result as JSON, without the program's name.
+    /// Results as JSON, without the program's name.
     pub(crate) fn json(&self) -> Value {
         let worst = |worst: Option<LargestError>| {
             worst.map(|LargestError { error, period, value, exact }| {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The option `takt board sim --robot --serve`: hybrid robot at the pins, and an external host at the pseudo-terminal, such as LinuxCNC
+//! The option `takt board sim --robot --serve`: hybrid robot at the pins, and an external host such as LinuxCNC at the pseudo-terminal
 //! (docs/linuxcnc.md).
 
 use super::plant_at_pins::{RobotAtPins, State};
@@ -15,24 +15,24 @@ use takt_board::protocol::{self, Receiver};
 use takt_board::terminal::Terminal;
 
 /// Wall-clock time for which the board waits for its host after a stream frame, so that results do not depend on the machine's load:
-/// simulated time stands still until a write arrives; reads are answered meanwhile. Afterwards it proceeds, and the board detects the loss
-/// of its host.
+/// simulated time stops until a write arrives; reads are answered meanwhile. After this time the simulation proceeds, and the board
+/// detects the loss of its host.
 const PATIENCE: Duration = Duration::from_secs(10);
-/// Pause in which nothing but a request can happen.
+/// Interval between polls for a request, while nothing else can happen.
 const REST: Duration = Duration::from_micros(200);
-/// Number of recorded periods after the end of the drive.
+/// Number of periods recorded after the drive has ended.
 const AFTER: u32 = 100;
-/// Number of rows buffered before a write of the record.
+/// Number of rows buffered before they are written to the record.
 const ROWS: u32 = 500;
 
-/// Scheduled events, in driven periods.
+/// Scheduled events, in periods since the outputs began to drive.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Events {
-    /// Cut the serial line.
+    /// Disconnects the serial line.
     pub(super) unplug: Option<u64>,
-    /// Press the button at the pin `stop`.
+    /// Presses the button at the pin `stop`.
     pub(super) stop: Option<u64>,
-    /// End the whole simulation.
+    /// Ends the whole simulation.
     pub(super) end: Option<u64>,
 }
 
@@ -45,7 +45,7 @@ struct Record {
 
 impl Record {
     fn create(path: &Path) -> Result<Record> {
-        // Rows are written on the way, since the simulation usually ends by an interrupt.
+        // Write rows during the run, since an interrupt usually ends the simulation.
         let file = File::create(path).with_context(|| format!("cannot write {}", path.display()))?;
         let mut file = BufWriter::new(file);
         writeln!(file, "tick,drive,x,y,z,alpha,gamma,F1,F2,F3,tau4,tau5,pins")?;
@@ -126,7 +126,7 @@ pub(super) fn serve(
         }
         frames.put(&step.received);
         while let Some(frame) = frames.frame() {
-            // A frame, for example the answer to a request, restarts the waiting time.
+            // A frame, such as the answer to a request, restarts the waiting time.
             waits = (frame.stream || waits.is_some()).then(Instant::now);
             is_asked &= frame.stream;
         }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! `takt board hal`: LinuxCNC's HAL file for a system on a board, with the joints, units and addresses that `hal_takt` needs.
+//! The command `takt board hal`: LinuxCNC's HAL file for a system on a board, with the joints, units and addresses that `hal_takt` needs.
 
 use super::Target;
 use crate::terminal::files::Out;
@@ -45,11 +45,11 @@ enum Geometry {
     Hybrid,
 }
 
-/// The most joints: a knot is one request.
+/// Maximum number of joints: a knot must fit into one request.
 const MOST: usize = 7;
-/// The most periods from frame to frame of a stream.
+/// Maximum number of periods between two frames of a stream.
 const EVERY: f64 = 4095.0;
-/// Values of the snapshot behind the counts.
+/// Values of the snapshot that follow the encoder counts.
 const BEHIND: [&str; 4] = ["knot", "phase", "starved", "standing"];
 
 fn joints(text: &str) -> Result<String, String> {
@@ -60,7 +60,7 @@ fn joints(text: &str) -> Result<String, String> {
     }
 }
 
-/// The address of the first of values with neighbouring addresses.
+/// First of the consecutive addresses of these values.
 fn block(endpoints: &Endpoints, names: &[String]) -> Result<u16> {
     let find = |name: &String| {
         let place = endpoints.place(name);
@@ -73,7 +73,7 @@ fn block(endpoints: &Endpoints, names: &[String]) -> Result<u16> {
     places.first().copied().context("a joint")
 }
 
-/// The parameters of `hal_takt` that follow from system and wiring.
+/// Parameters of `hal_takt`, derived from system and wiring.
 fn addresses(endpoints: &Endpoints, wiring: &Wiring, arguments: &Hal, cores: usize) -> Result<String> {
     let numbered =
         |text: &str| (1..=arguments.joints.len()).map(|joint| format!("{text}{joint}")).collect::<Vec<_>>();

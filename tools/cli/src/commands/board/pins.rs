@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Pins of a simulated board under their user-visible names, and their drivers: commands from a script or standard input, or a plant at two
+//! Pins of a simulated board under their user-visible names, driven by commands from a script or standard input, or by a plant at two
 //! pipes.
 
 use super::text;
@@ -23,21 +23,21 @@ use takt_debug::inputs::Table;
 use takt_isa::program::Port;
 use takt_isa::{Register, Type};
 
-/// Maximal length of a command line in bytes.
+/// Maximum length of a command line in bytes.
 const LINE: u64 = 4096;
-/// Number of lines that are read from standard input in advance.
+/// Number of lines read from standard input in advance.
 const AHEAD: usize = 64;
 
-/// A pin: its name for the user, and its name in the circuit.
+/// A pin: user-visible name, and name in the circuit.
 #[derive(Clone)]
 struct Pin {
     name: String,
-    /// Name of the peripheral, if this is its only input.
+    /// Name of the peripheral, if the pin is its only input.
     short: Option<String>,
     circuit: String,
 }
 
-/// An encoder, settable by its count as well as by its pins.
+/// An encoder, which can be set by its count as well as by its pins.
 struct Encoder {
     name: String,
     start: i32,
@@ -51,7 +51,7 @@ pub(super) struct Pins {
 }
 
 impl Pins {
-    /// Pins of a wiring on a board; those in `taken` are driven elsewhere.
+    /// Pins of a wiring on a board; pins in `taken` are driven elsewhere.
     pub(super) fn new(board: &Board, wiring: &Wiring, taken: &[&str]) -> Pins {
         let (mut inputs, mut outputs, mut encoders) = (Vec::new(), Vec::new(), Vec::new());
         for (signal, _) in SIGNALS.iter().zip(&wiring.signals).filter(|(_, pin)| pin.is_some()) {
@@ -87,7 +87,7 @@ impl Pins {
         Pins { inputs, outputs, encoders }
     }
 
-    /// Input pin by name. If a signal and a peripheral share the name, the signal's pin.
+    /// Finds an input pin by name. If a signal and a peripheral share the name, the signal's pin is chosen.
     fn input(&self, name: &str) -> Result<&Pin, String> {
         let of = |name: &str, short: bool| {
             self.inputs
@@ -109,7 +109,7 @@ impl Pins {
         })
     }
 
-    /// Short names of inputs as columns, with their pins.
+    /// Short names of inputs as columns of a table, with their pins.
     fn shorts(&self) -> (Vec<(String, Type)>, Vec<&Pin>) {
         let is_other = |short: &str| self.inputs.iter().any(|pin| pin.name == short);
         let shorts = self.inputs.iter().filter_map(|pin| Some((pin.short.as_ref()?, pin)));
@@ -119,7 +119,7 @@ impl Pins {
             .unzip()
     }
 
-    /// Parses assignments such as `limit=1` into circuit pins with levels.
+    /// Parses assignments such as `limit=1` into pins of the circuit with their levels.
     ///
     /// # Errors
     /// If an assignment is malformed or names no input pin.
@@ -176,10 +176,10 @@ impl Command {
     }
 }
 
-/// Source of pin commands.
+/// Source of pin commands: a file or standard input.
 enum Source {
     File(VecDeque<Command>),
-    /// Lines of standard input as they arrive, with the number of the last one.
+    /// Lines of standard input as they arrive, with the number of the last line.
     Live {
         lines: Receiver<std::io::Result<String>>,
         number: usize,
@@ -192,14 +192,14 @@ pub(super) struct Script<'a> {
     pins: &'a Pins,
     clock: f64,
     source: Source,
-    /// Cycle at which the present `wait` ends.
+    /// Cycle at which the current `wait` ends.
     until: u64,
     /// Messages on standard error are coloured.
     color: bool,
 }
 
 impl<'a> Script<'a> {
-    /// Opens a script; a file is parsed in full in advance.
+    /// Opens a script; a file is parsed completely in advance.
     pub(super) fn open(path: &Path, pins: &'a Pins, wiring: &Wiring, color: bool) -> Result<Script<'a>> {
         let clock = wiring.clock;
         let source = if files::is_dash(path) {
@@ -216,15 +216,15 @@ impl<'a> Script<'a> {
         Ok(Script { pins, clock, source, until: 0, color })
     }
 
-    /// Executes all commands that are due; returns whether to end the simulation.
+    /// Executes all due commands; returns whether the simulation ends.
     pub(super) fn act(&mut self, sim: &mut Simulation, out: &mut Out) -> Result<bool> {
         while sim.cycles >= self.until {
             let Some(command) = self.next()? else { return Ok(false) };
             match command {
                 Command::Set(levels) => levels.iter().for_each(|(pin, level)| sim.set(pin, *level)),
                 Command::Wait(cycles) => {
-                    // A file's wait counts from the end of the previous wait, so that run lengths do not accumulate; an interactive one
-                    // from now.
+                    // In a file, a wait starts at the end of the previous wait, so that the lengths of runs do not accumulate; an
+                    // interactive wait starts now.
                     let from = if matches!(self.source, Source::File(_)) { self.until } else { sim.cycles };
                     self.until = from.saturating_add(cycles);
                 }
@@ -235,7 +235,7 @@ impl<'a> Script<'a> {
         Ok(false)
     }
 
-    /// Length of the next run: at most up to the next command.
+    /// Limits the length of the next run to the next command.
     pub(super) fn at_most(&self, now: u64, cycles: u32) -> u32 {
         match self.until.saturating_sub(now) {
             0 => cycles,
@@ -301,7 +301,7 @@ fn listen() -> Receiver<std::io::Result<String>> {
     lines
 }
 
-/// A user's plant at the pins: exchanges a row of inputs and a row of outputs per period.
+/// A user's plant at the pins: exchanges one row of inputs and one row of outputs per period.
 pub(super) struct Plant<'a> {
     pub(super) pins: &'a Pins,
     pub(super) wiring: &'a Wiring,
@@ -309,15 +309,15 @@ pub(super) struct Plant<'a> {
     pub(super) outputs: Option<&'a Path>,
 }
 
-/// Target of a column.
+/// Pins that a column of the table drives.
 enum Column<'a> {
     Pin(&'a Pin),
-    /// Encoder: numbers of its two pins in the simulation's inputs, and the last count.
+    /// Encoder: indices of its two pins among the simulation's inputs, and the previous count.
     Encoder([usize; 2], i32),
 }
 
 impl Plant<'_> {
-    /// Runs until the rows end or the cycle limit is reached; returns the board.
+    /// Runs until the rows end or the cycle limit is reached; returns the simulation.
     pub(super) fn run(
         &self,
         simulation: impl FnOnce() -> Result<Simulation>,
@@ -343,7 +343,7 @@ impl Plant<'_> {
         for encoder in &self.pins.encoders {
             let pins = ["a", "b"].map(|pin| sim.input(&format!("{}_{pin}", encoder.name)));
             let [Some(a), Some(b)] = pins else { bail!("`{}` has no pins", encoder.name) };
-            // Start the encoder at its initial count, at rest.
+            // The encoder starts at its initial count, at rest.
             sim.turns.push(EncoderMotion { pins: [a, b], from: encoder.start, by: 0 });
             columns.push(Column::Encoder([a, b], encoder.start));
         }

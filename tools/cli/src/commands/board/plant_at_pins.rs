@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Hybrid robot at the pins of a simulated board: encoders follow its axes, forces follow the half bridges, and brakes hold it until the
-//! outputs drive.
+//! Hybrid robot at the pins of a simulated board: encoders follow the axes, forces follow the half bridges, and brakes hold the robot
+//! while the outputs are safe.
 
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use takt_board::Wiring;
@@ -14,29 +14,29 @@ use takt_programs::path::Pose;
 
 /// Number of axes: the first inputs are encoders, the first outputs forces and torques.
 pub(super) const AXES: usize = 5;
-/// Plant steps per period: forces act one step later than the pulses that command them.
+/// Plant steps per period: forces act one step after the pulses that command them.
 pub(super) const STEPS: u32 = 20;
 
 /// Pins of an axis.
 #[derive(Clone, Debug)]
 pub(super) struct Axis {
     encoder: String,
-    /// Input port with the encoder's count.
+    /// Input port for the encoder's count.
     port: String,
     motor: String,
-    /// Cycles of the motor's pulse from duty 0 to full duty.
+    /// Range of the motor's pulse length in cycles, from duty 0 to full duty.
     half: f64,
     /// Force or torque at full duty, N or N·m.
     full: f64,
 }
 
-/// A wiring's port has this name, with or without a core's name before it.
+/// A port of the wiring has this name, with or without a core's name as prefix.
 fn is_called(port: &str, name: &str) -> bool {
     port.rsplit('.').next() == Some(name)
 }
 
 impl Axis {
-    /// Axis with this input port as count and this output port as duty; its initial count is `count`.
+    /// Axis with this input port for the count and this output port for the duty; `count` is its initial count.
     fn new(wiring: &Wiring, input: &str, output: &str, count: i32) -> Result<Axis> {
         let of = |kind: &str, port: &dyn Fn(&Peripheral) -> bool| {
             wiring.peripherals.iter().find(|peripheral| peripheral.kind.name == kind && port(peripheral))
@@ -78,7 +78,7 @@ impl Axis {
         })
     }
 
-    /// Axes of a wiring for this robot, in this pose.
+    /// Axes of a wiring for this robot in this pose.
     ///
     /// # Errors
     /// If the wiring is not for this robot.
@@ -91,7 +91,7 @@ impl Axis {
             length * 1e6,
             wiring.period
         );
-        // The signals `drive` and `tick` are needed for the brakes, and for the times of plant samples.
+        // The brakes need the signal `drive`; sampling the plant needs `tick`.
         for (signal, pin) in takt_board::wiring::SIGNALS.iter().zip(&wiring.signals) {
             if ["drive", "tick"].contains(&signal.name) && pin.is_none() {
                 bail!("the robot needs the signal `{}` on a pin, under [signals]", signal.name);
@@ -109,27 +109,27 @@ impl Axis {
 pub(super) struct Step {
     /// Bytes sent by the board.
     pub(super) received: Vec<u8>,
-    /// State of the robot at the beginning of the step, if that is a tick. A stopped board also gets a state once per period.
+    /// State of the robot at the beginning of the step, if a tick occurred there. A stopped board also reports a state once per period.
     pub(super) state: Option<State>,
-    /// The board is at rest: only a request changes its state.
+    /// The board is idle: only a request can change its state.
     pub(super) rests: bool,
 }
 
-/// State of the robot at a tick, or at the time of an absent tick.
+/// State of the robot at a tick, or at the time when a stopped board would have one.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct State {
-    /// Number of the tick since the board's start, from 1; 0 before the first.
+    /// Number of the tick since the board's start, from 1; 0 before the first tick.
     pub(super) tick: u32,
-    /// The outputs drive; otherwise they are safe.
+    /// The outputs drive; otherwise they are at their safe levels.
     pub(super) drives: bool,
     pub(super) pose: Pose,
-    /// Mean forces and torques since the last state, N and N·m.
+    /// Mean forces and torques since the previous state, N and N·m.
     pub(super) force: [f64; AXES],
-    /// A motor's pin was 1 since the last state.
+    /// A motor's pin was 1 since the previous state.
     pub(super) is_lit: bool,
 }
 
-/// Mechanics of the robot, with brakes.
+/// Mechanics of the robot, including brakes.
 struct BrakedPlant {
     plant: Plant,
     was_driven: bool,
@@ -148,7 +148,7 @@ impl BrakedPlant {
         self.plant.counts().ok_or_else(|| anyhow!("an axis has left the range of its encoder"))
     }
 
-    /// Integrates the plant with these forces; without drive the brakes hold it at once.
+    /// Integrates the plant with these forces; if the outputs do not drive, the brakes hold it immediately.
     fn advance(&mut self, seconds: f64, drives: bool, force: [f64; AXES]) {
         if drives {
             let [a, b, c, d, e] = force;
@@ -162,27 +162,27 @@ impl BrakedPlant {
 
 /// A board with the robot at its pins.
 pub(super) trait RobotAtPins {
-    /// Simulates one step, while `bytes` are sent to the board.
+    /// Simulates one step while `bytes` are sent to the board.
     fn step(&mut self, bytes: &[u8]) -> Result<Step>;
 
     /// Presses the button at the pin `stop`.
     fn stop(&mut self);
 }
 
-/// Phase of the search for the board's ticks, to which steps are then aligned. The robot is held during the search.
+/// Phase of the search for the board's ticks, to which steps are then aligned. The robot does not move during the search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Ticks {
-    /// No tick yet, in runs of a step's length.
+    /// No tick yet; each run is as long as a step.
     Sought,
-    /// The last run contained a tick: the next is less than a step after this run's end.
+    /// The last run contained a tick: the next one is less than a step after the end of this run.
     Near,
-    /// The tick is in one of the next runs of one cycle.
+    /// The tick is expected in one of the next runs, of one cycle each.
     Next,
     /// Steps begin at ticks.
     Found,
 }
 
-/// The circuit with the robot at its pins.
+/// Simulated circuit with the robot at its pins.
 pub(super) struct CircuitWithRobot {
     sim: Simulation,
     axes: Vec<Axis>,
@@ -191,7 +191,7 @@ pub(super) struct CircuitWithRobot {
     period: u32,
     ticks: Ticks,
     tick: u32,
-    /// Number of runs since the last tick, or since the last state without a tick.
+    /// Number of runs since the last tick or state.
     runs: u32,
     force: [f64; AXES],
     is_lit: bool,
@@ -206,7 +206,7 @@ impl CircuitWithRobot {
     ) -> Result<CircuitWithRobot> {
         let pins = |axis: &Axis| ["a", "b"].map(|pin| sim.input(&format!("{}_{pin}", axis.encoder)));
         let pins = axes.iter().map(pins).filter_map(|[a, b]| Some([a?, b?])).collect();
-        // During reset, pins may look like a tick.
+        // During reset, the pins may show a spurious tick.
         sim.run(takt_board::top::RESET, &[])?;
         Ok(CircuitWithRobot {
             sim,
@@ -222,7 +222,7 @@ impl CircuitWithRobot {
         })
     }
 
-    /// Moves the robot by the forces of the last step's pulses.
+    /// Moves the robot according to the forces of the last step's pulses.
     fn move_robot(&mut self, drives: bool) {
         let cycles = f64::from(self.period / STEPS);
         let mut force = [0.0; AXES];
@@ -236,7 +236,7 @@ impl CircuitWithRobot {
         self.force.iter_mut().zip(force).for_each(|(sum, force)| *sum += force / f64::from(STEPS));
     }
 
-    /// Next phase of the search for ticks, after a run.
+    /// Next phase of the search for ticks, given whether the last run contained one.
     fn follow(&mut self, has_tick: bool) -> Ticks {
         self.runs = if has_tick { 0 } else { self.runs + 1 };
         match (self.ticks, has_tick) {
@@ -292,7 +292,7 @@ impl RobotAtPins for CircuitWithRobot {
     }
 }
 
-/// The emulated board with the robot at its peripheral registers; a step is a period.
+/// Emulated board with the robot at its peripheral registers; a step is a period.
 pub(super) struct EmulationWithRobot {
     board: EmulatedBoard,
     axes: Vec<Axis>,
@@ -328,7 +328,7 @@ impl RobotAtPins for EmulationWithRobot {
         self.robot.advance(SAMPLE_TIME, drives, force);
         let rests = tick == before;
         let tick = if rests { 0 } else { tick };
-        // A driving half bridge always conducts in one of the two directions.
+        // A half bridge that drives always conducts in one of the two directions.
         let state = State { tick, drives, pose, force, is_lit: drives };
         Ok(Step { received, state: Some(state), rests })
     }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The option `takt board sim --robot`: hybrid robot at the pins of a simulated board. Encoders follow its axes, forces follow the PWM
-//! pulses, and the host at the UART (a pseudo-terminal, as for every host) sends a point of the path each period.
+//! pulses, and the host at the UART (a pseudo-terminal, as for any host) sends a point of the path in each period.
 
 use super::plant_at_pins::{AXES, Axis, CircuitWithRobot, RobotAtPins};
 use crate::commands::track;
@@ -26,13 +26,13 @@ use takt_programs::hybrid::closed_loop::{ClosedLoop, TrackingError, distance};
 use takt_programs::hybrid::kinematics::Reference;
 use takt_programs::trajectory::{Sample, Trajectory};
 
-/// Number of periods at the first point of the path before the motion.
+/// Number of periods at the first point of the path before the motion starts.
 const STANDS: usize = 20;
-/// Wall-clock time for which the board waits for its host after a period, so that results do not depend on the machine's load. The host is
-/// a thread of this process, silent longer only if it has ended.
+/// Wall-clock time for which the board waits for its host after a period, so that results do not depend on the machine's load. The host
+/// is a thread of this process, which is silent for longer only if it has ended.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// A drive, checked and ready to run.
+/// A drive along a path, checked and ready to run.
 pub(super) struct Drive<'a> {
     program: &'a Program,
     wiring: &'a Wiring,
@@ -45,10 +45,10 @@ pub(super) struct Drive<'a> {
 }
 
 impl<'a> Drive<'a> {
-    /// Prepares a drive along a path over a number of periods.
+    /// Prepares a drive along a path over a given number of periods.
     ///
     /// # Errors
-    /// If program or wiring is not for this robot.
+    /// If program or wiring do not suit this robot.
     pub(super) fn new(
         program: &'a Program,
         wiring: &'a Wiring,
@@ -69,7 +69,7 @@ impl<'a> Drive<'a> {
         Ok(Drive { program, wiring, path, trajectory, periods, axes, reference })
     }
 
-    /// Executes the drive, and reports.
+    /// Executes the drive and reports the results.
     pub(super) fn run(&self, board: &str, sim: Simulation, out: &mut Out) -> Result<()> {
         let terminal = Terminal::new()?;
         let port = terminal.path().to_owned();
@@ -114,7 +114,7 @@ impl<'a> Drive<'a> {
         Ok(())
     }
 
-    /// Tracking error of the same periods on the emulator, with ideal forces.
+    /// Tracking error over the same periods on the emulator, with ideal forces.
     fn without_pins(&self) -> Result<TrackingError> {
         let mut emulator = Emulator::new(self.program)?;
         emulator.set_tick_period(NonZeroU64::new(self.wiring.period.into()));
@@ -134,7 +134,7 @@ impl<'a> Drive<'a> {
             vec![(self.reference, reference.to_array().map(f32::to_bits).to_vec())]
         };
         let first = samples.first().context("a path has a point")?;
-        // Hold the program first, so that the first period reads the first point.
+        // Hold the program first, so that its first period reads the first point.
         host.set("control", protocol::RUN | protocol::HOLD | protocol::ENABLE)?;
         for (address, words) in row(first) {
             host.write(address, &words)?;
@@ -152,14 +152,14 @@ impl<'a> Drive<'a> {
         Ok(HostResult { fed, cycles, misses })
     }
 
-    /// Board side with the robot; returns the tool's position at each tick.
+    /// Board side, with the robot; returns the tool's position at each tick.
     fn robot(&self, sim: Simulation, mut terminal: Terminal, is_over: &AtomicBool) -> Result<Vec<[f64; 3]>> {
         let mut board = CircuitWithRobot::new(sim, self.wiring, &self.axes, &self.trajectory.start())?;
         let (mut frames, mut bytes) = (Receiver::default(), Vec::new());
         let (mut ticks, mut waits) = (Vec::new(), None::<Instant>);
         while !is_over.load(Ordering::Relaxed) {
             bytes.extend(terminal.receive()?);
-            // A request may arrive in pieces, with arbitrary gaps on a busy machine.
+            // A request may arrive in pieces; on a busy machine, the gaps between them are arbitrary.
             if let Some(since) = waits
                 && !protocol::has_request(&bytes)
             {

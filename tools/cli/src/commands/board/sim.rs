@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The command `takt board sim`: a board in Verilator, with its UART on a pseudo-terminal, and a driver at its pins.
+//! The command `takt board sim`: a board in Verilator, with its UART on a pseudo-terminal and drivers at its pins.
 
 use super::Target;
 #[cfg(unix)]
@@ -106,7 +106,7 @@ struct Axis {
     motor: String,
     pins: [usize; 2],
     half: f64,
-    /// Counts per cycle at full duty.
+    /// Speed at full duty, in counts per cycle.
     speed: f64,
     position: f64,
     counts: i32,
@@ -131,7 +131,7 @@ impl Axis {
         Ok(Axis { motor: motor.to_owned(), pins: [a, b], half: half.into(), speed, position: 0.0, counts: 0 })
     }
 
-    /// Advances the encoder after a PWM period, by the force of the previous one.
+    /// Advances the encoder after a PWM period, according to the force of the previous one.
     fn moves(&mut self, sim: &mut Simulation, cycles: u32) {
         let high = sim.output(&format!("{}_high", self.motor)).map_or(0, |(_, high)| high);
         let drives = sim.output(&format!("{}_low", self.motor)).is_none_or(|(_, low)| low + high > 0);
@@ -158,7 +158,7 @@ pub(super) fn run(arguments: &Sim, color: bool, out: &mut Out) -> Result<()> {
         outputs.into_iter().filter_map(|(name, path)| Some((name, path.as_deref()?))).collect();
     files::check(&reads, &writes)?;
     let (board, wiring, carried) = arguments.target.read(color, true)?;
-    // Check the pins' drivers before the circuit is compiled.
+    // Check the drivers of the pins before the circuit is compiled.
     let taken: Vec<&str> = arguments.axis.iter().filter_map(|text| text.split(',').nth(1)).collect();
     let pins = pins::Pins::new(&board, &wiring, &taken);
     let levels =
@@ -172,7 +172,7 @@ pub(super) fn run(arguments: &Sim, color: bool, out: &mut Out) -> Result<()> {
         output::message("compiling the circuit …");
         let mut sim = Simulation::new(&board, &wiring, carried.on_board(), &folder)?;
         sim.noise = arguments.noise;
-        // With --robot alone this command is the host, and says itself how its drive ended.
+        // With --robot alone, this command is the host, and reports itself how its drive ended.
         sim.tell = (!arguments.robot || arguments.serve).then_some(output::message as fn(&str));
         levels.iter().for_each(|(pin, level)| sim.set(pin, *level));
         Ok(sim)
@@ -207,7 +207,7 @@ pub(super) fn run(arguments: &Sim, color: bool, out: &mut Out) -> Result<()> {
     ended
 }
 
-/// Robot at the pins, with an external host program.
+/// Serves the robot at the pins to an external host program.
 #[cfg(unix)]
 fn serve_robot(
     arguments: &Sim,
@@ -248,12 +248,12 @@ fn serve_robot(
 /// Reports at the end of a simulation why the outputs are safe, if they are.
 #[cfg(unix)]
 fn report_safe_outputs(mut sim: Simulation, wiring: &Wiring, carried: &Application) -> Result<()> {
-    // No host is connected any more, so its requests need no disturbance.
+    // No external host is connected any more, so disturbing the requests serves no purpose.
     sim.noise = 0;
     sim.unplugged = false;
     sim.tell = None;
     let mut host = Host::connect(sim, 1)?;
-    // First, since every request takes simulated time, in which a host that was silent appears as one more reason.
+    // Query this first: each request takes simulated time, after which a silent host would appear as a further reason.
     let reasons = host.safe_reasons(Some(&carried.on_board()))?;
     for trip in host.tripped(Some(wiring))? {
         output::message(&format!("at the end {trip}"));
@@ -274,7 +274,7 @@ fn serve(
 ) -> Result<Simulation> {
     let axes = arguments.axis.iter().map(|text| Axis::new(text, wiring, &sim));
     let mut axes = axes.collect::<Result<Vec<Axis>>>()?;
-    // Pulses are measured over whole PWM periods.
+    // Pulses are measured over complete PWM periods.
     let whole = axes.iter().map(|axis| 2 * axis.half as u32).max();
     let mut terminal = takt_board::terminal::Terminal::new()?;
     writeln!(out, "{} {}", terminal.path().display(), wiring.baud)?;

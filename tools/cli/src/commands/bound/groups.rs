@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Grouping of similar paths through a system, and times from cycles, for tables.
+//! Grouping of similar paths through a system, and conversion of cycles to time, for tables.
 
 use takt_isa::timing::Cycle;
 
-/// Time of a number of cycles at a clock in MHz.
+/// Time for a number of cycles at a clock in MHz.
 pub(crate) fn microseconds(cycles: Cycle, clock: f64) -> String {
     format!("{:.3} µs", cycles as f64 / clock)
 }
 
-/// Number of names shown of a long list.
+/// Number of names shown from a long list.
 const SHOWN: usize = 3;
 
 /// List of names, abbreviated if long.
@@ -19,10 +19,10 @@ pub(crate) fn listed(names: &[String]) -> String {
     }
 }
 
-/// Accessor to the names of one end of a group, or merger of another group's names at that end.
+/// Functions for one end of a group: access the names, and merge those of another group.
 type Side<G> = (fn(&G) -> &Vec<String>, fn(&mut G, G));
 
-/// Groups paths that differ only in the names of their ends: each head of a group has a path to each of its tails.
+/// Groups paths that differ only in the names of their ends: within a group, every head has a path to every tail.
 pub(crate) fn grouped<G>(
     ways: impl Iterator<Item = G>,
     alike: impl Fn(&G, &G) -> bool,
@@ -39,6 +39,6 @@ pub(crate) fn grouped<G>(
         }
         merged
     };
-    // Merge tails of equal heads first, then heads of equal tails.
+    // Merge groups with equal heads first, then groups with equal tails.
     merged(merged(ways.collect(), heads, with_tails), tails, with_heads)
 }

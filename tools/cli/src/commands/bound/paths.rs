@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Paths through a system, from a command of the host to the first response of an output.
+//! Paths through a system, from a host command to the first response of an output.
 
 use super::groups::{grouped, listed, microseconds};
 use crate::terminal::files::Out;
@@ -19,7 +19,7 @@ pub(crate) fn paths(description: &Description, bounds: &[Bounds]) -> Result<Vec<
 #[derive(Clone, Copy)]
 pub(crate) struct Deadline {
     pub(super) cycles: u64,
-    /// Assume empty FIFOs at the time of the command.
+    /// Assume that FIFOs are empty at the time of the command.
     pub(super) empty: bool,
 }
 
@@ -47,7 +47,7 @@ pub(crate) fn way_json(description: &Description, way: &Latency) -> Value {
     })
 }
 
-/// Table of the paths; paths that differ only in the names of their ends share a row.
+/// Writes a table of the paths; paths that differ only in the names of their ends share a row.
 pub(crate) fn write_ways(
     description: &Description,
     ways: &[Latency],
@@ -118,7 +118,7 @@ pub(crate) fn write_ways(
     Ok(())
 }
 
-/// States on the path to a first response; `None` for a direct path that ends with the response.
+/// States on the path to a first response; `None` for a direct path, which ends with the response.
 fn states_text(way: &Latency, cores: &[&str]) -> Option<String> {
     let periods = |count: u32| format!("{count} period{}", if count == 1 { "" } else { "s" });
     let through = |(number, core): (usize, &&str)| {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The option `takt bound --pins`: latency bounds from an edge at a pin to an edge at a pin.
+//! The option `takt bound --pins`: latency bounds from an edge at an input pin to an edge at an output pin.
 
 use super::Bound;
 use super::groups::{grouped, listed, microseconds};
@@ -13,7 +13,7 @@ use takt_analysis::Bounds;
 use takt_board::latency::{Answer, End, Part, PinPath, PinPaths, Until};
 use takt_board::{Application, Board, Wiring};
 
-/// Minimal width of a part's text in characters.
+/// Minimum width of a part's text, in characters.
 const WIDTH: usize = 36;
 
 /// Format of the table of parts.
@@ -21,11 +21,11 @@ const WIDTH: usize = 36;
 struct Table {
     /// Clock in MHz, for times.
     clock: f64,
-    /// Width of a part's text in characters.
+    /// Width of a part's text, in characters.
     width: usize,
 }
 
-/// Paths between pins, with their context for output.
+/// Paths between pins, with the context needed for output.
 struct PinPathReport<'a> {
     application: Application<'a>,
     board: Board,
@@ -132,7 +132,7 @@ impl PinPathReport<'_> {
     }
 }
 
-/// Paths from each input to each output that differ only in their ends.
+/// Paths between inputs and outputs that differ only in their ends.
 #[derive(Clone)]
 struct Group {
     /// A representative path, with all inputs and outputs.
@@ -145,7 +145,7 @@ struct Group {
     first: Vec<String>,
     /// Names of the last links.
     last: Vec<String>,
-    /// In a program: groups of ports and the outputs that follow them, if not all outputs follow all ports.
+    /// In a program: groups of ports with the outputs that follow them, unless all outputs follow all ports.
     ports: Vec<[Vec<String>; 2]>,
 }
 
@@ -193,7 +193,8 @@ impl Group {
         )
     }
 
-    /// Groups of a program. Its paths share everything between their ends unless their states differ; each such set is one group.
+    /// Groups the paths of a program, which share everything between their ends unless their states differ. Each set of states forms a
+    /// group.
     fn of_program(ways: &[PinPath]) -> Vec<Group> {
         let mut groups: Vec<Group> = Vec::new();
         for group in Group::all(ways) {

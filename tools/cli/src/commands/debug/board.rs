@@ -23,7 +23,7 @@ use takt_debug::remote::{Activity, Remote, RemoteError, RemoteSession, State};
 use takt_debug::session::{Control, Options, Session};
 use takt_isa::{BundleAddress, Program, Register};
 
-/// Addresses whose distance is at most this are read in one request.
+/// Maximum distance of two addresses that are read in one request.
 const GAP: u16 = 4;
 /// Interval between two polls of a running board.
 const POLL: Duration = Duration::from_millis(50);
@@ -40,7 +40,7 @@ pub(super) fn run(arguments: &Debug, port: &Path, color: bool, out: &mut Out) ->
         );
         return Err(Failure::Usage(text).into());
     }
-    // Check the command line before touching the board.
+    // Check the command line before accessing the board.
     let commands = arguments.script.as_deref().map(|path| script(path, Target::Board)).transpose()?;
     let loaded = Load::new(arguments.machine.machine, color).with(&arguments.source).with_source(file)?;
     super::changed_sources(file, &loaded, color);
@@ -71,8 +71,8 @@ pub(super) fn run(arguments: &Debug, port: &Path, color: bool, out: &mut Out) ->
     converse(console, &said, commands, &control, &ended, color, out)
 }
 
-/// Ctrl-C stops the running command. Without a prompt it also ends the session, which leaves the board in order; a second Ctrl-C ends the
-/// process at once.
+/// Ctrl-C stops the running command. Without a prompt it also ends the session, which restores the board first; a second Ctrl-C ends the
+/// process immediately.
 fn interrupts(control: &Arc<Control>, interactive: bool) -> Result<Arc<AtomicBool>> {
     let ended = Arc::new(AtomicBool::new(false));
     let (heard, ends) = (Arc::clone(control), Arc::clone(&ended));
@@ -98,11 +98,11 @@ fn carries<L: Line>(host: &mut Host<L>, records: &[[u32; 3]]) -> Result<()> {
     }
 }
 
-/// A board as a machine that runs elsewhere.
+/// A board as a remote machine.
 struct Board<L> {
     host: Host<L>,
     program: Program,
-    /// Bit of `control` that lets outputs drive after a restart, or 0.
+    /// Bit of `control` that enables the outputs after a restart, or 0.
     enable: u32,
 }
 
@@ -122,7 +122,7 @@ impl<L: Line> Board<L> {
         self.host.set(name, value).map_err(failed)
     }
 
-    /// Values at ascending addresses; nearby addresses are read together.
+    /// Reads values at ascending addresses; nearby addresses are combined in one request.
     fn read(&mut self, addresses: &[u16]) -> Result<Vec<u32>, RemoteError> {
         let mut values = Vec::with_capacity(addresses.len());
         for near in addresses.chunk_by(|a, b| b - a <= GAP) {
@@ -136,7 +136,7 @@ impl<L: Line> Board<L> {
     /// Waits until the program is between two periods, or has stopped.
     fn settle(&mut self) -> Result<(), RemoteError> {
         self.host.settle().map_err(failed)?;
-        // The read of any register also waits for the outputs to reach the peripherals.
+        // Reading any register also waits until the outputs have reached the peripherals.
         let any = self.program.machine.slots.iter().flat_map(|slot| slot.bank.registers()).next();
         self.registers(any.as_slice()).map(drop)
     }
@@ -148,7 +148,7 @@ impl<L: Line> Board<L> {
         ports.iter().map(|port| find(&port.name).map_err(RemoteError::Other)).collect()
     }
 
-    /// Values at addresses in any order.
+    /// Reads values at addresses in any order.
     fn read_any(&mut self, addresses: &[u16]) -> Result<Vec<u32>, RemoteError> {
         let mut sorted = addresses.to_vec();
         sorted.sort_unstable();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The command `takt debug`: a session at a prompt, from a script, or full-screen.
+//! The command `takt debug`: a session at a prompt, from a script, or in the full-screen view.
 
 #[cfg(feature = "board")]
 mod board;
@@ -86,9 +86,9 @@ Examples:
   takt debug prog.s --board /dev/ttyUSB0     on a board that carries it, a period at a time
   takt debug --track                         the robot's controller, where the tracking error is largest";
 
-/// Maximal number of input rows.
+/// Maximum number of input rows.
 const ROWS: usize = 1 << 20;
-/// Maximal size of a script in bytes.
+/// Maximum size of a script in bytes.
 const SCRIPT_LIMIT: usize = 16 << 20;
 /// Interval between two progress checks of a running command.
 const WATCH: Duration = Duration::from_millis(50);
@@ -114,7 +114,7 @@ pub(crate) fn run(arguments: &Debug, color: bool, out: &mut Out) -> Result<()> {
     }
     let is_system = arguments.file.as_deref().is_some_and(load::is_system);
     let target = if is_system { Target::System } else { Target::Program };
-    // Check a script before anything runs.
+    // Check the script before anything runs.
     let script = arguments.script.as_deref().map(|path| script(path, target)).transpose()?;
 
     if arguments.tui && !cfg!(feature = "tui") {
@@ -143,7 +143,8 @@ pub(crate) fn run(arguments: &Debug, color: bool, out: &mut Out) -> Result<()> {
     converse(console, &place, script, &control, &AtomicBool::new(false), color, out)
 }
 
-/// Executes commands from a script, the prompt or standard input until their end or `ended`; `place` describes the start of the session.
+/// Executes commands from a script, the prompt or standard input until they end or `ended` is set; `place` describes the start of the
+/// session.
 fn converse(
     mut console: Console,
     place: &str,
@@ -163,7 +164,7 @@ fn converse(
     done.and(leave(&mut console, out))
 }
 
-/// Ends a session, and prints its final message.
+/// Ends a session and prints its final message.
 fn leave(console: &mut Console, out: &mut Out) -> Result<()> {
     let left = console.leave().map_err(|error| anyhow!("{error}"))?;
     Ok(out.write_all(left.as_bytes())?)
@@ -172,14 +173,14 @@ fn leave(console: &mut Console, out: &mut Out) -> Result<()> {
 /// A session opened from the command line.
 pub(crate) struct OpenedSession {
     pub(crate) console: Console,
-    /// Reason for the starting position.
+    /// Reason for the initial position.
     pub(crate) note: Option<String>,
-    /// Source file of each core's program, for the debug adapter.
+    /// Source files of the cores' programs, for the debug adapter.
     #[cfg_attr(not(feature = "editor"), expect(dead_code, reason = "the debug adapter is left out"))]
     pub(crate) files: Vec<PathBuf>,
 }
 
-/// Opens a session of a program or a system on the emulator.
+/// Opens a session on the emulator for a program or a system.
 pub(crate) fn open(arguments: &Debug, control: &Arc<Control>, color: bool) -> Result<OpenedSession> {
     if let Some(file) = arguments.file.as_deref().filter(|file| load::is_system(file)) {
         check_system(arguments)?;
@@ -193,7 +194,7 @@ pub(crate) fn open(arguments: &Debug, control: &Arc<Control>, color: bool) -> Re
     Ok(OpenedSession { console: Console::new(session), note, files })
 }
 
-/// Rejects options that system sessions lack.
+/// Rejects options that sessions on systems lack.
 fn check_system(arguments: &Debug) -> Result<()> {
     let refused = [
         ("--machine", arguments.machine.machine.is_some(), "the system's file names each core's"),
@@ -224,8 +225,8 @@ fn open_program(arguments: &Debug, control: &Arc<Control>, color: bool) -> Resul
     Ok((Session::new(&program, Options { inputs, tick, constants, sources, names, control })?, None))
 }
 
-/// Warns of sources that changed since the image was made. They are searched like includes, from the image's folder on; a missing source is
-/// no error, since the image contains its text.
+/// Warns of sources that have changed since the image was written. They are searched like includes, starting from the image's folder; a
+/// missing source is not an error, since the image contains its text.
 fn changed_sources(path: &Path, loaded: &LoadedProgram, color: bool) {
     let folder = path.parent().unwrap_or(Path::new(""));
     for (name, text) in &loaded.sources {
@@ -261,7 +262,7 @@ fn rows(path: &Path, loaded: &LoadedProgram) -> Result<Arc<Rows>> {
     Ok(Arc::new(rows))
 }
 
-/// Session on a recorded closed loop, at the period of interest.
+/// Opens a session on a recorded closed loop, at the period of interest.
 fn in_recording(recording: Recording, control: &Arc<Control>) -> Result<(Session, String)> {
     let Recording { loaded, inputs, tick, period, why: reason } = recording;
     let LoadedProgram { program, constants, sources, names, .. } = loaded;
@@ -297,7 +298,7 @@ fn batch(
             Ok(text) => out.write_all(text.as_bytes())?,
             Err(error) => {
                 failed = true;
-                // Keep the order with earlier output.
+                // Flush, to keep the order with earlier output.
                 out.flush()?;
                 output::error(&format!("{name}:{number}: {error}"), color);
             }
@@ -312,7 +313,7 @@ fn batch(
     if failed { Err(Failure::Reported.into()) } else { Ok(()) }
 }
 
-/// Executes a line in a separate thread; calls `meanwhile` at intervals until it is done.
+/// Executes a line in another thread; calls `meanwhile` at intervals until the line is done.
 fn execute(
     console: &mut Console,
     line: &str,

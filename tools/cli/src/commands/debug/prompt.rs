@@ -33,7 +33,7 @@ pub(super) fn run(console: Console, control: &Arc<Control>, color: bool, out: &m
         let answer = execute(&mut console, &line, control, || {
             shown = std::io::stderr().is_terminal();
             if shown {
-                // A full-width bar would be broken by the terminal's `^C`.
+                // The terminal's `^C` would wrap a full-width bar.
                 write!(std::io::stderr(), "\r{}{CLEAR}", running(counts, control))?;
             }
             Ok(())

@@ -17,12 +17,12 @@ use tui_input::backend::crossterm::EventHandler;
 /// Lines per Page Up and Page Down.
 const PAGE: isize = 10;
 
-/// The terminal, restored on drop. (On a panic ratatui's hook does so before the message.)
+/// The terminal in full-screen mode, restored on drop. (On a panic, ratatui's hook restores it before the message is printed.)
 struct Terminal(DefaultTerminal);
 
 impl Terminal {
-    /// Clears the screen and the record of its contents, which are unknown after a resize. (ratatui's own `clear` queries the cursor, which
-    /// some terminals do not answer.)
+    /// Clears the screen and ratatui's record of its contents, which are unknown after a resize. (ratatui's own `clear` queries the
+    /// cursor position, which some terminals do not answer.)
     fn renew(&mut self) -> Result<()> {
         let size = self.0.size()?;
         self.0.resize(Rect::new(0, 0, size.width, size.height))?;
@@ -40,7 +40,7 @@ impl Drop for Terminal {
 #[derive(Default)]
 struct Typing {
     input: Input,
-    /// Position in the history, counted back from 1; 0 is the new line.
+    /// Position in the history, counted backwards from 1; 0 is the new line.
     back: usize,
 }
 
@@ -102,7 +102,7 @@ impl Front<'_> {
         Ok(())
     }
 
-    /// Handles a scroll key; returns whether it was one.
+    /// Handles a scroll key; returns false for any other key.
     fn scrolls(&mut self, key: KeyEvent) -> bool {
         let lines = match key.code {
             KeyCode::Up => -1,
@@ -174,7 +174,7 @@ impl Front<'_> {
         Ok(())
     }
 
-    /// Completes the word before the cursor to its unambiguous part, and lists the candidates.
+    /// Completes the word before the cursor as far as it is unambiguous, and lists the candidates.
     fn complete(&mut self) {
         let Some(Typing { input, .. }) = &mut self.typing else { return };
         let before: String = input.value().chars().take(input.cursor()).collect();
@@ -193,7 +193,7 @@ impl Front<'_> {
         }
     }
 
-    /// Executes a line; the terminal stays responsive meanwhile.
+    /// Executes a line; meanwhile the terminal stays responsive.
     fn execute(&mut self, line: &str) -> Result<()> {
         let Front { console, control, terminal, screen, .. } = self;
         screen.typed = None;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Candidates of a search, and its Pareto front in time, LUT and block RAM.
+//! Candidates of a search, and their Pareto front in time, LUT and block RAM.
 
 use serde::Serialize;
 use takt_isa::Machine;
@@ -10,11 +10,11 @@ use takt_rtl::estimate::Estimate;
 pub(super) struct Candidate {
     #[serde(serialize_with = "name")]
     pub(super) machine: &'static Machine,
-    /// Cycles of a period, for each program.
+    /// Cycles per period, for each program.
     pub(super) cycles: Vec<u64>,
     #[serde(flatten)]
     pub(super) estimate: Estimate,
-    /// Time in µs of one period of each program in sequence, at the estimated clock.
+    /// Time in µs for one period of every program, at the estimated clock.
     pub(super) time: f64,
 }
 
@@ -32,14 +32,14 @@ impl Candidate {
         [self.time, self.estimate.luts, self.estimate.block_rams as f64]
     }
 
-    /// This candidate dominates the other: no measure is worse, and one is better.
+    /// The candidate dominates the other: it is worse in no measure, and better in at least one.
     fn betters(&self, other: &Candidate) -> bool {
         let (own, others) = (self.measures(), other.measures());
         own.iter().zip(&others).all(|(own, other)| own <= other) && own != others
     }
 }
 
-/// Pareto front, fastest first; of candidates equal in all measures, the first found.
+/// Pareto front, fastest first; of candidates that are equal in all measures, the first found.
 pub(super) fn front(all: &[Candidate]) -> Vec<&Candidate> {
     let mut front: Vec<&Candidate> = Vec::new();
     for one in all {

@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Neighbours of a row in the search: a unit moved, doubled, removed or replaced, or a slot added or removed. Validity is checked later, by
-//! the rules of rows and circuits.
+//! Neighbours of a row in the search: a unit is moved, duplicated, removed or replaced, or a slot added or removed. Validity is checked
+//! later, by the rules for rows and circuits.
 
 use std::collections::BTreeSet;
 use takt_isa::spec::row::{BankOwned, RowOwned, SlotOwned, UnitOwned};
 use takt_isa::{Function, Machine};
 
-/// Units that a second slot may get.
+/// Units that may be duplicated in a second slot.
 const DOUBLED: [&str; 6] = ["add", "multiply", "alu", "convert", "fused", "divroot"];
 /// Names of slots and banks, in order of assignment.
 const NAMES: [(&str, &str); 7] =
     [("mul", "m"), ("add", "a"), ("aux", "x"), ("mac", "p"), ("more", "q"), ("most", "u"), ("last", "v")];
 
-/// Unit of the table, with other functions and cycles if given.
+/// Unit from the specification's table; `functions` and `cycles` replace its functions, latency and interval.
 fn unit(name: &str, functions: &[Function], cycles: Option<(u32, u32)>) -> Option<UnitOwned> {
     let mut unit = UnitOwned::of(name)?;
     if !functions.is_empty() {
@@ -24,7 +24,7 @@ fn unit(name: &str, functions: &[Function], cycles: Option<(u32, u32)>) -> Optio
     Some(unit)
 }
 
-/// Replacements of a unit: other circuits for its functions, and other depths and intervals of its circuit.
+/// Replacements of a unit: other circuits for its functions, or other latencies and intervals of its circuit.
 fn instead(of: &UnitOwned) -> Vec<UnitOwned> {
     use Function::{Fused, Multiply};
     let choices = match of.name {
@@ -45,7 +45,7 @@ fn functions(units: &[UnitOwned]) -> BTreeSet<Function> {
     units.iter().flat_map(|unit| unit.functions.iter().copied()).collect()
 }
 
-/// Puts a unit into a slot, without functions that the slot already has; returns false if none is left.
+/// Adds a unit to a slot, without functions that the slot already has; returns false if no function is left.
 fn put(slot: &mut SlotOwned, mut unit: UnitOwned) -> bool {
     let own = functions(&slot.units);
     unit.functions.retain(|function| !own.contains(function));
@@ -56,7 +56,7 @@ fn put(slot: &mut SlotOwned, mut unit: UnitOwned) -> bool {
     is_new
 }
 
-/// All neighbours in the form of [`finished`].
+/// All neighbours of a row, normalised by [`finished`].
 pub(super) fn neighbours(row: &RowOwned) -> Vec<RowOwned> {
     let mut all = Vec::new();
     let count = row.slots.len();
@@ -89,7 +89,7 @@ pub(super) fn neighbours(row: &RowOwned) -> Vec<RowOwned> {
                     push(exchanged);
                 }
             }
-            // An additional slot, for this unit or a second one of its kind.
+            // Add a slot for this unit, or for a second one of its kind.
             let mut alone = SlotOwned { units: Vec::new(), ..slot.clone() };
             put(&mut alone, unit.clone());
             if slot.units.len() > 1 && !is_core {
@@ -108,7 +108,7 @@ pub(super) fn neighbours(row: &RowOwned) -> Vec<RowOwned> {
                 push(merged);
             }
         }
-        // Remove a slot: its units move to another.
+        // Remove a slot, and move its units to another.
         for other in (0..count).filter(|other| *other != s) {
             let mut merged = row.slots.clone();
             for unit in &slot.units {
@@ -121,12 +121,12 @@ pub(super) fn neighbours(row: &RowOwned) -> Vec<RowOwned> {
     all
 }
 
-/// Normal form of a row in the search: units in table order, names and banks by number of slots, maximal banks, and a name derived from the
-/// contents. `None` without slots, or with more than there are names.
+/// Normalises a row: units in table order, names and banks determined by the number of slots, banks of maximum depth, and a name derived
+/// from the contents. `None` if there are no slots, or more than names.
 pub(super) fn finished(row: &RowOwned) -> Option<RowOwned> {
     let mut slots: Vec<SlotOwned> = row.slots.iter().filter(|slot| !slot.units.is_empty()).cloned().collect();
     let order = |unit: &UnitOwned| takt_isa::UNITS.iter().position(|row| row.name == unit.name);
-    // Banks begin at multiples of the largest depth; the inputs' bank is last and ends the register space of 1,024.
+    // Banks start at multiples of the largest depth; the input bank comes last and ends the register space of 1,024.
     let (depths, inputs) = match slots.len() {
         1 => ([512; 7], 256),
         2 | 3 => ([256; 7], 256),
@@ -154,7 +154,7 @@ pub(super) fn finished(row: &RowOwned) -> Option<RowOwned> {
     Some(row)
 }
 
-/// Units of a slot in words.
+/// Units of a slot, as text.
 fn summary(slot: &SlotOwned) -> String {
     let unit = |unit: &UnitOwned| match takt_isa::UNITS.iter().find(|row| row.name == unit.name) {
         Some(row) if (row.latency, row.interval) != (unit.latency, unit.interval) => {
@@ -165,12 +165,12 @@ fn summary(slot: &SlotOwned) -> String {
     format!("{}: {}", slot.name, slot.units.iter().map(unit).collect::<Vec<_>>().join(" "))
 }
 
-/// Units of all slots of a machine in words.
+/// Units of all slots of a machine, as text.
 pub(super) fn summary_of(machine: &Machine) -> String {
     RowOwned::from(machine).slots.iter().map(summary).collect::<Vec<_>>().join("; ")
 }
 
-/// FNV-1a hash, 64 bits, equal on every computer.
+/// 64-bit FNV-1a hash, which is the same on every computer.
 pub(super) fn content(text: &str) -> u64 {
     text.bytes()
         .fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3))
@@ -182,7 +182,7 @@ mod tests {
     use takt_isa::MACHINES;
     use takt_rtl::{Library, Plan};
 
-    /// From any machine of the table, the neighbours include rows with circuits, and rows with other numbers of slots.
+    /// The neighbours of every machine in the table include rows with circuits, and rows with other numbers of slots.
     #[test]
     fn neighbours_have_circuits() {
         for &machine in MACHINES {

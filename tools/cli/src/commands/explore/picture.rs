@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Plot of the front: time over LUT, with a circle for each machine whose size grows with its block RAM.
+//! Plot of the front: time over LUT, with a circle for each machine, sized by its block RAM.
 
 use super::front::Candidate;
 use crate::terminal::plot::{Outcome, chart, font, headed, in_pixels, mesh, px};
@@ -10,7 +10,7 @@ const SIZE: (u32, u32) = (960, 620);
 const FRONT: RGBColor = RGBColor(0x1f, 0x5f, 0xa8);
 const OTHER: RGBColor = RGBColor(0xb8, 0xb8, 0xb8);
 
-/// Plot of all candidates; machines of the front are labelled.
+/// Plots all candidates; machines on the front are labelled.
 pub(super) fn draw(all: &[Candidate], front: &[&Candidate]) -> Result<String> {
     let mut svg = String::new();
     draw_into(all, front, &mut svg).map_err(|error| anyhow!("cannot draw: {error}"))?;

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Results of earlier searches in the user's cache: one file per programs, options and build, one line per row with its cycles and a
-//! checksum. Lines are written as soon as they are known, so that a stopped search can resume.
+//! Results of earlier searches in the user's cache: one file for each combination of programs, options and build, with one line per row
+//! that has its cycles and a checksum. Lines are written as soon as they are known, so that a stopped search can resume.
 
 use super::moves::content;
 use std::collections::HashMap;
 use std::fs::{File, OpenOptions};
 use std::io::Write as _;
 
-/// Cycles of each program on a row; `None` if one does not fit.
+/// Cycles of each program on a row; `None` if a program does not fit.
 pub(super) type CachedCycles = Option<Vec<u64>>;
 
 pub(super) struct ResultCache {
@@ -16,7 +16,7 @@ pub(super) struct ResultCache {
 }
 
 impl ResultCache {
-    /// Opens the results of a key.
+    /// Opens the stored results for a key.
     pub(super) fn open(key: &str) -> ResultCache {
         let folder = takt_cache::folder().ok().map(|folder| folder.join("explore"));
         let path = folder.as_ref().map(|folder| folder.join(format!("{:016x}.jsonl", content(key))));
@@ -36,7 +36,7 @@ impl ResultCache {
         kept
     }
 
-    /// Cycles of a row, if known; `Some(None)` if a program does not fit it.
+    /// Cycles of a row, if stored; `Some(None)` if a program does not fit it.
     pub(super) fn find(&self, row: &str) -> Option<CachedCycles> {
         self.known.get(row).cloned()
     }
@@ -48,7 +48,7 @@ impl ResultCache {
         self.known.insert(row, cycles);
     }
 
-    /// Appends text to the file. Errors are ignored: the result is then computed again.
+    /// Appends text to the file. Errors are ignored: a missing result is computed again.
     fn append(&mut self, text: &str) {
         if let Some(file) = &mut self.file {
             let _ = file.write_all(text.as_bytes());
@@ -56,7 +56,7 @@ impl ResultCache {
     }
 }
 
-/// Parses a line into row and cycles; `None` if its checksum is wrong.
+/// Parses a line into row and cycles; `None` if the checksum is wrong.
 fn read_line(line: &[u8]) -> Option<(String, CachedCycles)> {
     let (sum, line) = std::str::from_utf8(line).ok()?.split_once(' ')?;
     (u64::from_str_radix(sum, 16) == Ok(content(line))).then(|| serde_json::from_str(line).ok())?

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Place and route of the fastest machines of a front, with several seeds. Each netlist and each seed is a unit of work with a cached
+//! Place and route of the fastest machines on a front, with several seeds. Each netlist and each seed is a unit of work with a cached
 //! result.
 
 use super::front::Candidate;
@@ -22,18 +22,18 @@ use takt_work::{Failure, Unit};
 #[derive(Serialize)]
 pub(super) struct RoutedMachine {
     machine: &'static str,
-    /// Finished seeds, from 1 on; fewer than requested if the search was stopped.
+    /// Results of seeds from 1 on; fewer than requested if the search was stopped.
     seeds: Vec<PlacedCore>,
-    /// Time in µs of one period of each program in sequence, at the median clock.
+    /// Time in µs for one period of every program, at the median clock.
     time: Option<f64>,
     /// Estimates: clock in MHz, and LUT4.
     estimated: (f64, f64),
-    /// Reason for the absence of a clock.
+    /// Reason why there is no clock.
     failure: Option<String>,
 }
 
 impl RoutedMachine {
-    /// Median clock in MHz; of an even number, the lower of the middle two.
+    /// Median clock in MHz; for an even number of seeds, the lower of the middle two.
     fn median(&self) -> Option<f64> {
         let mut clocks: Vec<f64> = self.seeds.iter().map(|placed| placed.mhz).collect();
         clocks.sort_by(f64::total_cmp);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Units of a search: cycles of some rows, a netlist, place and route with one seed. A unit is this command again, with a file that says
-//! what to do; so it runs in a process of its own, here or on another computer that sees the same files.
+//! Units of work in a search: cycles of some rows, a netlist, or place and route with one seed. A unit is a call of this command with a
+//! job file; it runs in a separate process, on this computer or on another with the same file system.
 
 use super::moves::content;
 use super::result_cache::CachedCycles;
@@ -13,31 +13,31 @@ use std::time::Duration;
 use takt_isa::Machine;
 use takt_work::Unit;
 
-/// Rows in a unit, some seconds' work.
+/// Number of rows in a unit: a few seconds of work.
 pub(super) const ROWS: usize = 8;
-/// The time of a unit, or more: cycles of rows, a netlist, place and route.
+/// Upper bounds of the run time of a unit: cycles of rows, a netlist, place and route.
 const TIMES: [Duration; 3] = [Duration::from_secs(60), Duration::from_secs(600), Duration::from_secs(1200)];
 
-/// The work of a unit.
+/// Job of a unit.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) enum Job {
-    /// The cycles of all programs on machines, by their rows.
+    /// Cycles of all programs on machines, given by their rows.
     Cycles(Vec<String>),
-    /// The netlist of a machine's core, in a folder.
+    /// Netlist of a machine's core, written to a folder.
     #[cfg(feature = "board")]
     Netlist { row: String, folder: PathBuf, tools: PathBuf },
-    /// The core placed and routed there.
+    /// Place and route of the netlist in a folder, with one seed.
     #[cfg(feature = "board")]
     Seed { folder: PathBuf, tools: PathBuf, seed: u32 },
 }
 
-/// The machine of a row.
+/// Machine described by a row.
 pub(super) fn machine(row: &str) -> Result<&'static Machine> {
     takt_asm::machine::read("row.toml", row).map_err(|mistakes| anyhow::anyhow!("{}", mistakes.render(false)))
 }
 
 impl Job {
-    /// The unit that does it, as [`Workers::unit`].
+    /// Creates the unit that performs the job; see [`Workers::unit`].
     pub(super) fn unit(
         &self,
         workers: &Workers,
@@ -56,7 +56,7 @@ impl Job {
     }
 }
 
-/// Does a unit's job in this process.
+/// Performs a job in this process.
 pub(super) fn run(job: Job, result: &Path, cycles: impl Fn(&'static Machine) -> CachedCycles) -> Result<()> {
     match job {
         Job::Cycles(rows) => {
@@ -79,7 +79,7 @@ pub(super) fn run(job: Job, result: &Path, cycles: impl Fn(&'static Machine) -> 
     }
 }
 
-/// The cycles of rows, by units; where one failed, an error.
+/// Computes the cycles of rows in units; an error if a unit failed.
 pub(super) fn cycles(
     workers: &Workers,
     key: &str,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Subcommand `shadow` of `takt live`: compares a board's outputs with the emulator's on the same inputs, period by period.
+//! Subcommand `shadow` of `takt live`: compares a board's outputs with the emulator's for the same inputs, period by period.
 
 use crate::commands::live::value::{find, value_text};
 use crate::terminal::files::Out;
@@ -15,10 +15,10 @@ use takt_isa::timing::Cycle;
 use takt_isa::{Register, Type};
 use takt_system::{Description, End, System};
 
-/// Cycle limit for the first `wait` of all cores.
+/// Cycle limit until all cores reach their first `wait`.
 const START: u64 = 1 << 32;
 
-/// A value on the board: a port, or a host's end of a link.
+/// A value on the board: a port, or an end of a link at the host.
 struct WatchedValue {
     name: String,
     address: u16,
@@ -27,15 +27,15 @@ struct WatchedValue {
     register: Register,
 }
 
-/// The emulator that shadows the board.
+/// Emulator that shadows the board.
 enum Shadow {
     Program(Box<Emulator>),
-    /// A system, the snapshots that the host publishes, and the cycle of its next turn.
+    /// A system, the snapshots that the host publishes, and the cycle of the host's next turn.
     System(Box<System>, Vec<usize>, Cycle),
 }
 
 impl Shadow {
-    /// A shadow at the start of the program, like the board.
+    /// Starts a shadow at the beginning of the program, where the board is.
     fn start(application: &Application<'_>) -> Result<Shadow> {
         let description = application.description();
         if application.is_program() {
@@ -51,7 +51,7 @@ impl Shadow {
         Ok(Shadow::System(Box::new(system), snapshots, start - description.lead()))
     }
 
-    /// Runs a period or a base tick with these inputs.
+    /// Runs one period or base tick with these inputs.
     fn run(&mut self, inputs: &[WatchedValue], bits: &[u32]) -> Result<()> {
         let inputs = inputs.iter().zip(bits);
         match self {
@@ -85,7 +85,7 @@ impl Shadow {
     }
 }
 
-/// Output ports of every core.
+/// Output ports of all cores.
 fn outputs(application: &Application<'_>) -> Result<Vec<WatchedValue>> {
     let mut all = Vec::new();
     for (core, known) in application.description().cores.iter().enumerate() {
@@ -98,7 +98,7 @@ fn outputs(application: &Application<'_>) -> Result<Vec<WatchedValue>> {
     Ok(all)
 }
 
-/// Input ports of a program, or the host's ends of a system's links.
+/// Input ports of a program, or ends of a system's links at the host.
 fn inputs(application: &Application<'_>) -> Result<Vec<WatchedValue>> {
     let program = &application.description().cores[0].program;
     let names: Vec<(String, Register)> = match application.is_program() {
@@ -115,7 +115,7 @@ fn inputs(application: &Application<'_>) -> Result<Vec<WatchedValue>> {
     names.into_iter().map(watched).collect()
 }
 
-/// Values from the board; consecutive addresses are read together.
+/// Reads values from the board, combining consecutive addresses.
 fn read<L: Line>(host: &mut Host<L>, all: &[WatchedValue]) -> Result<Vec<u32>> {
     let mut addresses: Vec<u16> = all.iter().map(|one| one.address).collect();
     addresses.sort_unstable();
@@ -127,7 +127,7 @@ fn read<L: Line>(host: &mut Host<L>, all: &[WatchedValue]) -> Result<Vec<u32>> {
     Ok(all.iter().map(word).collect())
 }
 
-/// Part of the board that does not wait for its next period, with its state.
+/// Part of the board that is not waiting for its next period, with a description of its state.
 fn stopped<L: Line>(host: &mut Host<L>, application: &Application<'_>) -> Result<Option<String>> {
     let Description { cores, .. } = application.description();
     for (number, core) in cores.iter().enumerate() {
@@ -138,7 +138,7 @@ fn stopped<L: Line>(host: &mut Host<L>, application: &Application<'_>) -> Result
         };
         match status {
             s if s.fault() => return Ok(Some(format!("{who} has stopped with a fault"))),
-            // In a system the other cores continue.
+            // In a system, the other cores continue.
             s if s.halted() && application.is_program() => return Ok(Some(format!("{who} has halted"))),
             _ => {}
         }
@@ -146,10 +146,10 @@ fn stopped<L: Line>(host: &mut Host<L>, application: &Application<'_>) -> Result
     Ok(None)
 }
 
-/// Compares a number of periods or base ticks from the start; the board was restarted and is held. FIFOs from the host stay empty.
+/// Compares a number of periods or base ticks from the start, after a restart of the board, which is held. FIFOs from the host stay empty.
 ///
 /// # Errors
-/// The first difference, or the reason why the board or the emulator stopped.
+/// The first difference, or the reason why board or emulator stopped.
 pub(crate) fn run<L: Line>(
     host: &mut Host<L>,
     application: &Application<'_>,
@@ -160,7 +160,7 @@ pub(crate) fn run<L: Line>(
         if application.is_program() { ("period", "input ports") } else { ("base tick", "inputs") };
     let (inputs, outputs) = (inputs(application)?, outputs(application)?);
     let mut shadow = Shadow::start(application)?;
-    // A dropped bar is cleared.
+    // The bar is cleared on drop.
     let bar = progress(periods.into(), &format!("{unit}s"), false).with_finish(ProgressFinish::AndClear);
     for period in 1..=periods {
         let compared = compare(host, application, &mut shadow, &inputs, &outputs);
@@ -184,14 +184,14 @@ fn compare<L: Line>(
     inputs: &[WatchedValue],
     outputs: &[WatchedValue],
 ) -> Result<()> {
-    // A port read returns once the program waits, so the previous step is over, too.
+    // A port read waits until the program waits, so the previous step is complete.
     host.settle()?;
     read(host, outputs)?;
     let before = host.register("periods")?;
     host.set("step", 1)?;
     host.settle()?;
     let live = read(host, outputs)?;
-    // Inputs do not change between two ticks: these are the period's inputs.
+    // Inputs do not change between two ticks, so these are the inputs of the period.
     let given = read(host, inputs)?;
     match (stopped(host, application)?, shadow.run(inputs, &given)) {
         (None, Ok(())) => {}
@@ -203,7 +203,7 @@ fn compare<L: Line>(
         bail!("the board did not run the period: is another host connected?");
     }
     for (port, bits) in outputs.iter().zip(live) {
-        // A port without a write may have any value.
+        // A port that was never written may have any value.
         let Some(expected) = shadow.output(port).filter(|expected| *expected != bits) else { continue };
         let mut text = String::new();
         for (i, (input, bits)) in inputs.iter().zip(&given).enumerate() {

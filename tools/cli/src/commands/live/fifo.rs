@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Subcommands `push` and `pop` of `takt live`: entries of FIFOs between host and board.
+//! Subcommands `push` and `pop` of `takt live`: transfer entries of FIFOs between host and board.
 
 use super::value::{bits, value_text};
 use crate::terminal::files::Out;
@@ -10,7 +10,7 @@ use takt_board::protocol::Line;
 use takt_board::{Application, Host};
 use takt_system::LinkKind;
 
-/// Capacity of a FIFO in entries.
+/// Capacity of a FIFO, in entries.
 pub(super) fn depth(application: &Application<'_>, fifo: &Fifo) -> u32 {
     match application.description().links[fifo.link].kind {
         LinkKind::Fifo { depth, .. } => depth,
@@ -18,7 +18,7 @@ pub(super) fn depth(application: &Application<'_>, fifo: &Fifo) -> u32 {
     }
 }
 
-/// FIFO by name, in the given direction.
+/// Finds a FIFO by name, in the given direction.
 pub(super) fn of(application: &Application<'_>, name: &str, to_host: bool) -> Result<Fifo> {
     if application.is_program() {
         bail!("FIFOs are links of a system of several cores; this is a single program");
@@ -26,7 +26,7 @@ pub(super) fn of(application: &Application<'_>, name: &str, to_host: bool) -> Re
     Ok(application.endpoints().fifo(name, to_host).map_err(|text| anyhow!("{text}"))?.clone())
 }
 
-/// Parses a FIFO from the host, and an entry for it from `field=value`, one for each field.
+/// Parses the name of a FIFO from the host, and an entry as `field=value` for each field.
 pub(super) fn entry(
     application: &Application<'_>,
     name: &str,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The commands `takt load` and `takt live`: a board at a serial port.
+//! The commands `takt load` and `takt live`: access to a board at a serial port.
 
 mod comparison;
 mod fifo;
@@ -45,7 +45,7 @@ pub(crate) fn open(port: &Path, baud: u32) -> Result<Host<Serial>> {
     let name = port.display();
     let line = Serial::open(port, baud)
         .with_context(|| format!("cannot open {name}: is the board plugged in, and may you use the port?"))?;
-    // Number of the first request: should differ from an earlier command's last request.
+    // Number of the first request; it should differ from the last request of an earlier command.
     let now = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.subsec_micros());
     Host::connect(line, now as u8).with_context(|| format!("{name} at {baud} baud"))
 }
@@ -171,10 +171,10 @@ enum Command {
     },
 }
 
-/// Parsed arguments of a command, checked before the serial port is opened.
+/// Arguments of a command, parsed before the serial port is opened.
 enum PreparedCommand {
     Nothing,
-    /// Addresses and values, and the port name at each address.
+    /// Addresses and values to set, and the port name at each address.
     Settings(Vec<(u16, u32)>, Vec<(u16, String)>),
     /// Entry to push into a FIFO.
     Entry(Fifo, Vec<u32>),
@@ -268,7 +268,7 @@ pub(crate) fn live(arguments: &Live, color: bool, out: &mut Out) -> Result<()> {
         }
         Command::Shadow { periods, drive, .. } => {
             let enable = if *drive { ENABLE } else { 0 };
-            // Hold the program from its start on, so that no period passes unseen.
+            // Hold the program from its start, so that no period is missed.
             host.set("control", RUN | HOLD | enable | RESTART)?;
             if let PreparedCommand::Settings(settings, names) = &prepared {
                 set(&mut host, settings, names)?;
@@ -294,7 +294,7 @@ pub(crate) fn live(arguments: &Live, color: bool, out: &mut Out) -> Result<()> {
     Ok(())
 }
 
-/// Sets ports; the error names ports that the board refuses to set.
+/// Sets ports; the error names ports that the board does not let the host set.
 fn set(host: &mut Host<Serial>, settings: &[(u16, u32)], names: &[(u16, String)]) -> Result<()> {
     host.set_ports(settings).map_err(|error| {
         let LinkError::ReadOnly { address, words } = error else { return error.into() };
@@ -324,7 +324,7 @@ fn streamed(
             Some((period, values)) => {
                 let values = values.map(|(bits, ty)| value_text(bits, ty));
                 writeln!(out, "{period} {}", values.collect::<Vec<_>>().join(" "))?;
-                // A reader may wait for each line.
+                // Flush: a reader may be waiting for each line.
                 out.flush()?;
                 (printed, silent) = (printed + 1, 0);
             }
@@ -345,5 +345,5 @@ fn streamed(
     Ok(())
 }
 
-/// Time without a frame, in tenths of a second, after which the stream counts as ended.
+/// Time without a frame after which the stream counts as ended, in tenths of a second.
 const SILENCE: u32 = 50;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Subcommand `status` of `takt live`: state of each core, FIFOs, counters.
+//! Subcommand `status` of `takt live`: state of each core, FIFOs, and counters.
 
 use super::fifo::depth;
 use crate::terminal::files::Out;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Sources that state their memory sizes, and their cycles.
+//! Sources that state their memory sizes, and the cycles of these sources.
 
 use super::{Cycles, Model};
 use crate::run::load::Load;
@@ -13,7 +13,7 @@ use takt_isa::Machine;
 pub(super) trait MachineSource {
     /// Text of the source.
     fn text(&self) -> &str;
-    /// Machine stated in the source.
+    /// Machine that the source states.
     fn machine(&self) -> &'static Machine;
 }
 
@@ -23,10 +23,10 @@ pub(super) struct Figures {
     pub(super) bundles: usize,
 }
 
-/// Program memory depths to try, in bundles: room for pipelined loops, and the maximum.
+/// Program memory depths to try, in bundles: enough for pipelined loops, and the maximum.
 const TRIED: [usize; 2] = [4096, 65_535];
 
-/// Assembles the source with the smallest sufficient program memory.
+/// Assembles the source with the smallest program memory that suffices.
 pub(super) fn sized<S: MachineSource>(
     arguments: &Model,
     color: bool,
@@ -49,7 +49,7 @@ pub(super) fn sized<S: MachineSource>(
     if source.machine().name == deep.machine().name {
         return Ok((source, figures));
     }
-    // A tight program memory makes the assembler pipeline fewer loops.
+    // With less program memory, the assembler pipelines fewer loops.
     let again = self::figures(&load(&source).finish(assemble(&source))?)?;
     Ok(if again.cycles.worst > figures.cycles.worst { (deep, figures) } else { (source, again) })
 }

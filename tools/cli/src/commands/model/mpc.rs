@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Model-predictive control in `takt model system.json`.
+//! Model-predictive controllers, by `takt model system.json`.
 
 use super::memory_sizes::{Figures, MachineSource, sized};
 use super::{Model, decoded, folder_loader, for_robots, no_body};
@@ -12,7 +12,7 @@ use std::io::Write;
 use takt_front::mpc::{self, Contraction, Controller, Extreme, Hint, Search, Source};
 use takt_isa::Machine;
 
-/// Number of periods for the warm start of a search.
+/// Number of periods with which a search starts warm.
 const PERIODS: usize = 1;
 
 impl MachineSource for Source {
@@ -25,7 +25,7 @@ impl MachineSource for Source {
     }
 }
 
-/// Text of the file, if it is a control problem.
+/// Reads the file, if it is a control problem.
 pub(super) fn text(arguments: &Model) -> Result<Option<String>> {
     let text = decoded(&arguments.file, mpc::MAX_BYTES)?.text;
     Ok(Some(text).filter(|text| mpc::is_system(text)))
@@ -110,7 +110,7 @@ pub(super) fn run(arguments: &Model, text: &str, color: bool, out: &mut Out) -> 
     Ok(())
 }
 
-/// Recommends a better penalty, or reports weights that no penalty suits.
+/// Recommends a better penalty, or reports that no penalty suits the weights.
 fn advise(hint: Hint, rho: f64, out: &mut Out) -> Result<()> {
     let Hint { rho: better, rate, spread } = hint;
     if better != rho {

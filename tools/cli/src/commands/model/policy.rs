@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Learned policies in `takt model policy.onnx`.
+//! Learned policies, by `takt model policy.onnx`.
 
 use super::memory_sizes::{Figures, MachineSource, sized};
 use super::{Model, for_robots, no_body};

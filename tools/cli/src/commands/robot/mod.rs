@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The command `takt robot`: command level of the three-processor controller, at a prompt, from a script, or with a program file.
+//! The command `takt robot`: command level of the three-processor controller, at a prompt, from a script, or from a program file.
 
 mod picture;
 mod prompt;
@@ -70,7 +70,7 @@ Examples:
   takt robot square.robot --faults corrupt@1.5       what the controller does about a bad packet
   echo 'move joints(30, _, _, _, _, _)' | takt robot";
 
-/// Maximal duration in s.
+/// Maximum duration of a session, in s.
 const LONGEST: f64 = limits::LONGEST;
 
 /// Parses a link fault such as `corrupt@2.5`.
@@ -87,7 +87,7 @@ fn fault(text: &str) -> Result<(LinkFault, f64), String> {
     }
 }
 
-/// Files on the user's disk.
+/// Loader of files from disk.
 struct DiskFiles;
 
 impl Files for DiskFiles {
@@ -166,7 +166,7 @@ pub(crate) fn run(arguments: &Robot, color: bool, out: &mut Out) -> Result<()> {
         (None, None) if std::io::stdin().is_terminal() && !desk.json => prompt::run(&mut desk)?,
         (None, None) => desk.lines("standard input", &mut BufReader::new(std::io::stdin()))?,
     }
-    // An error that aborted a program has already stopped the robot.
+    // An error that aborted the program has already stopped the robot.
     let broken_off = desk.failed && arguments.file.is_some();
     if !(arguments.check || desk.session.quit || broken_off) {
         let result = desk.session.finish();
@@ -210,13 +210,13 @@ impl RobotConsole<'_> {
             for line in lines {
                 writeln!(self.out, "{:13}{line}", "")?;
             }
-            // A minute of robot time takes a while: show messages at once.
+            // Show messages at once: a minute of robot time takes a while to simulate.
             self.out.flush()?;
         }
         Ok(())
     }
 
-    /// Prints the messages of a command, and its mistakes.
+    /// Prints the messages of a command and any mistakes in it.
     fn print_messages<T>(&mut self, result: Result<T, Diagnostics>) -> Result<Option<T>> {
         self.show()?;
         match result {
@@ -226,7 +226,7 @@ impl RobotConsole<'_> {
                 if self.json {
                     self.mistakes.extend(mistakes.messages());
                 } else {
-                    // Keep the order with earlier output.
+                    // Flush, to keep the order with earlier output.
                     self.out.flush()?;
                     output::message(&mistakes.render(self.color));
                 }
@@ -235,7 +235,7 @@ impl RobotConsole<'_> {
         }
     }
 
-    /// Runs a program, and prints its messages as they come.
+    /// Runs a program; prints its messages as they occur.
     fn program(&mut self, name: &str, text: &str) -> Result<()> {
         let begun = self.session.begin(name, text);
         let Some(mut running) = self.print_messages(begun)? else { return Ok(()) };
@@ -247,7 +247,7 @@ impl RobotConsole<'_> {
         }
     }
 
-    /// Executes all commands, each a line or a block of lines, even after errors.
+    /// Executes all commands, each a line or a block of lines, and continues after errors.
     fn lines(&mut self, name: &str, lines: &mut dyn BufRead) -> Result<()> {
         let mut text = String::new();
         let mut lines = lines.lines();

@@ -9,12 +9,12 @@ use takt_robot::geometry::pose_of;
 use takt_robot::host::{TICK, degrees};
 
 const NAMES: [&str; 6] = ["q1", "q2", "q3", "q4", "q5", "q6"];
-/// Heights of the panels in pixels.
+/// Height of the panels, in pixels.
 const PANEL: u32 = 300;
 const PATHS: u32 = 420;
 const HEIGHT: u32 = 3 * PANEL + PATHS;
 
-/// Plots of all records as SVG.
+/// Plots all records, as SVG.
 pub(super) fn draw(title: &str, records: &[Record]) -> Result<String> {
     let mut svg = String::new();
     draw_into(title, records, &mut svg).map_err(|error| anyhow!("cannot draw: {error}"))?;
@@ -32,7 +32,7 @@ fn draw_into(title: &str, records: &[Record], svg: &mut String) -> Outcome<()> {
     };
     let reference = curves(&|i, joint| records[i].reference[joint].to_degrees());
     panel(&angles, &format!("{title}: joint angles"), "angle, degrees", &thin(&reference))?;
-    // Differences from record to record; the reference is a binary32, so that they are coarse at this step.
+    // Differences between records; since the reference is a binary32, they are coarse at this step.
     let step = TICK * RECORD_TICKS as f64;
     let velocity = curves(&|i, joint| {
         let (a, b) = (i.saturating_sub(2), (i + 2).min(records.len() - 1));
@@ -74,7 +74,7 @@ fn thin(curves: &[Vec<(f64, f64)>; 6]) -> [Vec<(f64, f64)>; 6] {
     std::array::from_fn(|joint| curves[joint].iter().step_by(every).copied().collect())
 }
 
-/// Value of the largest magnitude in each stretch of time, so that no peak is lost.
+/// Value of largest magnitude in each stretch of time, so that no peak is lost.
 fn extremes(curves: &[Vec<(f64, f64)>; 6]) -> [Vec<(f64, f64)>; 6] {
     let every = curves[0].len().div_ceil(POINTS as usize).max(1);
     std::array::from_fn(|joint| {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Summary of a session: tracking errors of the joints, cycles of the cores.
+//! Summary of a session: tracking errors of the joints, and cycles of the cores.
 
 use serde_json::{Value, json};
 use std::fmt::Write as _;
@@ -9,7 +9,7 @@ use takt_robot::level::Message;
 use takt_robot::plant::COUNTS;
 use takt_system::CorePeriods;
 
-/// Periods of a core, and its cycles per period.
+/// Number of periods of a core, and cycles per period.
 struct Core {
     name: String,
     periods: CorePeriods,
@@ -27,7 +27,7 @@ pub(super) struct Summary {
 
 /// Duration of a base tick in s.
 const TICK: f64 = takt_robot::host::TICK;
-/// Periods in the paper, by core.
+/// Periods given in the paper, by core.
 const PAPER: [(&str, &str); 2] = [("kinematic", "40 ms"), ("dynamic", "15 to 20 ms")];
 
 impl Summary {
@@ -42,7 +42,7 @@ impl Summary {
         Summary { time, tracking: *controller.tracking(), cores: cores.collect(), tick: description.tick }
     }
 
-    /// The robot has moved, so the tracking errors have a meaning.
+    /// The robot has moved, so the tracking errors are meaningful.
     pub(super) fn moved(&self) -> bool {
         self.tracking.ticks > 0
     }

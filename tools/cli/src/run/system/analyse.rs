@@ -13,12 +13,12 @@ use takt_debug::trace::{SystemTracer, Timeline};
 use takt_isa::timing::Cause;
 use takt_system::{Description, System};
 
-/// Default number of base ticks without `--inputs`.
+/// Default number of base ticks, without `--inputs`.
 const TICKS: u64 = 10;
 /// Number of stalls listed for each core, longest first.
 const STALLS: usize = 8;
 
-/// Runs a system; returns the outcome as JSON and as text. `html` receives a page with the timeline.
+/// Runs a system; returns the outcome as JSON and as text. `html` receives a page with a timeline.
 pub(crate) fn analyse(
     description: &Description,
     tables: Tables<'_>,
@@ -85,11 +85,12 @@ pub(crate) fn analyse(
     Ok((value, text))
 }
 
-/// Timeline from the host's write for the last period of the slowest core. The run is repeated with the same host, and is identical.
+/// Timeline that starts with the host's write for the last period of the slowest core. The run is repeated with the same host, and
+/// proceeds identically.
 fn timeline(ran: &System, ticks: u64) -> Result<Timeline> {
     let description = ran.description();
     let slowest = description.cores.iter().map(|core| core.every).max().unwrap_or(1);
-    // Begin one cycle earlier, to include the host's writes.
+    // Begin one cycle earlier, to include the writes of the host.
     let first = ran.now().saturating_sub(slowest.min(ticks) * description.tick + 1);
     let mut system = System::new(description)?;
     let mut tracer = SystemTracer::timeline(first..ran.now());

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Hybrid robot's controller: a system in which one core computes the points of the path.
+//! Controller of the hybrid robot: a system in which one core computes the points of the path.
 
 use super::observers::Observer;
 use crate::run::deny::{Denials, Watch};
@@ -15,29 +15,29 @@ use takt_system::{Description, HostError, LinkKind, System, SystemFault};
 
 /// Name of the FIFO of motion blocks.
 const BLOCKS: &str = "blocks";
-/// Number of encoders, the first inputs.
+/// Number of encoders, which are the first inputs.
 const AXES: usize = 5;
 
-/// A system as controller, with its own reference.
+/// A system as a controller that computes its own reference.
 pub(crate) struct SystemController {
     pub(crate) system: System,
     observer: Observer,
-    /// Field names of a motion block in the system.
+    /// Names of a motion block's fields in the system.
     fields: [String; FIELDS.len()],
     fifo: usize,
     depth: usize,
     waiting: std::vec::IntoIter<Block>,
-    /// Link and field of each output.
+    /// Link and field that carry each output.
     outputs: [(usize, usize); OUTPUTS.len()],
-    /// Core that computes the points, with its registers.
+    /// Core that computes the points, and its registers.
     generation: usize,
     point: [Register; REFERENCE_LEN],
-    /// Cycle of the host's next write, and distance between writes.
+    /// Cycle of the host's next write, and the distance between writes.
     next: Cycle,
     tick: Cycle,
 }
 
-/// Errors after which the system cannot control the robot further.
+/// Errors after which the system cannot continue to control the robot.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum StepError {
     #[error("{0}")]
@@ -103,15 +103,15 @@ impl SystemController {
         })
     }
 
-    /// Denied events of each core.
+    /// Denied events that occurred, for each core.
     pub(crate) fn denials(&self) -> Vec<Denials> {
         self.observer.denials(&self.system)
     }
 
-    /// Runs a base tick: pushes a block if it fits, writes the encoders, and runs the system up to the next tick.
+    /// Runs a base tick: pushes a block if there is room, writes the encoder counts, and runs the system up to the next tick.
     pub(crate) fn tick(&mut self, counts: [i32; AXES]) -> Result<(), StepError> {
         self.system.run_until(self.next)?;
-        // A single block per tick: entries under way are not yet counted in the FIFO.
+        // Push one block per tick: the FIFO's count does not yet include entries in transit.
         if self.system.fifo_entries(self.fifo).len() < self.depth
             && let Some(block) = self.waiting.next()
         {
@@ -131,7 +131,7 @@ impl SystemController {
         Ok(result?)
     }
 
-    /// Point of this tick; 0 before the first is computed.
+    /// Point of this tick; 0 until the first one is computed.
     pub(crate) fn point(&self) -> [f32; REFERENCE_LEN] {
         let core = self.system.core(self.generation);
         self.point.map(|register| f32::from_bits(core.output_bits(register).unwrap_or(0)))

@@ -13,7 +13,7 @@ use takt_debug::console::Console;
 use takt_debug::session::{Control, Options, Session};
 use takt_debug::system::{SystemOptions, SystemSession};
 
-/// Session at the start of a system, with at most `most` rows of inputs.
+/// Opens a session at the start of a system, with at most `most` rows of inputs.
 pub(crate) fn console(
     loaded: LoadedSystem,
     inputs: Option<&Path>,

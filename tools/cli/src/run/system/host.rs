@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Host of a system run: a row of inputs and a row of outputs for each base tick.
+//! Host in a run of a system: one row of inputs and one row of outputs per base tick.
 
 use anyhow::Result;
 use takt_cosim::system::SystemLockstep;
@@ -8,7 +8,7 @@ use takt_isa::program::Port;
 use takt_isa::{Register, Type};
 use takt_system::{Description, End, HostAction, LinkKind, System, SystemPort};
 
-/// A system that accepts host actions, or one on both sides of a lockstep.
+/// A system that accepts host actions, or the two systems of a lockstep.
 pub(crate) trait HostSide {
     /// Executes a host action; see [`System::act`].
     fn act(&mut self, action: &HostAction) -> Result<bool>;
@@ -36,17 +36,17 @@ impl HostSide for SystemLockstep {
     }
 }
 
-/// Name suffix of the column that says whether a row pushes an entry into a FIFO.
+/// Suffix of a column's name that tells whether a row pushes an entry into a FIFO.
 const PUSH: &str = "push";
 
-/// Host of a run: its columns, and their meanings.
+/// Host of a run: meanings of the table's columns.
 pub(crate) struct Host {
     pub(crate) inputs: Vec<SystemPort>,
-    /// Snapshots published by the host.
+    /// Snapshots that the host publishes.
     snapshots: Vec<usize>,
-    /// FIFOs filled by the host.
+    /// FIFOs that the host pushes to.
     pushes: Vec<usize>,
-    /// FIFOs emptied by the host.
+    /// FIFOs that the host pops from.
     pub(crate) pops: Vec<usize>,
     pub(crate) outputs: Vec<SystemPort>,
 }
@@ -69,19 +69,19 @@ impl Host {
 
     /// Input columns, in the order of their values.
     pub(crate) fn columns(&self, description: &Description) -> Vec<Port> {
-        // The table needs a register for each column; its value is irrelevant.
+        // The table needs a register for each column; which one does not matter.
         let port = |name, ty| Port { name, register: Register::ZERO, ty };
         let inputs = self.inputs.iter().map(|input| port(input.name.clone(), input.ty));
         let pushes = self.pushes.iter().map(|link| port(Host::push_column(description, *link), Type::I));
         inputs.chain(pushes).collect()
     }
 
-    /// Name of a FIFO's push column.
+    /// Name of the push column of a FIFO.
     pub(crate) fn push_column(description: &Description, link: usize) -> String {
         format!("{}.{PUSH}", description.links[link].name)
     }
 
-    /// Executes the actions of a row; returns the number of refused entries.
+    /// Executes the actions of a row; returns the number of rejected entries.
     pub(crate) fn write(&self, system: &mut impl HostSide, row: &takt_emu::Row) -> Result<u64> {
         let (inputs, pushes) = row.split_at(self.inputs.len());
         for (input, (_, bits)) in self.inputs.iter().zip(inputs) {
@@ -111,7 +111,7 @@ impl Host {
         }
     }
 
-    /// Outputs as the host sees them now. Takes one entry from each FIFO; `None` from an empty one.
+    /// Outputs as the host sees them now. Pops one entry from each FIFO; `None` if the FIFO is empty.
     pub(crate) fn read(&self, system: &mut impl HostSide) -> Result<Vec<Option<u32>>> {
         let value = |output: &SystemPort| system.system().field_bits(output.link, output.field);
         let mut values: Vec<Option<u32>> = self.outputs.iter().map(value).collect();

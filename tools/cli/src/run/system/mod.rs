@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Systems of several cores: their files, and the commands that accept them.
+//! Systems of several cores: their files, and the commands that support them.
 
 pub(crate) mod analyse;
 pub(crate) mod controller;
@@ -24,7 +24,7 @@ use takt_asm::nearest;
 use takt_rtl::{Library, SystemDesign, export_system};
 use takt_system::{Description, ProgramError, ReadError, Request, SystemFault, TEXT_BYTES, stale_reads};
 
-/// A system with its cores' programs and their debug information.
+/// A system with the programs of its cores and their debug information.
 pub(crate) struct LoadedSystem {
     pub(crate) description: Description,
     pub(crate) programs: Vec<LoadedProgram>,
@@ -32,7 +32,7 @@ pub(crate) struct LoadedSystem {
     pub(crate) files: Vec<PathBuf>,
 }
 
-/// Reads a system's file, and its programs relative to that file.
+/// Reads a system's file, and its programs by paths relative to that file.
 pub(crate) fn load(path: &Path, source: &SourceArguments, color: bool) -> Result<LoadedSystem> {
     let name = files::input_name(path);
     let text = String::from_utf8(files::read(path, TEXT_BYTES)?).map_err(|error| {
@@ -64,7 +64,7 @@ pub(crate) fn load(path: &Path, source: &SourceArguments, color: bool) -> Result
     }
 }
 
-/// Prints stale reads in the form of the assembler's warnings.
+/// Prints warnings about stale reads, in the form of the assembler's warnings.
 fn warn(system: &LoadedSystem, source: &SourceArguments, color: bool) -> Result<()> {
     let levels: Levels = source.warnings.iter().copied().collect();
     let reads = stale_reads::stale_reads(&system.description);
@@ -109,7 +109,7 @@ pub(crate) fn located_fault(fault: &SystemFault, system: &LoadedSystem, color: b
     Failure::Diagnostics(fault::rendered(&fault.fault, &system.programs[fault.core], &note, color)).into()
 }
 
-/// Circuit of a system; the top is named after the file.
+/// Circuit of a system; the top module is named after the file.
 pub(crate) fn circuit(system: &LoadedSystem, file: &Path) -> Result<SystemDesign> {
     let name = file.file_stem().unwrap_or_default().to_string_lossy();
     Ok(export_system(&system.description, &name, &Library::builtin())?)

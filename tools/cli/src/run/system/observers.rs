@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Observers of a system's cores: for `--deny`, or for replays of each core alone.
+//! Observers of a system's cores: for `--deny`, or to replay each core alone.
 
 use crate::run::deny::{Denials, Watch};
 use takt_system::{Recording, System};
 
-/// An observer; with `Idle`, a system keeps its full speed.
+/// An observer; with `Idle`, the system keeps its full speed.
 #[derive(Default)]
 pub(crate) enum Observer {
     #[default]
@@ -24,7 +24,7 @@ impl Observer {
         Observer::Watches(vec![watch; system.description().cores.len()])
     }
 
-    /// Observes the part of the run since the last call.
+    /// Observes the part of the run since the previous call.
     pub(crate) fn observe(&mut self, system: &mut System) {
         match self {
             Observer::Idle => {}
@@ -38,7 +38,7 @@ impl Observer {
         }
     }
 
-    /// Denied events of each core.
+    /// Denied events that occurred, for each core.
     pub(crate) fn denials(&self, system: &System) -> Vec<Denials> {
         let idle = Watch::idle();
         let end = |(number, core): (usize, &takt_system::Core)| {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Recorded host actions of a system, in the table format of `takt run`, `cosim` and `debug`.
+//! Recorded host actions of a system, in the table format that `takt run`, `cosim` and `debug` read.
 
 use super::host::Host;
 use crate::run::ports;
@@ -9,7 +9,7 @@ use std::path::Path;
 use takt_isa::timing::Cycle;
 use takt_system::{HostAction, System};
 
-/// Maximal number of rows: a hundred seconds at a tick of 100 µs.
+/// Maximum number of rows: a hundred seconds at a tick of 100 µs.
 const ROWS: usize = 1_000_000;
 
 /// Writes the host's actions since [`System::keep_host_actions`], one row per base tick.
@@ -27,7 +27,7 @@ pub(crate) fn write(system: &System, path: &Path) -> Result<()> {
     let mut flush = |values: &mut [u32]| -> Result<()> {
         let texts = columns.iter().zip(&*values).map(|(column, &bits)| ports::format(column.ty, bits));
         ports::write_row(&mut out, texts)?;
-        // Push flags last one tick; written values persist.
+        // Push flags last for one tick, written values persist.
         values[host.inputs.len()..].fill(0);
         Ok(())
     };
@@ -46,7 +46,7 @@ pub(crate) fn write(system: &System, path: &Path) -> Result<()> {
                 continue;
             }
             HostAction::Push(link) => Host::push_column(description, *link),
-            // Every row publishes, and pops, by itself.
+            // Publishing and popping is implicit in every row.
             HostAction::Publish(_) | HostAction::Pop(_) => continue,
         };
         let column = columns.iter().position(|column| column.name == name);

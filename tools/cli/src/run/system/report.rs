@@ -18,7 +18,7 @@ use takt_system::latency::Latency;
 pub(crate) struct SystemTracking<'a> {
     pub(crate) name: String,
     pub(crate) path: &'a str,
-    /// Clock in MHz, for times.
+    /// Clock in MHz, for conversion to time.
     pub(crate) clock: f64,
     pub(crate) system: &'a System,
     pub(crate) periods: u64,
@@ -26,11 +26,11 @@ pub(crate) struct SystemTracking<'a> {
     pub(crate) points: Accuracy<REFERENCE_LEN>,
     pub(crate) ways: Vec<Latency>,
     pub(crate) friction: Option<Friction>,
-    /// Denied events of each core.
+    /// Denied events that occurred, for each core.
     pub(crate) denials: &'a [Denials],
 }
 
-/// Kinds of a point's values: name, unit, and range of indices.
+/// Kinds of values in a point: name, unit, and range of indices.
 const KINDS: [(&str, &str, std::ops::Range<usize>); 6] = [
     ("position", "m", 0..3),
     ("velocity", "m/s", 3..6),
@@ -41,7 +41,7 @@ const KINDS: [(&str, &str, std::ops::Range<usize>); 6] = [
 ];
 
 impl SystemTracking<'_> {
-    /// Largest error of a kind.
+    /// Largest error among the values of a kind.
     fn worst(&self, kind: &std::ops::Range<usize>) -> &MaxError {
         let errors = &self.points.errors[kind.clone()];
         errors.iter().max_by(|a, b| a.absolute.total_cmp(&b.absolute)).unwrap_or(&errors[0])

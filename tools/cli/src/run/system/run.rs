@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Run of a system, one base tick for each row of inputs.
+//! Run of a system, with one base tick per row of inputs.
 
 use super::host::Host;
 use super::observers::Observer;
@@ -20,15 +20,15 @@ pub(crate) struct SystemRun<'a, 't> {
     description: &'a Description,
     host: Host,
     pub(crate) system: System,
-    /// Cycle limit of the run; beyond it the run fails.
+    /// Cycle limit of the run; a run that exceeds it fails.
     pub(crate) max_cycles: Option<u64>,
     pub(crate) tracer: Option<SystemTracer<'t>>,
     pub(crate) observer: Observer,
     /// Cycle in which the host writes the next row.
     next: Cycle,
-    /// Outputs at the host's last read.
+    /// Outputs when the host last read them.
     last: Vec<Option<u32>>,
-    /// Number of entries that a full FIFO refused.
+    /// Number of entries that full FIFOs rejected.
     refused: u64,
 }
 
@@ -50,7 +50,7 @@ impl<'a, 't> SystemRun<'a, 't> {
         })
     }
 
-    /// Runs to the first base tick; `None` without a tick.
+    /// Runs to the first base tick; returns `None` if there is no tick.
     fn start(&mut self) -> Result<Option<Cycle>> {
         let limit = self.max_cycles.unwrap_or(PERIOD_LIMIT);
         let start = match &mut self.tracer {
@@ -89,7 +89,7 @@ impl TableApplication for SystemRun<'_, '_> {
 
     fn begin(&mut self) -> Result<()> {
         match self.start()? {
-            // The host writes early enough for the periods that begin at the tick.
+            // The host writes early enough for the periods that start at the tick.
             Some(start) => self.next = start - self.description.lead(),
             None if self.system.halted() => {
                 bail!("every core has halted before the first tick: there are no periods to run")

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Plot of a drive on the terminal: same panels, texts and colours as the SVG, with lines in Braille dots, two by four per character.
+//! Plot of a drive on the terminal: panels, texts and colours of the SVG, with lines of Braille dots, two by four per character.
 
 use super::{DEVIATES, Plot, REQUIRED, WRITES_NAN, error_title, path_title, required_text};
 use crate::terminal::page::Page;
@@ -7,17 +7,17 @@ use std::fmt::Write as _;
 use std::ops::Range;
 use takt_isa::text::visible;
 
-/// Width in columns of a plot in a pipe.
+/// Width of a plot in columns, if the output is not a terminal.
 const WIDTH: usize = 100;
-/// Width in columns of the value labels, with the axis.
+/// Width of the value labels in columns, including the axis.
 const LABELS: usize = 9;
-/// Rows of the error panel, and maximal rows of the path panel.
+/// Rows of the error panel, and maximum rows of the path panel.
 const ERROR_ROWS: usize = 10;
 const PATH_ROWS: usize = 30;
-/// Minimal distance in columns between labels of the horizontal axis.
+/// Minimum distance in columns between labels of the horizontal axis.
 const TICK: usize = 14;
 
-/// Colours of dots, as in the SVG. If several fall into one character, the later in this order wins: the path hides small deviations.
+/// Colours of dots, as in the SVG. If several share a character, the later in this order wins: the path hides small deviations.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Ink {
     Rapid,
@@ -52,7 +52,7 @@ impl Canvas {
         Canvas { columns, rows, x, y, cells: vec![(0, None); columns * rows] }
     }
 
-    /// Coordinates of a point in dots from the upper left.
+    /// Coordinates of a point, in dots from the upper left corner.
     fn dots(&self, (x, y): (f64, f64)) -> (f64, f64) {
         let across = (x - self.x.start) / (self.x.end - self.x.start) * (2 * self.columns - 1) as f64;
         let down = (self.y.end - y) / (self.y.end - self.y.start) * (4 * self.rows - 1) as f64;
@@ -71,7 +71,7 @@ impl Canvas {
         }
         let (across, down) = (across as usize, down as usize);
         let cell = &mut self.cells[down / 4 * self.columns + across / 2];
-        // Bits of a Braille character: three rows of two dots, then the fourth row.
+        // Bits of a Braille character: first three rows of two dots, then the fourth row.
         cell.0 |= match (across % 2, down % 4) {
             (0, 3) => 0x40,
             (_, 3) => 0x80,
@@ -88,7 +88,7 @@ impl Canvas {
         for pair in points.windows(2) {
             let (from, to) = (self.dots(pair[0]), self.dots(pair[1]));
             let steps = (to.0 - from.0).abs().max((to.1 - from.1).abs()).ceil();
-            // A visible line is no longer than both sides together.
+            // A visible line is at most as long as both sides together.
             let steps = if steps.is_finite() {
                 steps.min((4 * (self.columns + self.rows)) as f64).max(1.0)
             } else {
@@ -101,7 +101,7 @@ impl Canvas {
         }
     }
 
-    /// Writes the rows, with labels on the left and below.
+    /// Writes the rows, with labels on the left and at the bottom.
     fn write(&self, unit: (&str, &str), page: Page, out: &mut String) {
         let values = Values::of(&self.y, self.rows / 3);
         let height = (self.y.end - self.y.start) / self.rows as f64;
@@ -124,7 +124,7 @@ impl Canvas {
         let values = Values::of(&self.x, self.columns / TICK);
         let width = (self.x.end - self.x.start) / self.columns as f64;
         let (mut axis, mut below) = (String::new(), String::new());
-        // The unit is at the right end, within the panel.
+        // The unit is at the right end, inside the panel.
         let end = self.columns.saturating_sub(unit.0.chars().count());
         for column in 0..self.columns {
             let left = self.x.start + column as f64 * width;
@@ -149,7 +149,7 @@ struct Values {
 }
 
 impl Values {
-    /// Labels of a range, at most `most`.
+    /// At most `most` labels for a range.
     fn of(range: &Range<f64>, most: usize) -> Values {
         let least = ((range.end - range.start) / most.max(1) as f64).max(1e-9);
         let power = least.log10().floor();
@@ -158,7 +158,7 @@ impl Values {
         Values { step, decimals: (-step.log10().floor()).max(0.0) as usize }
     }
 
-    /// Label in a half-open range, lower end included.
+    /// Label within a half-open range that includes its lower end.
     fn within(&self, low: f64, high: f64) -> Option<f64> {
         let value = (low / self.step).ceil() * self.step;
         // Avoid a negative zero.
@@ -170,7 +170,7 @@ impl Values {
     }
 }
 
-/// Text in a colour, if the page has colours.
+/// Colours a text, if the page has colours.
 fn inked(text: &str, ink: Option<Ink>, page: Page) -> String {
     match ink.filter(|_| page.is_bold) {
         Some(ink) => format!("{}{text}\x1b[0m", ink.code()),
@@ -187,7 +187,7 @@ fn head(title: &str, lines: &[(&str, Ink)], page: Page, out: &mut String) {
 }
 
 impl Plot {
-    /// Text of the plot, for a page's width.
+    /// Plot as text, for the width of a page.
     pub(crate) fn text(&self, title: &str, page: Page) -> String {
         let columns = page.width.unwrap_or(WIDTH).clamp(LABELS + 2 * TICK, 2 * WIDTH) - LABELS - 1;
         let mut out = String::new();
@@ -202,7 +202,7 @@ impl Plot {
         let lines = [("rapid moves", Ink::Rapid), ("cutting moves", Ink::Cut), (DEVIATES, Ink::Deviation)];
         head(&path_title(title), &lines, page, out);
         let (x, y) = self.ranges();
-        // Equal scales on both axes: dots have equal distances horizontally and vertically.
+        // Equal scales on both axes: dots have the same spacing horizontally and vertically.
         let shape = (y.end - y.start) / (x.end - x.start);
         let rows = ((shape * (2 * columns) as f64 / 4.0).ceil() as usize).clamp(2, PATH_ROWS);
         let scale = ((x.end - x.start) / (2 * columns) as f64).max((y.end - y.start) / (4 * rows) as f64);
@@ -253,7 +253,7 @@ impl Plot {
 mod tests {
     use super::*;
 
-    /// Rows of a canvas without colours.
+    /// Rows of a canvas, without colours.
     fn rows(canvas: &Canvas) -> Vec<String> {
         let mut text = String::new();
         canvas.write(("x", "y"), Page::default(), &mut text);

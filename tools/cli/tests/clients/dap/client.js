@@ -1,4 +1,4 @@
-// Microsoft's test client of the debug adapter protocol, run against `takt dap`: writes its findings to standard output as JSON.
+// Microsoft's test client for the debug adapter protocol, run against `takt dap`: writes its findings to standard output as JSON.
 const { DebugClient } = require('@vscode/debugadapter-testsupport');
 const [takt, folder] = process.argv.slice(2);
 const path = require('path');
@@ -11,7 +11,7 @@ async function main() {
   await client.start();
   const capabilities = (await client.initializeRequest()).body;
   found.stepsBack = capabilities.supportsStepBack;
-  // Errors of a configuration are reported.
+  // Errors in a configuration are reported.
   found.refused = await client.launchRequest({ program: path.join(folder, 'none.s') }).catch((error) => error.message);
   await Promise.all([
     client.waitForEvent('initialized'),
@@ -61,7 +61,7 @@ async function main() {
   await client.setFunctionBreakpointsRequest({ breakpoints: [{ name: 'add' }] });
   found.reverse = await run((a) => client.reverseContinueRequest(a));
   await client.setFunctionBreakpointsRequest({ breakpoints: [] });
-  // Takt's own requests; and log points, which do not stop on the way back.
+  // Takt's own requests, and log points, which do not stop when going back.
   found.cycle = await run(() => client.customRequest('takt/gotoCycle', { cycle: 9 }));
   found.atCycle = (await client.evaluateRequest({ expression: 'cycle', context: 'watch' })).body.result;
   found.noCycle = await client.customRequest('takt/gotoCycle', { cycle: -1 }).catch((error) => error.message);
@@ -80,7 +80,7 @@ async function main() {
   await closedLoop();
 }
 
-// Attached to the closed loop: periods, hexadecimal values, and changes of a port.
+// Attach to the closed loop: periods, hexadecimal values, and changes of a port.
 async function closedLoop() {
   const client = new DebugClient(takt, 'dap', 'takt', { cwd: folder });
   client.defaultTimeout = 60000;
@@ -113,7 +113,7 @@ async function closedLoop() {
   await client.setDataBreakpointsRequest({ breakpoints: [{ dataId: info.dataId }] });
   found.port = await run(client.continueRequest({ threadId: 1 }));
   found.another = (await evaluate(rows[0].name)) !== before;
-  // No NaN occurs: the run continues to the end of the periods.
+  // No NaN occurs, so the run continues to the last period.
   const checked = await client.setDataBreakpointsRequest({ breakpoints: [{ dataId: info.dataId, condition: 'nan' }] });
   found.nan = checked.body.breakpoints[0].verified;
   await client.stop();

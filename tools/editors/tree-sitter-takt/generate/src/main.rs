@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Generates tree-sitter's parser of the language, `../src/parser.c`, from `../src/grammar.json`, unless it is current.
+//! Generates the tree-sitter parser `../src/parser.c` from `../src/grammar.json`, unless it is current.
 
 use std::path::Path;
 use std::process::ExitCode;
 use tree_sitter_generate::{OptLevel, generate_parser_in_directory};
 
-/// Version of the parser's tables: every Helix reads it, and Neovim from 0.7 on.
+/// Version of the parser's tables: supported by all versions of Helix, and by Neovim from 0.7.
 const ABI: usize = 14;
 
-/// Last line of the parser: FNV-1a hash of its grammar.
+/// Last line of the parser: FNV-1a hash of the grammar.
 fn mark(grammar: &[u8]) -> String {
     let fold = |hash: u64, byte: &u8| (hash ^ u64::from(*byte)).wrapping_mul(0x100_0000_01b3);
     format!("/* of grammar.json {:016x} */\n", grammar.iter().fold(0xcbf2_9ce4_8422_2325, fold))

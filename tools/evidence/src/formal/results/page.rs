@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Tables of `docs/verification.md` from the rows of `verification.toml` and from mutants' outcomes.
+//! Tables of `docs/verification.md`, from the rows of `verification.toml` and from the outcomes of mutants.
 
 use crate::mutants::results::Survivor;
 use anyhow::{Context, Result, ensure};
@@ -10,7 +10,7 @@ use std::fmt::Write as _;
 const ROWS: &str = include_str!("../../../verification.toml");
 const EXPLAINED: &str = include_str!("../../../survivors.toml");
 
-/// A row of the page: a part, and the evidence for its correctness.
+/// A row of the document: a part of the project, and the evidence for its correctness.
 #[derive(Deserialize, Debug)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Row {
@@ -19,10 +19,10 @@ pub(super) struct Row {
     oracle: String,
     kind: String,
     how: String,
-    /// Date of the last run of everything that the row states; empty if CI runs it.
+    /// Date of the last complete run of the evidence in the row; empty if CI runs it.
     #[serde(default)]
     date: String,
-    /// Command that repeats the evidence; empty if there is no such command.
+    /// Command that repeats the evidence; empty if none exists.
     command: String,
 }
 
@@ -38,14 +38,14 @@ struct ExplanationFile {
     mutant: Vec<Explanation>,
 }
 
-/// Explanation why mutants survive.
+/// Explanation of surviving mutants.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Explanation {
     /// Keys of the explained mutants.
     of: Vec<String>,
     why: String,
-    /// The mutants are equivalent: all results are the same, or only time or memory of the tool differ.
+    /// The mutants are equivalent: results are the same, and at most time or memory of the tool differ.
     no_fault: bool,
 }
 
@@ -54,7 +54,7 @@ fn explanations() -> Result<Vec<Explanation>> {
     Ok(mutant)
 }
 
-/// Explanation of a surviving mutant.
+/// Looks up the explanation of a surviving mutant.
 fn explained<'a>(explanations: &'a [Explanation], survivor: &Survivor) -> Option<&'a Explanation> {
     explanations.iter().find(|explanation| explanation.of.contains(&survivor.key))
 }
@@ -67,7 +67,7 @@ fn survivors(part: &Value) -> Result<Vec<Survivor>> {
 /// Permitted kinds of evidence.
 const KINDS: [&str; 4] = ["proved", "exhaustive", "tested", "not verified"];
 
-/// Parses and checks the rows of `verification.toml`.
+/// Reads and checks the rows of `verification.toml`.
 ///
 /// # Errors
 /// If the file is malformed.
@@ -99,7 +99,7 @@ pub(super) fn table(rows: &[Row], section: &str) -> String {
     text
 }
 
-/// Table of mutation scores, and the surviving mutants with their explanations.
+/// Table of mutation scores, and list of surviving mutants with explanations.
 ///
 /// # Errors
 /// If the explanations are malformed.
@@ -147,7 +147,7 @@ pub(super) fn mutants(results: &serde_json::Map<String, Value>) -> Result<String
     Ok(format!("{text}\n{rows}"))
 }
 
-/// Text as code in a table cell.
+/// Formats text as code in a table cell.
 fn code(text: &str) -> String {
     format!("`{}`", text.replace('|', "\\|").replace('`', "'"))
 }
@@ -172,7 +172,7 @@ mod tests {
         })
     }
 
-    /// A test of the package, or a module of its tests, has this path.
+    /// The package has a test, or a test module, with this path.
     fn has_test(package: &str, path: &str, is_lib: bool) -> bool {
         let folder = folder(package).unwrap_or_else(|| panic!("there is no package {package}"));
         let (module, function) = path.split_once("::").unwrap_or((path, ""));
@@ -189,7 +189,7 @@ mod tests {
             .iter()
             .any(|name| if path.contains("::") { *name == module } else { name.starts_with(module) });
         let text = fs::read_to_string(folder.join(format!("tests/{module}.rs"))).unwrap_or_default();
-        // A macro may generate the function: look for its name with a colon in the macro's list.
+        // A macro may generate the function: look for the name followed by a colon in the macro's list.
         let named = function.is_empty()
             || [
                 format!("fn {function}("),
@@ -202,7 +202,7 @@ mod tests {
         begins && named
     }
 
-    /// Every row is reproducible by a stranger: its command exists, with these options, and so do the named tests.
+    /// Every row can be reproduced: its command exists, with these options, and so do the tests that it names.
     #[test]
     fn every_command_exists() {
         let mutants = crate::mutants::results::results().unwrap();
@@ -234,7 +234,7 @@ mod tests {
         }
     }
 
-    /// Every survivor has one explanation, and every explanation refers to survivors.
+    /// Every survivor has exactly one explanation, and every explanation refers to survivors.
     #[test]
     fn survivors_are_explained() {
         let results = crate::mutants::results::results().unwrap();
