@@ -83,15 +83,73 @@ fn bits(seen: ExpectedValue, ty: Type) -> Result<u32, NoValue> {
     }
 }
 
+fn run(op: Op, sources: &[ExpectedValue], ty: Type) -> Result<u32, NoValue> {
+    let mut all = [0; 3];
+    for (bits_of, source) in all.iter_mut().zip(sources) {
+        *bits_of = bits(*source, ty)?;
+    }
+    Ok(compute::<Host>(op, all[0], all[1], all[2]).bits)
+}
+
+/// Value of an operation on constants. Computed from the operands' values: a decided choice drops its other alternative.
+fn folded(tree: &Tree, operands: &[ExpectedValue]) -> Result<ExpectedValue, NoValue> {
+    let written: Vec<String> = operands
+        .iter()
+        .map(|operand| match operand {
+            ExpectedValue::Constant(Value::Int(value)) => format!("({value})"),
+            ExpectedValue::Constant(Value::Real(value)) => format!("({value:?})"),
+            ExpectedValue::Float(_) | ExpectedValue::Int(_) => String::new(),
+        })
+        .collect();
+    let folded = match tree {
+        Prefix(operator, _) => format!("{operator}{}", written[0]),
+        Infix(operator, ..) => format!("{} {operator} {}", written[0], written[1]),
+        Call(name, _) => format!("{name}({})", written.join(", ")),
+        _ => text(tree),
+    };
+    let parsed = Expression::parse(&folded).map_err(|_| NoValue)?;
+    parsed.evaluate(|_| None).map(ExpectedValue::Constant).map_err(|_| NoValue)
+}
+
+fn int_infix(operator: &str, a: u32, b: u32) -> Result<u32, NoValue> {
+    let (x, y) = (a.cast_signed(), b.cast_signed());
+    Ok(match operator {
+        "+" => a.wrapping_add(b),
+        "-" => a.wrapping_sub(b),
+        "&" => a & b,
+        "|" => a | b,
+        "<<" => a << (b & 31),
+        ">>" => (x >> (b & 31)).cast_unsigned(),
+        "==" => u32::from(a == b),
+        "!=" => u32::from(a != b),
+        "<" => u32::from(x < y),
+        "<=" => u32::from(x <= y),
+        ">" => u32::from(x > y),
+        ">=" => u32::from(x >= y),
+        _ => return Err(NoValue),
+    })
+}
+
+fn float_infix(operator: &str, operands: &[ExpectedValue]) -> Result<ExpectedValue, NoValue> {
+    let (a, b) = (f32::from_bits(bits(operands[0], Type::F)?), f32::from_bits(bits(operands[1], Type::F)?));
+    let truth = |condition: bool| ExpectedValue::Int(condition.into());
+    Ok(match operator {
+        "+" => ExpectedValue::Float(run(Op::fadd, operands, Type::F)?),
+        "-" => ExpectedValue::Float(run(Op::fsub, operands, Type::F)?),
+        "*" => ExpectedValue::Float(run(Op::fmul, operands, Type::F)?),
+        "/" => ExpectedValue::Float(run(Op::fdiv, operands, Type::F)?),
+        "==" => truth(a == b),
+        "!=" => truth(a != b),
+        "<" => truth(a < b),
+        "<=" => truth(a <= b),
+        ">" => truth(a > b),
+        ">=" => truth(a >= b),
+        _ => return Err(NoValue),
+    })
+}
+
 /// Evaluates an expression: constant parts in binary64, all else by one operation each, in the order written.
 fn evaluate(tree: &Tree, registers: &Registers) -> Result<ExpectedValue, NoValue> {
-    let run = |op, sources: &[ExpectedValue], ty: Type| -> Result<u32, NoValue> {
-        let mut all = [0; 3];
-        for (bits_of, source) in all.iter_mut().zip(sources) {
-            *bits_of = bits(*source, ty)?;
-        }
-        Ok(compute::<Host>(op, all[0], all[1], all[2]).bits)
-    };
     let operands = match tree {
         Literal(_) | Name(_) => vec![],
         Prefix(_, a) => vec![evaluate(a, registers)?],
@@ -110,23 +168,7 @@ fn evaluate(tree: &Tree, registers: &Registers) -> Result<ExpectedValue, NoValue
     let constant = |operand: &ExpectedValue| matches!(operand, ExpectedValue::Constant(_));
     let folds = !matches!(tree, Name(_) | Choice(..) | Call("sat" | "sign" | "itof" | "ftoi", _));
     if folds && operands.iter().all(constant) {
-        // Computed from the operands' values: a choice with a constant condition drops its other alternative.
-        let written: Vec<String> = operands
-            .iter()
-            .map(|operand| match operand {
-                ExpectedValue::Constant(Value::Int(value)) => format!("({value})"),
-                ExpectedValue::Constant(Value::Real(value)) => format!("({value:?})"),
-                ExpectedValue::Float(_) | ExpectedValue::Int(_) => String::new(),
-            })
-            .collect();
-        let folded = match tree {
-            Prefix(operator, _) => format!("{operator}{}", written[0]),
-            Infix(operator, ..) => format!("{} {operator} {}", written[0], written[1]),
-            Call(name, _) => format!("{name}({})", written.join(", ")),
-            _ => text(tree),
-        };
-        let parsed = Expression::parse(&folded).map_err(|_| NoValue)?;
-        return parsed.evaluate(|_| None).map(ExpectedValue::Constant).map_err(|_| NoValue);
+        return folded(tree, &operands);
     }
     let is_int_one = |seen: &ExpectedValue| matches!(seen, ExpectedValue::Int(_));
     Ok(match tree {
@@ -146,41 +188,9 @@ fn evaluate(tree: &Tree, registers: &Registers) -> Result<ExpectedValue, NoValue
         Prefix(..) => ExpectedValue::Float(run(Op::fneg, &operands, Type::F)?),
         Infix(operator, ..) if operands.iter().any(is_int_one) => {
             let (a, b) = (bits(operands[0], Type::I)?, bits(operands[1], Type::I)?);
-            let (x, y) = (a.cast_signed(), b.cast_signed());
-            ExpectedValue::Int(match *operator {
-                "+" => a.wrapping_add(b),
-                "-" => a.wrapping_sub(b),
-                "&" => a & b,
-                "|" => a | b,
-                "<<" => a << (b & 31),
-                ">>" => (x >> (b & 31)).cast_unsigned(),
-                "==" => u32::from(a == b),
-                "!=" => u32::from(a != b),
-                "<" => u32::from(x < y),
-                "<=" => u32::from(x <= y),
-                ">" => u32::from(x > y),
-                ">=" => u32::from(x >= y),
-                _ => return Err(NoValue),
-            })
+            ExpectedValue::Int(int_infix(operator, a, b)?)
         }
-        Infix(operator, ..) => {
-            let (a, b) =
-                (f32::from_bits(bits(operands[0], Type::F)?), f32::from_bits(bits(operands[1], Type::F)?));
-            let truth = |condition: bool| ExpectedValue::Int(condition.into());
-            match *operator {
-                "+" => ExpectedValue::Float(run(Op::fadd, &operands, Type::F)?),
-                "-" => ExpectedValue::Float(run(Op::fsub, &operands, Type::F)?),
-                "*" => ExpectedValue::Float(run(Op::fmul, &operands, Type::F)?),
-                "/" => ExpectedValue::Float(run(Op::fdiv, &operands, Type::F)?),
-                "==" => truth(a == b),
-                "!=" => truth(a != b),
-                "<" => truth(a < b),
-                "<=" => truth(a <= b),
-                ">" => truth(a > b),
-                ">=" => truth(a >= b),
-                _ => return Err(NoValue),
-            }
-        }
+        Infix(operator, ..) => float_infix(operator, &operands)?,
         Call("xor", _) => ExpectedValue::Int(bits(operands[0], Type::I)? ^ bits(operands[1], Type::I)?),
         Call("itof", _) => ExpectedValue::Float(run(Op::itof, &operands, Type::I)?),
         Call("ftoi", _) => ExpectedValue::Int(run(Op::ftoi, &operands, Type::F)?),

@@ -35,10 +35,13 @@ fn rows_of_the_table_are_machines() {
     }
 }
 
-#[test]
-fn every_reason() {
+/// An invalid row, and its message after the name.
+type Case = (Machine, &'static str);
+
+/// Numbers and names of slots, units and banks.
+fn names() -> Vec<Case> {
     let many: Vec<Slot> = (0..9).map(|_| F3.slots[0]).collect();
-    let cases: Vec<(Machine, &str)> = vec![
+    vec![
         (Machine { slots: &[], ..F3 }, "0 slots; a machine has 1 to 8"),
         (Machine { slots: leak(many), ..F3 }, "9 slots; a machine has 1 to 8"),
         (
@@ -64,6 +67,12 @@ fn every_reason() {
         (slot(1, |slot| slot.name = "mul"), "two slots are called `mul`"),
         (slot(1, |slot| slot.bank.name = "m"), "two banks are called `m`"),
         (Machine { inputs: Bank { name: "x", ..F3.inputs }, ..F3 }, "two banks are called `x`"),
+    ]
+}
+
+/// Depths and places of banks and memories.
+fn depths() -> Vec<Case> {
+    vec![
         (bank(256, 0), "bank `a` has 0 registers; a bank has 1 to 512"),
         (bank(256, 513), "bank `a` has 513 registers; a bank has 1 to 512"),
         (bank(900, 200), "bank `a` has registers 900 to 1099; the register space ends at 1023"),
@@ -87,6 +96,12 @@ fn every_reason() {
         (Machine { code_depth: 65537, ..F3 }, "code_depth is 65537; it is 1 to 65536"),
         (Machine { data_depth: 0, ..F3 }, "data_depth is 0; it is 1 to 65536"),
         (Machine { stack_depth: 0, ..F3 }, "stack_depth is 0; it is 1 to 65536"),
+    ]
+}
+
+/// Units of one slot.
+fn slot_units() -> Vec<Case> {
+    vec![
         (
             units(&[Unit { latency: 64, ..ADD }]),
             "slot `add`: unit `add` has latency 64; latencies stay below 64",
@@ -110,6 +125,12 @@ fn every_reason() {
             units(&[ADD, ALU, CONVERT, ALU_LATE]),
             "slot `add`: unit `alu` and unit `alu_late` both offer Alu; in a slot, one unit executes a function",
         ),
+    ]
+}
+
+/// Functions that slots share, and counts of loops.
+fn functions() -> Vec<Case> {
+    vec![
         (slot(2, |slot| slot.units = leak([ALU, MEMORY])), "no slot hosts the sequencer (function Control)"),
         (
             units(&[ADD, SEQUENCER]),
@@ -135,7 +156,12 @@ fn every_reason() {
             "slot `aux` is the third that hosts Load; the data memory has two ports",
         ),
         (Machine { loop_depth: 4, ..F3 }, "loop_depth is 4; the sequencer does not offer Loop, so it is 0"),
-    ];
+    ]
+}
+
+#[test]
+fn every_reason() {
+    let cases = [names(), depths(), slot_units(), functions()].concat();
     for (machine, message) in &cases {
         let error = machine.error().map(|error| error.to_string()).unwrap_or_default();
         assert_eq!(error, format!("machine `{}`: {message}", machine.name));

@@ -119,14 +119,17 @@ const SMALL: &str = r#"<mujoco model="small">
 <geom size="0.1"/>
 </body></body></worldbody></mujoco>"#;
 
-#[test]
-fn wrong_models_are_refused() {
-    let changed = |from: &str, to: &str| {
+/// Checks the message of each change of the model: text, replacement, message.
+fn refused(cases: &[(&str, &str, &str)]) {
+    for (from, to, expected) in cases {
         assert!(SMALL.contains(from), "{from}");
-        message(&SMALL.replacen(from, to, 1), None, None)
-    };
-    assert_eq!(changed("<body", "<body"), "");
-    for (from, to, expected) in [
+        assert_eq!(message(&SMALL.replacen(from, to, 1), None, None), *expected);
+    }
+}
+
+#[test]
+fn wrong_joints_are_refused() {
+    refused(&[
         (
             "<joint name=\"first\" axis=\"0 1 0\"/>",
             "<freejoint/>",
@@ -150,6 +153,12 @@ fn wrong_models_are_refused() {
         ),
         ("axis=\"0 1 0\"", "class=\"big\"", "6: there is no class `big` of defaults"),
         ("axis=\"0 1 0\"", "armature=\"-1\"", "6: `first`: `armature` is -1; it is not negative"),
+    ]);
+}
+
+#[test]
+fn wrong_bodies_are_refused() {
+    refused(&[
         ("mass=\"1\"", "mass=\"-1\"", "5: a mass is -1; a mass is not negative"),
         ("pos=\"0 0 1\"", "quat=\"0 0 0 0\"", "7: `quat` is `0 0 0 0`: this is no direction"),
         (
@@ -168,6 +177,12 @@ fn wrong_models_are_refused() {
             "type=\"box\" size=\"1 1\"",
             "9: a shape `box` needs 3 positive numbers as its `size`",
         ),
+    ]);
+}
+
+#[test]
+fn unknown_parts_are_refused() {
+    refused(&[
         (
             "<worldbody>",
             "<include file=\"x.xml\"/><worldbody>",
@@ -216,6 +231,33 @@ fn wrong_models_are_refused() {
             "10: `deformable` is not read: MuJoCo writes a model without it: mujoco.mj_saveLastXML",
         ),
         (
+            "<geom size=\"0.1\"/>",
+            "<replicate count=\"2\"/>",
+            "9: `replicate` is not read: MuJoCo writes a model without it: mujoco.mj_saveLastXML",
+        ),
+        (
+            "<worldbody>",
+            "<compiler settotalmass=\"2\"/><worldbody>",
+            "3: `settotalmass` is `2`: masses are read as they are; MuJoCo writes a model without it: mujoco.mj_saveLastXML",
+        ),
+        (
+            "<worldbody>",
+            "<compiler angle=\"turn\"/><worldbody>",
+            "3: `angle` is `turn`: `radian` and `degree` are known",
+        ),
+        (
+            "<worldbody>",
+            "<compiler eulerseq=\"xya\"/><worldbody>",
+            "3: `eulerseq` is `xya`: three of the letters x, y, z, X, Y, Z are needed",
+        ),
+        ("<default>", "<default><default/>", "2: a class of defaults has a name: `class`"),
+    ]);
+}
+
+#[test]
+fn wrong_actuators_and_tendons_are_refused() {
+    refused(&[
+        (
             "</mujoco>",
             "<actuator><motor joint=\"x\" armature=\"1\"/></actuator></mujoco>",
             "10: there is no joint `x`",
@@ -250,30 +292,12 @@ fn wrong_models_are_refused() {
             "name=\"two\" gravcomp=\"0.5\"",
             "7: `two`: `gravcomp` takes weight off this body and not off all bodies that move, at all joints: leave it out, or state it for all",
         ),
-        (
-            "<geom size=\"0.1\"/>",
-            "<replicate count=\"2\"/>",
-            "9: `replicate` is not read: MuJoCo writes a model without it: mujoco.mj_saveLastXML",
-        ),
-        (
-            "<worldbody>",
-            "<compiler settotalmass=\"2\"/><worldbody>",
-            "3: `settotalmass` is `2`: masses are read as they are; MuJoCo writes a model without it: mujoco.mj_saveLastXML",
-        ),
-        (
-            "<worldbody>",
-            "<compiler angle=\"turn\"/><worldbody>",
-            "3: `angle` is `turn`: `radian` and `degree` are known",
-        ),
-        (
-            "<worldbody>",
-            "<compiler eulerseq=\"xya\"/><worldbody>",
-            "3: `eulerseq` is `xya`: three of the letters x, y, z, X, Y, Z are needed",
-        ),
-        ("<default>", "<default><default/>", "2: a class of defaults has a name: `class`"),
-    ] {
-        assert_eq!(changed(from, to), expected);
-    }
+    ]);
+}
+
+#[test]
+fn wrong_models_are_refused() {
+    assert_eq!(message(SMALL, None, None), "");
     assert_eq!(message("<mujoco/>", None, None), "the model has no `worldbody`, in which the bodies are");
     assert_eq!(message("<mujoco><worldbody/></mujoco>", None, None), "no joint that `world` carries moves");
     assert!(

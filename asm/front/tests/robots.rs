@@ -184,6 +184,10 @@ fn wrong_robots_are_refused() {
     ] {
         assert_eq!(changed(from, to), expected);
     }
+}
+
+#[test]
+fn wrong_trees_are_refused() {
     // A refused joint may lie before the base.
     let floating = UR5.replacen("type=\"revolute\"", "type=\"floating\"", 1);
     assert_eq!(message(&floating, Some("shoulder_link"), None), "");

@@ -94,25 +94,7 @@ pub(crate) fn check(context: &mut Context, ir: &Ir, assignment: &BankAssignment)
     if !opaque {
         no_wait(context, ir);
         unreachable::check(context, ir);
-        for array in context.declared.arrays.clone() {
-            // An array counts as used if one element is.
-            let elements = array.elements().map(RegisterId::index);
-            let best = elements
-                .max_by_key(|&element| (uses[element].read.is_some(), uses[element].written.is_some()));
-            if let Some(best) = best {
-                let register = VirtualRegister { name: array.name.clone(), ..ir.registers[best].clone() };
-                unused(context, &register, &uses[best]);
-            }
-        }
-        for table in context.declared.tables.clone() {
-            let name = &table.array.name;
-            let is_included = context.reports.sources.file_of(table.array.span.start) != 0;
-            if !table.used && !name.starts_with('_') && !is_included {
-                let message = format!("array `{name}` is never used");
-                let span = table.array.span;
-                context.reports.sink.push(Diagnostic::warning("unused", span, message));
-            }
-        }
+        unused_arrays(context, ir, &uses);
         let single = |(register, _, id): &(&VirtualRegister, &Use, RegisterId)| {
             !assignment.quiet.contains(id) && !register.name.ends_with(']')
         };
@@ -129,6 +111,29 @@ pub(crate) fn check(context: &mut Context, ir: &Ir, assignment: &BankAssignment)
                     format!("constant `{}` is never used", constant.name),
                 )
             });
+        }
+    }
+}
+
+/// Warns of arrays without a use: of registers, and in memory.
+fn unused_arrays(context: &mut Context, ir: &Ir, uses: &[Use]) {
+    for array in context.declared.arrays.clone() {
+        // An array counts as used if one element is.
+        let elements = array.elements().map(RegisterId::index);
+        let best =
+            elements.max_by_key(|&element| (uses[element].read.is_some(), uses[element].written.is_some()));
+        if let Some(best) = best {
+            let register = VirtualRegister { name: array.name.clone(), ..ir.registers[best].clone() };
+            unused(context, &register, &uses[best]);
+        }
+    }
+    for table in context.declared.tables.clone() {
+        let name = &table.array.name;
+        let is_included = context.reports.sources.file_of(table.array.span.start) != 0;
+        if !table.used && !name.starts_with('_') && !is_included {
+            let message = format!("array `{name}` is never used");
+            let span = table.array.span;
+            context.reports.sink.push(Diagnostic::warning("unused", span, message));
         }
     }
 }

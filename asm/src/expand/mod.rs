@@ -533,18 +533,7 @@ impl<'l> Expander<'l> {
         let DirectiveLine { kind, span } = &ast.directives[directive as usize];
         let span = *span;
         match kind {
-            DirectiveKind::Declare(what, names) => {
-                for declaration in names {
-                    let (first, count) = declaration.sizes;
-                    if count > 0 {
-                        let sizes = &ast.sizes[first as usize..(first + count) as usize];
-                        let _ = self.declare_array(at, *what, declaration, sizes);
-                        continue;
-                    }
-                    // Each name is a declaration of its own: a mistake in one leaves the others.
-                    let _ = self.declare(at, *what, declaration);
-                }
-            }
+            DirectiveKind::Declare(what, names) => self.declare_all(at, ast, *what, names),
             DirectiveKind::Machine(machine, options) => self.machine(at, machine, options, index, span)?,
             DirectiveKind::Array(arrays, values) => {
                 for (number, declaration) in (1..).zip(arrays) {
@@ -616,20 +605,39 @@ impl<'l> Expander<'l> {
                 }
             }
             DirectiveKind::Deadline(..) | DirectiveKind::Order(_) | DirectiveKind::Late(..) => {
-                if self.section == Section::Data {
-                    let error =
-                        Diagnostic::error("section", span, "ports are not read or written in `.data`")
-                            .help("open `.once` or `.period` before it");
-                    return Err(self.context.report(at.scope, error));
-                }
-                let is_same = |other: &Timing| (other.at.ast, other.directive) == (at.ast, directive);
-                if !(self.context.again && self.flat.timing.iter().any(is_same)) {
-                    self.flat.timing.push(Timing { at, directive, section: self.section });
-                }
+                self.demand(at, directive, span)?;
             }
             DirectiveKind::Error(text) => {
                 return Err(self.context.report(at.scope, Diagnostic::error("user", span, text.clone())));
             }
+        }
+        Ok(())
+    }
+
+    /// Declares registers, ports, or arrays of them.
+    fn declare_all(&mut self, at: AstPlace, ast: &Ast, what: DeclarationKind, names: &[Declaration]) {
+        for declaration in names {
+            let (first, count) = declaration.sizes;
+            if count > 0 {
+                let sizes = &ast.sizes[first as usize..(first + count) as usize];
+                let _ = self.declare_array(at, what, declaration, sizes);
+                continue;
+            }
+            // Each name is a declaration of its own: a mistake in one leaves the others.
+            let _ = self.declare(at, what, declaration);
+        }
+    }
+
+    /// Keeps a demand on ports for its section.
+    fn demand(&mut self, at: AstPlace, directive: u32, span: Span) -> Result<(), ErrorReported> {
+        if self.section == Section::Data {
+            let error = Diagnostic::error("section", span, "ports are not read or written in `.data`")
+                .help("open `.once` or `.period` before it");
+            return Err(self.context.report(at.scope, error));
+        }
+        let is_same = |other: &Timing| (other.at.ast, other.directive) == (at.ast, directive);
+        if !(self.context.again && self.flat.timing.iter().any(is_same)) {
+            self.flat.timing.push(Timing { at, directive, section: self.section });
         }
         Ok(())
     }

@@ -218,22 +218,7 @@ impl Resolver<'_> {
         terms: &[Term],
         words: &[(Word, Term)],
     ) -> Result<(), ErrorReported> {
-        let mut failed = false;
-        for ((target, wanted, span), term) in targets.iter().zip(terms) {
-            let VirtualRegister { name, span: declared, .. } =
-                &self.context.declared.registers[target.index()];
-            let (name, declared) = (name.clone(), *declared);
-            failed |= self.check_target(at, (&name, declared), (*wanted, *span), *term).is_err();
-        }
-        for (word, term) in words {
-            let arrays::Array { name, span: declared, ty, .. } =
-                &self.context.declared.tables[word.array.0 as usize].array;
-            let (name, declared, wanted) = (name.clone(), *declared, Kind::of(*ty));
-            failed |= self.check_target(at, (&name, declared), (wanted, word.span), *term).is_err();
-        }
-        if failed {
-            return Err(ErrorReported);
-        }
+        self.check_targets(at, targets, terms, words)?;
         // The last operation writes the target itself if nothing after it reads the target's old value.
         let mut left: Vec<(RegisterId, Kind, Term)> = Vec::new();
         for (index, ((target, wanted, _), term)) in targets.iter().zip(terms).enumerate() {
@@ -277,22 +262,7 @@ impl Resolver<'_> {
             left.push((*target, *wanted, *term));
         }
         // Elements first: their values and subscripts may be registers that are written.
-        for (word, term) in words {
-            let value = match term.form {
-                TermForm::Register(register, _) => register,
-                TermForm::Constant(value, expr) => {
-                    let ty = match self.element_type(word) {
-                        Type::B if matches!(value, Value::Int(_)) => Type::I,
-                        Type::B => Type::F,
-                        ty => ty,
-                    };
-                    self.holding(at, value, expr, term.span, ty)?
-                }
-                // Does not occur: the caller has settled chains and functions of indices.
-                TermForm::Chain(..) | TermForm::Counted(_) => return Err(ErrorReported),
-            };
-            self.store(at, line, word, value, word.span)?;
-        }
+        self.store_elements(at, line, words)?;
         // A register that is both read and written is copied first where it is read after it is written.
         for index in 0..left.len() {
             let TermForm::Register(value, kind) = left[index].2.form else { continue };
@@ -314,6 +284,56 @@ impl Resolver<'_> {
             let kind = term.kind().unwrap_or(Kind::of(ty));
             self.copy(at, line, term, ty, Some(target))?;
             self.written(target, kind.or(wanted));
+        }
+        Ok(())
+    }
+
+    /// Checks that all values of an equation may go to its registers and elements.
+    fn check_targets(
+        &mut self,
+        at: AstPlace,
+        targets: &[(RegisterId, Kind, Span)],
+        terms: &[Term],
+        words: &[(Word, Term)],
+    ) -> Result<(), ErrorReported> {
+        let mut failed = false;
+        for ((target, wanted, span), term) in targets.iter().zip(terms) {
+            let VirtualRegister { name, span: declared, .. } =
+                &self.context.declared.registers[target.index()];
+            let (name, declared) = (name.clone(), *declared);
+            failed |= self.check_target(at, (&name, declared), (*wanted, *span), *term).is_err();
+        }
+        for (word, term) in words {
+            let arrays::Array { name, span: declared, ty, .. } =
+                &self.context.declared.tables[word.array.0 as usize].array;
+            let (name, declared, wanted) = (name.clone(), *declared, Kind::of(*ty));
+            failed |= self.check_target(at, (&name, declared), (wanted, word.span), *term).is_err();
+        }
+        if failed { Err(ErrorReported) } else { Ok(()) }
+    }
+
+    /// Writes an equation's values to elements of arrays in memory.
+    fn store_elements(
+        &mut self,
+        at: AstPlace,
+        line: &mut CurrentEquation,
+        words: &[(Word, Term)],
+    ) -> Result<(), ErrorReported> {
+        for (word, term) in words {
+            let value = match term.form {
+                TermForm::Register(register, _) => register,
+                TermForm::Constant(value, expr) => {
+                    let ty = match self.element_type(word) {
+                        Type::B if matches!(value, Value::Int(_)) => Type::I,
+                        Type::B => Type::F,
+                        ty => ty,
+                    };
+                    self.holding(at, value, expr, term.span, ty)?
+                }
+                // The caller has computed an expression's value.
+                TermForm::Chain(..) | TermForm::Counted(_) => return Err(ErrorReported),
+            };
+            self.store(at, line, word, value, word.span)?;
         }
         Ok(())
     }

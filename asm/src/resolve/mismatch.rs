@@ -25,7 +25,6 @@ impl Resolver<'_> {
         if self.forms.get(symbol, terms.len()).is_empty() {
             return self.no_symbol(at, symbol, terms, place);
         }
-        let text = |resolver: &Self, term: &Term| resolver.context.reports.sources.text(term.span).to_owned();
         let shown = if symbol == "?:" { "`? :`".to_owned() } else { format!("`{symbol}`") };
         let condition = symbol == "?:";
         // The type of a choice's condition does not matter to its alternatives.
@@ -33,7 +32,7 @@ impl Resolver<'_> {
         let find = |kind| mixed.iter().find(|term| term.kind() == Some(kind));
         let convert = |from, to| self.forms.conversion(from, to);
         if condition && terms[0].kind() == Some(Kind::Float) {
-            let condition = text(self, &terms[0]);
+            let condition = self.text(&terms[0]);
             let error = Diagnostic::error(
                 "equation",
                 terms[0].span,
@@ -52,24 +51,10 @@ impl Resolver<'_> {
         let error = match (find(Kind::Int), find(Kind::Float)) {
             // If no instruction takes either type, converting one operand does not help.
             (Some(int), Some(float)) if condition || wants(Type::F) => {
-                let (name, other) = (text(self, int), text(self, float));
-                let message = format!("{shown} between an integer and a float");
-                let error = Diagnostic::error("equation", int.span, message)
-                    .here("an integer")
-                    .also(float.span, "a float");
-                // Rounding a float before a comparison would compare another value.
-                let compares = Operator::COMPARISONS.iter().any(|operator| operator.text() == symbol);
-                match (convert(Type::I, Type::F), convert(Type::F, Type::I)) {
-                    (Some(float_of), Some(int_of)) if wants(Type::I) && !compares => error
-                        .help(format!("convert one of them: `{float_of}({name})` or `{int_of}({other})`")),
-                    (Some(float_of), _) => {
-                        error.mend(format!("convert it: `{float_of}({name})`"), format!("{float_of}({name})"))
-                    }
-                    _ => error,
-                }
+                self.mixed(symbol, &shown, int, float, wants(Type::I))
             }
             (Some(int), None) if wants(Type::F) => {
-                let name = text(self, int);
+                let name = self.text(int);
                 let real = terms.iter().find(|term| term.kind().is_none());
                 let message = match (real, wants(Type::I)) {
                     (Some(_), true) => format!("{shown} between an integer and a real number"),
@@ -86,35 +71,7 @@ impl Resolver<'_> {
                     None => error,
                 }
             }
-            (_, Some(float)) => {
-                let name = text(self, float);
-                let message = format!("{shown} takes integers, and `{name}` is a float");
-                let error = Diagnostic::error("equation", float.span, message).here("a float");
-                let (and, or, not) = (Operator::And.text(), Operator::Or.text(), Operator::Not.text());
-                if symbol == not {
-                    let zero = format!("{name} == 0");
-                    let message = error.message;
-                    let error = Diagnostic::error("equation", span, message)
-                        .mend(format!("compare it: `{zero}`"), zero);
-                    return self.context.report(at.scope, error);
-                }
-                if symbol == and || symbol == or {
-                    // Either the bits of a number as a condition, or a comparison without its parentheses.
-                    let error = error.help(format!(
-                        "conditions are comparisons in parentheses, as `({name} > 0) {symbol} …`; declare `{name}:bits` if its pattern is meant"
-                    ));
-                    return self.context.report(at.scope, error);
-                }
-                match convert(Type::F, Type::I) {
-                    Some(convert) => error.mend(
-                        format!(
-                            "convert it: `{convert}({name})`, or declare it `:bits` if its pattern is meant"
-                        ),
-                        format!("{convert}({name})"),
-                    ),
-                    None => error,
-                }
-            }
+            (_, Some(float)) => self.unexpected_float(symbol, &shown, float, span),
             _ => {
                 let real = terms.iter().find(|term| term.kind().is_none());
                 let message = format!("{shown} takes integers");
@@ -122,6 +79,55 @@ impl Resolver<'_> {
             }
         };
         self.context.report(at.scope, error)
+    }
+
+    fn text(&self, term: &Term) -> String {
+        self.context.reports.sources.text(term.span).to_owned()
+    }
+
+    /// Error of a symbol, `shown` in the message, between an integer and a float.
+    fn mixed(&self, symbol: &str, shown: &str, int: &Term, float: &Term, takes_integers: bool) -> Diagnostic {
+        let (name, other) = (self.text(int), self.text(float));
+        let message = format!("{shown} between an integer and a float");
+        let error =
+            Diagnostic::error("equation", int.span, message).here("an integer").also(float.span, "a float");
+        // Rounding a float before a comparison would compare another value.
+        let compares = Operator::COMPARISONS.iter().any(|operator| operator.text() == symbol);
+        match (self.forms.conversion(Type::I, Type::F), self.forms.conversion(Type::F, Type::I)) {
+            (Some(float_of), Some(int_of)) if takes_integers && !compares => {
+                error.help(format!("convert one of them: `{float_of}({name})` or `{int_of}({other})`"))
+            }
+            (Some(float_of), _) => {
+                error.mend(format!("convert it: `{float_of}({name})`"), format!("{float_of}({name})"))
+            }
+            _ => error,
+        }
+    }
+
+    /// Error of a float, where a symbol, `shown` in the message, takes integers.
+    fn unexpected_float(&self, symbol: &str, shown: &str, float: &Term, span: Span) -> Diagnostic {
+        let name = self.text(float);
+        let message = format!("{shown} takes integers, and `{name}` is a float");
+        let error = Diagnostic::error("equation", float.span, message).here("a float");
+        let (and, or, not) = (Operator::And.text(), Operator::Or.text(), Operator::Not.text());
+        if symbol == not {
+            let zero = format!("{name} == 0");
+            let message = error.message;
+            return Diagnostic::error("equation", span, message).mend(format!("compare it: `{zero}`"), zero);
+        }
+        if symbol == and || symbol == or {
+            // Either the bits of a number as a condition, or a comparison without its parentheses.
+            return error.help(format!(
+                "conditions are comparisons in parentheses, as `({name} > 0) {symbol} …`; declare `{name}:bits` if its pattern is meant"
+            ));
+        }
+        match self.forms.conversion(Type::F, Type::I) {
+            Some(convert) => error.mend(
+                format!("convert it: `{convert}({name})`, or declare it `:bits` if its pattern is meant"),
+                format!("{convert}({name})"),
+            ),
+            None => error,
+        }
     }
 
     /// Reports that no instruction has the form at all.

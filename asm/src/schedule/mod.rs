@@ -200,6 +200,28 @@ fn reservation(machine: &Machine, operation: &Operation, slot: Option<SlotIndex>
     Reservation::new(machine, slot, operation.row().function, operation.dest.is_some())
 }
 
+/// A problem without tasks.
+fn empty_problem(machine: &Machine) -> Problem {
+    Problem {
+        slots: machine.slots.len(),
+        units: machine.slots.iter().map(|slot| slot.units.len()).sum(),
+        ..Problem::default()
+    }
+}
+
+/// Task of a bundle, with the reservations of each choice of slots.
+fn task(ir: &Ir, bundle: &Bundle, domains: Option<&Domains>) -> Task {
+    Task {
+        operations: bundle.operations.len(),
+        uses: choices(ir, bundle, domains)
+            .iter()
+            .flat_map(|slots| bundle.operations.iter().zip(slots))
+            .map(|(operation, slot)| reservation(ir.machine, operation, *slot))
+            .collect(),
+        ..Task::default()
+    }
+}
+
 /// Event of an earlier task for which a task waits.
 #[derive(Clone, Copy)]
 enum Wait {
@@ -241,13 +263,8 @@ impl Block {
         second: usize,
         of: Option<LoopId>,
     ) -> (Block, Vec<(usize, usize, u32)>) {
-        let machine = ir.machine;
         let is_output = |id: RegisterId| ir.register(id).kind == RegisterKind::Output;
-        let mut problem = Problem {
-            slots: machine.slots.len(),
-            units: machine.slots.iter().map(|slot| slot.units.len()).sum(),
-            ..Problem::default()
-        };
+        let mut problem = empty_problem(ir.machine);
         let mut origins = Vec::new();
         // For each register: the task and the operation of its last value, and the tasks that read it since.
         let mut values: HashMap<RegisterId, (usize, usize)> = HashMap::new();
@@ -267,15 +284,7 @@ impl Block {
             }
             let to = problem.tasks.len();
             origins.push(b);
-            let mut task = Task {
-                operations: bundle.operations.len(),
-                uses: choices(ir, bundle, domains)
-                    .iter()
-                    .flat_map(|slots| bundle.operations.iter().zip(slots))
-                    .map(|(operation, slot)| reservation(machine, operation, *slot))
-                    .collect(),
-                ..Task::default()
-            };
+            let mut task = task(ir, bundle, domains);
             let Problem { tasks, edges, .. } = &mut problem;
             let mut edge = |from: usize, distance: u32, latency_of: Option<usize>| {
                 if from != to {

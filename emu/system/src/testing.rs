@@ -18,18 +18,47 @@ use takt_isa::{MACHINES, Machine, Program, Register};
 pub fn random_system(seed: u64, machines: &[&'static Machine]) -> (String, BTreeMap<String, Program>) {
     let mut random = Random::new(seed.wrapping_mul(0x9e37_79b9) ^ 0x5157);
     let count = 2 + random.below(3) as usize;
-    let mut text = format!("tick = {}\n", 40 + random.below(500));
+    let text = format!("tick = {}\n", 40 + random.below(500));
+    let mut writer = Writer { random, text, inputs: Vec::new(), outputs: Vec::new(), links: 0 };
     let mut programs = BTreeMap::new();
-    // Names of each core's ports; an input is removed once a link drives it.
-    let (mut inputs, mut outputs) = (Vec::new(), Vec::new());
     for core in 0..count {
-        let machine = machines[random.below(machines.len() as u32) as usize];
+        let machine = machines[writer.random.below(machines.len() as u32) as usize];
+        let path = format!("core{core}.s");
+        let program = writer.core(core, machine, &path);
+        programs.insert(path, program);
+    }
+    for core in 0..count {
+        while let Some(input) = writer.inputs[core].pop() {
+            writer.link(core, &input);
+        }
+    }
+    for _ in 0..2 {
+        writer.host_link();
+    }
+    (writer.text, programs)
+}
+
+/// Writer of a random system's file.
+struct Writer {
+    random: Random,
+    text: String,
+    /// Names of each core's input ports that no link drives yet.
+    inputs: Vec<Vec<String>>,
+    /// Names of each core's output ports.
+    outputs: Vec<Vec<String>>,
+    /// Number of links so far.
+    links: usize,
+}
+
+impl Writer {
+    /// Writes a core with a random program.
+    fn core(&mut self, core: usize, machine: &'static Machine, path: &str) -> Program {
+        let Writer { random, text, .. } = self;
         let options = Options { bundles: 20 + random.below(30), ..Options::TAME };
         let program = random_program(random.bits(), machine, options);
         let program = Program { latched: random.once_in(3), ..program };
-        inputs.push(program.inputs.iter().map(|port| port.name.clone()).collect::<Vec<_>>());
-        outputs.push(program.outputs.iter().map(|port| port.name.clone()).collect::<Vec<_>>());
-        let path = format!("core{core}.s");
+        self.inputs.push(program.inputs.iter().map(|port| port.name.clone()).collect());
+        self.outputs.push(program.outputs.iter().map(|port| port.name.clone()).collect());
         let _ = writeln!(text, "\n[[core]]\nname = \"c{core}\"\nprogram = \"{path}\"");
         // Machines made by tests have no name that a file could use: their programs bring them.
         if Machine::from_name(machine.name).is_ok() {
@@ -38,82 +67,95 @@ pub fn random_system(seed: u64, machines: &[&'static Machine]) -> (String, BTree
         if random.once_in(2) {
             let _ = writeln!(text, "tick = {}\noffset = {}", 1 + random.below(3), random.below(40));
         }
-        programs.insert(path, program);
+        program
     }
-    let latency = |random: &mut Random| match random.below(3) {
-        0 => String::new(),
-        1 => format!("latency = {}\n", 4 + random.below(4)),
-        _ => format!("latency = {}\n", 4 + random.below(80)),
-    };
-    let mut number = 0;
-    for core in 0..count {
-        while let Some(last) = inputs[core].pop() {
-            number += 1;
-            let sender = random.below(count as u32 + 1) as usize;
-            let host = sender == count;
-            let from = if host { "host".to_owned() } else { format!("c{sender}") };
-            let output = |random: &mut Random| match host {
-                true => format!("h{}", random.bits() % 1_000_000),
-                false => outputs[sender][random.below(outputs[sender].len() as u32) as usize].clone(),
-            };
-            let own = |random: &mut Random| {
-                outputs[core][random.below(outputs[core].len() as u32) as usize].clone()
-            };
-            let kind = random.below(3);
-            if kind == 0 {
-                let _ = write!(
-                    text,
-                    "\n[[wire]]\nfrom = \"{from}.{}\"\nto = \"c{core}.{last}\"\n",
-                    output(&mut random)
-                );
-                text.push_str(&latency(&mut random));
-                continue;
+
+    /// Random output port of a core; a new value of the host for the number after the last core's.
+    fn output(&mut self, sender: usize) -> String {
+        match self.outputs.get(sender) {
+            Some(ports) => ports[self.random.below(ports.len() as u32) as usize].clone(),
+            None => format!("h{}", self.random.bits() % 1_000_000),
+        }
+    }
+
+    fn latency(&mut self) {
+        let random = &mut self.random;
+        let _ = match random.below(3) {
+            0 => Ok(()),
+            1 => writeln!(self.text, "latency = {}", 4 + random.below(4)),
+            _ => writeln!(self.text, "latency = {}", 4 + random.below(80)),
+        };
+    }
+
+    /// Writes a link that drives an input port of a core.
+    fn link(&mut self, core: usize, input: &str) {
+        self.links += 1;
+        let count = self.outputs.len();
+        let sender = self.random.below(count as u32 + 1) as usize;
+        let host = sender == count;
+        let from = if host { "host".to_owned() } else { format!("c{sender}") };
+        let kind = self.random.below(3);
+        if kind == 0 {
+            let output = self.output(sender);
+            let _ = write!(self.text, "\n[[wire]]\nfrom = \"{from}.{output}\"\nto = \"c{core}.{input}\"\n");
+            self.latency();
+            return;
+        }
+        let mut ports = vec![format!("\"{} -> {input}\"", self.output(sender))];
+        if self.random.once_in(2)
+            && let Some(more) = self.inputs[core].pop()
+        {
+            ports.push(format!("\"{} -> {more}\"", self.output(sender)));
+        }
+        let (number, table) = (self.links, if kind == 1 { "snapshot" } else { "fifo" });
+        let _ = write!(
+            self.text,
+            "\n[[{table}]]\nname = \"l{number}\"\nfrom = \"{from}\"\nto = \"c{core}\"\nports = [{}]\n",
+            ports.join(", ")
+        );
+        self.latency();
+        if kind == 1 {
+            if !host && self.random.once_in(2) {
+                let strobe = self.output(sender);
+                let _ = writeln!(self.text, "strobe = \"{strobe}\"");
             }
-            let mut ports = vec![format!("{} -> {last}", output(&mut random))];
-            if random.once_in(2)
-                && let Some(more) = inputs[core].pop()
+            return;
+        }
+        self.fifo(core, sender);
+    }
+
+    /// Writes the depth and the ports of a FIFO, the last link.
+    fn fifo(&mut self, core: usize, sender: usize) {
+        let count = self.outputs.len();
+        // Depths beyond the circuit's limit for FIFOs outside of block RAM.
+        let depth = [1, 2, 3, 4, 5, 6, 33, 40][self.random.below(8) as usize];
+        let pop = self.output(core);
+        let _ = writeln!(self.text, "depth = {depth}\npop = \"{pop}\"");
+        if sender < count {
+            let push = self.output(sender);
+            let _ = writeln!(self.text, "push = \"{push}\"");
+        }
+        for (key, core) in [("receiver", core), ("sender", sender)] {
+            if core < count
+                && self.random.once_in(2)
+                && let Some(port) = self.inputs[core].pop()
             {
-                ports.push(format!("{} -> {more}", output(&mut random)));
-            }
-            let ports: Vec<String> = ports.iter().map(|port| format!("\"{port}\"")).collect();
-            let table = if kind == 1 { "snapshot" } else { "fifo" };
-            let _ = write!(
-                text,
-                "\n[[{table}]]\nname = \"l{number}\"\nfrom = \"{from}\"\nto = \"c{core}\"\nports = [{}]\n",
-                ports.join(", ")
-            );
-            text.push_str(&latency(&mut random));
-            if kind == 1 {
-                if !host && random.once_in(2) {
-                    let _ = writeln!(text, "strobe = \"{}\"", output(&mut random));
-                }
-                continue;
-            }
-            // Depths beyond the circuit's limit for FIFOs outside of block RAM.
-            let depth = [1, 2, 3, 4, 5, 6, 33, 40][random.below(8) as usize];
-            let _ = writeln!(text, "depth = {depth}\npop = \"{}\"", own(&mut random));
-            if !host {
-                let _ = writeln!(text, "push = \"{}\"", output(&mut random));
-            }
-            for (key, core) in [("receiver", core), ("sender", sender)] {
-                if core < count
-                    && random.once_in(2)
-                    && let Some(port) = inputs[core].pop()
-                {
-                    let status = Status::ALL[random.below(5) as usize].name();
-                    let _ = writeln!(text, "{key} = {{ {status} = \"{port}\" }}");
-                }
+                let status = Status::ALL[self.random.below(5) as usize].name();
+                let _ = writeln!(self.text, "{key} = {{ {status} = \"{port}\" }}");
             }
         }
     }
-    // Links to the host.
-    let all: Vec<(usize, &String)> = outputs
-        .iter()
-        .enumerate()
-        .flat_map(|(core, ports)| ports.iter().map(move |port| (core, port)))
-        .collect();
-    for _ in 0..2 {
-        number += 1;
+
+    /// Writes a link from a core to the host.
+    fn host_link(&mut self) {
+        self.links += 1;
+        let (number, random, text) = (self.links, &mut self.random, &mut self.text);
+        let all: Vec<(usize, &String)> = self
+            .outputs
+            .iter()
+            .enumerate()
+            .flat_map(|(core, ports)| ports.iter().map(move |port| (core, port)))
+            .collect();
         let (core, port) = all[random.below(all.len() as u32) as usize];
         let _ = match random.below(3) {
             0 => write!(text, "\n[[wire]]\nfrom = \"c{core}.{port}\"\nto = \"host.o{number}\"\n"),
@@ -126,9 +168,8 @@ pub fn random_system(seed: u64, machines: &[&'static Machine]) -> (String, BTree
                 "\n[[fifo]]\nname = \"l{number}\"\nfrom = \"c{core}\"\nto = \"host\"\nports = [\"{port}\"]\ndepth = 3\npush = \"{port}\"\n"
             ),
         };
-        text.push_str(&latency(&mut random));
+        self.latency();
     }
-    (text, programs)
 }
 
 /// Description of a system from its file and programs.
@@ -402,115 +443,145 @@ impl Reference {
         found.map(|(_, _, value)| *value)
     }
 
-    fn link(&mut self, description: &Description, number: usize, link: &Link, now: Cycle) {
-        let waits = |reference: &Reference, end| match end {
-            End::Core(core) => reference.cores[core].waits.contains(&now),
+    /// The core at this end waits for its tick in this cycle.
+    fn waits(&self, end: End, now: Cycle) -> bool {
+        match end {
+            End::Core(core) => self.cores[core].waits.contains(&now),
             End::Host => false,
-        };
+        }
+    }
+
+    fn link(&mut self, description: &Description, number: usize, link: &Link, now: Cycle) {
         match &link.kind {
-            LinkKind::Wire => {
-                let written = self.written(link.from, link.fields[0].output, now);
-                let latched = description.core(link.from).is_some_and(|core| core.program.latched);
-                let wait = waits(self, link.from);
-                let state = &mut self.links[number];
-                let sent = if latched {
-                    state.changed = written.or(state.changed);
-                    if wait { state.changed.take() } else { None }
-                } else {
-                    written.or(state.host_value.take())
-                };
-                if let Some(value) = state.wire.step(sent) {
-                    match link.to {
-                        End::Core(core) => self.arrive(core, Source::Field { link: number, field: 0 }, value),
-                        End::Host => state.shown = value,
-                    }
-                }
-            }
+            LinkKind::Wire => self.wire(description, number, link, now),
             LinkKind::Snapshot { strobe } => {
-                // A snapshot takes values that were published before this cycle.
-                if let (End::Core(core), Some(start)) = (link.to, self.start) {
-                    let known = &description.cores[core];
-                    let (first, period) =
-                        (start + known.offset - description.taking(core), known.period(description.tick));
-                    let waits = self.cores[core].waits.last().is_some_and(|since| since + ENDED_DELAY <= now)
-                        && matches!(self.cores[core].emulator.status(), takt_emu::Status::Waiting { .. });
-                    if now >= first && (now - first).is_multiple_of(period) && waits {
-                        for (field, value) in self.links[number].published.clone().into_iter().enumerate() {
-                            self.arrive(core, Source::Field { link: number, field }, value);
-                        }
-                    }
-                }
-                let fields = link.fields.iter().enumerate();
-                let mut writes: Vec<(usize, u32)> = fields
-                    .filter_map(|(i, field)| Some((i, self.written(link.from, field.output, now)?)))
-                    .collect();
-                let publish = match strobe {
-                    Some(strobe) => self.written(link.from, Some(*strobe), now).is_some(),
-                    None => waits(self, link.from),
-                };
-                let state = &mut self.links[number];
-                let host = state.host_publish.take();
-                let published = publish || host.is_some();
-                writes.extend(host.into_iter().flatten().enumerate());
-                let input = if writes.is_empty() && !published { None } else { Some((writes, published)) };
-                if let Some((writes, published)) = state.writes.step(input) {
-                    writes.into_iter().for_each(|(field, value)| state.working[field] = value);
-                    if published {
-                        state.published.clone_from(&state.working);
-                    }
-                }
+                self.take_snapshot(description, number, link, now);
+                self.publish_snapshot(number, link, *strobe, now);
             }
             LinkKind::Fifo { push, pop, sender, receiver, .. } => {
-                // Changes of the previous cycle arrive in this one.
-                let change = self.links[number].change.take();
-                let (head, status) = change.unzip();
-                if let End::Core(core) = link.to {
-                    for (field, value) in head.flatten().into_iter().flatten().enumerate() {
-                        self.arrive(core, Source::Field { link: number, field }, value);
-                    }
-                    for &(status, value) in status.iter().flatten() {
-                        if receiver.iter().any(|(wanted, _)| *wanted == status) {
-                            self.arrive(
-                                core,
-                                Source::Status { link: number, side: Side::Receiver, status },
-                                value,
-                            );
-                        }
-                    }
-                }
-                let back = self.links[number].back.step(status);
-                if let End::Core(core) = link.from {
-                    for (status, value) in back.into_iter().flatten() {
-                        if sender.iter().any(|(wanted, _)| *wanted == status) {
-                            self.arrive(
-                                core,
-                                Source::Status { link: number, side: Side::Sender, status },
-                                value,
-                            );
-                        }
-                    }
-                }
-                for (i, field) in link.fields.iter().enumerate() {
-                    if let Some(value) = self.written(link.from, field.output, now) {
-                        self.links[number].working[i] = value;
-                    }
-                }
-                let pushed = push.is_some_and(|push| self.written(link.from, Some(push), now).is_some());
-                let popped = pop.is_some_and(|pop| self.written(link.to, Some(pop), now).is_some());
-                let state = &mut self.links[number];
-                let entry = match state.host_push.take() {
-                    Some(entry) => Some(entry),
-                    None => pushed.then(|| state.working.clone()),
-                };
-                let entry = state.pushes.step(entry);
-                let popped = popped || std::mem::take(&mut state.host_pop);
-                if popped || entry.is_some() {
-                    let Change { head, .. } = state.store.cycle(popped, entry);
-                    let first = state.store.entries.front().filter(|_| head).cloned();
-                    let status = Status::ALL.map(|status| (status, state.store.status(status))).to_vec();
-                    state.change = Some((first, status));
+                self.deliver_fifo(number, link, sender, receiver);
+                self.step_fifo(number, link, *push, *pop, now);
+            }
+        }
+    }
+
+    fn wire(&mut self, description: &Description, number: usize, link: &Link, now: Cycle) {
+        let written = self.written(link.from, link.fields[0].output, now);
+        let latched = description.core(link.from).is_some_and(|core| core.program.latched);
+        let wait = self.waits(link.from, now);
+        let state = &mut self.links[number];
+        let sent = if latched {
+            state.changed = written.or(state.changed);
+            if wait { state.changed.take() } else { None }
+        } else {
+            written.or(state.host_value.take())
+        };
+        if let Some(value) = state.wire.step(sent) {
+            match link.to {
+                End::Core(core) => self.arrive(core, Source::Field { link: number, field: 0 }, value),
+                End::Host => state.shown = value,
+            }
+        }
+    }
+
+    /// Takes the published values at the start of the receiving core's period.
+    fn take_snapshot(&mut self, description: &Description, number: usize, link: &Link, now: Cycle) {
+        // A snapshot takes values that were published before this cycle.
+        if let (End::Core(core), Some(start)) = (link.to, self.start) {
+            let known = &description.cores[core];
+            let (first, period) =
+                (start + known.offset - description.taking(core), known.period(description.tick));
+            let waits = self.cores[core].waits.last().is_some_and(|since| since + ENDED_DELAY <= now)
+                && matches!(self.cores[core].emulator.status(), takt_emu::Status::Waiting { .. });
+            if now >= first && (now - first).is_multiple_of(period) && waits {
+                for (field, value) in self.links[number].published.clone().into_iter().enumerate() {
+                    self.arrive(core, Source::Field { link: number, field }, value);
                 }
             }
+        }
+    }
+
+    /// Writes fields of a snapshot; publishes them with a write of the strobe, or when the sender waits.
+    fn publish_snapshot(&mut self, number: usize, link: &Link, strobe: Option<Register>, now: Cycle) {
+        let fields = link.fields.iter().enumerate();
+        let mut writes: Vec<(usize, u32)> =
+            fields.filter_map(|(i, field)| Some((i, self.written(link.from, field.output, now)?))).collect();
+        let publish = match strobe {
+            Some(strobe) => self.written(link.from, Some(strobe), now).is_some(),
+            None => self.waits(link.from, now),
+        };
+        let state = &mut self.links[number];
+        let host = state.host_publish.take();
+        let published = publish || host.is_some();
+        writes.extend(host.into_iter().flatten().enumerate());
+        let input = if writes.is_empty() && !published { None } else { Some((writes, published)) };
+        if let Some((writes, published)) = state.writes.step(input) {
+            writes.into_iter().for_each(|(field, value)| state.working[field] = value);
+            if published {
+                state.published.clone_from(&state.working);
+            }
+        }
+    }
+
+    /// Brings the head and the status of a FIFO to its ends.
+    fn deliver_fifo(
+        &mut self,
+        number: usize,
+        link: &Link,
+        sender: &[(Status, Register)],
+        receiver: &[(Status, Register)],
+    ) {
+        // Changes of the previous cycle arrive in this one.
+        let change = self.links[number].change.take();
+        let (head, status) = change.unzip();
+        if let End::Core(core) = link.to {
+            for (field, value) in head.flatten().into_iter().flatten().enumerate() {
+                self.arrive(core, Source::Field { link: number, field }, value);
+            }
+            for &(status, value) in status.iter().flatten() {
+                if receiver.iter().any(|(wanted, _)| *wanted == status) {
+                    self.arrive(core, Source::Status { link: number, side: Side::Receiver, status }, value);
+                }
+            }
+        }
+        let back = self.links[number].back.step(status);
+        if let End::Core(core) = link.from {
+            for (status, value) in back.into_iter().flatten() {
+                if sender.iter().any(|(wanted, _)| *wanted == status) {
+                    self.arrive(core, Source::Status { link: number, side: Side::Sender, status }, value);
+                }
+            }
+        }
+    }
+
+    /// Pushes an entry into a FIFO, and pops its head.
+    fn step_fifo(
+        &mut self,
+        number: usize,
+        link: &Link,
+        push: Option<Register>,
+        pop: Option<Register>,
+        now: Cycle,
+    ) {
+        for (i, field) in link.fields.iter().enumerate() {
+            if let Some(value) = self.written(link.from, field.output, now) {
+                self.links[number].working[i] = value;
+            }
+        }
+        let pushed = push.is_some_and(|push| self.written(link.from, Some(push), now).is_some());
+        let popped = pop.is_some_and(|pop| self.written(link.to, Some(pop), now).is_some());
+        let state = &mut self.links[number];
+        let entry = match state.host_push.take() {
+            Some(entry) => Some(entry),
+            None => pushed.then(|| state.working.clone()),
+        };
+        let entry = state.pushes.step(entry);
+        let popped = popped || std::mem::take(&mut state.host_pop);
+        if popped || entry.is_some() {
+            let Change { head, .. } = state.store.cycle(popped, entry);
+            let first = state.store.entries.front().filter(|_| head).cloned();
+            let status = Status::ALL.map(|status| (status, state.store.status(status))).to_vec();
+            state.change = Some((first, status));
         }
     }
 

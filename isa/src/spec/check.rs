@@ -159,10 +159,58 @@ impl MachineError {
                 .text(" ")
                 .name(name)
                 .text(": a name is a lower-case letter, then lower-case letters, digits and single `_`"),
+            Twice { what, name } => m.text("two ").text(what).text("s are called ").name(name),
+            Depth { what, depth, most } => {
+                m.text(what).text(" is ").number(depth).text("; it is 1 to ").number(most)
+            }
+            Wait { what, cycles } => {
+                m.text(what).text(" is ").number(cycles).text("; it stays below ").number(MAX_LATENCY)
+            }
+            LoopDepth { counts: false, depth } => {
+                m.text("loop_depth is ").number(depth).text("; the sequencer does not offer Loop, so it is 0")
+            }
+            LoopDepth { counts: true, depth } => m
+                .text("loop_depth is ")
+                .number(depth)
+                .text("; the sequencer offers Loop, so it is 1 to ")
+                .number(MAX_LOOPS),
+            NoSequencer => m.text("no slot hosts the sequencer (function Control)"),
+            TwoSlots { function, slot, other } => m
+                .slot(other)
+                .text(" and slot ")
+                .name(slot)
+                .text(" both host ")
+                .text(function.name())
+                .text("; a machine has one sequencer, and one slot at most that stores"),
+            Ports { slot } => m.slot(slot).text(" is the third that hosts Load; the data memory has two ports"),
+            LoadAfterStore { slot, store } => m
+                .slot(slot)
+                .text(" hosts Load after slot ")
+                .name(store)
+                .text(", which hosts Store; a bundle's loads read what was there before its store, so they come before it"),
+            BankName { .. }
+            | BankDepth { .. }
+            | RegisterSpace { .. }
+            | Overlap { .. }
+            | Zero { .. }
+            | Outputs { .. } => self.bank_message(m),
+            Latency { .. }
+            | NoLatency { .. }
+            | IdleLatency { .. }
+            | Interval { .. }
+            | Idle { .. }
+            | NoFunction { .. }
+            | TwoUnits { .. } => self.unit_message(m),
+        }
+    }
+
+    /// Appends a reason of the banks of registers.
+    const fn bank_message(&self, m: Message) -> Message {
+        use MachineReason::*;
+        match self.reason {
             BankName { bank } => {
                 m.text("bank ").name(bank).text(": the name has letters only; a register's number follows it")
             }
-            Twice { what, name } => m.text("two ").text(what).text("s are called ").name(name),
             BankDepth { bank, depth, most } => m
                 .text("bank ")
                 .name(bank)
@@ -204,12 +252,14 @@ impl MachineError {
                 .text(" has ")
                 .number(depth as u32)
                 .text(" registers, of which 1 to all can be output ports"),
-            Depth { what, depth, most } => {
-                m.text(what).text(" is ").number(depth).text("; it is 1 to ").number(most)
-            }
-            Wait { what, cycles } => {
-                m.text(what).text(" is ").number(cycles).text("; it stays below ").number(MAX_LATENCY)
-            }
+            _ => m,
+        }
+    }
+
+    /// Appends a reason of one slot's units.
+    const fn unit_message(&self, m: Message) -> Message {
+        use MachineReason::*;
+        match self.reason {
             Latency { slot, unit, latency } => m
                 .unit(slot, unit)
                 .text(" has latency ")
@@ -241,28 +291,7 @@ impl MachineError {
                 .text(" both offer ")
                 .text(function.name())
                 .text("; in a slot, one unit executes a function"),
-            LoopDepth { counts: false, depth } => {
-                m.text("loop_depth is ").number(depth).text("; the sequencer does not offer Loop, so it is 0")
-            }
-            LoopDepth { counts: true, depth } => m
-                .text("loop_depth is ")
-                .number(depth)
-                .text("; the sequencer offers Loop, so it is 1 to ")
-                .number(MAX_LOOPS),
-            NoSequencer => m.text("no slot hosts the sequencer (function Control)"),
-            TwoSlots { function, slot, other } => m
-                .slot(other)
-                .text(" and slot ")
-                .name(slot)
-                .text(" both host ")
-                .text(function.name())
-                .text("; a machine has one sequencer, and one slot at most that stores"),
-            Ports { slot } => m.slot(slot).text(" is the third that hosts Load; the data memory has two ports"),
-            LoadAfterStore { slot, store } => m
-                .slot(slot)
-                .text(" hosts Load after slot ")
-                .name(store)
-                .text(", which hosts Store; a bundle's loads read what was there before its store, so they come before it"),
+            _ => m,
         }
     }
 }

@@ -413,20 +413,7 @@ impl<'a> Reader<'a> {
             }
             None => Some(0),
         };
-        let baud = top.integer("baud", 9600, 12_000_000);
-        if let Some(baud) = &baud {
-            let divide = clock * 1e6 / f64::from(baud.value);
-            let error = (divide.round() / divide - 1.0).abs();
-            if !(4.0..=65535.0).contains(&divide.round()) || error > 0.02 {
-                mistake(
-                    &baud.place,
-                    format!(
-                        "{} baud are {divide:.2} cycles of {clock} MHz; that must be 4 to 65535, within 2 % of a whole number",
-                        baud.value
-                    ),
-                );
-            }
-        }
+        let baud = self.baud(top, clock);
         let autostart = top.boolean("autostart").is_some_and(|at| at.value);
         let deadlines = top.integer("deadlines", 1, 65535).map_or(1, |at| at.value);
         let host = top.integer("host", 0, 65535).map_or(0, |at| at.value);
@@ -462,6 +449,25 @@ impl<'a> Reader<'a> {
             carriers: self.carriers.all,
             peripherals,
         })
+    }
+
+    /// Reads the baud rate, which a divider of the clock must approximate.
+    fn baud(&self, top: &Table<'a>, clock: f64) -> Option<Located<u32>> {
+        let baud = top.integer("baud", 9600, 12_000_000);
+        if let Some(baud) = &baud {
+            let divide = clock * 1e6 / f64::from(baud.value);
+            let error = (divide.round() / divide - 1.0).abs();
+            if !(4.0..=65535.0).contains(&divide.round()) || error > 0.02 {
+                self.document.mistake(
+                    &baud.place,
+                    format!(
+                        "{} baud are {divide:.2} cycles of {clock} MHz; that must be 4 to 65535, within 2 % of a whole number",
+                        baud.value
+                    ),
+                );
+            }
+        }
+        baud
     }
 
     /// Marks a pin of the board as used; returns its name.

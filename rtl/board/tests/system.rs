@@ -192,17 +192,58 @@ fn a_system_runs_talks_and_fails_safe() {
     let names = Names::of(&description);
     let mut sim = board(&description, "system-board");
     let encoder = [sim.input("encoder_a").expect("a pin"), sim.input("encoder_b").expect("a pin")];
-
-    // After power-up, without a host, the board is safe; then it drives, with an error of 0.
-    sim.run(1000, &[]).expect("it runs");
-    assert_eq!(sim.output("signal_drive"), Some((false, 0)), "before the first periods");
-    periods(&mut sim, 10);
-    assert_eq!(sim.output("signal_drive").map(|(level, _)| level), Some(true), "it drives");
-    assert_eq!(pulse(&mut sim), expected(0.0));
-
+    drives_after_power_up(&mut sim);
     let mut host = connect(sim);
     pins_follow_as_the_bound_says(&mut host, &description, encoder);
+    ports_are_read_and_set(&mut host, &description, &names, encoder);
+    let fifos = Fifos { moves: names.fifo("moves", false), reached: names.fifo("reached", true) };
+    moves_end_in_order(&mut host, &names, &fifos);
+    other_addresses_are_refused(&mut host, &names, &fifos);
+    periods_are_counted_and_streamed(&mut host, &names);
+    noise_loses_no_entry(&mut host, &fifos);
+    full_fifos_refuse_entries(&mut host, &fifos);
+    a_start_follows_silence(&mut host, &names, &fifos);
+    stop_and_reset_make_outputs_safe(&mut host);
+    wrong_programs_make_outputs_safe(&mut host, &names, &fifos);
+    an_entry_starts_base_ticks(&mut host, &fifos);
+    other_systems_are_refused(&mut host, &description);
+}
 
+/// FIFOs between host and system.
+struct Fifos {
+    moves: Fifo,
+    reached: Fifo,
+}
+
+/// A register of each core.
+fn registers(host: &mut Host<Simulation>, name: &str) -> [u32; 3] {
+    [0, 1, 2].map(|core| host.register_of(core, name).expect("a register"))
+}
+
+fn causes(host: &mut Host<Simulation>, core: usize) -> Vec<&'static str> {
+    host.status_of(core).expect("status").causes().collect()
+}
+
+/// The system with a text of one source replaced.
+fn in_place(of: &str, from: &str, to: &str) -> Description {
+    system(&|name, source| if name == of { source.replace(from, to) } else { source.to_owned() })
+}
+
+/// After power-up, without a host, the board is safe; then it drives, with an error of 0.
+fn drives_after_power_up(sim: &mut Simulation) {
+    sim.run(1000, &[]).expect("it runs");
+    assert_eq!(sim.output("signal_drive"), Some((false, 0)), "before the first periods");
+    periods(sim, 10);
+    assert_eq!(sim.output("signal_drive").map(|(level, _)| level), Some(true), "it drives");
+    assert_eq!(pulse(sim), expected(0.0));
+}
+
+fn ports_are_read_and_set(
+    host: &mut Host<Simulation>,
+    description: &Description,
+    names: &Names,
+    encoder: [usize; 2],
+) {
     // The loop through the pins is closed: the servo reads the encoder, and the watch lights the lamp.
     host.line.turns.push(EncoderMotion { pins: encoder, from: 0, by: 20 });
     periods(&mut host.line, 3);
@@ -212,50 +253,52 @@ fn a_system_runs_talks_and_fails_safe() {
 
     // The host reads and sets ports of each core, and the values that the host drives.
     assert_eq!(host.cores, 3);
-    host.fits(&description).expect("it is this system's circuit");
+    host.fits(description).expect("it is this system's circuit");
     assert!((0..3).all(|core| host.status_of(core).expect("status").drives()));
-    assert_eq!(names.read(&mut host, "servo.n"), 20);
-    assert_eq!(names.read(&mut host, "n"), 20, "the wire that the encoder drives");
-    assert_eq!(names.read(&mut host, "servo.error"), float(-20.0));
-    assert_eq!(names.read(&mut host, "watch.error"), float(-20.0));
-    assert_eq!(names.read(&mut host, "seen.peak"), float(20.0));
-    assert_eq!(names.read(&mut host, "watch.limit"), 0);
+    assert_eq!(names.read(host, "servo.n"), 20);
+    assert_eq!(names.read(host, "n"), 20, "the wire that the encoder drives");
+    assert_eq!(names.read(host, "servo.error"), float(-20.0));
+    assert_eq!(names.read(host, "watch.error"), float(-20.0));
+    assert_eq!(names.read(host, "seen.peak"), float(20.0));
+    assert_eq!(names.read(host, "watch.limit"), 0);
     host.write(names.set("watch.limit"), &[float(25.0)]).expect("a port");
     periods(&mut host.line, 4);
-    assert_eq!(names.read(&mut host, "watch.limit"), float(25.0));
+    assert_eq!(names.read(host, "watch.limit"), float(25.0));
     assert_eq!(host.line.output("lamp_out").map(|(level, _)| level), Some(false), "below the limit");
+}
 
-    // Two moves go into a FIFO, and the places where they end come out of another.
-    let (moves, reached) = (names.fifo("moves", false), names.fifo("reached", true));
-    assert_eq!(host.pop(&reached).expect("a FIFO"), None);
+/// Two moves go into a FIFO, and the places where they end come out of another.
+fn moves_end_in_order(host: &mut Host<Simulation>, names: &Names, fifos: &Fifos) {
+    assert_eq!(host.pop(&fifos.reached).expect("a FIFO"), None);
     for target in [10.0, 15.0] {
-        assert!(host.push(&moves, &[float(target), float(5.0)]).expect("a FIFO"));
+        assert!(host.push(&fifos.moves, &[float(target), float(5.0)]).expect("a FIFO"));
     }
     periods(&mut host.line, 6);
-    assert_eq!(names.read(&mut host, "profile.wanted"), float(15.0));
+    assert_eq!(names.read(host, "profile.wanted"), float(15.0));
     assert_eq!(pulse(&mut host.line), expected(-5.0));
-    assert_eq!(host.fifo(&reached).expect("a FIFO").count(), 2);
-    assert_eq!(host.pop(&reached).expect("a FIFO"), Some(vec![float(10.0)]));
-    assert_eq!(host.pop(&reached).expect("a FIFO"), Some(vec![float(15.0)]));
-    assert_eq!(host.pop(&reached).expect("a FIFO"), None);
+    assert_eq!(host.fifo(&fifos.reached).expect("a FIFO").count(), 2);
+    assert_eq!(host.pop(&fifos.reached).expect("a FIFO"), Some(vec![float(10.0)]));
+    assert_eq!(host.pop(&fifos.reached).expect("a FIFO"), Some(vec![float(15.0)]));
+    assert_eq!(host.pop(&fifos.reached).expect("a FIFO"), None);
+}
 
-    // A write to an address that cannot be written is refused: registers, a core's ports, a value that the encoder drives or that a link
-    // brings, a FIFO's status, the fields of a FIFO to the host, the image of a running program.
+/// A write to an address that cannot be written is refused: registers, a core's ports, a value that the encoder drives or that a link
+/// brings, a FIFO's status, the fields of a FIFO to the host, the image of a running program.
+fn other_addresses_are_refused(host: &mut Host<Simulation>, names: &Names, fifos: &Fifos) {
     let drives = names.at("n");
     for address in [0, 15, 16, 0x102, names.at("servo.n"), drives, names.at("watch.lit"), 0x3400, 0x8000] {
-        refuses(&mut host, address, &[1]);
+        refuses(host, address, &[1]);
     }
-    for address in [moves.address, reached.address, reached.field(0), IMAGE] {
-        refuses(&mut host, address, &[1]);
+    for address in [fifos.moves.address, fifos.reached.address, fifos.reached.field(0), IMAGE] {
+        refuses(host, address, &[1]);
     }
+}
 
+fn periods_are_counted_and_streamed(host: &mut Host<Simulation>, names: &Names) {
     // Each core has counters: the watch has every second base tick.
-    let all = |host: &mut Host<Simulation>, name: &str| {
-        [0, 1, 2].map(|core| host.register_of(core, name).expect("a register"))
-    };
-    let counted = all(&mut host, "periods");
+    let counted = registers(host, "periods");
     assert!(counted[0].abs_diff(2 * counted[2]) <= 4 && counted[0].abs_diff(counted[1]) <= 2, "{counted:?}");
-    assert_eq!(all(&mut host, "misses"), [0; 3]);
+    assert_eq!(registers(host, "misses"), [0; 3]);
 
     // The stream carries a core's port.
     host.set("stream", 2 << 20 | 1 << 16 | u32::from(names.at("watch.values"))).expect("stream");
@@ -268,62 +311,68 @@ fn a_system_runs_talks_and_fails_safe() {
     assert!(seen.windows(2).all(|pair| pair[1].0 == pair[0].0 + 2 && pair[1].1 == pair[0].1 + 2), "{seen:?}");
     assert!(seen.iter().all(|(period, values)| period == values), "periods are the watch's: {seen:?}");
     host.set("stream", 0).expect("stream");
+}
 
-    // Noise on the line loses no entry, and no entry goes in or comes out twice.
+/// Noise on the line loses no entry, and no entry goes in or comes out twice.
+fn noise_loses_no_entry(host: &mut Host<Simulation>, fifos: &Fifos) {
     host.line.noise = 300;
     let mut ended = Vec::new();
     for target in 0..24 {
-        while !host.push(&moves, &[float(target as f32), float(50.0)]).expect("in spite of noise") {
+        while !host.push(&fifos.moves, &[float(target as f32), float(50.0)]).expect("in spite of noise") {
             periods(&mut host.line, 1);
         }
         periods(&mut host.line, 1);
-        while let Some(entry) = host.pop(&reached).expect("in spite of noise") {
+        while let Some(entry) = host.pop(&fifos.reached).expect("in spite of noise") {
             ended.push(entry[0]);
         }
     }
     host.line.noise = 0;
     periods(&mut host.line, 6);
-    while let Some(entry) = host.pop(&reached).expect("a FIFO") {
+    while let Some(entry) = host.pop(&fifos.reached).expect("a FIFO") {
         ended.push(entry[0]);
     }
     assert_eq!(ended, (0..24).map(|target| float(target as f32)).collect::<Vec<_>>());
     assert!(host.retries > 0, "there was no noise");
-    assert!(!host.fifo(&reached).expect("a FIFO").overflow());
+    assert!(!host.fifo(&fifos.reached).expect("a FIFO").overflow());
+}
 
-    // A FIFO that nobody empties refuses an entry and reports it; so does a full FIFO.
+/// A FIFO that nobody empties refuses an entry and reports it; so does a full FIFO.
+fn full_fifos_refuse_entries(host: &mut Host<Simulation>, fifos: &Fifos) {
     host.set("control", 0b111).expect("hold");
-    let pushed = (0..6).filter(|_| host.push(&moves, &[float(1.0), float(9.0)]).expect("a FIFO")).count();
+    let pushed =
+        (0..6).filter(|_| host.push(&fifos.moves, &[float(1.0), float(9.0)]).expect("a FIFO")).count();
     assert_eq!(pushed, 4);
-    let status = host.fifo(&moves).expect("a FIFO");
+    let status = host.fifo(&fifos.moves).expect("a FIFO");
     assert!(status.full() && !status.overflow() && status.count() == 4, "{status:?}");
     host.set("control", 0b101).expect("go");
     periods(&mut host.line, 8);
-    assert!(host.fifo(&reached).expect("a FIFO").overflow(), "depth 2, four moves");
+    assert!(host.fifo(&fifos.reached).expect("a FIFO").overflow(), "depth 2, four moves");
+}
 
+fn a_start_follows_silence(host: &mut Host<Simulation>, names: &Names, fifos: &Fifos) {
     // The host is gone.
     host.line.unplugged = true;
     periods(&mut host.line, 70);
     assert!(safe(&mut host.line), "without a host");
     host.line.unplugged = false;
-    let causes = |host: &mut Host<Simulation>, core: usize| -> Vec<&'static str> {
-        host.status_of(core).expect("status").causes().collect()
-    };
-    assert_eq!(causes(&mut host, 1), ["host silent"]);
+    assert_eq!(causes(host, 1), ["host silent"]);
     // A start empties FIFOs, and clears the values that the host had set. A value that the host sets at once waits until all is loaded.
     host.set("control", 0x105).expect("control");
     host.write(names.set("limit"), &[float(7.0)]).expect("a port");
-    assert_eq!(names.read(&mut host, "limit"), float(7.0));
-    assert!(host.fifo(&moves).expect("a FIFO").empty());
+    assert_eq!(names.read(host, "limit"), float(7.0));
+    assert!(host.fifo(&fifos.moves).expect("a FIFO").empty());
     periods(&mut host.line, 6);
     assert!(host.status().expect("status").drives());
-    assert_eq!(names.read(&mut host, "watch.limit"), float(7.0));
+    assert_eq!(names.read(host, "watch.limit"), float(7.0));
+}
 
-    // The stop input makes outputs safe, and so does a reset in mid-period.
+/// The stop input makes outputs safe, and so does a reset in mid-period.
+fn stop_and_reset_make_outputs_safe(host: &mut Host<Simulation>) {
     host.line.set("signal_stop", true);
     periods(&mut host.line, 1);
     assert!(safe(&mut host.line), "stopped");
     host.line.set("signal_stop", false);
-    assert_eq!(causes(&mut host, 2), ["stop"]);
+    assert_eq!(causes(host, 2), ["stop"]);
     host.set("control", 0x105).expect("control");
     periods(&mut host.line, 5);
     host.line.run(1037, &[]).expect("it runs");
@@ -333,21 +382,19 @@ fn a_system_runs_talks_and_fails_safe() {
     host.line.set("button", false);
     periods(&mut host.line, 6);
     assert!(host.status().expect("status").drives(), "after a reset");
+}
 
-    // With other programs in the same circuit, each core's fault, halt, missed deadline or NaN makes outputs safe, and the status says the
-    // cause.
+/// Systems with a program that faults, halts, misses its deadline or computes a NaN: the core, and the cause in its status.
+fn wrong_programs() -> [(Description, usize, &'static str); 4] {
     let slow = "        mov     k, 9000\nagain:  isub    k, k, 1\n        bnz     k, again\n        wait    period\n";
-    let in_place = |of: &'static str, from: &'static str, to: String| {
-        system(&move |name, source| if name == of { source.replace(from, &to) } else { source.to_owned() })
-    };
-    let cases = [
-        (in_place("watch.s", "        flt     lit, limit, a\n", "        ret\n".to_owned()), 2, "fault"),
-        (in_place("profile.s", "        bnz     empty, idle\n", "        halt\n".to_owned()), 0, "halt"),
+    [
+        (in_place("watch.s", "        flt     lit, limit, a\n", "        ret\n"), 2, "fault"),
+        (in_place("profile.s", "        bnz     empty, idle\n", "        halt\n"), 0, "halt"),
         (
             in_place(
                 "watch.s",
                 ".reg    a\n",
-                format!(".reg    a k:int\n{}", slow.replace("        wait    period\n", "")),
+                &format!(".reg    a k:int\n{}", slow.replace("        wait    period\n", "")),
             ),
             2,
             "missed deadline",
@@ -356,22 +403,27 @@ fn a_system_runs_talks_and_fails_safe() {
             in_place(
                 "servo.s",
                 "        wait    period\n",
-                "        fdiv    duty, zero, zero\n        wait    period\n".to_owned(),
+                "        fdiv    duty, zero, zero\n        wait    period\n",
             ),
             1,
             "NaN output",
         ),
-    ];
-    for (other, core, cause) in cases {
+    ]
+}
+
+/// With other programs in the same circuit, each core's fault, halt, missed deadline or NaN makes outputs safe, and the status says the
+/// cause.
+fn wrong_programs_make_outputs_safe(host: &mut Host<Simulation>, names: &Names, fifos: &Fifos) {
+    for (other, core, cause) in wrong_programs() {
         host.fits(&other).expect("the circuit is the same");
         host.load(&top::image(&other).expect("it fits").records).expect("it is loaded");
         assert!(safe(&mut host.line), "while it is loaded");
-        assert!(matches!(host.push(&moves, &[0, 0]), Err(LinkError::Stopped)), "entries would be lost");
+        assert!(matches!(host.push(&fifos.moves, &[0, 0]), Err(LinkError::Stopped)), "entries would be lost");
         host.set("control", 5).expect("control");
         periods(&mut host.line, 12);
         assert!(safe(&mut host.line), "{cause}");
         for each in 0..3 {
-            let found = causes(&mut host, each);
+            let found = causes(host, each);
             assert_eq!(found.contains(&cause), each == core, "{cause}: core {each}: {found:?}");
         }
         let status = host.status_of(core).expect("status");
@@ -379,27 +431,31 @@ fn a_system_runs_talks_and_fails_safe() {
         // The host can read ports of a core that has stopped, and of the other cores, but no ports of a core that never waits.
         let is_late = |name: &str| cause == "missed deadline" && name == "watch.peak";
         for name in ["profile.wanted", "servo.n", "watch.peak"].into_iter().filter(|name| !is_late(name)) {
-            names.read(&mut host, name);
+            names.read(host, name);
         }
-        let misses = all(&mut host, "misses");
+        let misses = registers(host, "misses");
         // Every tick comes too early to a core that has halted.
         assert_eq!(misses[core] > 1, ["missed deadline", "halt"].contains(&cause), "{cause}: {misses:?}");
     }
+}
 
-    // A core waits for an entry before its first period: the host can push an entry, and then base ticks begin.
+/// A core waits for an entry before its first period: the host can push an entry, and then base ticks begin.
+fn an_entry_starts_base_ticks(host: &mut Host<Simulation>, fifos: &Fifos) {
     let first = "        mov     wanted, zero\n";
-    let waits = in_place("profile.s", first, format!("{first}boot:   bnz     empty, boot\n"));
+    let waits = in_place("profile.s", first, &format!("{first}boot:   bnz     empty, boot\n"));
     host.load(&top::image(&waits).expect("it fits").records).expect("it is loaded");
     host.set("control", 5).expect("control");
     periods(&mut host.line, 6);
-    assert_eq!(all(&mut host, "periods"), [0; 3]);
-    assert!(host.push(&moves, &[float(4.0), float(4.0)]).expect("a FIFO"));
+    assert_eq!(registers(host, "periods"), [0; 3]);
+    assert!(host.push(&fifos.moves, &[float(4.0), float(4.0)]).expect("a FIFO"));
     periods(&mut host.line, 6);
     assert!(host.status().expect("status").drives());
-    assert_eq!(host.pop(&reached).expect("a FIFO"), Some(vec![float(4.0)]));
+    assert_eq!(host.pop(&fifos.reached).expect("a FIFO"), Some(vec![float(4.0)]));
+}
 
-    // The board has the first programs again, and another system's programs are refused before anything happens.
-    host.load(&top::image(&description).expect("it fits").records).expect("it is loaded");
+/// The board has the first programs again, and another system's programs are refused before anything happens.
+fn other_systems_are_refused(host: &mut Host<Simulation>, description: &Description) {
+    host.load(&top::image(description).expect("it fits").records).expect("it is loaded");
     host.set("control", 5).expect("control");
     periods(&mut host.line, 12);
     assert!(host.status().expect("status").drives());

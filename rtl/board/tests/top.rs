@@ -6,7 +6,7 @@ use std::panic::AssertUnwindSafe;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use takt_asm::{MemoryLoader, Options, assemble};
-use takt_board::latency::{self, Part};
+use takt_board::latency::{self, Part, PinPath};
 use takt_board::protocol::{IMAGE, INPUTS, LinkError, OUTPUTS};
 use takt_board::simulation::{EncoderMotion, Simulation};
 use takt_board::tools::Venv;
@@ -239,44 +239,62 @@ fn the_routed_design_does_the_same() {
 /// Tests everything that the board has to do, from power-up on.
 fn runs_talks_and_fails_safe(mut sim: Simulation, wiring: &Wiring, first: &Program) {
     let encoder = [sim.input("encoder_a").expect("a pin"), sim.input("encoder_b").expect("a pin")];
-
-    // From power-up, without a host: safe, then it drives. The encoder stands at 0, so half of the time each way.
-    sim.run(1000, &[]).expect("it runs");
-    assert_eq!(sim.output("signal_drive"), Some((false, 0)), "before the first period");
-    periods(&mut sim, 10);
-    assert_eq!(sim.output("signal_drive").map(|(level, _)| level), Some(true), "it drives");
-    assert_eq!(pulse(&mut sim), 250 - 5, "half of the time, less the dead time");
-
-    // The loop through the pins: 40 counts forward are a force of -10, which is 160 cycles less.
-    sim.turns.push(EncoderMotion { pins: encoder, from: 0, by: 40 });
-    periods(&mut sim, 3);
-    periods(&mut sim, 3);
-    assert_eq!(pulse(&mut sim), 250 - 160 - 5);
-
-    // From pin to pin, in cycles: with an edge that is counted just before a tick, and one that is counted just after it.
+    drives_after_power_up(&mut sim, encoder);
     let bounds = takt_analysis::bound(first).expect("it can be bounded");
     let ways = latency::ways(wiring, &Application::from(first), &[bounds]).expect("it has a period");
     let way = &ways.ways[0];
+    pins_follow_as_the_bound_says(&mut sim, way, encoder);
+    glitches_are_not_counted(&mut sim);
+    let mut host = Host::connect(sim, 77).unwrap_or_else(|error| panic!("{error}"));
+    ports_are_read_and_set(&mut host, first, way);
+    other_addresses_are_refused(&mut host, first);
+    periods_are_stepped_and_streamed(&mut host, first);
+    noise_loses_no_step(&mut host);
+    a_start_follows_silence(&mut host, first);
+    stop_and_reset_make_outputs_safe(&mut host);
+    wrong_programs_make_outputs_safe(&mut host, first);
+}
+
+fn drives_after_power_up(sim: &mut Simulation, encoder: [usize; 2]) {
+    // From power-up, without a host: safe, then it drives. The encoder stands at 0, so half of the time each way.
+    sim.run(1000, &[]).expect("it runs");
+    assert_eq!(sim.output("signal_drive"), Some((false, 0)), "before the first period");
+    periods(sim, 10);
+    assert_eq!(sim.output("signal_drive").map(|(level, _)| level), Some(true), "it drives");
+    assert_eq!(pulse(sim), 250 - 5, "half of the time, less the dead time");
+
+    // The loop through the pins: 40 counts forward are a force of -10, which is 160 cycles less.
+    sim.turns.push(EncoderMotion { pins: encoder, from: 0, by: 40 });
+    periods(sim, 3);
+    periods(sim, 3);
+    assert_eq!(pulse(sim), 250 - 160 - 5);
+}
+
+/// From pin to pin, in cycles: with an edge that is counted just before a tick, and one that is counted just after it.
+fn pins_follow_as_the_bound_says(sim: &mut Simulation, way: &PinPath, encoder: [usize; 2]) {
     let [edge, lamp] = [&way.inputs[0].parts, &way.outputs[1].parts];
     let bound = Part::sum("", edge.iter().chain(&way.between).chain(lamp));
-    let ticks = Ticks::of(&mut sim, PERIOD);
+    let ticks = Ticks::of(sim, PERIOD);
     for (before, from, cycles) in [(edge[0].best, 40, bound.best), (edge[0].best - 1, 41, bound.worst)] {
         let turn = |sim: &mut Simulation| sim.turns.push(EncoderMotion { pins: encoder, from, by: 1 });
-        assert_eq!(ticks.measured(&mut sim, before, turn, "lamp_out"), cycles);
+        assert_eq!(ticks.measured(sim, before, turn, "lamp_out"), cycles);
     }
     sim.turns.push(EncoderMotion { pins: encoder, from: 42, by: -2 });
-    periods(&mut sim, 2);
+    periods(sim, 2);
+}
 
-    // Glitches shorter than the filter are not counted.
+/// Glitches shorter than the filter are not counted.
+fn glitches_are_not_counted(sim: &mut Simulation) {
     for _ in 0..5 {
         sim.set("encoder_a", true);
         sim.run(2, &[]).expect("it runs");
         sim.set("encoder_a", false);
         sim.run(7, &[]).expect("it runs");
     }
+}
 
-    // The host: reads ports and sets them.
-    let mut host = Host::connect(sim, 77).unwrap_or_else(|error| panic!("{error}"));
+/// The host reads ports and sets them.
+fn ports_are_read_and_set(host: &mut Host<Simulation>, first: &Program, way: &PinPath) {
     assert!(host.status().expect("status").drives());
     assert_eq!(host.read(port(first, "n"), 1).expect("a port")[0], 40);
     assert_eq!(host.read(port(first, "force"), 1).expect("a port")[0], (-10.0_f32).to_bits());
@@ -289,23 +307,27 @@ fn runs_talks_and_fails_safe(mut sim: Simulation, wiring: &Wiring, first: &Progr
     let exact = Part::sum("", &way.between[1..]);
     assert_eq!((exact.best, exact.worst), (cycles.into(), cycles.into()), "cycles from tick to outputs");
     assert_eq!(host.register("misses").expect("a register"), 0);
+}
 
-    // A write to an address that cannot be written is refused as a whole: read-only registers, and addresses without one; ports that the
-    // program or a peripheral drives, and the last port, which the machine does not have; the image of a running program; a tick of the
-    // host's own while the program is not held, with two writable registers before it; memories of the core.
+/// A write to an address that cannot be written is refused as a whole: read-only registers, and addresses without one; ports that the
+/// program or a peripheral drives, and the last port, which the machine does not have; the image of a running program; a tick of the
+/// host's own while the program is not held, with two writable registers before it; memories of the core.
+fn other_addresses_are_refused(host: &mut Host<Simulation>, first: &Program) {
     let n = port(first, "n");
     for address in [0, 2, 9, 20, 0xfff, port(first, "force"), n, INPUTS + 255, INPUTS + 256, 0x3000] {
-        refuses(&mut host, address, &[1]);
+        refuses(host, address, &[1]);
     }
     for (address, words) in
         [(4, &[9999, 5, 1][..]), (12, &[1]), (IMAGE, &[1, 2, 3, 0]), (0x8000, &[7]), (0xc000, &[7])]
     {
-        refuses(&mut host, address, words);
+        refuses(host, address, words);
     }
     assert!((INPUTS..n + 2).contains(&port(first, "wanted")), "next to `n`");
-    refuses(&mut host, n.min(port(first, "wanted")), &[7, 7]);
+    refuses(host, n.min(port(first, "wanted")), &[7, 7]);
     assert_eq!(host.read(port(first, "wanted"), 1).expect("a port")[0], 52);
+}
 
+fn periods_are_stepped_and_streamed(host: &mut Host<Simulation>, first: &Program) {
     // Hold, then one period at a time.
     host.set("control", 0b111).expect("control");
     let before = host.register("periods").expect("a register");
@@ -326,8 +348,10 @@ fn runs_talks_and_fails_safe(mut sim: Simulation, wiring: &Wiring, first: &Progr
     }
     assert!(seen.windows(2).all(|pair| pair[1] == pair[0] + 2), "{seen:?}");
     host.set("stream", 0).expect("stream");
+}
 
-    // Noise on the line: requests are repeated, and none is lost or carried out twice.
+/// Noise on the line: requests are repeated, and none is lost or carried out twice.
+fn noise_loses_no_step(host: &mut Host<Simulation>) {
     host.line.noise = 400;
     host.set("control", 0b111).expect("control");
     let before = host.register("periods").expect("a register");
@@ -339,7 +363,9 @@ fn runs_talks_and_fails_safe(mut sim: Simulation, wiring: &Wiring, first: &Progr
     host.line.noise = 0;
     assert!(host.retries > 0, "there was no noise");
     assert!(host.register("errors").expect("a register") > 0);
+}
 
+fn a_start_follows_silence(host: &mut Host<Simulation>, first: &Program) {
     // The host is gone.
     host.line.unplugged = true;
     periods(&mut host.line, 420);
@@ -354,7 +380,9 @@ fn runs_talks_and_fails_safe(mut sim: Simulation, wiring: &Wiring, first: &Progr
     assert_eq!(host.read(port(first, "wanted"), 1).expect("a port")[0], 52);
     periods(&mut host.line, 5);
     assert!(host.status().expect("status").drives());
+}
 
+fn stop_and_reset_make_outputs_safe(host: &mut Host<Simulation>) {
     // The stop input.
     host.line.set("signal_stop", true);
     periods(&mut host.line, 1);
@@ -373,10 +401,12 @@ fn runs_talks_and_fails_safe(mut sim: Simulation, wiring: &Wiring, first: &Progr
     host.line.set("button", false);
     periods(&mut host.line, 6);
     assert!(host.status().expect("status").drives(), "after a reset");
+}
 
+fn wrong_programs_make_outputs_safe(host: &mut Host<Simulation>, first: &Program) {
     // Programs that miss their deadlines, halt, or compute a NaN.
     host.set("control", 0).expect("control");
-    refuses(&mut host, IMAGE + 4 * top::RECORDS as u16, &[1, 2, 3, 0]);
+    refuses(host, IMAGE + 4 * top::RECORDS as u16, &[1, 2, 3, 0]);
     let instead = |what: &str| PROGRAM.replace("        iand    lit, n, 1\n", what);
     let nan = PROGRAM.replace("fmul    force, f, 0.25", "fdiv    force, zero, zero");
     for (source, cause) in

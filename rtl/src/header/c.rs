@@ -21,30 +21,59 @@ pub(super) fn write(header: &Header) -> String {
         header.machine,
         u8::from(header.latched)
     );
-    let mut names = Names::new(&[]);
-    let mut define = |text: &mut String, name: &str, value: String, what: &str| {
-        let name = names.give(&format!("{upper}_{name}"));
+    let mut macros = Macros { names: Names::new(&[]), upper: &upper };
+    write_registers(header, &mut macros, &mut text);
+    let places = write_ports(header, &mut macros, &mut text);
+    write_cycles(header, &mut macros, &mut text);
+    write_accessors(&p, &places, &mut text);
+    write_records(header, &p, &mut text);
+    write_loader(header, &p, &mut text);
+    text
+}
+
+/// Macros with distinct names.
+struct Macros<'a> {
+    names: Names,
+    /// Prefix of all names, in upper case.
+    upper: &'a str,
+}
+
+impl Macros<'_> {
+    /// Writes a macro and returns its name.
+    fn define(&mut self, text: &mut String, name: &str, value: String, what: &str) -> String {
+        let name = self.names.give(&format!("{}_{name}", self.upper));
         let _ = writeln!(text, "#define {name:<40} {value:<10} /* {} */", comment(what));
         name
-    };
+    }
+}
+
+fn write_registers(header: &Header, macros: &mut Macros<'_>, text: &mut String) {
     text.push_str("\n/* The slave's registers. */\n");
     for register in &header.registers {
         let name = register.name.to_uppercase();
-        define(&mut text, &name, format!("0x{:04x}u", register.address), register.text);
+        macros.define(text, &name, format!("0x{:04x}u", register.address), register.text);
         for field in &register.fields {
             let field_name = format!("{name}_{}", field.name.to_uppercase());
-            define(&mut text, &format!("{field_name}_SHIFT"), field.low.to_string(), field.text);
+            macros.define(text, &format!("{field_name}_SHIFT"), field.low.to_string(), field.text);
             let mask = ((1u64 << field.width) - 1) << field.low;
-            define(&mut text, &format!("{field_name}_MASK"), format!("0x{mask:08x}u"), field.text);
+            macros.define(text, &format!("{field_name}_MASK"), format!("0x{mask:08x}u"), field.text);
         }
     }
+}
+
+/// Writes the addresses of ports; returns their macros, and whether they are input ports.
+fn write_ports<'a>(
+    header: &'a Header,
+    macros: &mut Macros<'_>,
+    text: &mut String,
+) -> Vec<(&'a BusPort, String, bool)> {
     let mut places: Vec<(&BusPort, String, bool)> = Vec::new();
     for (title, kind, ports) in [("Input", "IN", &header.inputs), ("Output", "OUT", &header.outputs)] {
         let _ = writeln!(text, "\n/* {title} ports. */");
         for port in ports {
             let what = format!("{} {}, {}", title.to_lowercase(), port.number, port.ty);
-            let name = define(
-                &mut text,
+            let name = macros.define(
+                text,
                 &format!("{kind}_{}", port.name),
                 format!("0x{:04x}u", port.address),
                 &what,
@@ -52,17 +81,24 @@ pub(super) fn write(header: &Header) -> String {
             places.push((port, name, kind == "IN"));
         }
     }
+    places
+}
+
+fn write_cycles(header: &Header, macros: &mut Macros<'_>, text: &mut String) {
     text.push_str("\n/* Cycles. */\n");
     for (name, cycles, what) in header.figures() {
-        define(&mut text, &format!("CYCLES_{}", name.to_uppercase()), format!("{cycles}u"), &what);
+        macros.define(text, &format!("CYCLES_{}", name.to_uppercase()), format!("{cycles}u"), &what);
     }
     if let Some(reason) = &header.no_bound {
         let _ = writeln!(text, "/* There are no bounds: {} */", comment(reason));
     }
+}
 
+/// Writes functions that access ports by name.
+fn write_accessors(p: &str, places: &[(&BusPort, String, bool)], text: &mut String) {
     let mut functions = Names::new(&[]);
     text.push_str("\n/* Ports by name. */\n");
-    for (port, address, is_input) in &places {
+    for (port, address, is_input) in places {
         let (ty, convert) = match port.ty {
             "float" => ("float", true),
             "int" => ("int32_t", true),
@@ -92,7 +128,10 @@ pub(super) fn write(header: &Header) -> String {
             );
         }
     }
+}
 
+/// Writes the loader's records.
+fn write_records(header: &Header, p: &str, text: &mut String) {
     let load = &header.load;
     let count = load.records.len();
     let _ = write!(
@@ -113,6 +152,12 @@ pub(super) fn write(header: &Header) -> String {
         text.push_str("    { 0u, 0u, 0u },\n");
     }
     text.push_str("};\n");
+}
+
+/// Writes the function that loads the program.
+fn write_loader(header: &Header, p: &str, text: &mut String) {
+    let load = &header.load;
+    let upper = p.to_uppercase();
     let _ = write!(
         text,
         r"
@@ -148,5 +193,4 @@ static inline void {p}_load(volatile uint32_t *bus)
         data = load.data_words,
         inputs = crate::wishbone::INPUTS,
     );
-    text
 }

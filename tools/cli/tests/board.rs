@@ -2,7 +2,7 @@
 //! The commands `takt board`, `load` and `live`: output, refusals, and the control loop through a simulated board's pins.
 #![cfg(unix)]
 
-use crate::common::{Folder, SimulatedBoard};
+use crate::common::{Folder, RunOutput, SimulatedBoard};
 use std::io::Write;
 use std::process::Stdio;
 use std::sync::Arc;
@@ -238,53 +238,103 @@ period: isub    error, wanted, n
 ring:   .float  0, 0, 0, 0, 0, 0, 0, 0
 ";
 
+/// Checks that hold while RING runs on the board.
+const SAME: &str = "check error == wanted - n\ncheck x == error\ncheck abs(duty - x * gain) < 0.0001\ncheck ring[(at + 7) % 8] == x\n\
+        check count == period\ncheck at == period % 8\n";
+
+/// A simulated board that runs RING, and a folder with its files.
+struct Bench {
+    board: SimulatedBoard,
+    folder: Folder,
+    port: String,
+    baud: String,
+}
+
+impl Bench {
+    fn start() -> Bench {
+        let folder = Folder::new();
+        folder.write("ring.s", RING);
+        // A faster serial line speeds up the many reads of the whole data memory.
+        let wiring = std::fs::read_to_string(example("position.toml")).unwrap();
+        assert_eq!(wiring.matches("baud = 1_000_000").count(), 1);
+        folder.write("wiring.toml", wiring.replace("baud = 1_000_000", "baud = 10_000_000"));
+        let board = SimulatedBoard::start(
+            "board sim --board ulx3s-85f --wiring wiring.toml --program ring.s --machine t1 --axis motor,encoder,20000",
+            folder.path(),
+        );
+        let (port, baud) = (board.port.clone(), board.baud.clone());
+        Bench { board, folder, port, baud }
+    }
+
+    fn debug(&self, file: &str, more: &str, commands: &str) -> RunOutput {
+        let line = format!("debug {file} --machine t1 --board {} --baud {} {more}", self.port, self.baud);
+        self.folder.fed(&line, commands.as_bytes())
+    }
+
+    fn status(&self) -> String {
+        self.folder.line(&format!("live {} --baud {} status", self.port, self.baud)).ok()
+    }
+
+    /// Loads a program, with the options behind its file.
+    fn load(&self, program: &str) {
+        self.folder.line(&format!("load {} --baud {} {program} --machine t1", self.port, self.baud)).ok();
+    }
+
+    /// Debugs a changed program on a board that claims to carry RING.
+    fn planted(&self, what: &str, by: &str, commands: &str) -> RunOutput {
+        assert_eq!(RING.matches(what).count(), 1);
+        self.folder.write("planted.s", RING.replace(what, by));
+        self.load("planted.s");
+        let liar = Liar::start(&self.port, self.baud.parse().unwrap());
+        let line = format!("debug ring.s --machine t1 --board {} --baud {}", liar.port, self.baud);
+        self.folder.fed(&line, commands.as_bytes())
+    }
+}
+
 /// The debugger on a simulated board: registers, memory, moves, differences, and the state in which the board is left.
 #[test]
 fn a_board_is_debugged() {
-    let folder = Folder::new();
-    folder.write("ring.s", RING);
-    // A faster serial line speeds up the many reads of the whole data memory.
-    let wiring = std::fs::read_to_string(example("position.toml")).unwrap();
-    assert_eq!(wiring.matches("baud = 1_000_000").count(), 1);
-    folder.write("wiring.toml", wiring.replace("baud = 1_000_000", "baud = 10_000_000"));
-    let board = SimulatedBoard::start(
-        "board sim --board ulx3s-85f --wiring wiring.toml --program ring.s --machine t1 --axis motor,encoder,20000",
-        folder.path(),
-    );
-    let (port, baud) = (board.port.clone(), board.baud.clone());
-    let debug = |file: &str, more: &str, commands: &str| {
-        let line = format!("debug {file} --machine t1 --board {port} --baud {baud} {more}");
-        folder.fed(&line, commands.as_bytes())
-    };
-    let status = || folder.line(&format!("live {port} --baud {baud} status")).ok();
-    assert!(status().contains("the program runs; outputs drive"), "{}", status());
+    let bench = Bench::start();
+    values_agree_with_the_emulator(&bench);
+    a_restart_leaves_the_program_held(&bench);
+    other_programs_are_refused(&bench);
+    differences_are_reported(&bench);
+    a_program_halts(&bench);
+    a_program_does_not_reach_its_wait(&bench);
+    the_board_is_unplugged(bench);
+}
+
+fn values_agree_with_the_emulator(bench: &Bench) {
+    assert!(bench.status().contains("the program runs; outputs drive"), "{}", bench.status());
 
     // The outputs have the computed values, and always agree with the emulator.
-    let same = "check error == wanted - n\ncheck x == error\ncheck abs(duty - x * gain) < 0.0001\ncheck ring[(at + 7) % 8] == x\n\
-        check count == period\ncheck at == period % 8\n";
     let commands = format!(
-        "print count, ring[1]\n{same}step\n{same}set wanted = 7\nstep 3\n{same}check wanted == 7\nuntil at == 2\ncheck at == 2\n{same}\
+        "print count, ring[1]\n{SAME}step\n{SAME}set wanted = 7\nstep 3\n{SAME}check wanted == 7\nuntil at == 2\ncheck at == 2\n{SAME}\
          watch at == 5\ncontinue\ncheck at == 5\nregisters\nmemory ring 8\nwhere\nquit\n"
     );
-    let text = debug("ring.s", "", &commands).ok();
+    let text = bench.debug("ring.s", "", &commands).ok();
     assert!(text.starts_with("period ") && text.contains(": waits for the tick, since bundle "), "{text}");
     assert!(text.contains("; outputs drive\n   12  period: isub    error, wanted, n\n"), "{text}");
     assert!(text.contains("at           r") && text.contains("    0 ring         "), "{text}");
     assert!(text.ends_with("(takt) quit\nthe program runs; outputs drive\n"), "{text}");
-    assert!(status().contains("the program runs; outputs drive"), "{}", status());
+    assert!(bench.status().contains("the program runs; outputs drive"), "{}", bench.status());
+}
 
-    // After a restart unwritten values are known; the program stays held, as requested.
-    let commands = format!("print x\nstep 12\n{same}check sum == 12 * x\n");
-    let text = debug("ring.s", "--restart", &commands).ok();
+/// After a restart unwritten values are known; the program stays held, as requested.
+fn a_restart_leaves_the_program_held(bench: &Bench) {
+    let commands = format!("print x\nstep 12\n{SAME}check sum == 12 * x\n");
+    let text = bench.debug("ring.s", "--restart", &commands).ok();
     assert!(text.starts_with("period 0: waits") && text.contains("x = (never written)\n"), "{text}");
     assert!(text.ends_with("the program stays held; outputs are safe\n"), "{text}");
-    assert!(status().contains("the program held; outputs are safe"), "{}", status());
-    let text = debug("ring.s", "", "goto start\nstep\ngo\nhold\ngo\n").ok();
+    assert!(bench.status().contains("the program held; outputs are safe"), "{}", bench.status());
+    let text = bench.debug("ring.s", "", "goto start\nstep\ngo\nhold\ngo\n").ok();
     assert!(text.ends_with("the program runs; outputs are safe\n"), "{text}");
+}
 
-    // A session with another program is refused: names would be wrong.
-    folder.write("other.s", RING.replace("itof    x, error", "itof    x, wanted"));
-    let other = debug("other.s", "", "print x\n");
+/// A session with another program is refused: names would be wrong.
+fn other_programs_are_refused(bench: &Bench) {
+    bench.folder.write("other.s", RING.replace("itof    x, error", "itof    x, wanted"));
+    let other = bench.debug("other.s", "", "print x\n");
     assert_eq!((other.status, other.stdout.as_str()), (Some(1), ""));
     assert!(
         other.stderr.contains("the board does not carry other.s; `takt load")
@@ -292,20 +342,14 @@ fn a_board_is_debugged() {
         "{}",
         other.stderr
     );
-    folder.write("longer.s", RING.replace("wait    period\n.data", "nop\n wait period\n.data"));
-    let longer = debug("longer.s", "", "print x\n");
+    bench.folder.write("longer.s", RING.replace("wait    period\n.data", "nop\n wait period\n.data"));
+    let longer = bench.debug("longer.s", "", "print x\n");
     assert!(longer.stderr.contains("its image has "), "{}", longer.stderr);
+}
 
-    // Differences: the board runs a changed program but claims to run the original.
-    let planted = |what: &str, by: &str, commands: &str| {
-        assert_eq!(RING.matches(what).count(), 1);
-        folder.write("planted.s", RING.replace(what, by));
-        folder.line(&format!("load {port} --baud {baud} planted.s --machine t1")).ok();
-        let liar = Liar::start(&port, baud.parse().unwrap());
-        let line = format!("debug ring.s --machine t1 --board {} --baud {baud}", liar.port);
-        folder.fed(&line, commands.as_bytes())
-    };
-    let done = planted(
+/// Differences: the board runs a changed program but claims to run the original.
+fn differences_are_reported(bench: &Bench) {
+    let done = bench.planted(
         "isub    error, wanted, n",
         "iadd    error, wanted, n",
         "set wanted = 900\nstep 4\nprint error\n",
@@ -319,19 +363,20 @@ fn a_board_is_debugged() {
         "{done:?}"
     );
     assert!(done.stdout.ends_with("the program runs; outputs drive\n"), "{done:?}");
-    let done = planted("iadd    count, count, 1", "isub    count, count, 1", "step 2\n");
+    let done = bench.planted("iadd    count, count, 1", "isub    count, count, 1", "step 2\n");
     assert!(done.stderr.contains("`count` (register r2) is -") && done.status == Some(1), "{done:?}");
-    let done = planted("st      ring[at], x", "st      ring[at], sum", "step 2\n");
+    let done = bench.planted("st      ring[at], x", "st      ring[at], sum", "step 2\n");
     assert!(done.stderr.contains(": data word ") && done.stderr.contains(" (`ring"), "{done:?}");
-    let done = planted("gain = 0.02", "gain = 0.03", "");
+    let done = bench.planted("gain = 0.02", "gain = 0.03", "");
     assert!(
         done.stdout
             .contains(" is 0.03 on the board, 0.02 in the emulator, and the program does not write it\n"),
         "{done:?}"
     );
+}
 
-    // A program that halts.
-    folder.write(
+fn a_program_halts(bench: &Bench) {
+    bench.folder.write(
         "halts.s",
         RING.replace(
             "iadd    count, count, 1\n",
@@ -339,8 +384,8 @@ fn a_board_is_debugged() {
         )
         .replace(".data", "stop: halt\n.data"),
     );
-    folder.line(&format!("load {port} --baud {baud} halts.s --machine t1 --stopped")).ok();
-    let stopped = debug("halts.s", "", "step\ngoto start\nstep 9\ncheck count == 5\nstep\n");
+    bench.load("halts.s --stopped");
+    let stopped = bench.debug("halts.s", "", "step\ngoto start\nstep 9\ncheck count == 5\nstep\n");
     assert!(stopped.stdout.starts_with("stopped, in reset; outputs are safe\n"), "{stopped:?}");
     assert!(stopped.stdout.contains("the program has halted\nperiod 4: halted at bundle "), "{stopped:?}");
     assert!(stopped.stdout.ends_with("the program has halted; outputs are safe\n"), "{stopped:?}");
@@ -349,28 +394,35 @@ fn a_board_is_debugged() {
         stopped.stderr.contains(says) && stopped.stderr.contains("standard input:5: the program has halted"),
         "{stopped:?}"
     );
+}
 
-    // A program that does not reach its `wait`, and outputs that drive while the program is stepped.
-    folder.write("endless.s", RING.replace("count, 1\n", "count, 1\n bnz wanted, period\n"));
-    folder.line(&format!("load {port} --baud {baud} endless.s --machine t1")).ok();
+fn a_program_does_not_reach_its_wait(bench: &Bench) {
+    // A program that does not reach its `wait`, and outputs that drive while it is stepped.
+    bench.folder.write("endless.s", RING.replace("count, 1\n", "count, 1\n bnz wanted, period\n"));
+    bench.load("endless.s");
     let endless =
-        debug("endless.s", "--restart", "set wanted = 1\nstep\nwhere\nprint x\ngoto start\nprint x\n");
+        bench.debug("endless.s", "--restart", "set wanted = 1\nstep\nwhere\nprint x\ngoto start\nprint x\n");
     let says = "error: standard input:2: the program does not come to its `wait`";
     assert!(endless.status == Some(1) && endless.stderr.contains(says), "{endless:?}");
     assert!(endless.stdout.contains("period 0: has not come to its `wait`; bundle "), "{endless:?}");
     assert!(endless.stderr.contains("standard input:4: the program is in a period"), "{endless:?}");
     assert!(endless.stdout.contains("x = (never written)\nthe program stays held"), "{endless:?}");
-    let driven = debug("endless.s", "--restart --drive", "step 2\n").ok();
+    let driven = bench.debug("endless.s", "--restart --drive", "step 2\n").ok();
     assert!(driven.ends_with("the program stays held; outputs drive\n"), "{driven}");
 
-    // The emulator does not reach the `wait` either, which the message reports.
-    let line =
-        format!("live {port} --baud {baud} --program endless.s --machine t1 shadow wanted=1 --periods 3");
-    let shadow = folder.line(&line);
+    // The emulator does not reach the `wait` either, and that is the message.
+    let line = format!(
+        "live {} --baud {} --program endless.s --machine t1 shadow wanted=1 --periods 3",
+        bench.port, bench.baud
+    );
+    let shadow = bench.folder.line(&line);
     let says = "period 1: the program does not wait for its tick";
     assert!(shadow.status == Some(1) && shadow.stderr.contains(says), "{shadow:?}");
+}
 
-    // Unplugged while a script waits for its next command.
+/// Unplugged while a script waits for its next command.
+fn the_board_is_unplugged(bench: Bench) {
+    let Bench { board, folder, port, baud } = bench;
     let mut host = std::process::Command::new(env!("CARGO_BIN_EXE_takt"));
     let line = format!("debug endless.s --machine t1 --board {port} --baud {baud} --restart");
     host.args(line.split_whitespace()).current_dir(folder.path());

@@ -309,8 +309,7 @@ fn decoder(machine: &Machine, slot: &SlotPlan) -> String {
 /// Rules of issue as properties of issue events alone, independent of the core's scoreboard.
 fn scoreboard(plan: &Plan) -> String {
     let last = plan.index - 1;
-    let banks = plan.slots.len();
-    let (issue, fault, rst, load, advance) = (net::ISSUE, net::FAULT, net::RST, net::LOAD, net::ADVANCE);
+    let (issue, fault, rst, load) = (net::ISSUE, net::FAULT, net::RST, net::LOAD);
     let mut v = format!(
         "
     // ---- properties, added by `cargo evidence formal`
@@ -335,81 +334,10 @@ fn scoreboard(plan: &Plan) -> String {
     let mut checks = format!("        if (f_stopped & ~{rst}) assert (~{issue});\n");
     let mut drains = Vec::new();
     for slot in &plan.slots {
-        let name = slot.name();
-        let dest = slot.dest(Stage::Issue);
-        let mut latencies: Vec<u32> =
-            slot.slot.units.iter().map(|unit| unit.latency).filter(|&latency| latency > 0).collect();
-        latencies.sort_unstable();
-        latencies.dedup();
-        // Registers of the properties: cycles until the writeback of `f_register`, and cycles in which the bank is written.
-        let _ = writeln!(
-            v,
-            "
-    reg [5:0]  f_{name}_pending;
-    reg        f_{name}_due;
-    reg [63:0] f_{name}_booked;
-    wire       f_{name}_hit = {dest} == f_register;
-    always @(posedge clk) begin
-        f_{name}_pending <= f_{name}_pending - {{5'd0, |f_{name}_pending}};
-        f_{name}_due     <= f_{name}_pending == 6'd1;
-        f_{name}_booked  <= f_{name}_booked >> 1;"
-        );
-        for &latency in &latencies {
-            let issues = format!("f_issue & {}", slot.bit(Stage::Issue, ControlBit::Result(latency)));
-            let _ = writeln!(
-                v,
-                "        if ({issues}) f_{name}_booked[{0}] <= 1'b1;\n        if ({issues} & f_{name}_hit) f_{name}_pending <= 6'd{0};",
-                latency - 1
-            );
-            let _ = writeln!(checks, "        if ({issues}) assert (~f_{name}_booked[{latency}]);");
-            let _ =
-                writeln!(checks, "        if ({issues} & f_{name}_hit) assert (f_{name}_pending == 6'd0);");
-        }
-        let _ = writeln!(
-            v,
-            "        if ({rst}) begin\n            f_{name}_pending <= 6'd0;\n            f_{name}_due <= 1'b0;\n            f_{name}_booked <= 64'd0;\n        end\n    end"
-        );
-        let (written, register) = (slot.in_flight().at(0), slot.in_flight_index().low(plan.index));
-        let _ = writeln!(checks, "        if (f_check) assert ({written} == f_{name}_booked[0]);");
-        let _ = writeln!(
-            checks,
-            "        if (f_check) assert (({written} & ({register} == f_register)) == f_{name}_due);"
-        );
-        drains.push(format!("(|f_{name}_booked[63:1])"));
-        for late in &slot.late {
-            let u = format!("f_{name}_{}_busy", late.unit.name);
-            let uses = format!("f_issue & {}", slot.bit(Stage::Issue, ControlBit::Unit(late.unit.name)));
-            let _ = writeln!(
-                v,
-                "    reg [5:0] {u};\n    always @(posedge clk) {u} <= {rst} ? 6'd0 : {uses} ? 6'd{} : {u} - {{5'd0, |{u}}};",
-                late.unit.interval - 1
-            );
-            let _ = writeln!(checks, "        if ({uses}) assert ({u} == 6'd0);");
-        }
-        for operand in 0..slot.sources {
-            let source = slot.source(operand);
-            let _ = writeln!(
-                v,
-                "    reg [{banks}:0] f_r_{source}_bank, f_i_{source}_bank;
-    reg [{last}:0] f_r_{source}_index, f_i_{source}_index;
-    always @(posedge clk) if ({advance}) begin
-        f_r_{source}_bank  <= {};
-        f_r_{source}_index <= {};
-        f_i_{source}_bank  <= f_r_{source}_bank;
-        f_i_{source}_index <= f_r_{source}_index;
-    end",
-                slot.source_bank(Stage::Match, operand),
-                slot.source_index(Stage::Match, operand)
-            );
-            for producer in &plan.slots {
-                let _ = writeln!(
-                    checks,
-                    "        if (f_issue & f_i_{source}_bank[{}] & (f_i_{source}_index == f_register)) assert (f_{}_pending == 6'd0);",
-                    producer.number,
-                    producer.name()
-                );
-            }
-        }
+        writebacks(plan, slot, &mut v, &mut checks);
+        drains.push(format!("(|f_{}_booked[63:1])", slot.name()));
+        busy_units(slot, &mut v, &mut checks);
+        operands(plan, slot, &mut v, &mut checks);
         if slot.has(ControlBit::Drains) {
             let _ = writeln!(
                 checks,
@@ -421,4 +349,91 @@ fn scoreboard(plan: &Plan) -> String {
     let _ = writeln!(v, "    wire f_undrained = {};", drains.join(" | "));
     let _ = writeln!(v, "    always @* if (f_cycle >= {RESET}) begin\n{checks}    end\n");
     v
+}
+
+/// Properties of a slot's writebacks: at most one in a cycle, each after its latency.
+fn writebacks(plan: &Plan, slot: &SlotPlan, v: &mut String, checks: &mut String) {
+    let (name, rst) = (slot.name(), net::RST);
+    let dest = slot.dest(Stage::Issue);
+    let mut latencies: Vec<u32> =
+        slot.slot.units.iter().map(|unit| unit.latency).filter(|&latency| latency > 0).collect();
+    latencies.sort_unstable();
+    latencies.dedup();
+    // Registers of the properties: cycles until the writeback of `f_register`, and cycles in which the bank is written.
+    let _ = writeln!(
+        v,
+        "
+    reg [5:0]  f_{name}_pending;
+    reg        f_{name}_due;
+    reg [63:0] f_{name}_booked;
+    wire       f_{name}_hit = {dest} == f_register;
+    always @(posedge clk) begin
+        f_{name}_pending <= f_{name}_pending - {{5'd0, |f_{name}_pending}};
+        f_{name}_due     <= f_{name}_pending == 6'd1;
+        f_{name}_booked  <= f_{name}_booked >> 1;"
+    );
+    for &latency in &latencies {
+        let issues = format!("f_issue & {}", slot.bit(Stage::Issue, ControlBit::Result(latency)));
+        let _ = writeln!(
+            v,
+            "        if ({issues}) f_{name}_booked[{0}] <= 1'b1;\n        if ({issues} & f_{name}_hit) f_{name}_pending <= 6'd{0};",
+            latency - 1
+        );
+        let _ = writeln!(checks, "        if ({issues}) assert (~f_{name}_booked[{latency}]);");
+        let _ = writeln!(checks, "        if ({issues} & f_{name}_hit) assert (f_{name}_pending == 6'd0);");
+    }
+    let _ = writeln!(
+        v,
+        "        if ({rst}) begin\n            f_{name}_pending <= 6'd0;\n            f_{name}_due <= 1'b0;\n            f_{name}_booked <= 64'd0;\n        end\n    end"
+    );
+    let (written, register) = (slot.in_flight().at(0), slot.in_flight_index().low(plan.index));
+    let _ = writeln!(checks, "        if (f_check) assert ({written} == f_{name}_booked[0]);");
+    let _ = writeln!(
+        checks,
+        "        if (f_check) assert (({written} & ({register} == f_register)) == f_{name}_due);"
+    );
+}
+
+/// Properties of a slot's units: issues keep their intervals.
+fn busy_units(slot: &SlotPlan, v: &mut String, checks: &mut String) {
+    let (name, rst) = (slot.name(), net::RST);
+    for late in &slot.late {
+        let u = format!("f_{name}_{}_busy", late.unit.name);
+        let uses = format!("f_issue & {}", slot.bit(Stage::Issue, ControlBit::Unit(late.unit.name)));
+        let _ = writeln!(
+            v,
+            "    reg [5:0] {u};\n    always @(posedge clk) {u} <= {rst} ? 6'd0 : {uses} ? 6'd{} : {u} - {{5'd0, |{u}}};",
+            late.unit.interval - 1
+        );
+        let _ = writeln!(checks, "        if ({uses}) assert ({u} == 6'd0);");
+    }
+}
+
+/// Properties of a slot's operands: no writeback to them is pending at issue.
+fn operands(plan: &Plan, slot: &SlotPlan, v: &mut String, checks: &mut String) {
+    let (last, banks, advance) = (plan.index - 1, plan.slots.len(), net::ADVANCE);
+    for operand in 0..slot.sources {
+        let source = slot.source(operand);
+        let _ = writeln!(
+            v,
+            "    reg [{banks}:0] f_r_{source}_bank, f_i_{source}_bank;
+    reg [{last}:0] f_r_{source}_index, f_i_{source}_index;
+    always @(posedge clk) if ({advance}) begin
+        f_r_{source}_bank  <= {};
+        f_r_{source}_index <= {};
+        f_i_{source}_bank  <= f_r_{source}_bank;
+        f_i_{source}_index <= f_r_{source}_index;
+    end",
+            slot.source_bank(Stage::Match, operand),
+            slot.source_index(Stage::Match, operand)
+        );
+        for producer in &plan.slots {
+            let _ = writeln!(
+                checks,
+                "        if (f_issue & f_i_{source}_bank[{}] & (f_i_{source}_index == f_register)) assert (f_{}_pending == 6'd0);",
+                producer.number,
+                producer.name()
+            );
+        }
+    }
 }

@@ -170,13 +170,8 @@ impl Tree {
         })
     }
 
-    /// Extracts the robot between `base` (by default the root) and `tip` (by default everything that the base carries). Joints off the path
-    /// to the tip, or beyond it, are held at 0. Gravity acts as on the root.
-    ///
-    /// # Errors
-    /// If a link is unknown, the base does not carry the tip, the links do not form a tree, or nothing moves.
-    pub fn robot(&self, base: Option<&str>, tip: Option<&str>) -> Result<Robot, Error> {
-        let carriers = self.carriers()?;
+    /// Returns the link that no joint carries.
+    fn root(&self, carriers: &HashMap<&str, &Element>) -> Result<&str, Error> {
         let mut roots =
             self.links.iter().map(|(link, _)| link.as_str()).filter(|link| !carriers.contains_key(link));
         let root = roots
@@ -187,29 +182,50 @@ impl Tree {
                 format!("links `{root}` and `{other}` are both carried by no joint: a robot has one base");
             return Err(Error::plain(text));
         }
-        let base = base.map_or(Ok(root), |name| self.link(name, "--base"))?;
-        let way = match tip {
-            None => None,
-            Some(tip) => {
-                let path = self.path(&carriers, self.link(tip, "--tip")?)?;
-                let end = path.iter().position(|joint| joint.parent == base);
-                let end = end
-                    .ok_or_else(|| Error::plain(format!("--tip: link `{tip}` is not carried by `{base}`")))?;
-                Some(path[..=end].iter().map(|joint| joint.name.as_str()).collect::<HashSet<_>>())
-            }
-        };
-        // Direction of free fall in the base's frame, with all joints at 0.
+        Ok(root)
+    }
+
+    /// Names of the joints from `base` to `tip`.
+    fn way<'a>(
+        &'a self,
+        carriers: &HashMap<&str, &'a Element>,
+        base: &str,
+        tip: &str,
+    ) -> Result<HashSet<&'a str>, Error> {
+        let path = self.path(carriers, self.link(tip, "--tip")?)?;
+        let end = path.iter().position(|joint| joint.parent == base);
+        let end =
+            end.ok_or_else(|| Error::plain(format!("--tip: link `{tip}` is not carried by `{base}`")))?;
+        Ok(path[..=end].iter().map(|joint| joint.name.as_str()).collect())
+    }
+
+    /// Gravity in the frame of `base`, with all joints at 0.
+    fn gravity_at(&self, carriers: &HashMap<&str, &Element>, base: &str) -> Result<V3, Error> {
         let fall = space::norm(self.gravity);
         let mut down = self.gravity.map(|x| if fall > 0.0 { x / fall } else { 0.0 });
-        for joint in self.path(&carriers, base)?.iter().rev() {
+        for joint in self.path(carriers, base)?.iter().rev() {
             down = space::turn(&space::transpose(&joint.rotation), down);
         }
+        Ok(space::scale(fall, space::cleaned_vector(down, 1.0)))
+    }
+
+    /// Extracts the robot between `base` (by default the root) and `tip` (by default everything that the base carries). Joints off the path
+    /// to the tip, or beyond it, are held at 0. Gravity acts as on the root.
+    ///
+    /// # Errors
+    /// If a link is unknown, the base does not carry the tip, the links are no tree, or nothing moves.
+    pub fn robot(&self, base: Option<&str>, tip: Option<&str>) -> Result<Robot, Error> {
+        let carriers = self.carriers()?;
+        let root = self.root(&carriers)?;
+        let base = base.map_or(Ok(root), |name| self.link(name, "--base"))?;
+        let way = tip.map(|tip| self.way(&carriers, base, tip)).transpose()?;
+        let gravity = self.gravity_at(&carriers, base)?;
         let mut robot = Robot {
             name: self.name.clone(),
             base: base.to_owned(),
             joints: Vec::new(),
             frames: Vec::new(),
-            gravity: space::scale(fall, space::cleaned_vector(down, 1.0)),
+            gravity,
             notes: self.notes.clone(),
         };
         let mut children: HashMap<&str, Vec<&Element>> = HashMap::new();
@@ -257,37 +273,9 @@ impl Tree {
                     stack.push((&joint.child, Carrier::Known(carrier, pose.then(&rest))));
                     continue;
                 }
-                let kind = match joint.kind {
-                    ElementKind::Moves(kind) => kind,
-                    ElementKind::Floating(kind, known) | ElementKind::Refused(kind, known) => {
-                        let text = format!(
-                            "{kind}: only {known} are known; take the part of the robot behind it with `--base {}`",
-                            joint.child
-                        );
-                        return Err(joint.wrong(text));
-                    }
-                    ElementKind::Fixed | ElementKind::Held => continue,
-                };
-                let length = space::norm(joint.axis);
-                if !(length.is_finite() && length > 1e-9) {
-                    return Err(joint.wrong("its axis has no direction"));
-                }
-                if robot.joints.len() >= MAX_JOINTS {
-                    let text = format!(
-                        "the robot has more than {MAX_JOINTS} joints; --base and --tip take a part of it"
-                    );
-                    return Err(joint.wrong(text));
-                }
-                let moving = Joint {
-                    name: joint.name.clone(),
-                    kind,
-                    parent: carrier,
-                    place: pose.then(&rest),
-                    axis: space::scale(1.0 / length, joint.axis),
-                    passive: joint.passive,
-                    body: Inertia::default(),
-                };
-                stack.push((&joint.child, Carrier::New(moving)));
+                let place = pose.then(&rest);
+                let moving = moving_joint(joint, carrier, place, robot.joints.len())?;
+                stack.extend(moving.map(|moving| (joint.child.as_str(), Carrier::New(moving))));
             }
         }
         if robot.joints.is_empty() {
@@ -308,6 +296,43 @@ impl Tree {
         self.conditioned(&mut robot)?;
         Ok(robot)
     }
+}
+
+/// Joint of a robot with `joints` joints before it, without its body; `None` if the element does not move.
+fn moving_joint(
+    joint: &Element,
+    parent: Option<usize>,
+    place: Pose,
+    joints: usize,
+) -> Result<Option<Joint>, Error> {
+    let kind = match joint.kind {
+        ElementKind::Moves(kind) => kind,
+        ElementKind::Floating(kind, known) | ElementKind::Refused(kind, known) => {
+            let text = format!(
+                "{kind}: only {known} are known; take the part of the robot behind it with `--base {}`",
+                joint.child
+            );
+            return Err(joint.wrong(text));
+        }
+        ElementKind::Fixed | ElementKind::Held => return Ok(None),
+    };
+    let length = space::norm(joint.axis);
+    if !(length.is_finite() && length > 1e-9) {
+        return Err(joint.wrong("its axis has no direction"));
+    }
+    if joints >= MAX_JOINTS {
+        let text = format!("the robot has more than {MAX_JOINTS} joints; --base and --tip take a part of it");
+        return Err(joint.wrong(text));
+    }
+    Ok(Some(Joint {
+        name: joint.name.clone(),
+        kind,
+        parent,
+        place,
+        axis: space::scale(1.0 / length, joint.axis),
+        passive: joint.passive,
+        body: Inertia::default(),
+    }))
 }
 
 impl Tree {

@@ -360,7 +360,6 @@ pub fn read_with(bytes: &[u8]) -> Result<(Program, Option<DebugInfo>), ImageErro
     if bytes.len() > LIMIT {
         return Err(ImageError::TooLarge { bytes: bytes.len() });
     }
-    let damaged = |error: object::read::Error| ImageError::Damaged(error.to_string());
     let ident = |index: usize| bytes.get(index).copied();
     if bytes.len() >= 16 && (ident(4), ident(5)) != (Some(1), Some(1)) {
         return Err(ImageError::NotTakt);
@@ -413,31 +412,7 @@ pub fn read_with(bytes: &[u8]) -> Result<(Program, Option<DebugInfo>), ImageErro
     let code: Vec<u64> = code.as_chunks::<8>().0.iter().map(|bytes| u64::from_le_bytes(*bytes)).collect();
     validate::words(&code)?;
     let constants = validate::constants(&words(constants), machine)?;
-    let symbols = {
-        let table = sections.symbols(LE, bytes, elf::SHT_SYMTAB).map_err(damaged)?;
-        let mut symbols = Vec::new();
-        // The first is the null symbol.
-        for symbol in table.iter().skip(1) {
-            let name = symbol.name(LE, table.strings()).map_err(damaged)?;
-            let name = std::str::from_utf8(name)
-                .map_err(|_| ImageError::Name(String::from_utf8_lossy(name).into_owned()))?
-                .to_owned();
-            let address = symbol.st_value(LE);
-            let space = match symbol.st_shndx(LE).0 as usize {
-                index if index == code_index => Space::Code,
-                index if index == data_index => Space::Data,
-                _ => {
-                    return Err(ImageError::Label {
-                        name,
-                        address,
-                        reason: "it is in neither code nor data",
-                    });
-                }
-            };
-            symbols.push(Symbol { name, space, address });
-        }
-        symbols
-    };
+    let symbols = symbols(&sections, bytes, code_index, data_index)?;
     let mut program = meta.into_program(machine, code, words(data), constants, symbols)?;
     let bound =
         |&[address, most]: &[u32; 2]| LoopBound { address: BundleAddress::new(address), most, total: None };
@@ -454,6 +429,38 @@ pub fn read_with(bytes: &[u8]) -> Result<(Program, Option<DebugInfo>), ImageErro
     let debug = optional(DEBUG)?;
     let debug = debug.map(|(_, debug)| debug::from_json(debug, &program)).transpose()?;
     Ok((program, debug))
+}
+
+fn damaged(error: object::read::Error) -> ImageError {
+    ImageError::Damaged(error.to_string())
+}
+
+/// Labels of an image, given the indices of its sections for code and data.
+fn symbols(
+    sections: &object::read::elf::SectionTable<'_, elf::FileHeader32<LE>>,
+    bytes: &[u8],
+    code: usize,
+    data: usize,
+) -> Result<Vec<Symbol>, ImageError> {
+    let table = sections.symbols(LE, bytes, elf::SHT_SYMTAB).map_err(damaged)?;
+    let mut symbols = Vec::new();
+    // The first is the null symbol.
+    for symbol in table.iter().skip(1) {
+        let name = symbol.name(LE, table.strings()).map_err(damaged)?;
+        let name = std::str::from_utf8(name)
+            .map_err(|_| ImageError::Name(String::from_utf8_lossy(name).into_owned()))?
+            .to_owned();
+        let address = symbol.st_value(LE);
+        let space = match symbol.st_shndx(LE).0 as usize {
+            index if index == code => Space::Code,
+            index if index == data => Space::Data,
+            _ => {
+                return Err(ImageError::Label { name, address, reason: "it is in neither code nor data" });
+            }
+        };
+        symbols.push(Symbol { name, space, address });
+    }
+    Ok(symbols)
 }
 
 #[cfg(test)]

@@ -16,6 +16,50 @@ pub(crate) fn line<'t, 'a: 't>() -> Rule<'t, 'a, ParsedLine> {
     let expression = expression(false);
     let name = name(name_ref(expression.clone()));
     let expr = expr(expression.clone());
+    let operands = operand(name.clone(), expression.clone())
+        .separated_by(just(Token::Comma).labelled(ExpectedItem::Comma))
+        .collect::<Vec<()>>();
+
+    let operation =
+        name.clone().labelled(ExpectedItem::Instruction).then(operands).map_with(|(mnemonic, count), e| {
+            let span = e.span();
+            (e.state() as &mut Builder<'a>).push_operation(mnemonic, count.len(), span);
+        });
+    let raw = just(Token::Directive(Directive::Raw))
+        .labelled(ExpectedItem::Instruction)
+        .map_with(|_, e| e.span())
+        .then(name.clone().labelled(ExpectedItem::Slot))
+        .then(expr.clone())
+        .map_with(|((raw, slot), word), e| {
+            let span = e.span();
+            let builder: &mut Builder<'a> = e.state();
+            builder.ast.operands.push(Operand { kind: OperandKind::Name(slot.name), span: slot.span });
+            builder.ast.operands.push(Operand { kind: OperandKind::Expr(word.id), span: word.span });
+            let mnemonic = NameRef::plain(NameId::of_directive(Directive::Raw));
+            builder.push_operation(Name { name: mnemonic, span: raw }, 2, span);
+        });
+    let bundle = rule(operation)
+        .or(rule(raw))
+        .separated_by(just(Token::Bars).labelled(ExpectedItem::Bars))
+        .at_least(1)
+        .collect::<Vec<()>>()
+        .map(|count| Body::Bundle(count.len() as u32));
+
+    let directive = directive(name.clone(), expr, expression);
+    let body =
+        rule(bundle).or(directive).labelled(ExpectedItem::InstructionOrDirective).or(empty().to(Body::Empty));
+    // A plain label takes one look ahead; only a template is read twice.
+    let label = name.then_ignore(just(Token::Colon)).or_not();
+    rule(
+        label
+            .then(body)
+            .then_ignore(just(Token::Newline).labelled(ExpectedItem::EndOfLine))
+            .map(|(label, body)| ParsedLine { label, body }),
+    )
+}
+
+/// The parser of an instruction's operand, which it appends to the tree.
+fn operand<'t, 'a: 't>(name: Rule<'t, 'a, Name>, expression: Rule<'t, 'a, ()>) -> Rule<'t, 'a, ()> {
     let place = rule(
         just(Token::At)
             .ignore_then(name.clone())
@@ -77,45 +121,7 @@ pub(crate) fn line<'t, 'a: 't>() -> Rule<'t, 'a, ParsedLine> {
         .map_with(cast)
         .map_with(|operand, e| (e.state() as &mut Builder<'a>).ast.operands.push(operand))
         .labelled(ExpectedItem::Operand);
-    let operands =
-        rule(operand).separated_by(just(Token::Comma).labelled(ExpectedItem::Comma)).collect::<Vec<()>>();
-
-    let operation =
-        name.clone().labelled(ExpectedItem::Instruction).then(operands).map_with(|(mnemonic, count), e| {
-            let span = e.span();
-            (e.state() as &mut Builder<'a>).push_operation(mnemonic, count.len(), span);
-        });
-    let raw = just(Token::Directive(Directive::Raw))
-        .labelled(ExpectedItem::Instruction)
-        .map_with(|_, e| e.span())
-        .then(name.clone().labelled(ExpectedItem::Slot))
-        .then(expr.clone())
-        .map_with(|((raw, slot), word), e| {
-            let span = e.span();
-            let builder: &mut Builder<'a> = e.state();
-            builder.ast.operands.push(Operand { kind: OperandKind::Name(slot.name), span: slot.span });
-            builder.ast.operands.push(Operand { kind: OperandKind::Expr(word.id), span: word.span });
-            let mnemonic = NameRef::plain(NameId::of_directive(Directive::Raw));
-            builder.push_operation(Name { name: mnemonic, span: raw }, 2, span);
-        });
-    let bundle = rule(operation)
-        .or(rule(raw))
-        .separated_by(just(Token::Bars).labelled(ExpectedItem::Bars))
-        .at_least(1)
-        .collect::<Vec<()>>()
-        .map(|count| Body::Bundle(count.len() as u32));
-
-    let directive = directive(name.clone(), expr, expression.clone());
-    let body =
-        rule(bundle).or(directive).labelled(ExpectedItem::InstructionOrDirective).or(empty().to(Body::Empty));
-    // A plain label takes one look ahead; only a template is read twice.
-    let label = name.then_ignore(just(Token::Colon)).or_not();
-    rule(
-        label
-            .then(body)
-            .then_ignore(just(Token::Newline).labelled(ExpectedItem::EndOfLine))
-            .map(|(label, body)| ParsedLine { label, body }),
-    )
+    rule(operand)
 }
 
 /// A name and its place.

@@ -183,18 +183,18 @@ impl<'s> Lexer<'s> {
                 && (span.end - first.start) as usize > limits::LINE_BYTES
             {
                 (line.long, line.bad) = (true, true);
-                let message = format!(
-                    "this line is longer than the {} bytes that the assembler reads",
-                    limits::LINE_BYTES
-                );
-                sink.push(
-                    Diagnostic::error("limit", first, message)
-                        .here("it begins here")
-                        .help("break it into several lines"),
-                );
+                sink.push(too_long(first));
             }
         }
     }
+}
+
+/// Error of a line that is longer than the assembler reads, given its first token.
+#[cold]
+fn too_long(first: Span) -> Diagnostic {
+    let message =
+        format!("this line is longer than the {} bytes that the assembler reads", limits::LINE_BYTES);
+    Diagnostic::error("limit", first, message).here("it begins here").help("break it into several lines")
 }
 
 /// The line being read.

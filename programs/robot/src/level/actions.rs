@@ -126,20 +126,25 @@ impl<R: Robot + Clone> Session<R> {
                     }
                     None => 0.0,
                 };
-                let event = match what {
-                    Simulation::Input(number, on) => {
-                        Event::Input(self.whole(machine, number, "a digital input's number", 32)?, *on)
-                    }
-                    Simulation::Analogue(channel, value) => {
-                        let channel = self.whole(machine, channel, "an analogue input's channel", 2)?;
-                        Event::Analogue(channel, value::number(value, &self.environment(machine))? as f32)
-                    }
-                    Simulation::Fault(fault) => Event::Fault(*fault),
-                };
+                let event = self.event(machine, what)?;
                 self.host.schedule(after, event);
             }
         }
         Ok(())
+    }
+
+    /// Event of a simulated input or fault.
+    fn event(&self, machine: &Machine, what: &Simulation) -> Result<Event, Failure> {
+        Ok(match what {
+            Simulation::Input(number, on) => {
+                Event::Input(self.whole(machine, number, "a digital input's number", 32)?, *on)
+            }
+            Simulation::Analogue(channel, value) => {
+                let channel = self.whole(machine, channel, "an analogue input's channel", 2)?;
+                Event::Analogue(channel, value::number(value, &self.environment(machine))? as f32)
+            }
+            Simulation::Fault(fault) => Event::Fault(*fault),
+        })
     }
 
     fn name(&mut self, machine: &mut Machine, name: &str, value: Value) {

@@ -141,22 +141,28 @@ impl Asm {
             None => Ok(Some(self.file.with_extension("takt"))),
         }
     }
+
+    /// Files that the command writes, with their options.
+    fn writes<'a>(&'a self, image_path: &'a Option<PathBuf>) -> Vec<OptionPath<'a>> {
+        let mut writes: Vec<OptionPath<'_>> =
+            [("the image", image_path), ("--listing", &self.listing), ("--symbols", &self.symbols)]
+                .into_iter()
+                .filter_map(|(option, path)| Some((option, path.as_deref()?)))
+                .collect();
+        if self.header.is_some() {
+            writes.push(("--header", &self.header_file));
+        }
+        if self.json {
+            writes.push(("--json", Path::new("-")));
+        }
+        writes
+    }
 }
 
 pub(crate) fn run(arguments: &Asm, color: bool, out: &mut Out) -> Result<()> {
     let image_path = arguments.image_path()?;
     let source = Load::source(&arguments.file)?;
-    let mut writes: Vec<OptionPath<'_>> =
-        [("the image", &image_path), ("--listing", &arguments.listing), ("--symbols", &arguments.symbols)]
-            .into_iter()
-            .filter_map(|(option, path)| Some((option, path.as_deref()?)))
-            .collect();
-    if arguments.header.is_some() {
-        writes.push(("--header", &arguments.header_file));
-    }
-    if arguments.json {
-        writes.push(("--json", Path::new("-")));
-    }
+    let writes = arguments.writes(&image_path);
     files::check(&[("FILE", &arguments.file)], &writes)?;
 
     let schedule = if arguments.optimise { Schedule::All } else { arguments.schedule.into() };
@@ -197,23 +203,7 @@ pub(crate) fn run(arguments: &Asm, color: bool, out: &mut Out) -> Result<()> {
         }
         return Err(Failure::Reported.into());
     }
-    if let Some(path) = &arguments.listing {
-        files::write(path, listing::listing(&assembled).as_bytes())?;
-    }
-    if let Some(path) = &arguments.symbols {
-        files::write(path, listing::symbol_map(&assembled).to_string().as_bytes())?;
-    }
-    if let Some(folder) = &arguments.readmemh {
-        std::fs::create_dir_all(folder)
-            .with_context(|| format!("cannot make the folder {}", folder.display()))?;
-        for (name, text) in listing::readmemh(program) {
-            files::write(&folder.join(name), text.as_bytes())?;
-        }
-    }
-    if let Some(language) = arguments.header {
-        let text = header(program, &arguments.file).text(language.into());
-        files::write(&arguments.header_file, text.as_bytes())?;
-    }
+    write_outputs(arguments, &assembled)?;
     if let Some((path, image)) = image_path.as_ref().zip(image) {
         files::write(path, &image)?;
     }
@@ -225,41 +215,70 @@ pub(crate) fn run(arguments: &Asm, color: bool, out: &mut Out) -> Result<()> {
         files::json(&result, out)?;
     } else if !writes.iter().any(|(_, path)| files::is_dash(path)) {
         let place = image_path.map_or_else(|| "assembled".to_owned(), |path| path.display().to_string());
-        writeln!(
-            out,
-            "{place}: {} bundles ({} words), {} constants, {} data words for {}",
-            program.bundles(),
-            program.code.len(),
-            program.constants.len(),
-            program.data.len(),
-            program.machine.name
-        )?;
-        writeln!(out, "memories: {}", takt_isa::manual::memories_text(program.machine))?;
-        write_blocks(&assembled, out)?;
-        for counted in &assembled.counted_loops {
-            writeln!(out, "{counted}")?;
-        }
-        for Selection { location, registers, .. } in &assembled.selections {
-            let place = location.map_or_else(|| "a branch".to_owned(), |at| program.place_text(at));
-            let plural = if *registers == 1 { "" } else { "s" };
-            writeln!(out, "no branch at {place}: {registers} selection{plural} in its place")?;
-        }
-        for pipelined in &assembled.loops {
-            writeln!(out, "{}", loop_text(pipelined, program))?;
-        }
-        for PlainLoop { location, reason } in &assembled.plain_loops {
-            let place = location.map_or_else(|| "a loop".to_owned(), |at| program.place_text(at));
-            writeln!(out, "not pipelined: the loop at {place}: {reason}")?;
-        }
-        write_timing(&assembled, out)?;
-        write_contractions(&assembled, out)?;
-        write_adjustments(&assembled, out)?;
-        for line in spilled(&assembled) {
-            writeln!(out, "{line}")?;
-        }
+        write_report(&assembled, &place, out)?;
         if let Some(checked) = &verified {
             checked.write(out)?;
         }
+    }
+    Ok(())
+}
+
+/// Writes the files other than the image: listing, symbol map, memories and header.
+fn write_outputs(arguments: &Asm, assembled: &AssembledProgram) -> Result<()> {
+    if let Some(path) = &arguments.listing {
+        files::write(path, listing::listing(assembled).as_bytes())?;
+    }
+    if let Some(path) = &arguments.symbols {
+        files::write(path, listing::symbol_map(assembled).to_string().as_bytes())?;
+    }
+    if let Some(folder) = &arguments.readmemh {
+        std::fs::create_dir_all(folder)
+            .with_context(|| format!("cannot make the folder {}", folder.display()))?;
+        for (name, text) in listing::readmemh(&assembled.program) {
+            files::write(&folder.join(name), text.as_bytes())?;
+        }
+    }
+    if let Some(language) = arguments.header {
+        let text = header(&assembled.program, &arguments.file).text(language.into());
+        files::write(&arguments.header_file, text.as_bytes())?;
+    }
+    Ok(())
+}
+
+/// Report of a program at a place: sizes, blocks, loops, and the assembler's transformations.
+fn write_report(assembled: &AssembledProgram, place: &str, out: &mut Out) -> Result<()> {
+    let program = &assembled.program;
+    writeln!(
+        out,
+        "{place}: {} bundles ({} words), {} constants, {} data words for {}",
+        program.bundles(),
+        program.code.len(),
+        program.constants.len(),
+        program.data.len(),
+        program.machine.name
+    )?;
+    writeln!(out, "memories: {}", takt_isa::manual::memories_text(program.machine))?;
+    write_blocks(assembled, out)?;
+    for counted in &assembled.counted_loops {
+        writeln!(out, "{counted}")?;
+    }
+    for Selection { location, registers, .. } in &assembled.selections {
+        let place = location.map_or_else(|| "a branch".to_owned(), |at| program.place_text(at));
+        let plural = if *registers == 1 { "" } else { "s" };
+        writeln!(out, "no branch at {place}: {registers} selection{plural} in its place")?;
+    }
+    for pipelined in &assembled.loops {
+        writeln!(out, "{}", loop_text(pipelined, program))?;
+    }
+    for PlainLoop { location, reason } in &assembled.plain_loops {
+        let place = location.map_or_else(|| "a loop".to_owned(), |at| program.place_text(at));
+        writeln!(out, "not pipelined: the loop at {place}: {reason}")?;
+    }
+    write_timing(assembled, out)?;
+    write_contractions(assembled, out)?;
+    write_adjustments(assembled, out)?;
+    for line in spilled(assembled) {
+        writeln!(out, "{line}")?;
     }
     Ok(())
 }
@@ -470,75 +489,83 @@ fn messages(diagnostics: &Diagnostics) -> Result<Value> {
     Ok(serde_json::to_value(diagnostics.messages())?)
 }
 
+/// Schedule of a block with its bounds, as JSON.
+fn block_json(program: &Program, block: &BlockReport) -> Value {
+    let shared = |shared: &SharedBound| json!({ "resources": shared.resources.text(program.machine), "cycles": shared.cycles });
+    json!({
+        "name": block_name(program, block),
+        "address": block.address,
+        "operations": block.operations,
+        "bundles": block.bundles,
+        "cycles": block.cycles,
+        "bound": block.bound.cycles(),
+        "bound_set_by": bound_text(block, program),
+        "bounds": {
+            "critical_path": block.bound.critical_path,
+            "slots": block.bound.slots,
+            "units": block.bound.units,
+            "shared": block.bound.shared.iter().map(shared).collect::<Vec<_>>(),
+            "together": block.bound.windows,
+        },
+    })
+}
+
+/// A demand on ports with its result, as JSON.
+fn timing_json(report: &TimingReport) -> Value {
+    let (demand, result) = timing_text(report);
+    let port =
+        |(name, first, last): &(String, u32, u32)| json!({ "name": name, "first": first, "last": last });
+    json!({
+        "section": if report.period { "period" } else { "once" },
+        "demand": demand,
+        "result": result,
+        "window": report.window.map(|(window, _)| window),
+        "window_bound": report.window.map(|(_, bound)| bound),
+        "ports": report.ports.iter().map(port).collect::<Vec<_>>(),
+    })
+}
+
+/// Transfer of an operation's result to another bank, as JSON.
+fn adjustment_json(program: &Program, one: &Adjustment) -> Value {
+    let (made, details) = match one.transfer {
+        Transfer::Preset(bits) => ("preset", json!({ "bits": bits })),
+        Transfer::Rematerialised(mnemonic) => ("operation", json!({ "mnemonic": mnemonic })),
+        Transfer::Copy { address, alone, cycles } => {
+            ("copy", json!({ "address": address, "alone": alone, "cycles": cycles }))
+        }
+    };
+    json!({
+        "register": one.register,
+        "bank": one.bank,
+        "mnemonic": one.mnemonic,
+        "place": one.location.map(|at| program.place_text(at)),
+        "made": made,
+        "details": details,
+    })
+}
+
+/// Form of a counted loop, as JSON.
+fn counted_json(one: &CountedLoop) -> Value {
+    let (iterations, exact) = (one.count.most(), one.count.is_exact());
+    json!({
+        "name": one.name,
+        "place": format!("{}:{}", one.file, one.line),
+        "iterations": iterations,
+        "exact": exact,
+        "rolled": !matches!(one.form, LoopForm::Unrolled(_)),
+        "written_out": match one.form {
+            LoopForm::Unrolled(why) => Some(why.to_string()),
+            LoopForm::Rolled(_) => None,
+        },
+        "unrolled": match one.form {
+            LoopForm::Unrolled(_) => iterations,
+            LoopForm::Rolled(unroll) => unroll,
+        },
+    })
+}
+
 fn result_json(assembled: &AssembledProgram, image: Option<&Path>) -> Result<Value> {
     let program = &assembled.program;
-    let shared = |shared: &SharedBound| json!({ "resources": shared.resources.text(program.machine), "cycles": shared.cycles });
-    let block = |block: &BlockReport| {
-        json!({
-            "name": block_name(program, block),
-            "address": block.address,
-            "operations": block.operations,
-            "bundles": block.bundles,
-            "cycles": block.cycles,
-            "bound": block.bound.cycles(),
-            "bound_set_by": bound_text(block, program),
-            "bounds": {
-                "critical_path": block.bound.critical_path,
-                "slots": block.bound.slots,
-                "units": block.bound.units,
-                "shared": block.bound.shared.iter().map(shared).collect::<Vec<_>>(),
-                "together": block.bound.windows,
-            },
-        })
-    };
-    let timing = |report: &TimingReport| {
-        let (demand, result) = timing_text(report);
-        let port =
-            |(name, first, last): &(String, u32, u32)| json!({ "name": name, "first": first, "last": last });
-        json!({
-            "section": if report.period { "period" } else { "once" },
-            "demand": demand,
-            "result": result,
-            "window": report.window.map(|(window, _)| window),
-            "window_bound": report.window.map(|(_, bound)| bound),
-            "ports": report.ports.iter().map(port).collect::<Vec<_>>(),
-        })
-    };
-    let adjustment = |one: &Adjustment| {
-        let (made, details) = match one.transfer {
-            Transfer::Preset(bits) => ("preset", json!({ "bits": bits })),
-            Transfer::Rematerialised(mnemonic) => ("operation", json!({ "mnemonic": mnemonic })),
-            Transfer::Copy { address, alone, cycles } => {
-                ("copy", json!({ "address": address, "alone": alone, "cycles": cycles }))
-            }
-        };
-        json!({
-            "register": one.register,
-            "bank": one.bank,
-            "mnemonic": one.mnemonic,
-            "place": one.location.map(|at| program.place_text(at)),
-            "made": made,
-            "details": details,
-        })
-    };
-    let counted = |one: &CountedLoop| {
-        let (iterations, exact) = (one.count.most(), one.count.is_exact());
-        json!({
-            "name": one.name,
-            "place": format!("{}:{}", one.file, one.line),
-            "iterations": iterations,
-            "exact": exact,
-            "rolled": !matches!(one.form, LoopForm::Unrolled(_)),
-            "written_out": match one.form {
-                LoopForm::Unrolled(why) => Some(why.to_string()),
-                LoopForm::Rolled(_) => None,
-            },
-            "unrolled": match one.form {
-                LoopForm::Unrolled(_) => iterations,
-                LoopForm::Rolled(unroll) => unroll,
-            },
-        })
-    };
     let selection = |one: &Selection| {
         json!({
             "place": one.location.map(|at| program.place_text(at)),
@@ -570,14 +597,14 @@ fn result_json(assembled: &AssembledProgram, image: Option<&Path>) -> Result<Val
         "words": program.code.len(),
         "constants": program.constants.len(),
         "data_words": program.data.len(),
-        "blocks": assembled.blocks.iter().map(block).collect::<Vec<_>>(),
-        "counted_loops": assembled.counted_loops.iter().map(counted).collect::<Vec<_>>(),
+        "blocks": assembled.blocks.iter().map(|one| block_json(program, one)).collect::<Vec<_>>(),
+        "counted_loops": assembled.counted_loops.iter().map(counted_json).collect::<Vec<_>>(),
         "selections": assembled.selections.iter().map(selection).collect::<Vec<_>>(),
         "pipelined_loops": assembled.loops.iter().map(pipelined).collect::<Vec<_>>(),
         "plain_loops": assembled.plain_loops.iter().map(plain).collect::<Vec<_>>(),
         "contractions": assembled.contractions.iter().map(contraction).collect::<Vec<_>>(),
-        "timing": assembled.timing.iter().map(timing).collect::<Vec<_>>(),
-        "adjustments": assembled.adjustments.iter().map(adjustment).collect::<Vec<_>>(),
+        "timing": assembled.timing.iter().map(timing_json).collect::<Vec<_>>(),
+        "adjustments": assembled.adjustments.iter().map(|one| adjustment_json(program, one)).collect::<Vec<_>>(),
         "spills": assembled.spills.iter().map(|one| spills_json(assembled, one)).collect::<Vec<_>>(),
         "messages": messages(&assembled.warnings)?,
     }))

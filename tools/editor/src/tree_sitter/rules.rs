@@ -136,92 +136,10 @@ fn operands(directive: Directive) -> Option<Rule> {
 
 /// Lines, and the blocks that they form.
 fn lines(add: &mut impl FnMut(&str, Rule)) {
-    let end = |directive: Directive| text(directive.name());
-    let expression = || In::Line.expression();
-    // Macros are defined at top level or in branches. Bodies of macros and repetitions have separate rules without definitions.
-    for (suffix, macros) in [("", true), ("_within", false)] {
-        let rule = |name: &str| format!("{name}{suffix}");
-        let mut blocks = vec!["_conditional", "_repetition", "_counted_loop"];
-        blocks.extend(macros.then_some("_macro"));
-        let block = blocks.into_iter().map(|name| {
-            let rule = if name == "_conditional" { rule(name) } else { name.to_owned() };
-            let shown = match name {
-                "_macro" => "macro_definition",
-                _ => &name[1..],
-            };
-            alias(symbol(rule), shown)
-        });
-        add(
-            &rule("_line"),
-            choice([symbol("_plain_line"), seq([optional(symbol("_label")), choice(block)])]),
-        );
-        add(
-            &rule("_lines"),
-            repeat1(choice([symbol(NEWLINE), seq([symbol(rule("_line")), symbol(NEWLINE)])])),
-        );
-        // Lines of a block; a label may precede the closing directive.
-        let lines = symbol(rule("_lines"));
-        add(&rule("_body"), choice([seq([lines, optional(symbol("_label"))]), symbol("_label")]));
-        let body = || optional(alias(symbol(rule("_body")), "body"));
-        let branch = |directive: Directive, condition: Option<Rule>| match condition {
-            Some(condition) => seq([end(directive), field("condition", condition), symbol(NEWLINE), body()]),
-            None => seq([end(directive), symbol(NEWLINE), body()]),
-        };
-        add(&rule("_elif"), branch(Directive::Elif, Some(expression())));
-        add(&rule("_else"), branch(Directive::Else, None));
-        add(
-            &rule("_conditional"),
-            seq([
-                branch(Directive::If, Some(expression())),
-                repeat(alias(symbol(rule("_elif")), "elif_clause")),
-                optional(alias(symbol(rule("_else")), "else_clause")),
-                end(Directive::EndIf),
-            ]),
-        );
-    }
-    let body = || optional(alias(symbol("_body_within"), "body"));
-    let name = |role: &str| field(role, In::Line.any_name());
-    add(
-        "_macro",
-        seq([
-            text(Directive::Macro.name()),
-            name("name"),
-            repeat(seq([optional(text(",")), name("parameter"), optional(seq([text(":"), name("type")]))])),
-            symbol(NEWLINE),
-            body(),
-            end(Directive::EndMacro),
-        ]),
-    );
-    add(
-        "_repetition",
-        seq([
-            text(Directive::Rep.name()),
-            name("variable"),
-            text(","),
-            field("first", expression()),
-            text(","),
-            field("last", expression()),
-            symbol(NEWLINE),
-            body(),
-            end(Directive::EndRep),
-        ]),
-    );
-    let option = seq([field("option", In::Line.any_name()), expression()]);
-    add(
-        "_counted_loop",
-        seq([
-            text(Directive::For.name()),
-            name("variable"),
-            text(","),
-            field("first", expression()),
-            text(","),
-            field("last", expression()),
-            repeat(option),
-            symbol(NEWLINE),
-            body(),
-            end(Directive::EndFor),
-        ]),
-    );
+    // Macros are defined at top level or in branches; the bodies of macros and repetitions have rules without them.
+    conditionals(add, "", true);
+    conditionals(add, "_within", false);
+    definitions(add);
     let directives = Directive::ALL.iter().filter(|directive| operands(**directive).is_some());
     let directives = directives.map(|directive| symbol(directive_rule(*directive)));
     let body = choice(std::iter::once(symbol("bundle")).chain(directives));
@@ -240,6 +158,93 @@ fn lines(add: &mut impl FnMut(&str, Rule)) {
     for kind in [In::Line, In::Equation] {
         add(&kind.name("label"), seq([field("name", kind.node("template")), text(":")]));
     }
+}
+
+/// Lines with blocks, bodies, and conditionals; the suffix belongs to the names of their rules.
+fn conditionals(add: &mut impl FnMut(&str, Rule), suffix: &str, macros: bool) {
+    let expression = || In::Line.expression();
+    let rule = |name: &str| format!("{name}{suffix}");
+    let mut blocks = vec!["_conditional", "_repetition", "_counted_loop"];
+    blocks.extend(macros.then_some("_macro"));
+    let block = blocks.into_iter().map(|name| {
+        let rule = if name == "_conditional" { rule(name) } else { name.to_owned() };
+        let shown = match name {
+            "_macro" => "macro_definition",
+            _ => &name[1..],
+        };
+        alias(symbol(rule), shown)
+    });
+    add(&rule("_line"), choice([symbol("_plain_line"), seq([optional(symbol("_label")), choice(block)])]));
+    add(&rule("_lines"), repeat1(choice([symbol(NEWLINE), seq([symbol(rule("_line")), symbol(NEWLINE)])])));
+    // Lines of a block; a label may precede the closing directive.
+    let lines = symbol(rule("_lines"));
+    add(&rule("_body"), choice([seq([lines, optional(symbol("_label"))]), symbol("_label")]));
+    let body = || optional(alias(symbol(rule("_body")), "body"));
+    let branch = |directive: Directive, condition: Option<Rule>| match condition {
+        Some(condition) => {
+            seq([text(directive.name()), field("condition", condition), symbol(NEWLINE), body()])
+        }
+        None => seq([text(directive.name()), symbol(NEWLINE), body()]),
+    };
+    add(&rule("_elif"), branch(Directive::Elif, Some(expression())));
+    add(&rule("_else"), branch(Directive::Else, None));
+    add(
+        &rule("_conditional"),
+        seq([
+            branch(Directive::If, Some(expression())),
+            repeat(alias(symbol(rule("_elif")), "elif_clause")),
+            optional(alias(symbol(rule("_else")), "else_clause")),
+            text(Directive::EndIf.name()),
+        ]),
+    );
+}
+
+/// Macros, repetitions and counted loops.
+fn definitions(add: &mut impl FnMut(&str, Rule)) {
+    let expression = || In::Line.expression();
+    let body = || optional(alias(symbol("_body_within"), "body"));
+    let name = |role: &str| field(role, In::Line.any_name());
+    add(
+        "_macro",
+        seq([
+            text(Directive::Macro.name()),
+            name("name"),
+            repeat(seq([optional(text(",")), name("parameter"), optional(seq([text(":"), name("type")]))])),
+            symbol(NEWLINE),
+            body(),
+            text(Directive::EndMacro.name()),
+        ]),
+    );
+    add(
+        "_repetition",
+        seq([
+            text(Directive::Rep.name()),
+            name("variable"),
+            text(","),
+            field("first", expression()),
+            text(","),
+            field("last", expression()),
+            symbol(NEWLINE),
+            body(),
+            text(Directive::EndRep.name()),
+        ]),
+    );
+    let option = seq([field("option", In::Line.any_name()), expression()]);
+    add(
+        "_counted_loop",
+        seq([
+            text(Directive::For.name()),
+            name("variable"),
+            text(","),
+            field("first", expression()),
+            text(","),
+            field("last", expression()),
+            repeat(option),
+            symbol(NEWLINE),
+            body(),
+            text(Directive::EndFor.name()),
+        ]),
+    );
 }
 
 /// Bundles, equations, and the parts of directives.

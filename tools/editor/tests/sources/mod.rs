@@ -364,6 +364,14 @@ impl Writer<'_> {
         };
         self.put(choice.name());
         match choice {
+            Macro | Rep | For | If => self.block(choice, within, depth),
+            _ => self.operands(choice),
+        }
+    }
+
+    fn operands(&mut self, directive: Directive) {
+        use Directive::*;
+        match directive {
             Reg | State | Input | Output => self.declarations(),
             Machine => {
                 self.name(In::Line, 1);
@@ -433,6 +441,16 @@ impl Writer<'_> {
                     self.assigned();
                 }
             }
+            Once | Period | Data | Elif | Else | EndIf | EndMacro | EndRep | EndFor | Raw => {}
+            // They stand before a body.
+            Macro | Rep | For | If => {}
+        }
+    }
+
+    /// Operands, body and end of a block directive.
+    fn block(&mut self, directive: Directive, within: bool, depth: u32) {
+        use Directive::*;
+        match directive {
             Macro => {
                 self.names();
                 self.body(true, depth);
@@ -474,7 +492,7 @@ impl Writer<'_> {
                 }
                 self.put(EndIf.name());
             }
-            Once | Period | Data | Elif | Else | EndIf | EndMacro | EndRep | EndFor | Raw => {}
+            _ => {}
         }
     }
 

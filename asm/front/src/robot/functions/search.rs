@@ -308,15 +308,8 @@ fn write(
     Function { title: String::new(), notes: Vec::new(), inputs, outputs, input_arrays, output_arrays, graph }
 }
 
-fn equations(
-    inputs: &mut Inputs<'_>,
-    robot: &Robot,
-    what: RobotFunction,
-    options: &Options<'_>,
-    tip: Option<Tip<'_>>,
-    attempt: &Attempt,
-) -> Outputs {
-    let graph = inputs.graph;
+/// Links in the units of an attempt, and gravity.
+fn scaled_links(robot: &Robot, attempt: &Attempt) -> (Vec<Link>, [f64; 3]) {
     let mut links = frames::place(robot, &attempt.layout);
     let mut gravity = robot.gravity;
     if attempt.unit != 1.0 {
@@ -329,6 +322,19 @@ fn equations(
             link.body.mass *= unit * unit;
         }
     }
+    (links, gravity)
+}
+
+fn equations(
+    inputs: &mut Inputs<'_>,
+    robot: &Robot,
+    what: RobotFunction,
+    options: &Options<'_>,
+    tip: Option<Tip<'_>>,
+    attempt: &Attempt,
+) -> Outputs {
+    let graph = inputs.graph;
+    let (mut links, gravity) = scaled_links(robot, attempt);
     let count = links.len();
     let zero = vec![graph.constant(0.0); count];
     let position = |kind: Kind| kind.unit().to_owned();
@@ -382,18 +388,7 @@ fn equations(
         RobotFunction::MassMatrix => {
             let angles = Angles::new(graph, &links, &q, attempt.sums);
             let matrix = with_rotors(robot, mass::matrix(graph, &links, &angles, &q));
-            let mut ports = Vec::new();
-            let mut elements = vec![None; count * count];
-            for (row, entries) in matrix.iter().enumerate() {
-                for (column, entry) in entries.iter().enumerate() {
-                    let text = format!("inertia of {} and {}", links[row].name, links[column].name);
-                    let port = Port { name: format!("M_{}_{}", row + 1, column + 1), text };
-                    elements[row * count + column] = Some(ports.len());
-                    elements[column * count + row] = Some(ports.len());
-                    ports.push((port, entry.unwrap_or_else(|| graph.constant(0.0)).id()));
-                }
-            }
-            Outputs { ports, arrays: vec![Array { elements, ..Array::new("M", 0, &[count, count]) }] }
+            mass_ports(graph, &links, &matrix)
         }
         RobotFunction::ForwardDynamics => {
             let qd = inputs.joints(robot, "qd", "velocity", &speed);
@@ -416,20 +411,42 @@ fn equations(
             }
             let (rotation, position) =
                 kinematics::pose(graph, &links, &angles, &q, joint, &pose, (attempt.split, attempt.third));
-            let mut ports = Vec::new();
-            for (i, row) in rotation.iter().enumerate() {
-                for (j, entry) in row.iter().enumerate() {
-                    let text = format!("rotation, row {}, column {}", i + 1, j + 1);
-                    ports.push((Port { name: format!("R_{}_{}", i + 1, j + 1), text }, entry.id()));
-                }
-            }
-            for (axis, entry) in ["x", "y", "z"].iter().zip(position) {
-                let port = Port { name: format!("p_{axis}"), text: format!("position along {axis}, m") };
-                ports.push((port, entry.id()));
-            }
-            Outputs { ports, arrays: vec![Array::new("R", 0, &[3, 3]), Array::new("p", 9, &[3])] }
+            pose_ports(&rotation, &position)
         }
     }
+}
+
+/// Ports of the entries of the joint-space inertia.
+fn mass_ports(graph: &Graph, links: &[Link], matrix: &mass::Matrix<'_>) -> Outputs {
+    let count = links.len();
+    let mut ports = Vec::new();
+    let mut elements = vec![None; count * count];
+    for (row, entries) in matrix.iter().enumerate() {
+        for (column, entry) in entries.iter().enumerate() {
+            let text = format!("inertia of {} and {}", links[row].name, links[column].name);
+            let port = Port { name: format!("M_{}_{}", row + 1, column + 1), text };
+            elements[row * count + column] = Some(ports.len());
+            elements[column * count + row] = Some(ports.len());
+            ports.push((port, entry.unwrap_or_else(|| graph.constant(0.0)).id()));
+        }
+    }
+    Outputs { ports, arrays: vec![Array { elements, ..Array::new("M", 0, &[count, count]) }] }
+}
+
+/// Ports of a pose: rotation and position.
+fn pose_ports(rotation: &[[Expr<'_>; 3]; 3], position: &[Expr<'_>; 3]) -> Outputs {
+    let mut ports = Vec::new();
+    for (i, row) in rotation.iter().enumerate() {
+        for (j, entry) in row.iter().enumerate() {
+            let text = format!("rotation, row {}, column {}", i + 1, j + 1);
+            ports.push((Port { name: format!("R_{}_{}", i + 1, j + 1), text }, entry.id()));
+        }
+    }
+    for (axis, entry) in ["x", "y", "z"].iter().zip(position) {
+        let port = Port { name: format!("p_{axis}"), text: format!("position along {axis}, m") };
+        ports.push((port, entry.id()));
+    }
+    Outputs { ports, arrays: vec![Array::new("R", 0, &[3, 3]), Array::new("p", 9, &[3])] }
 }
 
 /// Adds the forces of rotor, friction and spring to a joint's force, given position, velocity, acceleration, and the velocity that friction
