@@ -238,7 +238,7 @@ enum Wait {
 /// - Values for one register, ports included, are written in the source's order: the earlier is written back when the later issues.
 /// - Loads and stores that may touch the same word keep their order, except loads among loads.
 /// - A load or store whose address is not known may fault, and the output ports must then show the same values as in source order:
-/// outputs written before it in the source issue before it, outputs written after it not before it.
+///   outputs written before it in the source issue before it, outputs written after it not before it.
 /// - Operations that redirect control come last; operations that drain issue after all writebacks.
 struct Block {
     problem: Problem,

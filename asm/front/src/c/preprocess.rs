@@ -3,8 +3,10 @@
 
 use super::Source;
 use crate::Error;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Headers of the supported part of C's library: name and text.
 pub const HEADERS: &[(&str, &str)] = &[
@@ -18,8 +20,24 @@ pub const HEADERS: &[(&str, &str)] = &[
     ("string.h", include_str!("headers/string.h")),
 ];
 
+/// Maximum number of names tried for a folder in a process.
+const FOLDERS: usize = 10_000;
+
 /// Programs that are tried, in order.
 const PROGRAMS: [&str; 3] = ["gcc", "cpp", "clang"];
+
+/// Makes a new folder for temporary files. A folder that another user made under the same name is not used.
+fn own_folder() -> std::io::Result<PathBuf> {
+    static COUNT: AtomicUsize = AtomicUsize::new(0);
+    loop {
+        let count = COUNT.fetch_add(1, Ordering::Relaxed);
+        let folder = std::env::temp_dir().join(format!("takt-cc-{}-{count}", std::process::id()));
+        match std::fs::create_dir(&folder) {
+            Err(error) if error.kind() == ErrorKind::AlreadyExists && count < FOLDERS => {}
+            made => return made.map(|()| folder),
+        }
+    }
+}
 
 /// A call of the preprocessor, with the headers in a folder of the same lifetime.
 pub struct Preprocessor {
@@ -33,12 +51,10 @@ impl Preprocessor {
     /// # Errors
     /// If no folder for temporary files can be written.
     pub fn new(options: &[String]) -> Result<Preprocessor, Error> {
-        static COUNT: std::sync::atomic::AtomicUsize = std::sync::atomic::AtomicUsize::new(0);
-        let count = COUNT.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
-        let folder = std::env::temp_dir().join(format!("takt-cc-{}-{count}", std::process::id()));
-        let written = std::fs::create_dir_all(&folder).and_then(|()| {
-            HEADERS.iter().try_for_each(|(name, text)| std::fs::write(folder.join(name), text))
-        });
+        let folder = own_folder().map_err(|error| {
+            Error::plain(format!("{}: no folder can be made: {error}", std::env::temp_dir().display()))
+        })?;
+        let written = HEADERS.iter().try_for_each(|(name, text)| std::fs::write(folder.join(name), text));
         match written {
             Ok(()) => Ok(Preprocessor { folder, options: options.to_vec() }),
             Err(error) => {
@@ -74,7 +90,7 @@ impl Preprocessor {
             command.args(&self.options).arg("-isystem").arg(&self.folder).arg(file);
             let done = match command.output() {
                 Ok(done) => done,
-                Err(error) if error.kind() == std::io::ErrorKind::NotFound => continue,
+                Err(error) if error.kind() == ErrorKind::NotFound => continue,
                 Err(error) => return Err(Error::plain(format!("{program}: {error}"))),
             };
             let text = String::from_utf8_lossy(&done.stdout).into_owned();
@@ -108,5 +124,28 @@ impl Preprocessor {
 impl Drop for Preprocessor {
     fn drop(&mut self) {
         let _ = std::fs::remove_dir_all(&self.folder);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::own_folder;
+
+    #[test]
+    fn a_folder_that_exists_is_not_used() {
+        let first = own_folder().expect("a folder");
+        let name = first.display().to_string();
+        let (front, count) = name.rsplit_once('-').expect("a number");
+        let next = format!("{front}-{}", count.parse::<usize>().expect("a number") + 1);
+        // Another test's call may have made it.
+        let planted = std::fs::create_dir(&next).is_ok();
+        let second = own_folder().expect("a folder");
+        assert!(second.display().to_string() != next && second != first);
+        if planted {
+            std::fs::remove_dir(next).expect("it was there");
+        }
+        for folder in [first, second] {
+            std::fs::remove_dir(folder).expect("it was there");
+        }
     }
 }
