@@ -29,7 +29,7 @@ pub(crate) enum Action {
     Argument(ExprId, usize),
     /// Stores the number of iterations from a number to a register's value in a cell.
     Count(Expr, i64, usize),
-    /// Skips to a label if a cell counts no more iterations than a number: cell, number, label.
+    /// Jumps to a label if a loop's iteration count is at most the iterations done: cell of the count, iterations done, label.
     Skip(usize, i64, usize),
 }
 

@@ -38,7 +38,7 @@ fn a_program_with_a_fault_of_the_link() {
     assert!(text.contains("a.robot can run: it takes 1."), "{text}");
 }
 
-/// The record of host and encoders is a table with which the cores repeat the run to the same end.
+/// `--record` writes the inputs from host and encoders; `takt run --inputs` replays them to the same outputs and pose.
 #[test]
 fn a_session_is_recorded() {
     let folder = Folder::new();

@@ -25,7 +25,7 @@ pub(super) struct Run {
     /// Start, date and time in UTC.
     pub(super) begun: String,
     pub(super) seconds: u64,
-    /// Hosts of the run, in words.
+    /// Executor of the units, as text: local workers or a HyperQueue server.
     pub(super) by: String,
     pub(super) units: [u64; 2],
     /// Number of units finished in this run.

@@ -13,9 +13,9 @@ use takt_board::endpoints::Endpoints;
 /// Write LinuxCNC's HAL file for a system of several cores on a board: the component `hal_takt` with the system's addresses, and the nets of
 /// its joints (docs/linuxcnc.md).
 ///
-/// By their names the system has, for joints 1 to N, a FIFO `knots` from the host with the fields `to_1` … `to_N`, `speed_1` … `speed_N`; the
-/// encoders' counts `n1` … `nN` from the host, where the wiring has them; and a snapshot `measured` to the host with `m1` … `mN`, `knot`,
-/// `phase`, `starved` and `standing`, in this order.
+/// The system must have these ports, for joints 1 to N: a FIFO `knots` from the host with the fields `to_1` … `to_N`, `speed_1` … `speed_N`,
+/// in this order; inputs `n1` … `nN` from the host for the encoder counts, if the wiring has encoders; and a snapshot `measured` to the host
+/// with `m1` … `mN`, `knot`, `phase`, `starved` and `standing`, in this order.
 #[derive(Args)]
 #[command(after_help = "\
 Example:

@@ -23,7 +23,7 @@ use takt_debug::remote::{Activity, Remote, RemoteError, RemoteSession, State};
 use takt_debug::session::{Control, Options, Session};
 use takt_isa::{BundleAddress, Program, Register};
 
-/// Maximum distance of two addresses that are read in one request.
+/// Maximum gap between neighbouring addresses that share one read request.
 const GAP: u16 = 4;
 /// Interval between two polls of a running board.
 const POLL: Duration = Duration::from_millis(50);
