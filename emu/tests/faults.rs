@@ -95,7 +95,7 @@ fn illegal_words_fault_where_they_are_reached() {
     let mut program = program(&F3, "jmp 2\nnop\nnop || fadd a0, zero, zero\nnop");
     let cases = [
         (7, 0, "bundle 2, slot add, cycle 13: illegal word: word 0 is unwritten memory, not an instruction"),
-        (7, 0x7f << 41, "slot add, cycle 13: illegal word: opcode 0x7f is no instruction"),
+        (7, 0x7f << 41, "slot add, cycle 13: illegal word: opcode 0x7f is not an instruction"),
         (7, 1 << 48, "slot add, cycle 13: illegal word: 0x1000000000000 is longer than a word of 48 bits"),
         (
             7,
