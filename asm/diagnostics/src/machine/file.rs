@@ -165,8 +165,7 @@ fn syntax(error: &toml::de::Error, text: &str) -> Diagnostic {
     let kind = other.and_then(|file| kinds.into_iter().find(|(key, _)| file.contains_key(*key)));
     match kind {
         Some((_, kind)) => {
-            Diagnostic { message: format!("this is {kind}, and a machine is wanted"), ..diagnostic }
-                .help(PATTERN)
+            Diagnostic { message: format!("expected a machine, found {kind}"), ..diagnostic }.help(PATTERN)
         }
         None if diagnostic.help.is_none() => diagnostic.help(PATTERN),
         None => diagnostic,
@@ -280,9 +279,10 @@ impl Reader {
     /// A number in the type of the row's field; the row's own checks come later.
     fn number<T: TryFrom<i64> + Default>(&mut self, what: &str, number: &Spanned<i64>) -> T {
         T::try_from(*number.get_ref()).unwrap_or_else(|_| {
-            let message = format!("{what} is {}; it is no number of that size", number.get_ref());
+            let message = format!("{what} is {}, which is out of range", number.get_ref());
             let error = Diagnostic::error("machine", span(number.span()), message);
-            self.mistakes.push(error.help("a number from 0, below 65536 of registers"));
+            self.mistakes
+                .push(error.help("a number that is not negative, and below 65536 if it counts registers"));
             T::default()
         })
     }
