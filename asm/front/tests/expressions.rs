@@ -189,7 +189,7 @@ fn wrong_lists_are_refused() {
         (r#"{"op": "Heaviside", "to": 1, "of": []}"#, "5: `Heaviside` has 0 operands; it takes 1 to 2"),
         (
             r#"{"op": "sin", "to": -1, "of": [7]}"#,
-            "5: this is no list of instructions: invalid value: integer `-1`, expected usize",
+            "5: this is not a list of instructions: invalid value: integer `-1`, expected usize",
         ),
     ] {
         assert_eq!(list(x, y, &format!("{input},\n{code}")), expected);
@@ -200,5 +200,5 @@ fn wrong_lists_are_refused() {
     let outside = r#"{"name": "x", "rows": 1, "columns": 1, "nonzeros": [[1, 0]]}"#;
     assert_eq!(list(outside, y, ""), "0: `x`: (1, 0) lies outside 1 by 1");
     let error = read("{", Rewrites::ALL).err().expect("an error");
-    assert!(error.line == Some(1) && error.text.starts_with("this is no list of instructions"), "{error}");
+    assert!(error.line == Some(1) && error.text.starts_with("this is not a list of instructions"), "{error}");
 }

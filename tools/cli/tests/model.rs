@@ -239,7 +239,7 @@ fn reads_descriptions_of_every_origin() {
     folder.write("look.xml", "<mujocoinclude>\n<option gravity=\"0\"/></mujocoinclude>");
     let done = folder.line("model leg.xml -f gravity");
     assert!(
-        done.stderr.contains("look.xml:2: `gravity` is `0`: it has 1 numbers, and 3 are needed"),
+        done.stderr.contains("look.xml:2: `gravity` is `0`: it has 1 numbers, expected 3"),
         "{}",
         done.stderr
     );
@@ -282,8 +282,8 @@ fn reports_an_unusable_penalty() {
     );
     assert!(text.contains(&advice), "{text}");
     for (from, to, expected) in [
-        ("[1e-6]", "[NaN]", "p.json:1: `R`: NaN: a finite number is needed"),
-        ("4}", "4,}", "p.json:2: this is no control problem: trailing comma"),
+        ("[1e-6]", "[NaN]", "p.json:1: `R`: expected a finite number, found NaN"),
+        ("4}", "4,}", "p.json:2: this is not a control problem: trailing comma"),
     ] {
         folder.write("p.json", problem.replace(from, to));
         let done = folder.line("model p.json");
@@ -327,7 +327,7 @@ fn mistakes_have_one_message() {
             2,
             "--function applies to robot descriptions, but f.json contains expressions",
         ),
-        ("model f.json", 1, "f.json:1: this is no list of instructions: EOF while parsing an object"),
+        ("model f.json", 1, "f.json:1: this is not a list of instructions: EOF while parsing an object"),
         ("model ur5.urdf -f gravity --snap 1", 2, "between 0 and 0.01 rad"),
         ("model ur5.urdf -f computed-torque --kp -1", 2, "a gain is finite and not negative"),
     ] {
@@ -360,8 +360,8 @@ fn excessive_nesting_has_one_message() {
             "model deep.urdf -f gravity".to_owned(),
             "deep.urdf:1: more than 64 elements are within one another here",
         ),
-        ("model array.json".to_owned(), "array.json:1: this is no list of instructions"),
-        ("model object.json".to_owned(), "object.json:1: this is no list of instructions"),
+        ("model array.json".to_owned(), "array.json:1: this is not a list of instructions"),
+        ("model object.json".to_owned(), "object.json:1: this is not a list of instructions"),
         ("asm sum.s".to_owned(), "sum.s"),
         ("track --gcode path.ngc".to_owned(), "path.ngc:1:"),
         ("robot --check moves.robot".to_owned(), "moves.robot"),

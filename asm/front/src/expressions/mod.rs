@@ -125,10 +125,10 @@ pub fn read(source: &str, rewrites: Rewrites) -> Result<Function, Error> {
     let file: File = serde_json::from_str(source).map_err(|error| {
         let text = error.to_string();
         let text = text.rsplit_once(" at line").map_or(text.as_str(), |(text, _)| text);
-        Error::on(error.line(), format!("this is no list of instructions: {text}"))
+        Error::on(error.line(), format!("this is not a list of instructions: {text}"))
     })?;
     if file.format != FORMAT {
-        return Err(Error::plain(format!("its format is `{}`; `{FORMAT}` is known", file.format)));
+        return Err(Error::plain(format!("unknown format `{}`; expected `{FORMAT}`", file.format)));
     }
     let mut ports = Vec::new();
     let mut first = Vec::new();
