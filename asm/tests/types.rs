@@ -459,7 +459,7 @@ fn places_take_the_value_or_refuse_it() {
                 (Ok(bits), None) => panic!("{declarations}{line} is accepted, and gives {bits:#x}"),
                 // A message may ask for the type of an undeclared name, and of a copied literal, too.
                 (Err(report), Some(_)) => {
-                    let asks = ["nothing says of which type", "write `", "convert it", "copy it first"]
+                    let asks = ["nothing states the type of", "write `", "convert it", "copy it first"]
                         .iter()
                         .any(|mend| report.contains(mend));
                     let declared = declarations.contains("d:") || declarations.is_empty();

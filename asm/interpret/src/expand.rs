@@ -146,11 +146,11 @@ impl Interpreter {
     ) -> Result<(), Fault> {
         let text = self.names.text(name).to_owned();
         let Some(&Macro { directive, start, end }) = self.macros.get(&text) else {
-            return Err(format!("`{text}` is no instruction and no macro"));
+            return Err(format!("`{text}` is neither an instruction nor a macro"));
         };
         let ast = Rc::clone(&self.ast);
         let DirectiveKind::Macro { parameters, .. } = &ast.directives[directive].kind else {
-            return Err(format!("`{text}` is no macro"));
+            return Err(format!("`{text}` is not a macro"));
         };
         self.depth += 1;
         if parameters.len() != given.len() || self.depth > DEPTH {
@@ -411,7 +411,7 @@ impl Interpreter {
     pub(crate) fn number(&self, nodes: &[Node], scope: &Rc<Scope>) -> Result<Number, Fault> {
         match self.value(nodes, 0, scope, &Results::default(), &[])? {
             crate::Value::Number(number) => Ok(number),
-            crate::Value::Bits(..) => Err("a register where a number is wanted".to_owned()),
+            crate::Value::Bits(..) => Err("expected a number, found a register".to_owned()),
         }
     }
 }

@@ -591,10 +591,11 @@ impl Resolver<'_> {
             ),
             DemandKind::Late(_) => (
                 "inputs that are to be read late are taken at the tick, whenever they are read",
-                "leave it out, or have `.ports direct`",
+                "leave it out, or write `.ports direct`",
             ),
         };
-        let error = Diagnostic::error("ports", span, message).also(latched, "for here it says so").help(help);
+        let error =
+            Diagnostic::error("ports", span, message).also(latched, "ports are latched here").help(help);
         self.context.report(at.scope, error)
     }
 
@@ -639,7 +640,7 @@ impl Resolver<'_> {
                 let range = Range { register: Register::ZERO, ty, low: least, high: largest };
                 if let Some(mistake) = range.mistake() {
                     let span = Span { end: high.span.end, ..low.span };
-                    self.context.error(at.scope, "range", span, format!("this is no range: {mistake}"));
+                    self.context.error(at.scope, "range", span, format!("this range is invalid: {mistake}"));
                     continue;
                 }
                 for register in members {

@@ -673,7 +673,7 @@ fn memories_of_other_depths() {
     let refused = folder.line("asm deep.s");
     assert!(
         refused.status != Some(0)
-            && refused.stderr.contains("`.machine t3 data=8192` takes it: 16 block RAMs"),
+            && refused.stderr.contains("`.machine t3 data=8192` makes room for it: 16 block RAMs"),
         "{refused:?}"
     );
     for asked in [

@@ -129,7 +129,7 @@ impl MachineMistake {
             }
             MachineMistake::Unread { .. } => Diagnostic::error("machine", span, self.to_string()),
             MachineMistake::File(mistakes) => {
-                let message = "the machine's file has mistakes";
+                let message = "the machine's file has errors";
                 let mut diagnostic = Diagnostic::error("machine", span, message);
                 for one in mistakes.messages() {
                     let help = one.help.map_or(String::new(), |help| format!(" ({help})"));

@@ -330,8 +330,9 @@ impl Exec<'_> {
                 return self.compared(op, typed(a), typed(b));
             }
             _ => {
-                return self
-                    .fail("these pointers cannot be compared: the objects that they point to depend on data");
+                return self.fail(
+                    "these pointers cannot be compared: the objects that they point to depend on data",
+                );
             }
         })
     }

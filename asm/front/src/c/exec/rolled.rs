@@ -414,8 +414,9 @@ impl<'a> Exec<'a> {
                     match self.register(value, &ty) {
                         Some(id) => id,
                         None => {
-                            return self
-                                .fail("a value in a loop that is too long to be written out has no register");
+                            return self.fail(
+                                "a value in a loop that is too long to be written out has no register",
+                            );
                         }
                     }
                 }
