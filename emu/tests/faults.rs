@@ -261,9 +261,9 @@ fn programs_that_do_not_fit_are_refused() {
         let error: LoadError = Emulator::new(&program).err().expect(text);
         assert_eq!(error.to_string(), text);
     };
-    refuse(&|p| p.code = vec![0; 3 * 1025], "program of 1025 bundles; f3 holds 1024");
-    refuse(&|p| p.code = vec![0; 4], "4 words are no whole number of bundles of 3");
-    refuse(&|p| p.data = vec![0; 1025], "1025 words of data; f3 holds 1024");
+    refuse(&|p| p.code = vec![0; 3 * 1025], "the program has 1025 bundles; f3 holds 1024");
+    refuse(&|p| p.code = vec![0; 4], "4 words are not a whole number of bundles of 3");
+    refuse(&|p| p.data = vec![0; 1025], "the program has 1025 words of data; f3 holds 1024");
     let register = |name| F3.register_address(name).unwrap();
     refuse(
         &|p| p.constants = vec![(Register::ZERO, 1)],
