@@ -155,7 +155,7 @@ fn an_error_that_is_not_reported_ends_a_wait() {
     session.enter("prompt", "simulate silent", true).expect("it is one");
     let since = session.host().time();
     let error = session.enter("prompt", "wait done", true).expect_err("it does not come to its end");
-    assert!(error.render(false).contains("of which no report has come; `reset` ends it"));
+    assert!(error.render(false).contains("that was not reported; `reset` ends this state"));
     assert!(session.host().time() - since < 5.0);
     session.enter("prompt", "reset", true).expect("it is answered");
 }

@@ -74,5 +74,5 @@ fn mistakes_on_the_command_line() {
     let speed = format!("{}/../../programs/systems/speed.toml", env!("CARGO_MANIFEST_DIR"));
     let done = folder.line(&format!("robot a.robot --system {speed}"));
     assert_eq!(done.status, Some(1));
-    assert!(done.stderr.contains("the system is no robot controller"), "{}", done.stderr);
+    assert!(done.stderr.contains("the system is not a robot controller"), "{}", done.stderr);
 }

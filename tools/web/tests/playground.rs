@@ -265,7 +265,7 @@ fn the_robot_follows_the_path() {
     assemble(&mut playground, DOUBLE, "");
     let error =
         playground.call("track", json!({ "begin": true, "periods": 1 })).expect_err("it has other ports");
-    assert!(error.contains("no tracking program"), "{error}");
+    assert!(error.contains("not a tracking program"), "{error}");
 }
 
 #[test]
