@@ -182,7 +182,7 @@ fn half<'a>(
             Some(half as u32)
         }
         (Some(_), Some(at)) => {
-            document.mistake(&at.place, "`half` says the period already: leave out one of the two");
+            document.mistake(&at.place, "`half` already determines the period: leave out one of the two");
             None
         }
         (None, None) => {
@@ -214,7 +214,7 @@ fn tick<'a>(
     let Some(given) = given else {
         for (key, place) in [("every", every.map(|at| at.place)), ("after", after.map(|at| at.place))] {
             if let Some(place) = place {
-                document.mistake(&place, format!("`{key}` is about ticks, and this carrier has no `tick`"));
+                document.mistake(&place, format!("`{key}` applies to ticks, but this carrier has no `tick`"));
             }
         }
         return None;
@@ -224,7 +224,7 @@ fn tick<'a>(
         "peak" => TickPlace::Peak,
         "both" => TickPlace::Both,
         other => {
-            let text = format!("`tick` is to be \"valley\", \"peak\" or \"both\", not \"{other}\"");
+            let text = format!("`tick` must be \"valley\", \"peak\" or \"both\", not \"{other}\"");
             document.mistake(&given.place, text);
             return None;
         }
@@ -265,7 +265,7 @@ pub(crate) fn instant(
         "peak" => half,
         _ => {
             let text = format!(
-                "`{}` is no place of a carrier; there are `{name}.valley` and `{name}.peak`",
+                "`{}` is not a place of a carrier; there are `{name}.valley` and `{name}.peak`",
                 at.value
             );
             document.mistake(&at.place, text);
@@ -290,7 +290,7 @@ pub(crate) fn find(
             [] => "the wiring has none: `[carrier.main]` with `half` makes one".to_owned(),
             _ => format!("there are {}", names.join(", ")),
         };
-        document.mistake(&at.place, format!("`{name}` is no carrier; {there}"));
+        document.mistake(&at.place, format!("`{name}` is not a carrier; {there}"));
     }
     found
 }

@@ -207,7 +207,7 @@ fn the_loop_closes_through_the_pins_of_a_simulated_board() {
     drop(board);
     let done = host.wait_with_output().unwrap();
     let stderr = String::from_utf8_lossy(&done.stderr);
-    let says = "the line is gone: the port was unplugged, or the simulated board has ended";
+    let says = "the connection is lost: the port was unplugged, or the simulated board has ended";
     assert!(done.status.code() == Some(1) && stderr.contains(says), "{done:?}");
     assert!(done.stdout.is_empty(), "{done:?}");
 }
@@ -433,7 +433,7 @@ fn the_board_is_unplugged(bench: Bench) {
     let _ = host.stdin.take().unwrap().write_all(b"step\nprint count\n");
     let done = host.wait_with_output().unwrap();
     let stderr = String::from_utf8_lossy(&done.stderr);
-    let says = "the line is gone: the port was unplugged, or the simulated board has ended";
+    let says = "the connection is lost: the port was unplugged, or the simulated board has ended";
     assert!(done.status.code() == Some(1) && stderr.contains(says), "{done:?}");
 }
 
@@ -652,7 +652,7 @@ fn path_from_pin_to_pin_has_a_bound() {
     for board in ["", " --board ulx3s-85f"] {
         refused(
             &format!("--wiring system.toml{board}"),
-            "system.toml:1:2: this is a system of several cores, and a wiring is needed",
+            "system.toml:1:2: expected a wiring, which assigns peripherals to a board's pins; found a system of several cores",
         );
     }
     folder.write("broken.toml", "period = \n");

@@ -129,7 +129,7 @@ fn wrong_systems_and_ports_are_refused() {
         "entries of `moves` have no field `speed`; there are target, rate",
     );
     refused(&live("pop moves"), "`moves` is a FIFO from the host, into which `push` puts entries");
-    refused(&live("stream servo.duty watch.peak"), "one stream has 15 numbers that follow each other");
+    refused(&live("stream servo.duty watch.peak"), "a stream can have up to 15 consecutive numbers");
     refused("live /dev/nothing push moves target=1", "ports have names in the program: --program FILE");
 }
 
