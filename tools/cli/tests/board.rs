@@ -186,7 +186,11 @@ fn the_loop_closes_through_the_pins_of_a_simulated_board() {
         folder.line(&format!("live {port} --baud {baud} --program {program} --machine t1 read [1024]"));
     assert!(beyond.stderr.contains("no port, register or data word `[1024]`"), "{}", beyond.stderr);
     let without = folder.line(&format!("live {port} --baud {baud} shadow"));
-    assert!(without.stderr.contains("ports have names in the program: --program FILE"), "{}", without.stderr);
+    assert!(
+        without.stderr.contains("ports are named by the program: give it with --program FILE"),
+        "{}",
+        without.stderr
+    );
     let loaded = folder.line(&format!("load {port} --baud {baud} {program} --machine t1 --stopped")).ok();
     assert!(loaded.contains("records loaded and compared; stopped"), "{loaded}");
     let broken = folder.line(&format!("live {port} --baud {baud} --program {program} set nothing=1"));
@@ -338,13 +342,13 @@ fn other_programs_are_refused(bench: &Bench) {
     assert_eq!((other.status, other.stdout.as_str()), (Some(1), ""));
     assert!(
         other.stderr.contains("the board does not carry other.s; `takt load")
-            && other.stderr.contains("of its image differs"),
+            && other.stderr.contains("of the board's image differs from this program's"),
         "{}",
         other.stderr
     );
     bench.folder.write("longer.s", RING.replace("wait    period\n.data", "nop\n wait period\n.data"));
     let longer = bench.debug("longer.s", "", "print x\n");
-    assert!(longer.stderr.contains("its image has "), "{}", longer.stderr);
+    assert!(longer.stderr.contains("the board's image has "), "{}", longer.stderr);
 }
 
 /// Differences: the board runs a changed program but claims to run the original.

@@ -117,7 +117,7 @@ fn wrong_systems_and_ports_are_refused() {
     let live = |what: &str| format!("live /dev/nothing --program {} {what}", example("axis.toml"));
     refused(&live("set servo.wanted=1"), "`servo.wanted` comes from the link `reference`");
     refused(&live("set servo.duty=1"), "`servo.duty` is an output port, which the program sets");
-    refused(&live("set limit=much"), "`much` is no value of `limit`");
+    refused(&live("set limit=much"), "`much` is not a value of `limit`");
     refused(&live("push limits x=1"), "the system has no FIFO `limits` from the host; there are moves");
     refused(&live("push reached there=1"), "`reached` is a FIFO to the host, whose entries `pop` takes out");
     refused(
@@ -130,7 +130,10 @@ fn wrong_systems_and_ports_are_refused() {
     );
     refused(&live("pop moves"), "`moves` is a FIFO from the host, into which `push` puts entries");
     refused(&live("stream servo.duty watch.peak"), "a stream can have up to 15 consecutive numbers");
-    refused("live /dev/nothing push moves target=1", "ports have names in the program: --program FILE");
+    refused(
+        "live /dev/nothing push moves target=1",
+        "ports are named by the program: give it with --program FILE",
+    );
 }
 
 /// Copies the example's files, with some texts replaced.

@@ -133,7 +133,7 @@ fn rejects_program_options_for_a_systems_circuit() {
     );
     for (line, text) in [
         ("rtl twice.toml -o out", "two modules or nets named `out_s_x`"),
-        ("rtl p.s -o out", "p.s is no system (`.toml`); a program's core: --program p.s"),
+        ("rtl p.s -o out", "p.s is not a system (`.toml`); for the core of a program, write --program p.s"),
         ("rtl right.toml -o out -m t1", "cannot be used with"),
         ("cosim right.toml -m t1", "the system's file names each core's"),
         ("rtl none.toml -o out", "none.toml"),

@@ -198,8 +198,8 @@ fn a_policy_becomes_a_program_that_runs() {
             2,
             "--body applies to robots and expressions, but relu.onnx contains a policy,",
         ),
-        ("model relu.onnx --range 1", 2, "two numbers with a comma between them, as -1,1"),
-        ("model relu.onnx --range 1,-1", 2, "the first number is not greater than the second"),
+        ("model relu.onnx --range 1", 2, "expected two numbers with a comma between them, as -1,1"),
+        ("model relu.onnx --range 1,-1", 2, "the first number must not be greater than the second"),
     ] {
         let done = folder.line(line);
         assert!(done.status == Some(status) && done.stderr.contains(expected), "{line}: {}", done.stderr);
@@ -299,7 +299,7 @@ fn mistakes_have_one_message() {
     folder.write("ball.xml", PENDULUM.replace("name=\"hip\"", "name=\"hip\" type=\"ball\""));
     folder.write("f.json", "{");
     for (line, status, expected) in [
-        ("model ur5.urdf", 2, "say with --function what to compute: forward-kinematics, jacobian,"),
+        ("model ur5.urdf", 2, "name what to compute with --function: forward-kinematics, jacobian,"),
         ("model ur5.urdf -f gravty", 2, "there is no such function; did you mean `gravity`?"),
         (
             "model ur5.urdf -f gravity --tip wrist",
@@ -329,7 +329,7 @@ fn mistakes_have_one_message() {
         ),
         ("model f.json", 1, "f.json:1: this is not a list of instructions: EOF while parsing an object"),
         ("model ur5.urdf -f gravity --snap 1", 2, "between 0 and 0.01 rad"),
-        ("model ur5.urdf -f computed-torque --kp -1", 2, "a gain is finite and not negative"),
+        ("model ur5.urdf -f computed-torque --kp -1", 2, "a gain must be finite and not negative"),
     ] {
         let done = folder.line(line);
         assert!(done.status == Some(status) && done.stderr.contains(expected), "{line}: {}", done.stderr);

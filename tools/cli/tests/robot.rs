@@ -59,7 +59,7 @@ fn mistakes_on_the_command_line() {
     folder.write("b.toml", "tick = 10\n");
     for (line, status, text) in [
         ("robot a.robot --faults flood@1", 2, "there is no fault `flood`"),
-        ("robot a.robot --faults corrupt", 2, "a fault has a time"),
+        ("robot a.robot --faults corrupt", 2, "expected a fault with its time"),
         ("robot a.robot --faults corrupt@-1", 2, "is no time"),
         ("robot --check", 2, "FILE"),
         ("robot none.robot", 1, "none.robot"),

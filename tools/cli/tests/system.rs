@@ -103,7 +103,7 @@ fn bound_counts_the_periods_of_states() {
         (&Value::Null, &Value::Null, &Value::Null)
     );
     let none = folder.line("bound same.toml --deadline 1ms");
-    assert!(none.status == Some(1) && none.stderr.contains("no way leads from an input"), "{none:?}");
+    assert!(none.status == Some(1) && none.stderr.contains("needs a path from an input"), "{none:?}");
 }
 
 #[test]
@@ -260,7 +260,7 @@ fn rejects_program_options_for_a_system() {
     folder.write("wrong.s", ".output y\n fadd y, q, 1\n halt\n");
     for (line, said) in [
         ("run missing.toml --periods 1", "there is no program b.s"),
-        ("run right.toml", "goes on from tick to tick"),
+        ("run right.toml", "runs from tick to tick"),
         ("run right.toml --periods 1 --tick 5", "--tick with a system"),
         ("run right.toml --periods 1 --machine t1", "--machine with a system"),
         ("run faults.toml --periods 1", "core a"),

@@ -197,7 +197,7 @@ def test_errors_of_robots(tmp_path):
     assert raised.value.line == 12
     with pytest.warns(UserWarning, match="the base is held, though it floats: `shoulder_pan_joint` .`floating=\"error\"`"):
         takt.urdf.program(tmp_path / "ur5.urdf", "gravity")
-    with pytest.raises(ValueError, match="kp is -1: a gain is finite and not negative"):
+    with pytest.raises(ValueError, match="kp is -1: a gain must be finite and not negative"):
         takt.urdf.program(UR5, "computed-torque", kp=-1)
     with pytest.raises(ValueError, match=r"`q` has shape \(4, 5\); an array of shape \(6,\) is needed"):
         takt.urdf.program(UR5, "gravity").run({"q": np.zeros((4, 5))})

@@ -128,7 +128,8 @@ const LIMIT: usize = 1 << 20;
 /// Name and text of a file.
 fn text(path: &Path) -> Result<(String, String)> {
     let name = files::input_name(path);
-    let text = String::from_utf8(files::read(path, LIMIT)?).map_err(|_| anyhow!("{name} is no text"))?;
+    let text =
+        String::from_utf8(files::read(path, LIMIT)?).map_err(|_| anyhow!("{name} is not UTF-8 text"))?;
     Ok((name, text))
 }
 

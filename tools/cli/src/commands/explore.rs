@@ -123,7 +123,7 @@ fn budget(text: &str) -> Result<Budget, String> {
             "multipliers" => budget.multipliers = Some(value),
             _ => {
                 let near = options::suggest(name, ["luts", "ram", "multipliers"]);
-                return Err(format!("`{name}` is no resource{near} (luts, ram, multipliers)"));
+                return Err(format!("`{name}` is not a resource{near} (luts, ram, multipliers)"));
             }
         }
     }

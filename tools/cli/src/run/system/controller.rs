@@ -61,7 +61,7 @@ impl SystemController {
         }
         let fifo = description.link_named(BLOCKS).context("its inputs have this link")?;
         let LinkKind::Fifo { depth, .. } = description.links[fifo].kind else {
-            bail!("this system cannot control the hybrid robot: `{BLOCKS}` is no FIFO");
+            bail!("this system cannot control the hybrid robot: `{BLOCKS}` is not a FIFO");
         };
         let known = description.outputs();
         let mut outputs = [(0, 0); OUTPUTS.len()];
@@ -74,7 +74,9 @@ impl SystemController {
         }
         let generation = match description.links[fifo].to {
             takt_system::End::Core(core) => core,
-            takt_system::End::Host => bail!("`{BLOCKS}` leads from the host to the host"),
+            takt_system::End::Host => bail!(
+                "this system cannot control the hybrid robot: the FIFO `{BLOCKS}` must lead to a core, not back to the host"
+            ),
         };
         let core = &description.cores[generation];
         let mut point = [Register::ZERO; REFERENCE_LEN];
@@ -86,7 +88,7 @@ impl SystemController {
         let mut system = System::new(description)?;
         let mut observer = Observer::watching(&mut system, watch);
         let start = system.run_to_start(PERIOD_LIMIT)?;
-        let start = start.context("the cores do not come to their first ticks")?;
+        let start = start.context("the cores do not reach their first ticks")?;
         observer.observe(&mut system);
         Ok(SystemController {
             system,
