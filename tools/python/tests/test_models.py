@@ -106,7 +106,7 @@ def test_sympy_expressions():
     assert_close(run.outputs["y"], np.sin(p.sum(axis=1)) * values**2)
     expected = [[[x, y * z], [z**0.5, max(x, y)]] for (x, y), z in zip(p, values)]
     assert_close(run.outputs["M"], expected)
-    with pytest.raises(ValueError, match="the symbol b is no input"):
+    with pytest.raises(ValueError, match="the symbol b is not an input"):
         takt.sympy.program({"a": a}, {"y": a + b})
 
 

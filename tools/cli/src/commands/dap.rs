@@ -37,8 +37,8 @@ pub(crate) fn run(arguments: &Dap, _color: bool, _out: &mut Out) -> Result<()> {
     // With port 0, the operating system chooses a port.
     message(&format!("listening on {}", listener.local_addr()?));
     loop {
-        let (stream, _) = listener.accept().context("cannot take a client")?;
-        let reader = stream.try_clone().context("cannot take a client")?;
+        let (stream, _) = listener.accept().context("cannot accept a client")?;
+        let reader = stream.try_clone().context("cannot accept a client")?;
         client(reader, &stream);
         // Also ends the reader of the other half.
         let _ = stream.shutdown(std::net::Shutdown::Both);

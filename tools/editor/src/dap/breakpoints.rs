@@ -49,7 +49,7 @@ impl Hits {
             ("", rest) => number(rest).map(Hits::AtLeast),
             _ => None,
         };
-        hits.ok_or_else(|| format!("`{text}` is no number of hits: write `5`, `>= 5`, `== 5` or `% 5`"))
+        hits.ok_or_else(|| format!("`{text}` is not a number of hits: write `5`, `>= 5`, `== 5` or `% 5`"))
     }
 
     pub(super) fn stops(self, met: u64) -> bool {
@@ -251,8 +251,9 @@ impl DebuggedSession {
         let make = |debugged: &DebuggedSession, one: &BreakpointRequest| {
             let reference =
                 one.instruction_reference.as_deref().ok_or("a breakpoint has an `instructionReference`")?;
-            let (core, address) =
-                debugged.address(reference).ok_or_else(|| format!("`{reference}` is no bundle's address"))?;
+            let (core, address) = debugged
+                .address(reference)
+                .ok_or_else(|| format!("`{reference}` is not a bundle's address"))?;
             let address = i64::from(address.get()).saturating_add(one.offset.unwrap_or(0));
             let session = debugged.session(core);
             let at = BreakpointLocation::parse(&format!("bundle {address}"), session.program())?;

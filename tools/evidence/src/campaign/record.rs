@@ -61,7 +61,7 @@ fn path() -> PathBuf {
 fn rows() -> Result<Vec<Row>> {
     let text =
         std::fs::read_to_string(path()).with_context(|| format!("cannot read {}", path().display()))?;
-    serde_json::from_str(&text).with_context(|| format!("{} is no track record", path().display()))
+    serde_json::from_str(&text).with_context(|| format!("{} is not a track record", path().display()))
 }
 
 /// Current date and time in UTC.
