@@ -111,7 +111,7 @@ impl Interpreter {
         // A template's text differs from iteration to iteration: its label needs no scope of its own.
         let owner = Scope::declaring(scope, label.name.resolve().is_ok());
         if owner.has(&text) {
-            return Err(format!("the label `{text}` stands twice"));
+            return Err(format!("the label `{text}` appears twice"));
         }
         owner.bind(&text, Meaning::Label(number));
         Ok(())

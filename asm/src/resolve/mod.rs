@@ -566,7 +566,7 @@ impl Resolver<'_> {
             let port = self.port(at, *name, wanted)?;
             if let Some((_, first)) = ports.iter().find(|(other, _)| *other == port) {
                 let message = format!(
-                    "`{}` stands twice in one directive",
+                    "`{}` appears twice in one directive",
                     self.context.reports.sources.text(name.span)
                 );
                 let error =
@@ -582,15 +582,15 @@ impl Resolver<'_> {
     fn unlatched(&mut self, at: AstPlace, kind: DemandKind, span: Span, latched: Span) -> ErrorReported {
         let (message, help) = match kind {
             DemandKind::Deadline(_) => (
-                "a deadline for outputs that are published together, at the `wait`",
+                "outputs that are published together, at the `wait`, cannot have deadlines of their own",
                 "bound the period instead: `takt bound --deadline`",
             ),
             DemandKind::Order => (
-                "an order of ports that are taken together, at the tick, or published together, at the `wait`",
+                "ports that are taken together, at the tick, or published together, at the `wait`, cannot have an order",
                 "leave it out",
             ),
             DemandKind::Late(_) => (
-                "inputs that are to be read late are taken at the tick, whenever they are read",
+                "inputs that are taken at the tick cannot be read later",
                 "leave it out, or write `.ports direct`",
             ),
         };

@@ -178,7 +178,7 @@ fn mistake(file: &File, error: &RowError) -> Diagnostic {
         let diagnostic = Diagnostic::error("machine", span(file.name.span()), error.to_string());
         return match error {
             RowError::Taken { .. } => {
-                diagnostic.help("another name; `takt machines` lists those that are taken")
+                diagnostic.help("choose another name; `takt machines` lists those that are taken")
             }
             _ => diagnostic,
         };
@@ -244,7 +244,7 @@ impl Reader {
         for table in &file.slot {
             let units = table.units.get_ref();
             if units.len() > UNITS_OF_SLOT {
-                let message = format!("{} units; a slot has {UNITS_OF_SLOT} at most", units.len());
+                let message = format!("{} units; a slot can have at most {UNITS_OF_SLOT}", units.len());
                 self.mistakes.push(Diagnostic::error("limit", span(table.units.span()), message));
             }
             let counts = *file.loop_depth.get_ref() != 0;
@@ -270,7 +270,8 @@ impl Reader {
 
     fn name(&mut self, name: &Spanned<String>) -> String {
         if name.get_ref().len() > NAME_BYTES {
-            let message = format!("a name of {} bytes; {NAME_BYTES} at most", name.get_ref().len());
+            let message =
+                format!("the name has {} bytes; at most {NAME_BYTES} are allowed", name.get_ref().len());
             self.mistakes.push(Diagnostic::error("limit", span(name.span()), message));
         }
         name.get_ref().clone()

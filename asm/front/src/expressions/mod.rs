@@ -258,7 +258,7 @@ impl<'g> Reader<'g> {
     fn unknown(&self, op: &str, operands: &[Expr<'g>]) -> String {
         let function = |expr: &Expr<'g>| crate::sink::expression(self.graph, self.names, expr.id());
         let operands: Vec<String> = operands.iter().map(function).collect();
-        let place = format!("operation `{op}` has no meaning here; in `{op}({})`", operands.join(", "));
+        let place = format!("operation `{op}` is not supported; in `{op}({})`", operands.join(", "));
         match REFUSED.iter().find(|(name, _)| *name == op) {
             Some((_, mend)) => format!("{place}: {mend}"),
             None => place,

@@ -217,7 +217,7 @@ impl Expander<'_> {
                 }
             };
             if again {
-                let message = format!("`{text}` stands twice");
+                let message = format!("`{text}` appears twice");
                 return Err(self.context.error(at.scope, "declared-twice", name.span, message));
             }
             if text == "step" && number == 0 {
@@ -354,7 +354,7 @@ impl Expander<'_> {
     ) -> Result<Vec<Pass>, ErrorReported> {
         if self.nest.len() >= limits::LOOP_DEPTH {
             let message = format!(
-                "a nest of {} counted loops: at most {} run within one another",
+                "a nest of {} counted loops: at most {} can run within one another",
                 self.nest.len() + 1,
                 limits::LOOP_DEPTH
             );
