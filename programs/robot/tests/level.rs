@@ -98,7 +98,7 @@ fn signals_and_waits() {
     );
     assert_eq!(said[0], "say: 112.5");
     assert_eq!(said[1..3], ["signal: output 2 on", "signal: level 1 is 0.25"]);
-    assert_eq!(said[3..], ["caught: test.robot:9: waited 0.2 s in vain: input 4 on", "say: none 0"]);
+    assert_eq!(said[3..], ["caught: test.robot:9: waited 0.2 s without success: input 4 on", "say: none 0"]);
 }
 
 #[test]

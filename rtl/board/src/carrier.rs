@@ -172,7 +172,7 @@ fn half<'a>(
             let half = (clock * 1e3 / at.value / 2.0).round();
             if !(f64::from(LEAST_HALF)..=f64::from(u16::MAX)).contains(&half) {
                 let text = format!(
-                    "{} kHz are {half} cycles of {clock} MHz for half a period; there may be {LEAST_HALF} to {}",
+                    "{} kHz are {half} cycles of {clock} MHz for half a period; expected {LEAST_HALF} to {}",
                     at.value,
                     u16::MAX
                 );
@@ -230,20 +230,22 @@ fn tick<'a>(
         }
     };
     if let Some(every) = every.as_ref().filter(|every| every.value > 1 && place == TickPlace::Both) {
-        let text = format!("with `tick = \"both\"` each place has a tick: `every` is 1, not {}", every.value);
+        let text =
+            format!("with `tick = \"both\"` each place has a tick: `every` must be 1, not {}", every.value);
         document.mistake(&every.place, text);
         return None;
     }
     let span = if place == TickPlace::Both { half } else { 2 * half };
     let period = span.saturating_mul(every.map_or(1, |every| every.value));
     if !(64..=MOST_PERIOD).contains(&period) {
-        let text = format!("ticks come every {period} cycles; there may be 64 to {MOST_PERIOD}");
+        let text = format!("ticks come every {period} cycles; expected 64 to {MOST_PERIOD}");
         document.mistake(&given.place, text);
         return None;
     }
     let cycles = after.as_ref().map_or(0.0, |after| (after.value * clock).round());
     if let Some(after) = after.filter(|_| cycles >= f64::from(span)) {
-        let text = format!("`after` is {cycles} cycles; places come every {span}: less than that");
+        let text =
+            format!("`after` is {cycles} cycles; it must be less than {span}, the cycles between two places");
         document.mistake(&after.place, text);
         return None;
     }

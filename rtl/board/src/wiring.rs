@@ -248,7 +248,7 @@ impl Wiring {
                 if *direction == Direction::Input
                     && let Some(other) = driven.insert(found.number, &peripheral.name)
                 {
-                    let text = format!("input port `{port}` is driven twice: `{other}` drives it, too");
+                    let text = format!("input port `{port}` is driven twice: `{other}` drives it too");
                     document.mistake(place, text);
                 }
                 self.check_type(&document, peripheral, (port.as_str(), found.ty), *direction, place);
@@ -381,7 +381,7 @@ impl<'a> Reader<'a> {
             mistake(
                 &at.place,
                 format!(
-                    "{} µs are {cycles} cycles of {clock} MHz; there may be {least} to {MOST_PERIOD}",
+                    "{} µs are {cycles} cycles of {clock} MHz; expected {least} to {MOST_PERIOD}",
                     at.value
                 ),
             );

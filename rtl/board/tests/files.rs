@@ -132,7 +132,7 @@ const WRONG: &[(&str, &str, &str)] = &[
     ),
     ("scale = { duty", "scale = { force", "27:11: `force` is not a register of a pwm that a program writes"),
     ("high = \"gp2\", ", "", "23:8: `high` is missing in [pins]"),
-    ("period = 400.0", "period = 0.1", "4:10: 0.1 µs are 5 cycles of 50 MHz; there may be 64 to 1073741824"),
+    ("period = 400.0", "period = 0.1", "4:10: 0.1 µs are 5 cycles of 50 MHz; expected 64 to 1073741824"),
     ("lead = 5", "lead = 400", "5:8: `lead` must be shorter than the period"),
     (
         "1_000_000",
@@ -189,11 +189,15 @@ fn mistakes_about_carriers_name_their_place() {
         ("half = 1500 ", "half = 1500\nfrequency = 20 ", "15:13: `half` already determines the period"),
         ("tick = \"valley\"", "tick = \"crest\"", "15:8: `tick` must be \"valley\", \"peak\" or \"both\""),
         ("tick = \"valley\" ", "", "16:9: `after` applies to ticks, but this carrier has no `tick`"),
-        ("after = 1.7", "after = 50", "16:9: `after` is 3000 cycles; places come every 3000: less than that"),
+        (
+            "after = 1.7",
+            "after = 50",
+            "16:9: `after` is 3000 cycles; it must be less than 3000, the cycles between two places",
+        ),
         (
             "tick = \"valley\" ",
             "every = 2\ntick = \"both\" ",
-            "15:9: with `tick = \"both\"` each place has a tick: `every` is 1, not 2",
+            "15:9: with `tick = \"both\"` each place has a tick: `every` must be 1, not 2",
         ),
         (
             "clock = 60 ",

@@ -650,7 +650,7 @@ fn path_from_pin_to_pin_has_a_bound() {
     refused(&format!("--wiring {wiring} --board colorlight-i5"), "this wiring is for the board `ulx3s-85f`");
     refused(&format!("--wiring {wiring} --deadline 100us"), "--deadline is not for --pins");
     folder.write("none.toml", "period = 100\n");
-    refused("--wiring none.toml", "none.toml names no board: `--board NAME`, or a line");
+    refused("--wiring none.toml", "none.toml does not name a board: give `--board NAME`, or begin it");
     // The message is the same for a board given by --board and in the file.
     folder.write("system.toml", "[core.one]\nmachine = \"t1\"\n");
     for board in ["", " --board ulx3s-85f"] {

@@ -88,7 +88,7 @@ fn the_wiring_names_the_board() {
         "bound --pins --wiring limit.toml limit.s",
     ] {
         let done = folder.line(line);
-        let says = "limit.toml names no board: `--board NAME`, or a line `board = \"NAME\"` at its beginning; \
+        let says = "limit.toml does not name a board: give `--board NAME`, or begin it with a line `board = \"NAME\"`; \
             there are ulx3s-85f";
         assert!(done.status == Some(1) && done.stderr.contains(says), "{line}: {done:?}");
     }

@@ -84,7 +84,7 @@ fn wrong_systems_and_ports_are_refused() {
         "wiring.toml:5:1: the system's `tick` is 5000 cycles, which at 50 MHz are 100 µs; `period` is 10000 cycles",
     );
     let two = "[peripheral.other]\nkind = \"step\"\npins = { step = \"gp4\", direction = \"gn4\" }\nports = { count = \"n\" }\n[peripheral.lamp]";
-    wired("[peripheral.lamp]", two, "input port `n` is driven twice: `encoder` drives it, too");
+    wired("[peripheral.lamp]", two, "input port `n` is driven twice: `encoder` drives it too");
 
     // Errors: one port of several cores; an offset that no board can keep; a system that is too large for any board.
     let system = std::fs::read_to_string(example("axis.toml")).unwrap();

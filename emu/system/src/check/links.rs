@@ -44,7 +44,8 @@ impl Checker<'_> {
                     field.to,
                     field.ty.name()
                 );
-                self.mistakes.add("type", table.to.span(), text).help = Some("another name".to_owned());
+                self.mistakes.add("type", table.to.span(), text).help =
+                    Some("choose another name".to_owned());
                 return;
             }
         }

@@ -260,7 +260,7 @@ impl<'m> Checker<'m> {
         } else if text == HOST {
             self.mistakes
                 .add("name", name.span(), format!("`{HOST}` stands for the outside and cannot name a {what}"))
-                .help = Some("another name".to_owned());
+                .help = Some("choose another name".to_owned());
         }
         good && text != HOST
     }

@@ -413,7 +413,7 @@ impl<R: Robot + Clone> Session<R> {
             }
             if self.host.time() >= end - 1e-9 {
                 let text = self.sources.text(condition.span);
-                let text = format!("waited {} s in vain: {text}", short(time));
+                let text = format!("waited {} s without success: {text}", short(time));
                 return Err(Problem::Late(text).into());
             }
             self.pause((LOOK as f64 * crate::host::TICK).min(end - self.host.time()))?;

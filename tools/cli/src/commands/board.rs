@@ -213,7 +213,7 @@ fn placed(name: &str, text: &str, board: Option<&str>, color: bool) -> Result<(B
         None => right(Wiring::board(name, text), color)?.with_context(|| {
             let names: Vec<&str> = Board::names().collect();
             format!(
-                "{name} names no board: `--board NAME`, or a line `board = \"NAME\"` at its beginning; there are {}",
+                "{name} does not name a board: give `--board NAME`, or begin it with a line `board = \"NAME\"`; there are {}",
                 names.join(", ")
             )
         })?,
