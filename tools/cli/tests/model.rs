@@ -142,7 +142,7 @@ fn expressions_become_programs() {
     let done = folder.line("model f.json");
     assert_eq!(done.status, Some(1));
     assert!(
-        done.stderr.contains("f.json:6: operation `lgamma` has no meaning here; in `lgamma(x_1, x_2)`"),
+        done.stderr.contains("f.json:6: operation `lgamma` is not supported; in `lgamma(x_1, x_2)`"),
         "{}",
         done.stderr
     );

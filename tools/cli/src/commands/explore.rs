@@ -297,7 +297,10 @@ impl Search<'_> {
                 Ok(_) => {}
             }
         }
-        anyhow::anyhow!("no program ends its period on {}; others to begin with: --from", machine.name)
+        anyhow::anyhow!(
+            "no program ends its period on {}: give other machines to begin with by --from",
+            machine.name
+        )
     }
 
     fn report(&self, out: &mut Out) -> Result<()> {

@@ -82,7 +82,8 @@ impl SystemController {
         let mut point = [Register::ZERO; REFERENCE_LEN];
         for (register, port) in point.iter_mut().zip(&INPUTS[AXES..]) {
             let found = core.program.outputs.iter().find(|output| output.name == port.name);
-            let found = found.with_context(|| format!("core {} computes no `{}`", core.name, port.name))?;
+            let found =
+                found.with_context(|| format!("core {} does not compute `{}`", core.name, port.name))?;
             *register = found.register;
         }
         let mut system = System::new(description)?;
