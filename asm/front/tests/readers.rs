@@ -249,7 +249,7 @@ fn infinities_of_python_are_no_limits() {
         (
             "8}",
             "NaN}",
-            "p.json:3: this is no control problem: `NaN` is not a JSON number, though Python's json.dumps writes it",
+            "p.json:3: this is not a control problem: `NaN` is not a JSON number, though Python's json.dumps writes it",
         ),
         ("8}", "8,}", "p.json:3: this is not a control problem: trailing comma"),
         ("8}", "8", "p.json:3: this is not a control problem: EOF while parsing an object"),

@@ -62,8 +62,8 @@ fn reports_a_broken_configuration() {
     let mut client = Client::start(&folder, "dap");
     client.command("initialize", json!({}));
     for (configuration, told) in [
-        (json!({}), "has `program`, the path of a source or an image, or `track`"),
-        (json!([]), "is an object"),
+        (json!({}), "needs `program`, the path of a source or an image, or `track`"),
+        (json!([]), "expected a launch configuration, an object"),
         (json!({ "program": 7 }), "`program` in the launch configuration is the path"),
         (json!({ "program": "none.s" }), "cannot open none.s"),
         (json!({ "program": "." }), "folder"),

@@ -217,7 +217,7 @@ fn rejects_unsupported_configurations() {
         source("board.toml"),
         source("tracking.s")
     );
-    refused(&alone, 1, "emulated is one with a system of several cores");
+    refused(&alone, 1, "--emulated is for systems of several cores");
     refused(&board("--record sim.csv --emulated").replace(" --serve", ""), 2, "--serve");
     refused(&board("--emulated --unplug-at x"), 2, "--unplug-at");
     refused(&board("--emulated --record none/sim.csv"), 1, "cannot write none/sim.csv");

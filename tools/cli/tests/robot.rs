@@ -60,7 +60,7 @@ fn mistakes_on_the_command_line() {
     for (line, status, text) in [
         ("robot a.robot --faults flood@1", 2, "there is no fault `flood`"),
         ("robot a.robot --faults corrupt", 2, "expected a fault with its time"),
-        ("robot a.robot --faults corrupt@-1", 2, "is no time"),
+        ("robot a.robot --faults corrupt@-1", 2, "is not a time"),
         ("robot --check", 2, "FILE"),
         ("robot none.robot", 1, "none.robot"),
         ("robot a.robot --plot a.robot", 2, "--plot would overwrite"),
