@@ -569,7 +569,7 @@ fn mistakes_about_arguments_name_the_mend() {
         (" y = powers(x, n + 1)", "of `powers` is a number that is known"),
         (" y = powers(x, A[1])", "is an element of an array"),
         (" y = powers(x, A)", "`A` is an array in data memory"),
-        (" y = pick(3)", "`3` is no name"),
+        (" y = pick(3)", "`3` is not a name"),
         (" y = untold(3)", "declare it: `v:float`, `v:int`, or `v:bits`"),
         (" y = outer(x)", "is a float, and"),
         (" y = wrong(x)", "`v` is a float, and `iadd` reads an integer"),

@@ -182,7 +182,13 @@ impl Expander<'_> {
                 if !matches!(argument.operand.kind, OperandKind::Name(_)) =>
             {
                 let shown = self.context.reports.sources.text(argument.operand.span).to_owned();
-                return Err(self.wrong_argument(argument, asked, argument.operand.span, &shown, "no name"));
+                return Err(self.wrong_argument(
+                    argument,
+                    asked,
+                    argument.operand.span,
+                    &shown,
+                    "not a name",
+                ));
             }
             _ => {}
         }

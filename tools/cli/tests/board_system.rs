@@ -110,7 +110,7 @@ fn wrong_systems_and_ports_are_refused() {
         "board build --board ulx3s-85f --wiring wiring.toml --program axis.toml --sources -o out",
         "the system needs 252 block RAMs at least, 9 of them for the image of ",
     );
-    refused(&format!("board check {} --machine t1", axis()), "--machine with a system");
+    refused(&format!("board check {} --machine t1", axis()), "--machine cannot be used with a system");
     refused(&format!("board sim {} --robot", axis()), "`takt track --system` drives it with one");
 
     // Detected before the serial port is opened.

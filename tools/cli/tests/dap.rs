@@ -111,7 +111,7 @@ fn survives_and_reports_invalid_messages() {
     assert_eq!(client.command("stackTrace", json!({}))["message"], "`stackTrace` before `launch`");
     client.raw(b"Content-Length: 3\r\n\r\n{]}");
     let output = client.event("output");
-    assert!(output["body"]["output"].as_str().unwrap().contains("no JSON"), "{output}");
+    assert!(output["body"]["output"].as_str().unwrap().contains("not JSON"), "{output}");
     client.send(&json!({ "hello": 1 }));
     assert_eq!(client.wait(|message| message["type"] == "response")["success"], false);
     client.command("launch", json!({ "program": "sum.s" }));
