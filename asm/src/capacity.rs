@@ -13,7 +13,7 @@ fn blocks(count: u64) -> String {
 pub(crate) fn for_bundles(machine: &'static Machine, bundles: usize) -> String {
     match machine.holding(bundles as u64, machine.data_depth.into()) {
         Some(larger) => format!(
-            "`{}` takes it: {} for program memory in place of {}",
+            "`{}` makes room for it: {} for program memory in place of {}",
             larger.directive(),
             blocks(larger.code_block_rams(&KBIT_18)),
             machine.code_block_rams(&KBIT_18)
@@ -26,7 +26,7 @@ pub(crate) fn for_bundles(machine: &'static Machine, bundles: usize) -> String {
 pub(crate) fn for_words(machine: &'static Machine, words: u64) -> String {
     match machine.holding(1, words) {
         Some(larger) => format!(
-            "`{}` takes it: {} for data memory in place of {}",
+            "`{}` makes room for it: {} for data memory in place of {}",
             larger.directive(),
             blocks(larger.data_block_rams(&KBIT_18)),
             machine.data_block_rams(&KBIT_18)

@@ -516,7 +516,7 @@ fn files_of_numbers_are_the_values_of_arrays() {
 fn mistakes_in_files_of_numbers_have_their_place() {
     let array = ".array A = \"data/A.csv\"";
     for (array, numbers, words) in [
-        (array, "1,2\n3,x4\n", "`x4` is no number"),
+        (array, "1,2\n3,x4\n", "`x4` is not a number"),
         (array, "1,2\n3,x4\n", "main/data/A.csv:2:3"),
         (array, "1;2\n3;4,5\n", "the decimal point is a `.`"),
         (array, "1,2\n3\n", "1 number in this row, and 2 in the first"),

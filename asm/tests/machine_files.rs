@@ -175,10 +175,13 @@ fn images_carry_the_row() {
         bytes[at..at + to.len()].copy_from_slice(to.as_bytes());
         image::read(&bytes).expect_err(to).to_string()
     };
-    assert_eq!(tampered("\\\"divroot", "\\\"divrood"), "the row of its machine: there is no unit `divrood`");
+    assert_eq!(
+        tampered("\\\"divroot", "\\\"divrood"),
+        "the image's description of its machine is invalid: there is no unit `divrood`"
+    );
     assert_eq!(
         tampered("\"mine,", "\"many,"),
-        "the row of its machine: it is called `mine`, and `machine` is `many`"
+        "the image's description of its machine is invalid: it is called `mine`, and `machine` is `many`"
     );
     // Images of the table's machines have no row.
     let plain =

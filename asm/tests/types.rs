@@ -459,7 +459,7 @@ fn places_take_the_value_or_refuse_it() {
                 (Ok(bits), None) => panic!("{declarations}{line} is accepted, and gives {bits:#x}"),
                 // A message may ask for the type of an undeclared name, and of a copied literal, too.
                 (Err(report), Some(_)) => {
-                    let asks = ["nothing says of which type", "write `", "convert it", "copy it first"]
+                    let asks = ["nothing states the type of", "write `", "convert it", "copy it first"]
                         .iter()
                         .any(|mend| report.contains(mend));
                     let declared = declarations.contains("d:") || declarations.is_empty();
@@ -569,7 +569,7 @@ fn mistakes_about_arguments_name_the_mend() {
         (" y = powers(x, n + 1)", "of `powers` is a number that is known"),
         (" y = powers(x, A[1])", "is an element of an array"),
         (" y = powers(x, A)", "`A` is an array in data memory"),
-        (" y = pick(3)", "`3` is no name"),
+        (" y = pick(3)", "`3` is not a name"),
         (" y = untold(3)", "declare it: `v:float`, `v:int`, or `v:bits`"),
         (" y = outer(x)", "is a float, and"),
         (" y = wrong(x)", "`v` is a float, and `iadd` reads an integer"),

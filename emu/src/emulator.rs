@@ -698,7 +698,7 @@ impl Emulator {
     }
 }
 
-/// Machine with an observer; see [`Emulator::observed`].
+/// Emulator with an observer; see [`Emulator::observed`].
 pub struct ObservedEmulator<'a> {
     emulator: &'a mut Emulator,
     sink: &'a mut dyn FnMut(&Event),

@@ -210,7 +210,7 @@ impl std::fmt::Display for FaultDisplay<'_> {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum LoadError {
     /// More bundles than the program memory holds.
-    #[error("program of {bundles} bundles; {machine} holds {depth}")]
+    #[error("the program has {bundles} bundles; {machine} holds {depth}")]
     Code {
         /// Number of bundles in the program.
         bundles: usize,
@@ -220,7 +220,7 @@ pub enum LoadError {
         depth: u32,
     },
     /// The last bundle is incomplete.
-    #[error("{words} words are no whole number of bundles of {slots}")]
+    #[error("{words} words are not a whole number of bundles of {slots}")]
     Bundle {
         /// Number of words in the program.
         words: usize,
@@ -228,7 +228,7 @@ pub enum LoadError {
         slots: usize,
     },
     /// More data than the data memory holds.
-    #[error("{words} words of data; {machine} holds {depth}")]
+    #[error("the program has {words} words of data; {machine} holds {depth}")]
     Data {
         /// Number of words in the program's data.
         words: usize,

@@ -224,7 +224,7 @@ pub enum PortError {
         ty: Type,
     },
     /// The number of values differs from the batch's number of lanes ([`crate::Batch`]).
-    #[error("{given} values for {lanes} lanes")]
+    #[error("{given} values found, expected one for each of {lanes} lanes")]
     Lanes {
         /// Number of values in the request.
         given: usize,
@@ -232,7 +232,7 @@ pub enum PortError {
         lanes: usize,
     },
     /// The machine has no input port at this address.
-    #[error("register address {register} is no input port")]
+    #[error("register address {register} is not an input port")]
     NoInput {
         /// Address in the request.
         register: Register,

@@ -95,7 +95,7 @@ fn illegal_words_fault_where_they_are_reached() {
     let mut program = program(&F3, "jmp 2\nnop\nnop || fadd a0, zero, zero\nnop");
     let cases = [
         (7, 0, "bundle 2, slot add, cycle 13: illegal word: word 0 is unwritten memory, not an instruction"),
-        (7, 0x7f << 41, "slot add, cycle 13: illegal word: opcode 0x7f is no instruction"),
+        (7, 0x7f << 41, "slot add, cycle 13: illegal word: opcode 0x7f is not an instruction"),
         (7, 1 << 48, "slot add, cycle 13: illegal word: 0x1000000000000 is longer than a word of 48 bits"),
         (
             7,
@@ -261,9 +261,9 @@ fn programs_that_do_not_fit_are_refused() {
         let error: LoadError = Emulator::new(&program).err().expect(text);
         assert_eq!(error.to_string(), text);
     };
-    refuse(&|p| p.code = vec![0; 3 * 1025], "program of 1025 bundles; f3 holds 1024");
-    refuse(&|p| p.code = vec![0; 4], "4 words are no whole number of bundles of 3");
-    refuse(&|p| p.data = vec![0; 1025], "1025 words of data; f3 holds 1024");
+    refuse(&|p| p.code = vec![0; 3 * 1025], "the program has 1025 bundles; f3 holds 1024");
+    refuse(&|p| p.code = vec![0; 4], "4 words are not a whole number of bundles of 3");
+    refuse(&|p| p.data = vec![0; 1025], "the program has 1025 words of data; f3 holds 1024");
     let register = |name| F3.register_address(name).unwrap();
     refuse(
         &|p| p.constants = vec![(Register::ZERO, 1)],

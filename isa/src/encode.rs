@@ -40,7 +40,7 @@ pub enum DecodeError {
     #[error("word 0 is unwritten memory, not an instruction")]
     Unwritten,
     /// No instruction has this opcode.
-    #[error("opcode 0x{opcode:02x} is no instruction")]
+    #[error("opcode 0x{opcode:02x} is not an instruction")]
     UnknownOpcode {
         /// Bits 47..41 of the word.
         opcode: u8,

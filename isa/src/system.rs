@@ -57,11 +57,11 @@ pub enum End {
 /// A value that a link carries.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Field {
-    /// Name of the sender's port; for the host as sender, of the system's port.
+    /// Name of the sender's port; if the sender is the host, the name of the system's input port.
     pub from: String,
     /// Output port of the sender; `None` for the host.
     pub output: Option<Register>,
-    /// Name of the receiver's port; for the host as receiver, of the system's port.
+    /// Name of the receiver's port; if the receiver is the host, the name of the system's output port.
     pub to: String,
     /// Input port of the receiver; `None` for the host.
     pub input: Option<Register>,

@@ -69,7 +69,7 @@ pub enum CircuitError {
     #[error("`{0}`: the code differs in width from the codes before it")]
     Width(String),
     /// A mnemonic that the unit does not execute.
-    #[error("`{0}` is no instruction that the unit `{1}` offers")]
+    #[error("`{0}` is not an instruction that the unit `{1}` offers")]
     Foreign(String, &'static str),
     /// An instruction with two codes.
     #[error("`{0}` has two codes")]
@@ -379,7 +379,7 @@ mod tests {
         assert!(message(&ADD, "//@ op 1'b0 fadd").contains("no circuit for fsub"));
         assert!(message(&ADD, "//@ op 1'b0 fadd\n//@ op 2'b01 fsub").contains("differs in width"));
         assert!(message(&ADD, "//@ op 1'b0 fadd fsub fadd").contains("two codes"));
-        assert!(message(&ADD, "//@ op 1'b0 fmul").contains("no instruction that the unit `add`"));
+        assert!(message(&ADD, "//@ op 1'b0 fmul").contains("not an instruction that the unit `add`"));
         assert!(message(&ADD, "//@ op 1'd0 fadd").contains("expected"));
         assert!(message(&MULTIPLY, "").contains("no circuit for fmul"));
         assert!(message(&MULTIPLY, "//@ as fused").contains("no circuit rtl/units/fused.v"));

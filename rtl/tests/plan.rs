@@ -120,7 +120,7 @@ fn every_reason() {
     }
 }
 
-/// An invalid row has no circuit, either.
+/// Exporting a machine with an invalid row fails with the row's error.
 #[test]
 fn no_machine() {
     let machine = Box::leak(Box::new(Machine { slots: &[], ..F3 }));

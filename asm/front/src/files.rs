@@ -9,5 +9,7 @@ pub type Files<'a> = &'a dyn Fn(&str) -> Result<String, String>;
 /// # Errors
 /// Always.
 pub fn no_files(name: &str) -> Result<String, String> {
-    Err(format!("`{name}` is a file's name, and this text comes from memory: put its content in its place"))
+    Err(format!(
+        "`{name}` is the name of a file, but this text comes from memory: replace the name by the file's content"
+    ))
 }

@@ -109,8 +109,8 @@ def main():
         ({"x": [a, a]}, a, "the symbol a is an input twice, in `x` and in `x`"),
         ({"x": sp.Symbol("i", imaginary=True)}, a, "the symbol i of the input `x` is declared not to be real"),
         ({"x": 3}, a, "the input `x` has 3, which is no symbol"),
-        ({"x": angle}, angle.diff(t), "Derivative(angle(t), t) is no input, and angle(t) is one: its derivative needs an input of its own"),
-        ({"x": a}, b, "the symbol b is no input"),
+        ({"x": angle}, angle.diff(t), "Derivative(angle(t), t) is not an input, but angle(t) is one: its derivative needs an input of its own"),
+        ({"x": a}, b, "the symbol b is not an input"),
     ]:
         try:
             takt_expressions.sympy_text("wrong", inputs, {"y": e})

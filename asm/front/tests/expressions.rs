@@ -65,7 +65,7 @@ fn other_tools_agree() {
     let error = |name: &str| read(&text(name), Rewrites::ALL).err().expect("an error");
     assert_eq!(
         error("unknown.json").text,
-        "operation `erfinv` has no meaning here; in `erfinv(0.5*sin(x))`: it has no macro; a polynomial over the range that is used can \
+        "operation `erfinv` is not supported; in `erfinv(0.5*sin(x))`: it has no macro; a polynomial over the range that is used can \
          take its place"
     );
     assert!(error("unknown.json").line.is_some_and(|line| line > 1));
@@ -183,13 +183,13 @@ fn wrong_lists_are_refused() {
         (r#"{"op": "input", "to": 1, "port": [3, 0]}"#, "5: there is no input 3 with a scalar 0"),
         (r#"{"op": "input", "to": 1, "port": [0, 1]}"#, "5: there is no input 0 with a scalar 1"),
         (r#"{"op": "const", "to": 1}"#, "5: `const` has no `value`"),
-        (r#"{"op": "sine", "to": 1, "of": [0]}"#, "5: operation `sine` has no meaning here; in `sine(x)`"),
+        (r#"{"op": "sine", "to": 1, "of": [0]}"#, "5: operation `sine` is not supported; in `sine(x)`"),
         (r#"{"op": "add", "to": 1, "of": [0]}"#, "5: `add` has 1 operands; it takes 2"),
         (r#"{"op": "sin", "to": 1, "of": [0, 0]}"#, "5: `sin` has 2 operands; it takes 1"),
         (r#"{"op": "Heaviside", "to": 1, "of": []}"#, "5: `Heaviside` has 0 operands; it takes 1 to 2"),
         (
             r#"{"op": "sin", "to": -1, "of": [7]}"#,
-            "5: this is no list of instructions: invalid value: integer `-1`, expected usize",
+            "5: this is not a list of instructions: invalid value: integer `-1`, expected usize",
         ),
     ] {
         assert_eq!(list(x, y, &format!("{input},\n{code}")), expected);
@@ -200,5 +200,5 @@ fn wrong_lists_are_refused() {
     let outside = r#"{"name": "x", "rows": 1, "columns": 1, "nonzeros": [[1, 0]]}"#;
     assert_eq!(list(outside, y, ""), "0: `x`: (1, 0) lies outside 1 by 1");
     let error = read("{", Rewrites::ALL).err().expect("an error");
-    assert!(error.line == Some(1) && error.text.starts_with("this is no list of instructions"), "{error}");
+    assert!(error.line == Some(1) && error.text.starts_with("this is not a list of instructions"), "{error}");
 }

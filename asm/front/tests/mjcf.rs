@@ -141,30 +141,30 @@ fn wrong_joints_are_refused() {
             "8: `second`: a ball joint: only hinges and slides are known; take the part of the robot behind it with `--base two`",
         ),
         ("type=\"slide\"", "type=\"screw\"", "8: there is no joint `screw`"),
-        ("name=\"second\" ", "", "8: a joint without a `name`, after which its ports are named"),
+        ("name=\"second\" ", "", "8: this joint has no `name`, which its ports need"),
         ("\"second\"", "\"first\"", "8: `first`: two joints have this name"),
         ("\"two\"", "\"one\"", "7: `one`: two bodies have this name"),
         ("axis=\"0 1 0\"", "axis=\"0 0 0\"", "6: `first`: its axis has no direction"),
-        ("axis=\"0 1 0\"", "axis=\"0 1\"", "6: `axis` is `0 1`: it has 2 numbers, and 3 are needed"),
+        ("axis=\"0 1 0\"", "axis=\"0 1\"", "6: `axis` is `0 1`: it has 2 numbers, expected 3"),
         (
             "axis=\"0 1 0\"",
             "axis=\"0 nan 0\"",
-            "6: `axis` is `0 nan 0`: 3 numbers are needed, finite and with spaces between",
+            "6: `axis` is `0 nan 0`: 3 numbers are expected, finite and separated by spaces",
         ),
         ("axis=\"0 1 0\"", "class=\"big\"", "6: there is no class `big` of defaults"),
-        ("axis=\"0 1 0\"", "armature=\"-1\"", "6: `first`: `armature` is -1; it is not negative"),
+        ("axis=\"0 1 0\"", "armature=\"-1\"", "6: `first`: `armature` is -1; it must not be negative"),
     ]);
 }
 
 #[test]
 fn wrong_bodies_are_refused() {
     refused(&[
-        ("mass=\"1\"", "mass=\"-1\"", "5: a mass is -1; a mass is not negative"),
-        ("pos=\"0 0 1\"", "quat=\"0 0 0 0\"", "7: `quat` is `0 0 0 0`: this is no direction"),
+        ("mass=\"1\"", "mass=\"-1\"", "5: a mass is -1; a mass must not be negative"),
+        ("pos=\"0 0 1\"", "quat=\"0 0 0 0\"", "7: `quat` is `0 0 0 0`, which is not a direction"),
         (
             "pos=\"0 0 1\"",
             "quat=\"1 0 0 0\" euler=\"0 0 0\"",
-            "7: both `quat` and `euler` are stated; one is enough",
+            "7: both `quat` and `euler` are stated; leave one of them out",
         ),
         (
             "size=\"0.1\"",
@@ -186,9 +186,9 @@ fn unknown_parts_are_refused() {
         (
             "<worldbody>",
             "<include file=\"x.xml\"/><worldbody>",
-            "3: `x.xml` is a file's name, and this text comes from memory: put its content in its place",
+            "3: `x.xml` is the name of a file, but this text comes from memory: replace the name by the file's content",
         ),
-        ("<worldbody>", "<include/><worldbody>", "3: `include` needs `file`"),
+        ("<worldbody>", "<include/><worldbody>", "3: `include` needs the attribute `file`"),
         (
             "axis=\"0 1 0\"",
             "axes=\"0 1 0\"",
@@ -202,7 +202,7 @@ fn unknown_parts_are_refused() {
         (
             "<worldbody>",
             "<option><flag spring=\"off\"/></option><worldbody>",
-            "3: `spring` is `off`: `enable` and `disable` are known",
+            "3: `spring` is `off`: expected `enable` or `disable`",
         ),
         (
             "<worldbody>",
@@ -243,14 +243,14 @@ fn unknown_parts_are_refused() {
         (
             "<worldbody>",
             "<compiler angle=\"turn\"/><worldbody>",
-            "3: `angle` is `turn`: `radian` and `degree` are known",
+            "3: `angle` is `turn`: expected `radian` or `degree`",
         ),
         (
             "<worldbody>",
             "<compiler eulerseq=\"xya\"/><worldbody>",
-            "3: `eulerseq` is `xya`: three of the letters x, y, z, X, Y, Z are needed",
+            "3: `eulerseq` is `xya`: expected three of the letters x, y, z, X, Y, Z",
         ),
-        ("<default>", "<default><default/>", "2: a class of defaults has a name: `class`"),
+        ("<default>", "<default><default/>", "2: a class of defaults needs a name, in the attribute `class`"),
     ]);
 }
 
@@ -275,7 +275,7 @@ fn wrong_actuators_and_tendons_are_refused() {
         (
             "</mujoco>",
             "<actuator><motor joint=\"first\" armature=\"-1\"/></actuator></mujoco>",
-            "10: `armature` is -1; it is not negative",
+            "10: `armature` is -1; it must not be negative",
         ),
         (
             "</mujoco>",
@@ -518,7 +518,7 @@ fn included_files_are_read() {
         "main.xml:3: `empty.xml` is included twice: once is allowed"
     );
     assert_eq!(refused("\n<include file=\"none.xml\"/>"), "main.xml:4: cannot open none.xml");
-    assert!(refused("<include file=\"bad.xml\"/>").starts_with("bad.xml:2: this is no XML:"), "bad.xml");
+    assert!(refused("<include file=\"bad.xml\"/>").starts_with("bad.xml:2: this is not XML:"), "bad.xml");
     let source = SMALL.replace(
         "<inertial mass=\"1\" pos=\"0 0 0\" diaginertia=\"1 1 1\"/>",
         "<include file=\"body.xml\"/>",

@@ -265,17 +265,17 @@ fn matrices_can_be_files() {
     let wrong = |a: &'static str| read(&problem, "mass", &files(a)).expect_err("wrong").to_string();
     assert_eq!(
         wrong("x1,x2\n1,2\n"),
-        "`A`: A.csv:1: `x1` is no finite number; rows of numbers are read, without a header"
+        "`A`: A.csv:1: `x1` is not a finite number; expected rows of numbers, without a header"
     );
     assert_eq!(
         wrong("1,nan\n1,2\n"),
-        "`A`: A.csv:1: `nan` is no finite number; rows of numbers are read, without a header"
+        "`A`: A.csv:1: `nan` is not a finite number; expected rows of numbers, without a header"
     );
     assert_eq!(
         wrong("1,2\n"),
-        "`A`: row 1 has 2 numbers, and 1 are needed: A has a row and a column for each state"
+        "`A`: row 1 has 2 numbers, expected 1: A has a row and a column for each state"
     );
-    assert_eq!(wrong(""), "`A`: 0 states; there are 1 to 32");
+    assert_eq!(wrong(""), "`A`: 0 states; expected 1 to 32");
     let other = problem.replace("B.csv", "none.csv");
     assert_eq!(
         read(&other, "mass", &files(comma)).expect_err("no file").to_string(),
@@ -364,41 +364,41 @@ fn rejects_inconsistent_sizes_by_key() {
     };
     assert_eq!(refused(&|_| ()), "accepted");
     for (key, value, expected) in [
-        (
-            "A",
-            json!([[1, 0.1]]),
-            "line: `A`: row 1 has 2 numbers, and 1 are needed: A has a row and a column",
-        ),
-        ("B", json!([[1]]), "line: `B`: 1 rows, and 2 are needed: B has a row for each state,"),
-        ("B", json!([]), "line: `B`: 0 inputs; there are 1 to 32"),
-        ("Q", json!([1, 2, 3]), "line: `Q`: 3 weights, and 2 are needed"),
-        ("Q", json!([1, -2]), "line: `Q`: an eigenvalue of the weights is -2.000e0, and all are 0 or above"),
+        ("A", json!([[1, 0.1]]), "line: `A`: row 1 has 2 numbers, expected 1: A has a row and a column"),
+        ("B", json!([[1]]), "line: `B`: 1 rows, expected 2: B has a row for each state,"),
+        ("B", json!([]), "line: `B`: 0 inputs; expected 1 to 32"),
+        ("Q", json!([1, 2, 3]), "line: `Q`: 3 weights, expected 2"),
+        ("Q", json!([1, -2]), "line: `Q`: an eigenvalue of the weights is -2.000e0; all must be 0 or above"),
         ("Q", json!([[1, 2], [0, 1]]), "line: `Q`: the matrix of weights is not symmetric"),
-        ("R", json!(0), "line: `R`: an eigenvalue of the weights is 0.000e0, and all are above 0"),
+        ("R", json!(0), "line: `R`: an eigenvalue of the weights is 0.000e0; all must be above 0"),
         ("u_min", json!([2]), "line: `u_min`: limit 1 is 2, above that of `u_max`, 1"),
-        ("x_max", json!([1]), "line: `x_max`: 1 limits, and 2 are needed"),
-        ("x_range", json!([[1, 0], [0, 1]]), "line: `x_range`: state 1: it lies between 1 and 0"),
+        ("x_max", json!([1]), "line: `x_max`: 1 limits, expected 2"),
+        ("x_range", json!([[1, 0], [0, 1]]), "line: `x_range`: state 1: the range from 1 to 0 is empty"),
         ("x_range", json!([[0, 1]]), "line: `x_range`: 1 ranges of 2 states"),
-        ("horizon", json!(1), "line: `horizon`: 1 states; there are 2 to 128"),
-        ("iterations", json!(0), "line: `iterations`: 0 iterations; there are 1 to 10000"),
-        ("rho", json!(0), "line: `rho`: the penalty is 0, and it is above 0"),
+        ("horizon", json!(1), "line: `horizon`: 1 states; expected 2 to 128"),
+        ("iterations", json!(0), "line: `iterations`: 0 iterations; expected 1 to 10000"),
+        ("rho", json!(0), "line: `rho`: the penalty is 0; it must be above 0"),
         (
             "references",
             json!("all"),
             "line: `references`: `all` is unknown; expected none, constant or horizon",
         ),
-        ("format", json!("takt-mpc 2"), "line: `format`: `takt-mpc 2` is not known; `takt-mpc 1` is"),
-        ("P", json!(1), "line: this is no control problem: unknown field `P`, expected one of"),
-        ("R", json!("x"), "line: `R`: `x` is a file's name, and this text comes from memory"),
-        ("R", json!(true), "line: `R`: a truth value is no number"),
-        ("R", json!("NaN"), "line: `R`: NaN: a finite number is needed"),
-        ("Q", json!(["Infinity", 1]), "line: `Q`: inf: a finite number is needed"),
-        ("Q", json!(["1", 1]), "line: `Q`: \"1\" is a text: a number has no quotes"),
+        ("format", json!("takt-mpc 2"), "line: `format`: unknown format `takt-mpc 2`; expected `takt-mpc 1`"),
+        ("P", json!(1), "line: this is not a control problem: unknown field `P`, expected one of"),
+        ("R", json!("x"), "line: `R`: `x` is the name of a file, but this text comes from memory"),
+        ("R", json!(true), "line: `R`: a truth value is not a number"),
+        ("R", json!("NaN"), "line: `R`: expected a finite number, found NaN"),
+        ("Q", json!(["Infinity", 1]), "line: `Q`: expected a finite number, found inf"),
+        (
+            "Q",
+            json!(["1", 1]),
+            "line: `Q`: expected a number, found the string \"1\": write it without quotes",
+        ),
         ("u_max", json!("-inf"), "line: `u_max`: -inf is not a limit; write `null` for no limit"),
         ("x_min", json!([null, "NaN"]), "line: `x_min`: NaN is not a limit; write `null` for no limit"),
-        ("x_range", json!([[0, "inf"], [0, 1]]), "line: `x_range`: inf: a finite number is needed"),
-        ("rho", json!("Infinity"), "line: `rho`: inf: a finite number is needed"),
-        ("A", json!(1), "line: `A`: a matrix is a list of rows, or the name of a file of numbers"),
+        ("x_range", json!([[0, "inf"], [0, 1]]), "line: `x_range`: expected a finite number, found inf"),
+        ("rho", json!("Infinity"), "line: `rho`: expected a finite number, found inf"),
+        ("A", json!(1), "line: `A`: expected a matrix: a list of rows, or the name of a file of numbers"),
         (
             "relinearise",
             json!(101),

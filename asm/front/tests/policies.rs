@@ -161,22 +161,22 @@ fn rejects_unsupported_operators_by_name() {
         ),
         (
             "product",
-            "node `/MatMul_1` (MatMul): both of its factors are computed; a layer has a constant matrix",
+            "node `/MatMul_1` (MatMul): both of its factors are computed, but a layer needs a constant matrix",
         ),
         (
             "outputs",
-            "a policy with one output is read; this has 2 that depend on the input (`action`, `v1`): name one of them",
+            "expected one output that depends on the input, found 2 (`action`, `v1`): name one of them",
         ),
-        ("inputs", "a policy with one input is read; output `action` depends on 2 (`obs`, `task`)."),
+        ("inputs", "expected one input, but output `action` depends on 2 (`obs`, `task`)."),
         ("width", "node `/MatMul_0` (MatMul): its weights expect 9 numbers, and the vector has 8"),
         ("zero", "node `/Div_0` (Div): it divides by zero"),
         ("bias", "node `/Gemm_0` (Gemm): its operands have the shapes [1, 3] and [4], which do not fit"),
-        ("shape", "input `obs`: its shape is [3, 4, 8]; a vector [n], or a batch of one [1, n], is read"),
+        ("shape", "input `obs`: its shape is [3, 4, 8]; expected a vector [n], or a batch of one [1, n]"),
         (
             "integers",
             "node `/Cast_1` (Cast): it converts computed values to int64; only floats are supported",
         ),
-        ("words", "node `/Mul_0` (Mul): its constant `words`: its elements are string; numbers are read"),
+        ("words", "node `/Mul_0` (Mul): its constant `words`: its elements are string; expected numbers"),
         (
             "external",
             "node `/Gemm_0` (Gemm): its constant `c0`: its numbers are in another file, whose name is missing",
@@ -187,15 +187,15 @@ fn rejects_unsupported_operators_by_name() {
         ),
         (
             "outside",
-            "node `/Gemm_0` (Gemm): its constant `c0`: its numbers lie in `../beside.onnx.data`; a file in the folder of the",
+            "node `/Gemm_0` (Gemm): its constant `c0`: its numbers lie in `../beside.onnx.data`; the file must be in the folder of the",
         ),
         (
             "absolute",
-            "node `/Gemm_0` (Gemm): its constant `c0`: its numbers lie in `/etc/passwd`; a file in the folder",
+            "node `/Gemm_0` (Gemm): its constant `c0`: its numbers lie in `/etc/passwd`; the file must be in the folder",
         ),
         (
             "inner",
-            "node `/Gemm_0` (Gemm): its constant `c0`: its numbers lie in `a/../../b.bin`; a file in the folder",
+            "node `/Gemm_0` (Gemm): its constant `c0`: its numbers lie in `a/../../b.bin`; the file must be in the folder",
         ),
         (
             "short",
@@ -203,13 +203,13 @@ fn rejects_unsupported_operators_by_name() {
         ),
         (
             "length",
-            "node `/Gemm_0` (Gemm): its constant `c0`: its numbers take 96 bytes, and 20 are given for them",
+            "node `/Gemm_0` (Gemm): its constant `c0`: its numbers need 96 bytes, but 20 are given for them",
         ),
         (
             "offset",
-            "node `/Gemm_0` (Gemm): its constant `c0`: `offset` of its numbers in `beside.onnx.data` is no number",
+            "node `/Gemm_0` (Gemm): its constant `c0`: `offset` of its numbers in `beside.onnx.data` is not a number",
         ),
-        ("nan", "node `/MatMul_0` (MatMul): one of its constants is NaN"),
+        ("nan", "node `/MatMul_0` (MatMul): one of its constants is NaN; constants must be finite"),
     ] {
         let error = network(&format!("bad_{name}")).expect_err(name);
         assert!(error.starts_with(expected), "{name}: {error}");
@@ -222,7 +222,7 @@ fn rejects_unsupported_operators_by_name() {
         &std::fs::read(path("relu.onnx")).expect("the file")[..5000],
     ] {
         let error = read(bytes, "x", None, &beside_data).expect_err("no model").to_string();
-        assert!(error.starts_with("this is no model of ONNX: "), "{error}");
+        assert!(error.starts_with("this is not an ONNX model: "), "{error}");
     }
     let wide = network("bad_wide").expect("a policy");
     let error = source(&wide, &T3, None, 0).err().expect("40 outputs");

@@ -196,7 +196,7 @@ fn rejects_ambiguous_tables() {
         (
             "joint,kind,a,alpha,alpha_deg,d,theta",
             "",
-            "t.csv:2: columns `alpha` and `alpha_deg`: one is enough",
+            "t.csv:2: columns `alpha` and `alpha_deg` exclude each other: leave one out",
         ),
         (
             "joint,kind,a_deg,alpha,d,theta",
@@ -244,15 +244,15 @@ fn infinities_of_python_are_no_limits() {
             "\"u_max\": NaN",
             "p.json:3: `u_max`: NaN is not a limit; write `null` for no limit",
         ),
-        ("[10, 1]", "[NaN, 1]", "p.json:2: `Q`: NaN: a finite number is needed"),
-        ("[1, 0.1]", "[1, Infinity]", "p.json:1: `A`: inf: a finite number is needed"),
+        ("[10, 1]", "[NaN, 1]", "p.json:2: `Q`: expected a finite number, found NaN"),
+        ("[1, 0.1]", "[1, Infinity]", "p.json:1: `A`: expected a finite number, found inf"),
         (
             "8}",
             "NaN}",
-            "p.json:3: this is no control problem: `NaN` is no number of JSON, though Python's json.dumps writes it",
+            "p.json:3: this is not a control problem: `NaN` is not a JSON number, though Python's json.dumps writes it",
         ),
-        ("8}", "8,}", "p.json:3: this is no control problem: trailing comma"),
-        ("8}", "8", "p.json:3: this is no control problem: EOF while parsing an object"),
+        ("8}", "8,}", "p.json:3: this is not a control problem: trailing comma"),
+        ("8}", "8", "p.json:3: this is not a control problem: EOF while parsing an object"),
     ] {
         assert_eq!(problem(from, to).expect_err("refused"), expected);
     }
@@ -274,7 +274,7 @@ fn decimal_commas_are_no_columns() {
         let error = read(file).expect_err("refused");
         assert!(
             error.starts_with("`B`:")
-                && (error.contains("decimal point") || error.contains("no finite number")),
+                && (error.contains("decimal point") || error.contains("not a finite number")),
             "{error}"
         );
     }

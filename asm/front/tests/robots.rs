@@ -123,25 +123,25 @@ fn wrong_robots_are_refused() {
         (
             "xyz=\"0 0 1\"",
             "xyz=\"0 0 nan\"",
-            "16: `xyz` is `0 0 nan`: 3 numbers are needed, finite and with spaces between",
+            "16: `xyz` is `0 0 nan`: 3 numbers are expected, finite and separated by spaces",
         ),
-        ("xyz=\"0 0 1\"", "xyz=\"0 0\"", "16: `xyz` is `0 0`: it has 2 numbers, and 3 are needed"),
+        ("xyz=\"0 0 1\"", "xyz=\"0 0\"", "16: `xyz` is `0 0`: it has 2 numbers, expected 3"),
         (
             "value=\"3.7\"",
             "value=\"-3.7\"",
-            "19: `shoulder_link`: its mass is -3.7; a mass is finite and not negative",
+            "19: `shoulder_link`: its mass is -3.7; a mass must be finite and not negative",
         ),
         (
             "ixx=\"0.010267495893\"",
             "ixx=\"inf\"",
-            "23: `ixx` is `inf`: a number is needed, finite and with spaces between",
+            "23: `ixx` is `inf`: a number is expected, finite and separated by spaces",
         ),
         ("ixx=\"0.010267495893\"", "", "23: `inertia` needs `ixx`"),
         ("<mass value=\"3.7\" />", "", "20: `inertial` needs `mass`"),
         (
             "type=\"revolute\"",
             "type=\"screw\"",
-            "12: `shoulder_pan_joint`: `screw` is no type of joint; there are revolute, continuous, prismatic and fixed ones, floating and planar",
+            "12: `shoulder_pan_joint`: `screw` is not a type of joint; there are revolute, continuous, prismatic and fixed ones, floating and planar",
         ),
         ("<parent link=\"base_link\" />", "", "12: `shoulder_pan_joint`: it has no `parent`"),
         (
@@ -175,7 +175,7 @@ fn wrong_robots_are_refused() {
             "26: `shoulder_pan_joint`: two joints have this name",
         ),
         ("name=\"shoulder_link\"", "name=\"base_link\"", "19: `base_link`: two links have this name"),
-        ("</robot>", "", "this is no XML: the root node was opened but never closed"),
+        ("</robot>", "", "this is not XML: the root node was opened but never closed"),
         (
             "<robot name=\"ur5\">",
             "<robot name=\"ur5\"><link name=\"alone\"/>",
@@ -191,8 +191,8 @@ fn wrong_trees_are_refused() {
     // A refused joint may lie before the base.
     let floating = UR5.replacen("type=\"revolute\"", "type=\"floating\"", 1);
     assert_eq!(message(&floating, Some("shoulder_link"), None), "");
-    assert_eq!(message("", None, None), "this is no XML: the document does not have a root node");
-    assert_eq!(message("<a/>", None, None), "this is no URDF: its element is `a`, not `robot`");
+    assert_eq!(message("", None, None), "this is not XML: the document does not have a root node");
+    assert_eq!(message("<a/>", None, None), "this is not a URDF: its root element is `a`, not `robot`");
     assert_eq!(message("<robot name=\"x\"/>", None, None), "the robot has no link");
     assert_eq!(
         message("<robot name=\"x\"><link name=\"a\"/></robot>", None, None),
@@ -261,18 +261,18 @@ fn wrong_tables_are_refused() {
     assert_eq!(message(&format!("{head}j,revolute,0,3*pi/4,-.5,1e-3\n")), "");
     for (row, expected) in [
         ("j,revolute,0,0,0", "3: 5 fields; the header has 6"),
-        ("j,sliding,0,0,0,0", "3: kind `sliding`: `revolute`, `prismatic` and `fixed` are known"),
-        ("j,revolute,0,pi/0,0,0", "3: `alpha`: `pi/0` is no finite number, such as 0.5 or -pi/2"),
-        ("j,revolute,0,tau,0,0", "3: `alpha`: `tau` is no finite number, such as 0.5 or -pi/2"),
-        (",revolute,0,0,0,0", "3: joint ``: every joint has a name of its own"),
-        ("j,revolute,0,0,0,0\nj,revolute,0,0,0,0", "4: joint `j`: every joint has a name of its own"),
+        ("j,sliding,0,0,0,0", "3: unknown kind `sliding`; expected `revolute`, `prismatic` or `fixed`"),
+        ("j,revolute,0,pi/0,0,0", "3: `alpha`: `pi/0` is not a finite number, such as 0.5 or -pi/2"),
+        ("j,revolute,0,tau,0,0", "3: `alpha`: `tau` is not a finite number, such as 0.5 or -pi/2"),
+        (",revolute,0,0,0,0", "3: joint ``: every joint needs a name of its own"),
+        ("j,revolute,0,0,0,0\nj,revolute,0,0,0,0", "4: joint `j`: every joint needs a name of its own"),
     ] {
         assert_eq!(message(&format!("{head}{row}\n")), expected);
     }
     assert_eq!(message(head), "0: the table has no joint");
     assert_eq!(
         message("# convention: other\n"),
-        "1: convention `other`: `standard` and `modified` are known"
+        "1: unknown convention `other`; expected `standard` or `modified`"
     );
     assert_eq!(
         message("joint,kind,a,alpha,d\n"),
@@ -282,6 +282,6 @@ fn wrong_tables_are_refused() {
     assert_eq!(message("joint,joint\n"), "1: column `joint` is there twice");
     assert_eq!(
         message("joint,kind,a,alpha,d,theta\nj,revolute,0,0,0,0\n"),
-        "2: say above it which frames the table means: `# convention: standard` or `# convention: modified`"
+        "2: state above the table which frames it uses: `# convention: standard` or `# convention: modified`"
     );
 }

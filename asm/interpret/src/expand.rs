@@ -29,7 +29,7 @@ pub(crate) enum Action {
     Argument(ExprId, usize),
     /// Stores the number of iterations from a number to a register's value in a cell.
     Count(Expr, i64, usize),
-    /// Skips to a label if a cell counts no more iterations than a number: cell, number, label.
+    /// Jumps to a label if a loop's iteration count is at most the iterations done: cell of the count, iterations done, label.
     Skip(usize, i64, usize),
 }
 
@@ -111,7 +111,7 @@ impl Interpreter {
         // A template's text differs from iteration to iteration: its label needs no scope of its own.
         let owner = Scope::declaring(scope, label.name.resolve().is_ok());
         if owner.has(&text) {
-            return Err(format!("the label `{text}` stands twice"));
+            return Err(format!("the label `{text}` appears twice"));
         }
         owner.bind(&text, Meaning::Label(number));
         Ok(())
@@ -146,11 +146,11 @@ impl Interpreter {
     ) -> Result<(), Fault> {
         let text = self.names.text(name).to_owned();
         let Some(&Macro { directive, start, end }) = self.macros.get(&text) else {
-            return Err(format!("`{text}` is no instruction and no macro"));
+            return Err(format!("`{text}` is neither an instruction nor a macro"));
         };
         let ast = Rc::clone(&self.ast);
         let DirectiveKind::Macro { parameters, .. } = &ast.directives[directive].kind else {
-            return Err(format!("`{text}` is no macro"));
+            return Err(format!("`{text}` is not a macro"));
         };
         self.depth += 1;
         if parameters.len() != given.len() || self.depth > DEPTH {
@@ -411,7 +411,7 @@ impl Interpreter {
     pub(crate) fn number(&self, nodes: &[Node], scope: &Rc<Scope>) -> Result<Number, Fault> {
         match self.value(nodes, 0, scope, &Results::default(), &[])? {
             crate::Value::Number(number) => Ok(number),
-            crate::Value::Bits(..) => Err("a register where a number is wanted".to_owned()),
+            crate::Value::Bits(..) => Err("expected a number, found a register".to_owned()),
         }
     }
 }

@@ -70,7 +70,7 @@ impl Interpreter {
                 let values = parts.into_iter().map(operand).collect::<Result<Vec<Value>, Fault>>()?;
                 function(text, &values)
             }
-            NodeKind::All | NodeKind::Range => Err("a slice where a value is wanted".to_owned()),
+            NodeKind::All | NodeKind::Range => Err("expected a value, found a slice".to_owned()),
         }
     }
 
@@ -144,7 +144,7 @@ impl Interpreter {
             OperandKind::Name(name) => match self.meaning(name, scope)? {
                 Meaning::Cell(cell) => Ok(Place::Cell(cell)),
                 Meaning::Argument(operand, scope) => self.place_of(operand, &scope, slice),
-                _ => Err("this is no register".to_owned()),
+                _ => Err("expected a register".to_owned()),
             },
             OperandKind::Element(element) => {
                 let Element { name, indices } = &self.ast.elements[element as usize];
@@ -161,7 +161,7 @@ impl Interpreter {
                 let index = integer(self.operand(base, scope)?)?;
                 self.at(name, &[index], scope)
             }
-            _ => Err("this is no place".to_owned()),
+            _ => Err("expected a place".to_owned()),
         }
     }
 
@@ -222,7 +222,7 @@ impl Interpreter {
             Meaning::Argument(Operand { kind: OperandKind::Name(name), .. }, scope) => {
                 self.array(name, &scope)
             }
-            _ => Err("this is no array".to_owned()),
+            _ => Err("expected an array".to_owned()),
         }
     }
 
@@ -245,7 +245,7 @@ fn integer(value: Value) -> Result<i64, Fault> {
     match value {
         Value::Number(number) => number.integer(),
         Value::Bits(bits, Type::I) => Ok(i64::from(bits.cast_signed())),
-        Value::Bits(..) => Err("an index that is no integer".to_owned()),
+        Value::Bits(..) => Err("an index that is not an integer".to_owned()),
     }
 }
 

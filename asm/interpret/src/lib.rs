@@ -42,7 +42,7 @@ impl Number {
         match self {
             Number::Int(value) => Ok(value),
             Number::Real(value) if value.fract() == 0.0 => Ok(value as i64),
-            Number::Real(value) => Err(format!("{value} is no integer")),
+            Number::Real(value) => Err(format!("{value} is not an integer")),
         }
     }
 
@@ -68,7 +68,7 @@ impl Value {
         match self {
             Value::Number(number) => number.bits(ty),
             Value::Bits(bits, own) if own == ty || own == Type::B || ty == Type::B => Ok(bits),
-            Value::Bits(_, own) => Err(format!("a value of type {own:?} where {ty:?} is wanted")),
+            Value::Bits(_, own) => Err(format!("expected a value of type {ty:?}, found {own:?}")),
         }
     }
 }

@@ -243,7 +243,7 @@ impl Interpreter {
 
     fn label_of(&self, operand: Operand, scope: &Rc<Scope>) -> Result<usize, Fault> {
         let OperandKind::Name(name) = operand.kind else {
-            return Err("a target that is no label".to_owned());
+            return Err("a target that is not a label".to_owned());
         };
         let text = self.spelled(name, scope)?;
         match scope.find(&text) {

@@ -45,7 +45,7 @@ fn equations() {
 #[test]
 fn rejects_unsupported_operations() {
     for (text, part) in [
-        (".once\n nope a\n", "no instruction and no macro"),
+        (".once\n nope a\n", "neither an instruction nor a macro"),
         (".reg a b\n.once\n a = b\n wait p\n.period\np: wait p\n", "read before it is written"),
         (".array A[3]\n.reg n:int\n.once\n n = 4\n A[n] = 1\n wait p\n", "no element"),
         (".once\np: jmp p\n", "no `wait`"),

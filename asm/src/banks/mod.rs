@@ -408,7 +408,7 @@ fn conflict(ir: &Ir, flow: &Flow, register: RegisterId, writes: &[Write]) -> Ban
     }
     if let Some(jump) = ir.operations().find(|operation| operation.target_number().is_some()) {
         let help = "jump to labels, so that the assembler can add an operation that copies";
-        let because = "this counts on every bundle's address".to_owned();
+        let because = "this depends on every bundle's address".to_owned();
         return because_of(help.to_owned(), Some((jump.span, because)));
     }
     match writes.iter().find_map(|write| branch_that_reads(ir, write.bundle)) {

@@ -45,7 +45,7 @@ impl Context {
         evaluate: impl FnOnce(&mut Context) -> Result<T, ErrorReported>,
     ) -> Result<T, ErrorReported> {
         if self.depth >= limits::EVALUATION_DEPTH {
-            let message = "names and arguments depend on one another too deeply";
+            let message = "names and arguments refer to one another too deeply";
             return Err(self.error(at.scope, "limit", span, message));
         }
         self.depth += 1;

@@ -494,7 +494,7 @@ fn report(ir: &Ir, pressure: &Pressure, peaks: &[Peak], why: Option<&str>, sink:
         let plural = if unplaced.len() == 1 { "" } else { "s" };
         let message = format!("no register is left for {} constant{plural}", unplaced.len());
         let error = Diagnostic::error("bank-full", ir.registers[*first].span, message)
-            .note(format!("{} has {available} registers, and needed are {fill}", machine.name))
+            .note(format!("{} has {available} registers; needed are {fill}", machine.name))
             .help(CONSTANTS_ELSEWHERE);
         sink.push(error);
     }

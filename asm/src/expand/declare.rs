@@ -335,7 +335,7 @@ impl Expander<'_> {
                 let error = Diagnostic::error(
                     "place",
                     span,
-                    format!("`{number}` is no place: only ports have numbers"),
+                    format!("`{number}` is not a place: only ports have numbers"),
                 )
                 .help(format!("a register's place is its name, as `@ {}3`", machine.slots[0].bank.name));
                 return Err(self.context.report(at.scope, error));
@@ -505,7 +505,7 @@ impl Expander<'_> {
     ) -> Result<&'static Machine, ErrorReported> {
         let within = include_path("", path).filter(|path| machine_file(path) == Some((path.as_str(), "")));
         let Some(within) = within else {
-            let message = format!("`{path}` is no machine's file within the project");
+            let message = format!("`{path}` is not a machine's file within the project");
             let error = Diagnostic::error("machine", span, message)
                 .help("a path relative to this source's folder that ends in `.toml`");
             return Err(self.context.report(at.scope, error));

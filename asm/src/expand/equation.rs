@@ -184,7 +184,7 @@ impl Expander<'_> {
         defined: Span,
     ) -> ErrorReported {
         let message = match parameters {
-            0 => format!("macro `{text}` has no parameter that it could write: it is no function"),
+            0 => format!("macro `{text}` has no parameter to write, so it is not a function"),
             parameters => {
                 let plural = if parameters == 2 { "" } else { "s" };
                 format!("`{text}` takes {} argument{plural}, not {found}", parameters - 1)

@@ -226,7 +226,7 @@ impl Expander<'_> {
             folders => error.note(format!("nor is it in {}", folders.join(", "))),
         };
         match near {
-            Some(near) => error.help(format!("is `{near}` meant?")),
+            Some(near) => error.help(format!("did you mean `{near}`?")),
             None if self.loader.takes_folders() => error.help("a folder to look in is given by `-I FOLDER`"),
             None if names.is_empty() => error,
             None => error.help(format!("the files here are {}", names.join(", "))),

@@ -182,7 +182,13 @@ impl Expander<'_> {
                 if !matches!(argument.operand.kind, OperandKind::Name(_)) =>
             {
                 let shown = self.context.reports.sources.text(argument.operand.span).to_owned();
-                return Err(self.wrong_argument(argument, asked, argument.operand.span, &shown, "no name"));
+                return Err(self.wrong_argument(
+                    argument,
+                    asked,
+                    argument.operand.span,
+                    &shown,
+                    "not a name",
+                ));
             }
             _ => {}
         }
@@ -295,7 +301,7 @@ impl Expander<'_> {
         for Open { parameter, span, taken: (mnemonic, place) } in open {
             let text = self.context.scopes.text(*parameter).to_owned();
             let of = self.context.scopes.text(name);
-            let message = format!("nothing says of which type `{text}` of `{of}` is");
+            let message = format!("nothing states the type of `{text}` of `{of}`");
             let warning = Diagnostic::warning("types", *span, message)
                 .also(*place, format!("`{mnemonic}` takes any bits"))
                 .help(format!("declare it: `{text}:float`, `{text}:int`, or `{text}:bits`"));

@@ -419,10 +419,10 @@ impl<'l> Expander<'l> {
                 let id = self.context.spelled(at, name.name, name.span)?;
                 let text = self.context.scopes.text(id).to_owned();
                 if text != "total" {
-                    let message = format!("`{text}` is no part of a `.loop_bound`");
+                    let message = format!("`{text}` is not part of a `.loop_bound`");
                     let error = Diagnostic::error("loop", name.span, message)
                         .did_you_mean(takt_diagnostics::nearest(&text, ["total"]))
-                        .note("behind the iterations may stand `total m`, the most in one section");
+                        .note("`total m`, the most in one section, may follow the iterations");
                     return Err(self.context.report(at.scope, error));
                 }
                 Some(self.iterations(at, *value)?)

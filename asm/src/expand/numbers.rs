@@ -79,7 +79,10 @@ fn mistake(cell: &str) -> (String, &'static str) {
         _ if cell.replacen(',', ".", 1).parse::<f64>().is_ok() => "the decimal point is a `.`",
         _ => "numbers are written as 12, -0.5 or 1e-3",
     };
-    (if cell.is_empty() { "a number is missing".to_owned() } else { format!("`{cell}` is no number") }, help)
+    (
+        if cell.is_empty() { "a number is missing".to_owned() } else { format!("`{cell}` is not a number") },
+        help,
+    )
 }
 
 impl Expander<'_> {

@@ -235,7 +235,7 @@ impl Expander<'_> {
                 let error = Diagnostic::error(
                     "slice",
                     element.name.span,
-                    format!("`{text}` is no array that is declared above"),
+                    format!("`{text}` is not an array that is declared above"),
                 )
                 .note("the length of a slice is needed where it stands")
                 .help(format!("declare `{text}` further up, with `.array` or `.reg`"));

@@ -415,7 +415,7 @@ pub struct Ir {
     pub files: Vec<String>,
     /// Parts of lines to which operations are attributed.
     pub(crate) parts: Vec<(Location, Columns)>,
-    /// Values with registers of their own, by [`Version::after`] for each name.
+    /// Values with registers of their own; those of one name ascend by [`Version::after`].
     pub(crate) versions: Vec<Version>,
 }
 

@@ -189,7 +189,7 @@ impl Resolver<'_> {
             None => format!("itof({text})"),
         };
         let (a, b) = (as_float(&terms[0], &a), as_float(&terms[1], &b));
-        let message = format!("`{}` of integers is by a constant that is a power of two", operator.text());
+        let message = format!("`{}` of integers needs a constant power of two on its right", operator.text());
         let help = match operator {
             Operator::Rem => format!("for floats, `fmod({a}, {b})` of `<math.s>` computes remainders"),
             _ => format!(

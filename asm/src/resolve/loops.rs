@@ -162,7 +162,7 @@ impl Resolver<'_> {
         let depth = self.nest.open.len();
         if depth >= limits::LOOP_DEPTH {
             let message = format!(
-                "a nest of {} counted loops: at most {} run within one another",
+                "a nest of {} counted loops: at most {} can run within one another",
                 depth + 1,
                 limits::LOOP_DEPTH
             );

@@ -36,7 +36,7 @@ impl Resolver<'_> {
             let error = Diagnostic::error(
                 "equation",
                 terms[0].span,
-                "a condition is an integer, as comparisons give it, and this is a float",
+                "expected an integer as the condition, as comparisons give it, found a float",
             )
             .mend(format!("compare it: `{condition} != 0`"), format!("{condition} != 0"));
             return self.context.report(at.scope, error);

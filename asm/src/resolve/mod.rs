@@ -566,7 +566,7 @@ impl Resolver<'_> {
             let port = self.port(at, *name, wanted)?;
             if let Some((_, first)) = ports.iter().find(|(other, _)| *other == port) {
                 let message = format!(
-                    "`{}` stands twice in one directive",
+                    "`{}` appears twice in one directive",
                     self.context.reports.sources.text(name.span)
                 );
                 let error =
@@ -582,19 +582,20 @@ impl Resolver<'_> {
     fn unlatched(&mut self, at: AstPlace, kind: DemandKind, span: Span, latched: Span) -> ErrorReported {
         let (message, help) = match kind {
             DemandKind::Deadline(_) => (
-                "a deadline for outputs that are published together, at the `wait`",
+                "outputs that are published together, at the `wait`, cannot have deadlines of their own",
                 "bound the period instead: `takt bound --deadline`",
             ),
             DemandKind::Order => (
-                "an order of ports that are taken together, at the tick, or published together, at the `wait`",
+                "ports that are taken together, at the tick, or published together, at the `wait`, cannot have an order",
                 "leave it out",
             ),
             DemandKind::Late(_) => (
-                "inputs that are to be read late are taken at the tick, whenever they are read",
-                "leave it out, or have `.ports direct`",
+                "inputs that are taken at the tick cannot be read later",
+                "leave it out, or write `.ports direct`",
             ),
         };
-        let error = Diagnostic::error("ports", span, message).also(latched, "for here it says so").help(help);
+        let error =
+            Diagnostic::error("ports", span, message).also(latched, "ports are latched here").help(help);
         self.context.report(at.scope, error)
     }
 
@@ -639,7 +640,7 @@ impl Resolver<'_> {
                 let range = Range { register: Register::ZERO, ty, low: least, high: largest };
                 if let Some(mistake) = range.mistake() {
                     let span = Span { end: high.span.end, ..low.span };
-                    self.context.error(at.scope, "range", span, format!("this is no range: {mistake}"));
+                    self.context.error(at.scope, "range", span, format!("this range is invalid: {mistake}"));
                     continue;
                 }
                 for register in members {

@@ -147,7 +147,11 @@ impl Resolver<'_> {
                 let Cast { operand: inner, ty } = self.context.asts[at.ast as usize].casts[cast as usize];
                 let ty = self.context.type_named(at, ty)?;
                 if !matches!(inner.kind, OperandKind::Name(_) | OperandKind::Place(_)) {
-                    let error = Diagnostic::error("type", operand.span, "only a register is taken as a type");
+                    let error = Diagnostic::error(
+                        "type",
+                        operand.span,
+                        "only a register can be read as another type",
+                    );
                     return Err(self.context.report(at.scope, error));
                 }
                 self.cast.get_or_insert(ty);

@@ -41,7 +41,7 @@ pub(crate) fn order(operations: &[Operation]) -> Result<Vec<usize>, Explain<'_>>
     let mut redirecting = operations.iter().filter(|operation| operation.redirects());
     if let (Some(first), Some(second)) = (redirecting.next(), redirecting.next()) {
         return Err(Box::new(move |_, _| {
-            let message = "two operations of the bundle continue elsewhere";
+            let message = "two operations of the bundle redirect execution";
             Diagnostic::error("bundle-order", second.span, message).also(first.span, "the other")
         }));
     }

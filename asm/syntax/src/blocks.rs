@@ -61,7 +61,7 @@ impl Blocks {
                 let message = format!("this `{}` is open", outer.opener.name());
                 error = error.also(ast.directives[outer.directive].span, message);
             }
-            sink.push(error.help("move the definition before it"));
+            sink.push(error.help("move the definition before the block"));
         }
         let branches = Vec::new();
         self.open.push(OpenBlock { opener, directive: id, latest: id, branches, has_else: false });

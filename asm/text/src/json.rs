@@ -19,7 +19,7 @@ pub fn from_json<T: DeserializeOwned>(text: &str) -> Result<T, Mistake> {
         let words = words.rsplit_once(" at line").map_or(words.as_str(), |(words, _)| words);
         let python = PYTHONS.iter().find(|name| words.contains(&format!("string \"{name}\"")));
         let text = match python {
-            Some(name) => format!("`{name}` is no number of JSON, though Python's json.dumps writes it"),
+            Some(name) => format!("`{name}` is not a JSON number, though Python's json.dumps writes it"),
             None => words.to_owned(),
         };
         Mistake { line: error.line(), text }
@@ -46,7 +46,7 @@ pub fn names_format(text: &str, format: &str) -> bool {
 pub fn number(value: &serde_json::Value) -> Result<f64, String> {
     match value {
         serde_json::Value::Number(number) => {
-            number.as_f64().ok_or_else(|| format!("`{number}` is no number"))
+            number.as_f64().ok_or_else(|| format!("`{number}` is not a number"))
         }
         // Rust's parser accepts all of Python's spellings of infinities and NaN; finite numbers in quotes are rejected.
         serde_json::Value::String(text) => match text.parse::<f64>() {
@@ -57,10 +57,10 @@ pub fn number(value: &serde_json::Value) -> Result<f64, String> {
             {
                 Ok(value)
             }
-            Ok(_) => Err(format!("\"{text}\" is a text: a number has no quotes")),
-            Err(_) => Err(format!("\"{text}\" is no number")),
+            Ok(_) => Err(format!("expected a number, found the string \"{text}\": write it without quotes")),
+            Err(_) => Err(format!("\"{text}\" is not a number")),
         },
-        other => Err(format!("{} is no number", shown(other))),
+        other => Err(format!("{} is not a number", shown(other))),
     }
 }
 
@@ -126,7 +126,7 @@ mod tests {
     #[test]
     fn mistakes_have_their_line() {
         let mistake = |text: &str| from_json::<Vec<f64>>(text).expect_err("a mistake");
-        let expected = "`Infinity` is no number of JSON, though Python's json.dumps writes it";
+        let expected = "`Infinity` is not a JSON number, though Python's json.dumps writes it";
         assert_eq!(mistake("[1,\nInfinity]"), Mistake { line: 2, text: expected.to_owned() });
         assert_eq!(mistake("[1,\n2,\n]").line, 3);
         assert!(mistake("[1,]").text.contains("trailing comma"));

@@ -25,7 +25,7 @@ pub fn no_number(text: &str) -> String {
     let digits = |text: &str| text.bytes().any(|byte| byte.is_ascii_digit());
     match text.split_once(',') {
         Some((whole, part)) if digits(whole) && digits(part) => format!("`{text}` has a comma: {POINT}"),
-        _ => format!("`{text}` is no finite number"),
+        _ => format!("`{text}` is not a finite number"),
     }
 }
 
@@ -104,11 +104,11 @@ fn cells(line: &str) -> (Vec<&str>, Vec<Gap>) {
 fn number(cell: &str, commas: bool) -> Result<f64, String> {
     let digits = cell.len() > 1 && cell.bytes().all(|byte| byte.is_ascii_digit());
     if commas && digits && cell.starts_with('0') {
-        return Err(format!("`{cell}` stands behind a comma that seems to be a decimal mark: {POINT}"));
+        return Err(format!("`{cell}` follows a comma that seems to be a decimal mark: {POINT}"));
     }
     match cell.parse::<f64>() {
         Ok(value) if value.is_finite() => Ok(value),
-        _ => Err(format!("`{cell}` is no finite number; rows of numbers are read, without a header")),
+        _ => Err(format!("`{cell}` is not a finite number; expected rows of numbers, without a header")),
     }
 }
 
@@ -140,9 +140,9 @@ mod tests {
             ("1;2\n0,5;1", 2, "both semicolons and commas"),
             ("0,5\t0,1", 1, "both commas and blanks"),
             ("1\t2\n0,5 1", 2, "both blanks and commas"),
-            ("0,5\n0,05", 2, "`05` stands behind a comma that seems to be a decimal mark"),
-            ("a,b\n1,2", 1, "`a` is no finite number; rows of numbers are read, without a header"),
-            ("1\nnan", 2, "`nan` is no finite number"),
+            ("0,5\n0,05", 2, "`05` follows a comma that seems to be a decimal mark"),
+            ("a,b\n1,2", 1, "`a` is not a finite number; expected rows of numbers, without a header"),
+            ("1\nnan", 2, "`nan` is not a finite number"),
             ("1\n2\n3\n4\n5\n6\n7\n8\n9\n10", 10, "more than 9 rows"),
         ] {
             let Mistake { line: at, text: said } = message(text);

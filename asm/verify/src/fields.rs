@@ -106,7 +106,7 @@ fn compare_data(program: &Program, data: &[u32], plain: &PlainProgram) -> Result
     let Some(at) = (0..length).find(|at| word(data, *at) != word(&plain.data, *at)) else { return Ok(()) };
     let name = program.data_text(at as u32);
     let text = |data: &[u32]| format!("{:?} (0x{:08x})", f32::from_bits(word(data, at)), word(data, at));
-    Err(differ(format!("{name} is not the source's"), text(&plain.data), text(data)))
+    Err(differ(format!("{name} differs from the source's"), text(&plain.data), text(data)))
 }
 
 /// The image's name may differ from the source's: the assembler renames its own names (which contain a point) if they collide or are too
@@ -161,7 +161,7 @@ fn compare_ports(ports: &[Port], plain: &PlainProgram, kind: PlainKind) -> Resul
             _ => machine.output_number(*place),
         };
         let Some(found) = found else {
-            return Err(refuse(format!("{what} `{known}` is no {what} port in the image")));
+            return Err(refuse(format!("{what} `{known}` is not an {what} port in the image")));
         };
         if u32::from(found) != number || register.pinned.is_some_and(|pinned| pinned != *place) {
             let text = |register| machine.register_name(register).unwrap_or_default();

@@ -248,7 +248,7 @@ impl<'a> Relation<'a> {
         Err(Difference {
             source: Some(words(ways.0)),
             image: Some(words(ways.1)),
-            ..self.difference(source.location(), "the programs go on differently")
+            ..self.difference(source.location(), "the programs continue differently")
         })
     }
 

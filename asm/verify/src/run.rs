@@ -256,7 +256,7 @@ impl<'a> Side<'a> {
                     Ok(world.terms.apply(op, [a, b, sources[1 - source]]))
                 }
                 _ => {
-                    Err(self.wrong(Some(operation), "adds something else than the product it is fused with"))
+                    Err(self.wrong(Some(operation), "adds something other than the product it is fused with"))
                 }
             },
         }
@@ -345,7 +345,7 @@ impl<'a> Side<'a> {
             }
             Effect::Return => {
                 let Some(back) = self.calls.pop() else {
-                    return Err(self.wrong(Some(operation), "returns from no call"));
+                    return Err(self.wrong(Some(operation), "returns without a call"));
                 };
                 self.marks.done += 1;
                 self.jump(back, machine);

@@ -108,7 +108,7 @@ impl Terms {
         self.assumed.get(&term).copied().unwrap_or(term)
     }
 
-    /// Replaces the assumptions. For a sum with a constant, the symbolic part is assumed to have the difference.
+    /// Replaces the assumptions. If a term is a sum with a constant, its symbolic part is assumed to equal the value minus the constant.
     pub(crate) fn assume(&mut self, cases: &[(Term, u32)]) {
         self.assumed.clear();
         for &(term, value) in cases {

@@ -95,7 +95,7 @@ pub enum Refusal {
         reason: String,
     },
     /// Execution that continues past the end of the program.
-    #[error("execution goes on past the end of the program, which has {bundles} bundles")]
+    #[error("execution continues past the end of the program, which has {bundles} bundles")]
     LeavesProgram {
         /// Number of bundles in the program.
         bundles: u32,

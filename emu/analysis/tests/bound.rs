@@ -245,7 +245,7 @@ fn rejects_unbounded_programs() {
         (" call f\n halt\nf: call g\n ret\ng: call f\n ret\n", "test.s:5: bundle 4 (g): recursion"),
         (" nop\n ret\n", "test.s:2: bundle 1: a return without a call"),
         (" call f\n halt\nf: wait f\n", "test.s:3: bundle 2 (f): `wait` within a subroutine"),
-        (" nop\n nop\n", "bundle 2: execution goes on past the end"),
+        (" nop\n nop\n", "bundle 2: execution continues past the end"),
         (" .raw aux 0\n halt\n", "illegal word in slot aux"),
     ];
     for (text, wanted) in cases {

@@ -57,7 +57,7 @@ pub enum MachineNameError {
         option: &'static str,
     },
     /// An option's value is not a number.
-    #[error("`{option}={value}`: `{value}` is no number")]
+    #[error("`{option}={value}`: `{value}` is not a number")]
     Number {
         /// Name of the option.
         option: &'static str,

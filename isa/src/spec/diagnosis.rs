@@ -46,7 +46,7 @@ impl MachineReason {
             }
             Name { .. } => "another name".to_owned(),
             BankName { .. } => "letters only: its registers are called by it and a number".to_owned(),
-            Twice { what, .. } => format!("another name for one {what}"),
+            Twice { what, .. } => format!("rename one {what}"),
             BankDepth { most, .. } => format!("a depth of 1 to {most}; circuits have powers of two"),
             RegisterSpace { .. } => format!("all banks together have the registers 0 to {LAST}"),
             Overlap { other, end, .. } => {

@@ -37,13 +37,13 @@ pub fn standard() -> Result<Description, String> {
 #[derive(Debug, thiserror::Error)]
 pub enum ControllerError {
     /// The system lacks a port or link that the host needs.
-    #[error("the system is no robot controller: {0}")]
+    #[error("the system is not a robot controller: {0}")]
     Host(#[from] HostError),
     /// A core's memories cannot hold its program.
     #[error("{0}")]
     Load(#[from] LoadError),
     /// A fault before the first ticks, or no ticks within ten million cycles.
-    #[error("the cores did not get to their first ticks: {0}")]
+    #[error("the cores did not reach their first ticks: {0}")]
     Start(String),
 }
 
@@ -178,7 +178,7 @@ impl Controller {
         let mut system = System::new(description)?;
         let start = system.run_to_start(START).map_err(|fault| ControllerError::Start(fault.to_string()))?;
         let start = start.ok_or_else(|| {
-            ControllerError::Start(format!("{START} cycles have passed, or all have halted"))
+            ControllerError::Start(format!("{START} cycles have passed, or all cores have halted"))
         })?;
         let view = View {
             joints: plant.joints(),

@@ -470,7 +470,7 @@ impl<R: Robot> Host<R> {
                 return Ok(());
             }
             if self.untold.is_some_and(|since| self.ticks - since > UNTOLD_TICKS) {
-                let text = "the robot stands after an error of which no report has come; `reset` ends it";
+                let text = "the robot stands after an error that was not reported; `reset` ends this state";
                 return Err(Problem::Late(text.to_owned()));
             }
             if self.ticks >= end {
@@ -488,7 +488,7 @@ impl<R: Robot> Host<R> {
     /// # Errors
     /// If they do not report within 2 s.
     pub fn power_up(&mut self) -> Result<(), Problem> {
-        let late = || "the controller did not get ready".to_owned();
+        let late = || "the controller did not become ready".to_owned();
         self.wait_until(READY_TICKS, late, &|| false, |host| Ok(host.ready))
     }
 
@@ -555,7 +555,7 @@ impl<R: Robot> Host<R> {
             return Err(Problem::Stopped(report));
         }
         let sequence = self.send(command);
-        let late = || format!("the link takes no words: {}", command.kind());
+        let late = || format!("the link does not accept words: {}", command.kind());
         self.wait_until(ANSWER_TICKS, late, &|| false, |host| Ok(host.out.is_empty()))?;
         Ok(sequence)
     }

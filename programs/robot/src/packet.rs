@@ -356,10 +356,10 @@ pub struct Report {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ReportError {
     /// Unknown kind of report.
-    #[error("a report of the unknown kind {0}")]
+    #[error("unknown report kind {0}")]
     Kind(u32),
     /// Unknown cause of a report.
-    #[error("a report with the unknown cause {0}")]
+    #[error("unknown report cause {0}")]
     Cause(u32),
 }
 

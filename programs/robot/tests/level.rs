@@ -98,7 +98,7 @@ fn signals_and_waits() {
     );
     assert_eq!(said[0], "say: 112.5");
     assert_eq!(said[1..3], ["signal: output 2 on", "signal: level 1 is 0.25"]);
-    assert_eq!(said[3..], ["caught: test.robot:9: waited 0.2 s in vain: input 4 on", "say: none 0"]);
+    assert_eq!(said[3..], ["caught: test.robot:9: waited 0.2 s without success: input 4 on", "say: none 0"]);
 }
 
 #[test]
@@ -155,7 +155,7 @@ fn an_error_that_is_not_reported_ends_a_wait() {
     session.enter("prompt", "simulate silent", true).expect("it is one");
     let since = session.host().time();
     let error = session.enter("prompt", "wait done", true).expect_err("it does not come to its end");
-    assert!(error.render(false).contains("of which no report has come; `reset` ends it"));
+    assert!(error.render(false).contains("that was not reported; `reset` ends this state"));
     assert!(session.host().time() - since < 5.0);
     session.enter("prompt", "reset", true).expect("it is answered");
 }

@@ -19,10 +19,10 @@ pub struct Binding {
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum BindingError {
     /// An input port that the algorithm does not have.
-    #[error("this is no tracking program: nothing gives its input port `{0}` a value")]
+    #[error("not a tracking program: the tracking algorithm does not drive input port `{0}`")]
     Undriven(String),
     /// A missing port of the algorithm.
-    #[error("this is no tracking program: it has no {kind} port `{name}`")]
+    #[error("not a tracking program: it has no {kind} port `{name}`")]
     Missing {
         /// Direction of the port: `input` or `output`.
         kind: &'static str,

@@ -184,7 +184,8 @@ fn linear(pairs: &[[f64; 2]], sign_speed: f64, stribeck_speed: Option<f64>, visc
     Some(Fit { friction, offset, rms: (squares.sum::<f64>() / pairs.len() as f64).sqrt() })
 }
 
-/// Solves four linear equations by Gaussian elimination, with the right sides in the last column; `None` if they are singular in binary64.
+/// Solves four linear equations by Gauss–Jordan elimination with partial pivoting; the last column holds the right-hand sides. `None` if a
+/// pivot is below 10⁻¹³ of its row's largest coefficient.
 fn gauss(mut equations: [[f64; 5]; 4]) -> Option<[f64; 4]> {
     for column in 0..4 {
         let pivot =

@@ -380,7 +380,9 @@ impl Application<'_> {
             return Ok((address, place.ty));
         }
         if place.read >= CORE_REGISTERS {
-            return Err(format!("`{name}` is no port but the core's own, which only its program writes"));
+            return Err(format!(
+                "`{name}` is not a port but internal to the core: only its program writes it"
+            ));
         }
         let is_output = (OUTPUTS..DRIVEN).contains(&place.read) || place.read >= SEEN;
         match self.connect(Direction::Input, name) {

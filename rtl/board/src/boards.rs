@@ -124,8 +124,10 @@ fn one_of<'a>(
 ) -> Option<&'a str> {
     let found = all.iter().find(|name| **name == given.value).copied();
     if found.is_none() {
-        document
-            .mistake(&given.place, format!("`{}` is no {what}; there are {}", given.value, all.join(", ")));
+        document.mistake(
+            &given.place,
+            format!("there is no {what} `{}`; there are {}", given.value, all.join(", ")),
+        );
     }
     found
 }
@@ -244,7 +246,7 @@ impl SiteAllocation<'_> {
     /// Takes a site, if its name is valid and it is free.
     fn take(&self, site: Located<String>, by: &str) -> Option<String> {
         if let Some(sites) = self.sites.filter(|sites| !(sites.is_site)(&site.value)) {
-            let text = format!("`{}` is no site; a site is {}", site.value, sites.form);
+            let text = format!("`{}` is not a site; a site is {}", site.value, sites.form);
             self.document.mistake(&site.place, text);
             return None;
         }

@@ -28,7 +28,7 @@ pub enum BuildError {
     Top(#[from] TopError),
     /// No open tools make a bitstream of the family.
     #[error(
-        "no open tools that Takt knows make a bitstream for {0}: `--sources` writes the Verilog for its maker's, `takt board sim` simulates it"
+        "Takt knows no open-source tools for {0}: write the Verilog for the vendor's tools with `--sources`, or simulate the board with `takt board sim`"
     )]
     NoTools(&'static str),
     /// A tool failed; nextpnr fails, too, if the clock is not met.

@@ -172,7 +172,7 @@ fn half<'a>(
             let half = (clock * 1e3 / at.value / 2.0).round();
             if !(f64::from(LEAST_HALF)..=f64::from(u16::MAX)).contains(&half) {
                 let text = format!(
-                    "{} kHz are {half} cycles of {clock} MHz for half a period; there may be {LEAST_HALF} to {}",
+                    "{} kHz are {half} cycles of {clock} MHz for half a period; expected {LEAST_HALF} to {}",
                     at.value,
                     u16::MAX
                 );
@@ -182,7 +182,7 @@ fn half<'a>(
             Some(half as u32)
         }
         (Some(_), Some(at)) => {
-            document.mistake(&at.place, "`half` says the period already: leave out one of the two");
+            document.mistake(&at.place, "`half` already determines the period: leave out one of the two");
             None
         }
         (None, None) => {
@@ -214,7 +214,7 @@ fn tick<'a>(
     let Some(given) = given else {
         for (key, place) in [("every", every.map(|at| at.place)), ("after", after.map(|at| at.place))] {
             if let Some(place) = place {
-                document.mistake(&place, format!("`{key}` is about ticks, and this carrier has no `tick`"));
+                document.mistake(&place, format!("`{key}` applies to ticks, but this carrier has no `tick`"));
             }
         }
         return None;
@@ -224,26 +224,28 @@ fn tick<'a>(
         "peak" => TickPlace::Peak,
         "both" => TickPlace::Both,
         other => {
-            let text = format!("`tick` is to be \"valley\", \"peak\" or \"both\", not \"{other}\"");
+            let text = format!("`tick` must be \"valley\", \"peak\" or \"both\", not \"{other}\"");
             document.mistake(&given.place, text);
             return None;
         }
     };
     if let Some(every) = every.as_ref().filter(|every| every.value > 1 && place == TickPlace::Both) {
-        let text = format!("with `tick = \"both\"` each place has a tick: `every` is 1, not {}", every.value);
+        let text =
+            format!("with `tick = \"both\"` each place has a tick: `every` must be 1, not {}", every.value);
         document.mistake(&every.place, text);
         return None;
     }
     let span = if place == TickPlace::Both { half } else { 2 * half };
     let period = span.saturating_mul(every.map_or(1, |every| every.value));
     if !(64..=MOST_PERIOD).contains(&period) {
-        let text = format!("ticks come every {period} cycles; there may be 64 to {MOST_PERIOD}");
+        let text = format!("ticks come every {period} cycles; expected 64 to {MOST_PERIOD}");
         document.mistake(&given.place, text);
         return None;
     }
     let cycles = after.as_ref().map_or(0.0, |after| (after.value * clock).round());
     if let Some(after) = after.filter(|_| cycles >= f64::from(span)) {
-        let text = format!("`after` is {cycles} cycles; places come every {span}: less than that");
+        let text =
+            format!("`after` is {cycles} cycles; it must be less than {span}, the cycles between two places");
         document.mistake(&after.place, text);
         return None;
     }
@@ -265,7 +267,7 @@ pub(crate) fn instant(
         "peak" => half,
         _ => {
             let text = format!(
-                "`{}` is no place of a carrier; there are `{name}.valley` and `{name}.peak`",
+                "`{}` is not a place of a carrier; there are `{name}.valley` and `{name}.peak`",
                 at.value
             );
             document.mistake(&at.place, text);
@@ -290,7 +292,7 @@ pub(crate) fn find(
             [] => "the wiring has none: `[carrier.main]` with `half` makes one".to_owned(),
             _ => format!("there are {}", names.join(", ")),
         };
-        document.mistake(&at.place, format!("`{name}` is no carrier; {there}"));
+        document.mistake(&at.place, format!("`{name}` is not a carrier; {there}"));
     }
     found
 }

@@ -139,7 +139,7 @@ impl<'a> Table<'a> {
         match read(found.get_ref()) {
             Some(value) => Some(Located { value, place: found.span() }),
             None => {
-                let text = format!("`{key}` is to be {expected}, not {}", written(found.get_ref()));
+                let text = format!("`{key}` must be {expected}, not {}", written(found.get_ref()));
                 self.document.mistake(&found.span(), text);
                 None
             }
@@ -207,7 +207,7 @@ impl<'a> Table<'a> {
                 }
                 None => {
                     let text = format!(
-                        "`{}` is to be a text in quotes, not {}",
+                        "`{}` must be a text in quotes, not {}",
                         key.get_ref(),
                         written(value.get_ref())
                     );
@@ -227,7 +227,7 @@ impl<'a> Table<'a> {
                 Some(n) => numbers.push((named(key), Located { value: n, place: value.span() })),
                 None => {
                     let text =
-                        format!("`{}` is to be a number, not {}", key.get_ref(), written(value.get_ref()));
+                        format!("`{}` must be a number, not {}", key.get_ref(), written(value.get_ref()));
                     self.document.mistake(&value.span(), text);
                 }
             }
@@ -251,7 +251,7 @@ impl<'a> Table<'a> {
                     };
                     tables.push((name, table));
                 }
-                None => self.document.mistake(&value.span(), format!("`{}` is to be a table", name.value)),
+                None => self.document.mistake(&value.span(), format!("`{}` must be a table", name.value)),
             }
         }
         tables.sort_by_key(|(name, _)| name.place.start);
@@ -267,7 +267,7 @@ impl<'a> Table<'a> {
                 let mut known: Vec<&str> = seen.iter().copied().chain(more.iter().copied()).collect();
                 known.sort_unstable();
                 known.dedup();
-                let text = format!("`{name}` is no key of {}; there are {}", self.name, known.join(", "));
+                let text = format!("`{name}` is not a key of {}; there are {}", self.name, known.join(", "));
                 self.document.mistake(&key.span(), text);
             }
         }

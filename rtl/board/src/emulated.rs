@@ -38,7 +38,7 @@ const KEPT: [&str; 3] = ["period", "lead", "stream"];
 pub enum EmulatedError {
     /// A single program, which has no system to emulate.
     #[error(
-        "a single program's board is simulated as a circuit only: emulated is one with a system of several cores"
+        "a board with a single program can only be simulated as a circuit: --emulated is for systems of several cores"
     )]
     Program,
     /// No circuit exists that could be emulated.

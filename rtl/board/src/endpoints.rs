@@ -79,14 +79,14 @@ impl Endpoints {
         for (all, what) in [(&self.inputs, "drives"), (&self.outputs, "sees")] {
             if all.len() > MOST_VALUES {
                 return Some(format!(
-                    "the host {what} {} values; on a board it can be {MOST_VALUES}",
+                    "the host {what} {} values; on a board at most {MOST_VALUES} are possible",
                     all.len()
                 ));
             }
         }
         if self.fifos.len() > MOST_FIFOS {
             return Some(format!(
-                "the host has {} FIFOs; on a board it can have {MOST_FIFOS}",
+                "the host has {} FIFOs; on a board at most {MOST_FIFOS} are possible",
                 self.fifos.len()
             ));
         }

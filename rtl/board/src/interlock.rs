@@ -23,7 +23,7 @@ pub(crate) struct Figures {
 pub(crate) fn command(run: bool, enable: bool) -> &'static str {
     match (run, enable) {
         (false, _) => "it is stopped",
-        (true, false) => "outputs are not enabled any more",
+        (true, false) => "outputs are no longer enabled",
         (true, true) => "it is started again",
     }
 }

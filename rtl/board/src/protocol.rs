@@ -371,7 +371,7 @@ pub trait Line {
 #[derive(Debug, Error)]
 pub enum LinkError {
     /// The line is gone.
-    #[error("the line is gone: {0}")]
+    #[error("the connection is lost: {0}")]
     Line(#[from] std::io::Error),
     /// The board did not answer, however often it was asked.
     #[error(
@@ -422,7 +422,7 @@ pub enum LinkError {
     )]
     Still,
     /// The device at the other end is not a Takt board.
-    #[error("what answers is no board of Takt: its register `id` is {0:#010x}")]
+    #[error("the device that answers is not a board of Takt: its register `id` is {0:#010x}")]
     Stranger(u32),
     /// A record of the image came back different from the record that was written.
     #[error(

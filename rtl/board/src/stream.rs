@@ -32,7 +32,7 @@ impl Stream {
         };
         if found.is_empty() || block(first) != block(last) || last - first >= STREAMED {
             return Err(format!(
-                "one stream has {STREAMED} numbers that follow each other: inputs, outputs, registers or data words of one core"
+                "a stream can have up to {STREAMED} consecutive numbers: inputs, outputs, registers or data words of one core"
             ));
         }
         let values = found.iter().map(|place| (usize::from(place.read - first), place.ty)).collect();

@@ -133,7 +133,8 @@ impl Peripheral {
 fn keys<'a>(document: &'a Document<'a>) -> Option<Table<'a>> {
     let top = document.top()?;
     if let Some(place) = top.place_of("core") {
-        let text = "this is a system of several cores, and a wiring is needed, which assigns peripherals to a board's pins";
+        let text =
+            "expected a wiring, which assigns peripherals to a board's pins; found a system of several cores";
         document.mistake(&place, text);
         return None;
     }
@@ -247,7 +248,7 @@ impl Wiring {
                 if *direction == Direction::Input
                     && let Some(other) = driven.insert(found.number, &peripheral.name)
                 {
-                    let text = format!("input port `{port}` is driven twice: `{other}` drives it, too");
+                    let text = format!("input port `{port}` is driven twice: `{other}` drives it too");
                     document.mistake(place, text);
                 }
                 self.check_type(&document, peripheral, (port.as_str(), found.ty), *direction, place);
@@ -346,7 +347,7 @@ pub(crate) fn unnamed(name: &str, what: &str) -> Option<String> {
     let is_name =
         name.starts_with(|c: char| c.is_ascii_lowercase()) && name.chars().all(letters) && name.len() <= 32;
     (!is_name).then(|| {
-        format!("`{name}` is no name of {what}: 32 small letters, digits and _ at most, a letter first")
+        format!("`{name}` is not a name for {what}: at most 32 small letters, digits and _, a letter first")
     })
 }
 
@@ -380,7 +381,7 @@ impl<'a> Reader<'a> {
             mistake(
                 &at.place,
                 format!(
-                    "{} µs are {cycles} cycles of {clock} MHz; there may be {least} to {MOST_PERIOD}",
+                    "{} µs are {cycles} cycles of {clock} MHz; expected {least} to {MOST_PERIOD}",
                     at.value
                 ),
             );
@@ -407,7 +408,7 @@ impl<'a> Reader<'a> {
                 if let (Some(lead), Some(period)) = (lead, period)
                     && lead >= period
                 {
-                    mistake(&place, "`lead` is to be shorter than the period".to_owned());
+                    mistake(&place, "`lead` must be shorter than the period".to_owned());
                 }
                 lead
             }
@@ -476,7 +477,7 @@ impl<'a> Reader<'a> {
             let names: Vec<&str> = self.board.pins.iter().map(|(name, _)| name.as_str()).collect();
             let some = names.iter().take(6).copied().collect::<Vec<_>>().join(", ");
             let text = format!(
-                "`{}` is no pin of {}; it has {some} … ({} in all: `takt board pins {}`)",
+                "`{}` is not a pin of {}; it has {some} … ({} in all: `takt board pins {}`)",
                 pin.value,
                 self.board.name,
                 names.len(),
@@ -503,7 +504,8 @@ impl<'a> Reader<'a> {
         let given = table.need("kind", table.string("kind"))?;
         let Some(kind) = Kind::from_name(&given.value) else {
             let kinds: Vec<&str> = KINDS.iter().map(|kind| kind.name).collect();
-            let text = format!("`{}` is no kind of peripheral; there are {}", given.value, kinds.join(", "));
+            let text =
+                format!("`{}` is not a kind of peripheral; there are {}", given.value, kinds.join(", "));
             document.mistake(&given.place, text);
             return None;
         };
@@ -543,7 +545,8 @@ impl<'a> Reader<'a> {
         }
         for (key, _) in &scales {
             if !kind.writes.iter().any(|register| register.name == key.value) {
-                let text = format!("`{}` is no register of a {} that a program writes", key.value, kind.name);
+                let text =
+                    format!("`{}` is not a register of a {} that a program writes", key.value, kind.name);
                 document.mistake(&key.place, text);
             }
         }

@@ -168,7 +168,10 @@ fn the_export_has_the_familys_modules_and_pins() {
 fn a_family_without_tools_makes_no_bitstream() {
     let error = build::packages(&board(BOARD)).expect_err("no tools");
     assert!(matches!(error, BuildError::NoTools("Made-up fabric")), "{error}");
-    assert!(error.to_string().contains("for Made-up fabric: `--sources` writes the Verilog"), "{error}");
+    assert!(
+        error.to_string().contains("Takt knows no open-source tools for Made-up fabric: write the Verilog"),
+        "{error}"
+    );
 }
 
 #[test]
@@ -215,14 +218,14 @@ fn a_boards_file_is_checked_against_its_family() {
     assert_eq!(
         mistakes(&wrong),
         [
-            "`BGA9` is no package; there are DIP40",
-            "`grade` is to be a whole number from 1 to 3, not 4",
-            "`A17` is no site; a site is a number from 1 to 40",
+            "there is no package `BGA9`; there are DIP40",
+            "`grade` must be a whole number from 1 to 3, not 4",
+            "`A17` is not a site; a site is a number from 1 to 40",
         ]
     );
     // The rest of a file with an unknown device is still read.
     let unknown = BOARD.replace("MU-200", "MU-9").replace("mhz = 25.0", "mhz = 1");
     let found = mistakes(&unknown);
-    assert_eq!(found[0], "`MU-9` is no device; there are MU-50, MU-100, MU-200");
+    assert_eq!(found[0], "there is no device `MU-9`; there are MU-50, MU-100, MU-200");
     assert_eq!(found.len(), 2, "{found:?}");
 }

@@ -166,7 +166,7 @@ fn reports_the_reason_for_safe_outputs_at_once() {
     told(&mut host, "it is started again");
     drives(&mut host);
     host.set("control", 1).expect("control");
-    told(&mut host, "outputs are not enabled any more");
+    told(&mut host, "outputs are no longer enabled");
     drives(&mut host);
     host.set("control", 0).expect("control");
     told(&mut host, "it is stopped");

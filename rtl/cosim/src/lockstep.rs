@@ -26,7 +26,7 @@ pub enum LockstepError {
     #[error(transparent)]
     Model(#[from] ModelError),
     /// The circuit was built for other ports than the program's.
-    #[error("the program's ports are {}, and the circuit was built with {circuit} latched inputs, where it needs {program}", if *.program > 0 { "latched" } else { "not latched" })]
+    #[error("the program needs {program} latched inputs, but the circuit was built with {circuit}")]
     Ports {
         /// Number of latched inputs that the program needs.
         program: u16,

@@ -65,7 +65,7 @@ fn only_the_familys_folder_names_the_family() {
             }
         }
     }
-    assert!(wrong.is_empty(), "belongs into rtl/family:\n{}", wrong.join("\n"));
+    assert!(wrong.is_empty(), "belongs in rtl/family:\n{}", wrong.join("\n"));
     for ((path, reason), used) in EXCEPT.iter().zip(excepted) {
         assert!(used, "{path} need not be excepted ({reason})");
     }

@@ -18,7 +18,7 @@ pub struct Pll {
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum PllError {
     /// No dividers give the frequency.
-    #[error("the PLL cannot make {wanted} MHz of {input}; near it are {below} and {above}")]
+    #[error("the PLL cannot make {wanted} MHz from {input}; the nearest are {below} and {above}")]
     Dividers {
         /// Frequency to be made, MHz.
         wanted: f64,

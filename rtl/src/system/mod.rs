@@ -34,7 +34,7 @@ pub enum SystemError {
     },
     /// Names in the file that collide in the circuit.
     #[error(
-        "the circuit would have two things named `{name}`: other names for the ports, links or cores that make it"
+        "the circuit would have two modules or nets named `{name}`: rename one of the ports, links or cores that form this name"
     )]
     Name {
         /// Name in the circuit.

@@ -22,7 +22,7 @@ use fp_common::{Pairs, Random, Triples, special_values};
 /// The C++ half of [`Simulation`].
 const DRIVER: &str = include_str!("driver.cpp");
 
-/// Most operations that go through the circuit in a batch.
+/// Maximum number of operations per batch.
 const BATCH: usize = 1 << 15;
 
 /// The Verilog files of the project.

@@ -40,7 +40,7 @@ pub fn output_of(command: &mut Command) -> Result<String> {
     if !output.status.success() {
         bail!("{program} failed ({})", output.status);
     }
-    String::from_utf8(output.stdout).with_context(|| format!("{program} writes no text"))
+    String::from_utf8(output.stdout).with_context(|| format!("{program} wrote output that is not UTF-8"))
 }
 
 /// Cargo features that enable every command of takt.

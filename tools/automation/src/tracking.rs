@@ -32,7 +32,9 @@ pub fn program(machine: &'static Machine) -> Result<Program> {
 pub fn periods() -> Result<Vec<(Inputs, Outputs<f64>)>> {
     let path = gcode::read(AGH).map_err(|error| anyhow!("the path: {error:?}"))?;
     let trajectory = Trajectory::plan(&path).map_err(|error| anyhow!("the path: {error}"))?;
-    let counts = Plant::at_rest(&trajectory.start()).counts().context("it begins within reach")?;
+    let counts = Plant::at_rest(&trajectory.start())
+        .counts()
+        .context("the path begins outside of the range of the encoders")?;
     let mut controller = Controller::<f64>::new();
     let inputs = trajectory.samples().take(PERIODS).map(|sample| {
         let inputs = Inputs { counts, reference: sample.reference.convert() };

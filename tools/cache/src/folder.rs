@@ -97,14 +97,16 @@ mod owner {
         // For a symbolic link, both link and target must belong to the user: another user may have created the link.
         let (link, about) = (read(fs::symlink_metadata(folder))?, read(fs::metadata(folder))?);
         if !about.is_dir() {
-            return Err("is no folder".to_owned());
+            return Err("is not a folder".to_owned());
         }
         if let Some(other) = [&link, &about].into_iter().find(|about| !is_own(about)) {
-            return Err(format!("belongs to user {}, and this is user {}", other.uid(), user()));
+            return Err(format!("belongs to user {}, not to the current user {}", other.uid(), user()));
         }
         let mode = about.mode() & 0o777;
         if mode & 0o022 != 0 {
-            return Err(format!("can be written by others (mode {mode:o}; delete it, it is made anew)"));
+            return Err(format!(
+                "can be written by others (mode {mode:o}; delete it, and it is created again)"
+            ));
         }
         if mode != 0o700 {
             fs::set_permissions(folder, fs::Permissions::from_mode(0o700))
@@ -130,6 +132,6 @@ mod owner {
     }
 
     pub(super) fn check(folder: &Path) -> Result<(), String> {
-        if folder.is_dir() { Ok(()) } else { Err("is no folder".to_owned()) }
+        if folder.is_dir() { Ok(()) } else { Err("is not a folder".to_owned()) }
     }
 }

@@ -65,10 +65,10 @@ fn files_in_place_of_the_folder_are_not_used() {
     let variables = [("XDG_CACHE_HOME", root.0.as_path())];
     let own = root.0.join("takt");
     pipe(&own);
-    assert!(folder(&variables, &root.0).unwrap_err().contains("is no folder"));
+    assert!(folder(&variables, &root.0).unwrap_err().contains("is not a folder"));
     fs::remove_file(&own).unwrap();
     fs::write(&own, "").unwrap();
-    assert!(folder(&variables, &root.0).unwrap_err().contains("is no folder"));
+    assert!(folder(&variables, &root.0).unwrap_err().contains("is not a folder"));
     fs::remove_file(&own).unwrap();
     symlink(root.0.join("nowhere"), &own).unwrap();
     assert!(folder(&variables, &root.0).is_err());
@@ -88,7 +88,7 @@ fn a_folder_of_another_user_is_not_used() {
         eprintln!("skipped: this user cannot give a folder to another one");
         return;
     }
-    let refused = format!("belongs to user {}, and this is user {user}", user + 1000);
+    let refused = format!("belongs to user {}, not to the current user {user}", user + 1000);
     assert!(folder(&[], &temporary).unwrap_err().contains(&refused));
     fs::rename(&own, root.0.join("takt")).unwrap();
     assert!(folder(&[("XDG_CACHE_HOME", &root.0)], &temporary).unwrap_err().contains(&refused));

@@ -186,7 +186,11 @@ fn the_loop_closes_through_the_pins_of_a_simulated_board() {
         folder.line(&format!("live {port} --baud {baud} --program {program} --machine t1 read [1024]"));
     assert!(beyond.stderr.contains("no port, register or data word `[1024]`"), "{}", beyond.stderr);
     let without = folder.line(&format!("live {port} --baud {baud} shadow"));
-    assert!(without.stderr.contains("ports have names in the program: --program FILE"), "{}", without.stderr);
+    assert!(
+        without.stderr.contains("ports are named by the program: give it with --program FILE"),
+        "{}",
+        without.stderr
+    );
     let loaded = folder.line(&format!("load {port} --baud {baud} {program} --machine t1 --stopped")).ok();
     assert!(loaded.contains("records loaded and compared; stopped"), "{loaded}");
     let broken = folder.line(&format!("live {port} --baud {baud} --program {program} set nothing=1"));
@@ -207,7 +211,7 @@ fn the_loop_closes_through_the_pins_of_a_simulated_board() {
     drop(board);
     let done = host.wait_with_output().unwrap();
     let stderr = String::from_utf8_lossy(&done.stderr);
-    let says = "the line is gone: the port was unplugged, or the simulated board has ended";
+    let says = "the connection is lost: the port was unplugged, or the simulated board has ended";
     assert!(done.status.code() == Some(1) && stderr.contains(says), "{done:?}");
     assert!(done.stdout.is_empty(), "{done:?}");
 }
@@ -338,13 +342,13 @@ fn other_programs_are_refused(bench: &Bench) {
     assert_eq!((other.status, other.stdout.as_str()), (Some(1), ""));
     assert!(
         other.stderr.contains("the board does not carry other.s; `takt load")
-            && other.stderr.contains("of its image differs"),
+            && other.stderr.contains("of the board's image differs from this program's"),
         "{}",
         other.stderr
     );
     bench.folder.write("longer.s", RING.replace("wait    period\n.data", "nop\n wait period\n.data"));
     let longer = bench.debug("longer.s", "", "print x\n");
-    assert!(longer.stderr.contains("its image has "), "{}", longer.stderr);
+    assert!(longer.stderr.contains("the board's image has "), "{}", longer.stderr);
 }
 
 /// Differences: the board runs a changed program but claims to run the original.
@@ -433,7 +437,7 @@ fn the_board_is_unplugged(bench: Bench) {
     let _ = host.stdin.take().unwrap().write_all(b"step\nprint count\n");
     let done = host.wait_with_output().unwrap();
     let stderr = String::from_utf8_lossy(&done.stderr);
-    let says = "the line is gone: the port was unplugged, or the simulated board has ended";
+    let says = "the connection is lost: the port was unplugged, or the simulated board has ended";
     assert!(done.status.code() == Some(1) && stderr.contains(says), "{done:?}");
 }
 
@@ -646,13 +650,13 @@ fn path_from_pin_to_pin_has_a_bound() {
     refused(&format!("--wiring {wiring} --board colorlight-i5"), "this wiring is for the board `ulx3s-85f`");
     refused(&format!("--wiring {wiring} --deadline 100us"), "--deadline is not for --pins");
     folder.write("none.toml", "period = 100\n");
-    refused("--wiring none.toml", "none.toml names no board: `--board NAME`, or a line");
+    refused("--wiring none.toml", "none.toml does not name a board: give `--board NAME`, or begin it");
     // The message is the same for a board given by --board and in the file.
     folder.write("system.toml", "[core.one]\nmachine = \"t1\"\n");
     for board in ["", " --board ulx3s-85f"] {
         refused(
             &format!("--wiring system.toml{board}"),
-            "system.toml:1:2: this is a system of several cores, and a wiring is needed",
+            "system.toml:1:2: expected a wiring, which assigns peripherals to a board's pins; found a system of several cores",
         );
     }
     folder.write("broken.toml", "period = \n");

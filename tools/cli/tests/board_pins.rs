@@ -88,7 +88,7 @@ fn the_wiring_names_the_board() {
         "bound --pins --wiring limit.toml limit.s",
     ] {
         let done = folder.line(line);
-        let says = "limit.toml names no board: `--board NAME`, or a line `board = \"NAME\"` at its beginning; \
+        let says = "limit.toml does not name a board: give `--board NAME`, or begin it with a line `board = \"NAME\"`; \
             there are ulx3s-85f";
         assert!(done.status == Some(1) && done.stderr.contains(says), "{line}: {done:?}");
     }
@@ -130,8 +130,8 @@ fn a_script_drives_a_limit_switch() {
             "bad.txt:2: `wait 3 parsecs`: `parsecs` is not one of the units",
         ),
         ("--script bad.txt", "jump\n", "bad.txt:1: no command `jump`; there are `set pin=level …`"),
-        ("--script bad.txt", "set\n", "bad.txt:1: `set` wants `pin=level`"),
-        ("--script bad.txt", "quit now\n", "bad.txt:1: `quit` stands alone; `now` follows it"),
+        ("--script bad.txt", "set\n", "bad.txt:1: `set` needs `pin=level`"),
+        ("--script bad.txt", "quit now\n", "bad.txt:1: `quit` takes no arguments, found `now`"),
     ] {
         folder.write("bad.txt", if text.is_empty() { "show\n" } else { text });
         let done = sim(&folder, line, "");

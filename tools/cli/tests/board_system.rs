@@ -84,7 +84,7 @@ fn wrong_systems_and_ports_are_refused() {
         "wiring.toml:5:1: the system's `tick` is 5000 cycles, which at 50 MHz are 100 µs; `period` is 10000 cycles",
     );
     let two = "[peripheral.other]\nkind = \"step\"\npins = { step = \"gp4\", direction = \"gn4\" }\nports = { count = \"n\" }\n[peripheral.lamp]";
-    wired("[peripheral.lamp]", two, "input port `n` is driven twice: `encoder` drives it, too");
+    wired("[peripheral.lamp]", two, "input port `n` is driven twice: `encoder` drives it too");
 
     // Errors: one port of several cores; an offset that no board can keep; a system that is too large for any board.
     let system = std::fs::read_to_string(example("axis.toml")).unwrap();
@@ -110,14 +110,14 @@ fn wrong_systems_and_ports_are_refused() {
         "board build --board ulx3s-85f --wiring wiring.toml --program axis.toml --sources -o out",
         "the system needs 252 block RAMs at least, 9 of them for the image of ",
     );
-    refused(&format!("board check {} --machine t1", axis()), "--machine with a system");
+    refused(&format!("board check {} --machine t1", axis()), "--machine cannot be used with a system");
     refused(&format!("board sim {} --robot", axis()), "`takt track --system` drives it with one");
 
     // Detected before the serial port is opened.
     let live = |what: &str| format!("live /dev/nothing --program {} {what}", example("axis.toml"));
     refused(&live("set servo.wanted=1"), "`servo.wanted` comes from the link `reference`");
     refused(&live("set servo.duty=1"), "`servo.duty` is an output port, which the program sets");
-    refused(&live("set limit=much"), "`much` is no value of `limit`");
+    refused(&live("set limit=much"), "`much` is not a value of `limit`");
     refused(&live("push limits x=1"), "the system has no FIFO `limits` from the host; there are moves");
     refused(&live("push reached there=1"), "`reached` is a FIFO to the host, whose entries `pop` takes out");
     refused(
@@ -129,8 +129,11 @@ fn wrong_systems_and_ports_are_refused() {
         "entries of `moves` have no field `speed`; there are target, rate",
     );
     refused(&live("pop moves"), "`moves` is a FIFO from the host, into which `push` puts entries");
-    refused(&live("stream servo.duty watch.peak"), "one stream has 15 numbers that follow each other");
-    refused("live /dev/nothing push moves target=1", "ports have names in the program: --program FILE");
+    refused(&live("stream servo.duty watch.peak"), "a stream can have up to 15 consecutive numbers");
+    refused(
+        "live /dev/nothing push moves target=1",
+        "ports are named by the program: give it with --program FILE",
+    );
 }
 
 /// Copies the example's files, with some texts replaced.

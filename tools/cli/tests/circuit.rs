@@ -132,8 +132,8 @@ fn rejects_program_options_for_a_systems_circuit() {
         format!("{core}{}{}{snapshot}", wire("host.in0", "a.in0"), wire("a.out0", "host.s_x")),
     );
     for (line, text) in [
-        ("rtl twice.toml -o out", "two things named `out_s_x`"),
-        ("rtl p.s -o out", "p.s is no system (`.toml`); a program's core: --program p.s"),
+        ("rtl twice.toml -o out", "two modules or nets named `out_s_x`"),
+        ("rtl p.s -o out", "p.s is not a system (`.toml`); for the core of a program, write --program p.s"),
         ("rtl right.toml -o out -m t1", "cannot be used with"),
         ("cosim right.toml -m t1", "the system's file names each core's"),
         ("rtl none.toml -o out", "none.toml"),

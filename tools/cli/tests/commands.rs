@@ -248,7 +248,7 @@ fn an_image_is_proved_to_be_its_source() {
     let done = folder.line("verify a.takt b.s --json");
     let json: serde_json::Value = serde_json::from_str(&done.stdout).unwrap();
     assert_eq!((done.status, &json["verified"], &json["place"]["line"]), (Some(1), &false.into(), &7.into()));
-    assert!(folder.line("verify a.s a.s").stderr.contains("a.s is no image"));
+    assert!(folder.line("verify a.s a.s").stderr.contains("a.s is not an image"));
 }
 
 /// A program with everything that the tracking programs lack: data, branches, calls, integers, bits, manual bundles.
@@ -635,7 +635,7 @@ fn the_plot_shows_the_path() {
     assert!(!drawn.contains('\x1b') && drawn.contains("Time of one period"));
     let refused = folder.line("track --plot --json");
     assert_eq!(refused.status, Some(2));
-    assert!(refused.stderr.contains("--plot with --json needs a file"), "{}", refused.stderr);
+    assert!(refused.stderr.contains("--plot with --json needs the name of a file"), "{}", refused.stderr);
 }
 
 #[test]
@@ -673,7 +673,7 @@ fn memories_of_other_depths() {
     let refused = folder.line("asm deep.s");
     assert!(
         refused.status != Some(0)
-            && refused.stderr.contains("`.machine t3 data=8192` takes it: 16 block RAMs"),
+            && refused.stderr.contains("`.machine t3 data=8192` makes room for it: 16 block RAMs"),
         "{refused:?}"
     );
     for asked in [

@@ -62,8 +62,8 @@ fn reports_a_broken_configuration() {
     let mut client = Client::start(&folder, "dap");
     client.command("initialize", json!({}));
     for (configuration, told) in [
-        (json!({}), "has `program`, the path of a source or an image, or `track`"),
-        (json!([]), "is an object"),
+        (json!({}), "needs `program`, the path of a source or an image, or `track`"),
+        (json!([]), "expected a launch configuration, an object"),
         (json!({ "program": 7 }), "`program` in the launch configuration is the path"),
         (json!({ "program": "none.s" }), "cannot open none.s"),
         (json!({ "program": "." }), "folder"),
@@ -111,7 +111,7 @@ fn survives_and_reports_invalid_messages() {
     assert_eq!(client.command("stackTrace", json!({}))["message"], "`stackTrace` before `launch`");
     client.raw(b"Content-Length: 3\r\n\r\n{]}");
     let output = client.event("output");
-    assert!(output["body"]["output"].as_str().unwrap().contains("no JSON"), "{output}");
+    assert!(output["body"]["output"].as_str().unwrap().contains("not JSON"), "{output}");
     client.send(&json!({ "hello": 1 }));
     assert_eq!(client.wait(|message| message["type"] == "response")["success"], false);
     client.command("launch", json!({ "program": "sum.s" }));

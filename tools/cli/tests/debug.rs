@@ -40,7 +40,7 @@ fn the_source_of_an_image() {
 
     let bare = listed("bare.takt");
     assert_eq!(bare.status, Some(1));
-    let message = "error: standard input:3: the program carries no source of sum.s: an image does unless it is assembled with --strip\n";
+    let message = "error: standard input:3: the program carries no source of sum.s: an image has its sources unless it was assembled with --strip\n";
     assert_eq!(bare.stderr, message);
     assert!(bare.stdout.contains("sum = 0.0 "), "the rest is there: {}", bare.stdout);
 

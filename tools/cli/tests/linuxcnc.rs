@@ -154,10 +154,13 @@ fn parameters_that_do_not_fit_are_refused() {
     let (wiring, system) = (source("followed_board.toml"), source("followed.toml"));
     for (arguments, says) in [
         ("--joints LLX --counts 1,1,1", "L for a linear joint and R for a rotary one"),
-        ("--joints LL --counts 1", "--counts has 1 sizes, and --joints 2 letters"),
-        ("--joints LL --counts 1,0", "0 is no size of a count"),
-        ("--joints LR --counts 1,1 --geometry hybrid", "the first three joints are linear"),
-        ("--joints LLLR --counts 1,1,1,1", "the value behind `measured.m4` is not the next one at the host"),
+        ("--joints LL --counts 1", "--counts has 1 sizes, but --joints has 2 letters"),
+        ("--joints LL --counts 1,0", "expected a finite size other than 0 in m or rad, found 0"),
+        ("--joints LR --counts 1,1 --geometry hybrid", "the first three joints must be linear"),
+        (
+            "--joints LLLR --counts 1,1,1,1",
+            "the value that must follow `measured.m4` at the host is not next to it",
+        ),
         ("--joints LLLRRR --counts 1,1,1,1,1,1", "the system has no value `n6` at the host"),
         (
             "--joints LLLRR --counts 1,1,1,1,1 --servo 950",
@@ -214,7 +217,7 @@ fn rejects_unsupported_configurations() {
         source("board.toml"),
         source("tracking.s")
     );
-    refused(&alone, 1, "emulated is one with a system of several cores");
+    refused(&alone, 1, "--emulated is for systems of several cores");
     refused(&board("--record sim.csv --emulated").replace(" --serve", ""), 2, "--serve");
     refused(&board("--emulated --unplug-at x"), 2, "--unplug-at");
     refused(&board("--emulated --record none/sim.csv"), 1, "cannot write none/sim.csv");

@@ -112,9 +112,9 @@ fn values_have_the_names_of_the_source() {
     );
     for (setting, says) in [
         ("k=1", "`k` is an output port, which the program sets"),
-        ("M[1,1]=1", "`M[1,1]` is no port but the core's own, which only its program writes"),
-        ("count=1", "`count` is no port but the core's own, which only its program writes"),
-        ("gain=fast", "`fast` is no value of `gain`"),
+        ("M[1,1]=1", "`M[1,1]` is not a port but internal to the core: only its program writes it"),
+        ("count=1", "`count` is not a port but internal to the core: only its program writes it"),
+        ("gain=fast", "`fast` is not a value of `gain`"),
         ("gain", "`gain` is not `name=value`"),
         ("n=1", "the board refuses to set `n`: a peripheral of its wiring drives it"),
     ] {

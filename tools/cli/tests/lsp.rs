@@ -266,7 +266,7 @@ fn names_are_followed_through_macros_repetitions_and_includes() {
     }
     // A rename that would change the program's meaning is rejected with the reason.
     for (of, to, why) in [
-        ("K\n", "x", "would not stay the same"),
+        ("K\n", "x", "would change"),
         ("p{i}, x", "x{i}x", "must end in `{i}`"),
         ("x, n", "1x", "is not a name"),
         ("fadd", "fsub", "no name here"),

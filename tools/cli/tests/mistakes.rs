@@ -212,7 +212,7 @@ fn controllers_that_go_wrong() {
         ),
         (
             "p: wait p\n.input extra",
-            "bad.s: this is no tracking program: nothing gives its input port `extra` a value",
+            "bad.s: not a tracking program: the tracking algorithm does not drive input port `extra`",
         ),
     ] {
         folder.write("bad.s", format!(".include \"robot.s\"\n.once\n wait p\n.period\n{text}\n"));

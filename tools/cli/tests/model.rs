@@ -142,7 +142,7 @@ fn expressions_become_programs() {
     let done = folder.line("model f.json");
     assert_eq!(done.status, Some(1));
     assert!(
-        done.stderr.contains("f.json:6: operation `lgamma` has no meaning here; in `lgamma(x_1, x_2)`"),
+        done.stderr.contains("f.json:6: operation `lgamma` is not supported; in `lgamma(x_1, x_2)`"),
         "{}",
         done.stderr
     );
@@ -198,8 +198,8 @@ fn a_policy_becomes_a_program_that_runs() {
             2,
             "--body applies to robots and expressions, but relu.onnx contains a policy,",
         ),
-        ("model relu.onnx --range 1", 2, "two numbers with a comma between them, as -1,1"),
-        ("model relu.onnx --range 1,-1", 2, "the first number is not greater than the second"),
+        ("model relu.onnx --range 1", 2, "expected two numbers with a comma between them, as -1,1"),
+        ("model relu.onnx --range 1,-1", 2, "the first number must not be greater than the second"),
     ] {
         let done = folder.line(line);
         assert!(done.status == Some(status) && done.stderr.contains(expected), "{line}: {}", done.stderr);
@@ -239,7 +239,7 @@ fn reads_descriptions_of_every_origin() {
     folder.write("look.xml", "<mujocoinclude>\n<option gravity=\"0\"/></mujocoinclude>");
     let done = folder.line("model leg.xml -f gravity");
     assert!(
-        done.stderr.contains("look.xml:2: `gravity` is `0`: it has 1 numbers, and 3 are needed"),
+        done.stderr.contains("look.xml:2: `gravity` is `0`: it has 1 numbers, expected 3"),
         "{}",
         done.stderr
     );
@@ -282,8 +282,8 @@ fn reports_an_unusable_penalty() {
     );
     assert!(text.contains(&advice), "{text}");
     for (from, to, expected) in [
-        ("[1e-6]", "[NaN]", "p.json:1: `R`: NaN: a finite number is needed"),
-        ("4}", "4,}", "p.json:2: this is no control problem: trailing comma"),
+        ("[1e-6]", "[NaN]", "p.json:1: `R`: expected a finite number, found NaN"),
+        ("4}", "4,}", "p.json:2: this is not a control problem: trailing comma"),
     ] {
         folder.write("p.json", problem.replace(from, to));
         let done = folder.line("model p.json");
@@ -299,7 +299,7 @@ fn mistakes_have_one_message() {
     folder.write("ball.xml", PENDULUM.replace("name=\"hip\"", "name=\"hip\" type=\"ball\""));
     folder.write("f.json", "{");
     for (line, status, expected) in [
-        ("model ur5.urdf", 2, "say with --function what to compute: forward-kinematics, jacobian,"),
+        ("model ur5.urdf", 2, "name what to compute with --function: forward-kinematics, jacobian,"),
         ("model ur5.urdf -f gravty", 2, "there is no such function; did you mean `gravity`?"),
         (
             "model ur5.urdf -f gravity --tip wrist",
@@ -327,9 +327,9 @@ fn mistakes_have_one_message() {
             2,
             "--function applies to robot descriptions, but f.json contains expressions",
         ),
-        ("model f.json", 1, "f.json:1: this is no list of instructions: EOF while parsing an object"),
+        ("model f.json", 1, "f.json:1: this is not a list of instructions: EOF while parsing an object"),
         ("model ur5.urdf -f gravity --snap 1", 2, "between 0 and 0.01 rad"),
-        ("model ur5.urdf -f computed-torque --kp -1", 2, "a gain is finite and not negative"),
+        ("model ur5.urdf -f computed-torque --kp -1", 2, "a gain must be finite and not negative"),
     ] {
         let done = folder.line(line);
         assert!(done.status == Some(status) && done.stderr.contains(expected), "{line}: {}", done.stderr);
@@ -360,8 +360,8 @@ fn excessive_nesting_has_one_message() {
             "model deep.urdf -f gravity".to_owned(),
             "deep.urdf:1: more than 64 elements are within one another here",
         ),
-        ("model array.json".to_owned(), "array.json:1: this is no list of instructions"),
-        ("model object.json".to_owned(), "object.json:1: this is no list of instructions"),
+        ("model array.json".to_owned(), "array.json:1: this is not a list of instructions"),
+        ("model object.json".to_owned(), "object.json:1: this is not a list of instructions"),
         ("asm sum.s".to_owned(), "sum.s"),
         ("track --gcode path.ngc".to_owned(), "path.ngc:1:"),
         ("robot --check moves.robot".to_owned(), "moves.robot"),

@@ -199,7 +199,8 @@ fn a_wrong_row_ends_the_run() {
     let mut running = RunningProcess::new(&folder, "");
     running.send("a,n\n4,1\n4,x\n4,2\n");
     assert_eq!((running.line(), running.line()), ("F,k,cycles\n".to_owned(), "0.25,2,12\n".to_owned()));
-    let error = "error: standard input:3: column n: `x` is no integer between -2147483648 and 2147483647\n";
+    let error =
+        "error: standard input:3: column n: `x` is not an integer between -2147483648 and 2147483647\n";
     assert_eq!(running.end(), (Some(1), String::new(), error.to_owned()));
     // A plant that sends nothing.
     let running = RunningProcess::new(&folder, "");

@@ -38,7 +38,7 @@ fn a_program_with_a_fault_of_the_link() {
     assert!(text.contains("a.robot can run: it takes 1."), "{text}");
 }
 
-/// The record of host and encoders is a table with which the cores repeat the run to the same end.
+/// `--record` writes the inputs from host and encoders; `takt run --inputs` replays them to the same outputs and pose.
 #[test]
 fn a_session_is_recorded() {
     let folder = Folder::new();
@@ -59,8 +59,8 @@ fn mistakes_on_the_command_line() {
     folder.write("b.toml", "tick = 10\n");
     for (line, status, text) in [
         ("robot a.robot --faults flood@1", 2, "there is no fault `flood`"),
-        ("robot a.robot --faults corrupt", 2, "a fault has a time"),
-        ("robot a.robot --faults corrupt@-1", 2, "is no time"),
+        ("robot a.robot --faults corrupt", 2, "expected a fault with its time"),
+        ("robot a.robot --faults corrupt@-1", 2, "is not a time"),
         ("robot --check", 2, "FILE"),
         ("robot none.robot", 1, "none.robot"),
         ("robot a.robot --plot a.robot", 2, "--plot would overwrite"),
@@ -74,5 +74,5 @@ fn mistakes_on_the_command_line() {
     let speed = format!("{}/../../programs/systems/speed.toml", env!("CARGO_MANIFEST_DIR"));
     let done = folder.line(&format!("robot a.robot --system {speed}"));
     assert_eq!(done.status, Some(1));
-    assert!(done.stderr.contains("the system is no robot controller"), "{}", done.stderr);
+    assert!(done.stderr.contains("the system is not a robot controller"), "{}", done.stderr);
 }

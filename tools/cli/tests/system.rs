@@ -103,7 +103,7 @@ fn bound_counts_the_periods_of_states() {
         (&Value::Null, &Value::Null, &Value::Null)
     );
     let none = folder.line("bound same.toml --deadline 1ms");
-    assert!(none.status == Some(1) && none.stderr.contains("no way leads from an input"), "{none:?}");
+    assert!(none.status == Some(1) && none.stderr.contains("needs a path from an input"), "{none:?}");
 }
 
 #[test]
@@ -123,7 +123,7 @@ fn a_session_sees_all_cores() {
     let wrong = folder.line(&format!("debug {toml} --script wrong.txt"));
     assert!(wrong.stderr.contains("wrong.txt:1: there is no command `stp`"), "{}", wrong.stderr);
     let wrong = folder.line(&format!("debug {toml} --tick 5 --script script.txt"));
-    assert!(wrong.stderr.contains("--tick with a system"), "{}", wrong.stderr);
+    assert!(wrong.stderr.contains("--tick cannot be used with a system"), "{}", wrong.stderr);
 }
 
 #[test]
@@ -140,7 +140,7 @@ fn analyse_accounts_for_each_cores_cycles() {
         assert_eq!(core["bundles"].as_u64().unwrap() + stalls, core["cycles"].as_u64().unwrap());
     }
     let wrong = folder.line(&format!("analyse {toml} --machine t1"));
-    assert!(wrong.stderr.contains("--machine with a system"), "{}", wrong.stderr);
+    assert!(wrong.stderr.contains("--machine cannot be used with a system"), "{}", wrong.stderr);
 }
 
 /// A core divides by values from another core: source line, period and cycle are reported as if it ran alone.
@@ -260,20 +260,23 @@ fn rejects_program_options_for_a_system() {
     folder.write("wrong.s", ".output y\n fadd y, q, 1\n halt\n");
     for (line, said) in [
         ("run missing.toml --periods 1", "there is no program b.s"),
-        ("run right.toml", "goes on from tick to tick"),
-        ("run right.toml --periods 1 --tick 5", "--tick with a system"),
-        ("run right.toml --periods 1 --machine t1", "--machine with a system"),
+        ("run right.toml", "runs from tick to tick"),
+        ("run right.toml --periods 1 --tick 5", "--tick cannot be used with a system"),
+        ("run right.toml --periods 1 --machine t1", "--machine cannot be used with a system"),
         ("run faults.toml --periods 1", "core a"),
         ("run asm.toml --periods 1", "wrong.s"),
         ("run nowhere.toml --periods 1", "nowhere.toml"),
-        ("run right.toml --batch .", "--batch with a system"),
-        ("run right.toml --periods 1 --deny all --trace t.vcd", "--deny and --trace with a system"),
+        ("run right.toml --batch .", "--batch cannot be used with a system"),
+        (
+            "run right.toml --periods 1 --deny all --trace t.vcd",
+            "--deny and --trace cannot be used with a system",
+        ),
         ("run right.toml --outputs out.csv", "--outputs has a row for each period"),
-        ("analyse right.toml --periods 0", "--periods 0 with a system"),
-        ("cosim right.toml --machine t1", "--machine with a system"),
-        ("accuracy right.toml --machine t1", "--machine with a system"),
+        ("analyse right.toml --periods 0", "--periods 0 cannot be used with a system"),
+        ("cosim right.toml --machine t1", "--machine cannot be used with a system"),
+        ("accuracy right.toml --machine t1", "--machine cannot be used with a system"),
         ("bound missing.toml", "there is no program b.s"),
-        ("bound right.toml --machine t1", "--machine with a system"),
+        ("bound right.toml --machine t1", "--machine cannot be used with a system"),
         ("asm right.toml", "is a system, but this command needs a single program"),
     ] {
         let done = folder.line(line);
@@ -309,8 +312,8 @@ fn the_hybrid_robot_on_two_processors() {
     for (line, said) in [
         ("track --system other.toml", "base tick is 500 cycles"),
         ("track --system other.toml --clock 5", "it has no input `n1`"),
-        ("track --system other.toml --machine t1", "--machine with a system"),
-        ("track --system other.toml --monte-carlo 3", "--monte-carlo with a system"),
+        ("track --system other.toml --machine t1", "--machine cannot be used with a system"),
+        ("track --system other.toml --monte-carlo 3", "--monte-carlo cannot be used with a system"),
     ] {
         let done = folder.line(line);
         assert_ne!(done.status, Some(0), "{line}");

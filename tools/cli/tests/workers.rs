@@ -69,7 +69,7 @@ fn images_are_verified_by_other_processes() {
         here.stdout.lines().filter(|line| line.contains("verified: the image is its source")).count();
     assert_eq!(verified, 2, "{}", here.stdout);
     assert!(here.stdout.contains("b.takt: not verified: a.s:4: output `y`"), "{}", here.stdout);
-    assert!(here.stdout.contains("b.s: cannot be checked: b.s is no image"), "{}", here.stdout);
+    assert!(here.stdout.contains("b.s: cannot be checked: b.s is not an image"), "{}", here.stdout);
     for more in ["", " --json"] {
         let (here, elsewhere) =
             (takt(&folder, &format!("{line}{more}")), takt(&folder, &format!("{line}{more} --hq")));
@@ -83,7 +83,7 @@ fn robots_of_one_run_are_not_given_away() {
     let folder = workshop();
     let done = takt(&folder, "track --hq");
     assert!(
-        done.stderr.contains("--hq and --hq-server give away the robots of --monte-carlo"),
+        done.stderr.contains("--hq and --hq-server distribute the robots of --monte-carlo"),
         "{}",
         done.stderr
     );

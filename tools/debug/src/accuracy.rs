@@ -22,8 +22,8 @@ pub(crate) fn registers(session: &Session, name: &str) -> Result<Vec<(String, Re
     let live = session.parse(name)?;
     match session.place(&live)? {
         Some((Place::Register(register), Type::F, _)) => Ok(vec![(live.text().to_owned(), register)]),
-        Some((Place::Register(_), ..)) => Err(format!("`{name}` is no float: integers have no error")),
-        _ => Err(format!("`{name}` is no register")),
+        Some((Place::Register(_), ..)) => Err(format!("`{name}` is not a float: integers have no error")),
+        _ => Err(format!("`{name}` is not a register")),
     }
 }
 

@@ -31,9 +31,9 @@ pub fn rows(name: &str, text: &[u8], ports: &[Port], most: usize) -> Result<Rows
 pub fn parse(ty: Type, text: &str) -> Result<u32, String> {
     match ty {
         Type::F => {
-            let value: f32 = text.parse().map_err(|_| format!("`{}` is no number", field_start(text)))?;
+            let value: f32 = text.parse().map_err(|_| format!("`{}` is not a number", field_start(text)))?;
             if value.is_nan() {
-                return Err("NaN is no input for a controller".to_owned());
+                return Err("NaN is not an input for a controller".to_owned());
             }
             if value.is_infinite() {
                 let largest = f32::MAX;
@@ -45,13 +45,13 @@ pub fn parse(ty: Type, text: &str) -> Result<u32, String> {
             Ok(value.to_bits())
         }
         Type::I => text.parse().map(i32::cast_unsigned).map_err(|_| {
-            format!("`{}` is no integer between {} and {}", field_start(text), i32::MIN, i32::MAX)
+            format!("`{}` is not an integer between {} and {}", field_start(text), i32::MIN, i32::MAX)
         }),
         Type::B => text
             .strip_prefix("0x")
             .and_then(|digits| u32::from_str_radix(digits, 16).ok())
             .or_else(|| text.parse().ok())
-            .ok_or_else(|| format!("`{}` is no 32-bit number (0x… or decimal)", field_start(text))),
+            .ok_or_else(|| format!("`{}` is not a 32-bit number (0x… or decimal)", field_start(text))),
     }
 }
 

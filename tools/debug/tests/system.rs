@@ -154,7 +154,7 @@ fn reports_mistakes() {
         ("set nothing = 1", "nothing"),
         ("set zero = 1", "`zero` is always zero"),
         ("step 0", "neither a count nor one of"),
-        ("goto cycle x", "`x` is no number of a cycle"),
+        ("goto cycle x", "`x` is not the number of a cycle"),
         ("hold", "it is for a board"),
         ("accuracy nothing", "nothing"),
         ("stepp", "did you mean `step`?"),

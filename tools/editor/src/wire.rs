@@ -58,8 +58,9 @@ pub fn read(stream: &mut impl BufRead) -> Result<Option<Value>, WireError> {
         };
         if name.trim().eq_ignore_ascii_case("content-length") {
             let value = value.trim();
-            let number =
-                value.parse().map_err(|_| WireError::Lost(format!("`{value}` is no length of a message")))?;
+            let number = value
+                .parse()
+                .map_err(|_| WireError::Lost(format!("`{value}` is not the length of a message")))?;
             length = Some(number);
         }
     }
@@ -78,7 +79,7 @@ pub fn read(stream: &mut impl BufRead) -> Result<Option<Value>, WireError> {
     }
     serde_json::from_slice(&bytes)
         .map(Some)
-        .map_err(|error| WireError::Message(format!("a message is no JSON: {error}")))
+        .map_err(|error| WireError::Message(format!("a message is not JSON: {error}")))
 }
 
 /// Writes a message with its header.
@@ -111,7 +112,10 @@ mod tests {
     #[test]
     fn one_broken_message_is_not_the_end() {
         let found = all("Content-Length: 2\r\n\r\n{]Content-Length: 2\r\nX: y\r\n\r\n{}");
-        assert!(found[0].as_ref().is_err_and(|error| error.starts_with("a message is no JSON")), "{found:?}");
+        assert!(
+            found[0].as_ref().is_err_and(|error| error.starts_with("a message is not JSON")),
+            "{found:?}"
+        );
         assert_eq!(found[1..], [Ok(Some(serde_json::json!({}))), Ok(None)]);
     }
 
@@ -119,7 +123,7 @@ mod tests {
     fn reports_invalid_headers() {
         for (text, told) in [
             ("{}\r\n\r\n", "a message begins with `Content-Length: …`, not with `{}`"),
-            ("Content-Length: x\r\n\r\n", "`x` is no length of a message"),
+            ("Content-Length: x\r\n\r\n", "`x` is not the length of a message"),
             ("X: y\r\n\r\n", "a header without `Content-Length`"),
             ("Content-Length: 9\r\n\r\n{}", "the stream ends within a message"),
             ("Content-Le", "the stream ends within a header, or no header ends"),

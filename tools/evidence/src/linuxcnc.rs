@@ -137,7 +137,7 @@ fn is_root() -> Result<bool> {
 fn id(what: &str, user: Option<&str>) -> Result<u32> {
     let output = Command::new("id").arg(what).args(user).output().context("cannot start id")?;
     let text = String::from_utf8_lossy(&output.stdout).trim().to_owned();
-    text.parse().with_context(|| format!("`id {what}` says `{text}`"))
+    text.parse().with_context(|| format!("`id {what}` printed `{text}`, which is not a number"))
 }
 
 /// Compiles the component and installs it for LinuxCNC.
@@ -201,7 +201,10 @@ fn refuses_what_is_no_board() -> Result<()> {
         let output = as_user(&folder, "halrun -f refused.hal")?.output().context("cannot start halrun")?;
         let [said, more] = [&output.stdout, &output.stderr].map(|text| String::from_utf8_lossy(text));
         let said = format!("{said}{more}");
-        ensure!(said.contains(says), "hal_takt at {port} with {baud} baud does not say `{says}`:\n{said}");
+        ensure!(
+            said.contains(says),
+            "hal_takt at {port} with {baud} baud was expected to print `{says}`, but printed:\n{said}"
+        );
         fs::remove_dir_all(&folder)?;
     }
     Ok(())

@@ -62,8 +62,11 @@ fn prepare(folder: &Path) -> Result<()> {
             emulator.set_input_bits(register, bits)?;
         }
         emulator.run_period(&[])?;
-        let outputs = program.outputs.iter().map(|port| emulator.output_bits(port.register));
-        expected.push(outputs.collect::<Option<Vec<u32>>>().context("an output that is never written")?);
+        let outputs = program.outputs.iter().map(|port| {
+            let bits = emulator.output_bits(port.register);
+            bits.with_context(|| format!("output `{}` is never written", port.name))
+        });
+        expected.push(outputs.collect::<Result<Vec<u32>>>()?);
         let words: Vec<String> = words.iter().map(|bits| format!("0x{bits:08x}u")).collect();
         let _ = writeln!(rows, "    {{ {} }},", words.join(", "));
     }

@@ -100,9 +100,9 @@ pub(crate) fn lockstep(arguments: &Arguments) -> Result<()> {
 /// Reduces a netlist to its top module and cells; writes `top.json` beside it. Returns the cell counts in words.
 fn mapped(path: &std::path::Path, top: &str, family: &Family) -> Result<String> {
     let netlist: Value =
-        serde_json::from_str(&fs::read_to_string(path)?).context("yosys' netlist is no JSON")?;
+        serde_json::from_str(&fs::read_to_string(path)?).context("yosys' netlist is not JSON")?;
     let mut module = netlist["modules"][top].clone();
-    let cells = module["cells"].as_object_mut().context("a netlist has cells")?;
+    let cells = module["cells"].as_object_mut().context("the netlist has no cells")?;
     cells.retain(|_, cell| cell["type"] != "$scopeinfo");
     let count = |kind: &str| cells.values().filter(|cell| cell["type"] == kind).count();
     let Cells { luts, flip_flops, multipliers, block_rams, .. } = family.cells;

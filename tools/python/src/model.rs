@@ -147,7 +147,7 @@ pub(crate) fn robot(
     for (gain, name) in [(gains.0, "kp"), (gains.1, "kd")] {
         if !gain.is_finite() || gain < 0.0 {
             return Err(PyValueError::new_err(format!(
-                "{name} is {gain}: a gain is finite and not negative"
+                "{name} is {gain}: a gain must be finite and not negative"
             )));
         }
     }

@@ -82,7 +82,7 @@ impl Sim {
             Type::F => {
                 let value: f64 = value.extract().map_err(typed)?;
                 if value.is_nan() {
-                    return Err(wrong("NaN is no input for a controller".to_owned()));
+                    return Err(wrong("NaN is not an input for a controller".to_owned()));
                 }
                 let rounded = value as f32;
                 if rounded.is_infinite() {

@@ -116,7 +116,7 @@ def words_of(what: str, port: Port, array: NDArray[Any], when: str = "") -> NDAr
     if port.type == "float":
         nan = np.isnan(array)
         if nan.any():
-            raise ValueError(f"{what}{first(nan)}{when}: NaN is no input for a controller")
+            raise ValueError(f"{what}{first(nan)}{when}: NaN is not an input for a controller")
         with np.errstate(over="ignore"):
             rounded = array.astype(np.float32)
         infinite = np.isinf(rounded)

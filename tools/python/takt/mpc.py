@@ -91,7 +91,7 @@ def _checked(key: str, array: NDArray[Any], good: Any) -> None:
     if not np.all(good):
         index = tuple(int(i) for i in np.argwhere(~np.asarray(good))[0])
         place = f"{key}[{', '.join(map(str, index))}]" if index else key
-        raise ValueError(f"{place} is {array[index]}: a finite number is needed")
+        raise ValueError(f"{place} is {array[index]}; it must be finite")
 
 
 def program(problem: Mapping[str, Any], machine: str = DEFAULT_MACHINE, *, effort: int | None = None) -> Program:

@@ -36,7 +36,7 @@ def program(
         effort: How long the scheduler searches; 0 is one pass.
 
     Raises:
-        ModelError: the file is no model of ONNX, has an operator that is not read, or does not fit the machine.
+        ModelError: the file is not an ONNX model, has an operator that is not read, or does not fit the machine.
         AssemblyError: the program does not fit the machine.
     """
     if hasattr(policy, "SerializeToString"):

@@ -39,7 +39,7 @@ def program(
 
     Raises:
         ModelError: an operation has no meaning on the machine, or there are more inputs or outputs than it has.
-        ValueError: a symbol is no input.
+        ValueError: a symbol is not an input.
         AssemblyError: the program does not fit the machine.
     """
     model = _takt.expressions(takt_expressions.sympy_text(name, inputs, outputs), name, exact, list(without), machine)

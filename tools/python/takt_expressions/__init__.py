@@ -114,7 +114,7 @@ def _of_reals(sp, e, real, taken):
     for derivative in e.atoms(sp.Derivative):
         functions = derivative.expr.atoms(sp.core.function.AppliedUndef) & real.keys()
         if functions and derivative not in real:
-            raise ValueError(f"{derivative} is no input, and {functions.pop()} is one: its derivative needs an input of its own")
+            raise ValueError(f"{derivative} is not an input, but {functions.pop()} is one: its derivative needs an input of its own")
     for part in e.atoms(sp.Abs, sp.re, sp.im, sp.conjugate, sp.arg):
         for symbol in real:
             if real[symbol] is not symbol and part.has(symbol):
@@ -154,7 +154,7 @@ class _Sympy:
         if e in (self.sympy.true, self.sympy.false):
             return self.step("const", value=float(e == self.sympy.true))
         if e.is_Symbol:
-            raise ValueError(f"the symbol {e} is no input")
+            raise ValueError(f"the symbol {e} is not an input")
         if name == "Mul":
             above, below = self.sympy.fraction(e)
             if below != 1:
@@ -192,7 +192,7 @@ class _Sympy:
                 value = self.step(self.FOLDED[name], [value, self.place(a)])
             return value
         if not isinstance(e, (self.sympy.Expr, self.sympy.logic.boolalg.Boolean)):
-            raise ValueError(f"{e} ({name}) is no number")
+            raise ValueError(f"{e} ({name}) is not a number")
         return self.step(self.FUNCTIONS.get(name, name), [self.place(a) for a in e.args])
 
 

@@ -99,7 +99,7 @@ def test_what_does_not_fit_is_said():
         batch.step({**given, "kq": 1})
     with pytest.raises(ValueError, match=r"`q` has shape \(3,\), not \(4,\) nor \(\)"):
         batch.step({**given, "q": [1, 2, 3]})
-    with pytest.raises(ValueError, match=r"`q`\[2\] of period 0: NaN is no input for a controller"):
+    with pytest.raises(ValueError, match=r"`q`\[2\] of period 0: NaN is not an input for a controller"):
         batch.step({**given, "q": [0, 0, np.nan, 0]})
     with pytest.raises(ValueError, match="`q` of period 0: 1e\\+39 does not fit binary32"):
         batch.step({**given, "q": 1e39})

@@ -192,7 +192,7 @@ def test_what_is_wrong_is_said(fake, tmp_path):
         board.set({"x": float("nan")})
     with pytest.raises(ValueError, match="no port, register or data word `nothing`"):
         board.read("nothing")
-    with pytest.raises(ValueError, match="numbers that follow each other"):
+    with pytest.raises(ValueError, match="consecutive numbers"):
         next(board.stream(["x", "y"]))
     with pytest.raises(ValueError, match="4095 at most"):
         board.stream(["y"], every=5000)
@@ -208,7 +208,7 @@ def test_what_is_wrong_is_said(fake, tmp_path):
     with pytest.raises(takt.BoardError, match="version 1 of the protocol"):
         takt.Board(simulated.port, program)
     simulated.words[0] = 7
-    with pytest.raises(takt.BoardError, match="no board of Takt"):
+    with pytest.raises(takt.BoardError, match="not a board of Takt"):
         takt.Board(simulated.port, program)
 
 

@@ -73,12 +73,12 @@ def test_what_is_refused():
     def made(**changed):
         return takt.mpc.problem(**({"A": A, "B": B, "Q": 1, "R": 1, "horizon": 5} | changed))
 
-    with pytest.raises(ValueError, match=r"A\[0, 1\] is nan: a finite number is needed"):
+    with pytest.raises(ValueError, match=r"A\[0, 1\] is nan; it must be finite"):
         made(A=[[1, np.nan], [0, 1]])
     with pytest.raises(ValueError, match=r"u_max\[0\] is -inf"):
         made(u_max=[-np.inf])
     for changed, text in [
-        ({"B": [[1]]}, r"mpc:\d+: `B`: 1 rows, and 2 are needed"),
+        ({"B": [[1]]}, r"mpc:\d+: `B`: 1 rows, expected 2"),
         ({"u_min": 1, "u_max": 0}, r"mpc:\d+: `u_min`: limit 1 is 1, above that of `u_max`, 0"),
         ({"A": [[2, 0], [0, 1]], "Q": [0, 1]}, r"mpc:\d+: `Q`: `A` has an unstable mode"),
     ]:

@@ -59,7 +59,7 @@ def test_what_is_refused(tmp_path):
     with pytest.raises(takt.ModelError, match="wide: it does not fit: `action` has 40 numbers, t3 has 32 output ports"):
         takt.onnx.program(tmp_path / "wide.onnx")
     (tmp_path / "text.onnx").write_text("no model")
-    with pytest.raises(takt.ModelError, match="text: this is no model of ONNX"):
+    with pytest.raises(takt.ModelError, match="text: this is not an ONNX model"):
         takt.onnx.program(tmp_path / "text.onnx")
     with pytest.raises(FileNotFoundError):
         takt.onnx.program(tmp_path / "missing.onnx")

@@ -44,10 +44,10 @@ def test_a_nan_names_its_input_and_period():
     sim = program.sim()
     for _ in range(3):
         sim.step({"x": 1.0})
-    with pytest.raises(ValueError, match="input `x` of period 3: NaN is no input"):
+    with pytest.raises(ValueError, match="input `x` of period 3: NaN is not an input"):
         sim.step({"x": float("nan")})
     plant = lambda outputs, period: {"x": np.where(np.arange(4) == 2, np.nan if period == 1 else 0.0, 1.0)}
-    with pytest.raises(ValueError, match=r"`x`\[2\] of period 2: NaN is no input"):
+    with pytest.raises(ValueError, match=r"`x`\[2\] of period 2: NaN is not an input"):
         program.batch(4).close(plant, 5, {"x": 1.0})
 
 

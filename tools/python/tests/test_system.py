@@ -122,7 +122,7 @@ def test_mistakes_and_faults(folder):
     system = takt.System(folder / "system.toml")
     with pytest.raises(ValueError, match="the system has no input `z`"):
         system.step({"z": 1})
-    with pytest.raises(ValueError, match="`x` of tick 0: NaN is no input for a controller"):
+    with pytest.raises(ValueError, match="`x` of tick 0: NaN is not an input for a controller"):
         system.step({"x": float("nan")})
     (folder / "half.s").write_text(".input s\n.output y\n.reg n:int\n.period\np: ftoi n, s\n ld y, table[n]\n wait p\n.data\ntable: .float 1, 2\n")
     system = takt.System(folder / "system.toml")

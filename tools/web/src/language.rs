@@ -19,7 +19,7 @@ pub(crate) fn server(machine: &'static Machine) -> Inline {
 
 pub(crate) fn receive(server: &mut Inline, message: Value) -> Result<Value, String> {
     let message: Message =
-        serde_json::from_value(message).map_err(|error| format!("no message of the protocol: {error}"))?;
+        serde_json::from_value(message).map_err(|error| format!("not a message of the protocol: {error}"))?;
     Ok(messages(server.receive(message)))
 }
 

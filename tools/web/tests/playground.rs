@@ -143,7 +143,7 @@ fn reports_mistakes() {
     let error = playground.call("run", json!({ "begin": true })).expect_err("there is no program");
     assert_eq!(error, "no program is assembled yet");
     let told = assemble(&mut playground, DOUBLE, "x\n1\ntwo\n");
-    assert_eq!(told["inputs_error"], "inputs:3: column x: `two` is no number");
+    assert_eq!(told["inputs_error"], "inputs:3: column x: `two` is not a number");
     // The table was made for other ports, so it belongs to another program: the program runs with zeros.
     let told = assemble(&mut playground, DOUBLE, "a,b\n1,2\n");
     assert_eq!((&told["inputs_error"], &told["rows"]), (&Value::Null, &Value::Null));
@@ -265,7 +265,7 @@ fn the_robot_follows_the_path() {
     assemble(&mut playground, DOUBLE, "");
     let error =
         playground.call("track", json!({ "begin": true, "periods": 1 })).expect_err("it has other ports");
-    assert!(error.contains("no tracking program"), "{error}");
+    assert!(error.contains("not a tracking program"), "{error}");
 }
 
 #[test]

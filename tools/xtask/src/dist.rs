@@ -34,7 +34,7 @@ pub(crate) fn archives(out: &Path, machine: Option<&str>) -> Result<()> {
     let sheet = data_sheet(&folder)?;
     for machine in machines {
         let package = package(machine, &folder, &sheet)?;
-        let name = package.file_name().context("it has a name")?;
+        let name = package.file_name().context("the folder to archive has no name")?;
         archive(&package, &out.join(format!("{}.tar.gz", name.display())))?;
     }
     Ok(())
@@ -42,8 +42,8 @@ pub(crate) fn archives(out: &Path, machine: Option<&str>) -> Result<()> {
 
 /// Archives a folder reproducibly: equal files yield equal archives.
 pub(crate) fn archive(folder: &Path, archive: &Path) -> Result<()> {
-    let parent = folder.parent().context("a folder of a folder")?;
-    let name = folder.file_name().context("it has a name")?;
+    let parent = folder.parent().context("the folder to archive has no parent folder")?;
+    let name = folder.file_name().context("the folder to archive has no name")?;
     let mut tar = Command::new("tar");
     tar.args(["--sort=name", "--mtime=@0", "--owner=0", "--group=0", "--numeric-owner", "--mode=go=rX,u+rw"]);
     tar.args(["--use-compress-program=gzip -n", "-C"]).arg(parent).arg("-cf").arg(archive).arg(name);

@@ -85,7 +85,9 @@ impl Figures<'_> {
         let mut filled = String::new();
         let mut rest = text;
         while let Some((before, after)) = rest.split_once(OPEN) {
-            let (name, after) = after.split_once(CLOSE).context("a comment of a figure does not end")?;
+            let (name, after) = after
+                .split_once(CLOSE)
+                .with_context(|| format!("unterminated figure comment: missing `{CLOSE}`"))?;
             let number = |c: char| c.is_ascii_digit() || ",.".contains(c);
             let kept = before.trim_end_matches(number);
             ensure!(kept.len() < before.len(), "no figure stands before {OPEN}{name}{CLOSE}");
@@ -100,7 +102,7 @@ impl Figures<'_> {
     fn value(&mut self, name: &str) -> Result<String> {
         let mut parts = name.splitn(3, '.');
         let [Some(what), Some(of), Some(quantity)] = [parts.next(), parts.next(), parts.next()] else {
-            bail!("a figure has a name of three parts");
+            bail!("expected a name of three parts, such as PROGRAM.MACHINE.QUANTITY");
         };
         if what == "circuit" {
             return circuit(of, quantity);
@@ -133,7 +135,7 @@ fn measure(
     contracted: bool,
     machine: &'static Machine,
 ) -> Result<ProgramMeasurement> {
-    let (folder, file) = path.rsplit_once('/').context("a program lies in a folder")?;
+    let (folder, file) = path.rsplit_once('/').context("expected the path of a program in a folder")?;
     let loader = Search::new(FileLoader::new(root.join(folder))).library(takt_programs::LIBRARY);
     let contract = if contracted { Contract::All } else { Contract::AsWritten };
     let options = Options { machine, contract, ..Options::default() };

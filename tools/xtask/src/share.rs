@@ -18,7 +18,7 @@ fn units(arguments: &[&str]) -> Result<BTreeMap<String, BTreeSet<String>>> {
     if !output.status.success() {
         bail!("cargo gave no plan: {}", String::from_utf8_lossy(&output.stderr));
     }
-    let plan: Value = serde_json::from_slice(&output.stdout).context("cargo's plan is no JSON")?;
+    let plan: Value = serde_json::from_slice(&output.stdout).context("cargo's plan is not JSON")?;
     let mut units: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
     for unit in plan["units"].as_array().context("cargo's plan has no units")? {
         let name = format!("{} {} {}", unit["pkg_id"], unit["target"]["kind"], unit["mode"]);

@@ -61,10 +61,11 @@ pub(crate) fn compile(environment: &[(&'static str, &'static str)]) -> Result<Ve
     compile.arg("test").args(WORKSPACE).args(["--no-run", "--message-format=json-render-diagnostics"]);
     let compiled = compile.stderr(Stdio::inherit()).output().context("cannot start cargo")?;
     ensure!(compiled.status.success(), "the tests do not compile ({})", compiled.status);
-    let text = String::from_utf8(compiled.stdout).context("cargo's messages are no text")?;
+    let text = String::from_utf8(compiled.stdout).context("cargo's output is not UTF-8")?;
     let mut jobs = Vec::new();
     for message in text.lines() {
-        let message: Value = serde_json::from_str(message).context("cargo's message is no JSON")?;
+        let message: Value =
+            serde_json::from_str(message).context("cargo printed a line that is not JSON")?;
         if let Some(program) = Program::of(&message) {
             for (name, tests) in program.parts()? {
                 let mut command = program.command();

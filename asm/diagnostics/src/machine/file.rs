@@ -165,8 +165,7 @@ fn syntax(error: &toml::de::Error, text: &str) -> Diagnostic {
     let kind = other.and_then(|file| kinds.into_iter().find(|(key, _)| file.contains_key(*key)));
     match kind {
         Some((_, kind)) => {
-            Diagnostic { message: format!("this is {kind}, and a machine is wanted"), ..diagnostic }
-                .help(PATTERN)
+            Diagnostic { message: format!("expected a machine, found {kind}"), ..diagnostic }.help(PATTERN)
         }
         None if diagnostic.help.is_none() => diagnostic.help(PATTERN),
         None => diagnostic,
@@ -179,7 +178,7 @@ fn mistake(file: &File, error: &RowError) -> Diagnostic {
         let diagnostic = Diagnostic::error("machine", span(file.name.span()), error.to_string());
         return match error {
             RowError::Taken { .. } => {
-                diagnostic.help("another name; `takt machines` lists those that are taken")
+                diagnostic.help("choose another name; `takt machines` lists those that are taken")
             }
             _ => diagnostic,
         };
@@ -245,7 +244,7 @@ impl Reader {
         for table in &file.slot {
             let units = table.units.get_ref();
             if units.len() > UNITS_OF_SLOT {
-                let message = format!("{} units; a slot has {UNITS_OF_SLOT} at most", units.len());
+                let message = format!("{} units; a slot can have at most {UNITS_OF_SLOT}", units.len());
                 self.mistakes.push(Diagnostic::error("limit", span(table.units.span()), message));
             }
             let counts = *file.loop_depth.get_ref() != 0;
@@ -271,7 +270,8 @@ impl Reader {
 
     fn name(&mut self, name: &Spanned<String>) -> String {
         if name.get_ref().len() > NAME_BYTES {
-            let message = format!("a name of {} bytes; {NAME_BYTES} at most", name.get_ref().len());
+            let message =
+                format!("the name has {} bytes; at most {NAME_BYTES} are allowed", name.get_ref().len());
             self.mistakes.push(Diagnostic::error("limit", span(name.span()), message));
         }
         name.get_ref().clone()
@@ -280,9 +280,10 @@ impl Reader {
     /// A number in the type of the row's field; the row's own checks come later.
     fn number<T: TryFrom<i64> + Default>(&mut self, what: &str, number: &Spanned<i64>) -> T {
         T::try_from(*number.get_ref()).unwrap_or_else(|_| {
-            let message = format!("{what} is {}; it is no number of that size", number.get_ref());
+            let message = format!("{what} is {}, which is out of range", number.get_ref());
             let error = Diagnostic::error("machine", span(number.span()), message);
-            self.mistakes.push(error.help("a number from 0, below 65536 of registers"));
+            self.mistakes
+                .push(error.help("a number that is not negative, and below 65536 if it counts registers"));
             T::default()
         })
     }

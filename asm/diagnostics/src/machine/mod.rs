@@ -81,7 +81,7 @@ pub fn load(file: &Path) -> Result<Vec<u8>, String> {
         _ => error.to_string(),
     })?;
     match about.len() {
-        _ if !about.is_file() => Err("it is no file".to_owned()),
+        _ if !about.is_file() => Err("it is not a file".to_owned()),
         bytes if bytes > FILE_BYTES as u64 => Err(too_long()),
         _ => std::fs::read(file).map_err(|error| error.to_string()),
     }
@@ -105,7 +105,7 @@ impl std::fmt::Display for MachineMistake {
             },
             MachineMistake::Unread { file, reason } => write!(f, "{file}: {reason}"),
             MachineMistake::File(mistakes) => {
-                write!(f, "it describes no machine\n{}", mistakes.render(false).trim_end())
+                write!(f, "it does not describe a machine\n{}", mistakes.render(false).trim_end())
             }
         }
     }
@@ -129,7 +129,7 @@ impl MachineMistake {
             }
             MachineMistake::Unread { .. } => Diagnostic::error("machine", span, self.to_string()),
             MachineMistake::File(mistakes) => {
-                let message = "the machine's file has mistakes";
+                let message = "the machine's file has errors";
                 let mut diagnostic = Diagnostic::error("machine", span, message);
                 for one in mistakes.messages() {
                     let help = one.help.map_or(String::new(), |help| format!(" ({help})"));

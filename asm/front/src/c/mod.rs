@@ -72,7 +72,7 @@ pub fn translate(sources: &[Source], options: &Options) -> Result<Translation, E
             Ok(thread) => thread
                 .join()
                 .unwrap_or_else(|_| Err(Error::plain("the translation failed: this is a defect, report it"))),
-            Err(error) => Err(Error::plain(format!("no thread for the translation: {error}"))),
+            Err(error) => Err(Error::plain(format!("cannot start a thread for the translation: {error}"))),
         }
     })
 }

@@ -92,7 +92,7 @@ impl Exec<'_> {
                     Some(super::exec::Named::Function(_, signature)) => {
                         Ok(((*key).clone(), signature.clone()))
                     }
-                    _ => Err(Error::plain(format!("--{option} {name}: this is no function"))),
+                    _ => Err(Error::plain(format!("--{option} {name}: expected a function"))),
                 }
             }
             [] => {
@@ -134,7 +134,7 @@ impl Exec<'_> {
                     (Some((_, object)), _) | (None, [(_, object)]) => *object,
                     _ => {
                         return Err(Error::plain(format!(
-                            "--init: its parameter `{name}` is no pointer to what a parameter of the step points to, by name or type"
+                            "--init: its parameter `{name}` must point to what a parameter of the step points to, matched by name or type"
                         )));
                     }
                 };
@@ -149,7 +149,7 @@ impl Exec<'_> {
                 }
                 (_, Type::Pointer(to)) => {
                     if matches!(*to, Type::Void | Type::Function(_)) {
-                        return self.fail(format!("`{name}` points to no data: a parameter of the step is a number, a structure, or a pointer to these"));
+                        return self.fail(format!("`{name}` does not point to data: a parameter of the step is a number, a structure, or a pointer to these"));
                     }
                     let extent = *self.facts.extents.entry(key.clone()).or_insert(1);
                     let ty = if extent == 1 { (*to).clone() } else { Type::Array(to.clone(), Some(extent)) };
@@ -289,7 +289,7 @@ impl Exec<'_> {
         let (ty, origin) = (self.objects[object].leaves[leaf].ty.clone(), self.objects[object].origin);
         let unfit = match &ty {
             Type::Int(integer) if integer.bits > 32 => {
-                Some("a 64-bit integer that outlives the step: 32 bits do")
+                Some("a 64-bit integer that outlives the step: use 32 bits")
             }
             Type::Double => Some("a double: give --double=float"),
             Type::Pointer(_) => match value {
@@ -429,7 +429,7 @@ impl Exec<'_> {
                     "" => object.name.clone(),
                     member => format!("{}.{member}", object.name),
                 };
-                let note = format!("{base} is written and read by nothing: it is left out");
+                let note = format!("{base} is written but never read: it is left out");
                 if !roles.notes.contains(&note) {
                     roles.notes.push(note);
                 }

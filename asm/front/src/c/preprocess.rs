@@ -101,7 +101,7 @@ impl Preprocessor {
             return Err(Error::plain(self.explained(messages.trim())));
         }
         Err(Error::plain(format!(
-            "there is no C preprocessor: install gcc or clang (Debian, Ubuntu: `apt install gcc`); {} were looked for",
+            "no C preprocessor found: install gcc or clang (Debian, Ubuntu: `apt install gcc`); looked for {}",
             PROGRAMS.join(", ")
         )))
     }

@@ -73,7 +73,7 @@ impl Unit {
                     .take_while(|c| !c.is_whitespace())
                     .take(24)
                     .collect();
-                Err(unit.error(error.offset, format!("this is no C99 that `takt cc` reads, at `{found}`")))
+                Err(unit.error(error.offset, format!("`takt cc` cannot read this as C99, at `{found}`")))
             }
         }
     }

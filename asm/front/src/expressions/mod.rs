@@ -125,10 +125,10 @@ pub fn read(source: &str, rewrites: Rewrites) -> Result<Function, Error> {
     let file: File = serde_json::from_str(source).map_err(|error| {
         let text = error.to_string();
         let text = text.rsplit_once(" at line").map_or(text.as_str(), |(text, _)| text);
-        Error::on(error.line(), format!("this is no list of instructions: {text}"))
+        Error::on(error.line(), format!("this is not a list of instructions: {text}"))
     })?;
     if file.format != FORMAT {
-        return Err(Error::plain(format!("its format is `{}`; `{FORMAT}` is known", file.format)));
+        return Err(Error::plain(format!("unknown format `{}`; expected `{FORMAT}`", file.format)));
     }
     let mut ports = Vec::new();
     let mut first = Vec::new();
@@ -258,7 +258,7 @@ impl<'g> Reader<'g> {
     fn unknown(&self, op: &str, operands: &[Expr<'g>]) -> String {
         let function = |expr: &Expr<'g>| crate::sink::expression(self.graph, self.names, expr.id());
         let operands: Vec<String> = operands.iter().map(function).collect();
-        let place = format!("operation `{op}` has no meaning here; in `{op}({})`", operands.join(", "));
+        let place = format!("operation `{op}` is not supported; in `{op}({})`", operands.join(", "));
         match REFUSED.iter().find(|(name, _)| *name == op) {
             Some((_, mend)) => format!("{place}: {mend}"),
             None => place,

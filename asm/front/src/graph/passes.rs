@@ -82,7 +82,7 @@ fn extend(graph: &Graph, ready: &mut Vec<u32>, delays: &Delays) {
     }
 }
 
-/// Limit on the rounds of rebuilding sums: factoring may bring up new common factors. Rounds end when the cost no longer falls, nearly
+/// Limit on the rounds of rebuilding sums: factoring may expose new common factors. Rounds end when the cost no longer falls, nearly
 /// always after two.
 const ROUNDS: usize = 6;
 

@@ -57,7 +57,7 @@ pub fn contraction(controller: &Controller) -> Option<Contraction> {
     Some(Contraction { rate, residuals })
 }
 
-/// Proximal operator of the quadratic program without limits: from a zero state, the plan that minimises cost plus penalised distance;
+/// Proximal operator of the unconstrained quadratic program: from a zero state, the plan that minimises cost plus penalised distance;
 /// states first.
 fn proximal(controller: &Controller) -> Option<DMatrix<f64>> {
     let System { a, b, q, r, rho, horizon, .. } = &controller.system;

@@ -85,7 +85,7 @@ fn modes(a: &DMatrix<f64>, q: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<(), Err
             return Err(Error::key(
                 "Q",
                 format!(
-                    "`A` has an unstable mode (eigenvalue of magnitude {size:.4}) that the weights do not see; give a state of it a \
+                    "`A` has an unstable mode (eigenvalue of magnitude {size:.4}) that the weights do not see; give one of its states a \
                      weight"
                 ),
             ));

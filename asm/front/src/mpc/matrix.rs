@@ -11,7 +11,7 @@ use takt_text::{json, table};
 pub(super) fn finite(key: &str, value: &Value) -> Result<f64, Error> {
     match json::number(value) {
         Ok(number) if number.is_finite() => Ok(number),
-        Ok(number) => Err(Error::key(key, format!("{number}: a finite number is needed"))),
+        Ok(number) => Err(Error::key(key, format!("expected a finite number, found {number}"))),
         Err(why) => Err(Error::key(key, why)),
     }
 }
@@ -31,7 +31,7 @@ pub(super) fn rows(key: &str, value: &Value, files: Files<'_>) -> Result<Vec<Vec
         Value::Array(rows) if rows.iter().all(Value::is_array) => {
             rows.iter().filter_map(Value::as_array).map(|row| all_finite(key, row)).collect()
         }
-        _ => Err(Error::key(key, "a matrix is a list of rows, or the name of a file of numbers")),
+        _ => Err(Error::key(key, "expected a matrix: a list of rows, or the name of a file of numbers")),
     }
 }
 
@@ -54,10 +54,10 @@ pub(super) fn matrix(
     why: &str,
 ) -> Result<DMatrix<f64>, Error> {
     if rows.len() != height {
-        return Err(Error::key(key, format!("{} rows, and {height} are needed: {why}", rows.len())));
+        return Err(Error::key(key, format!("{} rows, expected {height}: {why}", rows.len())));
     }
     if let Some(i) = rows.iter().position(|row| row.len() != width) {
-        let text = format!("row {} has {} numbers, and {width} are needed: {why}", i + 1, rows[i].len());
+        let text = format!("row {} has {} numbers, expected {width}: {why}", i + 1, rows[i].len());
         return Err(Error::key(key, text));
     }
     Ok(DMatrix::from_row_iterator(height, width, rows.iter().flatten().copied()))

@@ -101,14 +101,14 @@ pub fn read(text: &str, stem: &str, files: Files<'_>) -> Result<System, Error> {
         return Err(Error::plain(format!("the file is longer than {} MiB", MAX_BYTES >> 20)));
     }
     let file: File = json::from_json(text).map_err(|mistake| {
-        Error::on(mistake.line, format!("this is no control problem: {}", mistake.text))
+        Error::on(mistake.line, format!("this is not a control problem: {}", mistake.text))
     })?;
     system(file, stem, files).map_err(|error| error.located(text))
 }
 
 fn system(file: File, stem: &str, files: Files<'_>) -> Result<System, Error> {
     if file.format != FORMAT {
-        let text = format!("`{}` is not known; `{FORMAT}` is", file.format);
+        let text = format!("unknown format `{}`; expected `{FORMAT}`", file.format);
         return Err(Error::key("format", text));
     }
     let (a, b) = (rows("A", &file.A, files)?, rows("B", &file.B, files)?);
@@ -147,7 +147,7 @@ fn system(file: File, stem: &str, files: Files<'_>) -> Result<System, Error> {
     let x_range = file.x_range.map(|range| ranges(&range, n)).transpose()?;
     let rho = file.rho.map(|value| finite("rho", &value)).transpose()?;
     if let Some(rho) = rho.filter(|rho| *rho <= 0.0) {
-        return Err(Error::key("rho", format!("the penalty is {rho}, and it is above 0")));
+        return Err(Error::key("rho", format!("the penalty is {rho}; it must be above 0")));
     }
     let system = System {
         name: file.name.unwrap_or_else(|| stem.to_owned()),
@@ -180,7 +180,7 @@ fn ranges(range: &[[Value; 2]], states: usize) -> Result<Vec<(f64, f64)>, Error>
     let ends = |(i, [low, high]): (usize, &[Value; 2])| {
         let (low, high) = (finite(KEY, low)?, finite(KEY, high)?);
         if low > high {
-            return Err(Error::key(KEY, format!("state {}: it lies between {low} and {high}", i + 1)));
+            return Err(Error::key(KEY, format!("state {}: the range from {low} to {high} is empty", i + 1)));
         }
         Ok((low, high))
     };
@@ -191,7 +191,7 @@ fn within(key: &str, what: &str, count: usize, least: usize, most: usize) -> Res
     if (least..=most).contains(&count) {
         return Ok(());
     }
-    Err(Error::key(key, format!("{count} {what}; there are {least} to {most}")))
+    Err(Error::key(key, format!("{count} {what}; expected {least} to {most}")))
 }
 
 /// Reads a weight matrix; it must be positive semidefinite (`definite`: positive definite). The value is a number for the whole diagonal, a
@@ -207,9 +207,9 @@ fn weights(
         if diagonal.len() == size {
             return Ok(DMatrix::from_diagonal(&diagonal.into()));
         }
-        Err(Error::key(key, format!("{} weights, and {size} are needed", diagonal.len())))
+        Err(Error::key(key, format!("{} weights, expected {size}", diagonal.len())))
     };
-    let whole = |rows: &[Vec<f64>]| matrix(key, rows, size, size, "weights are square");
+    let whole = |rows: &[Vec<f64>]| matrix(key, rows, size, size, "the matrix of weights must be square");
     let matrix = match weights {
         Value::Array(list) if !list.iter().any(Value::is_array) => diagonal(all_finite(key, list)?)?,
         Value::Array(_) => whole(&rows(key, weights, files)?)?,
@@ -229,7 +229,7 @@ fn weights(
     let least = matrix.clone().symmetric_eigenvalues().min();
     if least < -ROUNDING * scale || (definite && least <= ROUNDING * scale) {
         let kind = if definite { "above 0" } else { "0 or above" };
-        let text = format!("an eigenvalue of the weights is {least:.3e}, and all are {kind}");
+        let text = format!("an eigenvalue of the weights is {least:.3e}; all must be {kind}");
         return Err(Error::key(key, text));
     }
     Ok(matrix)
@@ -247,7 +247,7 @@ fn limits(
         value => match json::number(value) {
             Ok(number) if number.is_finite() || number == none => Ok(number),
             Ok(number) => Err(Error::key(key, format!("{number} is not a limit; write `null` for no limit"))),
-            Err(why) => Err(Error::key(key, format!("{why}; a limit that is none is `null`"))),
+            Err(why) => Err(Error::key(key, format!("{why}; write `null` for no limit"))),
         },
     };
     let each = |key: &str, limits: Option<&Value>, none: f64| match limits {
@@ -255,9 +255,7 @@ fn limits(
         Some(Value::Array(list)) if list.len() == size => {
             list.iter().map(|value| limit(key, value, none)).collect()
         }
-        Some(Value::Array(list)) => {
-            Err(Error::key(key, format!("{} limits, and {size} are needed", list.len())))
-        }
+        Some(Value::Array(list)) => Err(Error::key(key, format!("{} limits, expected {size}", list.len()))),
         Some(value) => Ok(vec![limit(key, value, none)?; size]),
     };
     let low = each(keys[0], low, f64::NEG_INFINITY)?;

@@ -22,7 +22,7 @@ pub use write::{Source, source};
 use crate::graph::{Expr, Graph, Id, evaluate};
 use functions::REWRITES;
 
-/// Maximum number of weights of a layer, or of elements of an array: more than any machine has data words.
+/// Maximum number of weights of a layer, or of elements of an array: the largest data memory in words.
 pub const MAX_NUMBERS: usize = 1 << 16;
 
 /// Operand of an elementwise step.
@@ -279,9 +279,9 @@ impl Network {
         names
     }
 
-    /// Merges steps: layers absorb biases. Unless `exact`, they also absorb the factors of a normalisation, which changes roundings, and
-    /// tanh has an absolute error of 10⁻⁷ instead of keeping the last digit of small results. Differences at the input stay: they may
-    /// cancel digits that the sum of a layer would lose.
+    /// Merges steps: layers absorb biases. Unless `exact`, layers also absorb normalisation factors, which changes rounding, and tanh is
+    /// accurate to an absolute 10⁻⁷ rather than to the last digit near zero. Subtractions at the input are kept: folded into a layer's
+    /// bias, they would lose digits to cancellation.
     #[must_use]
     pub fn merged(self, exact: bool) -> Network {
         merge::merged(Network { exact, ..self })

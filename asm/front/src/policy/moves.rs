@@ -34,7 +34,7 @@ pub(super) fn integers(
 ) -> Result<Option<Vec<i64>>, String> {
     match inputs.get(position).copied().flatten() {
         Some(value) => {
-            value.integers().map(Some).ok_or_else(|| format!("`{name}` is computed; constants are read"))
+            value.integers().map(Some).ok_or_else(|| format!("`{name}` is computed, but must be a constant"))
         }
         None => Ok(attribute(node, name).map(|attribute| attribute.integers.clone())),
     }
@@ -56,7 +56,7 @@ pub(super) fn moved(node: &Node, inputs: &Operands<'_>) -> Result<Option<Vec<Val
         "Identity" | "Dropout" => one(first().cloned()),
         "Cast" => one(first().and_then(|x| cast(x, integer(node, "to", 1) as i32))),
         "CastLike" => {
-            let kind = inputs.get(1).copied().flatten().ok_or("it has one operand")?.kind;
+            let kind = inputs.get(1).copied().flatten().ok_or("its second operand is missing")?.kind;
             one(first().and_then(|x| cast(x, kind)))
         }
         "Flatten" => one(first().and_then(|x| flatten(x, integer(node, "axis", 1)))),
@@ -114,7 +114,7 @@ fn cast(x: &Value, to: i32) -> Result<Value, String> {
 
 fn shaped(x: &Value, dims: Vec<usize>) -> Result<Value, String> {
     if count(&dims)? != x.elements.len() {
-        return Err(format!("an array of shape {:?} has no shape {dims:?}", x.dims));
+        return Err(format!("an array of shape {:?} cannot be given the shape {dims:?}", x.dims));
     }
     Ok(Value { dims, ..x.clone() })
 }
@@ -130,9 +130,11 @@ fn reshape(x: &Value, shape: &[i64], zeros_count: bool) -> Result<Value, String>
     let mut dims = Vec::new();
     for (index, dim) in shape.iter().enumerate() {
         dims.push(match *dim {
-            0 if !zeros_count => *x.dims.get(index).ok_or_else(|| format!("its shape is {shape:?}"))?,
+            0 if !zeros_count => {
+                *x.dims.get(index).ok_or_else(|| format!("its new shape {shape:?} is invalid"))?
+            }
             -1 => 1,
-            dim => usize::try_from(dim).map_err(|_| format!("its shape is {shape:?}"))?,
+            dim => usize::try_from(dim).map_err(|_| format!("its new shape {shape:?} is invalid"))?,
         });
     }
     if let Some(open) = shape.iter().position(|dim| *dim == -1) {
@@ -227,7 +229,7 @@ fn split(node: &Node, inputs: &Operands<'_>, x: &Value) -> Result<Vec<Value>, St
         Some(lengths) => {
             let lengths: Option<Vec<usize>> =
                 lengths.iter().map(|length| usize::try_from(*length).ok()).collect();
-            lengths.ok_or("a part of it has no length")?
+            lengths.ok_or("one of its parts has a negative length")?
         }
         None => {
             // The last part may be shorter.
@@ -249,7 +251,7 @@ fn split(node: &Node, inputs: &Operands<'_>, x: &Value) -> Result<Vec<Value>, St
 
 fn gather(x: &Value, indices: &Value, at: i64) -> Result<Value, String> {
     let axis = axis(at, x.dims.len())?;
-    let found = indices.integers().ok_or("its indices are computed; constants are read")?;
+    let found = indices.integers().ok_or("its indices are computed, but must be constants")?;
     let length = x.dims[axis] as i64;
     let at = |index: &i64| {
         let index = if *index < 0 { index + length } else { *index };
@@ -316,7 +318,7 @@ fn filled(node: &Node, shape: &[i64]) -> Result<Value, String> {
         Some(tensor) => {
             let value =
                 super::tensor::constant(tensor, &|_, _, _| Err("its value lies in another file".to_owned()))?;
-            (value.number().ok_or("its value is no number")?, value.kind)
+            (value.number().ok_or("its value is not a number")?, value.kind)
         }
         None => (0.0, 1),
     };

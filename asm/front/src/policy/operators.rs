@@ -174,10 +174,10 @@ impl Reader<'_> {
             return self.dense(b, numbers, outs, dims);
         }
         if !a.is_constant() && !b.is_constant() {
-            return Err("both of its factors are computed; a layer has a constant matrix".to_owned());
+            return Err("both of its factors are computed, but a layer needs a constant matrix".to_owned());
         }
         let weights = if a.is_constant() { a } else { b };
-        Err(format!("its weights have shape {:?}; a matrix is needed", weights.dims))
+        Err(format!("its weights have shape {:?}; expected a matrix", weights.dims))
     }
 
     /// Adds a layer; its bias absorbs the constant elements of the vector.
@@ -329,7 +329,7 @@ fn fits(x: &Value, length: usize, ins: usize) -> Result<(), String> {
         return Err(format!("its weights expect {ins} numbers, and the vector has {length}"));
     }
     if x.elements.len() != length {
-        return Err(format!("its left factor has shape {:?}; one vector is read, a batch of 1", x.dims));
+        return Err(format!("its left factor has shape {:?}; expected one vector, a batch of 1", x.dims));
     }
     Ok(())
 }

@@ -32,8 +32,8 @@ pub(super) struct Reader<'a> {
 /// If the file is not an ONNX model, or its graph has an unsupported operator: with the node's name and operator.
 pub fn read(bytes: &[u8], name: &str, output: Option<&str>, files: Files<'_>) -> Result<Network, Error> {
     let model =
-        Model::decode(bytes).map_err(|error| Error::plain(format!("this is no model of ONNX: {error}")))?;
-    let no_graph = || Error::plain("this is no model of ONNX: it has no graph");
+        Model::decode(bytes).map_err(|error| Error::plain(format!("this is not an ONNX model: {error}")))?;
+    let no_graph = || Error::plain("this is not an ONNX model: it has no graph");
     let graph = model.graph.as_ref().filter(|_| model.ir_version > 0).ok_or_else(no_graph)?;
     let mut notes = Vec::new();
     let made_by = [&model.producer, &model.producer_version].map(|text| text.trim()).join(" ");
@@ -120,7 +120,7 @@ fn ends<'a>(
     }
     let &[output] = &candidates[..] else {
         return Err(Error::plain(format!(
-            "a policy with one output is read; this has {} that depend on the input ({}): name one of them",
+            "expected one output that depends on the input, found {} ({}): name one of them",
             candidates.len(),
             listed(candidates.iter().map(|output| output.name.as_str()))
         )));
@@ -128,7 +128,7 @@ fn ends<'a>(
     let read = read_by(output);
     let &[input] = &read[..] else {
         return Err(Error::plain(format!(
-            "a policy with one input is read; output `{}` depends on {} ({}). `onnx.utils.extract_model` cuts out a part",
+            "expected one input, but output `{}` depends on {} ({}). `onnx.utils.extract_model` cuts out a part",
             output.name,
             read.len(),
             listed(read.iter().map(|input| input.name.as_str()))
@@ -156,9 +156,9 @@ fn shape(
 ) -> Result<Vec<usize>, Error> {
     let wrong = |text: String| Error::plain(format!("input `{}`: {text}", input.name));
     let tensor = input.of.as_ref().and_then(|of| of.tensor.as_ref());
-    let Some(tensor) = tensor else { return Err(wrong("it is no tensor".to_owned())) };
+    let Some(tensor) = tensor else { return Err(wrong("it is not a tensor".to_owned())) };
     if !is_float(tensor.element) {
-        return Err(wrong(format!("its elements are {}; float is read", type_name(tensor.element))));
+        return Err(wrong(format!("its elements are {}; expected float", type_name(tensor.element))));
     }
     if tensor.element != FLOAT {
         let kind = type_name(tensor.element);
@@ -174,14 +174,14 @@ fn shape(
         format!("its shape is [{}]", dims.join(", "))
     };
     if stated.len() > 1 && stated[0].is_some_and(|batch| batch != 1) || stated.is_empty() {
-        return Err(wrong(format!("{}; a vector [n], or a batch of one [1, n], is read", text())));
+        return Err(wrong(format!("{}; expected a vector [n], or a batch of one [1, n]", text())));
     }
     let last = stated.len() - 1;
     let mut dims = Vec::new();
     for (axis, dim) in stated.iter().enumerate() {
         dims.push(match dim {
             None if axis == last => Reader::new(graph, files).length_by_layers(nodes).ok_or_else(|| {
-                wrong(format!("{}: its length is not stated, and no layer says it", text()))
+                wrong(format!("{}: its length is not stated, and no layer determines it", text()))
             })?,
             None => 1,
             Some(dim) => usize::try_from(*dim)
@@ -248,7 +248,7 @@ impl<'a> Reader<'a> {
             node.domain == "com.microsoft" && matches!(node.operator.as_str(), "Gelu" | "FastGelu");
         if !matches!(node.domain.as_str(), "" | "ai.onnx") && !is_microsoft {
             return Err(format!(
-                "operators of `{}` are not read; `onnx.inliner.inline_local_functions` makes operators of ONNX of a function",
+                "operators of `{}` are not supported; `onnx.inliner.inline_local_functions` turns functions into operators of ONNX",
                 node.domain
             ));
         }
@@ -305,7 +305,7 @@ impl<'a> Reader<'a> {
             ("value_floats", _) => Value::new(vec![attribute.floats.len()], floats(), FLOAT),
             ("value_int", _) => Value::new(Vec::new(), [attribute.integer as f64], LONG),
             ("value_ints", _) => Value::new(vec![attribute.integers.len()], whole(), LONG),
-            _ => return Err("its value is no array of numbers".to_owned()),
+            _ => return Err("its value is not an array of numbers".to_owned()),
         })
     }
 
@@ -322,7 +322,7 @@ impl<'a> Reader<'a> {
         };
         // A program stores constants as binary32.
         if let Some(value) = wrong {
-            return Err(format!("one of its constants is {value}"));
+            return Err(format!("one of its constants is {value}; constants must be finite"));
         }
         super::tensor::count(&[length])?;
         self.steps.push(step);
@@ -377,7 +377,7 @@ impl<'a> Reader<'a> {
     ) -> Result<Value, String> {
         let (least, most) = function.operands;
         if !(least..=most).contains(&operands.len()) {
-            return Err(format!("it has {} operands; {least} to {most} are read", operands.len()));
+            return Err(format!("it has {} operands; expected {least} to {most}", operands.len()));
         }
         let dims = broadcast(operands.iter().map(|operand| &operand.dims[..]))?;
         let length = dims.iter().product();

@@ -208,7 +208,7 @@ pub(super) fn constant(tensor: &Tensor, files: Files<'_>) -> Result<Value, Strin
         BOOL => 1,
         _ => match WHOLE.iter().find(|(known, _)| *known == kind) {
             Some((_, bytes)) => bytes.unsigned_abs() as usize,
-            None => return Err(format!("its elements are {}; numbers are read", type_name(kind))),
+            None => return Err(format!("its elements are {}; expected numbers", type_name(kind))),
         },
     };
     let elsewhere;
@@ -257,18 +257,18 @@ fn external(tensor: &Tensor, bytes: usize, files: Files<'_>) -> Result<Vec<u8>, 
         location.is_empty() || location.contains(':') || steps.iter().any(|step| matches!(*step, "" | ".."));
     if leaves {
         return Err(format!(
-            "its numbers lie in `{location}`; a file in the folder of the model, or below, is read"
+            "its numbers lie in `{location}`; the file must be in the folder of the model, or below it"
         ));
     }
     let whole = |key: &str, otherwise: u64| match entry(key).map(|text| text.parse::<u64>()) {
         None => Ok(otherwise),
         Some(Ok(value)) => Ok(value),
-        Some(Err(_)) => Err(format!("`{key}` of its numbers in `{location}` is no number")),
+        Some(Err(_)) => Err(format!("`{key}` of its numbers in `{location}` is not a number")),
     };
     let (offset, length) = (whole("offset", 0)?, whole("length", bytes as u64)?);
     if length != bytes as u64 {
         return Err(format!(
-            "its numbers take {bytes} bytes, and {length} are given for them in `{location}`"
+            "its numbers need {bytes} bytes, but {length} are given for them in `{location}`"
         ));
     }
     let found = files(location, offset, bytes)?;

@@ -99,7 +99,7 @@ pub fn read(source: &str, name: &str, snap: f64) -> Result<Tree, Error> {
             continue;
         };
         let convention = convention.ok_or_else(|| {
-            wrong("say above it which frames the table means: `# convention: standard` or `# convention: modified`".to_owned())
+            wrong("state above the table which frames it uses: `# convention: standard` or `# convention: modified`".to_owned())
         })?;
         table.joint(header.cells(line).map_err(wrong)?, convention).map_err(wrong)?;
     }
@@ -118,7 +118,7 @@ impl Convention {
         match name {
             "standard" => Ok(Convention::Standard),
             "modified" => Ok(Convention::Modified),
-            other => Err(format!("convention `{other}`: `standard` and `modified` are known")),
+            other => Err(format!("unknown convention `{other}`; expected `standard` or `modified`")),
         }
     }
 }
@@ -152,7 +152,10 @@ impl<'a> Header<'a> {
         for name in NEEDED {
             match (columns.contains_key(name), columns.contains_key(degrees(name).as_str())) {
                 (true, true) => {
-                    return Err(format!("columns `{name}` and `{}`: one is enough", degrees(name)));
+                    return Err(format!(
+                        "columns `{name}` and `{}` exclude each other: leave one out",
+                        degrees(name)
+                    ));
                 }
                 (false, false) => {
                     let needed = NEEDED.join(", ");
@@ -239,11 +242,13 @@ impl Table {
             "revolute" | "continuous" => ElementKind::Moves(Kind::Revolute),
             "prismatic" => ElementKind::Moves(Kind::Prismatic),
             "fixed" => ElementKind::Fixed,
-            other => return Err(format!("kind `{other}`: `revolute`, `prismatic` and `fixed` are known")),
+            other => {
+                return Err(format!("unknown kind `{other}`; expected `revolute`, `prismatic` or `fixed`"));
+            }
         };
         let joint = cells.text("joint").unwrap_or_default();
         if joint.is_empty() || self.tree.joints.iter().any(|other| other.name == joint) {
-            return Err(format!("joint `{joint}`: every joint has a name of its own"));
+            return Err(format!("joint `{joint}`: every joint needs a name of its own"));
         }
         if self.tree.joints.len() >= 2 * MAX_JOINTS {
             return Err(format!("more than {MAX_JOINTS} joints"));
@@ -259,7 +264,7 @@ impl Table {
         };
         let mass = cells.value("mass")?;
         if mass < 0.0 {
-            return Err(format!("its mass is {mass}; a mass is not negative"));
+            return Err(format!("its mass is {mass}; a mass must not be negative"));
         }
         let centre = [cells.value("cx")?, cells.value("cy")?, cells.value("cz")?];
         let [xx, yy, zz] = [cells.value("ixx")?, cells.value("iyy")?, cells.value("izz")?];

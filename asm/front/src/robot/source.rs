@@ -69,7 +69,7 @@ impl Source {
             at = node.range().end;
             let wrong = |text: String| named(Error::on(xml::line(node), text));
             let name = node.attribute("file").filter(|name| !name.trim().is_empty());
-            let name = name.ok_or_else(|| wrong("`include` needs `file`".to_owned()))?.trim();
+            let name = name.ok_or_else(|| wrong("`include` needs the attribute `file`".to_owned()))?.trim();
             if depth >= MAX_DEPTH {
                 return Err(wrong(format!("more than {MAX_DEPTH} files are included within one another")));
             }

@@ -247,7 +247,7 @@ impl Tree {
             };
             seen += 1;
             if seen > self.links.len() {
-                return Err(Error::plain("the links are no tree: a link carries itself"));
+                return Err(Error::plain("the links do not form a tree: a link carries itself"));
             }
             robot.frames.push(Frame { name: link.to_owned(), joint: carrier, pose });
             let body = bodies.get(link).map(|body| body.outside(&pose));

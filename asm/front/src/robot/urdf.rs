@@ -80,7 +80,7 @@ pub(super) fn from_xml(document: &Document<'_>, snap: f64) -> Result<Tree, Error
     let root = document.root_element();
     if root.tag_name().name() != "robot" {
         let name = root.tag_name().name();
-        return Err(Error::plain(format!("this is no URDF: its element is `{name}`, not `robot`")));
+        return Err(Error::plain(format!("this is not a URDF: its root element is `{name}`, not `robot`")));
     }
     if let Some(macros) = document.descendants().find(is_xacro) {
         let text = "this is a file for xacro, which makes URDF of it: `xacro FILE > robot.urdf`";
@@ -156,7 +156,7 @@ impl Reader {
         }
         let mass = self.values::<1>(mass, "value")?[0];
         if mass < 0.0 {
-            return Err(wrong(link, format!("its mass is {mass}; a mass is finite and not negative")));
+            return Err(wrong(link, format!("its mass is {mass}; a mass must be finite and not negative")));
         }
         let [xx, xy, xz, yy, yz, zz] = ["ixx", "ixy", "ixz", "iyy", "iyz", "izz"]
             .map(|name| self.values::<1>(inertia, name).map(|[value]| value));
@@ -181,7 +181,8 @@ impl Reader {
             let end = |end: &str| {
                 let element = only(node, end)?.ok_or_else(|| wrong(node, format!("it has no `{end}`")))?;
                 let link = element.attribute("link");
-                link.map(str::to_owned).ok_or_else(|| wrong(node, format!("`{end}` needs `link`")))
+                link.map(str::to_owned)
+                    .ok_or_else(|| wrong(node, format!("`{end}` needs the attribute `link`")))
             };
             let (parent, child) = (end("parent")?, end("child")?);
             if let Some(mimic) = only(node, "mimic")? {
@@ -294,7 +295,7 @@ fn kind(node: Node<'_, '_>) -> Result<ElementKind, Error> {
         "planar" => ElementKind::Refused("a planar joint", KNOWN),
         "spherical" => ElementKind::Refused("a spherical joint", KNOWN),
         other => {
-            let text = format!("`{other}` is no type of joint; there are {KNOWN}, floating and planar");
+            let text = format!("`{other}` is not a type of joint; there are {KNOWN}, floating and planar");
             return Err(wrong(node, text));
         }
     })
@@ -312,7 +313,7 @@ fn only<'a, 'i>(node: Node<'a, 'i>, name: &str) -> Result<Option<Node<'a, 'i>>, 
     let mut found = node.children().filter(|child| child.is_element() && child.tag_name().name() == name);
     let first = found.next();
     match found.next() {
-        Some(second) => Err(Error::on(xml::line(second), format!("a second `{name}`: one is read"))),
+        Some(second) => Err(Error::on(xml::line(second), format!("a second `{name}`; only one is allowed"))),
         None => Ok(first),
     }
 }

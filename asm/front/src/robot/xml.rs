@@ -43,7 +43,7 @@ pub(super) fn parse(source: &str) -> Result<Document<'_>, Error> {
     // Errors of this parser carry their position.
     let options = roxmltree::ParsingOptions { nodes_limit: MAX_NODES, allow_dtd: true };
     Document::parse_with_options(source, options).map_err(|error| {
-        let text = format!("this is no XML: {error}");
+        let text = format!("this is not XML: {error}");
         match error {
             roxmltree::Error::NodesLimitReached => {
                 Error::plain(format!("the file has more than {MAX_NODES} elements and texts"))
@@ -102,7 +102,7 @@ pub(super) fn some(node: Node<'_, '_>, name: &str, value: &str, most: usize) -> 
         let count = if most == 1 { "a number is".to_owned() } else { format!("{most} numbers are") };
         Error::on(
             line(node),
-            format!("`{name}` is `{value}`: {count} needed, finite and with spaces between"),
+            format!("`{name}` is `{value}`: {count} expected, finite and separated by spaces"),
         )
     })
 }
@@ -116,7 +116,7 @@ pub(super) fn numbers<const N: usize>(
     let numbers = some(node, name, value, N)?;
     let count = numbers.len();
     numbers.try_into().map_err(|_| {
-        Error::on(line(node), format!("`{name}` is `{value}`: it has {count} numbers, and {N} are needed"))
+        Error::on(line(node), format!("`{name}` is `{value}`: it has {count} numbers, expected {N}"))
     })
 }
 

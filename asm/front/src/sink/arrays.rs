@@ -64,7 +64,7 @@ pub(crate) fn number(value: f64) -> Result<String, Error> {
     let rounded = value as f32;
     if !rounded.is_finite() {
         return Err(Error::plain(format!(
-            "{value:e} is no number of binary32, whose largest is {:e}",
+            "{value:e} does not fit binary32, whose largest number is {:e}",
             f32::MAX
         )));
     }

@@ -210,18 +210,18 @@ impl Expander<'_> {
                 "max" => chosen.max.replace((number, value.span)).is_some(),
                 _ => {
                     let error =
-                        Diagnostic::error("loop", name.span, format!("`{text}` is no part of a `.for`"))
+                        Diagnostic::error("loop", name.span, format!("`{text}` is not part of a `.for`"))
                             .did_you_mean(takt_diagnostics::nearest(&text, ["step", "unroll", "max"]))
-                            .note("behind the last value may stand `step s`, `unroll n` and `max m`");
+                            .note("`step s`, `unroll n` and `max m` may follow the last value");
                     return Err(self.context.report(at.scope, error));
                 }
             };
             if again {
-                let message = format!("`{text}` stands twice");
+                let message = format!("`{text}` appears twice");
                 return Err(self.context.error(at.scope, "declared-twice", name.span, message));
             }
             if text == "step" && number == 0 {
-                let message = "a step of 0: the loop would not get on";
+                let message = "a step of 0: the loop would never end";
                 return Err(self.context.error(at.scope, "range", value.span, message));
             }
             if text == "unroll" && !(1..=limits::REPETITIONS).contains(&number) {
@@ -354,7 +354,7 @@ impl Expander<'_> {
     ) -> Result<Vec<Pass>, ErrorReported> {
         if self.nest.len() >= limits::LOOP_DEPTH {
             let message = format!(
-                "a nest of {} counted loops: at most {} run within one another",
+                "a nest of {} counted loops: at most {} can run within one another",
                 self.nest.len() + 1,
                 limits::LOOP_DEPTH
             );

@@ -120,7 +120,7 @@ pub(super) fn from_json(bytes: &[u8], program: &Program) -> Result<DebugInfo, Im
         let value = match constant.value {
             Number::Int(value) => Value::Int(value),
             Number::Real(text) => {
-                let wrong = || ImageError::Debug(format!("`{text}` is no number"));
+                let wrong = || ImageError::Debug(format!("`{text}` is not a number"));
                 Value::Real(text.parse().map_err(|_| wrong())?)
             }
         };

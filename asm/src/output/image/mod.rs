@@ -53,7 +53,7 @@ pub enum ImageError {
     #[error("the image is truncated or damaged: {0}")]
     Damaged(String),
     /// The ELF file is of another kind.
-    #[error("this ELF file is for another machine: it is no Takt image")]
+    #[error("this ELF file is for another machine: it is not a Takt image")]
     NotTakt,
     /// The container or the metadata is of another version.
     #[error("the image has format version {found}, and this program reads version {VERSION}")]
@@ -84,7 +84,7 @@ pub enum ImageError {
     #[error("the image is for a machine that is not known here: {0}")]
     UnknownMachine(MachineNameError),
     /// The machine's row, which the image carries, is invalid.
-    #[error("the row of its machine: {0}")]
+    #[error("the image's description of its machine is invalid: {0}")]
     Row(String),
     /// The code is not a whole number of bundles.
     #[error("{words} words of code: not a multiple of the {slots} slots of {machine}")]
@@ -171,7 +171,7 @@ pub enum ImageError {
     #[error("the image's section `{DEBUG}` cannot be used: {0}")]
     Debug(String),
     /// The source lines do not fit the code.
-    #[error("the source lines do not fit the code: {0}")]
+    #[error("the source lines do not match the code: {0}")]
     Lines(String),
 }
 

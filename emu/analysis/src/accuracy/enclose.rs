@@ -83,7 +83,7 @@ fn explored<'p>(program: &'p Program, stored: &BTreeSet<u32>) -> Result<Explorer
         let targets = explorer.section(once, address)?;
         sections.extend(targets.iter().map(|target| (false, *target)));
         if once {
-            // Outputs are compared at the ends of periods.
+            // Bounds hold for periods: keep the outputs of `.once` apart, for programs that have no period.
             once_outputs = std::mem::take(&mut explorer.outputs);
             once_computed = std::mem::take(&mut explorer.computed);
             explorer.initial = std::mem::take(&mut explorer.left);

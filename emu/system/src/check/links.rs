@@ -13,7 +13,7 @@ impl Checker<'_> {
         let mut ends = Vec::new();
         for (input, value) in [(false, &table.from), (true, &table.to)] {
             let Some((core, port)) = value.get_ref().split_once('.') else {
-                let text = format!("`{}` names no port", value.get_ref());
+                let text = format!("`{}` does not name a port", value.get_ref());
                 self.mistakes.add("port", value.span(), text).help =
                     Some("the core and its port, `core.port`; outside of the system, `host.name`".to_owned());
                 return;
@@ -44,7 +44,8 @@ impl Checker<'_> {
                     field.to,
                     field.ty.name()
                 );
-                self.mistakes.add("type", table.to.span(), text).help = Some("another name".to_owned());
+                self.mistakes.add("type", table.to.span(), text).help =
+                    Some("choose another name".to_owned());
                 return;
             }
         }
@@ -74,8 +75,7 @@ impl Checker<'_> {
         if let Some(first) = self.link_names.insert(name.get_ref().clone(), name.span()) {
             let text = format!("`{}` is the name of something else", name.get_ref());
             let diagnostic = self.mistakes.add("name", name.span(), text);
-            *diagnostic =
-                diagnostic.clone().also(span(first), "the first").help("another name for one of them");
+            *diagnostic = diagnostic.clone().also(span(first), "the first").help("rename one of them");
             return None;
         }
         let (sender, receiver) = (self.end(from.get_ref(), from.span()), self.end(to.get_ref(), to.span()));
@@ -125,7 +125,7 @@ impl Checker<'_> {
             (End::Host, None) => Some(None),
             (End::Host, Some(port)) => {
                 self.mistakes
-                    .add("port", port.span(), format!("`{key}` at the host, who has no such port"))
+                    .add("port", port.span(), format!("`{key}` at the host, which has no such port"))
                     .help = Some(format!("leave `{key}` out"));
                 None
             }
@@ -197,7 +197,7 @@ impl Checker<'_> {
         for (status, port) in Status::ALL.into_iter().zip(ports) {
             let Some(port) = port else { continue };
             if end == End::Host {
-                let text = format!("`{}` at the host, who has no ports", status.name());
+                let text = format!("`{}` at the host, which has no ports", status.name());
                 self.mistakes.add("port", port.span(), text).help =
                     Some("leave it out: the host is notified in any case".to_owned());
                 good = false;

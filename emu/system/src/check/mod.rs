@@ -64,7 +64,7 @@ pub fn read<E>(
     text: &str,
     load: impl FnMut(&Request<'_>) -> Result<Program, ProgramError<E>>,
 ) -> Result<Description, ReadError<E>> {
-    read_with(name, text, |_| Err("machines of files cannot be read here".to_owned()), load)
+    read_with(name, text, |_| Err("machine files cannot be read here".to_owned()), load)
 }
 
 /// Reads a system's file like [`read`]; `machines` returns the bytes of a machine's file, given its path as written in the system's file:
@@ -118,12 +118,12 @@ fn syntax(error: &toml::de::Error, text: &str) -> Diagnostic {
     let has = |file: &toml::Table, keys: &[&str]| keys.iter().any(|key| file.contains_key(*key));
     let other = toml::from_str::<toml::Table>(text).ok().filter(|file| !file.contains_key("core"));
     if other.as_ref().is_some_and(|file| has(file, &["board", "peripheral"])) {
-        let message = "this is a board's wiring, and a system of cores is wanted";
+        let message = "expected a system of cores, found a board's wiring";
         return Diagnostic { message: message.to_owned(), ..diagnostic }
             .help("a wiring is for `takt board`; docs/system.md says what a system's file has");
     }
     if other.as_ref().is_some_and(|file| has(file, &["slot"])) {
-        let message = "this is a machine, and a system of cores is wanted";
+        let message = "expected a system of cores, found a machine";
         return Diagnostic { message: message.to_owned(), ..diagnostic }
             .help("a machine's file is for `-m`; docs/system.md says what a system's file has");
     }
@@ -240,7 +240,7 @@ impl<'m> Checker<'m> {
     fn number(&mut self, value: &Spanned<i64>, what: &str, least: u64, most: u64) -> Option<u64> {
         let number = u64::try_from(*value.get_ref()).ok().filter(|number| (least..=most).contains(number));
         if number.is_none() {
-            let text = format!("{what} is {}; it is {least} to {most}", value.get_ref());
+            let text = format!("{what} is {}; expected {least} to {most}", value.get_ref());
             self.mistakes.add("number", value.span(), text);
         }
         number
@@ -255,12 +255,12 @@ impl<'m> Checker<'m> {
             && text.len() <= 64;
         if !good {
             let help = "letters, digits and `_`, a letter first, 64 at most";
-            self.mistakes.add("name", name.span(), format!("`{text}` is no name for a {what}")).help =
+            self.mistakes.add("name", name.span(), format!("`{text}` is not a name for a {what}")).help =
                 Some(help.to_owned());
         } else if text == HOST {
             self.mistakes
-                .add("name", name.span(), format!("`{HOST}` stands for the outside and is no {what}"))
-                .help = Some("another name".to_owned());
+                .add("name", name.span(), format!("`{HOST}` stands for the outside and cannot name a {what}"))
+                .help = Some("choose another name".to_owned());
         }
         good && text != HOST
     }
@@ -277,8 +277,7 @@ impl<'m> Checker<'m> {
         if let Some(first) = self.link_names.get(name).cloned() {
             let diagnostic =
                 self.mistakes.add("name", table.name.span(), format!("two cores named `{name}`"));
-            *diagnostic =
-                diagnostic.clone().also(span(first), "the first").help("another name for one of them");
+            *diagnostic = diagnostic.clone().also(span(first), "the first").help("rename one of them");
             good = false;
         }
         self.link_names.insert(name.clone(), table.name.span());
@@ -357,7 +356,7 @@ impl<'m> Checker<'m> {
             let spanned = name.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_')
                 && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
             if !spanned {
-                self.mistakes.add("name", place, format!("`{name}` is no name for a port"));
+                self.mistakes.add("name", place, format!("`{name}` is not a name for a port"));
                 return None;
             }
             return Some(EndPort { name: name.to_owned(), port: None });

@@ -31,9 +31,9 @@ pub struct Latency {
     pub links: Vec<usize>,
     /// Cores between the links.
     pub cores: Vec<usize>,
-    /// Least number of periods through which states of each core carry the value: 0 if it can pass directly.
+    /// For each core, the minimum number of periods for which its states hold the value; 0 if the value can pass within a period.
     pub least_states: Vec<u32>,
-    /// Greatest number of periods; `None` if branches, or addresses of data memory, can delay the response without end.
+    /// For each core, the maximum; `None` if branches, or addresses of data memory, can delay the response without end.
     pub most_states: Option<Vec<u32>>,
     /// States carry the value on to periods after the first response.
     pub lasting: bool,

@@ -303,7 +303,8 @@ impl Compiler {
             ExpressionKind::Number(_) => {}
             ExpressionKind::Hole if hole => {}
             ExpressionKind::Hole => {
-                let mistake = Diagnostic::error("syntax", expression.span, "`_` is no value here");
+                let mistake =
+                    Diagnostic::error("syntax", expression.span, "`_` cannot stand for a value here");
                 self.wrong(
                     mistake.help("`_` stands for \"as it is\" among the values of `joints` and `pose`"),
                 );
@@ -312,7 +313,7 @@ impl Compiler {
                 if !self.known.values.contains(name) {
                     let near = nearest(name, self.known.values.iter().map(String::as_str));
                     let mistake =
-                        Diagnostic::error("name", expression.span, format!("nothing has the name `{name}`"));
+                        Diagnostic::error("name", expression.span, format!("nothing is named `{name}`"));
                     let known = near.is_some();
                     let mistake = mistake.did_you_mean(near);
                     let help = format!("`let {name} = ...` gives a value this name");

@@ -142,7 +142,7 @@ impl Parser<'_> {
                 let word = self.word();
                 self.advance();
                 if word == "_" {
-                    let mistake = Diagnostic::error("syntax", span, "`_` is no value");
+                    let mistake = Diagnostic::error("syntax", span, "`_` cannot stand for a value");
                     return fail(
                         mistake.help("`_` stands for \"as it is\" among the values of `joints` and `pose`"),
                     );

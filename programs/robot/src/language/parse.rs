@@ -109,7 +109,7 @@ impl<'t> Parser<'t> {
         let (token, span) = (self.peek(), self.span());
         let there = match token {
             Token::Newline => "the line ends".to_owned(),
-            Token::NotNumber => format!("`{}` is no number", self.text(span)),
+            Token::NotNumber => format!("`{}` is not a number", self.text(span)),
             Token::OpenText => "this text has no end".to_owned(),
             _ => format!("there is `{}`", self.text(span)),
         };
@@ -142,7 +142,7 @@ impl<'t> Parser<'t> {
         let span = self.advance();
         let text = self.text(span).to_owned();
         if table::is_reserved(&text) {
-            let message = format!("`{text}` means something else already");
+            let message = format!("`{text}` already has another meaning");
             return fail(Diagnostic::error("name", span, message).help("choose another name"));
         }
         Ok(Name { text, span })
@@ -288,7 +288,7 @@ impl<'t> Parser<'t> {
                 return Ok(Statement { span: line, kind: StatementKind::Try(body, otherwise) });
             }
             "end" | "else" => {
-                let message = format!("`{word}` ends no block");
+                let message = format!("`{word}` does not end a block");
                 let span = self.advance();
                 return fail(Diagnostic::error("syntax", span, message));
             }

@@ -158,7 +158,11 @@ impl<R: Robot + Clone> Session<R> {
     fn whole(&self, machine: &Machine, of: &Expression, what: &str, last: u32) -> Result<u32, Failure> {
         let number = number_in(of, what, 1.0, f64::from(last), &self.environment(machine))?;
         if number.fract() != 0.0 {
-            return Err(wrong("value", of.span, format!("{what} is a whole number, not {}", short(number))));
+            return Err(wrong(
+                "value",
+                of.span,
+                format!("{what} must be a whole number, not {}", short(number)),
+            ));
         }
         Ok(number as u32)
     }
@@ -224,7 +228,7 @@ impl<R: Robot + Clone> Session<R> {
             }
         };
         if joints.iter().flatten().chain(&pose).any(|value| value.abs() > FARTHEST) {
-            let message = format!("no position or angle is larger than {}", short(FARTHEST));
+            let message = format!("positions and angles must not exceed {}", short(FARTHEST));
             return Err(wrong("value", place, message));
         }
         let command = match (goal, line, joints) {
@@ -409,7 +413,7 @@ impl<R: Robot + Clone> Session<R> {
             }
             if self.host.time() >= end - 1e-9 {
                 let text = self.sources.text(condition.span);
-                let text = format!("waited {} s in vain: {text}", short(time));
+                let text = format!("waited {} s without success: {text}", short(time));
                 return Err(Problem::Late(text).into());
             }
             self.pause((LOOK as f64 * crate::host::TICK).min(end - self.host.time()))?;

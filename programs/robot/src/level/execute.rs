@@ -174,7 +174,7 @@ impl<R: Robot + Clone> Session<R> {
         }
         machine.idle += 1;
         if machine.idle > limits::IDLE_STEPS {
-            let message = format!("{} steps took no time: this never ends", limits::IDLE_STEPS);
+            let message = format!("{} steps took no time: this would never end", limits::IDLE_STEPS);
             return Err(Box::new(
                 Diagnostic::error("limit", span, message).help("put a `wait` into the loop"),
             ));
@@ -286,7 +286,9 @@ impl<R: Robot + Clone> Session<R> {
         if machine.frames.len() > limits::CALL_DEPTH {
             let message = format!("more than {} calls in one another", limits::CALL_DEPTH);
             let mistake = Diagnostic::error("limit", span, message);
-            return Err(Box::new(mistake.help("a subprogram that calls itself must end some time")).into());
+            return Err(
+                Box::new(mistake.help("a subprogram that calls itself must end at some point")).into()
+            );
         }
         // A later text may have redefined the subprogram with other parameters.
         if subprogram.parameters.len() != arguments.len() {

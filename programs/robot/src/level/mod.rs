@@ -268,7 +268,7 @@ impl<R: Robot + Clone> Session<R> {
         if has_console && console && parsed.block.len() > 1 {
             let place = parsed.block.iter().find(|one| matches!(one.kind, StatementKind::Console(_)));
             let span = place.map_or(Span::default(), |one| one.span);
-            let mistake = Diagnostic::error("command", span, "this command stands by itself");
+            let mistake = Diagnostic::error("command", span, "this command must stand by itself");
             return Err(self.diagnostics(vec![mistake]));
         }
         compile(&parsed.block, &self.known_names(), console).map(Some).map_err(|list| self.diagnostics(list))
@@ -499,7 +499,7 @@ impl<R: Robot + Clone> Session<R> {
             Console::Step => return self.single_step(span),
             Console::Continue => {
                 let Some(machine) = self.stepping.take() else {
-                    let mistake = Diagnostic::error("command", span, "no program stands at a step");
+                    let mistake = Diagnostic::error("command", span, "no program is being stepped through");
                     return Err(self.diagnostics(vec![mistake.help("`step` begins the session's program")]));
                 };
                 self.drive(machine)?;

@@ -126,7 +126,7 @@ pub fn evaluate(expression: &Expression, around: &dyn Surroundings) -> Outcome<V
         && !number.is_finite()
         && expression.kind != ExpressionKind::Hole
     {
-        return wrong(expression, "this is no finite number".to_owned());
+        return wrong(expression, "this is not a finite number".to_owned());
     }
     Ok(value)
 }
@@ -204,7 +204,7 @@ pub fn number_in(
     if (low..=high).contains(&value) {
         return Ok(value);
     }
-    let bounds = format!("{what} is from {} to {}, not {}", short(low), short(high), short(value));
+    let bounds = format!("{what} must be from {} to {}, not {}", short(low), short(high), short(value));
     wrong(expression, bounds)
 }
 
@@ -267,12 +267,20 @@ fn call(
         ("frame", _) => Value::Frame(six()),
         ("input", _) => match around.input(a) {
             Some(on) => truth(on),
-            None => return wrong(whole, format!("there is no digital input {}: they are 1 to 32", short(a))),
+            None => {
+                return wrong(
+                    whole,
+                    format!("there is no digital input {}: the inputs are 1 to 32", short(a)),
+                );
+            }
         },
         ("analogue", _) => match around.analogue(a) {
             Some(value) => Value::Number(value),
             None => {
-                return wrong(whole, format!("there is no analogue input {}: they are 1 and 2", short(a)));
+                return wrong(
+                    whole,
+                    format!("there is no analogue input {}: the inputs are 1 and 2", short(a)),
+                );
             }
         },
         ("time", _) => Value::Number(around.time()),

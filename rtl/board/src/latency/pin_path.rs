@@ -93,8 +93,8 @@ pub struct PinPath {
     pub periods: Part,
     /// The parts from the written registers to an edge at a pin.
     pub outputs: Vec<End>,
-    /// The worst case is certain. It is not if branches, or addresses of data memory, can delay the first response: the worst case then
-    /// assumes the fewest states through which the response can come.
+    /// The worst case is an upper bound. If branches or data-memory addresses can delay the first response, there is none: the worst case
+    /// then assumes that the response passes through the fewest states.
     pub is_certain: bool,
 }
 

@@ -35,7 +35,7 @@ pub enum PlaceError {
     #[error(transparent)]
     Export(#[from] ExportError),
     /// No open tools place and route designs of the family.
-    #[error("no open tools that Takt knows place and route designs of {0}")]
+    #[error("Takt knows no open-source tools that place and route designs for {0}")]
     NoTools(&'static str),
     /// A tool failed, for example because the device is too small.
     #[error(transparent)]

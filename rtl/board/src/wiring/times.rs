@@ -26,7 +26,7 @@ impl<'a> Reader<'a> {
         if value.is_none() {
             let names: Vec<String> = parameter.names.iter().map(|name| format!("\"{name}\"")).collect();
             let text =
-                format!("`{}` is to be one of {}, not \"{}\"", parameter.name, names.join(", "), given.value);
+                format!("`{}` must be one of {}, not \"{}\"", parameter.name, names.join(", "), given.value);
             self.document.mistake(&given.place, text);
         }
         value.unwrap_or_default() as u32
@@ -55,7 +55,7 @@ impl<'a> Reader<'a> {
             Some(at) if kind.strobes.start && !at.value.contains('.') => document.mistake(
                 &at.place,
                 format!(
-                    "`starts` is to be \"lead\", \"publish\", or a place of a carrier as \"main.valley\", not \"{}\"",
+                    "`starts` must be \"lead\", \"publish\", or a place of a carrier as \"main.valley\", not \"{}\"",
                     at.value
                 ),
             ),
@@ -85,7 +85,7 @@ impl<'a> Reader<'a> {
                 [] => "the wiring has none: a peripheral of the kind \"trip\" is one".to_owned(),
                 _ => format!("there are {}", names.join(", ")),
             };
-            self.document.mistake(&at.place, format!("`{}` is no trip; {there}", at.value));
+            self.document.mistake(&at.place, format!("`{}` is not a trip; {there}", at.value));
         }
     }
 }

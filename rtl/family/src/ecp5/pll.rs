@@ -84,7 +84,7 @@ mod tests {
         assert!(
             error
                 .to_string()
-                .starts_with("the PLL cannot make 61.803 MHz of 25; near it are 60.7143 and 62.5"),
+                .starts_with("the PLL cannot make 61.803 MHz from 25; the nearest are 60.7143 and 62.5"),
             "{error}"
         );
     }

@@ -128,7 +128,8 @@ const LIMIT: usize = 1 << 20;
 /// Name and text of a file.
 fn text(path: &Path) -> Result<(String, String)> {
     let name = files::input_name(path);
-    let text = String::from_utf8(files::read(path, LIMIT)?).map_err(|_| anyhow!("{name} is no text"))?;
+    let text =
+        String::from_utf8(files::read(path, LIMIT)?).map_err(|_| anyhow!("{name} is not UTF-8 text"))?;
     Ok((name, text))
 }
 
@@ -212,7 +213,7 @@ fn placed(name: &str, text: &str, board: Option<&str>, color: bool) -> Result<(B
         None => right(Wiring::board(name, text), color)?.with_context(|| {
             let names: Vec<&str> = Board::names().collect();
             format!(
-                "{name} names no board: `--board NAME`, or a line `board = \"NAME\"` at its beginning; there are {}",
+                "{name} does not name a board: give `--board NAME`, or begin it with a line `board = \"NAME\"`; there are {}",
                 names.join(", ")
             )
         })?,

@@ -121,7 +121,7 @@ fn of_program(
 ) -> Result<bool> {
     let verdict = match (deadline, bounds.worst_period()) {
         (None, _) => None,
-        (Some(_), None) => bail!("a deadline, and the program has no period: it never waits for the tick"),
+        (Some(_), None) => bail!("--deadline needs a period, but the program never waits for the tick"),
         (Some(deadline), Some(worst)) => Some(Verdict { deadline, worst }),
     };
     if arguments.json {
@@ -145,7 +145,7 @@ fn of_system(
     let deadline = deadline.map(|cycles| Deadline { cycles, empty: arguments.empty_fifos });
     let ways = paths::paths(description, bounds);
     if deadline.is_some() && matches!(&ways, Ok(ways) if ways.is_empty()) {
-        bail!("a deadline, and no way leads from an input of the system to an output");
+        bail!("--deadline needs a path from an input of the system to an output, but there is none");
     }
     if !arguments.json {
         // Print the bounds of the cores even if the system has none.

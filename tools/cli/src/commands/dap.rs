@@ -37,8 +37,8 @@ pub(crate) fn run(arguments: &Dap, _color: bool, _out: &mut Out) -> Result<()> {
     // With port 0, the operating system chooses a port.
     message(&format!("listening on {}", listener.local_addr()?));
     loop {
-        let (stream, _) = listener.accept().context("cannot take a client")?;
-        let reader = stream.try_clone().context("cannot take a client")?;
+        let (stream, _) = listener.accept().context("cannot accept a client")?;
+        let reader = stream.try_clone().context("cannot accept a client")?;
         client(reader, &stream);
         // Also ends the reader of the other half.
         let _ = stream.shutdown(std::net::Shutdown::Both);
@@ -149,7 +149,7 @@ const OTHERS: [&str; 17] = [
 /// Translates a configuration to arguments of `takt debug`.
 fn arguments(configuration: &Value, folder: Option<&Path>) -> Result<Vec<String>, String> {
     let Some(fields) = configuration.as_object() else {
-        return Err("a launch configuration is an object with `program`, or with `track`".to_owned());
+        return Err("expected a launch configuration, an object with `program` or with `track`".to_owned());
     };
     let wrong = |name: &str, what: &str| format!("`{name}` in the launch configuration is {what}");
     // Paths are relative to `cwd`, if it is given.
@@ -162,7 +162,7 @@ fn arguments(configuration: &Value, folder: Option<&Path>) -> Result<Vec<String>
     let loops = fields.get("track").is_some_and(|track| *track != Value::Bool(false));
     if !fields.contains_key("program") && !loops {
         return Err(
-            "a launch configuration has `program`, the path of a source or an image, or `track`".to_owned()
+            "a launch configuration needs `program`, the path of a source or an image, or `track`".to_owned()
         );
     }
     let mut list = Vec::new();

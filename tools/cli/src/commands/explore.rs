@@ -123,7 +123,7 @@ fn budget(text: &str) -> Result<Budget, String> {
             "multipliers" => budget.multipliers = Some(value),
             _ => {
                 let near = options::suggest(name, ["luts", "ram", "multipliers"]);
-                return Err(format!("`{name}` is no resource{near} (luts, ram, multipliers)"));
+                return Err(format!("`{name}` is not a resource{near} (luts, ram, multipliers)"));
             }
         }
     }
@@ -297,7 +297,10 @@ impl Search<'_> {
                 Ok(_) => {}
             }
         }
-        anyhow::anyhow!("no program ends its period on {}; others to begin with: --from", machine.name)
+        anyhow::anyhow!(
+            "no program ends its period on {}: give other machines to begin with by --from",
+            machine.name
+        )
     }
 
     fn report(&self, out: &mut Out) -> Result<()> {

@@ -71,7 +71,7 @@ pub(crate) fn run(arguments: &Lsp, _color: bool, _out: &mut Out) -> Result<()> {
                     },
                     Err(_) => (
                         ErrorCode::InvalidRequest,
-                        "a message is no request, notification or response".to_owned(),
+                        "a message is not a request, notification or response".to_owned(),
                     ),
                 },
                 Err(WireError::Message(text)) => (ErrorCode::ParseError, text),

@@ -168,7 +168,7 @@ fn robot_function(name: &str) -> Result<RobotFunction, String> {
 fn gain(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(gain) if gain.is_finite() && gain >= 0.0 => Ok(gain),
-        Ok(_) => Err("a gain is finite and not negative".to_owned()),
+        Ok(_) => Err("a gain must be finite and not negative".to_owned()),
         Err(_) => Err("not a number".to_owned()),
     }
 }
@@ -187,9 +187,9 @@ fn range(text: &str) -> Result<(f64, f64), String> {
     match ends {
         Some((Ok(low), Ok(high))) if low <= high && low.is_finite() && high.is_finite() => Ok((low, high)),
         Some((Ok(_), Ok(_))) => {
-            Err("the first number is not greater than the second, and both are finite".to_owned())
+            Err("the first number must not be greater than the second, and both must be finite".to_owned())
         }
-        _ => Err("two numbers with a comma between them, as -1,1".to_owned()),
+        _ => Err("expected two numbers with a comma between them, as -1,1".to_owned()),
     }
 }
 
@@ -389,7 +389,7 @@ fn function(arguments: &Model, delays: &Delays) -> Result<Function> {
     let Some(what) = arguments.function else {
         let names: Vec<&str> = RobotFunction::ALL.iter().map(|(_, name, _)| *name).collect();
         return Err(
-            Failure::Usage(format!("say with --function what to compute: {}", names.join(", "))).into()
+            Failure::Usage(format!("name what to compute with --function: {}", names.join(", "))).into()
         );
     };
     tree.notes.extend(note);

@@ -59,7 +59,7 @@ impl SpreadArguments {
         let Some(path) = &self.spread else { return Ok(Spread::default()) };
         let name = files::input_name(path);
         let bytes = files::read(path, SPREAD_LIMIT)?;
-        let text = String::from_utf8(bytes).map_err(|_| anyhow!("{name} is no UTF-8 text"))?;
+        let text = String::from_utf8(bytes).map_err(|_| anyhow!("{name} is not UTF-8 text"))?;
         let spread: Spread = toml::from_str(&text).map_err(|error| {
             let line = error.span().map_or(1, |span| text[..span.start].matches('\n').count() + 1);
             anyhow!("{name}:{line}: {}", error.message().trim().replace('\n', " "))

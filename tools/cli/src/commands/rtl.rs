@@ -69,7 +69,9 @@ pub(crate) fn run(arguments: &Rtl, color: bool, out: &mut Out) -> Result<()> {
     if let Some(file) = &arguments.system {
         if !load::is_system(file) {
             let name = file.display();
-            let message = format!("{name} is no system (`.toml`); a program's core: --program {name}");
+            let message = format!(
+                "{name} is not a system (`.toml`); for the core of a program, write --program {name}"
+            );
             return Err(output::Failure::Usage(message).into());
         }
         return of_system(arguments, file, color, out);

@@ -149,18 +149,20 @@ pub(crate) fn run(arguments: &Track, color: bool, out: &mut Out) -> Result<()> {
     }
     files::check(&reads, &writes)?;
     if arguments.robot.spread.is_some() && arguments.robot.seed.is_none() && arguments.monte_carlo.is_none() {
-        let text = "--spread says how robots differ: give --seed for one of them, or --monte-carlo for many";
+        let text =
+            "--spread determines how robots differ: give --seed for one of them, or --monte-carlo for many";
         return Err(output::Failure::Usage(text.to_owned()).into());
     }
     if arguments.work.uses_server() && arguments.monte_carlo.is_none() {
-        let text = "--hq and --hq-server give away the robots of --monte-carlo: say how many";
+        let text =
+            "--hq and --hq-server distribute the robots of --monte-carlo: state how many with --monte-carlo";
         return Err(output::Failure::Usage(text.to_owned()).into());
     }
     arguments.work.check(&reads)?;
     let is_drawn_here = matches!(arguments.plot, Some(None));
     if is_drawn_here && (arguments.json || arguments.monte_carlo.is_some()) {
         let other = if arguments.json { "--json" } else { "--monte-carlo" };
-        return Err(output::Failure::Usage(format!("--plot with {other} needs a file")).into());
+        return Err(output::Failure::Usage(format!("--plot with {other} needs the name of a file")).into());
     }
     let builtin = if arguments.fit_friction { FRICTION_PATH } else { AGH_PATH };
     let (name, trajectory) = trajectory_or(arguments.gcode.as_deref(), builtin)?;
@@ -173,7 +175,7 @@ pub(crate) fn run(arguments: &Track, color: bool, out: &mut Out) -> Result<()> {
         return match &application {
             Application::System(system) => drive.system(file, system, &application, out),
             Application::Program(_) => {
-                bail!("{} is no system: its name does not end in .toml", files::input_name(file))
+                bail!("{} is not a system: its name does not end in .toml", files::input_name(file))
             }
         };
     }
@@ -306,7 +308,7 @@ impl Drive<'_> {
         let (mut totals, mut nans, mut closed) = (Totals::new(), NanWrites::default(), false);
         let (path, quiet) = (&self.path, arguments.quiet);
         let result = run_loop(&mut closed_loop, path, self.periods, quiet, |record, controller| {
-            let report = controller.report.as_ref().context("a period has no report")?;
+            let report = controller.report.as_ref().context("no report was made for a period")?;
             observed.add(record, !report.nan_writes.is_empty());
             totals.add(record, report);
             nans.add(&report.nan_writes);
@@ -325,7 +327,11 @@ impl Drive<'_> {
             return Denials::verdict([denials]);
         }
         let friction = observed.finish(&self.path, variant(&name), out)?;
-        let detail = closed_loop.controller().detail.as_ref().context("the last period was not looked at")?;
+        let detail = closed_loop
+            .controller()
+            .detail
+            .as_ref()
+            .context("no details were recorded for the last period")?;
         let nan_writes = detail.after.nan_writes;
         nans.warn(&loaded.program, nan_writes, self.color);
         let account = Account::between(&detail.before, &detail.after);
@@ -363,7 +369,10 @@ impl Drive<'_> {
         let ways = paths(description, &application.bounds()?)?;
         let robot = arguments.robot.robot(&self.trajectory)?;
         // The first block places the robot, and takes one tick at rest.
-        let counts = robot.plant().counts().context("the robot stands where its encoders reach")?;
+        let counts = robot
+            .plant()
+            .counts()
+            .context("the robot's start position is outside the range of its encoders")?;
         let watch = arguments.deny.watch();
         let mut controller = SystemController::new(description, blocks(&self.trajectory)?, watch)?;
         if arguments.csv.is_some() {
@@ -547,7 +556,7 @@ pub(crate) fn program(path: &Path, load: Load) -> Result<(String, LoadedProgram)
     if !path.exists() && !files::is_dash(path) {
         let names: Vec<&str> = builtin_names().collect();
         let near = suggest(&name, names.iter().copied());
-        bail!("there is no program and no file `{name}`{near} (programs: {})", names.join(", "));
+        bail!("no built-in program or file named `{name}`{near} (programs: {})", names.join(", "));
     }
     Ok((name, load.with_source(path)?))
 }

@@ -73,7 +73,7 @@ pub(crate) fn run(arguments: &Verify, color: bool, out: &mut Out) -> Result<()> 
     let pairs: Vec<(PathBuf, PathBuf)> = match arguments.files.as_chunks() {
         (pairs, []) => pairs.iter().map(|[image, source]| (image.clone(), source.clone())).collect(),
         (_, [image, ..]) => {
-            let text = format!("{} has no source: files are pairs, IMAGE SOURCE", image.display());
+            let text = format!("{} has no source: expected pairs of files, IMAGE SOURCE", image.display());
             return Err(Failure::Usage(text).into());
         }
     };
@@ -161,7 +161,9 @@ impl Verify {
         let name = files::input_name(image);
         let bytes = files::read(image, IMAGE_BYTES)?;
         if !image::is_image(&bytes) {
-            bail!("{name} is no image; `takt asm {name} --verify` assembles a source and checks the image");
+            bail!(
+                "{name} is not an image; `takt asm {name} --verify` assembles a source and checks the image"
+            );
         }
         let program = image::read(&bytes).with_context(|| format!("{name} is not an image that can run"))?;
         let text = Load::source(source)?;

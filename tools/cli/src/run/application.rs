@@ -22,7 +22,9 @@ pub(crate) enum Application {
 /// Rejects options that systems lack. Each is given as name, whether it is present, and reason.
 pub(crate) fn refuse(options: &[(&str, bool, &str)]) -> Result<()> {
     match options.iter().find(|(_, given, _)| *given) {
-        Some((option, _, why)) => Err(Failure::Usage(format!("{option} with a system: {why}")).into()),
+        Some((option, _, why)) => {
+            Err(Failure::Usage(format!("{option} cannot be used with a system: {why}")).into())
+        }
         None => Ok(()),
     }
 }

@@ -104,11 +104,11 @@ fn read(path: &Path, ports: &[takt_isa::program::Port]) -> Result<Vec<Inputs>> {
             }
         }
         if paths.is_empty() {
-            bail!("{name} has no .csv file: each is the inputs of one run");
+            bail!("{name} has no .csv file: each would hold the inputs of one run");
         }
         paths.sort();
         if paths.len() > RUNS {
-            bail!("{name}: {} runs; a batch has at most {RUNS}", paths.len());
+            bail!("{name}: {} runs, but a batch has at most {RUNS}", paths.len());
         }
         let mut left = PERIODS;
         let mut runs = Vec::new();
@@ -265,6 +265,6 @@ fn verdict(runs: &[BatchRun], loaded: &LoadedProgram, color: bool) -> Result<()>
     match failed.len() {
         0 => Ok(()),
         all if all <= SHOWN => Err(Failure::Reported.into()),
-        all => bail!("{all} runs failed; shown are the first {SHOWN}"),
+        all => bail!("{all} runs failed; only the first {SHOWN} are shown"),
     }
 }

@@ -51,7 +51,7 @@ impl WorkArguments {
         let (Some(file), Some(result)) = (&self.unit, &self.result) else { return Ok(None) };
         let text = files::read(file, UNIT_LIMIT)?;
         let job = serde_json::from_slice(&text);
-        let job = job.with_context(|| format!("{} is no unit of this command", file.display()))?;
+        let job = job.with_context(|| format!("{} is not a unit of this command", file.display()))?;
         Ok(Some((job, result)))
     }
 }
@@ -119,13 +119,13 @@ impl Workers {
         if takt_cache::read(&result).is_none() {
             takt_cache::discard(&result);
         }
-        let own = std::env::current_exe().context("this program has no path")?;
+        let own = std::env::current_exe().context("cannot determine the path of this program")?;
         let mut command = vec![own.display().to_string()];
         // Pass on the programs and assembler options; their paths are relative to the folder.
         command.extend(std::env::args().skip(1));
         command.extend(["--unit".to_owned(), file.display().to_string()]);
         command.extend(["--result".to_owned(), result.display().to_string()]);
-        let folder = std::env::current_dir().context("there is no current folder")?;
+        let folder = std::env::current_dir().context("cannot determine the current folder")?;
         Ok(Unit { name, command, folder, result, cpus: 1, time })
     }
 
@@ -157,7 +157,7 @@ impl Workers {
         let failures = self.run(units, stop, done)?;
         if let Some(Failure { name, reason }) = failures.first() {
             bail!(
-                "{} of {} units failed; the same command goes on from here. Unit {name}: {reason}",
+                "{} of {} units failed; first, unit {name}: {reason}. Run the same command again to continue",
                 failures.len(),
                 units.len()
             );
@@ -169,11 +169,9 @@ impl Workers {
             }
             let text = takt_cache::read(&unit.result).with_context(|| damaged(unit))?;
             let result = serde_json::from_slice(&text);
-            found.push(
-                result.with_context(|| {
-                    format!("{} is no result of a unit; delete it", unit.result.display())
-                })?,
-            );
+            found.push(result.with_context(|| {
+                format!("{} is not the result of a unit; delete it", unit.result.display())
+            })?);
         }
         for file in units.iter().flat_map(|unit| [unit.result.clone(), unit.result.with_extension("json")]) {
             let _ = std::fs::remove_file(file);

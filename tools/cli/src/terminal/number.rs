@@ -32,7 +32,7 @@ fn whole(text: &str, range: RangeInclusive<u64>) -> Result<u64, String> {
         return Err("not a whole number".to_owned());
     }
     if !rest.is_empty() {
-        return Err(format!("a whole number is wanted, without a unit; `{rest}` follows it"));
+        return Err(format!("expected a whole number without a unit; `{rest}` follows it"));
     }
     let (first, last) = (range.start(), range.end());
     match number.parse::<u64>() {
@@ -86,7 +86,7 @@ fn quantity(text: &str, units: Units, bare: bool, range: RangeInclusive<f64>) ->
     let scale = match units.iter().find(|(name, _)| *name == unit) {
         Some((_, scale)) => *scale,
         None if unit.is_empty() && bare => 1.0,
-        None if unit.is_empty() => return Err(format!("a unit is wanted: {}", names())),
+        None if unit.is_empty() => return Err(format!("expected a unit: {}", names())),
         None => return Err(format!("`{unit}` is not one of the units {}", names())),
     };
     let value = value * scale;
@@ -174,10 +174,10 @@ mod tests {
             ("1.5", "not a whole number in digits"),
             ("1e3", "not a whole number in digits (`1000`)"),
             ("18446744073709551616", "more than 18446744073709551615"),
-            ("100us", "a whole number is wanted, without a unit; `us` follows it"),
-            ("-100us", "a whole number is wanted, without a unit; `us` follows it"),
-            ("0x10", "a whole number is wanted, without a unit; `x10` follows it"),
-            ("1 000", "a whole number is wanted, without a unit; `000` follows it"),
+            ("100us", "expected a whole number without a unit; `us` follows it"),
+            ("-100us", "expected a whole number without a unit; `us` follows it"),
+            ("0x10", "expected a whole number without a unit; `x10` follows it"),
+            ("1 000", "expected a whole number without a unit; `000` follows it"),
         ] {
             assert_eq!(count(text), Err(reason.to_owned()), "{text:?}");
         }

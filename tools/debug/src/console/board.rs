@@ -205,7 +205,7 @@ impl Console {
     fn board(&mut self) -> Result<(&mut Board, &mut Inspector), String> {
         match &mut self.engine {
             Engine::Board(board) => Ok((board, &mut self.cores[0])),
-            Engine::Program | Engine::System(_) => Err("this is no board".to_owned()),
+            Engine::Program | Engine::System(_) => Err("this is not a board".to_owned()),
         }
     }
 

@@ -104,14 +104,14 @@ impl Inspector {
         let line = match (arguments, here) {
             ("", Some(location)) => location.line,
             ("", None) => return Err("no source line belongs to this position".to_owned()),
-            (text, _) => text.parse().map_err(|_| format!("`{text}` is no line number"))?,
+            (text, _) => text.parse().map_err(|_| format!("`{text}` is not a line number"))?,
         };
         let file = here.map_or(0, |location| location.file);
         let lines = panes::lines(&self.session, file, line.saturating_sub(5)..=line.saturating_add(5));
         let lines = lines.ok_or_else(|| {
             let name = self.session.program().files.get(file as usize).map_or("it", String::as_str);
             format!(
-                "the program carries no source of {name}: an image does unless it is assembled with --strip"
+                "the program carries no source of {name}: an image has its sources unless it was assembled with --strip"
             )
         })?;
         let mut text = String::new();

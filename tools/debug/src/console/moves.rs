@@ -141,7 +141,8 @@ impl Console {
             ["start"] => Move::Start,
             ["cycle", _] if self.target() == Target::Board => return Err(inside("goto cycle")),
             [unit @ ("cycle" | "period"), number] => {
-                let number = number.parse().map_err(|_| format!("`{number}` is no number of a {unit}"))?;
+                let number =
+                    number.parse().map_err(|_| format!("`{number}` is not the number of a {unit}"))?;
                 if unit == "cycle" { Move::Cycle(number) } else { Move::Period(number) }
             }
             _ => return Err("goto takes `cycle N`, `period N` or `start`".to_owned()),

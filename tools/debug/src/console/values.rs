@@ -59,7 +59,7 @@ impl Inspector {
         let (place, ty, _) = self
             .session
             .place(&target)?
-            .ok_or_else(|| format!("`{}` is no register, port or data word", target.text()))?;
+            .ok_or_else(|| format!("`{}` is not a register, port or data word", target.text()))?;
         let value = self.session.parse(value)?;
         let bits = self.session.evaluate(&value)?.bits(ty).map_err(|fault| fault.to_string())?;
         let note = noted(self.session.note(&value));
@@ -78,7 +78,7 @@ impl Inspector {
         let steps = match distance.steps {
             Some(1) => "1 number further as binary32".to_owned(),
             Some(steps) => format!("{steps} numbers further as binary32"),
-            None => "a NaN is no distance away".to_owned(),
+            None => "a NaN has no distance".to_owned(),
         };
         Ok(format!("{a} is {:.3} ulp from {b}; {steps}{note}\n", distance.error))
     }

@@ -514,7 +514,8 @@ fn parse(text: &str, known: LookupTables<'_>, depth: usize) -> Result<WatchExpre
         if let Some(rest) = text[at..].strip_prefix(':') {
             let length = rest.bytes().take_while(|byte| is_name(*byte)).count();
             let name = &rest[..length];
-            ty = Some(type_of(name).ok_or_else(|| format!("`{name}` is no type (types: float int bits)"))?);
+            ty =
+                Some(type_of(name).ok_or_else(|| format!("`{name}` is not a type (types: float int bits)"))?);
             at += 1 + length;
         }
         let is_name = head.starts_with(|first: char| first.is_ascii_alphabetic() || first == '_');
@@ -532,7 +533,7 @@ fn parse(text: &str, known: LookupTables<'_>, depth: usize) -> Result<WatchExpre
             match &mut operand {
                 Operand::Register(_, ty) | Operand::Memory { ty, .. } => *ty = wanted,
                 Operand::Name(_, ty) => *ty = Some(wanted),
-                _ => return Err(format!("`{head}` is no register: it has no type")),
+                _ => return Err(format!("`{head}` is not a register: it has no type")),
             }
         }
         // The placeholder is as long as the text, which keeps the columns in messages correct.

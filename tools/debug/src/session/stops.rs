@@ -100,7 +100,7 @@ impl BreakpointLocation {
     pub fn parse(text: &str, program: &Program) -> Result<BreakpointLocation, String> {
         let text = text.trim();
         let number = |rest: &str, what: &str| {
-            rest.trim().parse::<u64>().map_err(|_| format!("`{}` is no number of a {what}", rest.trim()))
+            rest.trim().parse::<u64>().map_err(|_| format!("`{}` is not the number of a {what}", rest.trim()))
         };
         let known = ["bundle", "cycle", "period"];
         if let Some((word, rest)) = text.split_once(' ').filter(|(word, _)| known.contains(word)) {

@@ -141,7 +141,7 @@ pub enum SignalError {
         near: Option<String>,
     },
     /// The name selects signals other than registers, in a format that selects by register.
-    #[error("`{0}` is no register: a retire log has the operations that write the registers selected")]
+    #[error("`{0}` is not a register: a retire log has the operations that write the registers selected")]
     NoRegister(String),
     /// Signals were requested in a format that has none.
     #[error("a Kanata trace shows operations; it has no signals to select")]

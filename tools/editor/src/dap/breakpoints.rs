@@ -49,7 +49,7 @@ impl Hits {
             ("", rest) => number(rest).map(Hits::AtLeast),
             _ => None,
         };
-        hits.ok_or_else(|| format!("`{text}` is no number of hits: write `5`, `>= 5`, `== 5` or `% 5`"))
+        hits.ok_or_else(|| format!("`{text}` is not a number of hits: write `5`, `>= 5`, `== 5` or `% 5`"))
     }
 
     pub(super) fn stops(self, met: u64) -> bool {
@@ -202,7 +202,7 @@ impl DebuggedSession {
 
     pub(super) fn set_lines(&mut self, arguments: SetBreakpointsArguments, from_one: bool) -> Answer {
         let SetBreakpointsArguments { source, breakpoints } = arguments;
-        let path = source.path.or(source.name).ok_or("`source` has a `path`")?;
+        let path = source.path.or(source.name).ok_or("`source` needs a `path`")?;
         let files = self.files(&path, source.source_reference.unwrap_or(0));
         let make = |debugged: &DebuggedSession, one: &BreakpointRequest| {
             if files.is_empty() {
@@ -213,7 +213,7 @@ impl DebuggedSession {
                 sources.dedup();
                 return Err(format!("no code comes from {path} (sources: {})", sources.join(" ")));
             }
-            let asked = one.line.ok_or("a breakpoint has a `line`")?;
+            let asked = one.line.ok_or("a breakpoint needs a `line`")?;
             let line = asked.saturating_add(u64::from(!from_one));
             let stops = files.iter().map(|(core, file)| {
                 let session = debugged.session(*core);
@@ -228,7 +228,7 @@ impl DebuggedSession {
 
     pub(super) fn set_functions(&mut self, arguments: SetBreakpointsArguments) -> Answer {
         let make = |debugged: &DebuggedSession, one: &BreakpointRequest| {
-            let name = one.name.as_deref().ok_or("a breakpoint has a `name`")?;
+            let name = one.name.as_deref().ok_or("a breakpoint needs a `name`")?;
             if let Some(stop) = debugged.console.link_stop(name) {
                 return Ok((vec![no_condition(stop?, one, name)?], None));
             }
@@ -250,9 +250,10 @@ impl DebuggedSession {
     pub(super) fn set_instructions(&mut self, arguments: SetBreakpointsArguments) -> Answer {
         let make = |debugged: &DebuggedSession, one: &BreakpointRequest| {
             let reference =
-                one.instruction_reference.as_deref().ok_or("a breakpoint has an `instructionReference`")?;
-            let (core, address) =
-                debugged.address(reference).ok_or_else(|| format!("`{reference}` is no bundle's address"))?;
+                one.instruction_reference.as_deref().ok_or("a breakpoint needs an `instructionReference`")?;
+            let (core, address) = debugged
+                .address(reference)
+                .ok_or_else(|| format!("`{reference}` is not a bundle's address"))?;
             let address = i64::from(address.get()).saturating_add(one.offset.unwrap_or(0));
             let session = debugged.session(core);
             let at = BreakpointLocation::parse(&format!("bundle {address}"), session.program())?;
@@ -291,7 +292,7 @@ impl DebuggedSession {
 
     pub(super) fn set_data(&mut self, arguments: SetBreakpointsArguments) -> Answer {
         let make = |debugged: &DebuggedSession, one: &BreakpointRequest| {
-            let name = one.data_id.as_deref().ok_or("a breakpoint has a `dataId`")?;
+            let name = one.data_id.as_deref().ok_or("a breakpoint needs a `dataId`")?;
             let condition = one.condition();
             if name.starts_with("link ") {
                 let text = condition.map_or(name.to_owned(), |event| format!("{name} {event}"));
@@ -331,10 +332,10 @@ fn any(stops: impl Iterator<Item = Result<RequestedStop, String>>) -> Result<Vec
 /// Rejects conditions on a link event: there is no core for whose expressions they could be evaluated.
 fn no_condition(stop: SystemStop, one: &BreakpointRequest, text: &str) -> Result<RequestedStop, String> {
     match one.condition() {
-        Some(_) => {
-            Err("a breakpoint on a link has no condition; it can say an event, as `link moves pushed`"
-                .to_owned())
-        }
+        Some(_) => Err(
+            "a breakpoint on a link cannot have a condition; it can name an event, as `link moves pushed`"
+                .to_owned(),
+        ),
         None => Ok(RequestedStop::Link(stop, text.to_owned())),
     }
 }

@@ -158,7 +158,7 @@ impl Server<'_> {
 
     fn message(&mut self, message: &Value, launcher: &mut dyn Launcher) {
         let Ok(Request { seq, command, arguments }) = read(message) else {
-            let text = "this is no request: it has no `command` and `seq`";
+            let text = "this is not a request: it needs `command` and `seq`";
             return self.respond(0, String::new(), Err(text.to_owned()));
         };
         self.then = FollowUp::Nothing;
@@ -255,7 +255,7 @@ impl DebuggedSession {
             }
             "takt/gotoCycle" | "takt/gotoPeriod" => {
                 let name = if command == "takt/gotoCycle" { "cycle" } else { "period" };
-                let wrong = |_| format!("`{name}` is a whole number, and not negative");
+                let wrong = |_| format!("`{name}` is a whole number that is not negative");
                 let GotoArguments { count, thread_id } = read(arguments).map_err(wrong)?;
                 let to = if name == "cycle" { Move::Cycle(count) } else { Move::Period(count) };
                 FollowUp::Move(self.thread(thread_id)?, to, "goto")

@@ -306,7 +306,8 @@ impl DebuggedSession {
 
     pub(super) fn disassemble(&mut self, arguments: &DisassembleArguments, from_one: bool) -> Answer {
         let asked = &arguments.memory_reference;
-        let (core, first) = self.address(asked).ok_or_else(|| format!("`{asked}` is no bundle's address"))?;
+        let (core, first) =
+            self.address(asked).ok_or_else(|| format!("`{asked}` is not a bundle's address"))?;
         let offset = arguments.instruction_offset.unwrap_or(0).saturating_add(arguments.offset.unwrap_or(0));
         let first = i64::from(first.get()).saturating_add(offset);
         let count = arguments.instruction_count.min(BUNDLES) as i64;
@@ -353,7 +354,7 @@ impl DebuggedSession {
     /// Reads data memory: `memoryReference` is a word address; the bytes are little-endian.
     pub(super) fn read_memory(&mut self, arguments: &ReadMemoryArguments) -> Answer {
         let asked = &arguments.memory_reference;
-        let (core, word) = self.address(asked).ok_or_else(|| format!("`{asked}` is no word's address"))?;
+        let (core, word) = self.address(asked).ok_or_else(|| format!("`{asked}` is not a word's address"))?;
         let start = (i64::from(word.get()) * 4).saturating_add(arguments.offset.unwrap_or(0));
         let count = arguments.count.min(BYTES) as usize;
         let memory = self.session(core).emulator().memory();

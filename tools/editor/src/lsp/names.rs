@@ -47,7 +47,7 @@ pub(crate) fn renamable(front: &Front, offset: u32) -> Result<(Span, String), St
     match front.files.place(declared).map(|(file, _)| &front.files.0[file]) {
         Some(file) if file.path.is_some() => Ok((span, front.files.text(declared).to_owned())),
         Some(file) => Err(format!("it is declared in the library, {}", file.name)),
-        None => Err("its declaration is not at hand".to_owned()),
+        None => Err("its declaration is not available".to_owned()),
     }
 }
 
@@ -77,7 +77,8 @@ pub(crate) fn rename(
         for reference in &references {
             let text = front.files.text(reference.span);
             let Some(text) = renamed(text, &old, new) else {
-                let (file, bytes) = front.files.place(reference.span).ok_or("a place is not at hand")?;
+                let (file, bytes) =
+                    front.files.place(reference.span).ok_or("a place in the source is not available")?;
                 let file = &front.files.0[file];
                 let line = file.text.line_of(bytes.start) + 1;
                 return Err(if halves(&old).1.is_empty() {
@@ -101,7 +102,7 @@ pub(crate) fn rename(
             spans.insert((span, new.to_owned()));
         }
         for (span, text) in spans {
-            let (file, bytes) = front.files.place(span).ok_or("a place is not at hand")?;
+            let (file, bytes) = front.files.place(span).ok_or("a place in the source is not available")?;
             let file = &front.files.0[file];
             let path =
                 file.path.clone().ok_or_else(|| format!("it is used in the library, {}", file.name))?;
@@ -206,7 +207,7 @@ fn verify(settings: &Settings, fronts: &[(&Path, &Front)], edits: &Edits, open: 
     let mut texts = (**open).clone();
     for (path, edits) in edits {
         let known = fronts.iter().find_map(|(_, front)| Some(Arc::clone(&front.files.of(path)?.text.text)));
-        let text = known.ok_or("a file is not at hand")?;
+        let text = known.ok_or("a file is not available")?;
         texts.insert(path.clone(), apply(&text, edits).into());
     }
     let texts = Arc::new(texts);
@@ -229,9 +230,10 @@ fn verify(settings: &Settings, fronts: &[(&Path, &Front)], edits: &Edits, open: 
             .iter()
             .find(|one| !front.diagnostics.list.iter().any(|old| old.message == one.message));
         if shape(front) != shape(&after) || codes(front) != codes(&after).as_slice() {
-            let why = new
-                .map_or("another name would then be meant somewhere".to_owned(), |new| new.message.clone());
-            return Err(format!("the program would not stay the same: {why}"));
+            let why = new.map_or("somewhere the name would then refer to something else".to_owned(), |new| {
+                new.message.clone()
+            });
+            return Err(format!("the program would change: {why}"));
         }
     }
     Ok(())

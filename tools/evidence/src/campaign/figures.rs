@@ -116,7 +116,7 @@ impl MergedResults {
             }
             let text = std::fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
             let Ok(Outcome { figures, seconds, host }) = serde_json::from_slice(&text) else {
-                bail!("{} is no result of a unit; delete it, and the unit is run again", path.display());
+                bail!("{} is not the result of a unit; delete it, and the unit is run again", path.display());
             };
             merged.add(figures);
             merged.seconds += seconds.unwrap_or(0.0);

@@ -85,13 +85,14 @@ pub(crate) struct Queue {
 
 /// Parses a range of units, as a value parser for clap.
 fn units(text: &str) -> Result<Range<u64>, String> {
-    let number = |text: &str| text.parse::<u64>().map_err(|_| format!("`{text}` is no number of a unit"));
+    let number =
+        |text: &str| text.parse::<u64>().map_err(|_| format!("`{text}` is not the number of a unit"));
     let range = match text.split_once("..") {
         Some((first, end)) => number(first)?..number(end)?,
         None => 0..number(text)?,
     };
     if range.is_empty() || range.end > MOST {
-        return Err(format!("units are K..L with K < L and L at most {MOST}"));
+        return Err(format!("expected units K..L with K < L and L at most {MOST}"));
     }
     Ok(range)
 }

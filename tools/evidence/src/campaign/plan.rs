@@ -60,7 +60,11 @@ impl Plan {
         fs::create_dir_all(plan.results())
             .with_context(|| format!("cannot make {}", plan.results().display()))?;
         fs::create_dir_all(plan.folder.join("programs"))?;
-        programs.push(("xtask", std::env::current_exe().context("this program has no path")?, root()));
+        programs.push((
+            "xtask",
+            std::env::current_exe().context("cannot determine the path of this program")?,
+            root(),
+        ));
         for (name, path, _) in programs {
             copy(&path, &plan.program(name))?;
         }
@@ -74,7 +78,8 @@ impl Plan {
     /// Reads the plan; called in the process of a unit.
     pub(super) fn read(path: &Path) -> Result<Plan> {
         let text = fs::read(path).with_context(|| format!("cannot read the plan {}", path.display()))?;
-        serde_json::from_slice(&text).with_context(|| format!("{} is no plan of a campaign", path.display()))
+        serde_json::from_slice(&text)
+            .with_context(|| format!("{} is not a plan of a campaign", path.display()))
     }
 
     pub(super) fn folder(&self) -> &Path {

@@ -25,7 +25,7 @@ pub(super) struct Run {
     /// Start, date and time in UTC.
     pub(super) begun: String,
     pub(super) seconds: u64,
-    /// Hosts of the run, in words.
+    /// Executor of the units, as text: local workers or a HyperQueue server.
     pub(super) by: String,
     pub(super) units: [u64; 2],
     /// Number of units finished in this run.
@@ -61,7 +61,7 @@ fn path() -> PathBuf {
 fn rows() -> Result<Vec<Row>> {
     let text =
         std::fs::read_to_string(path()).with_context(|| format!("cannot read {}", path().display()))?;
-    serde_json::from_str(&text).with_context(|| format!("{} is no track record", path().display()))
+    serde_json::from_str(&text).with_context(|| format!("{} is not a track record", path().display()))
 }
 
 /// Current date and time in UTC.

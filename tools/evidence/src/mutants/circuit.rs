@@ -326,7 +326,7 @@ fn chosen_at_start(netlist: &str, subject: &Subject) -> Result<String> {
     let head = format!("module {}(", subject.called);
     let (before, rest) =
         text.split_once(&head).with_context(|| format!("no module {} in the netlist", subject.called))?;
-    let (ports, body) = rest.split_once(");\n").context("a module has ports")?;
+    let (ports, body) = rest.split_once(");\n").context("the module has no ports")?;
     let ports = ports.replace(", mutsel", "").replace("mutsel, ", "");
     let parameters =
         if parameters.is_empty() { String::new() } else { format!(" #({})", parameters.join(", ")) };

@@ -45,7 +45,7 @@ pub(crate) fn mutants(arguments: &Arguments) -> Result<()> {
     );
     ensure!(
         arguments.only.is_empty() && arguments.test.is_none() || !circuit::PARTS.into_iter().any(wanted),
-        "a circuit has one test, and its mutants no numbers to choose them by"
+        "the mutants of a circuit cannot be chosen: it has one test"
     );
     for part in circuit::PARTS.into_iter().filter(|part| wanted(part)) {
         circuit::score(part, arguments)?;

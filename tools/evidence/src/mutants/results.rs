@@ -155,7 +155,7 @@ pub(crate) fn results() -> Result<Map<String, Value>> {
         return Ok(Map::new());
     }
     let text = fs::read_to_string(path).with_context(|| format!("cannot read {RESULTS}"))?;
-    serde_json::from_str(&text).with_context(|| format!("{RESULTS} is no JSON object"))
+    serde_json::from_str(&text).with_context(|| format!("{RESULTS} is not a JSON object"))
 }
 
 /// Current date in UTC.

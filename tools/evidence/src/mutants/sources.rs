@@ -171,7 +171,7 @@ pub(super) fn score(parts: &[&Part], arguments: &Arguments) -> Result<()> {
     // Number all mutants, from 1.
     let all: Vec<(&Source, &Mutant)> =
         every.iter().flat_map(|source| source.mutants.iter().map(|mutant| (*source, mutant))).collect();
-    ensure!(all.len() < 1 << 14, "{} mutants are more than there is room for", all.len());
+    ensure!(all.len() < 1 << 14, "{} mutants are more than can be numbered", all.len());
     let copy = Copy::new(&every)?;
     let (programs, stillborn) = progress::step("compiling all mutants", || copy.compile(&every))?;
     for part in parts {
@@ -371,7 +371,7 @@ impl Copy {
                 .stderr(fs::File::create(self.folder.with_extension("log"))?)
                 .output()
                 .context("cannot start cargo")?;
-            let text = String::from_utf8(output.stdout).context("cargo's messages are no text")?;
+            let text = String::from_utf8(output.stdout).context("cargo's output is not UTF-8")?;
             let messages: Vec<Value> =
                 text.lines().filter_map(|line| serde_json::from_str(line).ok()).collect();
             if output.status.success() {

@@ -142,7 +142,7 @@ pub(crate) fn synth(arguments: &Arguments) -> Result<()> {
             measured.push(row);
         } else {
             println!(
-                "{} not recorded: it is no row of the table, and no file of this repository",
+                "{} not recorded: it is neither a row of the table nor a file of this repository",
                 row.design
             );
         }

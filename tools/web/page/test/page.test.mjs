@@ -305,7 +305,7 @@ test("a link carries source, inputs and machine; a damaged one says so and loses
 test("wrong inputs are told with line and column", limit, async () => {
   const { page } = await open(link({ name: "a.s", machine: "t3", inputs: "x\n1\ntwo\n", source: ".input x\n.output y\n.period\nstart:\n    fadd y, x, x\n    wait start\n" }));
   await done(page);
-  assert.match(await page.textContent("#text"), /inputs:3: column x: `two` is no number/);
+  assert.match(await page.textContent("#text"), /inputs:3: column x: `two` is not a number/);
   await page.click("#tab-inputs");
   await page.fill("#table", "x\n1\n2\n");
   await page.click("#assemble");

@@ -62,7 +62,8 @@ impl Exec<'_> {
     fn arithmetic_types(&self, a: &Type, b: &Type) -> Result<(), Error> {
         for ty in [a, b] {
             if !matches!(ty, Type::Int(_) | Type::Float | Type::Double) {
-                return self.fail(format!("{} is no operand of this operator", self.structs.shown(ty)));
+                return self
+                    .fail(format!("{} cannot be an operand of this operator", self.structs.shown(ty)));
             }
         }
         Ok(())
@@ -113,7 +114,7 @@ impl Exec<'_> {
             _ => return self.fail("this operator takes integers"),
         };
         let (Some(a), Some(b)) = (self.register(&a, ty), self.register(&b, ty)) else {
-            return self.fail("this is no number that is known or in a register");
+            return self.fail("expected a number that is known at compile time or held in a register");
         };
         Ok(Value::Node(self.op(op, &[a, b])?))
     }
@@ -127,7 +128,7 @@ impl Exec<'_> {
         }
         let of = Type::Int(ty);
         let (Some(x), Some(y)) = (self.register(&a, &of), self.register(&b, &of)) else {
-            return self.fail("this is no number that is known or in a register");
+            return self.fail("expected a number that is known at compile time or held in a register");
         };
         let known = match &b {
             Value::Int(value) => Some(*value),
@@ -144,7 +145,7 @@ impl Exec<'_> {
             B::BitwiseOr => self.op(Op::Or, &[x, y])?,
             B::BitwiseXor => self.op(Op::Xor, &[x, y])?,
             B::Divide | B::Modulo => self.divided(operator, ty, x, known)?,
-            _ => return self.fail("this operator takes no integers"),
+            _ => return self.fail("this operator does not take integers"),
         };
         Ok(Value::Node(id))
     }
@@ -152,7 +153,7 @@ impl Exec<'_> {
     /// Quotient or remainder of integers; the divisor must be a power of two.
     fn divided(&mut self, operator: &B, ty: Integer, a: Id, by: Option<i64>) -> Result<Id, Error> {
         if by == Some(0) {
-            return self.fail("this divides by zero");
+            return self.fail("division by zero");
         }
         let power = by.filter(|by| by.unsigned_abs().is_power_of_two());
         let Some(by) = power else {
@@ -172,7 +173,7 @@ impl Exec<'_> {
             };
         }
         if by == i64::from(i32::MIN) {
-            return self.fail("this divides by -2^31: compare with it instead");
+            return self.fail("division by -2^31 is not supported: compare with -2^31 instead");
         }
         let divisor = self.nodes.int(by.unsigned_abs() as u32 as i32);
         match operator {
@@ -195,12 +196,12 @@ impl Exec<'_> {
             B::BitwiseAnd => a & b,
             B::BitwiseOr => a | b,
             B::BitwiseXor => a ^ b,
-            B::Divide | B::Modulo if b == 0 => return self.fail("this divides by zero"),
+            B::Divide | B::Modulo if b == 0 => return self.fail("division by zero"),
             B::Divide if unsigned => (a as u64 / b as u64) as i64,
             B::Modulo if unsigned => (a as u64 % b as u64) as i64,
             B::Divide => a.wrapping_div(b),
             B::Modulo => a.wrapping_rem(b),
-            _ => return self.fail("this operator takes no integers"),
+            _ => return self.fail("this operator does not take integers"),
         };
         Ok(ty.wrap(result))
     }
@@ -214,7 +215,10 @@ impl Exec<'_> {
         if let Value::Int(by) = b.value
             && !(0..i64::from(ty.bits)).contains(&by)
         {
-            return self.fail(format!("a shift by {by} of {} bits: C does not say what it gives", ty.bits));
+            return self.fail(format!(
+                "shift by {by} of an integer of {} bits: the result is undefined in C",
+                ty.bits
+            ));
         }
         if let (Value::Int(a), Value::Int(by)) = (&a.value, &b.value) {
             let shifted = match (operator, ty.bits == 64 && !ty.signed) {
@@ -261,7 +265,7 @@ impl Exec<'_> {
                 other => other,
             };
             let (Some(a), Some(b)) = (self.register(&a, &ty), self.register(&b, &ty)) else {
-                return self.fail("this is no number that is known or in a register");
+                return self.fail("expected a number that is known at compile time or held in a register");
             };
             let id = self.op(op, &[a, b])?;
             return Ok(self.condition_of(id));
@@ -279,7 +283,7 @@ impl Exec<'_> {
             return self.wide();
         }
         let (Some(a), Some(b)) = (self.register(&a, &ty), self.register(&b, &ty)) else {
-            return self.fail("this is no number that is known or in a register");
+            return self.fail("expected a number that is known at compile time or held in a register");
         };
         let positive = self.nodes.range(a).0 >= 0 && self.nodes.range(b).0 >= 0;
         let less = if integer.signed || positive { Op::IntLess } else { Op::Below };
@@ -300,7 +304,8 @@ impl Exec<'_> {
             (Value::Int(0), Value::Pointer(_) | Value::Function(_))
             | (Value::Pointer(_) | Value::Function(_), Value::Int(0)) => {
                 if op != Op::IntEqual {
-                    return self.fail("a pointer is compared with the null pointer by its order");
+                    return self
+                        .fail("a pointer and the null pointer have no order: compare them with == or !=");
                 }
                 Condition::Known(false)
             }
@@ -310,7 +315,7 @@ impl Exec<'_> {
                     if op == Op::IntEqual {
                         return Ok(Condition::Known(false));
                     }
-                    return self.fail("pointers into two objects have no order");
+                    return self.fail("pointers into different objects have no order");
                 }
                 if a.dynamic == b.dynamic {
                     return Ok(Condition::Known(match op {
@@ -324,7 +329,11 @@ impl Exec<'_> {
                 let typed = |id| Typed { ty: ty.clone(), value: Value::Node(id) };
                 return self.compared(op, typed(a), typed(b));
             }
-            _ => return self.fail("these pointers are not compared: their objects depend on data"),
+            _ => {
+                return self.fail(
+                    "these pointers cannot be compared: the objects that they point to depend on data",
+                );
+            }
         })
     }
 
@@ -347,10 +356,10 @@ impl Exec<'_> {
     fn pointer_sum(&mut self, operator: &B, a: Typed, b: Typed) -> Result<Typed, Error> {
         if let (Type::Pointer(to), Type::Pointer(_)) = (&a.ty, &b.ty) {
             let (Value::Pointer(x), Value::Pointer(y)) = (&a.value, &b.value) else {
-                return self.fail("these pointers have no difference");
+                return self.fail("these pointers cannot be subtracted");
             };
             if x.object != y.object || *operator == B::Plus {
-                return self.fail("pointers into two objects have no difference");
+                return self.fail("pointers into different objects cannot be subtracted");
             }
             let size = self.size_of(to)? as i64;
             if x.dynamic == y.dynamic {
@@ -369,13 +378,13 @@ impl Exec<'_> {
 
     /// Moves a pointer by a number of elements, backwards if `back`.
     pub(super) fn moved(&mut self, pointer: Typed, index: Typed, back: bool) -> Result<Typed, Error> {
-        let Type::Pointer(to) = pointer.ty.clone() else { return self.fail("this is no pointer") };
+        let Type::Pointer(to) = pointer.ty.clone() else { return self.fail("expected a pointer") };
         let size = self.size_of(&to)? as i64;
         let Value::Pointer(place) = pointer.value else {
             return match pointer.value {
                 Value::Int(0) => self.fail("this is the null pointer"),
                 Value::Mixed(reason) => self.fail(format!("this is {reason}")),
-                _ => self.fail("this is no pointer whose object is known"),
+                _ => self.fail("the object that this pointer points to is not known"),
             };
         };
         let index = self.promoted(index)?;
@@ -383,7 +392,7 @@ impl Exec<'_> {
             Value::Int(index) => {
                 let by = index.checked_mul(size).map(|by| if back { -by } else { by });
                 let Some(offset) = by.and_then(|by| place.offset.checked_add(by)) else {
-                    return self.fail("this index is far outside");
+                    return self.fail("this index is far outside its array");
                 };
                 Pointer { offset, ..place }
             }
@@ -403,7 +412,7 @@ impl Exec<'_> {
                 };
                 Pointer { dynamic: Some(dynamic), ..place }
             }
-            _ => return self.fail("this index is no integer"),
+            _ => return self.fail("expected an integer as the index"),
         };
         Ok(Typed { ty: pointer.ty, value: Value::Pointer(moved) })
     }

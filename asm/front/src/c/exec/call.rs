@@ -33,14 +33,14 @@ impl<'a> Exec<'a> {
             Type::Function(signature) => signature.clone(),
             Type::Pointer(to) => match &**to {
                 Type::Function(signature) => signature.clone(),
-                _ => return self.fail("this is no function"),
+                _ => return self.fail("expected a function"),
             },
-            _ => return self.fail("this is no function"),
+            _ => return self.fail("expected a function"),
         };
         let key = match callee.value {
             Value::Function(key) => key,
             Value::Mixed(_) | Value::Node(_) => {
-                return self.fail("data choose the function that this pointer calls: write `if` or `switch` with a call in each case");
+                return self.fail("the function that this pointer calls depends on data: write `if` or `switch` with a call in each case");
             }
             Value::Int(0) => return self.fail("this calls the null pointer"),
             _ => return self.fail(

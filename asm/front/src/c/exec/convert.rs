@@ -40,7 +40,7 @@ impl Exec<'_> {
             }
             (from, to) => {
                 let (from, to) = (self.structs.shown(from), self.structs.shown(to));
-                self.fail(format!("{from} is not converted to {to}"))
+                self.fail(format!("cannot convert {from} to {to}"))
             }
         }
     }
@@ -116,7 +116,7 @@ impl Exec<'_> {
                 let (least, most) = to.limits();
                 if !(whole >= least as f64 && whole <= most as f64) {
                     return self.fail(format!(
-                        "{value} does not fit into {}: C does not say what becomes of it",
+                        "{value} does not fit into {}: the result of this conversion is undefined in C",
                         self.structs.shown(&Type::Int(to))
                     ));
                 }
@@ -181,7 +181,7 @@ impl Exec<'_> {
                 _ => self.is_not_zero(*id)?,
             },
             Value::Mixed(reason) => return self.fail(format!("this is {reason}")),
-            Value::Unset | Value::Struct(_) => return self.fail("this is no condition: it is no number"),
+            Value::Unset | Value::Struct(_) => return self.fail("expected a number as the condition"),
         })
     }
 

@@ -36,10 +36,10 @@ impl<'a> Exec<'a> {
                     let base = self.base(&definition.specifiers)?;
                     let (name, ty) = self.declared(&definition.declarator.node, base.ty.clone())?;
                     let (Some(name), Type::Function(signature)) = (name, ty) else {
-                        return self.fail("this is no function");
+                        return self.fail("expected a function");
                     };
                     if !definition.declarations.is_empty() {
-                        return self.fail(format!("`{name}` declares its parameters as before 1989: put their types into the parentheses"));
+                        return self.fail(format!("`{name}` declares its parameters in the old style: put their types into the parentheses"));
                     }
                     let key = match base.storage {
                         Some(StorageClassSpecifier::Static) => format!("{name}@{unit}"),
@@ -96,7 +96,7 @@ impl<'a> Exec<'a> {
             (Some(StorageClassSpecifier::Extern), false) => {
                 let Some(object) = self.globals.get(&name).copied() else {
                     return self.fail(format!(
-                        "`{name}` is declared nowhere at file scope: give the file that defines it"
+                        "`{name}` is not declared at file scope: give the file that defines it"
                     ));
                 };
                 self.scope().names.insert(name, Named::Object(object));
@@ -297,7 +297,7 @@ impl<'a> Exec<'a> {
                     return match self.looked_up(&name.node.name) {
                         Some(Named::Type(ty)) => Ok(ty.clone()),
                         _ if name.node.name.starts_with("__builtin") => Ok(Type::Void),
-                        _ => self.fail(format!("`{}` is no type", name.node.name)),
+                        _ => self.fail(format!("`{}` is not a type", name.node.name)),
                     };
                 }
                 TypeSpecifier::TypeOf(node) => {
@@ -366,12 +366,12 @@ impl<'a> Exec<'a> {
                 }
                 for declarator in &field.node.declarators {
                     if declarator.node.bit_width.is_some() {
-                        return self.fail("a bit-field: declare it as an integer of its own");
+                        return self.fail("bit-fields are not supported: declare an integer of its own");
                     }
                     let Some(declarator) = &declarator.node.declarator else { continue };
                     let (name, ty) = self.declared(&declarator.node, base.clone())?;
                     if self.structs.size(&ty).is_none() {
-                        return self.fail("a member of unknown size: give an array's length");
+                        return self.fail("a member has an unknown size: give the length of its array");
                     }
                     members.push((name, ty));
                 }
@@ -429,7 +429,7 @@ impl<'a> Exec<'a> {
                     ArraySize::VariableExpression(size) | ArraySize::StaticExpression(size) => {
                         let count = self.known_integer(size)?;
                         let Ok(count) = usize::try_from(count) else {
-                            return self.fail(format!("an array of {count} elements"));
+                            return self.fail(format!("an array cannot have {count} elements"));
                         };
                         if count > crate::c::types::MAX_LEAVES {
                             return self.fail(format!(
@@ -440,7 +440,7 @@ impl<'a> Exec<'a> {
                         Type::Array(Rc::new(ty), Some(count))
                     }
                     ArraySize::VariableUnknown => {
-                        return self.fail("an array of unknown length: give a number");
+                        return self.fail("this array has an unknown length: give a number of elements");
                     }
                 },
                 DerivedDeclarator::Function(function) => {
@@ -464,7 +464,7 @@ impl<'a> Exec<'a> {
                 DerivedDeclarator::KRFunction(_) => {
                     Type::Function(Rc::new(Signature { result: ty, parameters: Vec::new() }))
                 }
-                DerivedDeclarator::Block(_) => return self.fail("blocks are no C99"),
+                DerivedDeclarator::Block(_) => return self.fail("blocks are not part of C99"),
             };
         }
         match &declarator.kind.node {
@@ -481,7 +481,7 @@ impl<'a> Exec<'a> {
     ) -> Result<i64, Error> {
         match self.value(expression)? {
             Typed { value: Value::Int(value), .. } => Ok(value),
-            _ => self.fail("a constant is needed here, and this depends on inputs or states"),
+            _ => self.fail("expected a constant, but this depends on inputs or states"),
         }
     }
 }

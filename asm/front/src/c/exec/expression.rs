@@ -132,13 +132,15 @@ impl<'a> Exec<'a> {
                 Ok(Typed { ty: Type::Int(UNSIGNED), value })
             }
             Expression::OffsetOf(offset) => self.offset_of(&offset.node),
-            Expression::StringLiteral(_) => {
-                self.fail("a text is no number: texts are only initial values of arrays of char")
-            }
+            Expression::StringLiteral(_) => self.fail(
+                "a string is not a number: strings are only supported as initial values of arrays of char",
+            ),
             Expression::GenericSelection(_) | Expression::VaArg(_) => {
                 self.fail("`_Generic` and `va_arg` are not translated: call the function that is meant")
             }
-            Expression::Statement(_) => self.fail("a statement in parentheses is no C99: make it a function"),
+            Expression::Statement(_) => {
+                self.fail("statement expressions are not part of C99: write a function")
+            }
         }
     }
 
@@ -194,7 +196,7 @@ impl<'a> Exec<'a> {
                 let digits = integer.number.trim_start_matches('0');
                 let parsed = if digits.is_empty() { Ok(0) } else { u64::from_str_radix(digits, radix) };
                 let Ok(value) = parsed else {
-                    return self.fail(format!("`{}` is no integer of 64 bits", integer.number));
+                    return self.fail(format!("`{}` does not fit a 64-bit integer", integer.number));
                 };
                 let suffix = &integer.suffix;
                 let fits = |ty: Integer| {
@@ -222,7 +224,9 @@ impl<'a> Exec<'a> {
                         })
                     }
                 };
-                let Some(value) = value else { return self.fail(format!("`{}` is no number", float.number)) };
+                let Some(value) = value else {
+                    return self.fail(format!("`{}` is not a number", float.number));
+                };
                 let ty = if single { Type::Float } else { Type::Double };
                 Ok(Typed { ty, value: Value::Real(value) })
             }
@@ -255,7 +259,7 @@ impl<'a> Exec<'a> {
         match &expression.node {
             Expression::Identifier(name) => match self.looked_up(&name.node.name) {
                 Some(Named::Object(object)) => Ok(self.place_of(*object)),
-                Some(_) => self.fail(format!("`{}` is no variable", name.node.name)),
+                Some(_) => self.fail(format!("`{}` is not a variable", name.node.name)),
                 None => self.fail(format!("`{}` is declared nowhere", name.node.name)),
             },
             Expression::Member(member) => {
@@ -291,7 +295,7 @@ impl<'a> Exec<'a> {
                 self.literal(&place, &literal.node.initializer_list)?;
                 Ok(place)
             }
-            _ => self.fail("this is no variable"),
+            _ => self.fail("expected a variable"),
         }
     }
 
@@ -335,9 +339,9 @@ impl<'a> Exec<'a> {
             (Type::Pointer(_), Value::Int(_)) => self.fail("this is the null pointer"),
             (Type::Pointer(_), Value::Mixed(reason)) => self.fail(format!("this is {reason}")),
             (Type::Pointer(_), _) => {
-                self.fail("this pointer's object is not known: it is neither set by the step nor by --init")
+                self.fail("what this pointer points to is not known: neither the step nor --init sets it")
             }
-            (ty, _) => self.fail(format!("{} is no pointer", self.structs.shown(&ty))),
+            (ty, _) => self.fail(format!("{} is not a pointer", self.structs.shown(&ty))),
         }
     }
 

@@ -83,7 +83,7 @@ impl<'a> Exec<'a> {
                     .fail(format!("`{name}` rounds once, and only some machines do: write `a*b + c`"));
             }
             ("printf" | "puts" | "fprintf" | "assert" | "__assert_fail", _) => {
-                return self.fail(format!("`{name}`: there is no one to print to; leave it out with `#ifndef`, or write to an output"));
+                return self.fail(format!("`{name}`: nothing can be printed while running; leave it out with `#ifndef`, or write to an output"));
             }
             _ => {}
         }
@@ -100,7 +100,7 @@ impl<'a> Exec<'a> {
 
     /// The type that a function of the library returns.
     pub(super) fn builtin_type(&mut self, call: &'a CallExpression) -> Result<Type, Error> {
-        let Expression::Identifier(name) = &call.callee.node else { return self.fail("this is no function") };
+        let Expression::Identifier(name) = &call.callee.node else { return self.fail("expected a function") };
         let bare = name.node.name.strip_prefix("__builtin_").unwrap_or(&name.node.name);
         let short = bare.strip_suffix('f').unwrap_or(bare);
         Ok(match short {
@@ -130,7 +130,7 @@ impl<'a> Exec<'a> {
         match x {
             Value::Real(x) => Ok(Value::Real(f64::from(function(*x) as f32))),
             x => {
-                let Some(id) = self.register(x, &FLOAT) else { return self.fail("this is no number") };
+                let Some(id) = self.register(x, &FLOAT) else { return self.fail("expected a number") };
                 Ok(Value::Node(self.op(op, &[id])?))
             }
         }
@@ -165,7 +165,7 @@ impl<'a> Exec<'a> {
             let value = self.converted(Typed { ty: FLOAT, value: Value::Real(whole) }, &ty)?;
             return Ok(Typed { ty, value });
         }
-        let Some(mut id) = self.register(x, &FLOAT) else { return self.fail("this is no number") };
+        let Some(mut id) = self.register(x, &FLOAT) else { return self.fail("expected a number") };
         if short == "lround" {
             id = self.op(Op::Round, &[id])?;
         }
@@ -174,10 +174,10 @@ impl<'a> Exec<'a> {
 
     fn of_two(&mut self, short: &str, x: &Value, y: &Value) -> Result<Value, Error> {
         let Some((_, op, function)) = BINARY.iter().find(|row| row.0 == short) else {
-            return self.fail(format!("`{short}` is no function of the library"));
+            return self.fail(format!("`{short}` is not a function of the library"));
         };
         let (a, b) = (self.register(x, &FLOAT), self.register(y, &FLOAT));
-        let (Some(a), Some(b)) = (a, b) else { return self.fail("this is no number") };
+        let (Some(a), Some(b)) = (a, b) else { return self.fail("expected a number") };
         match (x, y) {
             (Value::Real(x), Value::Real(y)) => Ok(Value::Real(f64::from(function(*x, *y) as f32))),
             // A square as one product: correctly rounded, and the shortest.
@@ -193,7 +193,7 @@ impl<'a> Exec<'a> {
             return Ok(Value::Real(if first { *a } else { *b }));
         }
         let (Some(a), Some(b)) = (self.register(&x, &FLOAT), self.register(&y, &FLOAT)) else {
-            return self.fail("this is no number");
+            return self.fail("expected a number");
         };
         // The comparison chooses b where a is a NaN; a known b is not a NaN.
         let condition =
@@ -211,7 +211,7 @@ impl<'a> Exec<'a> {
             return Ok(Value::Real(x.copysign(*y)));
         }
         let (Some(x), Some(y)) = (self.register(x, &FLOAT), self.register(y, &FLOAT)) else {
-            return self.fail("this is no number");
+            return self.fail("expected a number");
         };
         let (most, sign) = (self.nodes.int(i32::MAX), self.nodes.int(i32::MIN));
         let (x, y) = (self.op(Op::BitsOf, &[x])?, self.op(Op::BitsOf, &[y])?);
@@ -232,7 +232,7 @@ impl<'a> Exec<'a> {
             };
             return Ok(Typed { ty, value: Value::Int(i64::from(known)) });
         }
-        let Some(x) = self.register(&x, &FLOAT) else { return self.fail("this is no number") };
+        let Some(x) = self.register(&x, &FLOAT) else { return self.fail("expected a number") };
         let id: Id = match name {
             "isnan" => {
                 let equal = self.op(Op::Equal, &[x, x])?;
@@ -259,7 +259,7 @@ impl<'a> Exec<'a> {
         if let Value::Int(x) = x {
             return Ok(Typed { ty, value: Value::Int(INT.wrap(x.wrapping_abs())) });
         }
-        let Some(x) = self.register(&x, &ty) else { return self.fail("this is no integer") };
+        let Some(x) = self.register(&x, &ty) else { return self.fail("expected an integer") };
         let zero = self.nodes.int(0);
         let negative = self.op(Op::IntLess, &[x, zero])?;
         let opposite = self.op(Op::IntSub, &[zero, x])?;
@@ -276,7 +276,7 @@ impl<'a> Exec<'a> {
         let end = found.last().map_or(0, |(offset, ty)| offset + self.structs.size(ty).unwrap_or(0) as i64);
         if end > bytes || pointer.dynamic.is_some() {
             return self.fail(format!(
-                "this copies or sets a part of a scalar of `{}`: assign members",
+                "this copies or sets only a part of a scalar of `{}`: assign members instead",
                 object.name
             ));
         }
@@ -289,7 +289,8 @@ impl<'a> Exec<'a> {
         let (Value::Pointer(target), Value::Pointer(source), Value::Int(bytes)) =
             (&to.value, &from.value, &bytes.value)
         else {
-            return self.fail("`memcpy` takes known pointers and a known number of bytes");
+            return self
+                .fail("`memcpy` and `memmove` require pointers and a size that are known at compile time");
         };
         let covered = self.covered(source, *bytes)?;
         let mut read = Vec::new();
@@ -310,7 +311,7 @@ impl<'a> Exec<'a> {
         let (Value::Pointer(target), Value::Int(0), Value::Int(bytes)) =
             (&to.value, &byte.value, &bytes.value)
         else {
-            return self.fail("`memset` takes a known pointer, 0, and a known number of bytes: assign other values by a loop");
+            return self.fail("`memset` requires a pointer and a size that are known at compile time, and the value 0: assign other values in a loop");
         };
         for (offset, ty) in self.covered(target, *bytes)? {
             let at = Pointer { offset: target.offset + offset, ..target.clone() };

@@ -189,7 +189,7 @@ impl<'a> Exec<'a> {
                 other => self.members(other),
             };
             let Some(index) = index.filter(|index| *index < count) else {
-                return self.fail("this designator names no member");
+                return self.fail("this designator does not name a member");
             };
             first = first.or(Some(index));
             found = self.part(&found, index)?;
@@ -202,7 +202,7 @@ impl<'a> Exec<'a> {
         match initializer {
             Initializer::Expression(expression) => match &expression.node {
                 Expression::StringLiteral(text) => Ok(super::expression::text(&text.node).len() + 1),
-                _ => self.fail("an array has a list in braces as its initial value"),
+                _ => self.fail("expected a list in braces as the array's initial value"),
             },
             Initializer::List(items) => {
                 let per = match &**element {
@@ -244,11 +244,11 @@ impl<'a> Exec<'a> {
         expression: &'a Node<Expression>,
     ) -> Result<(), Error> {
         let Expression::StringLiteral(literal) = &expression.node else {
-            return self.fail("this is no text");
+            return self.fail("expected a string");
         };
         let bytes = super::expression::text(&literal.node);
         let Type::Int(integer) = **element else {
-            return self.fail("a text is the initial value of an array of char");
+            return self.fail("a string can only be the initial value of an array of char");
         };
         for index in 0..count {
             let part = self.part(place, index)?;

@@ -83,7 +83,7 @@ impl<'a> Exec<'a> {
         let used = self.nodes.len();
         if let Some(level) = self.budgets.iter().position(|limit| used > *limit) {
             self.exhausted = Some(level);
-            return self.fail("a loop is too long for being written out");
+            return self.fail("a loop is too long to be written out");
         }
         Ok(())
     }
@@ -130,7 +130,7 @@ impl<'a> Exec<'a> {
                     bound,
                 }
             }
-            _ => return self.fail("this is no loop"),
+            _ => return self.fail("expected a loop"),
         })
     }
 

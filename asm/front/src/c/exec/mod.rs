@@ -170,13 +170,13 @@ impl<'a> Exec<'a> {
         self.steps += 1;
         if self.steps > MAX_STEPS {
             return self.fail(format!(
-                "more than {MAX_STEPS} steps while translating: a loop counts too far for being executed here"
+                "more than {MAX_STEPS} steps while translating: a loop counts too far to be executed here"
             ));
         }
         if self.depth >= MAX_DEPTH {
             return self.fail(format!(
-                "statements, expressions and loops nest deeper than {MAX_DEPTH} while translating: give a loop that data end \
-                 `#pragma takt loop_bound(N)`"
+                "statements, expressions and loops nest deeper than {MAX_DEPTH} while translating: if data decide when a loop ends, write \
+                 `#pragma takt loop_bound(N)` before it"
             ));
         }
         Ok(())

@@ -276,7 +276,7 @@ impl<'a> Exec<'a> {
         }
     }
 
-    /// Emits a branch, whose sides set variables for all values needed after it.
+    /// Emits a branch in which each side assigns variables for all values needed after it.
     fn branched(
         &mut self,
         condition: Id,

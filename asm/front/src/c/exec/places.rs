@@ -69,7 +69,7 @@ impl Exec<'_> {
         };
         if let Some(leaf) = object.leaves.iter().find(unfit) {
             return self.fail(format!(
-                "data index `{}`, and its scalars {} lie in no memory: index only arrays of numbers of 32 bits by data",
+                "`{}` is indexed by data, but its scalars {} cannot lie in data memory: index only arrays of 32-bit numbers by data",
                 object.name,
                 self.structs.shown(&leaf.ty)
             ));
@@ -131,7 +131,7 @@ impl Exec<'_> {
                 Ok(())
             }
             (Type::Array(..) | Type::Function(_) | Type::Void | Type::Struct(_), _) => {
-                self.fail("this is not assigned as a whole")
+                self.fail("this cannot be assigned as a whole")
             }
             (scalar, value) => self.put_scalar(pointer, scalar, value),
         }
@@ -291,7 +291,9 @@ impl Exec<'_> {
             }
             (own, ty, _) => {
                 let (own, ty) = (self.structs.shown(own), self.structs.shown(ty));
-                self.fail(format!("{own} is read as {ty}: only 32 bits are read as another type of 32 bits"))
+                self.fail(format!(
+                    "{own} is read as {ty}: only 32-bit values can be read as another 32-bit type"
+                ))
             }
         }
     }

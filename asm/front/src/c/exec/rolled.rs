@@ -224,7 +224,7 @@ impl<'a> Exec<'a> {
             self.memory.set(counter.object, 0, Value::Int(end));
             return Ok(true);
         }
-        self.fail("what this loop changes is not found out: split its body")
+        self.fail("cannot determine what this loop changes: split its body")
     }
 
     /// The loop has the same number of iterations after the body as before it.
@@ -279,7 +279,7 @@ impl<'a> Exec<'a> {
             for mut outcome in leaves {
                 if outcome.exit != Exit::Break {
                     if exit.as_ref().is_some_and(|known| *known != outcome.exit) {
-                        return self.fail("this loop is left in several ways: use `break` and a variable");
+                        return self.fail("this loop has several exits by `return` or `goto`: leave it with `break`, and set a flag to branch on afterwards");
                     }
                     exit = Some(outcome.exit);
                     outcome.memory.set(left, 0, Value::Int(1));
@@ -299,7 +299,7 @@ impl<'a> Exec<'a> {
             }
             let goes_on = match self.register(&goes_on, &ty) {
                 Some(id) => id,
-                None => return self.fail("the loop's condition is no number"),
+                None => return self.fail("expected a number as the loop's condition"),
             };
             let mut body = self.close_body(&cells)?;
             self.nodes.forget(mark);
@@ -324,7 +324,7 @@ impl<'a> Exec<'a> {
             out.push(Outcome { exit, when, memory: self.memory.clone() });
             return self.not(when);
         }
-        self.fail("what this loop changes is not found out: split its body")
+        self.fail("cannot determine what this loop changes: split its body")
     }
 
     fn flag(&mut self, ty: &Type) -> Result<usize, Error> {
@@ -377,7 +377,7 @@ impl<'a> Exec<'a> {
         if let (Value::Pointer(old), Value::Pointer(new)) = (old, new) {
             if old.object != new.object {
                 return self.fail(format!(
-                    "`{name}` points to several objects in a loop that is too long for being written out"
+                    "`{name}` points to several objects in a loop that is too long to be written out"
                 ));
             }
             let before = self.scalars(old)?;
@@ -392,7 +392,7 @@ impl<'a> Exec<'a> {
         let old = if *old == Value::Unset { &zero } else { old };
         let Some(before) = self.register(old, &ty) else {
             return self.fail(format!(
-                "`{name}` changes in a loop that is too long for being written out, and no register holds {}",
+                "`{name}` changes in a loop that is too long to be written out, and no register holds {}",
                 self.structs.shown(&ty)
             ));
         };
@@ -405,26 +405,26 @@ impl<'a> Exec<'a> {
         let mut sets = Vec::new();
         for ((object, leaf), carried) in cells {
             let value = self.memory.get(*object, *leaf).clone();
-            let id =
-                match (&value, carried.pointer) {
-                    (Value::Pointer(pointer), Some(object)) if pointer.object == object => {
-                        self.scalars(pointer)?
-                    }
-                    (value, None) => {
-                        let ty = self.objects[*object].leaves[*leaf].ty.clone();
-                        match self.register(value, &ty) {
-                            Some(id) => id,
-                            None => return self.fail(
-                                "a value in a loop that is too long for being written out has no register",
-                            ),
+            let id = match (&value, carried.pointer) {
+                (Value::Pointer(pointer), Some(object)) if pointer.object == object => {
+                    self.scalars(pointer)?
+                }
+                (value, None) => {
+                    let ty = self.objects[*object].leaves[*leaf].ty.clone();
+                    match self.register(value, &ty) {
+                        Some(id) => id,
+                        None => {
+                            return self.fail(
+                                "a value in a loop that is too long to be written out has no register",
+                            );
                         }
                     }
-                    _ => {
-                        return self.fail(
-                            "a pointer in a loop that is too long for being written out has no known object",
-                        );
-                    }
-                };
+                }
+                _ => {
+                    return self
+                        .fail("a pointer in a loop that is too long to be written out has no known object");
+                }
+            };
             sets.push((carried.var, id));
         }
         if !sets.is_empty() {

@@ -39,7 +39,7 @@ impl<'a> Exec<'a> {
                 Ok(Type::Function(signature)) => signature.result.clone(),
                 Ok(Type::Pointer(to)) => match &*to {
                     Type::Function(signature) => signature.result.clone(),
-                    _ => return self.fail("this is no function"),
+                    _ => return self.fail("expected a function"),
                 },
                 _ => self.builtin_type(&call.node)?,
             },
@@ -83,7 +83,7 @@ impl<'a> Exec<'a> {
             Expression::StringLiteral(_)
             | Expression::GenericSelection(_)
             | Expression::VaArg(_)
-            | Expression::Statement(_) => return self.fail("this expression is not translated"),
+            | Expression::Statement(_) => return self.fail("unsupported expression: string literals, _Generic, va_arg and statement expressions cannot be used here"),
         })
     }
 

@@ -50,8 +50,9 @@ impl<'a, 'i: 'a> Classes<'a> {
         for child in node.children().filter(Node::is_element) {
             if child.has_tag_name("default") {
                 let name = child.attribute("class").filter(|name| !name.is_empty());
-                let name =
-                    name.ok_or_else(|| Error::on(line(child), "a class of defaults has a name: `class`"))?;
+                let name = name.ok_or_else(|| {
+                    Error::on(line(child), "a class of defaults needs a name, in the attribute `class`")
+                })?;
                 if self.names.insert(name, self.list.len()).is_some() {
                     return Err(Error::on(line(child), format!("`{name}`: two classes have this name")));
                 }
@@ -136,7 +137,7 @@ impl<'a, 'i: 'a> Reader<'a> {
                     continue;
                 }
                 if node.attribute(other).is_some() {
-                    let text = format!("both `{other}` and `{name}` are stated; one is enough");
+                    let text = format!("both `{other}` and `{name}` are stated; leave one of them out");
                     return Err(Error::on(line(node), text));
                 }
             }
@@ -144,7 +145,7 @@ impl<'a, 'i: 'a> Reader<'a> {
             stated = Some((
                 name,
                 rotation.ok_or_else(|| {
-                    Error::on(line(node), format!("`{name}` is `{value}`: this is no direction"))
+                    Error::on(line(node), format!("`{name}` is `{value}`, which is not a direction"))
                 })?,
             ));
         }

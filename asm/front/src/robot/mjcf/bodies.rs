@@ -156,7 +156,7 @@ impl<'a, 'i: 'a> Reader<'a> {
             (Some(name), _) => name.to_owned(),
             (None, ElementKind::Refused(..) | ElementKind::Floating(..)) => format!("joint of {body}"),
             (None, _) => {
-                return Err(Error::on(at, "a joint without a `name`, after which its ports are named"));
+                return Err(Error::on(at, "this joint has no `name`, which its ports need"));
             }
         };
         let name = self.name(true, &name, at)?;
@@ -198,7 +198,10 @@ impl<'a, 'i: 'a> Reader<'a> {
             ("stiffness", stiffness),
         ];
         if let Some((name, value)) = stated.iter().find(|(_, value)| *value < 0.0) {
-            return Err(Error::on(at, format!("`{}`: `{name}` is {value}; it is not negative", joint.name)));
+            return Err(Error::on(
+                at,
+                format!("`{}`: `{name}` is {value}; it must not be negative", joint.name),
+            ));
         }
         for (name, why) in table::refused("joint") {
             if self.classes.value(node, class, name)?.is_some_and(|value| !table::is_neutral(value)) {

@@ -139,7 +139,7 @@ fn settings(node: Node<'_, '_>, compiler: &mut Compiler) -> Result<(), Error> {
                 compiler.angle = match value {
                     "radian" => 1.0,
                     "degree" => 1_f64.to_radians(),
-                    _ => return Err(wrong(name, value, "`radian` and `degree` are known")),
+                    _ => return Err(wrong(name, value, "expected `radian` or `degree`")),
                 }
             }
             "eulerseq" => {
@@ -151,15 +151,15 @@ fn settings(node: Node<'_, '_>, compiler: &mut Compiler) -> Result<(), Error> {
                 };
                 let axes: Option<Vec<_>> = value.bytes().map(axis).collect();
                 let axes = axes.and_then(|axes| <[_; 3]>::try_from(axes).ok());
-                compiler.euler = axes
-                    .ok_or_else(|| wrong(name, value, "three of the letters x, y, z, X, Y, Z are needed"))?;
+                compiler.euler =
+                    axes.ok_or_else(|| wrong(name, value, "expected three of the letters x, y, z, X, Y, Z"))?;
             }
             "inertiafromgeom" => {
                 compiler.from_shapes = match value {
                     "auto" => None,
                     "true" => Some(true),
                     "false" => Some(false),
-                    _ => return Err(wrong(name, value, "`auto`, `true` and `false` are known")),
+                    _ => return Err(wrong(name, value, "expected `auto`, `true` or `false`")),
                 }
             }
             "inertiagrouprange" => {
@@ -167,7 +167,7 @@ fn settings(node: Node<'_, '_>, compiler: &mut Compiler) -> Result<(), Error> {
                 compiler.groups = (low, high);
             }
             "coordinate" if value != "local" => {
-                return Err(wrong(name, value, "positions are in the frames of the bodies, `local`"));
+                return Err(wrong(name, value, "expected `local`, positions in the frames of the bodies"));
             }
             _ if fate(TABLE, "compiler", name) == Some(Treatment::Refuses) && !table::is_neutral(value) => {
                 return Err(wrong(name, value, &format!("masses are read as they are; {REMEDY}")));

@@ -58,7 +58,7 @@ impl<'a, 'i: 'a> Reader<'a> {
             if let Some((name, value)) =
                 [("armature", armature), ("damping", damping)].iter().find(|(_, x)| *x < 0.0)
             {
-                return Err(Error::on(line(node), format!("`{name}` is {value}; it is not negative")));
+                return Err(Error::on(line(node), format!("`{name}` is {value}; it must not be negative")));
             }
             if armature == 0.0 && damping == 0.0 {
                 continue;

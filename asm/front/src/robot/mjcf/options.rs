@@ -46,7 +46,7 @@ impl Options {
                     "disable" => self.off.insert(name.to_owned()),
                     "enable" => self.off.remove(name),
                     _ => {
-                        let text = format!("`{name}` is `{value}`: `enable` and `disable` are known");
+                        let text = format!("`{name}` is `{value}`: expected `enable` or `disable`");
                         return Err(Error::on(line(flag), text));
                     }
                 };

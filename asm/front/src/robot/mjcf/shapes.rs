@@ -92,7 +92,7 @@ impl<'a, 'i: 'a> Reader<'a> {
         if let Some(text) = fromto.filter(|_| shape != "sphere") {
             let ends = some(node, "fromto", text, 6)?;
             let &[a, b, c, d, e, f] = &ends[..] else {
-                return Err(wrong(format!("`fromto` is `{text}`: 6 numbers are needed")));
+                return Err(wrong(format!("`fromto` is `{text}`: expected 6 numbers")));
             };
             let (from, to) = ([a, b, c], [d, e, f]);
             let along = space::sub(to, from);
@@ -124,7 +124,7 @@ impl<'a, 'i: 'a> Reader<'a> {
         let pose: Pose = self.pose(node, class)?;
         let mass = self.number(node, class, "mass", 0.0)?;
         if mass < 0.0 {
-            return Err(Error::on(line(node), format!("a mass is {mass}; a mass is not negative")));
+            return Err(Error::on(line(node), format!("a mass is {mass}; a mass must not be negative")));
         }
         let tensor = match node.attribute("fullinertia") {
             Some(_) => {

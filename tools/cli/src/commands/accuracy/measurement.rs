@@ -205,7 +205,7 @@ impl<'a> MeasurementReport<'a> {
         }
         for (&word, lost) in shadow.lost().iter().take(SHOWN) {
             let why =
-                if lost.infinite { "a result that is no finite number" } else { "a value taken as bits" };
+                if lost.infinite { "a result that is not a finite number" } else { "a value taken as bits" };
             let (count, period) = (lost.count, lost.period);
             writeln!(out, "  {}: {why}, {count} times, first in period {period}", self.place(word))?;
         }

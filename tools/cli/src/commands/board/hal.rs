@@ -13,9 +13,9 @@ use takt_board::endpoints::Endpoints;
 /// Write LinuxCNC's HAL file for a system of several cores on a board: the component `hal_takt` with the system's addresses, and the nets of
 /// its joints (docs/linuxcnc.md).
 ///
-/// By their names the system has, for joints 1 to N, a FIFO `knots` from the host with the fields `to_1` … `to_N`, `speed_1` … `speed_N`; the
-/// encoders' counts `n1` … `nN` from the host, where the wiring has them; and a snapshot `measured` to the host with `m1` … `mN`, `knot`,
-/// `phase`, `starved` and `standing`, in this order.
+/// The system must have these ports, for joints 1 to N: a FIFO `knots` from the host with the fields `to_1` … `to_N`, `speed_1` … `speed_N`,
+/// in this order; inputs `n1` … `nN` from the host for the encoder counts, if the wiring has encoders; and a snapshot `measured` to the host
+/// with `m1` … `mN`, `knot`, `phase`, `starved` and `standing`, in this order.
 #[derive(Args)]
 #[command(after_help = "\
 Example:
@@ -68,7 +68,7 @@ fn block(endpoints: &Endpoints, names: &[String]) -> Result<u16> {
     };
     let places = names.iter().map(find).collect::<Result<Vec<u16>>>()?;
     for (pair, name) in places.windows(2).zip(names) {
-        ensure!(pair[1] == pair[0] + 1, "the value behind `{name}` is not the next one at the host");
+        ensure!(pair[1] == pair[0] + 1, "the value that must follow `{name}` at the host is not next to it");
     }
     places.first().copied().context("a joint")
 }
@@ -107,21 +107,21 @@ fn addresses(endpoints: &Endpoints, wiring: &Wiring, arguments: &Hal, cores: usi
 pub(super) fn run(arguments: &Hal, color: bool, out: &mut Out) -> Result<()> {
     let count = arguments.joints.len();
     if arguments.counts.len() != count {
-        bail!("--counts has {} sizes, and --joints {count} letters", arguments.counts.len());
+        bail!("--counts has {} sizes, but --joints has {count} letters", arguments.counts.len());
     }
     if let Some(wrong) = arguments.counts.iter().find(|size| !size.is_finite() || **size == 0.0) {
-        bail!("--counts: {wrong} is no size of a count");
+        bail!("--counts: expected a finite size other than 0 in m or rad, found {wrong}");
     }
     let is_hybrid = matches!(arguments.geometry, Geometry::Hybrid);
     ensure!(
         !is_hybrid || arguments.joints.starts_with("LLL"),
-        "--geometry hybrid: the first three joints are linear"
+        "--geometry hybrid: the first three joints must be linear"
     );
     let (_, wiring, carried) = arguments.target.read(color, false)?;
     let application = carried.on_board();
     ensure!(
         !application.is_program(),
-        "hal_takt drives a system of several cores (docs/linuxcnc.md), and this is a program"
+        "hal_takt drives a system of several cores (docs/linuxcnc.md), but this is a single program"
     );
     let cores = application.description().cores.len();
     let parameters = addresses(application.endpoints(), &wiring, arguments, cores)?;

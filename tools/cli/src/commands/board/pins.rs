@@ -156,11 +156,11 @@ impl Command {
         let (word, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
         let alone = |command: Command| match rest {
             "" => Ok(Some(command)),
-            _ => Err(format!("`{word}` stands alone; `{}` follows it", rest.trim())),
+            _ => Err(format!("`{word}` takes no arguments, found `{}`", rest.trim())),
         };
         match word {
             "" => Ok(None),
-            "set" if rest.trim().is_empty() => Err("`set` wants `pin=level`, as in `set limit=1`".to_owned()),
+            "set" if rest.trim().is_empty() => Err("`set` needs `pin=level`, as in `set limit=1`".to_owned()),
             "set" => pins.levels(rest.split_whitespace()).map(|levels| Some(Command::Set(levels))),
             "wait" => {
                 let time =

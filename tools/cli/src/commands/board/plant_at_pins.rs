@@ -86,7 +86,7 @@ impl Axis {
         let length = f64::from(wiring.period) / (wiring.clock * 1e6);
         ensure!(
             (length / SAMPLE_TIME - 1.0).abs() < 1e-9 && wiring.period.is_multiple_of(STEPS),
-            "the robot's period is {} µs, the wiring's {} µs; in cycles ({}) it is to be divisible by {STEPS}",
+            "the robot's period is {} µs, the wiring's {} µs; in cycles ({}) it must be divisible by {STEPS}",
             SAMPLE_TIME * 1e6,
             length * 1e6,
             wiring.period
@@ -98,7 +98,9 @@ impl Axis {
             }
         }
         ensure!(!wiring.autostart, "the host starts the robot: leave out `autostart`");
-        let counts = Plant::at_rest(pose).counts().context("the path begins out of reach")?;
+        let counts = Plant::at_rest(pose)
+            .counts()
+            .context("the robot's start position is outside the range of its encoders")?;
         let names = INPUTS.iter().zip(&OUTPUTS).zip(counts).take(AXES);
         names.map(|((input, output), count)| Axis::new(wiring, input.name, output.name, count)).collect()
     }
@@ -303,7 +305,7 @@ pub(super) struct EmulationWithRobot {
 impl EmulationWithRobot {
     pub(super) fn new(board: EmulatedBoard, axes: &[Axis], pose: &Pose) -> Result<EmulationWithRobot> {
         let inputs = axes.iter().map(|axis| {
-            board.input(&axis.port).with_context(|| format!("`{}` is no input of the system", axis.port))
+            board.input(&axis.port).with_context(|| format!("`{}` is not an input of the system", axis.port))
         });
         let inputs = inputs.collect::<Result<Vec<usize>>>()?;
         Ok(EmulationWithRobot { board, axes: axes.to_vec(), inputs, robot: BrakedPlant::new(pose) })

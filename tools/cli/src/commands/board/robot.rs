@@ -62,9 +62,9 @@ impl<'a> Drive<'a> {
         let addresses: Vec<u16> = addresses.flatten().map(|index| protocol::INPUTS + index.get()).collect();
         ensure!(
             addresses.windows(2).all(|pair| pair[0] + 1 == pair[1]),
-            "the ports of the reference, x to eps_gamma, have no consecutive numbers: they could not change together"
+            "the ports of the reference, x to eps_gamma, must have consecutive numbers, so that they change together"
         );
-        let reference = *addresses.first().context("a reference has values")?;
+        let reference = *addresses.first().context("the reference has no port")?;
         let periods = periods.min(trajectory.periods());
         Ok(Drive { program, wiring, path, trajectory, periods, axes, reference })
     }
@@ -88,7 +88,7 @@ impl<'a> Drive<'a> {
         for (sample, period) in samples.iter().zip(&fed.used[STANDS..]) {
             // Periods count from 1.
             let position = positions.get((*period as usize).wrapping_sub(1));
-            let position = position.with_context(|| format!("the board has had no period {period}"))?;
+            let position = position.with_context(|| format!("the board has not run period {period}"))?;
             error.add_distance(distance(*position, sample.reference.position), sample.cutting);
         }
         let alone = self.without_pins()?;
@@ -133,7 +133,7 @@ impl<'a> Drive<'a> {
             let reference: Reference<f32> = sample.reference.convert();
             vec![(self.reference, reference.to_array().map(f32::to_bits).to_vec())]
         };
-        let first = samples.first().context("a path has a point")?;
+        let first = samples.first().context("the path has no point")?;
         // Hold the program first, so that its first period reads the first point.
         host.set("control", protocol::RUN | protocol::HOLD | protocol::ENABLE)?;
         for (address, words) in row(first) {

@@ -23,7 +23,7 @@ use takt_debug::remote::{Activity, Remote, RemoteError, RemoteSession, State};
 use takt_debug::session::{Control, Options, Session};
 use takt_isa::{BundleAddress, Program, Register};
 
-/// Maximum distance of two addresses that are read in one request.
+/// Maximum gap between neighbouring addresses that share one read request.
 const GAP: u16 = 4;
 /// Interval between two polls of a running board.
 const POLL: Duration = Duration::from_millis(50);
@@ -90,10 +90,10 @@ fn interrupts(control: &Arc<Control>, interactive: bool) -> Result<Arc<AtomicBoo
 fn carries<L: Line>(host: &mut Host<L>, records: &[[u32; 3]]) -> Result<()> {
     let there = host.register("records")? as usize;
     if there != records.len() {
-        bail!("its image has {there} records, this program's has {}", records.len());
+        bail!("the board's image has {there} records, but this program's has {}", records.len());
     }
     match host.first_difference(records)? {
-        Some(record) => bail!("record {record} of its image differs"),
+        Some(record) => bail!("record {record} of the board's image differs from this program's"),
         None => Ok(()),
     }
 }

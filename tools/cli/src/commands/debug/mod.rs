@@ -203,7 +203,7 @@ fn check_system(arguments: &Debug) -> Result<()> {
     ];
     for (option, given, why) in refused {
         if given {
-            return Err(Failure::Usage(format!("{option} with a system: {why}")).into());
+            return Err(Failure::Usage(format!("{option} cannot be used with a system: {why}")).into());
         }
     }
     Ok(())

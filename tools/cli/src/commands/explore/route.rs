@@ -87,11 +87,9 @@ pub(super) fn route(
         for unit in units.iter().filter(|unit| own(&unit.name) && unit.is_done()) {
             let text = takt_cache::read(&unit.result).with_context(|| damaged(unit))?;
             let placed = serde_json::from_slice(&text);
-            done.push(
-                placed.with_context(|| {
-                    format!("{} is no result of a unit; delete it", unit.result.display())
-                })?,
-            );
+            done.push(placed.with_context(|| {
+                format!("{} is not the result of a unit; delete it", unit.result.display())
+            })?);
         }
         let failure = failures.iter().find(|failure| own(&failure.name));
         let mut row = RoutedMachine {

@@ -195,9 +195,9 @@ fn compare<L: Line>(
     let given = read(host, inputs)?;
     match (stopped(host, application)?, shadow.run(inputs, &given)) {
         (None, Ok(())) => {}
-        (Some(stopped), Err(error)) => bail!("{stopped}; the emulator: {error}"),
-        (Some(stopped), Ok(())) => bail!("{stopped}, the emulator goes on"),
-        (None, Err(error)) => bail!("the board goes on; the emulator: {error}"),
+        (Some(stopped), Err(error)) => bail!("{stopped}; the emulator has stopped too: {error}"),
+        (Some(stopped), Ok(())) => bail!("{stopped}, but the emulator continues"),
+        (None, Err(error)) => bail!("the board continues, but the emulator has stopped: {error}"),
     }
     if application.is_program() && host.register("periods")? != before.wrapping_add(1) {
         bail!("the board did not run the period: is another host connected?");

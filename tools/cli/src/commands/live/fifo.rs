@@ -42,7 +42,7 @@ pub(super) fn entry(
         let at = at
             .with_context(|| format!("entries of `{name}` have no field `{field}`; there are {}", names()))?;
         let bits =
-            bits(text, fifo.fields[at].1).with_context(|| format!("`{text}` is no value of `{field}`"))?;
+            bits(text, fifo.fields[at].1).with_context(|| format!("`{text}` is not a value of `{field}`"))?;
         if entry[at].replace(bits).is_some() {
             bail!("`{field}` is given twice");
         }

@@ -188,7 +188,7 @@ fn prepare(
     application: Option<&Application<'_>>,
     wiring: Option<&Wiring>,
 ) -> Result<PreparedCommand> {
-    let named = || application.context("ports have names in the program: --program FILE");
+    let named = || application.context("ports are named by the program: give it with --program FILE");
     Ok(match command {
         Command::Set { values } | Command::Shadow { values, .. } => {
             if matches!(command, Command::Shadow { .. }) {
@@ -200,7 +200,7 @@ fn prepare(
                     value.split_once('=').with_context(|| format!("`{value}` is not `name=value`"))?;
                 let settable = named()?.settable(name);
                 let (address, ty) = settable.map_err(|text| anyhow!("{text}"))?;
-                let bits = bits(text, ty).with_context(|| format!("`{text}` is no value of `{name}`"))?;
+                let bits = bits(text, ty).with_context(|| format!("`{text}` is not a value of `{name}`"))?;
                 if let Some(driver) = wiring.and_then(|wiring| wiring.driver(application?, address)) {
                     bail!("`{name}` cannot be set: the wiring connects it to {driver}, which drives it");
                 }
@@ -234,7 +234,8 @@ pub(crate) fn live(arguments: &Live, color: bool, out: &mut Out) -> Result<()> {
         _ => None,
     };
     let prepared = prepare(&arguments.command, application.as_ref(), wiring.as_ref())?;
-    let named = || application.as_ref().context("ports have names in the program: --program FILE");
+    let named =
+        || application.as_ref().context("ports are named by the program: give it with --program FILE");
     let mut host = arguments.port.open()?;
     if let Some(application) = &application {
         host.fits(application.clone())?;

@@ -77,13 +77,13 @@ const LONGEST: f64 = limits::LONGEST;
 fn fault(text: &str) -> Result<(LinkFault, f64), String> {
     let names = || LinkFault::ALL.map(LinkFault::name).join(", ");
     let Some((name, time)) = text.split_once('@') else {
-        return Err("a fault has a time, as in `corrupt@2.5`".to_owned());
+        return Err("expected a fault with its time, as in `corrupt@2.5`".to_owned());
     };
     let fault = LinkFault::ALL.into_iter().find(|fault| fault.name() == name);
     let fault = fault.ok_or_else(|| format!("there is no fault `{name}`: there are {}", names()))?;
     match time.parse::<f64>() {
         Ok(time) if (0.0..=LONGEST).contains(&time) => Ok((fault, time)),
-        _ => Err(format!("`{time}` is no time from 0 to {LONGEST} s")),
+        _ => Err(format!("`{time}` is not a time from 0 to {LONGEST} s")),
     }
 }
 

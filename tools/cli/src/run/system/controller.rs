@@ -61,7 +61,7 @@ impl SystemController {
         }
         let fifo = description.link_named(BLOCKS).context("its inputs have this link")?;
         let LinkKind::Fifo { depth, .. } = description.links[fifo].kind else {
-            bail!("this system cannot control the hybrid robot: `{BLOCKS}` is no FIFO");
+            bail!("this system cannot control the hybrid robot: `{BLOCKS}` is not a FIFO");
         };
         let known = description.outputs();
         let mut outputs = [(0, 0); OUTPUTS.len()];
@@ -74,19 +74,22 @@ impl SystemController {
         }
         let generation = match description.links[fifo].to {
             takt_system::End::Core(core) => core,
-            takt_system::End::Host => bail!("`{BLOCKS}` leads from the host to the host"),
+            takt_system::End::Host => bail!(
+                "this system cannot control the hybrid robot: the FIFO `{BLOCKS}` must lead to a core, not back to the host"
+            ),
         };
         let core = &description.cores[generation];
         let mut point = [Register::ZERO; REFERENCE_LEN];
         for (register, port) in point.iter_mut().zip(&INPUTS[AXES..]) {
             let found = core.program.outputs.iter().find(|output| output.name == port.name);
-            let found = found.with_context(|| format!("core {} computes no `{}`", core.name, port.name))?;
+            let found =
+                found.with_context(|| format!("core {} does not compute `{}`", core.name, port.name))?;
             *register = found.register;
         }
         let mut system = System::new(description)?;
         let mut observer = Observer::watching(&mut system, watch);
         let start = system.run_to_start(PERIOD_LIMIT)?;
-        let start = start.context("the cores do not come to their first ticks")?;
+        let start = start.context("the cores do not reach their first ticks")?;
         observer.observe(&mut system);
         Ok(SystemController {
             system,

@@ -36,7 +36,7 @@ pub(crate) struct LoadedSystem {
 pub(crate) fn load(path: &Path, source: &SourceArguments, color: bool) -> Result<LoadedSystem> {
     let name = files::input_name(path);
     let text = String::from_utf8(files::read(path, TEXT_BYTES)?).map_err(|error| {
-        anyhow!("{name} is no text: byte {} is not UTF-8", error.utf8_error().valid_up_to())
+        anyhow!("{name} is not text: byte {} is not UTF-8", error.utf8_error().valid_up_to())
     })?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let (mut programs, mut files) = (Vec::new(), Vec::new());

@@ -17,7 +17,7 @@ pub(crate) fn write(system: &System, path: &Path) -> Result<()> {
     let description = system.description();
     let host = Host::new(description);
     let columns = host.columns(description);
-    let start = system.start().context("the cores have not come to their first ticks")?;
+    let start = system.start().context("the cores have not reached their first ticks")?;
     let first = start - description.lead();
     let row_of = |cycle: Cycle| (cycle.saturating_sub(first) / description.tick) as usize;
     let mut out = Out::create(path)?;
@@ -42,7 +42,7 @@ pub(crate) fn write(system: &System, path: &Path) -> Result<()> {
         let name = match action {
             HostAction::Input { name, bits } => {
                 let column = columns.iter().position(|column| column.name == *name);
-                values[column.context("the host writes to a port that is no input")?] = *bits;
+                values[column.context("the host writes to a port that is not an input")?] = *bits;
                 continue;
             }
             HostAction::Push(link) => Host::push_column(description, *link),
@@ -53,7 +53,7 @@ pub(crate) fn write(system: &System, path: &Path) -> Result<()> {
         let push = &mut values
             [column.context("the host pushes an entry into a link that is not one of its FIFOs")?];
         if *push != 0 {
-            bail!("the host put two entries into {name} in one tick, which a row cannot say");
+            bail!("the host put two entries into {name} in one tick, which a row cannot express");
         }
         *push = 1;
     }

@@ -123,7 +123,7 @@ impl<'a> Execution<'a> for SystemRun<'a, '_> {
     fn run_to_halt(&mut self) -> Result<()> {
         let start = self.start()?;
         if start.is_some() && !self.system.halted() {
-            bail!("the system goes on from tick to tick: give it base ticks with --inputs or --periods");
+            bail!("the system runs from tick to tick: give it base ticks with --inputs or --periods");
         }
         self.last = self.host.read(&mut self.system)?;
         if self.system.halted() { Ok(()) } else { Err(self.endless()) }
