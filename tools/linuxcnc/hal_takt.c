@@ -378,7 +378,7 @@ static int export(void) {
     return bad;
 }
 
-// Says who is there.
+// Connects to the board, and checks that it carries the system with the axes of this component.
 static int meet(void) {
     int error = takt_open(&board, port, baud);
     if (error) {
@@ -389,7 +389,7 @@ static int meet(void) {
     int done = request(TAKT_ID, 1, NULL);
     uint32_t id = board.words[0];
     const char *wrong = done < 0 ? "nothing answers: is this the right port, with the wiring's baud rate, and the board's bitstream loaded?"
-        : done || id >> 16 != TAKT_MAGIC ? "what answers is no board of Takt"
+        : done || id >> 16 != TAKT_MAGIC ? "the device that answers is not a board of Takt"
         : (id >> 8 & 0xff) != TAKT_VERSION ? "the board speaks another version of the protocol"
         : (id & 0xff) != (uint32_t)cores ? "the board carries another system: its number of cores is not `cores`"
         : control(0) || request((uint16_t)encoders, axes, NULL) ? "the board does not let its encoders be read" : NULL;

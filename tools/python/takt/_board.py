@@ -77,7 +77,8 @@ class Board:
             baud: Bits per second, as in the wiring.
 
         Raises:
-            BoardError: there is no such port, nothing answers, or what answers is no board with a circuit for this program or system.
+            BoardError: there is no such port, nothing answers, or the device that answers is not a board with a circuit for this program
+                or system.
             AssemblyError: mistakes in the system's file, or in a program of it.
         """
         rate = count_of("baud", baud) or 0

@@ -116,7 +116,7 @@ class ModelError(TaktError, ValueError):
 
 
 class BoardError(TaktError, OSError):
-    """A board does not answer, cannot do what is asked, or is no board."""
+    """A board does not answer, rejects a request, or the device is not a board."""
 
     def __str__(self) -> str:
         return in_python(super().__str__())
