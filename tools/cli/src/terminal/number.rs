@@ -49,6 +49,24 @@ fn whole(text: &str, range: RangeInclusive<u64>) -> Result<u64, String> {
     }
 }
 
+/// A number as text, rounded to some significant digits, without trailing zeros: plain from 0.001 to a million, else with an exponent.
+pub(crate) fn rounded(value: f64, digits: usize) -> String {
+    let scientific = format!("{value:.*e}", digits.saturating_sub(1));
+    let Some((mantissa, exponent)) = scientific.split_once('e') else { return scientific };
+    let without_zeros = |text: &str| match text.contains('.') {
+        true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
+        false => text.to_owned(),
+    };
+    match exponent.parse::<i32>() {
+        Ok(exponent @ -3..6) => {
+            let places = usize::try_from(digits as i32 - 1 - exponent).unwrap_or(0);
+            let text = without_zeros(&format!("{value:.places$}"));
+            if text == "-0" { "0".to_owned() } else { text }
+        }
+        _ => format!("{}e{exponent}", without_zeros(mantissa)),
+    }
+}
+
 /// Parses a count of at least 1, for clap.
 pub(crate) fn count(text: &str) -> Result<u64, String> {
     whole(text, 1..=u64::MAX)
@@ -155,6 +173,29 @@ impl Time {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn rounded_numbers() {
+        for (value, text) in [
+            (0.0, "0"),
+            (-0.0, "0"),
+            (1.0, "1"),
+            (58.09, "58.09"),
+            (-128.0, "-128"),
+            (0.001, "0.001"),
+            (9.9999e-4, "1e-3"),
+            (2.572e-2, "0.02572"),
+            (999_949.0, "999949"),
+            (999_960.0, "1e6"),
+            (123_456.7, "123457"),
+            (6.25e-7, "6.25e-7"),
+            (f64::INFINITY, "inf"),
+        ] {
+            assert_eq!(rounded(value, 4), text, "{value}");
+        }
+        assert_eq!(rounded(1_343.309_12, 7), "1343.309");
+        assert_eq!(rounded(-2.012_345_678, 7), "-2.012346");
+    }
 
     #[test]
     fn whole_numbers() {

@@ -3,6 +3,7 @@
 
 use super::lines::{SHOWN_PARTS, by_line, line_text};
 use crate::terminal::files::Out;
+use crate::terminal::number::rounded;
 use anyhow::Result;
 use serde_json::{Value, json};
 use std::io::Write;
@@ -18,9 +19,17 @@ pub(super) struct BoundReport<'a> {
     pub(super) enclosure: &'a Enclosure,
 }
 
+fn ends_text(low: f64, high: f64) -> String {
+    format!("[{}, {}]", rounded(low, 7), rounded(high, 7))
+}
+
+/// Units in the last place as text: hundredths where they matter.
+pub(super) fn ulps_text(ulps: f64) -> String {
+    if ulps < 1e4 { format!("{ulps:.2}") } else { rounded(ulps, 4) }
+}
+
 fn interval(interval: Option<Interval>) -> String {
-    interval
-        .map_or_else(|| "anywhere".to_owned(), |Interval { low, high }| format!("[{low:.6e}, {high:.6e}]"))
+    interval.map_or_else(|| "anywhere".to_owned(), |Interval { low, high }| ends_text(low, high))
 }
 
 impl BoundReport<'_> {
@@ -107,14 +116,15 @@ impl BoundReport<'_> {
         writeln!(out, "one period on {machine}, all inputs and states in their ranges, the states exact")?;
         let outputs = &enclosure.outputs;
         let width = outputs.iter().map(|output| output.name.len()).max().unwrap_or(0).max(6);
+        let wide = outputs.iter().map(|output| interval(output.range).len()).max().unwrap_or(0).max(5);
         writeln!(
             out,
-            "\n  {:<width$}  {:>32}  {:>12}  {:>9}  most of it from",
+            "\n  {:<width$}  {:>wide$}  {:>11}  {:>9}  most of it from",
             "output", "range", "error up to", "ulp"
         )?;
         for output in outputs {
-            let error = output.error.map_or_else(|| "-".to_owned(), |error| format!("{error:.3e}"));
-            let ulps = output.ulps().map_or_else(|| "-".to_owned(), |ulps| format!("{ulps:.2}"));
+            let error = output.error.map_or_else(|| "-".to_owned(), |error| rounded(error, 4));
+            let ulps = output.ulps().map_or_else(|| "-".to_owned(), ulps_text);
             let lines = self.parts(output);
             let lines = lines.iter().take(SHOWN_PARTS);
             let lines =
@@ -123,7 +133,7 @@ impl BoundReport<'_> {
             let range = interval(output.range);
             writeln!(
                 out,
-                "  {:<width$}  {range:>32}  {error:>12}  {ulps:>9}  {}",
+                "  {:<width$}  {range:>wide$}  {error:>11}  {ulps:>9}  {}",
                 output.name,
                 lines.join(", ")
             )?;
@@ -150,7 +160,7 @@ impl BoundReport<'_> {
         let states = |UnprovedRange { range, found, .. }: &UnprovedRange, found_text: &str, out: &mut Out| {
             let (low, high) = range.ends();
             let name = program.register_text(range.register);
-            writeln!(out, "  {name}: [{low:.6e}, {high:.6e}], {found_text} {}", interval(*found))
+            writeln!(out, "  {name}: {}, {found_text} {}", ends_text(low, high), interval(*found))
         };
         if enclosure.first().next().is_some() {
             writeln!(
@@ -165,7 +175,7 @@ impl BoundReport<'_> {
         for Converging { range, found } in &enclosure.converging {
             let (low, high) = range.ends();
             let name = program.register_text(range.register);
-            writeln!(out, "  {name}: [{low:.6e}, {high:.6e}], always in {}", interval(Some(*found)))?;
+            writeln!(out, "  {name}: {}, always in {}", ends_text(low, high), interval(Some(*found)))?;
         }
         if enclosure.later().next().is_some() {
             writeln!(out, "\nranges that a period is not shown to keep; they are taken as promised")?;

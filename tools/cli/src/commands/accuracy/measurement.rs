@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Measured errors of a program, as text and as JSON.
 
+use super::bound_report::ulps_text;
 use super::lines::{SHOWN, SHOWN_PARTS, by_line, line_text, location};
 use crate::terminal::files::Out;
+use crate::terminal::number::rounded;
 use anyhow::Result;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -143,8 +145,10 @@ impl<'a> MeasurementReport<'a> {
         )?;
         for output in outputs {
             let cell = |worst: Option<LargestError>, ulps: bool| match worst {
-                Some(LargestError { error, period, .. }) if ulps => format!("{error:>12.2} {period:>8}"),
-                Some(LargestError { error, period, .. }) => format!("{error:>12.3e} {period:>8}"),
+                Some(LargestError { error, period, .. }) if ulps => {
+                    format!("{:>12} {period:>8}", ulps_text(error))
+                }
+                Some(LargestError { error, period, .. }) => format!("{:>12} {period:>8}", rounded(error, 4)),
                 None => format!("{:>12} {:>8}", "-", "-"),
             };
             let [absolute, ulp, relative] =
