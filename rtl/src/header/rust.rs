@@ -33,7 +33,7 @@ pub(super) fn write(header: &Header) -> String {
     );
     text.push_str(
         "
-/// The type of a port.
+/// Type of a port's values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Type {
     /// binary32.
@@ -47,26 +47,26 @@ pub enum Type {
 /// A port.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Port {
-    /// Its name in the source.
+    /// Name of the port in the source.
     pub name: &'static str,
-    /// Its number.
+    /// Number of the port, from 0.
     pub number: u16,
-    /// Its address on the bus.
+    /// Word address of the port on the bus.
     pub address: u16,
-    /// The type that it carries.
+    /// Type of the port's values.
     pub ty: Type,
 }
 
-/// A word that the loader writes.
+/// Word of a memory, which the host writes before a start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Record {
-    /// 0 program memory, 1 data memory, 2 registers, 3 input ports.
+    /// Memory: 0 program memory, 1 data memory, 2 registers, 3 input ports.
     pub space: u8,
-    /// In program memory, the word of the bundle.
+    /// Word within the bundle, in program memory.
     pub slot: u8,
     /// Bundle, data word, register, or number of the input port.
     pub address: u16,
-    /// The word.
+    /// Value of the word.
     pub value: u64,
 }
 
@@ -128,7 +128,7 @@ pub mod register {
         }
         let _ = writeln!(
             text,
-            "    /// All of them, in the order of their declaration.\n    pub const ALL: [super::Port; {}] = [{}];\n}}",
+            "    /// All ports, in the order of their declaration.\n    pub const ALL: [super::Port; {}] = [{}];\n}}",
             all.len(),
             all.join(", ")
         );
