@@ -17,17 +17,25 @@ const LEAST: f64 = 1e-300;
 const MAX_TERMS: usize = 1024;
 
 /// Affine form of a real value, see the module.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub(super) struct Affine {
     center: f64,
     /// Symbols and coefficients, by ascending symbol.
     terms: Rc<[(u32, f64)]>,
     slack: f64,
+    /// Symbol that most of the slack comes from, if known. Reports name it; the form's values do not depend on it.
+    blamed: Option<u32>,
+}
+
+impl PartialEq for Affine {
+    fn eq(&self, other: &Affine) -> bool {
+        (self.center, &self.terms, self.slack) == (other.center, &other.terms, other.slack)
+    }
 }
 
 impl Affine {
     pub(super) fn constant(value: f64) -> Affine {
-        Affine { center: value, terms: Rc::default(), slack: 0.0 }
+        Affine { center: value, terms: Rc::default(), slack: 0.0, blamed: None }
     }
 
     pub(super) fn is_zero(&self) -> bool {
@@ -43,7 +51,7 @@ impl Affine {
     pub(super) fn of(interval: Interval, symbol: u32) -> Affine {
         let radius = interval.radius();
         let terms = if radius == 0.0 { Rc::default() } else { Rc::from([(symbol, radius)]) };
-        Affine { center: interval.middle(), terms, slack: 0.0 }
+        Affine { center: interval.middle(), terms, slack: 0.0, blamed: None }
     }
 
     /// Form of an interval without correlation, whose radius is all slack.
@@ -76,7 +84,7 @@ impl Affine {
 
     pub(super) fn neg(&self) -> Affine {
         let terms = self.terms.iter().map(|(symbol, coefficient)| (*symbol, -coefficient)).collect();
-        Affine { center: -self.center, terms, slack: self.slack }
+        Affine { center: -self.center, terms, ..self.clone() }
     }
 
     /// Linear combination `a·x + b·y`; its own rounding errors go to the slack.
@@ -115,7 +123,9 @@ impl Affine {
         if !finite || slack.is_nan() {
             return Affine { slack: f64::INFINITY, ..Affine::constant(0.0) };
         }
-        Affine { center, terms: terms.into(), slack }.short()
+        let [first, second] = if (a * x.slack).abs() >= (b * y.slack).abs() { [x, y] } else { [y, x] };
+        let blamed = first.blamed.or(second.blamed);
+        Affine { center, terms: terms.into(), slack, blamed }.short()
     }
 
     pub(super) fn add(&self, other: &Affine) -> Affine {
@@ -155,7 +165,8 @@ impl Affine {
         if !product.is_finite() || rest.is_nan() {
             return Affine { slack: f64::INFINITY, ..Affine::constant(0.0) };
         }
-        Affine { center: product, ..mixed }.widened(rest * (1.0 + ROUNDING))
+        let blamed = mixed.blamed.or_else(|| self.main_symbol()).or_else(|| other.main_symbol());
+        Affine { center: product, blamed, ..mixed }.widened(rest * (1.0 + ROUNDING))
     }
 
     /// Parts of [-1, 1] to which symbols are confined if the form is not positive, for symbols where that is narrower than `known`;
@@ -208,7 +219,8 @@ impl Affine {
             }
         }
         kept.extend(new);
-        Some(Affine { center, terms: kept.into(), slack: self.slack }.widened(lost * ROUNDING + LEAST))
+        let replaced = Affine { center, terms: kept.into(), ..self.clone() };
+        Some(replaced.widened(lost * ROUNDING + LEAST))
     }
 
     /// Coefficients of `symbols`, and a bound on the magnitude of the rest of the form less the number `from`.
@@ -230,14 +242,31 @@ impl Affine {
         self.terms.binary_search_by_key(&symbol, |(symbol, _)| *symbol).map_or(0.0, |at| self.terms[at].1)
     }
 
+    /// Term with the largest coefficient.
+    fn largest_term(&self) -> Option<&(u32, f64)> {
+        self.terms.iter().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
+    }
+
     /// Symbol with the largest coefficient.
     pub(super) fn largest(&self) -> Option<u32> {
-        self.terms.iter().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs())).map(|(symbol, _)| *symbol)
+        self.largest_term().map(|(symbol, _)| *symbol)
+    }
+
+    /// Symbol that most of the form's radius comes from: of the largest coefficient, or of a larger slack.
+    pub(super) fn main_symbol(&self) -> Option<u32> {
+        let is_larger = |(_, coefficient): &(u32, f64)| coefficient.abs() >= self.slack;
+        let largest = self.largest_term().filter(|term| self.blamed.is_none() || is_larger(term));
+        largest.map(|(symbol, _)| *symbol).or(self.blamed)
+    }
+
+    /// Symbol that most of the slack comes from, if known.
+    pub(super) fn blamed(&self) -> Option<u32> {
+        self.blamed
     }
 
     /// Adds a term to the form.
     pub(super) fn with(&self, symbol: u32, coefficient: f64) -> Affine {
-        let term = Affine { center: 0.0, terms: Rc::from([(symbol, coefficient)]), slack: 0.0 };
+        let term = Affine { terms: Rc::from([(symbol, coefficient)]), ..Affine::constant(0.0) };
         self.add(&term)
     }
 
@@ -252,7 +281,9 @@ impl Affine {
         let joined = Affine { slack: 0.0, ..mean.clone() };
         let joined = joined.widened(slack + mean.range().magnitude() * ROUNDING + LEAST);
         // Forms that share little are narrower as an interval.
-        let hull = Affine::free(self.range().hull(other.range()));
+        let wider = if self.radius() >= other.radius() { [self, other] } else { [other, self] };
+        let blamed = wider[0].main_symbol().or_else(|| wider[1].main_symbol());
+        let hull = Affine { blamed, ..Affine::free(self.range().hull(other.range())) };
         if hull.radius() < 0.9 * joined.radius() { hull } else { joined }
     }
 
@@ -263,10 +294,12 @@ impl Affine {
         }
         let mut terms = self.terms.to_vec();
         terms.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
-        let rest: f64 = terms.split_off(MAX_TERMS / 2).iter().map(|(_, coefficient)| coefficient.abs()).sum();
+        let smallest = terms.split_off(MAX_TERMS / 2);
+        let rest: f64 = smallest.iter().map(|(_, coefficient)| coefficient.abs()).sum();
+        let blamed = self.blamed.or(smallest.first().map(|(symbol, _)| *symbol));
         terms.sort_by_key(|(symbol, _)| *symbol);
         let grown = rest * (1.0 + MAX_TERMS as f64 * ROUNDING);
-        Affine { terms: terms.into(), ..self }.widened(grown)
+        Affine { terms: terms.into(), blamed, ..self }.widened(grown)
     }
 
     /// Values of the form for given noise.

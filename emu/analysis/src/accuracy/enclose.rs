@@ -598,9 +598,12 @@ impl Explorer<'_> {
             let number = value.float().ok();
             let computed = self.computed.get(&port.register).and_then(|value| value.float().ok());
             let mut shares: BTreeMap<u32, f64> = BTreeMap::new();
-            for (symbol, share) in computed.iter().flat_map(|number| number.error.shares().0) {
-                if let Some(word) = self.symbols[symbol as usize] {
-                    *shares.entry(word).or_default() += share;
+            if let Some(number) = &computed {
+                let (terms, rest) = number.error.shares();
+                for (symbol, share) in terms.chain(number.error.blamed().map(|symbol| (symbol, rest))) {
+                    if let Some(word) = self.symbols[symbol as usize] {
+                        *shares.entry(word).or_default() += share;
+                    }
                 }
             }
             let mut parts: Vec<(u32, f64)> = shares.into_iter().collect();
