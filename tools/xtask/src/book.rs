@@ -52,7 +52,7 @@ pub(crate) const SITE: &str = "target/book/site";
 
 /// Documents in reading order, by part; every document must be listed.
 const PARTS: &[(&str, &[&str])] = &[
-    ("Start", &["first-controller", "tour", "what-fits", "examples", "figures"]),
+    ("Start", &["first-controller", "coming-from", "tour", "what-fits", "examples", "figures"]),
     ("Writing programs", &["language", "library", "fast-code", "scheduling", "editors", "playground"]),
     ("Programs from models", &["model", "models", "readers", "c"]),
     ("Time and accuracy", &["analysis", "accuracy", "timing", "verify"]),
