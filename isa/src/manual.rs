@@ -243,7 +243,7 @@ pub fn markdown() -> String {
     let manual = manual();
     let mut out = String::from(
         "# Takt's instruction set\n\n\
-         Generated from the specification (`isa/src/spec/`) by `cargo xtask docs`; do not edit.\n\n",
+         <!-- Generated from the specification (`isa/src/spec/`) by `cargo xtask docs`; do not edit. -->\n\n",
     );
     let _ = writeln!(
         out,
@@ -326,7 +326,7 @@ type Capacity = (&'static str, fn(&Machine) -> String);
 pub fn capacities(block: &BlockRam, devices: &str) -> String {
     let mut out = String::from(
         "# What fits\n\n\
-         Generated from the table of machines (`isa/src/spec/machines.rs`) by `cargo xtask docs`; do not edit.\n\n\
+         <!-- Generated from the table of machines (`isa/src/spec/machines.rs`) by `cargo xtask docs`; do not edit. -->\n\n\
          The capacities of each machine. A program that needs more of one is refused, with the number that it needs; `takt asm FILE`\n\
          prints what a program takes, `--symbols -` where everything lies.\n\n|",
     );

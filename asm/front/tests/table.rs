@@ -169,8 +169,9 @@ fn line(case: &Case, what: RobotFunction, row: &Row) -> String {
 const HEAD: &str = "\
 # Robots and what their equations take
 
-Written by `TAKT_BLESS=1 cargo test --release -p takt-front --test suite table::`; docs/model.md says how the equations come
-about.
+<!-- Written by `TAKT_BLESS=1 cargo test --release -p takt-front --test suite table::`. -->
+
+How the equations come about: [model.md](model.md).
 
 - *operations*: sums, products, divisions, roots, sines and cosines, signs, as `takt model` prints them.
 - *CasADi*: the same function in CasADi 3.7 as the textbooks have it (`asm/front/tests/reference.py`: Newton and Euler in

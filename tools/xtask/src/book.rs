@@ -50,19 +50,19 @@ const TOOLS: &str = "target/tools";
 const SOURCE: &str = "target/book/source";
 pub(crate) const SITE: &str = "target/book/site";
 
+/// Title page: the document, and its chapter, from which mdbook makes `index.html`.
+const TITLE_PAGE: (&str, &str) = ("README.md", "index.md");
 /// Documents in reading order, by part; every document must be listed.
 const PARTS: &[(&str, &[&str])] = &[
-    ("Start", &["first-controller", "tour", "what-fits", "examples", "figures"]),
-    ("Writing programs", &["language", "library", "fast-code", "scheduling", "editors", "playground"]),
-    ("Programs from models", &["model", "models", "readers", "c"]),
+    ("Start", &["first-controller", "tour", "coming-from", "what-fits", "examples", "figures"]),
+    ("Writing programs", &["language", "editors", "playground", "library", "fast-code", "scheduling"]),
     ("Time and accuracy", &["analysis", "accuracy", "timing", "verify"]),
-    ("Running programs", &["debugging", "traces", "batch", "plant", "mujoco", "python", "system"]),
-    ("Controllers", &["motor", "robot", "friction", "generation", "arm", "controller", "robot-commands"]),
-    (
-        "Boards and circuits",
-        &["board", "power-stage", "linuxcnc", "hardware", "headers", "protocol", "synthesis"],
-    ),
-    ("The processor", &["isa", "machines", "machine-choice", "trig", "image"]),
+    ("Running programs", &["debugging", "python", "plant", "mujoco", "batch", "traces"]),
+    ("Programs from models and C", &["model", "models", "readers", "c"]),
+    ("Motors and boards", &["motor", "power-stage", "board", "protocol", "linuxcnc"]),
+    ("Several cores, your own design", &["system", "hardware", "headers", "image"]),
+    ("Robots", &["robot", "friction", "generation", "arm", "controller", "robot-commands"]),
+    ("The processor", &["isa", "machines", "synthesis", "machine-choice", "trig"]),
     ("Evidence", &["verification", "campaigns", "speed"]),
     ("Reference", &["glossary", "reach"]),
 ];
@@ -135,19 +135,20 @@ fn write_source(docs: &Path, folder: &Path) -> Result<()> {
     for entry in std::fs::read_dir(docs).context("cannot read docs/")? {
         let path = entry?.path();
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        // Skip the folder's index: the book has its own.
-        let Some(stem) = name.strip_suffix(".md").filter(|stem| *stem != "README") else { continue };
+        let Some(stem) = name.strip_suffix(".md") else { continue };
         let text = std::fs::read_to_string(&path).with_context(|| format!("cannot read docs/{name}"))?;
         let title = text.lines().find_map(|line| line.strip_prefix("# ")).unwrap_or(stem).to_owned();
         titles.insert(stem.to_owned(), title);
         texts.push((name, text));
     }
+    let (title_page, index) = TITLE_PAGE;
     for (name, text) in texts {
-        std::fs::write(chapters.join(&name), titled(&chapter(&name, &text, &chapters)?, &titles))?;
+        let file = if name == title_page { index } else { &name };
+        std::fs::write(chapters.join(file), titled(&chapter(&name, &text, &chapters)?, &titles))?;
     }
     copy(&docs.join("pictures"), &chapters.join("pictures"))?;
-    // The site opens with the first chapter, which addresses new readers.
-    let mut summary = "# Summary\n".to_owned();
+    let title = titles.remove(title_page.trim_end_matches(".md")).context("docs/ has no title page")?;
+    let mut summary = format!("# Summary\n\n[{title}]({index})\n");
     let mut contents = String::new();
     let mut put = |part: &str, chapters: Vec<(String, String)>| {
         if !chapters.is_empty() {
@@ -171,6 +172,8 @@ fn write_source(docs: &Path, folder: &Path) -> Result<()> {
     std::fs::write(chapters.join("SUMMARY.md"), summary)?;
     std::fs::write(folder.join("takt.css"), format!("{CSS}{}", colour::CSS))?;
     std::fs::write(folder.join("takt.js"), SCRIPT)?;
+    std::fs::create_dir_all(folder.join("theme"))?;
+    std::fs::write(folder.join("theme/favicon.svg"), FAVICON)?;
     std::fs::write(folder.join("book.toml"), CONFIGURATION)?;
     Ok(())
 }
@@ -187,6 +190,15 @@ no-section-label = true
 
 [output.html.search]
 limit-results = 40
+";
+
+/// Icon of the site, in place of mdbook's: ticks, and a period that ends before the next one.
+const FAVICON: &str = "\
+<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 32 32\">
+<rect width=\"32\" height=\"32\" rx=\"6\" fill=\"#1f4e79\"/>
+<path d=\"M6 7v18M26 7v18\" stroke=\"#fff\" stroke-width=\"3\" stroke-linecap=\"round\"/>
+<rect x=\"6\" y=\"12\" width=\"13\" height=\"8\" fill=\"#ffb000\"/>
+</svg>
 ";
 
 const CSS: &str = "\
@@ -391,7 +403,9 @@ mod tests {
         let chapters = folder.join("src");
         let summary = std::fs::read_to_string(chapters.join("SUMMARY.md")).expect("it was just written");
         let first = summary.lines().find_map(|line| line.split_once("](")).expect("it has chapters").1;
-        assert_eq!(first, "first-controller.md)", "the site opens with the page for a new reader");
+        assert_eq!(first, "index.md)", "the site opens with the title page");
+        let icon = std::fs::read_to_string(folder.join("theme/favicon.svg")).expect("it was just written");
+        assert!(icon.starts_with("<svg ") && icon.ends_with("</svg>\n"), "{icon}");
         let (mut broken, mut count) = (Vec::new(), 0);
         for entry in std::fs::read_dir(&chapters).expect("there are some") {
             let path = entry.expect("it can be read").path();

@@ -68,7 +68,8 @@ fn main() -> Outcome<()> {
     }
     let mut text = format!(
         "# How fast the tools are\n\n\
-         Written by `cargo evidence speed`. Absolute speeds depend on the machine, so each figure is a ratio to something that a \
+         <!-- Written by `cargo evidence speed`. -->\n\n\
+         Absolute speeds depend on the machine, so each figure is a ratio to something that a \
          reader has, measured in the same run: both sides take turns for {ROUNDS} rounds, a round's ratio is that of the \
          fastest samples, and the table has the median round and the range of all. Larger is slower for times, faster for \
          lines a second.\n\n"

@@ -72,7 +72,7 @@ pub(crate) fn markdown(rows: &[Synthesis]) -> String {
         "# Synthesis\n
 <!-- Written by `cargo evidence synth` and `cargo xtask docs` from rtl/synthesis.json. -->\n
 How fast the circuit is and how much of a device it takes, after place and route with open tools. `cargo evidence synth`
-measures it and writes this file; the first run installs the tools (400 MB) in `.venv`, or in the folder that `TAKT_VENV` names.\n
+measures it; the first run installs the tools (400 MB) in `.venv`, or in the folder that `TAKT_VENV` names.\n
 Clocks are nextpnr's, for the slowest conditions of the speed grade, with the seeds 1, 2, … up to the stated
 number. The median (of an even number, the lower of the two in the middle) is the clock that the README and `takt track`
 use. The total is nextpnr's {total}: {lut}, those of memories in logic included, and the halves of carry chains' cells,
