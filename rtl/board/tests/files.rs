@@ -2,7 +2,8 @@
 //! Boards and wirings as files: values read from valid files, and mistakes found in invalid ones.
 
 use takt_asm::{MemoryLoader, Options, assemble};
-use takt_board::{Board, Mistake, Wiring};
+use takt_board::kind::KINDS;
+use takt_board::{Board, Mistake, VERILOG, Wiring, model};
 use takt_isa::Program;
 
 fn ulx3s() -> Board {
@@ -64,7 +65,9 @@ fn builtin_boards_are_right() {
     assert_eq!(boards.len(), Board::names().count());
     for (board, name) in boards.iter().zip(Board::names()) {
         assert_eq!(board.name, name);
-        assert!(!board.source.is_empty() && board.pins.len() >= 16, "{name}");
+        let pins = board.pins.len();
+        assert!(!board.source.is_empty(), "{name}: expected a source");
+        assert!(pins >= 16, "{name}: expected at least 16 pins, found {pins}");
     }
     // The files name the sources of these facts.
     let board = ulx3s();
@@ -74,6 +77,25 @@ fn builtin_boards_are_right() {
         (board.site("gp0"), board.site("gn3"), board.site("nothing")),
         (Some("B11"), Some("C10"), None)
     );
+}
+
+#[test]
+fn every_kind_has_a_module_and_a_model() {
+    for kind in KINDS {
+        let file = format!("{}.v", kind.module);
+        assert!(
+            VERILOG.iter().any(|(name, _)| *name == file),
+            "{file} is missing: write it in rtl/board/verilog/, and list it in VERILOG, rtl/board/src/lib.rs"
+        );
+        let defaults = kind.parameters.iter().map(|parameter| parameter.default);
+        // A kind on a carrier takes half the carrier's period, too.
+        let parameters: Vec<u32> = defaults.chain([1000]).collect();
+        assert!(
+            model::of(kind, &parameters).is_some(),
+            "`{}` has no model: write it in rtl/board/src/model/, and name it in `of`",
+            kind.name
+        );
+    }
 }
 
 #[test]

@@ -331,6 +331,17 @@ const FAULTS: &[&[(&str, &str, &str)]] = &[
 ];
 
 #[test]
+fn every_kind_has_planted_faults() {
+    for kind in kind::KINDS {
+        let file = format!("{}.v", kind.module);
+        assert!(
+            FAULTS.iter().any(|faults| faults.iter().any(|(name, ..)| *name == file)),
+            "no fault is planted in {file}: add one to FAULTS in rtl/board/tests/peripherals.rs, (\"{file}\", what to replace, by what)"
+        );
+    }
+}
+
+#[test]
 fn planted_faults_are_found() {
     for (round, faults) in FAULTS.iter().enumerate() {
         let mut files = files();

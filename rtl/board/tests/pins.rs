@@ -339,7 +339,11 @@ fn each_peripheral_keeps_its_stated_latency() {
     // A kind that the wiring omits has no pin with a stated bound (`spi`), or has its own test (`pwm` in top.rs, `pwm3` and `trip` in
     // drive.rs).
     for kind in KINDS.iter().filter(|kind| !["spi", "pwm", "pwm3", "trip"].contains(&kind.name)) {
-        assert!(wiring.peripherals.iter().any(|known| known.kind == kind), "{} is not tried", kind.name);
+        assert!(
+            wiring.peripherals.iter().any(|known| known.kind == kind),
+            "{} is not tried: add it to KINDS_WIRING, or name its test in the comment above",
+            kind.name
+        );
     }
 
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("board-kinds");

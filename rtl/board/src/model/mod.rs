@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Behavioural models of the peripherals: pins and registers have, cycle by cycle, the values of the Verilog files of `rtl/board/verilog/`.
 //!
-//! An emulated board is made of the models, and `rtl/board/tests/peripherals.rs` compares the circuits with the models.
+//! `rtl/board/tests/peripherals.rs` compares the circuits with the models in every cycle.
 
 mod clocked;
 mod common;
