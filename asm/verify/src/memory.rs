@@ -4,7 +4,10 @@
 use crate::term::{Node, Term, Terms};
 use std::collections::{BTreeMap, HashSet};
 use takt_asm::plain::{PlainKind, PlainOperation, PlainProgram};
-use takt_isa::Effect;
+use takt_isa::{Effect, Op};
+
+/// Maximum number of stores over which a load or a store is moved.
+const MAX_PASSED: usize = 64;
 
 /// Partition of the data memory into regions.
 #[derive(Clone, Debug)]
@@ -69,6 +72,60 @@ fn touched(plain: &PlainProgram) -> Option<HashSet<u32>> {
     accesses.map(word).collect()
 }
 
+/// Least and greatest value of an address that is a constant, or a masked number and a constant.
+fn range(terms: &Terms, address: Term) -> Option<[u32; 2]> {
+    let (base, offset) = terms.linear(address);
+    let most = match terms.node(base) {
+        Node::Constant(bits) => bits,
+        Node::Apply(Op::iand, [a, b, _]) => terms.constant_value(a).or(terms.constant_value(b))?,
+        _ => return None,
+    };
+    Some([offset, offset.checked_add(most)?])
+}
+
+/// Two addresses differ, whatever the unknowns are.
+fn are_apart(terms: &Terms, one: Term, other: Term) -> bool {
+    let ((x, m), (y, n)) = (terms.linear(one), terms.linear(other));
+    if x == y {
+        return m != n;
+    }
+    let ranges = range(terms, one).zip(range(terms, other));
+    ranges.is_some_and(|([a, b], [c, d])| b < c || d < a)
+}
+
+/// A memory after a store. Stores to words that differ are put in one order, whichever the program has.
+fn stored(terms: &mut Terms, memory: Term, address: Term, value: Term) -> Term {
+    let (mut before, mut passed) = (memory, Vec::new());
+    while let Node::Store(inner, at, word) = terms.node(before) {
+        let is_later = terms.linear(address) < terms.linear(at);
+        if !is_later || passed.len() == MAX_PASSED || !are_apart(terms, address, at) {
+            break;
+        }
+        terms.steps += 1;
+        passed.push((at, word));
+        before = inner;
+    }
+    let after = terms.make(Node::Store(before, address, value));
+    passed.into_iter().rev().fold(after, |memory, (at, word)| terms.make(Node::Store(memory, at, word)))
+}
+
+/// A word of a memory: of its last store to the address, with stores to other words passed over.
+fn loaded(terms: &mut Terms, map: &Map, memory: Term, address: Term) -> Term {
+    let mut memory = memory;
+    for _ in 0..MAX_PASSED {
+        match terms.node(memory) {
+            Node::Store(_, at, value) if at == address => return value,
+            Node::Store(inner, at, _) if are_apart(terms, address, at) => memory = inner,
+            _ => break,
+        }
+        terms.steps += 1;
+    }
+    match (terms.node(memory), terms.constant_value(address)) {
+        (Node::Loaded(_), Some(word)) => terms.constant(map.data.get(word as usize).copied().unwrap_or(0)),
+        _ => terms.make(Node::Load(memory, address)),
+    }
+}
+
 /// Contents of a region.
 #[derive(Clone, Debug)]
 struct Region {
@@ -90,7 +147,7 @@ impl Region {
         let mut flat = self.base;
         for (&offset, &value) in &self.words {
             let address = terms.offset(self.unknown, offset);
-            flat = terms.make(Node::Store(flat, address, value));
+            flat = stored(terms, flat, address, value);
         }
         flat
     }
@@ -124,12 +181,7 @@ impl Memory {
             _ if unknown == region.unknown || region.words.is_empty() => region.base,
             _ => region.flat(terms),
         };
-        match (terms.node(base), terms.constant_value(address)) {
-            (Node::Loaded(_), Some(word)) => {
-                terms.constant(map.data.get(word as usize).copied().unwrap_or(0))
-            }
-            _ => terms.make(Node::Load(base, address)),
-        }
+        loaded(terms, map, base, address)
     }
 
     pub(crate) fn store(&mut self, terms: &mut Terms, region: Option<usize>, address: Term, value: Term) {

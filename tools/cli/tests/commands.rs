@@ -993,8 +993,7 @@ fn hidden_rows_count_for_the_status_of_accuracy() {
 
     folder.write("first.s", program(" mov s, 2.0", "nop"));
     let first = folder.line("accuracy first.s");
-    let text =
-        "then nothing above holds\n  s: [-1.000000e0, 1.000000e0], begins in [2.000000e0, 2.000000e0]\n";
+    let text = "then nothing above holds\n  s: [-1, 1], begins in [2, 2]\n";
     assert_eq!((first.status, first.stdout.ends_with(text)), (Some(1), true), "{}", first.stdout);
     let json: serde_json::Value =
         serde_json::from_str(&folder.line("accuracy first.s --json").stdout).unwrap();
