@@ -109,21 +109,35 @@ fn stored(terms: &mut Terms, memory: Term, address: Term, value: Term) -> Term {
     passed.into_iter().rev().fold(after, |memory, (at, word)| terms.make(Node::Store(memory, at, word)))
 }
 
-/// A word of a memory: of its last store to the address, with stores to other words passed over.
+/// A word of a memory. The term has only the stores that may have gone to the address, whatever else the program has stored.
 fn loaded(terms: &mut Terms, map: &Map, memory: Term, address: Term) -> Term {
-    let mut memory = memory;
+    let (mut memory, mut stores) = (memory, Vec::new());
     for _ in 0..MAX_PASSED {
-        match terms.node(memory) {
-            Node::Store(_, at, value) if at == address => return value,
-            Node::Store(inner, at, _) if are_apart(terms, address, at) => memory = inner,
-            _ => break,
-        }
+        let Node::Store(before, at, value) = terms.node(memory) else { break };
         terms.steps += 1;
+        if at == address {
+            if stores.is_empty() {
+                return value;
+            }
+            // Earlier contents of the word do not matter.
+            memory = terms.make(Node::Store(Terms::ZERO, at, value));
+            break;
+        }
+        if !are_apart(terms, address, at) {
+            stores.push((at, value));
+        }
+        memory = before;
     }
-    match (terms.node(memory), terms.constant_value(address)) {
-        (Node::Loaded(_), Some(word)) => terms.constant(map.data.get(word as usize).copied().unwrap_or(0)),
-        _ => terms.make(Node::Load(memory, address)),
+    if let (true, Node::Loaded(_), Some(word)) =
+        (stores.is_empty(), terms.node(memory), terms.constant_value(address))
+    {
+        return terms.constant(map.data.get(word as usize).copied().unwrap_or(0));
     }
+    let memory = stores
+        .into_iter()
+        .rev()
+        .fold(memory, |memory, (at, value)| terms.make(Node::Store(memory, at, value)));
+    terms.make(Node::Load(memory, address))
 }
 
 /// Contents of a region.
