@@ -4,10 +4,7 @@
 use crate::term::{Node, Term, Terms};
 use std::collections::{BTreeMap, HashSet};
 use takt_asm::plain::{PlainKind, PlainOperation, PlainProgram};
-use takt_isa::{Effect, Op};
-
-/// Maximum number of stores over which a load or a store is moved.
-const MAX_PASSED: usize = 64;
+use takt_isa::Effect;
 
 /// Partition of the data memory into regions.
 #[derive(Clone, Debug)]
@@ -72,74 +69,6 @@ fn touched(plain: &PlainProgram) -> Option<HashSet<u32>> {
     accesses.map(word).collect()
 }
 
-/// Least and greatest value of an address that is a constant, or a masked number and a constant.
-fn range(terms: &Terms, address: Term) -> Option<[u32; 2]> {
-    let (base, offset) = terms.linear(address);
-    let most = match terms.node(base) {
-        Node::Constant(bits) => bits,
-        Node::Apply(Op::iand, [a, b, _]) => terms.constant_value(a).or(terms.constant_value(b))?,
-        _ => return None,
-    };
-    Some([offset, offset.checked_add(most)?])
-}
-
-/// Two addresses differ, whatever the unknowns are.
-fn are_apart(terms: &Terms, one: Term, other: Term) -> bool {
-    let ((x, m), (y, n)) = (terms.linear(one), terms.linear(other));
-    if x == y {
-        return m != n;
-    }
-    let ranges = range(terms, one).zip(range(terms, other));
-    ranges.is_some_and(|([a, b], [c, d])| b < c || d < a)
-}
-
-/// A memory after a store. Stores to words that differ are put in one order, whichever the program has.
-fn stored(terms: &mut Terms, memory: Term, address: Term, value: Term) -> Term {
-    let (mut before, mut passed) = (memory, Vec::new());
-    while let Node::Store(inner, at, word) = terms.node(before) {
-        let is_later = terms.linear(address) < terms.linear(at);
-        if !is_later || passed.len() == MAX_PASSED || !are_apart(terms, address, at) {
-            break;
-        }
-        terms.steps += 1;
-        passed.push((at, word));
-        before = inner;
-    }
-    let after = terms.make(Node::Store(before, address, value));
-    passed.into_iter().rev().fold(after, |memory, (at, word)| terms.make(Node::Store(memory, at, word)))
-}
-
-/// A word of a memory. The term has only the stores that may have gone to the address, whatever else the program has stored.
-fn loaded(terms: &mut Terms, map: &Map, memory: Term, address: Term) -> Term {
-    let (mut memory, mut stores) = (memory, Vec::new());
-    for _ in 0..MAX_PASSED {
-        let Node::Store(before, at, value) = terms.node(memory) else { break };
-        terms.steps += 1;
-        if at == address {
-            if stores.is_empty() {
-                return value;
-            }
-            // Earlier contents of the word do not matter.
-            memory = terms.make(Node::Store(Terms::ZERO, at, value));
-            break;
-        }
-        if !are_apart(terms, address, at) {
-            stores.push((at, value));
-        }
-        memory = before;
-    }
-    if let (true, Node::Loaded(_), Some(word)) =
-        (stores.is_empty(), terms.node(memory), terms.constant_value(address))
-    {
-        return terms.constant(map.data.get(word as usize).copied().unwrap_or(0));
-    }
-    let memory = stores
-        .into_iter()
-        .rev()
-        .fold(memory, |memory, (at, value)| terms.make(Node::Store(memory, at, value)));
-    terms.make(Node::Load(memory, address))
-}
-
 /// Contents of a region.
 #[derive(Clone, Debug)]
 struct Region {
@@ -161,7 +90,7 @@ impl Region {
         let mut flat = self.base;
         for (&offset, &value) in &self.words {
             let address = terms.offset(self.unknown, offset);
-            flat = stored(terms, flat, address, value);
+            flat = terms.make(Node::Store(flat, address, value));
         }
         flat
     }
@@ -195,7 +124,12 @@ impl Memory {
             _ if unknown == region.unknown || region.words.is_empty() => region.base,
             _ => region.flat(terms),
         };
-        loaded(terms, map, base, address)
+        match (terms.node(base), terms.constant_value(address)) {
+            (Node::Loaded(_), Some(word)) => {
+                terms.constant(map.data.get(word as usize).copied().unwrap_or(0))
+            }
+            _ => terms.make(Node::Load(base, address)),
+        }
     }
 
     pub(crate) fn store(&mut self, terms: &mut Terms, region: Option<usize>, address: Term, value: Term) {
