@@ -71,6 +71,8 @@ pub(crate) struct Relation<'a> {
     live: Vec<Registers>,
     /// Bounds of loops compared so far.
     compared: ComparedLoops,
+    /// Branches of the source that were tried as selections, since the image's branch leads to another label.
+    tried: BTreeSet<u32>,
 }
 
 fn place(side: &Side<'_>) -> Place {
@@ -106,6 +108,7 @@ impl<'a> Relation<'a> {
             layout,
             live: live(source),
             compared: ComparedLoops::default(),
+            tried: BTreeSet::new(),
         }
     }
 
@@ -168,6 +171,22 @@ impl<'a> Relation<'a> {
         let decides = matches!(said, Event::Branch { .. } | Event::LoopEnd { .. });
         let done = image.run(&mut self.world);
         let agree = done.as_ref().is_ok_and(|done| agree((said, *done)));
+        // In copies of a loop's body, the image may select in one and branch in the next, on the same condition.
+        let leads_elsewhere = done.as_ref().is_ok_and(|done| self.leads_elsewhere(said, *done));
+        if agree
+            && leads_elsewhere
+            && source.passed_over(said).is_some()
+            && self.tried.insert(source.at)
+            && self.world.selected.insert(source.at)
+        {
+            return match self.visit_in(number, cases) {
+                Err(inner) if inner.at_decision => {
+                    self.world.selected.remove(&source.at);
+                    self.visit_in(number, cases)
+                }
+                result => result,
+            };
+        }
         let compared = done.and_then(|done| self.compare(&source, &image, (said, done)).map(|()| done));
         let refused = match compared {
             Ok(done) => {
@@ -204,6 +223,19 @@ impl<'a> Relation<'a> {
             }
         }
         Ok(())
+    }
+
+    /// Both programs branch, but to different labels.
+    fn leads_elsewhere(&self, said: Event, done: Event) -> bool {
+        let (Event::Branch { target: source, .. }, Event::Branch { target: image, .. }) = (said, done) else {
+            return false;
+        };
+        let labels = &self.layout.labels;
+        match (labels.source.get(&source), labels.image.get(&image)) {
+            (Some(said), Some(done)) => said.1 < done.0 || done.1 < said.0,
+            (None, Some(_)) => true,
+            (_, None) => false,
+        }
     }
 
     /// Compares the effects of both programs, and their next events.

@@ -3,7 +3,7 @@
 
 use crate::common::{build, check, text as words};
 use takt_asm::{Contract, MemoryLoader, Options, Schedule};
-use takt_isa::{T1, T3, T4};
+use takt_isa::{Instruction, Op, T1, T3, T4};
 use takt_verify::verify;
 
 const SOURCE: &str = "\
@@ -142,4 +142,31 @@ sub: ilt c, k, n\n bz c, L\n iadd k, k, 1\nL: ret\n";
         }
     }
     assert!(has_spills, "no program keeps values in data memory");
+}
+
+/// A loop whose body leaves `.schedule on` in its middle: the image selects in the first copy of the body, and branches in the others, on
+/// the same condition.
+#[test]
+fn a_selection_in_one_copy_and_branches_in_others_are_verified() {
+    const SOURCE: &str = ".schedule on\n.input x, m:int\n.output y\n.state s\n.reg f b:int\n.preset s = 0.5\n.period\n\
+                          p: f = s - x\n .for i, 1, 3\n iand b, m, 1\n bz b, keep\n mov s, f\nkeep:\n.schedule off\n\
+                          iand b, m, 1\n .endfor\n y = s\n wait p\n";
+    for machine in [&T1, &T3, &T4] {
+        let options = Options { machine, effort: 0, ..Options::default() };
+        let (assembled, plain) =
+            build("copies.s", &MemoryLoader::of("copies.s", SOURCE), &options).expect("it is right");
+        assert_eq!(assembled.selections.len(), 1, "{}", machine.name);
+        if let Err(difference) = check(&assembled, &plain) {
+            panic!("{}: {}", machine.name, words(&plain, &difference));
+        }
+        // A branch that is taken on another condition.
+        let mut program = assembled.program.clone();
+        let word = (0..program.code.len())
+            .find(|at| Instruction::decode(program.code[*at]).is_ok_and(|found| found.op == Op::bz))
+            .expect("a branch");
+        let mut branch = Instruction::decode(program.code[word]).expect("a branch");
+        branch.op = Op::bnz;
+        program.code[word] = branch.encode().expect("it has an encoding");
+        assert!(verify(&program, &plain, &assembled.contractions).is_err(), "{}", machine.name);
+    }
 }
