@@ -173,19 +173,9 @@ impl<'a> Relation<'a> {
         let agree = done.as_ref().is_ok_and(|done| agree((said, *done)));
         // In copies of a loop's body, the image may select in one and branch in the next, on the same condition.
         let leads_elsewhere = done.as_ref().is_ok_and(|done| self.leads_elsewhere(said, *done));
-        if agree
-            && leads_elsewhere
-            && source.passed_over(said).is_some()
-            && self.tried.insert(source.at)
-            && self.world.selected.insert(source.at)
-        {
-            return match self.visit_in(number, cases) {
-                Err(inner) if inner.at_decision => {
-                    self.world.selected.remove(&source.at);
-                    self.visit_in(number, cases)
-                }
-                result => result,
-            };
+        if agree && leads_elsewhere && source.passed_over(said).is_some() && self.tried.insert(source.at) {
+            let selected = self.visit_selecting(source.at, number, cases);
+            return selected.unwrap_or_else(|| self.visit_in(number, cases));
         }
         let compared = done.and_then(|done| self.compare(&source, &image, (said, done)).map(|()| done));
         let refused = match compared {
@@ -200,10 +190,9 @@ impl<'a> Relation<'a> {
             }
         };
         // The image may select instead of branching; if the branch is inside a loop, it may decide on the loop's count first.
-        if source.passed_over(said).is_some() && self.world.selected.insert(source.at) {
-            match self.visit_in(number, cases) {
-                Err(inner) if inner.at_decision => _ = self.world.selected.remove(&source.at),
-                result => return result,
+        if source.passed_over(said).is_some() {
+            if let Some(result) = self.visit_selecting(source.at, number, cases) {
+                return result;
             }
             self.world.terms.assume(cases);
         }
@@ -223,6 +212,26 @@ impl<'a> Relation<'a> {
             }
         }
         Ok(())
+    }
+
+    /// Visits a cut with the source's branch at `at` treated as a selection. Returns `None`, and takes that back, if the programs then
+    /// disagree on a decision, or the branch is one already.
+    fn visit_selecting(
+        &mut self,
+        at: u32,
+        number: usize,
+        cases: &mut Vec<(Term, u32)>,
+    ) -> Option<Result<(), Mismatch>> {
+        if !self.world.selected.insert(at) {
+            return None;
+        }
+        match self.visit_in(number, cases) {
+            Err(inner) if inner.at_decision => {
+                self.world.selected.remove(&at);
+                None
+            }
+            result => Some(result),
+        }
     }
 
     /// Both programs branch, but to different labels.

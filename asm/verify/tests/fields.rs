@@ -3,7 +3,7 @@
 
 #![allow(clippy::print_stdout)]
 
-use crate::common::{build, check};
+use crate::common::{build, check, set_random_inputs};
 use crate::random::{number, text};
 use crate::random_source::Random;
 use std::collections::{BTreeMap, BTreeSet};
@@ -433,14 +433,7 @@ fn watch(program: &Program, mut look: impl FnMut(&Emulator)) -> BTreeSet<BundleA
         emulator.set_cycle_limit(1_000_000);
         let random = &mut Random::new(run);
         for _ in 0..PERIODS {
-            for port in &program.inputs {
-                let bits = match random.below(3) {
-                    0 => random.below(20) as u32,
-                    1 => random.below(1 << 32) as u32,
-                    _ => ((random.below(4000) as f32 - 2000.0) / 300.0).to_bits(),
-                };
-                emulator.set_input_bits(port.register, bits).expect("it is an input");
-            }
+            set_random_inputs(&mut emulator, program, random);
             let mut sink = |event: &Event| {
                 if let Event::Issue { address, .. } = event {
                     issued.insert(*address);

@@ -3,7 +3,7 @@
 
 #![allow(clippy::print_stdout)]
 
-use crate::common::{build, check};
+use crate::common::{build, check, set_random_inputs};
 use crate::random::number;
 use crate::random_source::{Random, source, source_with_loops};
 use crate::shipped::{loader, shipped};
@@ -80,14 +80,7 @@ fn observe(program: &Program, plain: &PlainProgram, seed: u64) -> (Vec<String>, 
     let random = &mut Random::new(seed);
     let mut seen = Vec::new();
     for _ in 0..PERIODS {
-        for port in &program.inputs {
-            let bits = match random.below(4) {
-                0 => random.below(20) as u32,
-                1 => random.below(1 << 32) as u32,
-                _ => ((random.below(4000) as f32 - 2000.0) / 300.0).to_bits(),
-            };
-            emulator.set_input_bits(port.register, bits).expect("it is an input");
-        }
+        set_random_inputs(&mut emulator, program, random);
         let fault = emulator.run_period(&[]).err();
         let writes = emulator.take_port_writes();
         for port in &program.outputs {
