@@ -26,7 +26,7 @@ def remez(f, weight, low, high, powers):
     n = len(powers)
     points = [(low + high) / 2 - (high - low) / 2 * cos(pi * i / n) for i in range(n + 1)]
     grid = [(low + high) / 2 - (high - low) / 2 * cos(pi * i / GRID) for i in range(GRID + 1)]
-    # Where the polynomial's term vanishes against the rest, any value would do.
+    # A floor for the weight, where the polynomial's term vanishes against the rest.
     least = max(weight(low), weight(high)) / 10**4
     bounded = lambda x: max(weight(x), least)
     targets = [(x, f(x), bounded(x)) for x in grid]

@@ -145,7 +145,7 @@ fn a_program_that_misses_its_ticks_is_named() {
     let found = findings(WIRING, &source(2000));
     let late = lines(&found.late);
     assert!(late.len() == 1 && late[0].starts_with("w.toml:4:1: every tick is missed"), "{found:#?}");
-    // Of the two paths through the period, only the longer one misses the tick.
+    // The longer of two paths through the period misses the tick, the shorter does not.
     let source = ".input x:int, n:int\n.output y, z\n.reg f g c:int\n.period\np: itof f, x\n itof g, n\n ilt c, x, n\n bnz c, short\n .for i, 1, 2000\n fadd f, f, f\n .endfor\nshort: fmul y, f, g\n mov z, y\n wait p\n";
     let found = findings(WIRING, source);
     let warnings = lines(&found.warnings);

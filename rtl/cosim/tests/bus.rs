@@ -162,7 +162,7 @@ fn axi_master(slave: &str, parameters: &str) -> String {
     let tasks = "    task write(input [15:0] at, input [31:0] word, input [3:0] strobes);
         begin
             {awaddr, wdata, wstrb} = {at, noise[1:0], word, strobes};
-            // Its address, its data, or both come first.
+            // The address, the data, or both come first.
             {awvalid, wvalid, bready} = {at_once | noise[2], at_once | ~noise[2] | noise[3], noise[4]};
             if (~(awvalid & wvalid)) repeat (noise[6:5]) next;
             {awvalid, wvalid} = 2'b11;

@@ -207,7 +207,7 @@ pub(crate) fn compiled(
     text.push_str("static void get_(void *w) { if (fread(w, 4, 1, stdin) != 1) exit(3); }\n");
     text.push_str("static void put_(void *w) { fwrite(w, 4, 1, stdout); }\n");
     if programs.iter().any(|(program, ..)| program.double_is_float) {
-        // As the projects do.
+        // Projects in single precision build with these macros.
         text.push_str("#define double float\n");
         for name in ["sqrt", "fabs", "floor", "ceil", "trunc", "round", "fmod", "fmin", "fmax", "copysign"] {
             let _ = writeln!(text, "#define {name} {name}f");

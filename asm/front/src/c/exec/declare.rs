@@ -392,7 +392,7 @@ impl<'a> Exec<'a> {
             self.scope().names.insert(name, Named::Constant(next));
             next += 1;
         }
-        // As in gcc: unsigned if no constant is negative.
+        // gcc makes the type unsigned if no constant is negative.
         let ty = Type::Int(if least < 0 { INT } else { UNSIGNED });
         match &node.identifier {
             Some(tag) if node.enumerators.is_empty() => Ok(self.tag(&tag.node.name).cloned().unwrap_or(ty)),
