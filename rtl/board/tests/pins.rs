@@ -322,6 +322,18 @@ period: l0, l1, l2, l3 = count & 1, at_index & 1, indices & 1, errors & 1
         wait    period
 ";
 
+/// A kind that the wiring omits has no pin with a stated bound (`spi`), or has its own test (`pwm` in top.rs, `pwm3` and `trip` in
+/// drive.rs).
+fn every_other_kind_is_tried(wiring: &Wiring) {
+    for kind in KINDS.iter().filter(|kind| !["spi", "pwm", "pwm3", "trip"].contains(&kind.name)) {
+        assert!(
+            wiring.peripherals.iter().any(|known| known.kind == kind),
+            "{} is not tried: add it to KINDS_WIRING, or name its test in the comment above",
+            kind.name
+        );
+    }
+}
+
 /// Each kind of peripheral keeps the latency that it states, in the complete top level: an edge just in time for a tick shows at the lamp
 /// after the best case, an edge a cycle later after the worst case.
 #[test]
@@ -336,15 +348,7 @@ fn each_peripheral_keeps_its_stated_latency() {
     let bounds = takt_analysis::bound(&program).expect("it can be bounded");
     let period = bounds.sections.iter().find(|section| !section.once).expect("a period").cycles;
     let way = undivided(&wiring, period).into_iter().next().expect("inputs and outputs");
-    // A kind that the wiring omits has no pin with a stated bound (`spi`), or has its own test (`pwm` in top.rs, `pwm3` and `trip` in
-    // drive.rs).
-    for kind in KINDS.iter().filter(|kind| !["spi", "pwm", "pwm3", "trip"].contains(&kind.name)) {
-        assert!(
-            wiring.peripherals.iter().any(|known| known.kind == kind),
-            "{} is not tried: add it to KINDS_WIRING, or name its test in the comment above",
-            kind.name
-        );
-    }
+    every_other_kind_is_tried(&wiring);
 
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("board-kinds");
     let mut sim = Simulation::new(&board, &wiring, &program, &folder).unwrap_or_else(|e| panic!("{e}"));

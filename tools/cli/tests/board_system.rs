@@ -33,14 +33,17 @@ fn a_system_fits_its_board_and_a_circuit_is_written() {
     );
 }
 
+/// Runs a command that fails with these words, and prints nothing else.
+fn refused_in(folder: &Folder, line: &str, says: &str) {
+    let done = folder.line(line);
+    assert!(done.status == Some(1) || done.status == Some(2), "{line}: {done:?}");
+    assert!(done.stderr.contains(says) && done.stdout.is_empty(), "{line}: {}", done.stderr);
+}
+
 #[test]
 fn wrong_systems_and_ports_are_refused() {
     let folder = Folder::new();
-    let refused = |line: &str, says: &str| {
-        let done = folder.line(line);
-        assert!(done.status == Some(1) || done.status == Some(2), "{line}: {done:?}");
-        assert!(done.stderr.contains(says) && done.stdout.is_empty(), "{line}: {}", done.stderr);
-    };
+    let refused = |line: &str, says: &str| refused_in(&folder, line, says);
     let wiring = std::fs::read_to_string(example("wiring.toml")).unwrap();
     let wired = |from: &str, to: &str, says: &str| {
         assert!(wiring.contains(from));
