@@ -46,6 +46,11 @@ impl Map {
         around.filter(|(base, words, _)| address - base < *words).map_or(self.arrays.len(), |found| found.2)
     }
 
+    /// The address may be a word of an array: it is unknown, or one.
+    pub(crate) fn is_within(&self, terms: &Terms, address: Term, array: usize) -> bool {
+        terms.constant_value(address).is_none_or(|word| self.of(word) == array)
+    }
+
     /// Region of an address: from its value, or from the array that the source names; `None` if unknown.
     pub(crate) fn region(&self, terms: &Terms, address: Term, said: Option<usize>) -> Option<usize> {
         terms.constant_value(address).map(|address| self.of(address)).or(said)

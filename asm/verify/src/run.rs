@@ -273,6 +273,11 @@ impl<'a> Side<'a> {
         if outside {
             return Err(self.fault(operation, "leaves the data memory", world));
         }
+        if !self.is_image
+            && operation.array.is_some_and(|array| !world.map.is_within(&world.terms, address, array))
+        {
+            return Err(self.fault(operation, "leaves its array", world));
+        }
         let said = if self.is_image {
             match (world.terms.constant_value(address), world.touched.get(&address)) {
                 (_, Some(said)) => *said,
