@@ -65,7 +65,8 @@ pub struct EquivalenceReport {
     pub times: Vec<SectionTime>,
     /// Number of deadlines that hold in such sections.
     pub deadlines: usize,
-    /// Source lines that fault on a path that the check cannot exclude; the image's behaviour after the fault is not compared.
+    /// Source lines that fault, or leave the array of an element, on a path that the check cannot exclude; the image's behaviour from there on
+    /// is not compared.
     pub faults: Vec<Location>,
 }
 

@@ -3,7 +3,7 @@
 //! once).
 //!
 //! A cut is a pair of positions, after a decision on a value or at a tick. There the registers of both programs, memory and flags are
-//! cells; the relation knows which cells are equal, or constant. From a cut, both programs run independently to the next decision, which
+//! cells; the relation knows which cells are equal, differ by a constant, or are constant. From a cut, both programs run independently to the next decision, which
 //! must be the same, and their effects must agree. The partition at a cut is the meet over all paths to it.
 
 use crate::clock::Clock;
@@ -352,7 +352,7 @@ impl<'a> Relation<'a> {
         self.cuts[number].queued = false;
         let Cut { key, cells, clock, .. } = &self.cuts[number];
         self.world.terms.steps += cells.len() as u64 / COPIES;
-        let mut cells = cells.iter().map(|cell| self.world.terms.in_case(*cell));
+        let mut cells = cells.iter().map(|cell| self.world.terms.restored(*cell));
         let mut side = |code: &'a Code, is_image: bool, place: &Place| {
             let mut side = Side::new(code, is_image, Memory::holding([]));
             side.registers = cells.by_ref().take(code.initial.len()).collect();
@@ -552,20 +552,25 @@ fn agree(ways: (Event, Event)) -> bool {
     }
 }
 
-/// Meet of two partitions of cells: cells stay equal if they are equal in both; constants stay if they are the same.
+/// Meet of two partitions of cells. Cells keep their difference, 0 included, if both partitions know the same one; constants stay if they are
+/// the same.
 fn common(terms: &mut Terms, cut: u32, old: &[Term], new: &[Term]) -> Vec<Term> {
     terms.steps += old.len() as u64;
-    let mut classes: HashMap<(Term, Term), Term> = HashMap::new();
+    // By both symbolic parts of a cell and the difference between its constants: the unknown of the class, and the first cell's constant.
+    let mut classes: HashMap<(Term, Term, u32, bool), (Term, u32)> = HashMap::new();
     let mut of = |((&old, &new), cell): ((&Term, &Term), u32)| {
         if old == new && matches!(terms.node(old), Node::Constant(_) | Node::Loaded(_) | Node::Unwritten) {
             return old;
         }
         let risky = terms.may_be_unwritten(old) || terms.may_be_unwritten(new);
-        let class = match risky {
-            true => Node::PerhapsUnwritten { cut, cell },
-            false => Node::Unknown { cut, cell },
+        // A sum is written even if its operand may not be.
+        let (((x, m), (y, n)), class) = match risky {
+            true => (((old, 0), (new, 0)), Node::PerhapsUnwritten { cut, cell }),
+            false => ((terms.linear(old), terms.linear(new)), Node::Unknown { cut, cell }),
         };
-        *classes.entry((old, new)).or_insert_with(|| terms.in_any_case(class))
+        let named = || (terms.in_any_case(class), m);
+        let (unknown, first) = *classes.entry((x, y, m.wrapping_sub(n), risky)).or_insert_with(named);
+        terms.offset_in_any_case(unknown, m.wrapping_sub(first))
     };
     old.iter().zip(new).zip(0..).map(&mut of).collect()
 }

@@ -104,8 +104,17 @@ impl Terms {
     }
 
     /// Constant that the current case assumes for a term, or the term itself.
-    pub(crate) fn in_case(&self, term: Term) -> Term {
+    fn in_case(&self, term: Term) -> Term {
         self.assumed.get(&term).copied().unwrap_or(term)
+    }
+
+    /// The term under the current case, also if it is a sum of an assumed term and a constant.
+    pub(crate) fn restored(&mut self, term: Term) -> Term {
+        let (base, offset) = self.linear(term);
+        match self.in_case(base) {
+            same if same == base => self.in_case(term),
+            assumed => self.offset(assumed, offset),
+        }
     }
 
     /// Replaces the assumptions. If a term is a sum with a constant, its symbolic part is assumed to equal the value minus the constant.
@@ -180,6 +189,15 @@ impl Terms {
             return base;
         }
         self.make(Node::Apply(Op::iadd, [base, total, Terms::ZERO]))
+    }
+
+    /// Sum of an unknown and a constant, regardless of assumptions.
+    pub(crate) fn offset_in_any_case(&mut self, unknown: Term, offset: u32) -> Term {
+        if offset == 0 {
+            return unknown;
+        }
+        let offset = self.in_any_case(Node::Constant(offset));
+        self.in_any_case(Node::Apply(Op::iadd, [unknown, offset, Terms::ZERO]))
     }
 
     /// Splits a sum into its symbolic part and its constant. The symbolic part of a constant is [`Terms::ZERO`].

@@ -4,7 +4,7 @@
 use crate::common::{build, check, text as words};
 use takt_asm::{Contract, MemoryLoader, Options, Schedule};
 use takt_isa::{Instruction, Op, T1, T3, T4};
-use takt_verify::verify;
+use takt_verify::{MAX_STEPS, verify};
 
 const SOURCE: &str = "\
 .schedule on
@@ -169,4 +169,47 @@ fn a_selection_in_one_copy_and_branches_in_others_are_verified() {
         program.code[word] = branch.encode().expect("it has an encoding");
         assert!(verify(&program, &plain, &assembled.contractions).is_err(), "{}", machine.name);
     }
+}
+
+/// Checks the image of a source on three machines, and images of sources in which one text is replaced by another.
+fn verified_unless_changed(source: &str, changes: &[[&str; 2]]) {
+    for machine in [&T1, &T3, &T4] {
+        let options = Options { machine, effort: 0, ..Options::default() };
+        let build = |text: &str| {
+            build("a.s", &MemoryLoader::of("a.s", text.to_owned()), &options).expect("it assembles")
+        };
+        let (assembled, plain) = build(source);
+        let found = check(&assembled, &plain)
+            .unwrap_or_else(|difference| panic!("{}: {}", machine.name, words(&plain, &difference)));
+        let limit = MAX_STEPS / 10;
+        assert!(found.steps < limit, "{}: {} steps of {limit}", machine.name, found.steps);
+        for [from, to] in changes {
+            assert!(source.contains(from), "{from}");
+            let other = build(&source.replacen(from, to, 1)).0;
+            let verdict = verify(&other.program, &plain, &other.contractions);
+            assert!(verdict.is_err(), "{}: `{to}` in place of `{from}` is accepted", machine.name);
+        }
+    }
+}
+
+/// The check follows the copies of the body further than the count allows, to a word of the array before: the image's order of accesses
+/// to both arrays is another.
+#[test]
+fn paths_that_leave_an_array_end_there() {
+    let source = "\
+.schedule on\n.input n:int, x\n.output y\n.array A[4], B[4]\n.reg k:int\n.period\np: k = n & 3\n .for i, 1, k max 3 unroll 4\n\
+ B[4-i] = A[4]*x\n A[4] = x\n .endfor\n y = A[4]\n wait p\n";
+    let changes = [["B[4-i] = A[4]", "B[4-i] = A[3]"], ["A[4] = x", "A[4] = x*x"], ["B[4-i] =", "B[5-i] ="]];
+    verified_unless_changed(source, &changes);
+}
+
+/// The four copies of the inner loop have counts that differ by constants, so that a case of one decides all of them.
+#[test]
+fn counts_that_differ_by_constants_share_their_cases() {
+    let source = "\
+.schedule on\n.input x, z\n.output y\n.state s\n.preset s = 0.5\n.array A[12]\n.reg f g b:int\n.period\np:\n\
+ .for i, 1, 9 step 2\n .for j, 1, i unroll 4\n .for k, 1, j\n f = x*z + s\n A[12-k] = z*f\n g = f*z + s*f\n .endfor\n .endfor\n\
+ flt b, s, f\n bz b, skip\n y = g\nskip:\n .endfor\n s = x\n wait p\n";
+    let changes = [["A[12-k]", "A[13-k]"], [".for k, 1, j", ".for k, 1, j+1"], ["s*f", "s*x"]];
+    verified_unless_changed(source, &changes);
 }

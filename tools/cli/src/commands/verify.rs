@@ -231,7 +231,7 @@ impl CheckOutcome {
                     let places: Vec<String> = established.faults.iter().map(|at| self.place(*at)).collect();
                     writeln!(
                         out,
-                        "  not compared: paths that end in a fault of the source, at {} (if data lead there)",
+                        "  not compared: paths on which the source faults or leaves an array, at {} (if data lead there)",
                         places.join(", ")
                     )?;
                 }
