@@ -16,7 +16,7 @@ use crate::run::{Event, Side, World};
 use crate::term::{COPIES, Node, Term, Terms};
 use crate::{Difference, SectionTime};
 use foldhash::{HashMap, HashMapExt as _, HashSet, HashSetExt as _};
-use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::collections::{BTreeMap, BTreeSet};
 use takt_asm::plain::{PlainKind, PlainProgram};
 use takt_isa::Register;
 use takt_isa::program::Location;
@@ -25,6 +25,9 @@ use takt_isa::program::Location;
 const ARRIVING: u32 = u32::MAX;
 
 type Place = (u32, Vec<u32>, Vec<(u32, u32)>);
+
+/// Places of both programs in the order of their text, code of a subroutine where it is called.
+type Order = [Vec<u32>; 2];
 
 /// Limit on the nested cases of a visit.
 const MAX_CASES: usize = 24;
@@ -41,7 +44,6 @@ struct Cut {
     cells: Vec<Term>,
     /// Time of the image, if exactly one path leads here.
     clock: Option<Clock>,
-    queued: bool,
 }
 
 /// Result, while the check runs.
@@ -62,7 +64,8 @@ pub(crate) struct Relation<'a> {
     world: World<'a>,
     cuts: Vec<Cut>,
     numbers: HashMap<Key, usize>,
-    queue: VecDeque<usize>,
+    /// Cuts to visit. Earlier places come first, so that the facts in a loop settle before the code behind is visited.
+    queue: BTreeSet<(Order, usize)>,
     found: PartialReport,
     /// Last bundles of sections whose time depends on data.
     untimed: BTreeSet<u32>,
@@ -77,6 +80,11 @@ pub(crate) struct Relation<'a> {
 
 fn place(side: &Side<'_>) -> Place {
     (side.at, side.calls.clone(), side.loops.clone())
+}
+
+fn order(key: &Key) -> Order {
+    let called_from = |back: &u32| back.saturating_sub(1);
+    [&key.source, &key.image].map(|(at, calls, _)| calls.iter().map(called_from).chain([*at]).collect())
 }
 
 impl<'a> Relation<'a> {
@@ -102,7 +110,7 @@ impl<'a> Relation<'a> {
             },
             cuts: Vec::new(),
             numbers: HashMap::new(),
-            queue: VecDeque::new(),
+            queue: BTreeSet::new(),
             found: PartialReport::default(),
             untimed: BTreeSet::new(),
             layout,
@@ -134,7 +142,7 @@ impl<'a> Relation<'a> {
         self.compare_ports(&source, &image)?;
         image.clock = Some(Clock::new(image.at, self.world.machine.refill.into()));
         self.arrive(&mut source, &mut image, true);
-        while let Some(number) = self.queue.pop_front() {
+        while let Some((_, number)) = self.queue.pop_first() {
             self.visit(number)?;
         }
         self.compared.finish(self.source, self.image)?;
@@ -349,7 +357,6 @@ impl<'a> Relation<'a> {
 
     /// State of both programs at a cut, with its cells as registers.
     fn restore(&mut self, number: usize) -> (Side<'a>, Side<'a>) {
-        self.cuts[number].queued = false;
         let Cut { key, cells, clock, .. } = &self.cuts[number];
         self.world.terms.steps += cells.len() as u64 / COPIES;
         let mut cells = cells.iter().map(|cell| self.world.terms.restored(*cell));
@@ -400,8 +407,8 @@ impl<'a> Relation<'a> {
             let number = self.cuts.len();
             self.numbers.insert(key.clone(), number);
             let cells = common(terms, number as u32, &cells, &cells);
-            self.cuts.push(Cut { key, cells, clock: image.clock.take(), queued: true });
-            self.queue.push_back(number);
+            self.queue.insert((order(&key), number));
+            self.cuts.push(Cut { key, cells, clock: image.clock.take() });
             return;
         };
         let cut = &mut self.cuts[number];
@@ -413,9 +420,7 @@ impl<'a> Relation<'a> {
         }
         if joined != cut.cells || timed {
             cut.cells = joined;
-            if !std::mem::replace(&mut cut.queued, true) {
-                self.queue.push_back(number);
-            }
+            self.queue.insert((order(&cut.key), number));
         }
     }
 

@@ -42,3 +42,32 @@ fn an_image_that_never_ends_is_refused_at_the_limit() {
     assert!(difference.what.starts_with(&limit), "{}", difference.what);
     assert!(difference.place.is_some());
 }
+
+/// A loop in which each iteration takes the constant of one more register, before many branches: the check follows these once the loop's
+/// facts are settled, not after each iteration.
+#[test]
+fn code_behind_a_loop_is_checked_once_the_loop_is() {
+    use std::fmt::Write as _;
+    const SHIFTED: u32 = 16;
+    const BRANCHES: u32 = 40;
+    let mut text =
+        ".input x, n:int\n.output y\n.reg c:int\n.period\np: iand c, n, 15\n iadd c, c, 1\n".to_owned();
+    for k in 0..=SHIFTED {
+        let _ = writeln!(text, ".reg v{k}\n v{k} = {k}");
+    }
+    text += ".loop_bound 16\nagain:\n";
+    for k in (1..=SHIFTED).rev() {
+        let _ = writeln!(text, " mov v{k}, v{}", k - 1);
+    }
+    text += " v0 = x\n isub c, c, 1\n bnz c, again\n y = 0\n";
+    for k in 0..BRANCHES {
+        let _ = writeln!(text, " iand c, n, {}\n bz c, b{k}\n y = v{}*x\nb{k}:", 1 << (k % 31), k % SHIFTED);
+    }
+    text += " wait p\n";
+    let options = Options { machine: &T3, ..Options::default() };
+    let (assembled, plain) = build("a.s", &MemoryLoader::of("a.s", text), &options).expect("it assembles");
+    let found = check(&assembled, &plain).expect("it is its source");
+    assert!(found.cuts as u32 > 2 * BRANCHES, "{} cuts", found.cuts);
+    // Otherwise the check takes about 830,000.
+    assert!(found.steps < 400_000, "{} steps", found.steps);
+}
