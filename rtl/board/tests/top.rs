@@ -213,7 +213,7 @@ fn the_routed_design_does_the_same() {
     let venv =
         Venv::with(&venv, &build::packages(&board).expect("tools")).unwrap_or_else(|error| panic!("{error}"));
     let models = board.family.models.as_ref().expect("models of the cells");
-    let options = build::Options { seed: 1, netlist: true };
+    let options = build::Options { seed: 1, seeds: 1, time: None, netlist: true };
     std::fs::create_dir_all(&folder).expect("the target folder can be written");
     build::build(&venv, &board, &wiring, &first, options, &folder, &|_| ()).unwrap_or_else(|e| panic!("{e}"));
     let simulated = |change: &dyn Fn(&mut serde_json::Map<String, serde_json::Value>)| {

@@ -50,6 +50,7 @@ pub static FAMILY: Family = Family {
             "_LUT", "_MUX2", "_ALU", "_DFF", "_RAM16", "_MULT", "_SDP", "_DPB", "_SPX9", "_pROM", "$",
         ],
         places_any_pin: false,
+        timing: &[],
         measured: &MEASURED,
     }),
     pack: None,

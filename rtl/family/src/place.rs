@@ -22,6 +22,8 @@ pub struct Place {
     pub suffixes: &'static [&'static str],
     /// Ports without a given pin are placed at any free pin.
     pub places_any_pin: bool,
+    /// Arguments that weigh timing in the placement, for boards and for measurements.
+    pub timing: &'static [&'static str],
     /// Device on which cores are measured.
     pub measured: &'static MeasurementDevice,
 }

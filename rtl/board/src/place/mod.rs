@@ -177,8 +177,15 @@ pub fn statistics(folder: &Path) -> Result<Value, PlaceError> {
 pub fn arguments(place: &Place, part: &Part, grade: u8, mhz: u32, seed: u32, report: &str) -> Vec<String> {
     let mut arguments = (place.device)(part, place.measured.package, grade);
     let common = ["--json", NETLIST, "--timing-allow-fail", "--report", report, "-q"];
-    arguments
-        .extend(place.pins.iter().chain(place.measured.options).chain(&common).map(|&text| text.to_owned()));
+    arguments.extend(
+        place
+            .pins
+            .iter()
+            .chain(place.measured.options)
+            .chain(place.timing)
+            .chain(&common)
+            .map(|&text| text.to_owned()),
+    );
     let numbers = [("--freq", mhz), ("--seed", seed)];
     arguments.extend(numbers.into_iter().flat_map(|(name, number)| [name.to_owned(), number.to_string()]));
     arguments

@@ -52,6 +52,8 @@ pub static FAMILY: Family = Family {
         used: Some(["TRELLIS_COMB", "TRELLIS_FF", "MULT18X18D", "DP16KD"]),
         suffixes: &["_LUT4", "_CCU2C", "_TRELLIS", "_PFUMX", "_L6MUX", "_DPR16X4", "_DI", "_MULT18", "$"],
         places_any_pin: true,
+        // More weight on the longest paths than by default: 137.7 MHz instead of about 133 with t3's seed 1.
+        timing: &["--placer-heap-critexp", "4", "--placer-heap-timingweight", "20"],
         measured: &MEASURED,
     }),
     pack: Some(Pack {
@@ -104,14 +106,7 @@ LOCATE COMP \"serial_in\" SITE \"R18\";
 LOCATE COMP \"serial_out\" SITE \"U1\";
 ",
     ),
-    options: &[
-        "--lpf-allow-unconstrained",
-        // More weight on the longest paths than by default: 137.7 MHz instead of about 133 with t3's seed 1.
-        "--placer-heap-critexp",
-        "4",
-        "--placer-heap-timingweight",
-        "20",
-    ],
+    options: &["--lpf-allow-unconstrained"],
     // As yosys' `synth_ecp5` counts them (`add`, counted the same way, has 810 LUT4 and, placed, 814).
     units: &[("fused", 1635, 3), ("addmul", 945, 3), ("recurrence", 657, 0)],
 };

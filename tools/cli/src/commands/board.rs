@@ -21,6 +21,7 @@ use clap::{Args, Subcommand};
 use serde_json::json;
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 use takt_board::tools::Venv;
 use takt_board::{Application, Board, Findings, Mistake, Wiring};
 
@@ -81,9 +82,15 @@ struct Build {
     /// Output folder; created if it does not exist.
     #[arg(long, short, value_name = "DIR")]
     output: PathBuf,
-    /// Seed of the placement; another one may reach a higher clock.
-    #[arg(long, default_value_t = 1)]
+    /// First seed of the placement; another one may reach a higher clock.
+    #[arg(long, value_name = "S", default_value_t = 1)]
     seed: u32,
+    /// Seeds to try, as many at a time as there are processors, until the clock is met.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    seeds: u32,
+    /// Begin no further seed after this many minutes.
+    #[arg(long, value_name = "MINUTES", requires = "seeds")]
+    time: Option<u32>,
     /// Write the circuit and the pins only, without calling the tools.
     #[arg(long)]
     sources: bool,
@@ -92,6 +99,7 @@ struct Build {
 const BUILD: &str = "\
 Example:
   takt board build --wiring robot.toml --program robot.s -o out     on the board that robot.toml names
+  takt board build --wiring robot.toml --program robot.s --seeds 8 -o out   up to eight placements, until one meets the clock
   takt board build --board ulx3s-85f --wiring axis.toml --program system.toml -o out   several cores
   openFPGALoader --board ulx3s out/takt.bit";
 
@@ -340,13 +348,16 @@ fn build(arguments: &Build, color: bool, out: &mut Out) -> Result<()> {
     let packages = takt_board::build::packages(&board)?;
     step("tools");
     let venv = Venv::with(&tools_folder()?, &packages)?;
-    let options = takt_board::build::Options { seed: arguments.seed, netlist: false };
+    let time = arguments.time.map(|minutes| Duration::from_secs(60 * u64::from(minutes)));
+    let Build { seed, seeds, .. } = *arguments;
+    let options = takt_board::build::Options { seed, seeds, time, netlist: false };
     let report = takt_board::build::build(&venv, &board, &wiring, application, options, folder, &step)?;
     writeln!(out, "{}: {} bytes, for {}", folder.join(report.bitstream).display(), report.bytes, board.text)?;
     for (net, reached, needed) in &report.clocks {
         writeln!(
             out,
-            "clock {net}: {reached:.1} MHz, needed {needed:.1}: a margin of {:.1} %",
+            "clock {net}: {reached:.1} MHz with seed {}, needed {needed:.1}: a margin of {:.1} %",
+            report.seed,
             (reached / needed - 1.0) * 100.0
         )?;
     }
