@@ -38,6 +38,8 @@ pub enum SymbolKind {
     Data,
     /// Macro, declared by `.macro`.
     Macro,
+    /// Parameter that the host sets, declared by `.param`.
+    Tunable,
     /// A parameter of a macro.
     Parameter,
     /// The counter of a `.rep` or a `.for`.
@@ -58,6 +60,7 @@ impl SymbolKind {
             SymbolKind::Code => "code label",
             SymbolKind::Data => "data label",
             SymbolKind::Macro => "macro",
+            SymbolKind::Tunable => "tunable parameter",
             SymbolKind::Parameter => "parameter",
             SymbolKind::Count => "count of a repetition",
         }
@@ -244,6 +247,7 @@ impl Builder<'_> {
                 RegisterKind::Plain => Some(SymbolKind::Register),
                 RegisterKind::State => Some(SymbolKind::State),
                 RegisterKind::Input => Some(SymbolKind::Input),
+                RegisterKind::Parameter => Some(SymbolKind::Tunable),
                 RegisterKind::Output => Some(SymbolKind::Output),
                 RegisterKind::Constant(_) | RegisterKind::Zero => None,
             };

@@ -70,6 +70,8 @@ pub enum PlainKind {
     Input,
     /// Output port, which the host reads.
     Output,
+    /// Parameter: an input port that the host sets between periods.
+    Parameter,
 }
 
 /// Operations that execute together.
@@ -131,6 +133,7 @@ fn of(ir: &Ir, contract: Contract) -> PlainProgram {
         kind: match register.kind {
             RegisterKind::State => PlainKind::State,
             RegisterKind::Input => PlainKind::Input,
+            RegisterKind::Parameter => PlainKind::Parameter,
             RegisterKind::Output => PlainKind::Output,
             RegisterKind::Plain | RegisterKind::Constant(_) | RegisterKind::Zero => PlainKind::Plain,
         },

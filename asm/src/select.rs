@@ -132,7 +132,8 @@ impl SelectInstruction {
         let reads = operations.iter().flat_map(Operation::reads).copied();
         let may_be_unwritten = |register: &RegisterId| {
             let kind = ir.register(*register).kind;
-            let holds = matches!(kind, RegisterKind::Constant(_) | RegisterKind::Input | RegisterKind::Zero);
+            let holds =
+                kind.is_from_outside() || matches!(kind, RegisterKind::Constant(_) | RegisterKind::Zero);
             !holds && !written.contains(register) && !is_written(ir, runs, flow, index, *register)
         };
         if reads.collect::<Vec<_>>().iter().any(may_be_unwritten) {

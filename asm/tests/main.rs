@@ -20,6 +20,7 @@ mod limits;
 mod machine_files;
 mod memory;
 mod mistakes;
+mod parameters;
 mod pipeline;
 mod properties;
 mod random_source;

@@ -260,6 +260,10 @@ prop_compose! {
             let name = if register.get() % 3 == 0 { format!("m{register}") } else { format!("r.{register}_") };
             list.insert(0, Port { name, register, ty: types[ty] });
         }
+        // Parameters have a finite value at the start.
+        let mut constants = constants;
+        let parameters: Vec<Port> = inputs.extract_if(.., |port| port.register.get() % 3 == 1).collect();
+        constants.extend(parameters.iter().map(|port| (port.register, 0x3f00_0000 + u32::from(port.register.get()))));
         let mut symbols: Vec<Symbol> = labels.iter().enumerate().map(|(i, (code, index))| {
             let (space, end) = if *code { (Space::Code, bundles) } else { (Space::Data, data.len()) };
             Symbol { name: format!("label{i}"), space, address: index.index(end + 1) as u32 }
@@ -275,7 +279,7 @@ prop_compose! {
             _ => None,
         };
         let lines = (0..code.len()).map(|i| location(&lines[i])).collect();
-        let mut ranges: Vec<Range> = inputs.iter().filter(|port| port.ty != Type::B && port.register.get() % 2 == 0).map(|port| {
+        let mut ranges: Vec<Range> = inputs.iter().chain(&parameters).filter(|port| port.ty != Type::B && port.register.get() % 2 == 0).map(|port| {
             let (low, high) = if port.ty == Type::F { ((-1.5f32).to_bits(), 0.25f32.to_bits()) } else { ((-7i32).cast_unsigned(), 7) };
             Range { register: port.register, ty: port.ty, low, high }
         }).collect();
@@ -288,6 +292,7 @@ prop_compose! {
             constants: constants.into_iter().filter(|(register, _)| machine.register_name(*register).is_some()).collect(),
             inputs,
             outputs,
+            parameters,
             latched,
             registers,
             symbols,

@@ -133,6 +133,7 @@ fn period() -> Program {
         ranges: Vec::new(),
         loop_bounds: Vec::new(),
         parts: Vec::new(),
+        parameters: Vec::new(),
         latched: false,
         sections: Vec::new(),
         files: Vec::new(),

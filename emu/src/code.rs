@@ -178,7 +178,8 @@ fn check(program: &Program) -> Result<(), LoadError> {
     }
     let inputs = program.inputs.iter().map(|port| (port, "input", machine.is_input(port.register)));
     let outputs = program.outputs.iter().map(|port| (port, "output", machine.is_output(port.register)));
-    for (port, kind, exists) in inputs.chain(outputs) {
+    let parameters = program.parameters.iter().map(|port| (port, "input", machine.is_input(port.register)));
+    for (port, kind, exists) in inputs.chain(outputs).chain(parameters) {
         if !exists {
             let (name, register) = (port.name.clone(), port.register);
             return Err(LoadError::Port { name, register, machine: machine.name, kind });

@@ -6,7 +6,7 @@ use crate::event::{Event, PortWrite};
 use crate::fault::Fault;
 use std::collections::VecDeque;
 use std::num::NonZeroU64;
-use takt_isa::program::Port;
+use takt_isa::program::{ParameterError, Port};
 use takt_isa::timing::{self, Cycle};
 use takt_isa::{BundleAddress, Program, Register, Type};
 
@@ -231,6 +231,9 @@ pub enum PortError {
         /// Number of the batch's lanes.
         lanes: usize,
     },
+    /// The program has no such parameter, or its parameter may not have this value.
+    #[error(transparent)]
+    Parameter(#[from] ParameterError),
     /// The machine has no input port at this address.
     #[error("register address {register} is not an input port")]
     NoInput {
@@ -308,6 +311,21 @@ impl Emulator {
             return Err(PortError::NoInput { register });
         }
         self.state.set_input(register, bits);
+        Ok(())
+    }
+
+    /// Sets a parameter, as [`Emulator::set_input`] sets an input port; between two periods, the next period reads the value.
+    ///
+    /// # Errors
+    /// If the program has no such parameter, the value has another type, is not finite, or lies outside of the range in the source.
+    pub fn set_parameter(&mut self, name: &str, value: Number) -> Result<(), PortError> {
+        let parameter = self.program.parameter(name)?;
+        if !value.fits(parameter.ty) {
+            return Err(PortError::Type { name: name.to_owned(), ty: parameter.ty });
+        }
+        self.program.check_parameter(parameter, value.bits())?;
+        let register = parameter.register;
+        self.state.set_input(register, value.bits());
         Ok(())
     }
 

@@ -307,6 +307,7 @@ impl Generator {
             loop_bounds: self.loop_bounds,
             ranges: Vec::new(),
             parts: Vec::new(),
+            parameters: Vec::new(),
             latched: false,
             sections: vec![section("once", 0, period), section("period", period, end)],
             files: Vec::new(),

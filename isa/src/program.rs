@@ -24,6 +24,9 @@ pub struct Program {
     pub inputs: Vec<Port>,
     /// Output ports, in the order of their declaration.
     pub outputs: Vec<Port>,
+    /// Parameters, in the order of their declaration: input ports that keep their value, at first that of [`Program::constants`], until
+    /// the host sets another between two periods.
+    pub parameters: Vec<Port>,
     /// Ports are latched: inputs are taken together at the tick, outputs published together at `wait`.
     pub latched: bool,
     /// Registers that the source names.
@@ -151,6 +154,15 @@ impl Range {
         (value(self.low), value(self.high))
     }
 
+    /// The value with these bits lies in the range. A NaN lies in none.
+    pub fn holds(&self, bits: u32) -> bool {
+        let (low, high) = self.ends();
+        match self.ty {
+            Type::F => (low..=high).contains(&f64::from(f32::from_bits(bits))),
+            Type::I | Type::B => (low..=high).contains(&f64::from(bits.cast_signed())),
+        }
+    }
+
     /// The reason why the range is invalid; `None` if it is valid.
     pub fn mistake(&self) -> Option<&'static str> {
         let (low, high) = self.ends();
@@ -183,7 +195,94 @@ pub enum IllegalWord {
     Placement(#[from] PlacementError),
 }
 
+/// Reason why a parameter cannot have a value.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ParameterError {
+    /// The program has no parameter with this name.
+    #[error("the program has no parameter `{name}`; there are {}", if .known.is_empty() { "none" } else { .known })]
+    Unknown {
+        /// Name in the request.
+        name: String,
+        /// Names of the parameters, separated by commas.
+        known: String,
+    },
+    /// The value is not finite, or lies outside of the range that the source states.
+    #[error("{value} is no value of the parameter `{name}`: {range}")]
+    Outside {
+        /// Name of the parameter.
+        name: String,
+        /// Value in the request.
+        value: String,
+        /// Range of the parameter in words.
+        range: String,
+    },
+}
+
 impl Program {
+    /// Parameter with a name.
+    ///
+    /// # Errors
+    /// If the program has none.
+    pub fn parameter(&self, name: &str) -> Result<&Port, ParameterError> {
+        self.parameters.iter().find(|port| port.name == name).ok_or_else(|| {
+            let known: Vec<String> = self.parameters.iter().map(|port| format!("`{}`", port.name)).collect();
+            ParameterError::Unknown { name: name.to_owned(), known: known.join(", ") }
+        })
+    }
+
+    /// Range that the source states for a register.
+    pub fn range(&self, register: Register) -> Option<&Range> {
+        self.ranges.iter().find(|range| range.register == register)
+    }
+
+    /// Bits that the loader writes to a register.
+    pub fn initial(&self, register: Register) -> Option<u32> {
+        self.constants.iter().find(|(known, _)| *known == register).map(|(_, bits)| *bits)
+    }
+
+    /// Checks that a parameter may have a value: finite, and in the range of the source.
+    ///
+    /// # Errors
+    /// If it may not.
+    pub fn check_parameter(&self, parameter: &Port, bits: u32) -> Result<(), ParameterError> {
+        let value = match parameter.ty {
+            Type::F => f64::from(f32::from_bits(bits)),
+            Type::I | Type::B => f64::from(bits.cast_signed()),
+        };
+        let range = match self.range(parameter.register) {
+            _ if !value.is_finite() => "parameters are finite".to_owned(),
+            Some(range) if !range.holds(bits) => {
+                let (low, high) = range.ends();
+                format!("the source states the range {low} to {high}")
+            }
+            _ => return Ok(()),
+        };
+        Err(ParameterError::Outside { name: parameter.name.clone(), value: value.to_string(), range })
+    }
+
+    /// Checks a value for a register: if it is a parameter's, [`Program::check_parameter`] holds.
+    ///
+    /// # Errors
+    /// If it may not have the value.
+    pub fn check_register(&self, register: Register, bits: u32) -> Result<(), ParameterError> {
+        let parameter = self.parameters.iter().find(|port| port.register == register);
+        parameter.map_or(Ok(()), |parameter| self.check_parameter(parameter, bits))
+    }
+
+    /// Sets the value of a parameter at the start.
+    ///
+    /// # Errors
+    /// If the program has no such parameter, or the parameter may not have the value.
+    pub fn set_parameter(&mut self, name: &str, bits: u32) -> Result<(), ParameterError> {
+        let parameter = self.parameter(name)?;
+        let register = parameter.register;
+        self.check_parameter(parameter, bits)?;
+        for (_, value) in self.constants.iter_mut().filter(|(known, _)| *known == register) {
+            *value = bits;
+        }
+        Ok(())
+    }
+
     /// The number of input ports that the circuit must latch: the least power of two above the highest port number that the
     /// program declares or reads; 0 if its ports are not latched.
     pub fn latched_inputs(&self) -> u16 {
@@ -192,7 +291,7 @@ impl Program {
         }
         let instructions = self.code.iter().filter_map(|&word| Instruction::decode(word).ok());
         let read = instructions.flat_map(|instruction| instruction.reads().to_vec());
-        let declared = self.inputs.iter().map(|port| port.register);
+        let declared = self.host_registers().map(|port| port.register);
         let numbers = read.chain(declared).filter_map(|register| self.machine.input_number(register));
         // At least two: a multiplexer needs more than one input.
         numbers.max().map_or(2, |last| (last + 1).next_power_of_two().max(2))
@@ -293,12 +392,19 @@ impl Program {
         self.word_place(address.index() * self.machine.slots.len() + slot.index())
     }
 
+    /// Registers that the host sets: input ports, then parameters.
+    pub fn host_registers(&self) -> impl Iterator<Item = &Port> + Clone {
+        self.inputs.iter().chain(&self.parameters)
+    }
+
+    /// Registers that the source names: input ports, parameters, output ports, then the program's own.
+    pub fn named_registers(&self) -> impl Iterator<Item = &Port> + Clone {
+        self.host_registers().chain(&self.outputs).chain(&self.registers)
+    }
+
     /// The source's name for a register (a port or a named register), or else its canonical name.
     pub fn register_text(&self, register: Register) -> String {
-        self.outputs
-            .iter()
-            .chain(&self.inputs)
-            .chain(&self.registers)
+        self.named_registers()
             .find(|port| port.register == register)
             .map(|port| port.name.clone())
             .or_else(|| self.machine.register_name(register))

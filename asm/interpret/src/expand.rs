@@ -248,6 +248,15 @@ impl Interpreter {
                 let name = self.spelled(name.name, scope)?;
                 owner.bind(&name, Meaning::Number(number));
             }
+            DirectiveKind::Param { declaration, values, .. } => {
+                let ([value], (_, 0)) = (&values[..], declaration.sizes) else {
+                    return Err("arrays of parameters are not known".to_owned());
+                };
+                self.register(DeclarationKind::Parameter, declaration, scope, &owner)?;
+                let Name { name, span } = declaration.name;
+                let register = Operand { kind: OperandKind::Name(name), span };
+                self.presets.push((register, *value, Rc::clone(scope)));
+            }
             DirectiveKind::Preset { register, placed: false, value } => {
                 self.presets.push((*register, *value, Rc::clone(scope)));
             }
@@ -354,7 +363,7 @@ impl Interpreter {
         match what {
             DeclarationKind::Input => self.inputs.extend(first..self.cells.len()),
             DeclarationKind::Output => self.outputs.extend(first..self.cells.len()),
-            DeclarationKind::Register | DeclarationKind::State => {}
+            DeclarationKind::Register | DeclarationKind::State | DeclarationKind::Parameter => {}
         }
         owner.bind(
             &name,

@@ -232,7 +232,8 @@ fn unused(context: &mut Context, register: &VirtualRegister, found: &Use) {
         RegisterKind::Zero | RegisterKind::Constant(_) => return,
         RegisterKind::Input if !read => format!("input `{name}` is never read"),
         RegisterKind::Output if !written => format!("output `{name}` is never written"),
-        RegisterKind::Input | RegisterKind::Output => return,
+        RegisterKind::Parameter if !read => format!("parameter `{name}` is never read"),
+        RegisterKind::Input | RegisterKind::Output | RegisterKind::Parameter => return,
         RegisterKind::Plain | RegisterKind::State => match (read, written) {
             (true, _) => return,
             (false, false) => format!("register `{name}` is never used"),

@@ -177,6 +177,7 @@ impl Declarations {
         match binding {
             Binding::Register(id) => match self.registers[id.index()].kind {
                 RegisterKind::Input => "an input port",
+                RegisterKind::Parameter => "a parameter that the host sets",
                 RegisterKind::Output => "an output port",
                 RegisterKind::Zero => "the register that always reads as zero",
                 _ => "a register",

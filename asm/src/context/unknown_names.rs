@@ -167,7 +167,8 @@ impl Context {
             (_, Binding::Array(_)) => false,
             (_, Binding::Argument(_)) => true,
             (NameRole::Dest | NameRole::Left, Binding::Register(id)) => {
-                !matches!(self.declared.registers[id.index()].kind, RegisterKind::Input | RegisterKind::Zero)
+                let kind = self.declared.registers[id.index()].kind;
+                !kind.is_from_outside() && kind != RegisterKind::Zero
             }
             (NameRole::Dest | NameRole::Left, _) => false,
             (NameRole::Source, Binding::Code(_)) => false,

@@ -37,7 +37,7 @@ impl Window {
     fn of(bank: &Bank, kind: RegisterKind, outputs: u16) -> Window {
         let split = bank.base + bank.depth - outputs.min(bank.depth);
         match kind {
-            RegisterKind::Input => {
+            RegisterKind::Input | RegisterKind::Parameter => {
                 Window { first: bank.base, end: (bank.base + bank.depth).min(Register::ZERO.get()) }
             }
             _ => Window { first: bank.base, end: split },
@@ -206,21 +206,23 @@ fn pressure_with(ir: &Ir, runs: &[Run], close: bool, sink: &mut Sink) -> Pressur
     let is_constant = |index: &usize| {
         let register: &VirtualRegister = &ir.registers[*index];
         matches!(register.kind, RegisterKind::Constant(_))
-            || (register.kind != RegisterKind::Input && writer[*index].is_none())
+            || (!register.kind.is_from_outside() && writer[*index].is_none())
     };
     let wanted = (0..ir.registers.len()).filter(|index| {
         let register = &ir.registers[*index];
         addresses[*index].is_none()
             && ranges[*index].is_none()
             && register.kind != RegisterKind::Output
-            && (used[*index] || register.kind == RegisterKind::Input || register.preset.is_some())
+            && (used[*index] || register.kind.is_from_outside() || register.preset.is_some())
     });
-    let (constants, registers): (Vec<usize>, Vec<usize>) = wanted.partition(is_constant);
+    let (constants, mut registers): (Vec<usize>, Vec<usize>) = wanted.partition(is_constant);
+    // Parameters come behind the inputs: a new one leaves the inputs' numbers alone.
+    registers.sort_by_key(|index| ir.registers[*index].kind == RegisterKind::Parameter);
     let mut missing: Vec<(usize, Option<SlotIndex>)> = Vec::new();
     for index in registers {
         let kind = ir.registers[index].kind;
         let (bank, slot) = match (kind, writer[index]) {
-            (RegisterKind::Input, _) => (&machine.inputs, None),
+            (RegisterKind::Input | RegisterKind::Parameter, _) => (&machine.inputs, None),
             (_, slot) => (&machine.slot(slot.unwrap_or(SlotIndex::FIRST)).bank, slot),
         };
         match space.take(Window::of(bank, kind, machine.outputs_per_bank)) {

@@ -66,6 +66,7 @@ pub(crate) fn emit(ir: &mut Ir, allocation: &Allocation, sink: &mut Sink) -> Emi
         constants: constants(ir, allocation),
         inputs: ports(ir, allocation, |kind| kind == RegisterKind::Input),
         outputs: ports(ir, allocation, |kind| kind == RegisterKind::Output),
+        parameters: ports(ir, allocation, |kind| kind == RegisterKind::Parameter),
         latched: ir.latched,
         registers: ports(ir, allocation, |kind| matches!(kind, RegisterKind::Plain | RegisterKind::State)),
         symbols: symbols(std::mem::take(&mut ir.labels)),
@@ -209,11 +210,12 @@ fn ranges(ir: &Ir, allocation: &Allocation) -> Vec<Range> {
 /// Makes all names unique and short enough. Only names made by the assembler, of a macro's locals and of values split from a name,
 /// can collide or be too long.
 fn distinguish(program: &mut Program) {
-    let count =
-        program.inputs.len() + program.outputs.len() + program.registers.len() + program.symbols.len();
+    let count = program.named_registers().count() + program.symbols.len();
     let mut all: HashSet<&str> = HashSet::with_capacity(count);
-    let ports = program.inputs.iter().chain(&program.outputs).chain(&program.registers);
-    let listed = ports.map(|port| &port.name).chain(program.symbols.iter().map(|symbol| &symbol.name));
+    let listed = program
+        .named_registers()
+        .map(|port| &port.name)
+        .chain(program.symbols.iter().map(|symbol| &symbol.name));
     all.extend(listed.filter(|name| name.len() <= NAME_BYTES).map(String::as_str));
     if all.len() == count {
         return;
@@ -221,8 +223,9 @@ fn distinguish(program: &mut Program) {
     // Names without a point come from the source and are kept; names with a point are changed.
     let mut taken: HashSet<String> =
         all.into_iter().filter(|name| !name.contains('.')).map(str::to_owned).collect();
-    let Program { inputs, outputs, registers, symbols, .. } = program;
-    let ports = inputs.iter_mut().chain(outputs).chain(registers).map(|port| &mut port.name);
+    let Program { inputs, outputs, parameters, registers, symbols, .. } = program;
+    let ports =
+        inputs.iter_mut().chain(outputs).chain(parameters).chain(registers).map(|port| &mut port.name);
     for name in ports.chain(symbols.iter_mut().map(|symbol| &mut symbol.name)) {
         if !name.contains('.') || (name.len() <= NAME_BYTES && taken.insert(name.clone())) {
             continue;

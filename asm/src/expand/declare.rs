@@ -68,12 +68,7 @@ impl Expander<'_> {
         id: NameId,
     ) -> Result<(), ErrorReported> {
         let span = declaration.name.span;
-        let kind = match what {
-            DeclarationKind::Register => RegisterKind::Plain,
-            DeclarationKind::State => RegisterKind::State,
-            DeclarationKind::Input => RegisterKind::Input,
-            DeclarationKind::Output => RegisterKind::Output,
-        };
+        let kind = kind_of(what);
         let register = RegisterId::new(self.context.declared.registers.len());
         self.context.declare(at, id, span, Binding::Register(register))?;
         // From here on the name is known: a mistake in its type or place is reported, and the declaration stands.
@@ -107,12 +102,7 @@ impl Expander<'_> {
         let Name { name, span } = declaration.name;
         let id = self.context.name(at, name, span)?;
         let text = self.context.scopes.full_name(at.scope, id);
-        let kind = match what {
-            DeclarationKind::Register => RegisterKind::Plain,
-            DeclarationKind::State => RegisterKind::State,
-            DeclarationKind::Input => RegisterKind::Input,
-            DeclarationKind::Output => RegisterKind::Output,
-        };
+        let kind = kind_of(what);
         // With a place, one element is declared: disassembly writes arrays like this.
         if declaration.place.is_some() {
             let mut indices = Vec::with_capacity(sizes.len());
@@ -329,7 +319,7 @@ impl Expander<'_> {
     ) -> Result<(), ErrorReported> {
         let machine = self.context.machine;
         let (what, count) = match self.context.declared.registers[register.index()].kind {
-            RegisterKind::Input => ("input", machine.input_count()),
+            RegisterKind::Input | RegisterKind::Parameter => ("input", machine.input_count()),
             RegisterKind::Output => ("output", machine.outputs_per_bank),
             _ => {
                 let error = Diagnostic::error(
@@ -556,7 +546,7 @@ impl Expander<'_> {
             _ if address == Register::ZERO => {
                 Some("`zero` is never written: nothing can be placed there".to_owned())
             }
-            RegisterKind::Input if !machine.is_input(address) => {
+            RegisterKind::Input | RegisterKind::Parameter if !machine.is_input(address) => {
                 Some(format!("`{place}` is not an input port"))
             }
             RegisterKind::Output if !machine.is_output(address) => {
@@ -588,6 +578,17 @@ impl Expander<'_> {
         self.context.declared.by_address.insert(address, register);
         self.context.declared.registers[register.index()].pinned = Some(address);
         Ok(())
+    }
+}
+
+/// Kind of the registers that a directive declares.
+fn kind_of(what: DeclarationKind) -> RegisterKind {
+    match what {
+        DeclarationKind::Register => RegisterKind::Plain,
+        DeclarationKind::State => RegisterKind::State,
+        DeclarationKind::Input => RegisterKind::Input,
+        DeclarationKind::Output => RegisterKind::Output,
+        DeclarationKind::Parameter => RegisterKind::Parameter,
     }
 }
 

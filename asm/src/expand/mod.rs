@@ -23,7 +23,7 @@ use crate::expand::equation::{Piece, Step};
 use crate::expand::files::FileId;
 use crate::expand::load::{Loader, include_path};
 use crate::expand::loops::{CountedLoop, ForDirective, LoopNote, Pass};
-use crate::ir::{Label, LabelId};
+use crate::ir::{Label, LabelId, RegisterId};
 use crate::limits;
 use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
@@ -107,6 +107,17 @@ pub(crate) struct Preset {
     pub(crate) span: Span,
 }
 
+/// A `.param` directive, with its scope.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Parameters {
+    pub(crate) at: AstPlace,
+    pub(crate) directive: u32,
+    /// First register that the directive declares; the other elements of an array follow it.
+    pub(crate) first: RegisterId,
+    /// Number of registers; 1 unless an array is declared.
+    pub(crate) count: usize,
+}
+
 /// A `.deadline`, `.order` or `.late`: the directive, and the section that it applies to.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Timing {
@@ -127,6 +138,7 @@ pub(crate) struct ExpandedSource {
     pub(crate) loop_notes: Vec<LoopNote>,
     pub(crate) data: Vec<Data>,
     pub(crate) presets: Vec<Preset>,
+    pub(crate) parameters: Vec<Parameters>,
     pub(crate) loop_bounds: Vec<LoopBound>,
     pub(crate) timing: Vec<Timing>,
     /// Each `.range`: its scope, and the directive.
@@ -233,6 +245,7 @@ impl<'l> Expander<'l> {
             loop_notes: Vec::new(),
             data: Vec::new(),
             presets: Vec::new(),
+            parameters: Vec::new(),
             loop_bounds: Vec::new(),
             timing: Vec::new(),
             ranges: Vec::new(),
@@ -544,6 +557,14 @@ impl<'l> Expander<'l> {
                 }
             }
             DirectiveKind::Const(name, value) => self.constant(at, name, value)?,
+            DirectiveKind::Param { declaration, .. } => {
+                let first = RegisterId::new(self.context.declared.registers.len());
+                self.declare_all(at, ast, DeclarationKind::Parameter, std::slice::from_ref(declaration));
+                let count = self.context.declared.registers.len() - first.index();
+                if count > 0 {
+                    self.flat.parameters.push(Parameters { at, directive, first, count });
+                }
+            }
             DirectiveKind::Preset { register, placed, value } => {
                 // Registers may be declared further down.
                 let (register, placed, value) = (*register, *placed, *value);

@@ -67,12 +67,21 @@ pub enum RegisterKind {
     State,
     /// An input port: written from outside, at the tick.
     Input,
+    /// A parameter: an input port that changes only between two periods.
+    Parameter,
     /// An output port: read from outside.
     Output,
     /// Holds these bits from the start; nothing writes it.
     Constant(u32),
     /// Always reads as zero.
     Zero,
+}
+
+impl RegisterKind {
+    /// The host writes the register, and the program does not.
+    pub const fn is_from_outside(self) -> bool {
+        matches!(self, RegisterKind::Input | RegisterKind::Parameter)
+    }
 }
 
 /// A register of the source, before it has a place in the machine.

@@ -45,6 +45,25 @@ struct Writer<'p> {
     filler: u64,
 }
 
+/// Type of a declaration as the source writes it.
+fn type_suffix(ty: Type) -> &'static str {
+    match ty {
+        Type::F => "",
+        Type::I => ":int",
+        Type::B => ":bits",
+    }
+}
+
+/// A value that reads back as the same bits.
+fn value_text(ty: Type, bits: u32) -> String {
+    let value = f32::from_bits(bits);
+    match ty {
+        Type::F => format!("{value:?}"),
+        Type::I => bits.cast_signed().to_string(),
+        Type::B => format!("0x{bits:08x}"),
+    }
+}
+
 /// The line that names the machine: a directive if other tools find it by that name.
 fn machine(machine: &Machine) -> String {
     match Machine::from_name(machine.name) {
@@ -62,7 +81,6 @@ fn machine(machine: &Machine) -> String {
 
 impl<'p> Writer<'p> {
     fn new(program: &'p Program) -> Writer<'p> {
-        let ports = program.inputs.iter().chain(&program.outputs).chain(&program.registers);
         let mut targets = HashMap::new();
         for symbol in program.symbols.iter().filter(|symbol| symbol.space == Space::Code) {
             targets.entry(BundleAddress::new(symbol.address)).or_insert(symbol.name.as_str());
@@ -70,7 +88,7 @@ impl<'p> Writer<'p> {
         Writer {
             program,
             text: machine(program.machine),
-            registers: ports.map(|port| (port.register, port.name.as_str())).collect(),
+            registers: program.named_registers().map(|port| (port.register, port.name.as_str())).collect(),
             targets,
             filler: Instruction::NOP.encode().unwrap_or(0),
         }
@@ -87,29 +105,32 @@ impl<'p> Writer<'p> {
     }
 
     fn declarations(&mut self) {
-        let Program { inputs, outputs, registers, constants, files, latched, .. } = self.program;
+        let Program { inputs, outputs, parameters, registers, constants, files, latched, .. } = self.program;
         if *latched {
             self.line(format_args!(".ports  latched"));
         }
         for (directive, ports) in [(".input", inputs), (".output", outputs), (".reg", registers)] {
             for Port { name, register, ty } in ports {
-                let ty = match ty {
-                    Type::F => "",
-                    Type::I => ":int",
-                    Type::B => ":bits",
-                };
+                let ty = type_suffix(*ty);
                 let place = self.place(*register);
                 self.line(format_args!("{directive:<8}{name}{ty} @ {place}"));
             }
         }
-        for (register, bits) in constants {
+        for Port { name, register, ty } in parameters {
+            let (suffix, place) = (type_suffix(*ty), self.place(*register));
+            let bits =
+                constants.iter().find(|constant| constant.0 == *register).map_or(0, |constant| constant.1);
+            self.line(format_args!(".param  {name}{suffix} @ {place} = {}", value_text(*ty, bits)));
+        }
+        let is_parameter = |register| parameters.iter().any(|port| port.register == register);
+        for (register, bits) in constants.iter().filter(|(register, _)| !is_parameter(*register)) {
             let place = self.place(*register);
             let value = f32::from_bits(*bits);
             self.line(format_args!(".preset @{place} = 0x{bits:08x}  ; {value:?}"));
         }
         for range in &self.program.ranges {
             // Elements are named by their place, and a place has no type.
-            let named = inputs.iter().chain(outputs).chain(registers).find(|port| {
+            let named = self.program.named_registers().find(|port| {
                 port.register == range.register && port.ty == range.ty && !port.name.contains('[')
             });
             let name =

@@ -197,7 +197,7 @@ impl<'a> Lister<'a> {
     /// The source's name of a register, or the value of the constant that it holds.
     fn register(&self, register: takt_isa::Register) -> String {
         let constants = &self.program.constants;
-        let named = self.program.registers.iter().any(|port| port.register == register);
+        let named = self.program.named_registers().any(|port| port.register == register);
         match constants.binary_search_by_key(&register, |constant| constant.0) {
             Ok(index) if !named => bits_text(constants[index].1),
             _ => self.program.register_text(register),
@@ -244,6 +244,8 @@ pub struct SymbolMap {
     pub inputs: Vec<Register>,
     /// Output ports of the program.
     pub outputs: Vec<Register>,
+    /// Parameters in the order of their declaration.
+    pub parameters: Vec<Register>,
     /// Registers with a name.
     pub registers: Vec<Register>,
     /// Constants with a name.
@@ -289,7 +291,7 @@ pub struct Constant {
 
 /// The symbol map of an assembled program.
 pub fn symbol_map(assembled: &AssembledProgram) -> SymbolMap {
-    let Program { machine, symbols, inputs, outputs, registers, .. } = &assembled.program;
+    let Program { machine, symbols, inputs, outputs, parameters, registers, .. } = &assembled.program;
     let label = |symbol: &takt_isa::program::Symbol| Label {
         name: symbol.name.clone(),
         space: symbol.space,
@@ -310,6 +312,7 @@ pub fn symbol_map(assembled: &AssembledProgram) -> SymbolMap {
         labels: symbols.iter().map(label).collect(),
         inputs: list(inputs),
         outputs: list(outputs),
+        parameters: list(parameters),
         registers: list(registers),
         constants: assembled.constants.iter().map(constant).collect(),
     }
@@ -318,7 +321,13 @@ pub fn symbol_map(assembled: &AssembledProgram) -> SymbolMap {
 impl std::fmt::Display for SymbolMap {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let names = self.labels.iter().map(|label| label.name.len());
-        let ports = self.inputs.iter().chain(&self.outputs).chain(&self.registers);
+        let lists = [
+            ("input", &self.inputs),
+            ("output", &self.outputs),
+            ("param", &self.parameters),
+            ("register", &self.registers),
+        ];
+        let ports = lists.iter().flat_map(|(_, list)| *list);
         let names = names.chain(ports.map(|register| register.name.len()));
         let width =
             names.chain(self.constants.iter().map(|constant| constant.name.len())).max().unwrap_or(0) + 2;
@@ -326,9 +335,7 @@ impl std::fmt::Display for SymbolMap {
             let space = if label.space == Space::Code { "code" } else { "data" };
             writeln!(f, "label     {:<width$}{space} {:04x}", label.name, label.address)?;
         }
-        for (what, list) in
-            [("input", &self.inputs), ("output", &self.outputs), ("register", &self.registers)]
-        {
+        for (what, list) in lists {
             for register in list {
                 let ty = register.ty.name();
                 let what = register.number.map_or(what.to_owned(), |number| format!("{what} {number}"));

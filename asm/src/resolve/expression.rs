@@ -602,10 +602,14 @@ impl Resolver<'_> {
         Ok(Term { form: TermForm::Register(register, result), span: here.0 })
     }
 
+    /// Input port that may change within a period.
     fn is_input(&self, id: RegisterId) -> bool {
         let register = &self.context.declared.registers[id.index()];
-        register.kind == RegisterKind::Input
-            || register.pinned.is_some_and(|address| self.ir.machine.is_input(address))
+        match register.kind {
+            RegisterKind::Input => true,
+            RegisterKind::Parameter => false,
+            _ => register.pinned.is_some_and(|address| self.ir.machine.is_input(address)),
+        }
     }
 
     /// The types of the terms fit an instruction.

@@ -24,7 +24,7 @@ mod term;
 use crate::capacity;
 use crate::context::{AstPlace, Binding, Context, ErrorReported, ScopeId};
 use crate::expand::load::Loader;
-use crate::expand::{self, Data, ExpandedSource, Item, Part, Timing};
+use crate::expand::{self, Data, ExpandedSource, Item, Parameters, Part, Timing};
 use crate::ir::type_evidence::{self, Kind};
 use crate::ir::{
     Attribution, Bundle, Constant, Demand, DemandKind, Ir, Label, LabelId, LoopBound, Operation, RegisterId,
@@ -111,6 +111,7 @@ pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: Expanded
     resolver.insert();
     resolver.entered();
     resolver.data();
+    resolver.parameters();
     resolver.presets();
     resolver.ranges();
     for timing in std::mem::take(&mut resolver.flat.timing) {
@@ -599,6 +600,78 @@ impl Resolver<'_> {
         self.context.report(at.scope, error)
     }
 
+    /// Values and ranges of the parameters.
+    fn parameters(&mut self) {
+        for parameters in std::mem::take(&mut self.flat.parameters) {
+            // Errors have been reported.
+            let _ = self.parameter(parameters);
+        }
+    }
+
+    fn parameter(
+        &mut self,
+        Parameters { at, directive, first, count }: Parameters,
+    ) -> Result<(), ErrorReported> {
+        let ast = Rc::clone(&self.context.asts[at.ast as usize]);
+        let DirectiveKind::Param { declaration, values, range } = &ast.directives[directive as usize].kind
+        else {
+            return Err(ErrorReported);
+        };
+        let ty = self.context.declared.registers[first.index()].ty;
+        let members = (first.index()..first.index() + count).map(RegisterId::new);
+        if values.len() != 1 && values.len() != count {
+            let span = values[0].span.to(values[values.len() - 1].span);
+            let name = self.context.reports.sources.text(declaration.name.span).to_owned();
+            let message = format!("`{name}` has {count} elements, and these are {} values", values.len());
+            let error = Diagnostic::error("array", span, message)
+                .help("give one value for all elements, or one for each, the last index counting fastest");
+            return Err(self.context.report(at.scope, error));
+        }
+        let mut bits = |expr: &Expr| {
+            let value = self.context.value(at, expr.id)?;
+            let bits = self.bits(at, value, ty, (*expr).into())?;
+            if ty == Type::F && !f32::from_bits(bits).is_finite() {
+                return Err(self.context.error(
+                    at.scope,
+                    "range",
+                    expr.span,
+                    "a parameter's value is finite",
+                ));
+            }
+            Ok(bits)
+        };
+        let given = values.iter().map(&mut bits).collect::<Result<Vec<u32>, _>>()?;
+        let ends = match range {
+            Some((_, least, largest)) => Some([bits(least)?, bits(largest)?]),
+            None => None,
+        };
+        for (register, value) in members.clone().zip(given.iter().cycle()) {
+            self.context.declared.registers[register.index()].preset = Some(*value);
+        }
+        let (Some((word, least, largest)), Some([low, high])) = (range, ends) else { return Ok(()) };
+        let id = self.context.spelled(at, word.name, word.span)?;
+        if self.context.scopes.text(id) != "range" {
+            let message = "behind a parameter's value stands `range`, as in `range 0..50`";
+            return Err(self.context.error(at.scope, "syntax", word.span, message));
+        }
+        let span = least.span.to(largest.span);
+        let range = Range { register: Register::ZERO, ty, low, high };
+        if let Some(mistake) = range.mistake() {
+            let message = format!("this range is invalid: {mistake}");
+            return Err(self.context.error(at.scope, "range", span, message));
+        }
+        for (value, expr) in given.iter().zip(values) {
+            if !range.holds(*value) {
+                let error =
+                    Diagnostic::error("range", expr.span, "the value at the start lies outside of the range")
+                        .also(span, "the range");
+                return Err(self.context.report(at.scope, error));
+            }
+        }
+        self.ir.ranges.extend(members.map(|register| (register, [low, high])));
+        Ok(())
+    }
+
     fn presets(&mut self) {
         let mut seen: HashMap<RegisterId, Span> = HashMap::default();
         for preset in std::mem::take(&mut self.flat.presets) {
@@ -608,6 +681,11 @@ impl Resolver<'_> {
             let Ok((members, ty)) = found else { continue };
             let Ok(bits) = self.bits(preset.at, value, ty, preset.value.into()) else { continue };
             for register in members {
+                if self.context.declared.registers[register.index()].kind == RegisterKind::Parameter {
+                    let message = "`.param` states a parameter's value at the start";
+                    self.context.error(preset.at.scope, "declared-twice", preset.span, message);
+                    break;
+                }
                 if let Some(first) = seen.insert(register, preset.span) {
                     let message = "this register is preset already";
                     let error = Diagnostic::error("declared-twice", preset.span, message)
@@ -621,7 +699,10 @@ impl Resolver<'_> {
     }
 
     fn ranges(&mut self) {
-        let mut seen: HashMap<RegisterId, Span> = HashMap::default();
+        let declared = |(register, _): &(RegisterId, [u32; 2])| {
+            (*register, self.context.declared.registers[register.index()].span)
+        };
+        let mut seen: HashMap<RegisterId, Span> = self.ir.ranges.iter().map(declared).collect();
         for (at, directive) in std::mem::take(&mut self.flat.ranges) {
             let ast = Rc::clone(&self.context.asts[at.ast as usize]);
             let DirectiveKind::Range { registers, placed, low, high } =

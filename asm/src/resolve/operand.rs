@@ -258,7 +258,7 @@ impl Resolver<'_> {
         let VirtualRegister { kind, name, span, pinned, .. } =
             &self.context.declared.registers[register.index()];
         let machine = self.ir.machine;
-        let input = *kind == RegisterKind::Input || pinned.is_some_and(|address| machine.is_input(address));
+        let input = kind.is_from_outside() || pinned.is_some_and(|address| machine.is_input(address));
         let error = match kind {
             RegisterKind::Zero => {
                 let error = Diagnostic::error(
@@ -270,6 +270,10 @@ impl Resolver<'_> {
             }
             _ if input && name.is_empty() => {
                 Diagnostic::error("not-writable", given.span, "an input port is written from outside only")
+            }
+            RegisterKind::Parameter => {
+                let message = format!("`{name}` is a parameter: it is set from outside only");
+                Diagnostic::error("not-writable", given.span, message).also(*span, "declared here")
             }
             _ if input => {
                 let message = format!("`{name}` is an input port: it is written from outside only");

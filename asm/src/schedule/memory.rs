@@ -112,8 +112,9 @@ impl<'a> Memory<'a> {
         }
         let found = self.ir.register(register);
         let machine = self.ir.machine;
-        if found.kind == RegisterKind::Input || found.pinned.is_some_and(|at| machine.is_input(at)) {
-            // Inputs may change from one cycle to the next.
+        let is_input = found.pinned.is_some_and(|at| machine.is_input(at));
+        if found.kind == RegisterKind::Input || found.kind != RegisterKind::Parameter && is_input {
+            // Inputs may change from one cycle to the next, parameters between periods only.
             return self.unknown();
         }
         self.values.get(&register).copied().unwrap_or(Value::Based(Root::Initial(register), 0))
@@ -266,7 +267,7 @@ pub(super) fn fixed(ir: &Ir) -> Vec<Option<u32>> {
             RegisterKind::Zero => Some(0),
             RegisterKind::Constant(bits) => Some(bits),
             RegisterKind::Plain | RegisterKind::State => register.preset,
-            RegisterKind::Input | RegisterKind::Output => None,
+            RegisterKind::Input | RegisterKind::Output | RegisterKind::Parameter => None,
         })
         .collect();
     let opaque = ir.is_opaque();

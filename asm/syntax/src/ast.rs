@@ -229,6 +229,8 @@ pub enum DeclarationKind {
     Input,
     /// Ports that the program writes: `.output`.
     Output,
+    /// Ports that the host sets between periods: `.param`.
+    Parameter,
 }
 
 /// A declared name, with sizes, type and place as written.
@@ -304,6 +306,15 @@ pub enum DirectiveKind {
     Array(Vec<Declaration>, ArrayValues),
     /// `.const`, the name and its value.
     Const(Name, Expr),
+    /// `.param`.
+    Param {
+        /// Parameter, or array of parameters.
+        declaration: Declaration,
+        /// Values at the start: one for all elements, or one for each.
+        values: Vec<Expr>,
+        /// Option's name, least and largest value.
+        range: Option<(Name, Expr, Expr)>,
+    },
     /// `.preset`, the register and its value.
     Preset {
         /// The register, by its name or its place; or an element of an array.
@@ -448,6 +459,7 @@ directives! {
     Output ".output" "a, b:int, u[4]" "Output ports; `@ 3` gives one its number.";
     Array ".array" "A[12,12], x[12], k[3]:int = 1, 2, 3|\"file\"" "Arrays in data memory; the values are those of the last one, listed or in a file of numbers.";
     Const ".const" "NAME = expression" "A named constant, evaluated in binary64 or as an integer, rounded once where it is used.";
+    Param ".param" "kp = 2.0 range 0..50" "A parameter: an input that keeps its value until the host sets another between two periods; a set acts at once.";
     Preset ".preset" "m12 = expression" "A register that the loader sets.";
     Once ".once" "" "The following code runs once, after reset.";
     Period ".period" "" "The following code runs in every period.";

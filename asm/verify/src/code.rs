@@ -59,7 +59,7 @@ pub(crate) struct Code {
     pub(crate) initial: Vec<Option<u32>>,
     /// Output port of each register, by number of the source's declaration.
     pub(crate) outputs: Vec<Option<usize>>,
-    /// Registers of the inputs, in order of declaration.
+    /// Registers of the inputs, then of the parameters, in order of declaration.
     pub(crate) inputs: Vec<usize>,
     /// Labels before each bundle: numbers of the first and the last.
     pub(crate) labels: HashMap<u32, (u32, u32)>,
@@ -126,6 +126,12 @@ pub(crate) fn named(plain: &PlainProgram, kind: PlainKind) -> impl Iterator<Item
         .map(|(id, register)| (id, register.name.as_str()))
 }
 
+/// Indices of inputs, then of parameters: registers that the host writes.
+pub(crate) fn inputs_of(plain: &PlainProgram) -> impl Iterator<Item = usize> {
+    let of = |kind| named(plain, kind).map(|(id, _)| id);
+    of(PlainKind::Input).chain(of(PlainKind::Parameter))
+}
+
 /// Converts the source. `contractions` names the fused products; each is accepted only where the source permits it.
 pub(crate) fn of_source(
     plain: &PlainProgram,
@@ -182,7 +188,7 @@ pub(crate) fn of_source(
         outputs[id] = Some(number);
     }
     let initial = plain.registers.iter().map(|register| register.preset).collect();
-    let inputs = named(plain, PlainKind::Input).map(|(id, _)| id).collect();
+    let inputs = inputs_of(plain).collect();
     let mut bounds: HashMap<u32, Bound> = HashMap::new();
     for &(head, most, total) in &plain.loop_bounds {
         let bound = Bound { most, total };

@@ -5,7 +5,7 @@
 //! where they are passed, named registers at each tick.
 
 use crate::Difference;
-use crate::code::{named, refuse};
+use crate::code::{inputs_of, named, refuse};
 use crate::labels::{self, Labels};
 use foldhash::{HashMap, HashMapExt as _, HashSet, HashSetExt as _};
 use takt_asm::plain::{PlainKind, PlainProgram, PlainRegister};
@@ -16,7 +16,7 @@ use takt_isa::{Instruction, Machine, Program, Register, Type};
 pub(crate) struct Layout {
     /// Register of each output of the source.
     pub(crate) outputs: Vec<Register>,
-    /// Register of each input of the source.
+    /// Register of each input of the source, then of each parameter.
     pub(crate) inputs: Vec<Register>,
     /// Named registers other than ports: index in the source, and register in the image.
     pub(crate) registers: Vec<(usize, Register)>,
@@ -60,6 +60,7 @@ pub(crate) fn compare(program: &Program, plain: &PlainProgram) -> Result<Layout,
         constants,
         inputs,
         outputs,
+        parameters,
         latched,
         registers,
         symbols,
@@ -79,7 +80,8 @@ pub(crate) fn compare(program: &Program, plain: &PlainProgram) -> Result<Layout,
         return Err(refuse("image and source differ in whether ports are latched".to_owned()));
     }
     compare_data(program, data, plain)?;
-    let inputs = compare_ports(inputs, plain, PlainKind::Input)?;
+    let mut inputs = compare_ports(inputs, plain, PlainKind::Input)?;
+    inputs.extend(compare_ports(parameters, plain, PlainKind::Parameter)?);
     let outputs = compare_ports(outputs, plain, PlainKind::Output)?;
     let registers = compare_registers(registers, plain)?;
     let period = compare_sections(sections, program.bundles(), plain)?;
@@ -119,15 +121,14 @@ pub(crate) fn is_name_of(image: &str, source: &str) -> bool {
 /// Numbers of ports).
 fn numbers(plain: &PlainProgram, kind: PlainKind) -> Vec<u32> {
     let machine = plain.machine;
-    let of = |register: Register| match kind {
-        PlainKind::Input => machine.input_number(register),
-        _ => machine.output_number(register),
-    };
+    let of = |register: Register| number_of(machine, kind, register);
     let given = |register: &PlainRegister| {
         let own = register.number.filter(|_| register.kind == kind);
         own.or_else(|| register.pinned.and_then(of)).map(u32::from)
     };
-    let mut taken: HashSet<u32> = plain.registers.iter().filter_map(given).collect();
+    // Parameters are numbered behind the inputs.
+    let before = if kind == PlainKind::Parameter { numbers(plain, PlainKind::Input) } else { Vec::new() };
+    let mut taken: HashSet<u32> = plain.registers.iter().filter_map(given).chain(before).collect();
     let mut number = |register: &PlainRegister| {
         given(register).unwrap_or_else(|| {
             let free = (0..).find(|number| !taken.contains(number)).unwrap_or(u32::MAX);
@@ -138,9 +139,27 @@ fn numbers(plain: &PlainProgram, kind: PlainKind) -> Vec<u32> {
     plain.registers.iter().filter(|register| register.kind == kind).map(&mut number).collect()
 }
 
+/// Number of a port of a kind.
+fn number_of(machine: &Machine, kind: PlainKind, register: Register) -> Option<u16> {
+    match kind {
+        PlainKind::Input | PlainKind::Parameter => machine.input_number(register),
+        _ => machine.output_number(register),
+    }
+}
+
+/// Kind of a named register in messages.
+fn kind_text(kind: PlainKind) -> &'static str {
+    match kind {
+        PlainKind::Input => "input",
+        PlainKind::Output => "output",
+        PlainKind::Parameter => "parameter",
+        PlainKind::Plain | PlainKind::State => "register",
+    }
+}
+
 fn compare_ports(ports: &[Port], plain: &PlainProgram, kind: PlainKind) -> Result<Vec<Register>, Difference> {
     let machine: &Machine = plain.machine;
-    let what = if kind == PlainKind::Input { "input" } else { "output" };
+    let what = kind_text(kind);
     let mut places = Vec::new();
     let mut ports = ports.iter();
     for ((id, known), number) in named(plain, kind).zip(numbers(plain, kind)) {
@@ -156,12 +175,8 @@ fn compare_ports(ports: &[Port], plain: &PlainProgram, kind: PlainKind) -> Resul
             let what = format!("{what} `{known}` has another type in the image");
             return Err(differ(what, register.ty.name().to_owned(), ty.name().to_owned()));
         }
-        let found = match kind {
-            PlainKind::Input => machine.input_number(*place),
-            _ => machine.output_number(*place),
-        };
-        let Some(found) = found else {
-            return Err(refuse(format!("{what} `{known}` is not an {what} port in the image")));
+        let Some(found) = number_of(machine, kind, *place) else {
+            return Err(refuse(format!("{what} `{known}` is no port of its kind in the image")));
         };
         if u32::from(found) != number || register.pinned.is_some_and(|pinned| pinned != *place) {
             let text = |register| machine.register_name(register).unwrap_or_default();
@@ -172,9 +187,7 @@ fn compare_ports(ports: &[Port], plain: &PlainProgram, kind: PlainKind) -> Resul
         places.push(*place);
     }
     match ports.next() {
-        Some(port) => {
-            Err(refuse(format!("the image has an {what} `{}` that the source does not", port.name)))
-        }
+        Some(port) => Err(refuse(format!("the source does not declare {what} `{}` of the image", port.name))),
         None => Ok(places),
     }
 }
@@ -259,7 +272,7 @@ fn compare_constants(
             return Err(refuse("the loader writes a register twice".to_owned()));
         }
     }
-    let inputs = named(plain, PlainKind::Input).map(|(id, _)| id).zip(layout.inputs.iter().copied());
+    let inputs = inputs_of(plain).zip(layout.inputs.iter().copied());
     let outputs = named(plain, PlainKind::Output).map(|(id, _)| id).zip(layout.outputs.iter().copied());
     let own = |register: &PlainRegister| matches!(register.kind, PlainKind::Plain | PlainKind::State);
     let pinned = plain.registers.iter().enumerate().filter(|(_, register)| own(register));
@@ -278,11 +291,7 @@ fn compare_constants(
         // If an operation writes the register, the loader may preset a constant of `once` there; the tick compares its value.
         if said != found && !written.contains(&id) {
             let text = |bits: Option<u32>| bits.map(|bits| format!("0x{bits:08x}"));
-            let kind = match known.kind {
-                PlainKind::Input => "input",
-                PlainKind::Output => "output",
-                PlainKind::Plain | PlainKind::State => "register",
-            };
+            let kind = kind_text(known.kind);
             let name = program.register_text(place);
             let what = format!("{kind} `{name}` has another value at the start in the image");
             return Err(differ(what, text(said), text(found)));
@@ -303,7 +312,7 @@ fn compare_constants(
 }
 
 fn compare_ranges(ranges: &[Range], plain: &PlainProgram, layout: &Layout) -> Result<(), Difference> {
-    let inputs = named(plain, PlainKind::Input).map(|(id, _)| id).zip(layout.inputs.iter().copied());
+    let inputs = inputs_of(plain).zip(layout.inputs.iter().copied());
     let outputs = named(plain, PlainKind::Output).map(|(id, _)| id).zip(layout.outputs.iter().copied());
     let places: HashMap<usize, Register> =
         inputs.chain(outputs).chain(layout.registers.iter().copied()).collect();

@@ -5,6 +5,7 @@ mod common;
 mod fields;
 mod limits;
 mod mutants;
+mod parameters;
 mod places;
 mod random;
 #[path = "../../tests/random_source/mod.rs"]

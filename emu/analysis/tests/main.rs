@@ -5,5 +5,6 @@ mod accuracy;
 mod bound;
 mod dependence;
 mod enclosures;
+mod parameters;
 mod refined;
 mod trace;

@@ -31,6 +31,7 @@ pub(crate) fn program(machine: &'static Machine, source: &str) -> Program {
         loop_bounds: Vec::new(),
         ranges: Vec::new(),
         parts: Vec::new(),
+        parameters: Vec::new(),
         latched: false,
         sections: Vec::new(),
         files: vec!["test.s".to_owned()],

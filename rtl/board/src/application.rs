@@ -7,7 +7,7 @@ use crate::kind::Direction;
 use crate::protocol::{CORE, CORE_DATA, CORE_REGISTERS, DRIVEN, INPUTS, OUTPUTS, Place, SEEN, core_words};
 use std::borrow::Cow;
 use std::sync::Arc;
-use takt_isa::program::{Port, Space};
+use takt_isa::program::{ParameterError, Port, Space};
 use takt_isa::text::element_names;
 use takt_isa::{BankIndex, Program, Register, Type};
 use takt_system::{Core, Description, End, LinkKind, Source};
@@ -179,7 +179,7 @@ impl Application<'_> {
             Some(array) => element_names(&array.name, &array.sizes),
             // Elements of an array in registers are registers.
             None => {
-                let registers = self.description.cores[core].program.registers.iter();
+                let registers = self.description.cores[core].program.named_registers();
                 let is_element =
                     |name: &str| name.strip_prefix(own).is_some_and(|rest| rest.starts_with('['));
                 registers.map(|register| register.name.clone()).filter(|name| is_element(name)).collect()
@@ -351,8 +351,9 @@ impl Application<'_> {
     /// A message about the name.
     pub fn find(&self, name: &str) -> Result<Place, String> {
         let here = self.endpoints();
-        let is_port =
-            |program: &Program| has(program, Direction::Input, name) || has(program, Direction::Output, name);
+        let is_port = |program: &Program| {
+            program.host_registers().chain(&program.outputs).any(|port| port.name == name)
+        };
         match self.named(name, here.place(name), is_port)? {
             NameMeaning::Endpoint(place) => Ok(place),
             NameMeaning::Core(core, port) => self.of_core(core, port),
@@ -384,11 +385,45 @@ impl Application<'_> {
                 "`{name}` is not a port but internal to the core: only its program writes it"
             ));
         }
+        if self.parameter(name).is_ok() {
+            return Err(format!(
+                "`{name}` is a parameter of a core; in a system, it keeps the value that it is loaded with (`takt load --param`)"
+            ));
+        }
         let is_output = (OUTPUTS..DRIVEN).contains(&place.read) || place.read >= SEEN;
         match self.connect(Direction::Input, name) {
             Err(text) if !is_output => Err(text),
             _ => Err(format!("`{name}` is an output port, which the program sets")),
         }
+    }
+
+    /// Parameter with a name (`kp`, in a system `core.kp`), and the program that has it.
+    ///
+    /// # Errors
+    /// If there is none.
+    pub fn parameter(&self, name: &str) -> Result<(&Program, &Port), ParameterError> {
+        let (core, own) = match name.split_once('.') {
+            Some((core, own)) if !self.is_program => (self.description.core_named(core), own),
+            _ => (self.is_program.then_some(0), name),
+        };
+        let Some(core) = core else {
+            let cores = self.description.cores.iter().enumerate();
+            let known = cores.flat_map(|(core, known)| {
+                known.program.parameters.iter().map(move |port| format!("`{}`", self.name(core, &port.name)))
+            });
+            let known = known.collect::<Vec<_>>().join(", ");
+            return Err(ParameterError::Unknown { name: name.to_owned(), known });
+        };
+        let program = &*self.description.cores[core].program;
+        Ok((program, program.parameter(own)?))
+    }
+
+    /// Checks a value for a name: if it is a parameter's, the range of the source holds.
+    ///
+    /// # Errors
+    /// If the parameter may not have the value.
+    pub fn check_parameter(&self, name: &str, bits: u32) -> Result<(), ParameterError> {
+        self.parameter(name).map_or(Ok(()), |(program, port)| program.check_parameter(port, bits))
     }
 
     /// Address at which the host reads a core's register. The bank's next registers have the next addresses. An input port is read at the
@@ -420,6 +455,11 @@ impl Application<'_> {
     /// Address and type of a core's port, register or data word.
     fn of_core(&self, core: usize, name: &str) -> Result<Place, String> {
         let program = &self.description.cores[core].program;
+        if let Some(port) = program.parameters.iter().find(|port| port.name == name) {
+            let number = number(program, port, Direction::Input).unwrap_or(0);
+            let read = INPUTS + CORE * core as u16 + number;
+            return Ok(Place { read, set: self.is_program.then_some(read), ty: port.ty });
+        }
         let port = |direction: Direction, base: u16| {
             let port = ports(program, direction).iter().find(|port| port.name == name)?;
             Some((base + CORE * core as u16 + number(program, port, direction)?, port.ty))
@@ -439,7 +479,8 @@ impl Application<'_> {
             return found;
         }
         self.held(core, name).ok_or_else(|| {
-            let names = listed(program.inputs.iter().chain(&program.outputs).map(|port| port.name.as_str()));
+            let names =
+                listed(program.host_registers().chain(&program.outputs).map(|port| port.name.as_str()));
             format!(
                 "{} has no port, register or data word `{name}`; there are the ports {names}",
                 self.core_text(core)
@@ -490,7 +531,7 @@ impl Application<'_> {
     /// Names of all ports of cores, as [`Application::find`] accepts them.
     pub fn names(&self) -> Vec<String> {
         let of = |(core, known): (usize, &Core)| {
-            let ports = known.program.inputs.iter().chain(&known.program.outputs);
+            let ports = known.program.host_registers().chain(&known.program.outputs);
             ports.map(|port| self.name(core, &port.name)).collect::<Vec<_>>()
         };
         self.description.cores.iter().enumerate().flat_map(of).collect()

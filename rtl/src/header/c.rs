@@ -68,17 +68,24 @@ fn write_ports<'a>(
     text: &mut String,
 ) -> Vec<(&'a BusPort, String, bool)> {
     let mut places: Vec<(&BusPort, String, bool)> = Vec::new();
-    for (title, kind, ports) in [("Input", "IN", &header.inputs), ("Output", "OUT", &header.outputs)] {
-        let _ = writeln!(text, "\n/* {title} ports. */");
+    let groups = [
+        ("Input ports.", "input", "IN", &header.inputs),
+        ("Output ports.", "output", "OUT", &header.outputs),
+        ("Parameters: written between periods.", "parameter", "PARAM", &header.parameters),
+    ];
+    for (title, what, kind, ports) in
+        groups.into_iter().filter(|group| group.2 != "PARAM" || !group.3.is_empty())
+    {
+        let _ = writeln!(text, "\n/* {title} */");
         for port in ports {
-            let what = format!("{} {}, {}", title.to_lowercase(), port.number, port.ty);
+            let what = format!("{what} {}, {}", port.number, port.ty);
             let name = macros.define(
                 text,
                 &format!("{kind}_{}", port.name),
                 format!("0x{:04x}u", port.address),
                 &what,
             );
-            places.push((port, name, kind == "IN"));
+            places.push((port, name, kind != "OUT"));
         }
     }
     places

@@ -51,6 +51,9 @@ pub struct Header {
     pub inputs: Vec<BusPort>,
     /// Output ports, in order of declaration.
     pub outputs: Vec<BusPort>,
+    /// Parameters, which the host writes like input ports, between periods; in order of declaration.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub parameters: Vec<BusPort>,
     /// Words that the loader writes.
     pub load: Load,
     /// Cycle bounds of each section; `None` if the analysis finds none.
@@ -167,6 +170,7 @@ impl Header {
             registers: REGISTERS.iter().map(register).collect(),
             inputs: program.inputs.iter().map(input).collect(),
             outputs: program.outputs.iter().map(output).collect(),
+            parameters: program.parameters.iter().map(input).collect(),
             load: Load {
                 bundles: machine.code_depth,
                 slots: machine.slots.len() as u32,

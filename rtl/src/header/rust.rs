@@ -94,8 +94,13 @@ pub mod register {
         }
     }
     text.push_str("}\n");
+    let groups = [
+        ("input", "Input ports", &header.inputs),
+        ("output", "Output ports", &header.outputs),
+        ("parameter", "Parameters, written between periods", &header.parameters),
+    ];
     for (module, what, ports) in
-        [("input", "Input ports", &header.inputs), ("output", "Output ports", &header.outputs)]
+        groups.into_iter().filter(|group| group.0 != "parameter" || !group.2.is_empty())
     {
         let _ = writeln!(
             text,

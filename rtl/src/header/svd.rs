@@ -76,9 +76,14 @@ pub(super) fn write(header: &Header) -> String {
     for of in &header.registers {
         register(of.name, of.text, of.address, of.access, &of.fields);
     }
-    for (kind, access, ports) in [("in", "w", &header.inputs), ("out", "r", &header.outputs)] {
+    let groups = [
+        ("in", "input port", "w", &header.inputs),
+        ("out", "output port", "r", &header.outputs),
+        ("param", "parameter", "w", &header.parameters),
+    ];
+    for (kind, what, access, ports) in groups {
         for port in ports {
-            let what = format!("{}put port {}, {}: {}", kind, port.number, port.ty, port.name);
+            let what = format!("{what} {}, {}: {}", port.number, port.ty, port.name);
             register(&format!("{kind}_{}", port.name), &what, port.address, access, &[]);
         }
     }

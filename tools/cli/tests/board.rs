@@ -145,7 +145,8 @@ fn the_loop_closes_through_the_pins_of_a_simulated_board() {
     let stream = folder.line(&format!(
         "live {port} --baud {baud} --program {program} --machine t1 stream n --every 20 --count 3"
     ));
-    assert_eq!((stream.status, stream.stdout.lines().count()), (Some(0), 3), "{stream:?}");
+    assert_eq!((stream.status, stream.stdout.lines().count()), (Some(0), 4), "{stream:?}");
+    assert!(stream.stdout.starts_with("period n\n"), "{stream:?}");
     assert!(live("status").contains("the program runs; outputs drive"), "{}", live("status"));
     // While held, the axis stays; single steps move it.
     live("hold");

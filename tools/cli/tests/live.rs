@@ -156,6 +156,7 @@ fn a_stream_is_printed_as_it_comes() {
     command.args(line.split_whitespace()).current_dir(folder.path());
     let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
+    assert_eq!(lines.next().unwrap().unwrap(), "period M[2,3] M[1,1]");
     let first = lines.next().unwrap().unwrap();
     let (period, values) = first.split_once(' ').unwrap();
     assert!(period.parse::<u32>().is_ok() && values == "-2 1.5", "{first}");

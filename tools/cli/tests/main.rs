@@ -22,6 +22,7 @@ mod machine_file;
 mod mistakes;
 mod model;
 mod page;
+mod parameters;
 mod plant;
 mod robot;
 mod sources;

@@ -6,6 +6,7 @@ use crate::target::Target;
 use std::collections::BTreeSet;
 use std::ops::RangeInclusive;
 use takt_emu::Status;
+use takt_isa::program::Port;
 use takt_isa::timing::{Cause, Cycle};
 use takt_isa::{Register, Type};
 
@@ -17,7 +18,7 @@ const STALLS: usize = 10;
 /// Kind of a named register.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Kind {
-    /// Input port, written by the host.
+    /// Input port or parameter, written by the host.
     Input,
     /// Output port, read by the host.
     Output,
@@ -149,8 +150,7 @@ impl Panes {
             .into_iter()
             .flat_map(|kind| named(session, kind).map(move |row| (kind, row)))
             .collect();
-        let all = program.inputs.iter().chain(&program.outputs).chain(&program.registers);
-        for (((_, row), port), before) in rows.iter_mut().zip(all).zip(before) {
+        for (((_, row), port), before) in rows.iter_mut().zip(program.named_registers()).zip(before) {
             row.changed = row.bits != *before;
             row.used = used.contains(&port.register);
         }
@@ -261,12 +261,12 @@ pub(crate) fn loops(session: &Session) -> impl Iterator<Item = String> {
 /// Ports or registers named in the source, in declaration order.
 pub(crate) fn named(session: &Session, kind: Kind) -> impl Iterator<Item = NamedRegister> {
     let program = session.program();
-    let ports = match kind {
-        Kind::Input => &program.inputs,
-        Kind::Output => &program.outputs,
-        Kind::Register => &program.registers,
+    let ports: Vec<&Port> = match kind {
+        Kind::Input => program.host_registers().collect(),
+        Kind::Output => program.outputs.iter().collect(),
+        Kind::Register => program.registers.iter().collect(),
     };
-    ports.iter().map(|port| NamedRegister {
+    ports.into_iter().map(move |port| NamedRegister {
         name: port.name.clone(),
         place: program.machine.register_name(port.register).unwrap_or_default(),
         ty: port.ty,
@@ -280,8 +280,7 @@ pub(crate) fn named(session: &Session, kind: Kind) -> impl Iterator<Item = Named
 /// Values of all named registers: input ports, output ports, registers of the source.
 pub(crate) fn values(session: &Session) -> Vec<Option<u32>> {
     let program = session.program();
-    let all = program.inputs.iter().chain(&program.outputs).chain(&program.registers);
-    all.map(|port| session.register(port.register)).collect()
+    program.named_registers().map(|port| session.register(port.register)).collect()
 }
 
 /// Registers that the next bundle reads or writes.

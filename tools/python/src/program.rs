@@ -408,6 +408,37 @@ impl Program {
         ports(&self.program.outputs)
     }
 
+    /// Parameters: name, type, bits at the start, and the range of the source.
+    #[getter]
+    fn parameters(&self) -> Vec<(String, &'static str, u32, Option<(f64, f64)>)> {
+        let parameter = |port: &Port| {
+            let range = self.program.range(port.register).map(takt_isa::program::Range::ends);
+            (port.name.clone(), port.ty.name(), self.program.initial(port.register).unwrap_or(0), range)
+        };
+        self.program.parameters.iter().map(parameter).collect()
+    }
+
+    /// The program with other values of parameters at the start, as bits.
+    fn with_parameters(&self, settings: Vec<(String, u32)>) -> PyResult<Program> {
+        let mut program = (*self.program).clone();
+        for (name, bits) in settings {
+            let set = program.set_parameter(&name, bits);
+            set.map_err(|error| PyValueError::new_err(error.to_string()))?;
+        }
+        let mut assembled = self.assembled.clone();
+        if let Some(assembled) = &mut assembled {
+            assembled.program = program.clone();
+        }
+        Ok(Program {
+            program: Arc::new(program),
+            sources: Arc::clone(&self.sources),
+            assembled,
+            kept: self.kept.clone(),
+            recipe: self.recipe.clone(),
+            debug: self.debug.clone(),
+        })
+    }
+
     /// Address of an array in data memory.
     fn data_address(&self, name: &str) -> Option<usize> {
         let of = |symbol: &&Symbol| symbol.space == Space::Data && symbol.name == name;

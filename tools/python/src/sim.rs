@@ -54,7 +54,7 @@ pub(crate) struct Sim {
     sources: Arc<Vec<(String, String)>>,
     max_cycles: u64,
     inputs: HashMap<String, usize>,
-    /// Whether each input has been set.
+    /// Whether each input has been set, then each parameter, which always has a value.
     given: Vec<bool>,
     outputs: Vec<(Py<PyString>, Register, Type)>,
     /// Inputs to set at the start of the next period.
@@ -104,7 +104,8 @@ impl Sim {
     }
 
     fn take(&mut self, inputs: &Bound<'_, PyDict>) -> PyResult<()> {
-        let ports = &self.emulator.program().inputs;
+        let program = self.emulator.program();
+        let ports: Vec<&Port> = program.host_registers().collect();
         self.next.clear();
         let mut given: Vec<(usize, u32)> = Vec::new();
         for (name, value) in inputs.iter() {
@@ -113,11 +114,15 @@ impl Sim {
                 let near = suggest(&name, ports.iter().map(|port| port.name.as_str()));
                 return Err(PyValueError::new_err(format!("the program has no input `{name}`{near}")));
             };
-            let bits = Self::bits(&ports[index], &value, self.periods)?;
+            let bits = Self::bits(ports[index], &value, self.periods)?;
+            if index >= program.inputs.len() {
+                let checked = program.check_parameter(ports[index], bits);
+                checked.map_err(|error| PyValueError::new_err(error.to_string()))?;
+            }
             self.next.push((ports[index].register, bits));
             given.push((index, bits));
         }
-        let missing = |(index, port): (usize, &'_ Port)| {
+        let missing = |(index, port): (usize, &&'_ Port)| {
             (!self.given[index] && given.iter().all(|(given, _)| *given != index))
                 .then(|| format!("`{}`", port.name))
         };
@@ -161,6 +166,12 @@ impl Sim {
     }
 }
 
+/// For each input: not set. Parameters have a value from the start.
+fn not_given(program: &takt_isa::Program) -> Vec<bool> {
+    let inputs = program.inputs.len();
+    (0..program.host_registers().count()).map(|index| index >= inputs).collect()
+}
+
 #[pymethods]
 impl Sim {
     /// Creates a machine that runs the program.
@@ -168,7 +179,7 @@ impl Sim {
     fn new(program: &Program, tick: Option<NonZeroU64>, max_cycles: NonZeroU64) -> PyResult<Sim> {
         let mut emulator = loaded(Emulator::new(&program.program))?;
         emulator.set_tick_period(tick);
-        let (inputs, outputs) = (&program.program.inputs, &program.program.outputs);
+        let (inputs, outputs) = (program.program.host_registers(), &program.program.outputs);
         let named = |port: &Port| {
             Python::attach(|py| (PyString::intern(py, &port.name).unbind(), port.register, port.ty))
         };
@@ -177,10 +188,10 @@ impl Sim {
             history: History::default(),
             sources: Arc::clone(&program.sources),
             max_cycles: max_cycles.get(),
-            given: vec![false; inputs.len()],
-            inputs: inputs.iter().enumerate().map(|(index, port)| (port.name.clone(), index)).collect(),
+            given: not_given(&program.program),
+            inputs: inputs.enumerate().map(|(index, port)| (port.name.clone(), index)).collect(),
             outputs: outputs.iter().map(named).collect(),
-            next: Vec::with_capacity(inputs.len()),
+            next: Vec::new(),
             periods: 0,
             cycles: 0,
             missed: 0,
@@ -248,7 +259,7 @@ impl Sim {
             for _ in 0..count {
                 let (index, bits) = words.next().zip(words.next()).ok_or_else(damaged)?;
                 let index = index as usize;
-                let port = self.emulator.program().inputs.get(index).ok_or_else(damaged)?;
+                let port = self.emulator.program().host_registers().nth(index).ok_or_else(damaged)?;
                 self.next.push((port.register, bits));
                 self.given[index] = true;
                 given.push((index, bits));
@@ -283,7 +294,7 @@ impl Sim {
     /// Restores the state after loading.
     fn reset(&mut self) {
         self.emulator.reset();
-        self.given.fill(false);
+        self.given = not_given(self.emulator.program());
         self.history = History::default();
         (self.periods, self.cycles, self.missed, self.failure) = (0, 0, 0, None);
     }

@@ -32,7 +32,7 @@ from takt._errors import (
     Place,
     TaktError,
 )
-from takt._ports import Array, Port
+from takt._ports import Array, Parameter, Port
 from takt._program import DEFAULT_MACHINE, Program, assemble, load, machines
 from takt._progress import set_progress
 from takt._results import (
@@ -81,6 +81,7 @@ __all__ = [
     "ModelError",
     "NoBoundError",
     "OutputBound",
+    "Parameter",
     "Place",
     "Port",
     "Program",

@@ -41,6 +41,16 @@ class Port:
 
 
 @dataclass(frozen=True)
+class Parameter(Port):
+    """A parameter of a program, which `Sim.step` sets like an input."""
+
+    #: Value at the start.
+    value: float
+    #: Range that the source states, if any.
+    limits: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
 class Array:
     """Several ports as one array, as models have them: `q` of shape (6,) for `q_shoulder`, ….
 

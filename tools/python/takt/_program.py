@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from takt import _takt
 from takt._batch import Batch
 from takt._errors import AssemblyWarning, Diagnostic, FaultError, diagnostics
-from takt._ports import AnyPath, Array, Port, count_of, limits_of, mapping_of, near, numbers, path_of, words_of
+from takt._ports import AnyPath, Array, Parameter, Port, count_of, limits_of, mapping_of, near, numbers, path_of, word_of, words_of
 from takt._progress import progress
 from takt._results import Accuracy, Analysis, Bound, Enclosure, Largest, Model, Run, Section, Span, ports_table
 from takt._sim import Sim
@@ -38,6 +38,8 @@ class Program:
     #: Input and output ports by name, in order of declaration.
     inputs: dict[str, Port]
     outputs: dict[str, Port]
+    #: Parameters (`.param`) by name, in order of declaration.
+    parameters: dict[str, Parameter]
     #: Arrays of ports, for programs generated from models.
     input_arrays: tuple[Array, ...]
     output_arrays: tuple[Array, ...]
@@ -58,8 +60,30 @@ class Program:
         self.model = model
         self.inputs = {name: Port(name, kind) for name, kind in core.inputs}
         self.outputs = {name: Port(name, kind) for name, kind in core.outputs}
+        self.parameters = {
+            name: Parameter(name, kind, np.array([bits], np.uint32).view(Port(name, kind).dtype)[0].item(), limits)
+            for name, kind, bits, limits in core.parameters
+        }
         self.input_arrays = tuple(input_arrays)
         self.output_arrays = tuple(output_arrays)
+
+    def with_parameters(self, values: Mapping[str, float]) -> Program:
+        """The program with other values of parameters at the start.
+
+        Args:
+            values: Numbers by the parameter's name; an element of an array is `K[1,2]`.
+
+        Raises:
+            ValueError: an unknown name, or a value outside of the range in the source.
+        """
+        settings = []
+        for name, value in mapping_of("values", values).items():
+            if name not in self.parameters:
+                raise ValueError(f"the program has no parameter `{name}`{near(name, self.parameters)}")
+            settings.append((name, word_of(name, value, self.parameters[name])))
+        return Program(
+            self._core.with_parameters(settings), self.input_arrays, self.output_arrays, self.model, self._data
+        )
 
     # ---- Properties.
 

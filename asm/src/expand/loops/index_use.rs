@@ -98,6 +98,31 @@ impl Expander<'_> {
         None
     }
 
+    /// Place of a declared name that needs an index, in its own text or in the sizes of the array. Arrays in registers are noted: their
+    /// subscripts need it.
+    fn declared(
+        &self,
+        ast: &Ast,
+        declaration: &Declaration,
+        in_registers: bool,
+        known: &mut BodyNames,
+    ) -> Option<Span> {
+        let Name { name, span } = declaration.name;
+        let (first, count) = declaration.sizes;
+        let sizes = &ast.sizes[first as usize..(first + count) as usize];
+        let needs = |size: &Expr| self.mentions(ast, &ast.nodes[size.id.range()], known);
+        if self.mentions_name(ast, name, known) || sizes.iter().any(needs) {
+            return Some(span);
+        }
+        if count > 0
+            && in_registers
+            && let Ok(name) = name.resolve()
+        {
+            known.arrays.push(name);
+        }
+        None
+    }
+
     fn directive_needs(&self, ast: &Ast, line: &DirectiveLine, known: &mut BodyNames) -> Option<Span> {
         let mentions = |exprs: &[Expr], known: &BodyNames| {
             let mut found =
@@ -122,27 +147,19 @@ impl Expander<'_> {
                 let named = self.mentions_name(ast, name.name, known).then_some(name.span);
                 named.or_else(|| mentions(&[*value], known))
             }
+            DirectiveKind::Param { declaration, values, range } => {
+                let ends = range.map(|(_, least, largest)| [least, largest]);
+                let named = mentions(values, known).or_else(|| mentions(&ends?, known));
+                named.or_else(|| self.declared(ast, declaration, true, known))
+            }
+            DirectiveKind::Array(names, ArrayValues::Listed(values))
+                if let Some(found) = mentions(values, known) =>
+            {
+                Some(found)
+            }
             DirectiveKind::Declare(_, names) | DirectiveKind::Array(names, _) => {
-                if let DirectiveKind::Array(_, ArrayValues::Listed(values)) = &line.kind
-                    && let Some(found) = mentions(values, known)
-                {
-                    return Some(found);
-                }
-                for declaration in names {
-                    let Name { name, span } = declaration.name;
-                    let (first, count) = declaration.sizes;
-                    let sizes = &ast.sizes[first as usize..(first + count) as usize];
-                    if self.mentions_name(ast, name, known) || mentions(sizes, known).is_some() {
-                        return Some(span);
-                    }
-                    if declaration.sizes.1 > 0
-                        && matches!(line.kind, DirectiveKind::Declare(..))
-                        && let Ok(name) = name.resolve()
-                    {
-                        known.arrays.push(name);
-                    }
-                }
-                None
+                let in_registers = matches!(line.kind, DirectiveKind::Declare(..));
+                names.iter().find_map(|declaration| self.declared(ast, declaration, in_registers, known))
             }
             DirectiveKind::Preset { register, value, .. } => {
                 self.operand_needs(ast, *register, known).or_else(|| mentions(&[*value], known))

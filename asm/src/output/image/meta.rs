@@ -19,6 +19,9 @@ pub(super) struct Meta {
     row: Option<String>,
     inputs: Vec<MetaPort>,
     outputs: Vec<MetaPort>,
+    /// Left out if empty.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    parameters: Vec<MetaPort>,
     /// Left out if it is false.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     latched: bool,
@@ -129,6 +132,7 @@ impl Meta {
             row: (!program.machine.is_builtin()).then(|| program.machine.row().to_toml()),
             inputs: ports(&program.inputs),
             outputs: ports(&program.outputs),
+            parameters: ports(&program.parameters),
             latched: program.latched,
             registers: ports(&program.registers),
             ranges: program.ranges.iter().map(range).collect(),
@@ -200,6 +204,7 @@ impl Meta {
             constants,
             inputs: ports("input", self.inputs)?,
             outputs: ports("output", self.outputs)?,
+            parameters: ports("parameter", self.parameters)?,
             latched: self.latched,
             registers: ports("register", self.registers)?,
             symbols,

@@ -7,7 +7,7 @@ use crate::limits;
 use std::collections::HashSet;
 use takt_isa::encode::WORD_MASK;
 use takt_isa::program::{LoopBound, Port, Space};
-use takt_isa::{BundleAddress, Machine, Program, Register};
+use takt_isa::{BundleAddress, Machine, Program, Register, Type};
 
 /// Maximum length of a source file's name, in bytes.
 pub(super) const FILE_NAME: usize = 4096;
@@ -145,6 +145,14 @@ fn ports(program: &Program) -> Result<(), ImageError> {
     for port in &program.inputs {
         check("input", port, machine.is_input(port.register))?;
     }
+    for port in &program.parameters {
+        check("parameter", port, machine.is_input(port.register))?;
+        let value = program.initial(port.register);
+        if value.is_none_or(|bits| port.ty == Type::F && !f32::from_bits(bits).is_finite()) {
+            let reason = "it has no finite value at the start";
+            return Err(wrong_port("parameter", &port.name, port.register.get(), reason));
+        }
+    }
     let mut numbers = HashSet::new();
     for port in &program.outputs {
         let number = machine.output_number(port.register);
@@ -162,8 +170,10 @@ fn ports(program: &Program) -> Result<(), ImageError> {
 }
 
 fn names(program: &Program) -> Result<(), ImageError> {
-    let ports = program.inputs.iter().chain(&program.outputs).chain(&program.registers);
-    let names = ports.map(|port| &port.name).chain(program.symbols.iter().map(|symbol| &symbol.name));
+    let names = program
+        .named_registers()
+        .map(|port| &port.name)
+        .chain(program.symbols.iter().map(|symbol| &symbol.name));
     let mut seen = HashSet::new();
     for name in names {
         if !is_name(name) {

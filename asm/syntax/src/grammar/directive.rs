@@ -79,8 +79,8 @@ impl<'t, 'a: 't> Parts<'t, 'a> {
         Parts { name, expr, text, values, assigned, register, more }
     }
 
-    /// Registers, ports and arrays, separated by blanks or commas.
-    fn declared(&self) -> Rule<'t, 'a, Vec<Declaration>> {
+    /// Register, port or array.
+    fn declaration(&self) -> Rule<'t, 'a, Declaration> {
         let Parts { name, expr, .. } = self;
         let sizes = expr
             .clone()
@@ -114,7 +114,12 @@ impl<'t, 'a: 't> Parts<'t, 'a> {
                     .or_not(),
             )
             .map(|(((name, sizes), ty), place)| Declaration { name, sizes, ty, place });
-        let declaration = rule(declaration);
+        rule(declaration)
+    }
+
+    /// Registers, ports and arrays, separated by blanks or commas.
+    fn declared(&self) -> Rule<'t, 'a, Vec<Declaration>> {
+        let declaration = self.declaration();
         let declarations = declaration
             .clone()
             .then(comma().or_not().ignore_then(declaration).repeated().collect::<Vec<_>>())
@@ -159,6 +164,20 @@ impl<'t, 'a: 't> Parts<'t, 'a> {
         let constant = is(Directive::Const)
             .ignore_then(assigned.clone())
             .map(|(name, value)| DirectiveKind::Const(name, value));
+        let dots = just(Token::Dots).labelled(ExpectedItem::Dots);
+        let ends = name
+            .clone()
+            .labelled(ExpectedItem::Range)
+            .then(expr.clone().labelled(ExpectedItem::Least))
+            .then_ignore(dots)
+            .then(expr.clone().labelled(ExpectedItem::Largest))
+            .map(|((name, least), largest)| (name, least, largest));
+        let param = is(Directive::Param)
+            .ignore_then(self.declaration())
+            .then_ignore(just(Token::Assign).labelled(ExpectedItem::Assign))
+            .then(values.clone())
+            .then(ends.or_not())
+            .map(|((declaration, values), range)| DirectiveKind::Param { declaration, values, range });
         let preset = is(Directive::Preset)
             .ignore_then(just(Token::At).or_not())
             .then(register.clone().labelled(ExpectedItem::Register))
@@ -173,6 +192,7 @@ impl<'t, 'a: 't> Parts<'t, 'a> {
             rule(float),
             rule(word),
             rule(constant),
+            rule(param),
             rule(preset),
             rule(space),
         ]

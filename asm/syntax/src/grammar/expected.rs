@@ -31,6 +31,7 @@ macro_rules! whats {
 
 whats! {
     Comma "`,`";
+    Dots "`..`";
     Colon "`:`";
     At "`@`";
     Assign "`=`";
@@ -69,6 +70,7 @@ whats! {
     Cycles "cycles";
     Least "the least value";
     Largest "the largest value";
+    Range "`range`";
     SomethingElse "something else";
 }
 
@@ -119,6 +121,7 @@ impl Bit for DefaultExpected<'_, Token> {
             DefaultExpected::Token(token) => match *token {
                 Token::Directive(directive) => return 1 << (ExpectedItem::ALL.len() + directive as usize),
                 Token::Comma => ExpectedItem::Comma,
+                Token::Dots => ExpectedItem::Dots,
                 Token::Colon => ExpectedItem::Colon,
                 Token::At => ExpectedItem::At,
                 Token::Assign => ExpectedItem::Assign,

@@ -32,6 +32,8 @@ pub(crate) enum Token {
     Int(i64),
     Real(f64),
     Text,
+    /// `..`, between the ends of a range.
+    Dots,
     Comma,
     Colon,
     Open,
@@ -97,6 +99,7 @@ impl<'s> Lexer<'s> {
         sink: &mut Sink,
     ) -> bool {
         let Chunk { tokens, lines } = chunk;
+        let source = self.lexer.source();
         tokens.clear();
         lines.clear();
         if self.done {
@@ -104,14 +107,28 @@ impl<'s> Lexer<'s> {
         }
         let mut line = LineState::new(0, self.line, self.base + self.lexer.span().end as u32);
         loop {
-            let raw = self.lexer.next();
-            let range = self.lexer.span();
+            let mut raw = self.lexer.next();
+            let mut range = self.lexer.span();
+            // The ends of a parameter's range: `0..50` is three tokens there, and a mistake elsewhere.
+            if line.has_range
+                && matches!(raw, Some(Ok(Raw::Name | Raw::NotNumber)))
+                && let Some(at) = self.lexer.slice().find("..").filter(|at| *at > 0)
+            {
+                range.end = range.start + at;
+                raw = Raw::lexer(&source[range.clone()]).next();
+                self.lexer = Raw::lexer(source);
+                self.lexer.bump(range.end);
+            }
+            if raw == Some(Ok(Raw::Dots)) && !line.has_range {
+                raw = Some(Err(()));
+            }
+            let text = &source[range.clone()];
             let span = Span::new(self.base + range.start as u32, self.base + range.end as u32);
             // The common case first.
             if !line.long && (span.end - line.from) as usize <= limits::LINE_BYTES {
                 match raw {
                     Some(Ok(Raw::Name)) if range.len() <= limits::NAME_BYTES => {
-                        tokens.push((Token::Name(names.intern(self.lexer.slice())), span));
+                        tokens.push((Token::Name(names.intern(text)), span));
                         continue;
                     }
                     Some(Ok(Raw::Comma)) => {
@@ -145,7 +162,7 @@ impl<'s> Lexer<'s> {
                 // The rest of a line that is too long is dropped.
                 _ if line.long => continue,
                 Some(Ok(raw)) => {
-                    let text = self.lexer.slice();
+                    line.has_range |= raw == Raw::Directive && text == Directive::Param.name();
                     token(raw, text, &mut line.nesting, names).unwrap_or_else(|message| {
                         line.bad = true;
                         sink.add(Severity::Error, "token", span, || {
@@ -163,7 +180,6 @@ impl<'s> Lexer<'s> {
                 Some(Err(())) => {
                     // The unknown characters of a line are one error, whatever their number.
                     if !std::mem::replace(&mut line.unknown, true) {
-                        let text = self.lexer.slice();
                         sink.add(Severity::Error, "token", span, || {
                             TokenError::Unknown.diagnostic(span, text)
                         });
@@ -209,6 +225,8 @@ struct LineState {
     /// An unknown character was met, and is reported.
     unknown: bool,
     long: bool,
+    /// The line declares a parameter, whose range has `..` between its ends.
+    has_range: bool,
     /// Tokens that may nest expressions.
     nesting: usize,
     /// Number of comparison operators so far.
@@ -219,8 +237,9 @@ struct LineState {
 
 impl LineState {
     fn new(start: usize, number: u32, from: u32) -> LineState {
-        let (bad, continued, unknown, long) = (false, false, false, false);
-        LineState { start, number, from, bad, continued, unknown, long, nesting: 0, compares: 0, joins: 0 }
+        let (bad, continued, unknown, long, has_range) = (false, false, false, false, false);
+        let (nesting, compares, joins) = (0, 0, 0);
+        LineState { start, number, from, bad, continued, unknown, long, has_range, nesting, compares, joins }
     }
 
     fn end(&self, end: usize) -> LineTokens {
@@ -324,6 +343,7 @@ fn token(raw: Raw, text: &str, nesting: &mut usize, names: &mut Interner) -> Res
         Raw::Slashes => return Err(TokenError::Slashes),
         Raw::Text => Token::Text,
         Raw::OpenText => return Err(TokenError::OpenText),
+        Raw::Dots => Token::Dots,
         Raw::Comma => Token::Comma,
         Raw::Colon => Token::Colon,
         Raw::Open => {

@@ -40,6 +40,8 @@ pub(crate) enum Raw {
     Text,
     #[regex(r#""([^"\\\n]|\\[^\n])*"#, priority = 1)]
     OpenText,
+    #[token("..")]
+    Dots,
     #[token(",")]
     Comma,
     #[token(":")]

@@ -8,11 +8,11 @@
 
 use super::converge::Linear;
 use super::enclosure::{Converging, Enclosure, Hazard, Moment, OutputBound, UnprovedRange};
-use super::fixed;
 use super::interval::Interval;
 use super::node::{Made, Node};
 use super::number::{Number, Problem, float_grid};
 use super::value::Value;
+use super::{fixed, preset};
 use crate::error::{BoundError, Refusal, place};
 use crate::graph::{Edge, Graph};
 use std::collections::{BTreeMap, BTreeSet};
@@ -166,7 +166,7 @@ impl Explorer<'_> {
     fn begin(&mut self, once: bool, address: BundleAddress) -> State {
         let program = self.program;
         // After `.once`, a register that the program writes may no longer hold its preset.
-        let constants = if once { program.constants.iter().copied().collect() } else { self.fixed.clone() };
+        let constants = if once { preset(program).collect() } else { self.fixed.clone() };
         let constant = |bits| Node::leaf(Value::bits(bits));
         let mut registers: BTreeMap<Register, Rc<Node>> =
             constants.into_iter().map(|(register, bits)| (register, constant(bits))).collect();
@@ -201,12 +201,14 @@ impl Explorer<'_> {
     }
 
     /// Gives new values to the input ports that a bundle reads: unless ports are latched, the host may have set them since the last read.
+    /// Parameters keep their values within a period.
     fn sample(&mut self, address: BundleAddress, state: &mut State) {
         let program = self.program;
         let Some(Ok(instructions)) = program.bundle(address).filter(|_| !program.latched) else { return };
         let reads: BTreeSet<Register> = instructions.iter().flat_map(Instruction::reads).copied().collect();
         for range in program.ranges.iter().filter(|range| reads.contains(&range.register)) {
-            if program.machine.is_input(range.register) {
+            let is_parameter = program.parameters.iter().any(|port| port.register == range.register);
+            if program.machine.is_input(range.register) && !is_parameter {
                 let value = self.ranged(range);
                 state.registers.insert(range.register, Node::leaf(value));
             }

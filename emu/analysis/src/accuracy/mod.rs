@@ -45,9 +45,14 @@ fn is_rounder(bits: u32) -> bool {
     ROUNDERS.contains(&f64::from(f32::from_bits(bits)).abs())
 }
 
+/// Registers that the loader sets, with their bits; without input ports and parameters, which the host may set afterwards.
+fn preset(program: &Program) -> impl Iterator<Item = (Register, u32)> {
+    program.constants.iter().copied().filter(|(register, _)| !program.machine.is_input(*register))
+}
+
 /// Constant registers with their bits: set by the loader, written by no operation.
 fn fixed(program: &Program) -> BTreeMap<Register, u32> {
-    let mut fixed: BTreeMap<Register, u32> = program.constants.iter().copied().collect();
+    let mut fixed: BTreeMap<Register, u32> = preset(program).collect();
     for bundle in program.code.chunks_exact(program.machine.slots.len()) {
         for (word, slot) in bundle.iter().zip(program.machine.slots) {
             if let Some(register) = Instruction::decode(*word).ok().and_then(|i| i.writes(slot)) {

@@ -8,6 +8,7 @@ use crate::run::cache::CacheEntry;
 use crate::run::fault;
 use crate::run::load::Load;
 use crate::run::loaded_program::LoadedProgram;
+use crate::run::parameters::ParameterArguments;
 use crate::run::ports;
 use crate::run::system;
 use crate::run::table_run::Tables;
@@ -45,6 +46,8 @@ pub(crate) struct Analyse {
     /// CSV with one named column for each input port and one row for each period; `-` is standard input.
     #[arg(long, value_name = "CSV")]
     inputs: Option<PathBuf>,
+    #[command(flatten)]
+    parameters: ParameterArguments,
     /// Run N periods and analyse the last; 0 is what runs once [default: the rows of --inputs, else 2].
     #[arg(long, value_name = "N", value_parser = number::natural, allow_hyphen_values = true)]
     periods: Option<u64>,
@@ -79,7 +82,8 @@ pub(crate) fn run(arguments: &Analyse, color: bool, out: &mut Out) -> Result<()>
         writes.push(("--json", Path::new("-")));
     }
     files::check(&reads, &writes)?;
-    let application = Application::load(&arguments.file, &arguments.machine, &arguments.source, color)?;
+    let mut application = Application::load(&arguments.file, &arguments.machine, &arguments.source, color)?;
+    arguments.parameters.apply(&mut application)?;
     let system = match &application {
         Application::Program(loaded) => return of_program(arguments, loaded, color, out),
         Application::System(system) => system,
@@ -172,7 +176,8 @@ fn candidates(
         let load = Load { machine: Some(machine), ..load.clone() };
         let kept = load.assembled_program(&arguments.file, source.to_vec(), true).ok();
         bar.add(1);
-        let CacheEntry { loaded, spare } = kept?;
+        let CacheEntry { mut loaded, spare } = kept?;
+        arguments.parameters.set(&mut loaded.program).ok()?;
         Some((address(machine), Candidate { program: loaded.program, spare }))
     };
     machines.par_iter().filter_map(candidate).collect()

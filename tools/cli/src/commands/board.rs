@@ -13,6 +13,7 @@ mod robot;
 mod sim;
 
 use crate::run::application;
+use crate::run::parameters::ParameterArguments;
 use crate::terminal::files::{self, Out};
 use crate::terminal::options::{OptionalMachine, SourceArguments};
 use crate::terminal::output::{self, Failure};
@@ -128,6 +129,8 @@ pub(crate) struct Target {
     pub(crate) machine: OptionalMachine,
     #[command(flatten)]
     pub(crate) source: SourceArguments,
+    #[command(flatten)]
+    pub(crate) parameters: ParameterArguments,
 }
 
 /// Maximum size of a board file or a wiring in bytes.
@@ -173,7 +176,12 @@ impl Target {
         let mut reads: Vec<(&str, &Path)> = vec![("--program", &self.program)];
         reads.extend(self.wiring.as_deref().map(|path| ("--wiring", path)));
         files::check(&reads, &[])?;
-        let load = || application::Application::load(&self.program, &self.machine, &self.source, color);
+        let load = || {
+            let mut carried =
+                application::Application::load(&self.program, &self.machine, &self.source, color)?;
+            self.parameters.apply(&mut carried)?;
+            anyhow::Ok(carried)
+        };
         let Some(path) = &self.wiring else {
             let board = find(self.board.as_deref().context("a board: --board NAME")?, color)?;
             let carried = load()?;

@@ -3,6 +3,7 @@
 
 use crate::run::application::Application;
 use crate::run::fault;
+use crate::run::parameters::ParameterArguments;
 use crate::run::ports;
 use crate::run::system::host::Host;
 use crate::run::system::{self, LoadedSystem};
@@ -43,6 +44,8 @@ pub(crate) struct Cosim {
     /// CSV with one named column for each input port and one row for each period; `-` is standard input.
     #[arg(long, value_name = "CSV", requires = "file", conflicts_with_all = ["seed", "programs"])]
     inputs: Option<PathBuf>,
+    #[command(flatten)]
+    parameters: ParameterArguments,
     /// Run at most this many periods [default: one for each row; without --inputs, 100].
     #[arg(long, value_name = "N", value_parser = number::count, requires = "file", allow_hyphen_values = true)]
     periods: Option<u64>,
@@ -223,7 +226,8 @@ fn run_system(
 
 /// Runs a program or a system from a file.
 fn one(arguments: &Cosim, file: &Path, color: bool, out: &mut Out) -> Result<()> {
-    let application = Application::load(file, &arguments.machine, &arguments.source, color)?;
+    let mut application = Application::load(file, &arguments.machine, &arguments.source, color)?;
+    arguments.parameters.apply(&mut application)?;
     let pair = Pair::new(&application, file)?;
     let rows = pair.rows(arguments)?;
     let simulation = pair.simulation(None)?;

@@ -9,6 +9,7 @@ use crate::run::loaded_program::LoadedProgram;
 use crate::run::memory;
 use crate::run::nan::NanWrites;
 use crate::run::outcome::{CoreOutcome, Execution, OutcomeOptions, RunOutcome};
+use crate::run::parameters::ParameterArguments;
 use crate::run::ports;
 use crate::run::system::LoadedSystem;
 use crate::run::system::observers::Observer;
@@ -73,6 +74,8 @@ pub(crate) struct Run {
     #[arg(long, value_name = "NAME", conflicts_with = "batch")]
     memory: Vec<String>,
     #[command(flatten)]
+    parameters: ParameterArguments,
+    #[command(flatten)]
     trace: TraceArguments,
     #[command(flatten)]
     deny: DenyArguments,
@@ -93,6 +96,7 @@ Examples:
 pub(crate) fn run(arguments: &Run, color: bool, out: &mut Out) -> Result<()> {
     let mut reads = vec![("FILE", arguments.file.as_path())];
     reads.extend(arguments.inputs.as_deref().map(|path| ("--inputs", path)));
+    reads.extend(arguments.parameters.file.as_deref().map(|path| ("--params", path)));
     // An output folder is not checked: it cannot be overwritten by accident.
     let batch = arguments.batch.as_deref();
     reads.extend(batch.filter(|path| !path.is_dir()).map(|path| ("--batch", path)));
@@ -118,7 +122,8 @@ pub(crate) fn run(arguments: &Run, color: bool, out: &mut Out) -> Result<()> {
         )
         .into());
     }
-    let application = Application::load(&arguments.file, &arguments.machine, &arguments.source, color)?;
+    let mut application = Application::load(&arguments.file, &arguments.machine, &arguments.source, color)?;
+    arguments.parameters.apply(&mut application)?;
     if let (Some(inputs), Application::Program(loaded)) = (batch, &application) {
         let Run { file, tick, max_cycles, shown, .. } = arguments;
         let (tick, max_cycles) = (*tick, *max_cycles);

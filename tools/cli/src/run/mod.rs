@@ -14,6 +14,7 @@ pub(crate) mod machine_mistake;
 pub(crate) mod memory;
 pub(crate) mod nan;
 pub(crate) mod outcome;
+pub(crate) mod parameters;
 pub(crate) mod ports;
 pub(crate) mod spills;
 pub(crate) mod synthesis;

@@ -151,11 +151,13 @@ impl Board {
 
     /// Sets an input port of the machine.
     pub(super) fn set(&mut self, view: &mut Session, place: Place, bits: u32) -> Result<(), String> {
-        let inputs = &self.session.program().inputs;
-        let port = inputs.iter().map(|port| port.register).find(|port| place == Place::Register(*port));
+        let program = self.session.program();
+        let ports = program.host_registers().map(|port| port.register);
+        let port = ports.into_iter().find(|port| place == Place::Register(*port));
         let port = port.ok_or(
-            "only input ports can be set on a board: the host cannot write other registers or data words",
+            "only input ports and parameters can be set on a board: the host cannot write other registers or data words",
         )?;
+        program.check_register(port, bits).map_err(|error| error.to_string())?;
         self.session.set_input(port, bits).map_err(|error| error.to_string())?;
         self.session.show(view);
         Ok(())

@@ -320,13 +320,13 @@ impl RemoteSession {
 
     fn read_inputs(&mut self) -> Result<(), RemoteError> {
         let read = self.remote.inputs()?;
-        let ports = self.base.program().inputs.iter().map(|port| port.register);
+        let ports = self.base.program().host_registers().map(|port| port.register);
         self.seen.registers.extend(ports.zip(read));
         Ok(())
     }
 
     fn inputs(&self) -> Vec<(Register, u32)> {
-        let ports = self.program().inputs.iter().map(|port| port.register);
+        let ports = self.program().host_registers().map(|port| port.register);
         ports.filter_map(|port| Some((port, *self.seen.registers.get(&port)?))).collect()
     }
 

@@ -117,7 +117,7 @@ impl Shadow {
         let (port, bits) = pairs.find(|(port, bits)| expected(port).is_some_and(|other| other != **bits))?;
         let mut text = format!("output port `{}` {}", port.name, both(port.ty, *bits, expected(port)?));
         for (i, (register, bits)) in inputs.iter().enumerate() {
-            let input = program.inputs.iter().find(|port| port.register == *register)?;
+            let input = program.host_registers().find(|port| port.register == *register)?;
             let before = if i == 0 { "; inputs: " } else { ", " };
             let _ = write!(text, "{before}{} = {}", input.name, value::text(input.ty, *bits));
         }
@@ -181,7 +181,7 @@ fn both(ty: Type, bits: u32, other: u32) -> String {
 
 /// Name, place and type of a register.
 fn register_name(program: &Program, register: Register) -> (String, Type) {
-    let mut named = program.outputs.iter().chain(&program.inputs).chain(&program.registers);
+    let mut named = program.named_registers();
     let place = program.machine.register_name(register).unwrap_or_default();
     match named.find(|port| port.register == register) {
         Some(port) => (format!("`{}` (register {place})", port.name), port.ty),

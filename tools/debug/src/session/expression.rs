@@ -601,7 +601,7 @@ fn name(name: &str, known: LookupTables<'_>) -> Result<Operand, String> {
     if let Some((_, value)) = BUILTINS.iter().find(|builtin| builtin.0 == name) {
         return Ok(Operand::Constant(*value));
     }
-    let ports = program.inputs.iter().chain(&program.outputs).chain(&program.registers);
+    let ports = program.named_registers();
     let symbols = program.symbols.iter().map(|symbol| symbol.name.as_str());
     let values = names.values.iter().map(|value| value.name.as_str());
     let near = nearest(name, ports.map(|port| port.name.as_str()).chain(symbols).chain(values));
@@ -614,7 +614,7 @@ fn meanings(name: &str, known: LookupTables<'_>) -> Option<Name> {
     let LookupTables { program, constants, names } = known;
     let constant = |value| Some(Meaning::Constant(value));
     let global = held(name, names).map(Meaning::Values).or_else(|| {
-        let mut ports = program.inputs.iter().chain(&program.outputs).chain(&program.registers);
+        let mut ports = program.named_registers();
         Some(Meaning::Values(vec![NameValue::always(ports.find(|port| port.name == name)?)]))
     });
     // Many programs have a label `period`, but `until period == 3` means the counter.
@@ -632,8 +632,8 @@ pub(crate) fn names<'p>(
     constants: &'p [(String, Value)],
     names: &'p Names,
 ) -> impl Iterator<Item = &'p str> {
-    let ports = program.inputs.iter().chain(&program.outputs).chain(&program.registers);
-    ports
+    program
+        .named_registers()
         .map(|port| port.name.as_str())
         .chain(program.symbols.iter().map(|symbol| symbol.name.as_str()))
         .chain(constants.iter().map(|constant| constant.0.as_str()))

@@ -131,8 +131,7 @@ impl Name {
         let mut known: HashMap<&str, &Port> = HashMap::new();
         let mut symbols: HashMap<&str, u32> = HashMap::new();
         if names.scopes.len() > 1 {
-            let ports = program.inputs.iter().chain(&program.outputs).chain(&program.registers);
-            known.extend(ports.map(|port| (port.name.as_str(), port)));
+            known.extend(program.named_registers().map(|port| (port.name.as_str(), port)));
             symbols.extend(program.symbols.iter().map(|symbol| (symbol.name.as_str(), symbol.address)));
         }
         let register = |name: &str| {

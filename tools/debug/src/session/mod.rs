@@ -551,7 +551,9 @@ impl Session {
             Place::Register(register) if self.program().machine.register_name(register).is_none() => {
                 return Err(format!("{} has no register at {register}", self.program().machine.name));
             }
-            Place::Register(_) => {}
+            Place::Register(register) => {
+                self.program().check_register(register, bits).map_err(|error| error.to_string())?;
+            }
             Place::Word(_) => {
                 self.machine().read(place, self.program())?;
             }

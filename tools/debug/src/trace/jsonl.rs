@@ -28,7 +28,7 @@ impl<'w> JsonLines<'w> {
                 _ => None,
             })
             .collect();
-        let ports = program.inputs.len() + program.outputs.len() + program.registers.len();
+        let ports = program.named_registers().count();
         // If all named registers are selected, also log unnamed registers.
         let rest = named.len() == ports;
         JsonLines { target, registers: if rest { Vec::new() } else { named }, rest }

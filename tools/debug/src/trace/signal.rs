@@ -167,9 +167,12 @@ pub(super) fn all(program: &Program) -> Vec<Signal> {
     for (kind, name) in Cause::KINDS.iter().enumerate() {
         signals.push(wire(Some("stall"), &name.replace(' ', "_"), Source::Stall(kind), 1));
     }
-    for (scope, ports) in
-        [("inputs", &program.inputs), ("outputs", &program.outputs), ("registers", &program.registers)]
-    {
+    for (scope, ports) in [
+        ("inputs", &program.inputs),
+        ("parameters", &program.parameters),
+        ("outputs", &program.outputs),
+        ("registers", &program.registers),
+    ] {
         signals.extend(ports.iter().map(|port| Signal {
             part: None,
             scope: Some(scope),

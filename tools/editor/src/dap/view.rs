@@ -115,7 +115,7 @@ impl DebuggedSession {
         };
         let mut scopes = vec![
             scope("Registers", NAMED, program.registers.len(), false),
-            scope("Inputs", INPUTS, program.inputs.len(), false),
+            scope("Inputs", INPUTS, program.host_registers().count(), false),
             scope("Outputs", OUTPUTS, program.outputs.len(), false),
             scope("In flight", FLIGHT, 0, false),
             scope("Stalls", STALLS, 0, false),
@@ -160,12 +160,10 @@ impl DebuggedSession {
         let core = self.checked(all / CORE).ok_or_else(unknown)?;
         let hex = Format::is_hex(arguments.format.as_ref());
         let program = self.session(core).program();
-        let ports = |ports: &[Port]| -> Vec<Variable> {
-            let row = |port: &Port| self.register_row(core, &port.name, port.register, port.ty, hex);
-            ports.iter().map(row).collect()
-        };
+        let row = |port: &Port| self.register_row(core, &port.name, port.register, port.ty, hex);
+        let ports = |ports: &[Port]| -> Vec<Variable> { ports.iter().map(row).collect() };
         let mut rows = match all % CORE {
-            INPUTS => ports(&program.inputs),
+            INPUTS => program.host_registers().map(row).collect(),
             OUTPUTS => ports(&program.outputs),
             NAMED => ports(&program.registers),
             FLIGHT => self.in_flight(core),

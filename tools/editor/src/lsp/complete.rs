@@ -212,21 +212,23 @@ fn of_operand(
 }
 
 /// Kinds of symbols that an operation can read.
-const READABLE: [SymbolKind; 6] = [
+const READABLE: [SymbolKind; 7] = [
     SymbolKind::Register,
     SymbolKind::State,
     SymbolKind::Input,
+    SymbolKind::Tunable,
     SymbolKind::Output,
     SymbolKind::Table,
     SymbolKind::Parameter,
 ];
 
-const ANY: [SymbolKind; 11] = [
+const ANY: [SymbolKind; 12] = [
     SymbolKind::Array,
     SymbolKind::Table,
     SymbolKind::Register,
     SymbolKind::State,
     SymbolKind::Input,
+    SymbolKind::Tunable,
     SymbolKind::Output,
     SymbolKind::Constant,
     SymbolKind::Code,
@@ -318,7 +320,7 @@ fn named(
         let kind = match symbol.kind {
             SymbolKind::Constant | SymbolKind::Count => CompletionItemKind::CONSTANT,
             SymbolKind::Code | SymbolKind::Data => CompletionItemKind::REFERENCE,
-            SymbolKind::Input | SymbolKind::Output => CompletionItemKind::PROPERTY,
+            SymbolKind::Input | SymbolKind::Output | SymbolKind::Tunable => CompletionItemKind::PROPERTY,
             _ => CompletionItemKind::VARIABLE,
         };
         let ty = symbol.ty.map_or(String::new(), |ty| format!(":{}", ty.name()));

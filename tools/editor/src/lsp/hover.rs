@@ -169,7 +169,11 @@ fn symbol_text(front: &Front, counted: Option<&CountedProgram>, symbol: &Symbol)
                 }
             }
         }
-        SymbolKind::Register | SymbolKind::State | SymbolKind::Input | SymbolKind::Output => {
+        SymbolKind::Register
+        | SymbolKind::State
+        | SymbolKind::Input
+        | SymbolKind::Output
+        | SymbolKind::Tunable => {
             register(front.machine, counted, symbol, &mut text);
         }
         SymbolKind::Table => {
@@ -227,8 +231,7 @@ fn register(machine: &Machine, counted: Option<&CountedProgram>, symbol: &Symbol
     let program = &assembled.program;
     let values: Vec<_> = assembled.names.values.iter().filter(|value| value.name == symbol.name).collect();
     if values.is_empty() {
-        let ports = program.inputs.iter().chain(&program.outputs).chain(&program.registers);
-        match ports.into_iter().find(|port| port.name == symbol.name) {
+        match program.named_registers().find(|port| port.name == symbol.name) {
             Some(port) => {
                 let _ = write!(text, "\n\nplace {}{}", place(port.register), uses(program, port.register));
             }

@@ -78,7 +78,7 @@ pub(crate) fn symbols(front: &Front, file: &File, encoding: Encoding) -> Vec<Doc
     for ((start, end), what) in declared {
         let kind = match what.kind {
             SymbolKind::Register | SymbolKind::State => ValueNotations::VARIABLE,
-            SymbolKind::Input | SymbolKind::Output => ValueNotations::PROPERTY,
+            SymbolKind::Input | SymbolKind::Output | SymbolKind::Tunable => ValueNotations::PROPERTY,
             SymbolKind::Constant => ValueNotations::CONSTANT,
             SymbolKind::Code => ValueNotations::METHOD,
             SymbolKind::Data | SymbolKind::Array | SymbolKind::Table => ValueNotations::ARRAY,
@@ -175,7 +175,7 @@ fn colour(kind: SymbolKind) -> (u32, u32) {
         SymbolKind::Macro => (2, 0),
         SymbolKind::Register | SymbolKind::State | SymbolKind::Array | SymbolKind::Table => (3, 0),
         SymbolKind::Output => (4, 0),
-        SymbolKind::Input => (4, READONLY),
+        SymbolKind::Input | SymbolKind::Tunable => (4, READONLY),
         SymbolKind::Constant => (5, READONLY),
         SymbolKind::Count => (7, READONLY),
         SymbolKind::Code | SymbolKind::Data => (6, 0),

@@ -106,6 +106,23 @@ fn operands(directive: Directive) -> Option<Rule> {
             ])),
         ]),
         Const => seq([named(), assigned()]),
+        Param => seq([
+            symbol("declaration"),
+            text("="),
+            commas(expression()),
+            optional(seq([
+                field("option", name()),
+                choice([
+                    seq([field("least", expression()), text(".."), field("largest", expression())]),
+                    // `-1..1`, `0..2*pi`: no blank before `..`.
+                    seq([
+                        optional(text("-")),
+                        symbol("range_ends"),
+                        optional(field("largest", expression())),
+                    ]),
+                ]),
+            ])),
+        ]),
         Preset => seq([optional(text("@")), named(), optional(indices()), assigned()]),
         Float | Word => commas(expression()),
         Space => expression(),
@@ -421,6 +438,8 @@ fn tokens(add: &mut impl FnMut(&str, Rule)) {
             .join("|"),
         ),
     );
+    // The start of a parameter's range up to `..`, and the number behind it.
+    add("range_ends", pattern("[0-9.][0-9A-Za-z_.]*\\.\\.[0-9A-Za-z_.]*"));
     // Declared after `number`, which takes precedence if lengths are equal.
     add("_no_number", pattern("[0-9][0-9A-Za-z_.]*"));
     add(NEVER, seq([symbol("_no_number"), immediate(pattern("[0-9]"))]));

@@ -337,17 +337,21 @@ impl Writer<'_> {
             if index > 0 && self.chance(2) {
                 self.put(",");
             }
-            self.name(In::Line, 1);
-            if self.chance(3) {
-                self.put("[");
-                self.commas(1, |writer| writer.expression(In::Line, 1));
-                self.put("]");
-            }
-            self.typed();
-            if self.chance(3) {
-                self.put("@");
-                self.expression(In::Line, 1);
-            }
+            self.declaration();
+        }
+    }
+
+    fn declaration(&mut self) {
+        self.name(In::Line, 1);
+        if self.chance(3) {
+            self.put("[");
+            self.commas(1, |writer| writer.expression(In::Line, 1));
+            self.put("]");
+        }
+        self.typed();
+        if self.chance(3) {
+            self.put("@");
+            self.expression(In::Line, 1);
         }
     }
 
@@ -393,6 +397,17 @@ impl Writer<'_> {
             Const => {
                 self.name(In::Line, 1);
                 self.assigned();
+            }
+            Param => {
+                self.declaration();
+                self.put("=");
+                self.commas(1, |writer| writer.expression(In::Line, 1));
+                if self.chance(2) {
+                    self.name(In::Line, 1);
+                    self.expression(In::Line, 1);
+                    self.put("..");
+                    self.expression(In::Line, 1);
+                }
             }
             Preset => {
                 if self.chance(2) {

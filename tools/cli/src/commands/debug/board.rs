@@ -143,7 +143,10 @@ impl<L: Line> Board<L> {
 
     /// Addresses of the program's ports.
     fn ports(&self, outputs: bool) -> Result<Vec<u16>, RemoteError> {
-        let ports = if outputs { &self.program.outputs } else { &self.program.inputs };
+        let ports: Vec<&_> = match outputs {
+            true => self.program.outputs.iter().collect(),
+            false => self.program.host_registers().collect(),
+        };
         let find = |name: &str| Application::from(&self.program).find(name).map(|place| place.read);
         ports.iter().map(|port| find(&port.name).map_err(RemoteError::Other)).collect()
     }
@@ -213,7 +216,7 @@ impl<L: Line> Remote for Board<L> {
     }
 
     fn set_input(&mut self, port: Register, bits: u32) -> Result<(), RemoteError> {
-        let known = self.program.inputs.iter().find(|known| known.register == port);
+        let known = self.program.host_registers().find(|known| known.register == port);
         let name = known.map_or("", |port| &port.name);
         let (address, _) = Application::from(&self.program).settable(name).map_err(RemoteError::Other)?;
         self.host.write(address, &[bits]).map_err(failed)

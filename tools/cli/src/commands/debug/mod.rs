@@ -11,6 +11,7 @@ use crate::commands::left_out;
 use crate::commands::track::{ClosedLoopArguments, Recording};
 use crate::run::load::{self, Load};
 use crate::run::loaded_program::LoadedProgram;
+use crate::run::parameters::ParameterArguments;
 use crate::run::ports;
 use crate::run::system;
 use crate::terminal::files::{self, OptionPath, Out};
@@ -50,6 +51,8 @@ pub(crate) struct Debug {
     /// CSV with one named column for each input port and one row for each period [default: the ports are 0].
     #[arg(long, value_name = "CSV", conflicts_with = "track")]
     inputs: Option<PathBuf>,
+    #[command(flatten)]
+    parameters: ParameterArguments,
     /// Cycles from tick to tick, up to 100000000 [default: the tick comes when the program is ready].
     #[arg(long, value_name = "CYCLES", value_parser = number::tick, allow_hyphen_values = true, conflicts_with = "track")]
     tick: Option<NonZeroU64>,
@@ -184,7 +187,8 @@ pub(crate) struct OpenedSession {
 pub(crate) fn open(arguments: &Debug, control: &Arc<Control>, color: bool) -> Result<OpenedSession> {
     if let Some(file) = arguments.file.as_deref().filter(|file| load::is_system(file)) {
         check_system(arguments)?;
-        let loaded = system::load(file, &arguments.source, color)?;
+        let mut loaded = system::load(file, &arguments.source, color)?;
+        arguments.parameters.apply_to_system(&mut loaded)?;
         let files = loaded.files.clone();
         let console = system::debug::console(loaded, arguments.inputs.as_deref(), ROWS, control)?;
         return Ok(OpenedSession { console, note: None, files });
@@ -217,7 +221,8 @@ fn open_program(arguments: &Debug, control: &Arc<Control>, color: bool) -> Resul
         return Ok((session, Some(why)));
     }
     let path = arguments.file.as_deref().context("no file")?;
-    let loaded = load.with_source(path)?;
+    let mut loaded = load.with_source(path)?;
+    arguments.parameters.set(&mut loaded.program)?;
     let inputs = arguments.inputs.as_deref().map(|path| rows(path, &loaded)).transpose()?;
     changed_sources(path, &loaded, color);
     let LoadedProgram { program, constants, sources, names, .. } = loaded;

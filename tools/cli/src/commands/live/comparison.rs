@@ -102,7 +102,7 @@ fn outputs(application: &Application<'_>) -> Result<Vec<WatchedValue>> {
 fn inputs(application: &Application<'_>) -> Result<Vec<WatchedValue>> {
     let program = &application.description().cores[0].program;
     let names: Vec<(String, Register)> = match application.is_program() {
-        true => program.inputs.iter().map(|port| (port.name.clone(), port.register)).collect(),
+        true => program.host_registers().map(|port| (port.name.clone(), port.register)).collect(),
         false => {
             let ends = application.endpoints().inputs.iter();
             ends.map(|end| (end.name.clone(), Register::ZERO)).collect()

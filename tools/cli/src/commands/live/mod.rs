@@ -3,12 +3,14 @@
 
 mod comparison;
 mod fifo;
+mod parameters;
 mod status;
 mod value;
 
 use crate::commands::board;
 use crate::commands::live::value::{bits, find, value_text};
 use crate::run::application;
+use crate::run::parameters::ParameterArguments;
 use crate::terminal::files::{self, Out};
 use crate::terminal::number;
 use crate::terminal::options::{OptionalMachine, SourceArguments};
@@ -66,12 +68,15 @@ pub(crate) struct LoadBoard {
     machine: OptionalMachine,
     #[command(flatten)]
     source: SourceArguments,
+    #[command(flatten)]
+    parameters: ParameterArguments,
 }
 
 pub(crate) fn load(arguments: &LoadBoard, color: bool, out: &mut Out) -> Result<()> {
     files::check(&[("the program", &arguments.program)], &[])?;
-    let carried =
+    let mut carried =
         application::Application::load(&arguments.program, &arguments.machine, &arguments.source, color)?;
+    arguments.parameters.apply(&mut carried)?;
     let records = image(carried.on_board())?.records;
     let mut host = arguments.port.open()?;
     host.fits(carried.on_board())?;
@@ -132,6 +137,17 @@ enum Command {
         #[arg(required = true)]
         values: Vec<String>,
     },
+    /// Show parameters (`.param`), or set some of them, all at once between two periods.
+    Param {
+        /// `name=value`, each; without any, all parameters are shown.
+        values: Vec<String>,
+        /// Set the parameters in this file, lines `kp = 3.0` in TOML; values on the command line come after it.
+        #[arg(long, value_name = "TOML")]
+        load: Option<PathBuf>,
+        /// Write all parameters, as they are on the board then, to this file.
+        #[arg(long, value_name = "TOML")]
+        save: Option<PathBuf>,
+    },
     /// Run the program from its beginning, a period at a time, alongside the emulator with the same inputs, and report the first output
     /// that differs. Outputs stay safe unless --drive is given; afterwards the board is held.
     Shadow {
@@ -157,7 +173,7 @@ enum Command {
         /// The FIFO.
         name: String,
     },
-    /// Print ports, registers or data words every N periods, with the period's number.
+    /// Print ports, registers or data words every N periods, with the period's number: a head line with the names, then a line each.
     Stream {
         /// Ports, registers or data words, as for `read`: all of one kind, of one core, and within 15 consecutive numbers.
         #[arg(required = true)]
@@ -181,6 +197,8 @@ enum PreparedCommand {
     /// FIFO to pop an entry from.
     Pop(Fifo),
     Stream(Stream),
+    /// Parameters to set.
+    Parameters(parameters::Changes),
 }
 
 fn prepare(
@@ -201,6 +219,7 @@ fn prepare(
                 let settable = named()?.settable(name);
                 let (address, ty) = settable.map_err(|text| anyhow!("{text}"))?;
                 let bits = bits(text, ty).with_context(|| format!("`{text}` is not a value of `{name}`"))?;
+                named()?.check_parameter(name, bits)?;
                 if let Some(driver) = wiring.and_then(|wiring| wiring.driver(application?, address)) {
                     bail!("`{name}` cannot be set: the wiring connects it to {driver}, which drives it");
                 }
@@ -219,11 +238,18 @@ fn prepare(
             let stream = Stream::of(named()?, names);
             PreparedCommand::Stream(stream.map_err(|text| anyhow!("{text}"))?)
         }
+        Command::Param { values, load, .. } => {
+            let given = ParameterArguments { settings: values.clone(), file: load.clone() };
+            PreparedCommand::Parameters(parameters::prepare(named()?, &given)?)
+        }
         _ => PreparedCommand::Nothing,
     })
 }
 
 pub(crate) fn live(arguments: &Live, color: bool, out: &mut Out) -> Result<()> {
+    if let Command::Param { load: Some(load), save: Some(save), .. } = &arguments.command {
+        files::check(&[("--load", load.as_path())], &[("--save", save.as_path())])?;
+    }
     let carried = arguments.program.as_deref();
     let carried = carried
         .map(|path| application::Application::load(path, &arguments.machine, &arguments.source, color))
@@ -267,6 +293,11 @@ pub(crate) fn live(arguments: &Live, color: bool, out: &mut Out) -> Result<()> {
                 set(&mut host, settings, names)?;
             }
         }
+        Command::Param { save, .. } => {
+            if let PreparedCommand::Parameters(changes) = &prepared {
+                parameters::run(&mut host, changes, save.as_deref(), out)?;
+            }
+        }
         Command::Shadow { periods, drive, .. } => {
             let enable = if *drive { ENABLE } else { 0 };
             // Hold the program from its start, so that no period is missed.
@@ -286,9 +317,9 @@ pub(crate) fn live(arguments: &Live, color: bool, out: &mut Out) -> Result<()> {
                 fifo::pop(&mut host, fifo, out)?;
             }
         }
-        Command::Stream { every, count, .. } => {
+        Command::Stream { names, every, count } => {
             if let PreparedCommand::Stream(stream) = &prepared {
-                streamed(&mut host, stream, *every, *count, color, out)?;
+                streamed(&mut host, (stream, names), *every, *count, color, out)?;
             }
         }
     }
@@ -308,16 +339,18 @@ fn set(host: &mut Host<Serial>, settings: &[(u16, u32)], names: &[(u16, String)]
     })
 }
 
-/// Prints the values of `count` stream frames.
+/// Prints a head line, then the values of `count` stream frames, each line as it comes.
 fn streamed(
     host: &mut Host<Serial>,
-    stream: &Stream,
+    (stream, names): (&Stream, &[String]),
     every: u32,
     count: u32,
     color: bool,
     out: &mut Out,
 ) -> Result<()> {
     host.set("stream", stream.register(every))?;
+    writeln!(out, "period {}", names.join(" "))?;
+    out.flush()?;
     let (mut printed, mut silent) = (0, 0);
     while printed < count && silent < SILENCE {
         let frame = host.streamed()?;

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Subcommand `param` of `takt live`: shows, sets, saves and loads the parameters of a program on a board.
+
+use crate::run::parameters::{ParameterArguments, bits, line};
+use crate::terminal::files::Out;
+use anyhow::{Result, anyhow, bail};
+use std::io::Write;
+use std::path::Path;
+use takt_board::protocol::{LinkError, WORDS};
+use takt_board::serial::Serial;
+use takt_board::{Application, Host};
+use takt_debug::value;
+use takt_isa::Type;
+
+/// Parameter of the program on the board.
+struct Parameter {
+    name: String,
+    address: u16,
+    ty: Type,
+    /// Range of the source in words; empty without one.
+    range: String,
+}
+
+/// Parameters, and the values to set.
+pub(super) struct Changes {
+    all: Vec<Parameter>,
+    /// Addresses and bits, ascending.
+    settings: Vec<(u16, u32)>,
+}
+
+/// Checks values before the serial port is opened: names, types, ranges, and that one request holds them.
+pub(super) fn prepare(application: &Application<'_>, given: &ParameterArguments) -> Result<Changes> {
+    let mut all = Vec::new();
+    for (core, known) in application.description().cores.iter().enumerate() {
+        for port in &known.program.parameters {
+            let name = application.name(core, &port.name);
+            let place = application.find(&name).map_err(|text| anyhow!("{text}"))?;
+            let range = known.program.range(port.register).map_or(String::new(), |range| {
+                let (low, high) = range.ends();
+                format!("   {low} to {high}")
+            });
+            all.push(Parameter { name, address: place.read, ty: port.ty, range });
+        }
+    }
+    if all.is_empty() {
+        bail!("the {} has no parameters: `.param kp = 2.0 range 0..50` declares one", application.kind());
+    }
+    let mut settings: Vec<(u16, u32)> = Vec::new();
+    for (name, text) in given.settings()? {
+        let (program, port) = application.parameter(&name)?;
+        let bits = bits(port, &text)?;
+        program.check_parameter(port, bits)?;
+        let (address, _) = application.settable(&name).map_err(|text| anyhow!("{text}"))?;
+        // A value on the command line replaces that of the file.
+        settings.retain(|(known, _)| *known != address);
+        settings.push((address, bits));
+    }
+    settings.sort_unstable();
+    if let [(first, _), .., (last, _)] = settings[..]
+        && usize::from(last - first) >= WORDS
+    {
+        let name =
+            |address| all.iter().find(|known| known.address == address).map_or("", |known| &known.name);
+        bail!(
+            "`{}` and `{}` cannot change at once: the board sets {WORDS} consecutive ports between two periods, and their \
+             numbers are {} apart; set them by two commands",
+            name(first),
+            name(last),
+            last - first
+        );
+    }
+    Ok(Changes { all, settings })
+}
+
+/// Sets parameters, then shows them, or writes them to a file.
+pub(super) fn run(
+    host: &mut Host<Serial>,
+    changes: &Changes,
+    save: Option<&Path>,
+    out: &mut Out,
+) -> Result<()> {
+    let Changes { all, settings } = changes;
+    if let [(first, _), ..] = settings[..]
+        && let Some((last, _)) = settings.last()
+    {
+        // One request: ports in between keep what they hold.
+        let mut words = host.read(first, usize::from(last - first) + 1)?;
+        for (address, bits) in settings {
+            words[usize::from(address - first)] = *bits;
+        }
+        let settings: Vec<(u16, u32)> = (first..).zip(words).collect();
+        host.set_ports(&settings).map_err(|error| match error {
+            LinkError::ReadOnly { .. } => {
+                anyhow!("the board sets none of them: a port between them is a peripheral's; set them by several commands")
+            }
+            error => error.into(),
+        })?;
+    }
+    let addresses: Vec<u16> = all.iter().map(|parameter| parameter.address).collect();
+    let values = host.read_each(&addresses)?;
+    if let Some(path) = save {
+        let mut file = Out::create(path)?;
+        for (Parameter { name, ty, .. }, bits) in all.iter().zip(&values) {
+            file.write_all(line(name, *ty, *bits).as_bytes())?;
+        }
+        return file.finish();
+    }
+    let is_set = |address: u16| settings.iter().any(|(known, _)| *known == address);
+    for (Parameter { name, address, ty, range }, bits) in all.iter().zip(values) {
+        if settings.is_empty() || is_set(*address) {
+            writeln!(out, "{name} = {}{range}", value::text(*ty, bits))?;
+        }
+    }
+    Ok(())
+}
