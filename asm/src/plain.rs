@@ -10,7 +10,7 @@ use std::collections::HashMap;
 use std::sync::Arc;
 use takt_diagnostics::diag::Diagnostics;
 use takt_diagnostics::source::Sources;
-use takt_isa::program::{Location, Space};
+use takt_isa::program::{ArrayRange, Location, Space};
 use takt_isa::{Machine, Op, Register, Type};
 
 /// A program in source order, before any transformation.
@@ -36,6 +36,8 @@ pub struct PlainProgram {
     pub labels: Vec<(String, Space, u32)>,
     /// `.range`s in source order: the register, and the bits of its least and largest value.
     pub ranges: Vec<(u32, [u32; 2])>,
+    /// `.range`s of arrays in data memory, by ascending word.
+    pub array_ranges: Vec<ArrayRange>,
     /// `.deadline`s: the output, the last cycle in which it may be written, and whether the demand is on `.period`.
     pub deadlines: Vec<(u32, u32, bool)>,
     /// Source files that locations name.
@@ -162,6 +164,7 @@ fn of(ir: &Ir, contract: Contract) -> PlainProgram {
         loop_bounds: ir.loop_bounds.iter().map(|bound| (bound.position, bound.most, bound.total)).collect(),
         labels: ir.labels.iter().filter(|label| !label.name.is_empty()).map(label).collect(),
         ranges: ir.ranges.iter().map(|(id, ends)| (id.index() as u32, *ends)).collect(),
+        array_ranges: ir.array_ranges.clone(),
         deadlines: ir.demands.iter().flat_map(deadlines).collect(),
         files: ir.files.clone(),
     }

@@ -131,6 +131,7 @@ fn period() -> Program {
         registers: Vec::new(),
         symbols: Vec::new(),
         ranges: Vec::new(),
+        array_ranges: Vec::new(),
         loop_bounds: Vec::new(),
         parts: Vec::new(),
         parameters: Vec::new(),

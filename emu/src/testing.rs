@@ -306,6 +306,7 @@ impl Generator {
             symbols: Vec::new(),
             loop_bounds: self.loop_bounds,
             ranges: Vec::new(),
+            array_ranges: Vec::new(),
             parts: Vec::new(),
             parameters: Vec::new(),
             latched: false,

@@ -39,6 +39,8 @@ pub struct Program {
     pub loop_bounds: Vec<LoopBound>,
     /// The ranges in which inputs and states lie when a period begins, by ascending register.
     pub ranges: Vec<Range>,
+    /// The ranges in which the words of arrays in data memory lie when a period begins, by ascending word; they do not overlap.
+    pub array_ranges: Vec<ArrayRange>,
     /// Source files, as the source names them.
     pub files: Vec<String>,
     /// The source location of each operation, parallel to `code`; `None` for filler.
@@ -147,11 +149,7 @@ pub struct Range {
 impl Range {
     /// The least and the largest value as numbers.
     pub fn ends(&self) -> (f64, f64) {
-        let value = |bits: u32| match self.ty {
-            Type::F => f64::from(f32::from_bits(bits)),
-            Type::I | Type::B => f64::from(bits.cast_signed()),
-        };
-        (value(self.low), value(self.high))
+        ends(self.ty, [self.low, self.high])
     }
 
     /// The value with these bits lies in the range. A NaN lies in none.
@@ -165,13 +163,57 @@ impl Range {
 
     /// The reason why the range is invalid; `None` if it is valid.
     pub fn mistake(&self) -> Option<&'static str> {
-        let (low, high) = self.ends();
-        match () {
-            () if self.ty == Type::B => Some("bits as such have no order"),
-            () if !low.is_finite() || !high.is_finite() => Some("its ends must be finite"),
-            () if low > high => Some("its least value is above its largest"),
-            () => None,
-        }
+        mistake(self.ty, [self.low, self.high])
+    }
+}
+
+/// The range in which every word of an array in data memory lies whenever a period begins, promised by the source.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ArrayRange {
+    /// First word of the array, which has a label.
+    pub first: u32,
+    /// Number of words, at least 1: up to the next label or the end of the data.
+    pub words: u32,
+    /// The type of the ends: binary32, or a signed integer.
+    pub ty: Type,
+    /// The least value's bits.
+    pub low: u32,
+    /// The largest value's bits.
+    pub high: u32,
+}
+
+impl ArrayRange {
+    /// The least and the largest value as numbers.
+    pub fn ends(&self) -> (f64, f64) {
+        ends(self.ty, [self.low, self.high])
+    }
+
+    /// The reason why the range is invalid; `None` if it is valid.
+    pub fn mistake(&self) -> Option<&'static str> {
+        mistake(self.ty, [self.low, self.high])
+    }
+
+    /// Words of the array.
+    pub fn span(&self) -> std::ops::Range<u32> {
+        self.first..self.first.saturating_add(self.words)
+    }
+}
+
+fn ends(ty: Type, [low, high]: [u32; 2]) -> (f64, f64) {
+    let value = |bits: u32| match ty {
+        Type::F => f64::from(f32::from_bits(bits)),
+        Type::I | Type::B => f64::from(bits.cast_signed()),
+    };
+    (value(low), value(high))
+}
+
+fn mistake(ty: Type, bits: [u32; 2]) -> Option<&'static str> {
+    let (low, high) = ends(ty, bits);
+    match () {
+        () if ty == Type::B => Some("bits as such have no order"),
+        () if !low.is_finite() || !high.is_finite() => Some("its ends must be finite"),
+        () if low > high => Some("its least value is above its largest"),
+        () => None,
     }
 }
 
@@ -458,6 +500,11 @@ impl Program {
         self.nearest(Space::Code, address.get())
     }
 
+    /// Label of the array that a word of data memory belongs to: the last label at or before the word.
+    pub fn data_array(&self, word: u32) -> Option<&str> {
+        self.nearest(Space::Data, word).map(|(label, _)| label)
+    }
+
     /// A word of data memory, with the last label before it and the distance from there: ``data word 12 (`A+5`)``.
     pub fn data_text(&self, word: u32) -> String {
         match self.nearest(Space::Data, word) {
@@ -465,6 +512,20 @@ impl Program {
             Some((label, distance)) => format!("data word {word} (`{label}+{distance}`)"),
             None => format!("data word {word}"),
         }
+    }
+
+    /// Label at a word of data memory.
+    pub fn data_label(&self, word: u32) -> Option<&str> {
+        let mut labels = self.symbols.iter().filter(|symbol| symbol.space == Space::Data);
+        labels.find(|label| label.address == word).map(|label| label.name.as_str())
+    }
+
+    /// Words of the label at an address of data memory: up to the next label or the end of the data. `None` without a label there, or words.
+    pub fn label_words(&self, first: u32) -> Option<std::ops::Range<u32>> {
+        let labels = || self.symbols.iter().filter(|symbol| symbol.space == Space::Data);
+        let ends = labels().map(|label| label.address).chain([self.data.len() as u32]);
+        let end = ends.filter(|end| *end > first).min()?;
+        self.data_label(first).map(|_| first..end)
     }
 
     /// A target as the source names it: the label there, or else the bundle's number.

@@ -73,6 +73,7 @@ pub(crate) fn emit(ir: &mut Ir, allocation: &Allocation, sink: &mut Sink) -> Emi
         sections: sections(ir),
         loop_bounds: loop_bounds(ir),
         ranges: ranges(ir, allocation),
+        array_ranges: ir.array_ranges.clone(),
         files: ir.files.clone(),
         lines,
         // Columns of equations are added where the sources are at hand.

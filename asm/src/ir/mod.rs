@@ -27,7 +27,7 @@ use smallvec::SmallVec;
 use std::collections::BTreeMap;
 use std::num::NonZeroU32;
 use takt_diagnostics::source::Span;
-use takt_isa::program::{Columns, Location, Space};
+use takt_isa::program::{ArrayRange, Columns, Location, Space};
 use takt_isa::{Effect, Machine, Op, Operand, ROWS, Register, Row, SlotIndex, Slots, Type};
 
 /// A register of [`Ir::registers`].
@@ -404,6 +404,8 @@ pub struct Ir {
     pub accesses: Vec<ArrayAccess>,
     /// Ranges of registers when a period begins, least and largest value, in source order.
     pub ranges: Vec<(RegisterId, [u32; 2])>,
+    /// Ranges of arrays in data memory when a period begins, by ascending word.
+    pub array_ranges: Vec<ArrayRange>,
     /// Timing demands on ports, in source order.
     pub demands: Vec<Demand>,
     /// Inputs are latched together at the tick, and outputs published together at `wait`.

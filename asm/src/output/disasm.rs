@@ -142,6 +142,14 @@ impl<'p> Writer<'p> {
             };
             self.line(format_args!(".range  {name} = {ends}"));
         }
+        for range in &self.program.array_ranges {
+            let Some(label) = self.program.data_label(range.first) else { continue };
+            let ends = match range.ty {
+                Type::F => format!("{:?}, {:?}", f32::from_bits(range.low), f32::from_bits(range.high)),
+                Type::I | Type::B => format!("{}, {}", range.low.cast_signed(), range.high.cast_signed()),
+            };
+            self.line(format_args!(".range  {label} = {ends}"));
+        }
         // The order of the first `.loc` lines is the order of the files in the program.
         for file in files {
             self.line(format_args!(".loc {} 1", quoted(file)));

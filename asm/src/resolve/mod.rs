@@ -40,10 +40,11 @@ use std::collections::BTreeMap;
 use std::rc::Rc;
 use takt_diagnostics::diag::Diagnostic;
 use takt_diagnostics::source::Span;
-use takt_isa::program::{Location, Range};
+use takt_isa::program::{ArrayRange, Location, Range, Space};
 use takt_isa::spec::instructions::Function;
 use takt_isa::{Effect, Machine, Op, ROWS, Register, Slots, Type};
 use takt_syntax::ast::*;
+use takt_syntax::expr::Value;
 
 /// Limit on the cycles that a demand on ports can name: many times the length of a program.
 const MAX_CYCLES: u32 = 1 << 24;
@@ -149,6 +150,7 @@ fn empty(machine: &'static Machine, flat: &ExpandedSource) -> Ir {
         arrays: Vec::new(),
         accesses: Vec::new(),
         ranges: Vec::new(),
+        array_ranges: Vec::new(),
         demands: Vec::new(),
         latched: flat.ports.is_some_and(|(latched, _)| latched),
         numbers: BTreeMap::new(),
@@ -711,6 +713,10 @@ impl Resolver<'_> {
                 continue;
             };
             for name in registers {
+                if !*placed && let Some(array) = self.ranged_array(at, *name, [low, high]) {
+                    self.array_range(at, *name, array, [low, high]);
+                    continue;
+                }
                 // Errors have been reported.
                 let Ok((members, ty)) = self.range_registers(at, *name, *placed) else { continue };
                 let mut end = |end: &Expr| {
@@ -735,6 +741,71 @@ impl Resolver<'_> {
                     self.ir.ranges.push((register, [least, largest]));
                 }
             }
+        }
+    }
+
+    /// The array or label of data memory that a `.range` names: its words' extent and type. A label has no type: it is the ends'.
+    fn ranged_array(
+        &mut self,
+        at: AstPlace,
+        operand: Operand,
+        [low, high]: [&Expr; 2],
+    ) -> Option<(std::ops::Range<u32>, Type)> {
+        let OperandKind::Name(name) = operand.kind else { return None };
+        let id = self.context.spelled(at, name, operand.span).ok()?;
+        match self.context.lookup(at.scope, id) {
+            Binding::Table(number) => {
+                let array = &self.context.declared.tables[number as usize].array;
+                Some((array.base..array.base + array.words, array.ty))
+            }
+            Binding::Data(label) => {
+                let first = self.context.declared.labels[label.0 as usize].position;
+                let mut is_integer = |end: &Expr| matches!(self.context.value(at, end.id), Ok(Value::Int(_)));
+                let ty = if is_integer(low) && is_integer(high) { Type::I } else { Type::F };
+                Some((first..self.words_end(first), ty))
+            }
+            _ => None,
+        }
+    }
+
+    /// End of the words that follow a label of data memory: the next label, or the end of the data.
+    fn words_end(&self, first: u32) -> u32 {
+        let labels = self.context.declared.labels.iter().filter(|label| label.space == Space::Data);
+        let ends = labels.map(|label| label.position).chain([self.ir.data.len() as u32]);
+        ends.filter(|end| *end > first).min().unwrap_or(first)
+    }
+
+    fn array_range(
+        &mut self,
+        at: AstPlace,
+        operand: Operand,
+        (words, ty): (std::ops::Range<u32>, Type),
+        [low, high]: [&Expr; 2],
+    ) {
+        let mut end = |end: &Expr| {
+            let value = self.context.value(at, end.id)?;
+            self.bits(at, value, ty, (*end).into())
+        };
+        let (Ok(least), Ok(largest)) = (end(low), end(high)) else { return };
+        let count = words.end.saturating_sub(words.start);
+        let range = ArrayRange { first: words.start, words: count, ty, low: least, high: largest };
+        let span = Span { end: high.span.end, ..low.span };
+        let known = self.ir.array_ranges.partition_point(|known| known.first < range.first);
+        let has_range = self.ir.array_ranges.get(known).is_some_and(|known| known.first == range.first);
+        if let Some(mistake) = range.mistake() {
+            self.context.error(at.scope, "range", span, format!("this range is invalid: {mistake}"));
+        } else if has_range {
+            self.context.error(at.scope, "declared-twice", operand.span, "this array has a range already");
+        } else if count == 0 {
+            let message = "no words of data follow this label: expected an array or a label before words";
+            self.context.error(at.scope, "range", operand.span, message);
+        } else if self.words_end(range.first) != words.end {
+            let message = "words without a label follow this array, so that its range has no end in an image";
+            let error =
+                Diagnostic::error("range", operand.span, message).help("put a label before these words");
+            self.context.report(at.scope, error);
+        } else {
+            self.ir.array_ranges.insert(known, range);
         }
     }
 

@@ -9,7 +9,7 @@ use crate::code::{inputs_of, named, refuse};
 use crate::labels::{self, Labels};
 use foldhash::{HashMap, HashMapExt as _, HashSet, HashSetExt as _};
 use takt_asm::plain::{PlainKind, PlainProgram, PlainRegister};
-use takt_isa::program::{LoopBound, Port, Range, Section, Space};
+use takt_isa::program::{ArrayRange, LoopBound, Port, Range, Section, Space};
 use takt_isa::{Instruction, Machine, Program, Register, Type};
 
 /// Locations in the image of the source's declarations.
@@ -67,6 +67,7 @@ pub(crate) fn compare(program: &Program, plain: &PlainProgram) -> Result<Layout,
         sections,
         loop_bounds,
         ranges,
+        array_ranges,
         // File names and line numbers serve messages only.
         files: _,
         lines: _,
@@ -95,6 +96,7 @@ pub(crate) fn compare(program: &Program, plain: &PlainProgram) -> Result<Layout,
     };
     compare_constants(program, constants, plain, &layout)?;
     compare_ranges(ranges, plain, &layout)?;
+    compare_array_ranges(program, array_ranges, plain)?;
     Ok(layout)
 }
 
@@ -336,6 +338,25 @@ fn compare_ranges(ranges: &[Range], plain: &PlainProgram, layout: &Layout) -> Re
     match left.first() {
         Some(range) => {
             let name = plain.machine.register_name(range.register).unwrap_or_default();
+            Err(refuse(format!("the image has a range for {name} that the source does not")))
+        }
+        None => Ok(()),
+    }
+}
+
+fn compare_array_ranges(
+    program: &Program,
+    ranges: &[ArrayRange],
+    plain: &PlainProgram,
+) -> Result<(), Difference> {
+    let lacks = |all: &[ArrayRange], range: &&ArrayRange| !all.contains(range);
+    if let Some(range) = plain.array_ranges.iter().find(|range| lacks(ranges, range)) {
+        let name = program.data_text(range.first);
+        return Err(refuse(format!("the range of {name} is another in the image")));
+    }
+    match ranges.iter().find(|range| lacks(&plain.array_ranges, range)) {
+        Some(range) => {
+            let name = program.data_text(range.first);
             Err(refuse(format!("the image has a range for {name} that the source does not")))
         }
         None => Ok(()),

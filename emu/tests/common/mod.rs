@@ -30,6 +30,7 @@ pub(crate) fn program(machine: &'static Machine, source: &str) -> Program {
         symbols: Vec::new(),
         loop_bounds: Vec::new(),
         ranges: Vec::new(),
+        array_ranges: Vec::new(),
         parts: Vec::new(),
         parameters: Vec::new(),
         latched: false,

@@ -6,7 +6,7 @@ use super::{ImageError, VERSION};
 use serde::{Deserialize, Serialize};
 use takt_diagnostics::diag::Diagnostics;
 use takt_diagnostics::machine;
-use takt_isa::program::{Columns, Location, Port, Range, Section, Symbol};
+use takt_isa::program::{ArrayRange, Columns, Location, Port, Range, Section, Symbol};
 use takt_isa::{BundleAddress, Machine, Program, Register, Type};
 
 #[derive(Serialize, Deserialize)]
@@ -29,6 +29,9 @@ pub(super) struct Meta {
     /// Left out if empty.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     ranges: Vec<MetaRange>,
+    /// Left out if empty.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    array_ranges: Vec<MetaArrayRange>,
     sections: Vec<MetaSection>,
     files: Vec<String>,
     /// File and line of each word of code.
@@ -66,6 +69,17 @@ pub(super) enum MetaType {
 #[serde(deny_unknown_fields)]
 struct MetaRange {
     register: u16,
+    #[serde(rename = "type")]
+    ty: MetaType,
+    low: u32,
+    high: u32,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct MetaArrayRange {
+    first: u32,
+    words: u32,
     #[serde(rename = "type")]
     ty: MetaType,
     low: u32,
@@ -121,6 +135,13 @@ impl Meta {
             low: range.low,
             high: range.high,
         };
+        let array_range = |&ArrayRange { first, words, ty, low, high }: &ArrayRange| MetaArrayRange {
+            first,
+            words,
+            ty: ty.into(),
+            low,
+            high,
+        };
         let section = |section: &Section| MetaSection {
             name: section.name.clone(),
             start: section.start,
@@ -136,6 +157,7 @@ impl Meta {
             latched: program.latched,
             registers: ports(&program.registers),
             ranges: program.ranges.iter().map(range).collect(),
+            array_ranges: program.array_ranges.iter().map(array_range).collect(),
             sections: program.sections.iter().map(section).collect(),
             files: program.files.clone(),
             lines: program
@@ -196,6 +218,13 @@ impl Meta {
             let known = Register::new(register.into()).ok_or(ImageError::Range { register, reason })?;
             Ok(Range { register: known, ty: ty.into(), low, high })
         };
+        let array_range = |MetaArrayRange { first, words, ty, low, high }| ArrayRange {
+            first,
+            words,
+            ty: ty.into(),
+            low,
+            high,
+        };
         let section = |MetaSection { name, start, end }| Section { name, start, end };
         Ok(Program {
             machine,
@@ -210,6 +239,7 @@ impl Meta {
             symbols,
             loop_bounds: Vec::new(),
             ranges: self.ranges.into_iter().map(range).collect::<Result<_, ImageError>>()?,
+            array_ranges: self.array_ranges.into_iter().map(array_range).collect(),
             sections: self.sections.into_iter().map(section).collect(),
             files: self.files,
             lines: self

@@ -164,6 +164,14 @@ pub enum ImageError {
         /// Reason against the range.
         reason: &'static str,
     },
+    /// A range of an array is not that of a label's words, is empty, or is out of order.
+    #[error("the range of the array at data word {first}: {reason}")]
+    ArrayRange {
+        /// First word of the array.
+        first: u32,
+        /// Reason against the range.
+        reason: &'static str,
+    },
     /// The format cannot hold the program.
     #[error("an image cannot hold this program: {0}")]
     Unwritable(String),

@@ -87,6 +87,7 @@ pub(super) fn program(program: &Program) -> Result<(), ImageError> {
     sections(program)?;
     loops(program)?;
     ranges(program)?;
+    array_ranges(program)?;
     lines(program)
 }
 
@@ -122,6 +123,24 @@ fn ranges(program: &Program) -> Result<(), ImageError> {
             return Err(ImageError::Range { register: register.get(), reason });
         }
         last = Some(register);
+    }
+    Ok(())
+}
+
+/// Each range is one label's words, so that a disassembly can name them.
+fn array_ranges(program: &Program) -> Result<(), ImageError> {
+    let mut last = None;
+    for range in &program.array_ranges {
+        let first = range.first;
+        let reason = match range.mistake() {
+            _ if program.label_words(first) != Some(range.span()) => "it is not the words of a label",
+            _ if last.is_some_and(|last| last >= first) => "ranges are not in ascending order",
+            mistake => mistake.unwrap_or_default(),
+        };
+        if !reason.is_empty() {
+            return Err(ImageError::ArrayRange { first, reason });
+        }
+        last = Some(first);
     }
     Ok(())
 }
