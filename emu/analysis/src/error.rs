@@ -113,12 +113,13 @@ pub enum Refusal {
     },
     /// A data word that keeps a value from one period to another.
     #[error(
-        "{word} is read here before this period has written it, and the program changes it: what \
-         lasts from one period to another has a range only in a `.state` with a `.range`, so that arrays that do are beyond this analysis"
+        "{word} is read here before this period has written it, and the program changes it: write `.range {array} = least, largest`"
     )]
     NoRangeOfWord {
         /// Data word, as the source names it.
         word: String,
+        /// Name of the word's array.
+        array: String,
     },
     /// An exceeded limit of the analysis.
     #[error("more than {limit} {what}: the analysis gives up")]

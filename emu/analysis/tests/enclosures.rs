@@ -5,14 +5,14 @@
 //! Campaign: `TAKT_PROGRAMS=10000 cargo test --release -p takt-analysis --test suite enclosures::`; `TAKT_SEED` moves its seeds.
 #![allow(clippy::print_stdout)]
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
-use takt_analysis::accuracy::{Enclosure, Problem, Shadow, enclose};
+use takt_analysis::accuracy::{Enclosure, MAX_UNROLLED, Problem, Shadow, StateRange, enclose_within};
 use takt_asm::{MemoryLoader, Options};
 use takt_emu::testing::Random;
 use takt_emu::{Emulator, Status, Step};
 use takt_isa::fp::{Flags, Host};
-use takt_isa::program::Range;
+use takt_isa::program::{Range, Space};
 use takt_isa::timing::Cycle;
 use takt_isa::{Effect, Instruction, MACHINES, Machine, Program, ROWS, Register, Row, Type, compute};
 
@@ -146,12 +146,45 @@ impl Writer<'_> {
     }
 
     fn load(&mut self) {
+        if self.random.once_in(2) {
+            return self.access();
+        }
         let index = self.operand(Type::I);
         let (at, name) = (format!("t{}", self.temporaries.len()), format!("t{}", self.temporaries.len() + 1));
         writeln!(self.text, " iand {at}:int, {index}, 3\n ld {name}:float, V[{at}:int]").unwrap();
         self.temporaries.extend([at.clone(), name.clone()]);
         self.integers.push(at);
         self.floats.push(name);
+    }
+
+    /// Load from or store to an array that lasts from period to period, mostly within its bounds. Returns the value's name.
+    fn access(&mut self) {
+        let index = self.operand(Type::I);
+        let at = format!("t{}", self.temporaries.len());
+        let line = if self.random.once_in(8) && index.contains(':') { "mov" } else { "iand" };
+        let mask = if line == "iand" { ", 3" } else { "" };
+        writeln!(self.text, " {line} {at}:int, {index}{mask}").unwrap();
+        self.temporaries.push(at.clone());
+        self.integers.push(at.clone());
+        let (array, ty) = if self.random.once_in(2) { ("A", Type::F) } else { ("N", Type::I) };
+        let name = format!("t{}", self.temporaries.len());
+        self.temporaries.push(name.clone());
+        if self.random.once_in(2) {
+            // Values stay in the range of their array more often than not.
+            let limit = match (self.random.once_in(4), ty) {
+                (true, _) => "mov",
+                (_, Type::F) => "fsat",
+                _ => "iand",
+            };
+            let value = self.operand(ty);
+            let (cast, most) = if ty == Type::F { ("float", "1.0") } else { ("int", "7") };
+            let most = if limit == "mov" { String::new() } else { format!(", {most}") };
+            writeln!(self.text, " {limit} {name}:{cast}, {value}{most}\n st {array}[{at}:int], {name}")
+                .unwrap();
+        } else {
+            writeln!(self.text, " ld {name}, {array}[{at}:int]").unwrap();
+        }
+        if ty == Type::F { &mut self.floats } else { &mut self.integers }.push(name);
     }
 
     fn branch(&mut self) {
@@ -230,12 +263,27 @@ impl Writer<'_> {
         }
     }
 
+    /// Counted loop, now and then a long one; its count goes down to 1, and may be an index.
     fn turns(&mut self) {
         self.labels += 1;
-        let (label, turns) = (self.labels, 1 + self.random.below(4));
+        let longest = if self.random.once_in(4) { 30 } else { 4 };
+        let (label, turns) = (self.labels, 1 + self.random.below(longest));
         writeln!(self.text, " li k, {turns}\n.loop_bound {turns}\nl{label}:").unwrap();
-        for _ in 0..1 + self.random.below(3) {
-            self.again();
+        for _ in 0..1 + self.random.below(4) {
+            let value = self.operand(Type::F);
+            let line = match self.random.below(8) {
+                0 => format!(" fadd u, u, {value}\n"),
+                1 => format!(" fadd u, u, {value}\n fsat u, u, 3.0\n"),
+                2 => format!(" fmul u, u, 0.75\n fadd u, u, {value}\n"),
+                3 => " iand j, k, 3\n ld w, A[j]\n fadd u, u, w\n".to_owned(),
+                4 => " iadd j, j, 1\n iand j, j, 3\n fsat w, u, 1.0\n st A[j], w\n".to_owned(),
+                5 => " isub j, j, 2\n".to_owned(),
+                _ => {
+                    self.again();
+                    String::new()
+                }
+            };
+            self.text += &line;
         }
         writeln!(self.text, " isub k, k, 1\n bnz k, l{label}").unwrap();
     }
@@ -250,7 +298,8 @@ fn source(random: &mut Random, machine: &'static Machine) -> String {
     if random.once_in(2) {
         text += ".schedule on\n";
     }
-    text += ".input x0, x1, x2, n0:int\n.output y0, y1, y2, y3\n.state s0\n.state c0:int\n.reg k:int\n";
+    text += ".input x0, x1, x2, n0:int\n.output y0, y1, y2, y3, y4, z0:int, z1:int\n.state s0\n.state c0:int\n.reg k:int j:int u w\n";
+    text += ".range A = -2.0, 2.0\n.range N = 0, 9\n";
     for name in ["x0", "x1", "x2", "s0"] {
         let (low, high) = ends(random);
         writeln!(text, ".range {name} = {low:e}, {high:e}").unwrap();
@@ -269,8 +318,8 @@ fn source(random: &mut Random, machine: &'static Machine) -> String {
     let rows: Vec<_> = ROWS.iter().filter(offered).collect();
     let names = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
     let mut writer = Writer {
-        floats: names(&["x0", "x1", "x2", "s0"]),
-        integers: names(&["n0", "c0"]),
+        floats: names(&["x0", "x1", "x2", "s0", "u"]),
+        integers: names(&["n0", "c0", "j"]),
         temporaries: Vec::new(),
         labels: 0,
         rows,
@@ -278,14 +327,16 @@ fn source(random: &mut Random, machine: &'static Machine) -> String {
         text: String::new(),
     };
     for _ in 0..1 + writer.random.below(10) {
-        match writer.random.below(18) {
-            0 if !only_float => writer.load(),
+        match writer.random.below(20) {
+            0 | 18 | 19 if !only_float => writer.load(),
             1 | 2 => writer.branch(),
             3 => writer.turns(),
             4..=7 => writer.decision(),
             _ => writer.operation(false),
         }
     }
+    let last = writer.integers[writer.integers.len() - 1].clone();
+    writeln!(writer.text, " mov y4, u\n mov z0, {last}:int\n mov z1, j").unwrap();
     // Outputs: recent values; integers as numbers, now and then as arbitrary bits.
     for i in 0..4 {
         let random = &mut *writer.random;
@@ -314,7 +365,7 @@ fn source(random: &mut Random, machine: &'static Machine) -> String {
         1 if !keeps => " iadd c0, c0, 1\n".to_owned(),
         _ => String::new(),
     };
-    let body = std::mem::take(&mut writer.text) + &state + &counter;
+    let body = " mov u, 0.0\n mov w, 0.0\n mov j, 0\n".to_owned() + &writer.text + &state + &counter;
     let temporaries = writer.temporaries.join(" ");
     let start = pick(writer.random, &["0.0", "1.0", "-2.0", "1e-39", "zero", "x0"]);
     let first = pick(writer.random, &["0", "1", "4", "n0"]);
@@ -330,7 +381,7 @@ fn source(random: &mut Random, machine: &'static Machine) -> String {
         0 => ".preset s0 = 0.5\n.preset c0 = 2\n.once\n".to_owned(),
         _ => format!(".once\n mov s0, {start}\n mov c0, {first}\n"),
     };
-    let data = ".data\nV: .float 1.0, -2.5\n .word 3, 0x3f000000\n";
+    let data = ".data\nV: .float 1.0, -2.5\n .word 3, 0x3f000000\nA: .float 1.0, 0.5, -1.0, 0.25\nN: .word 1, 0, 7, 2\n";
     text + &presets + &enter + &body + " wait p\n" + data
 }
 
@@ -370,10 +421,12 @@ fn settles(row: &Row) -> bool {
 fn tainted(program: &Program, enclosure: &Enclosure) -> BTreeSet<Register> {
     let listed = |word: usize| {
         let here = enclosure.hazards.iter().filter(|hazard| hazard.word as usize == word);
-        here.into_iter().any(|hazard| !matches!(hazard.problem, Problem::Conversion | Problem::Output))
+        here.into_iter().any(|hazard| !hazard.problem.is_defined() && hazard.problem != Problem::Output)
     };
     let slots = program.machine.slots.len();
-    let mut tainted = BTreeSet::new();
+    let unbounded = enclosure.hazards.iter().filter(|hazard| hazard.problem == Problem::Unbounded);
+    let mut tainted: BTreeSet<Register> =
+        unbounded.flat_map(|hazard| hazard.operands.iter().map(|(register, _)| *register)).collect();
     loop {
         let before = tainted.len();
         for (word, bits) in program.code.iter().enumerate() {
@@ -391,6 +444,30 @@ fn tainted(program: &Program, enclosure: &Enclosure) -> BTreeSet<Register> {
     }
 }
 
+/// Registers that may hold a float, or an integer computed from a float's bits.
+fn of_bits(program: &Program) -> BTreeSet<Register> {
+    let slots = program.machine.slots.len();
+    let typed = program.inputs.iter().chain(&program.registers).filter(|port| port.ty == Type::F);
+    let mut found: BTreeSet<Register> = typed.map(|port| port.register).collect();
+    loop {
+        let before = found.len();
+        for (word, bits) in program.code.iter().enumerate() {
+            let Ok(instruction) = Instruction::decode(*bits) else { continue };
+            let Some(register) = instruction.writes(&program.machine.slots[word % slots]) else { continue };
+            let row = instruction.op.row();
+            let is_float = row.result_type() == Type::F || instruction.effect() == Effect::Load;
+            let from = row.result_type() != Type::F
+                && instruction.reads().iter().any(|register| found.contains(register));
+            if is_float || from && !settles(row) {
+                found.insert(register);
+            }
+        }
+        if found.len() == before {
+            return found;
+        }
+    }
+}
+
 /// Counts of statements compared with a run.
 #[derive(Default, Debug)]
 struct CheckCounts {
@@ -404,6 +481,14 @@ struct CheckCounts {
     states: u64,
     /// Operations that raised a flag, each listed.
     raised: u64,
+    /// Sums of integers that wrapped, and shifts by more than 31, each listed.
+    wrapped: u64,
+    /// Array that each access of the run has touched, by its word.
+    touched: BTreeMap<usize, Option<u32>>,
+    /// Accesses outside of their array, each listed.
+    outside: u64,
+    /// Ranges of integer outputs compared with a value.
+    integers: u64,
 }
 
 /// Run of a program, compared with its enclosure.
@@ -411,6 +496,8 @@ struct Run<'p> {
     program: &'p Program,
     enclosure: &'p Enclosure,
     tainted: BTreeSet<Register>,
+    /// Registers that may hold a float, or an integer computed from a float's bits.
+    bits: BTreeSet<Register>,
     /// Inputs change in every cycle, since ports are not latched.
     restless: bool,
 }
@@ -431,6 +518,9 @@ impl Run<'_> {
         instruction: &Instruction,
         checked: &mut CheckCounts,
     ) {
+        if matches!(instruction.effect(), Effect::Load | Effect::Store) {
+            return self.access(emulator, word, instruction, checked);
+        }
         if instruction.effect() != Effect::Compute {
             return;
         }
@@ -441,9 +531,63 @@ impl Run<'_> {
         let value = compute::<Host>(instruction.op, operands[0], operands[1], operands[2]);
         let known = instruction.reads().iter().all(|register| !self.tainted.contains(register));
         let listed = self.enclosure.hazards.iter().any(|hazard| hazard.word as usize == word);
+        let is_listed = |problem| {
+            self.enclosure
+                .hazards
+                .iter()
+                .any(|hazard| hazard.word as usize == word && hazard.problem == problem)
+        };
+        let signed = |operand: u32| i64::from(operand.cast_signed());
+        let sum = match instruction.op.row().mnemonic {
+            "iadd" => signed(operands[0]) + signed(operands[1]),
+            "isub" => signed(operands[0]) - signed(operands[1]),
+            _ => 0,
+        };
+        let is_whole = |register: &Register| !self.bits.contains(register);
+        if i32::try_from(sum).is_err() && known && instruction.reads().iter().all(is_whole) {
+            checked.wrapped += 1;
+            assert!(is_listed(Problem::Wrap), "{instruction:?} of {operands:08x?} wraps");
+        }
+        let is_shift = matches!(instruction.op.row().mnemonic, "ishl" | "ishr" | "isar");
+        if is_shift && operands[1] > 31 && known && instruction.reads().iter().all(is_whole) {
+            checked.wrapped += 1;
+            assert!(is_listed(Problem::Shift), "{instruction:?} of {operands:08x?} shifts by more than 31");
+        }
         if value.flags != Flags::NONE {
             checked.raised += u64::from(listed);
             assert!(listed || !known, "{instruction:?} of {operands:08x?} raises {}", value.flags);
+        }
+    }
+
+    /// Checks that an access outside of its array is listed.
+    fn access(&self, emulator: &Emulator, word: usize, instruction: &Instruction, checked: &mut CheckCounts) {
+        let base = instruction.reads()[0];
+        let address = emulator.register(base).unwrap_or(0).wrapping_add(instruction.constant);
+        let starts = || {
+            let labels = self.program.symbols.iter().filter(|symbol| symbol.space == Space::Data);
+            labels.map(|label| label.address).chain([self.program.data.len() as u32])
+        };
+        if self.tainted.contains(&base) {
+            return;
+        }
+        let array = starts().filter(|start| *start <= address).max();
+        let touched = checked.touched.entry(word).or_insert(array);
+        if *touched != array || address >= self.program.data.len() as u32 {
+            checked.outside += 1;
+            let mut hazards = self.enclosure.hazards.iter();
+            let is_listed =
+                hazards.any(|hazard| hazard.word as usize == word && hazard.problem == Problem::Address);
+            assert!(is_listed, "{instruction:?} accesses word {address}");
+        }
+    }
+
+    /// Checks the ranges of integer outputs.
+    fn integers(&self, emulator: &Emulator, checked: &mut CheckCounts) {
+        for bound in self.enclosure.outputs.iter().filter(|bound| bound.ty == Type::I) {
+            let Some(range) = bound.range else { continue };
+            let value = f64::from(emulator.register(bound.register).unwrap().cast_signed());
+            checked.integers += 1;
+            assert!(range.contains(value), "{} is {value}, of {range:?}", bound.name);
         }
     }
 
@@ -460,10 +604,26 @@ impl Run<'_> {
             };
             let (low, high) = range.ends();
             let within = low <= value && value <= high;
-            let assumed = self.enclosure.later().any(|state| state.range.register == range.register);
+            let assumed = self.enclosure.later().any(|state| state.range == StateRange::Register(*range));
             checked.states += u64::from(!assumed);
             assert!(within || assumed, "a state is {value}, {bits:08x}, of [{low}, {high}]");
             kept &= within;
+        }
+        for range in &self.program.array_ranges {
+            let (low, high) = range.ends();
+            let assumed = self.enclosure.later().any(|state| state.range == StateRange::Array(*range));
+            for word in range.span() {
+                let bits = emulator.memory()[word as usize];
+                let value = if range.ty == Type::F {
+                    f64::from(f32::from_bits(bits))
+                } else {
+                    f64::from(bits.cast_signed())
+                };
+                let within = low <= value && value <= high;
+                checked.states += u64::from(!assumed);
+                assert!(within || assumed, "data word {word} is {value}, of [{low}, {high}]");
+                kept &= within;
+            }
         }
         kept
     }
@@ -472,6 +632,7 @@ impl Run<'_> {
         let (program, machine) = (self.program, self.program.machine);
         let mut emulator = Emulator::new(program).unwrap();
         let mut shadow = Shadow::new(program).each_period_afresh();
+        checked.touched.clear();
         self.inputs(&mut emulator, random);
         let mut begun = false;
         for _ in 0..periods {
@@ -516,6 +677,7 @@ impl Run<'_> {
                         assert!(value.is_finite(), "{} is {value}", port.name);
                     }
                 }
+                self.integers(&emulator, checked);
                 if !self.states(&emulator, checked) {
                     break;
                 }
@@ -523,7 +685,7 @@ impl Run<'_> {
                 return;
             }
         }
-        for bound in &self.enclosure.outputs {
+        for bound in self.enclosure.outputs.iter().filter(|bound| bound.ty == Type::F) {
             let measured = shadow.outputs().iter().find(|output| output.register == bound.register).unwrap();
             let (Some(error), Some(range), Some(worst)) = (bound.error, bound.range, measured.absolute)
             else {
@@ -556,8 +718,17 @@ fn check(seed: u64, checked: &mut CheckCounts) {
     let machine = MACHINES[random.below(MACHINES.len() as u32) as usize];
     let text = source(&mut random, machine);
     let Some(program) = assembled(&text, machine) else { return };
+    compare(&program, MAX_UNROLLED, seed, &text, checked);
+    if text.contains(".loop_bound") {
+        compare(&program, 0, seed, &text, checked);
+    }
+}
+
+/// Compares the statements with runs; loops of more than so many bundles are summarised.
+fn compare(program: &Program, unrolled: u64, seed: u64, text: &str, checked: &mut CheckCounts) {
     checked.programs += 1;
-    let enclosure = match enclose(&program) {
+    let mut random = Random::new(seed);
+    let enclosure = match enclose_within(program, unrolled) {
         Ok(enclosure) => enclosure,
         Err(_) => {
             checked.refused += 1;
@@ -566,14 +737,16 @@ fn check(seed: u64, checked: &mut CheckCounts) {
     };
     checked.safe += u64::from(enclosure.hazards.is_empty());
     let run = Run {
-        tainted: tainted(&program, &enclosure),
+        tainted: tainted(program, &enclosure),
+        bits: of_bits(program),
         restless: !program.latched && random.once_in(2),
-        program: &program,
+        program,
         enclosure: &enclosure,
     };
     let result =
         std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| run.run(PERIODS, &mut random, checked)));
-    assert!(result.is_ok(), "seed {seed} on {}:\n{text}{enclosure:#?}", machine.name);
+    let machine = program.machine.name;
+    assert!(result.is_ok(), "seed {seed} on {machine}, loops up to {unrolled}:\n{text}{enclosure:#?}");
 }
 
 #[test]
@@ -584,12 +757,28 @@ fn no_run_contradicts_an_enclosure() {
     for seed in first..first + programs {
         check(seed, &mut checked);
     }
-    let CheckCounts { programs, refused, safe, bounds, tight, states, raised } = checked;
+    let CheckCounts {
+        programs,
+        refused,
+        safe,
+        bounds,
+        tight,
+        states,
+        raised,
+        wrapped,
+        outside,
+        integers,
+        ..
+    } = checked;
     println!(
         "figures: programs={programs} refused={refused} without_hazards={safe} bounds={bounds} tight={tight} states={states} \
-         raised={raised}"
+         raised={raised} wrapped={wrapped} outside={outside} integers={integers}"
     );
     // Weak statements would not test the analysis: require enough that are made and nearly reached.
     assert!(refused < programs / 4 && safe > programs / 8 && bounds > programs / 2, "too little is stated");
+    assert!(
+        wrapped > programs / 8 && outside > programs / 100 && integers > programs,
+        "integers are not tried"
+    );
     assert!(tight > programs / 20 && states > programs && raised > programs / 4, "nothing comes near");
 }

@@ -2,6 +2,7 @@
 //! Integration tests of the crate, in one executable: a module for each subject.
 
 mod accuracy;
+mod arrays;
 mod bound;
 mod dependence;
 mod enclosures;

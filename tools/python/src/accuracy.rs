@@ -99,7 +99,7 @@ pub(crate) fn enclose(
     };
     let assumed = |state: &takt_analysis::accuracy::UnprovedRange| {
         let first = state.moment == Moment::First;
-        (program.register_text(state.range.register), state.range.ends(), first, state.found.map(ends))
+        (state.range.name(program), state.range.ends(), first, state.found.map(ends))
     };
     Ok((
         found.outputs.iter().map(output).collect(),

@@ -60,7 +60,7 @@ class OutputBound:
     name: str
     #: Range of the output, including its ends; None if a hazard leaves it open.
     range: tuple[float, float] | None
-    #: Bound of the error, in the unit of the output and in ulps of its largest value; None if a hazard leaves it open.
+    #: Bound of the error, in the unit of the output and in ulps of its largest value; None if a hazard leaves it open, and for an integer.
     error: float | None
     ulp: float | None
     #: Bounds of the rounding errors that operations contribute, largest first: place (`law.s:12`) and error.
@@ -113,7 +113,8 @@ class Enclosure:
 
     @property
     def safe(self) -> bool:
-        """Whether no NaN, no overflow, no division by zero and no conversion out of range is possible, as long as states keep their ranges."""
+        """Whether no NaN, no overflow, no division by zero, no conversion, shift or index out of range and no integer that wraps is possible, as
+        long as states keep their ranges."""
         return not self.hazards and not any(state.first for state in self.assumed)
 
 

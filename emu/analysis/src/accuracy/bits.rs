@@ -11,12 +11,14 @@
 
 use super::affine::Affine;
 use super::interval::Interval;
+use super::node::Meaning;
 use super::number::*;
 use super::operand;
 use super::value::{Offset, Value};
 use super::{FRACTION, LEAST_EXPONENT};
 use std::collections::BTreeSet;
 use std::rc::Rc;
+use takt_isa::Instruction;
 use takt_isa::fp::Bitwise;
 
 /// Limit on the size of an integer range that is enumerated.
@@ -167,6 +169,39 @@ fn negated(number: &Number) -> Number {
 fn added(a: &Number, b: &Number) -> Number {
     let grid = a.grid.unwrap_or(0).min(b.grid.unwrap_or(0));
     integer(a.actual + b.actual, a.form.add(&b.form), grid)
+}
+
+/// Hazard of an operation on integers: a sum that may wrap, a shift by less than 0 or more than 31. The result is defined in either case.
+///
+/// Sums of floats' bits are no sums of integers: functions take floats apart by them.
+pub(super) fn hazard(instruction: &Instruction, operands: &[Value; 3]) -> Option<Problem> {
+    match Meaning::of(instruction)? {
+        Meaning::Add(terms) => {
+            let [a, b] = terms.each_ref().map(|term| integer_term(term, operands));
+            let (a, b) = (a?, b?);
+            let sum = (a.actual + b.actual).meet(a.form.add(&b.form).range());
+            (!sum.within(INTEGERS)).then_some(Problem::Wrap)
+        }
+        Meaning::Bitwise(Bitwise::Left | Bitwise::Right | Bitwise::RightSigned, of) => {
+            let Meaning::Source(place) = of[1] else { return None };
+            let amount = Some(&operands[place]).filter(|amount| **amount != Value::Broken)?.whole().actual;
+            (!amount.within(Interval::new(0.0, 31.0))).then_some(Problem::Shift)
+        }
+        _ => None,
+    }
+}
+
+/// Term of a sum of integers; `None` for floats and their bits.
+fn integer_term(term: &Meaning, operands: &[Value; 3]) -> Option<Number> {
+    match term {
+        Meaning::Neg(of) => integer_term(of, operands).map(|number| negated(&number)),
+        Meaning::Integer(of) => {
+            let Meaning::Source(place) = **of else { return None };
+            let value = &operands[place];
+            matches!(value, Value::Integer(_) | Value::Patterns(_)).then(|| Number::clone(&value.whole()))
+        }
+        _ => None,
+    }
 }
 
 /// Abstract operation on bits.
@@ -422,6 +457,7 @@ fn shifted(op: Bitwise, number: &Number, by: u32) -> Number {
 mod tests {
     use super::*;
     use takt_emu::testing::Random;
+    use takt_isa::{BankIndex, Op, Register};
 
     /// The abstract value contains these bits.
     fn holds(value: &Value, bits: u32) -> bool {
@@ -515,6 +551,46 @@ mod tests {
             }
         }
         assert!(2 * known > all, "{known} of {all}");
+    }
+
+    /// Brute force on small ranges near the ends of the integers and of shift amounts: an operation is listed if and only if two members of
+    /// its operands' ranges wrap, or shift by less than 0 or more than 31.
+    #[test]
+    fn hazards_of_integers_are_those_of_their_members() {
+        let places = [i32::MIN, -1, 0, 1, 31, 33, 1 << 30, i32::MAX];
+        let ranges = || {
+            let range = |at: i32, size: i32| at.saturating_sub(size / 2)..=at.saturating_add(size);
+            places.into_iter().flat_map(move |at| [0, 1, 2].map(|size| range(at, size)))
+        };
+        let (mut listed, mut all) = (0, 0);
+        for op in [Op::iadd, Op::isub, Op::ishl, Op::ishr, Op::isar] {
+            let instruction = Instruction {
+                op,
+                dest: BankIndex::new(0).unwrap(),
+                sources: [Register::ZERO; 3],
+                constant: 0,
+            };
+            for (symbol, one) in (0..).step_by(2).zip(ranges()) {
+                for other in ranges() {
+                    let value = |range: &std::ops::RangeInclusive<i32>, symbol: u32| {
+                        let ends = Interval::new((*range.start()).into(), (*range.end()).into());
+                        Value::Integer(Rc::new(Number::of(ends, symbol, Some(0))))
+                    };
+                    let operands = [value(&one, symbol), value(&other, symbol + 1), Value::bits(0)];
+                    let pairs = one.clone().flat_map(|a| other.clone().map(move |b| (a, b)));
+                    let expected = pairs.into_iter().any(|(a, b)| match op {
+                        Op::iadd => a.checked_add(b).is_none(),
+                        Op::isub => a.checked_sub(b).is_none(),
+                        _ => !(0..32).contains(&b),
+                    });
+                    let found = hazard(&instruction, &operands);
+                    assert_eq!(found.is_some(), expected, "{op:?} of {one:?} and {other:?}: {found:?}");
+                    listed += usize::from(expected);
+                    all += 1;
+                }
+            }
+        }
+        assert!(listed > all / 10 && listed < all * 9 / 10, "{listed} of {all}");
     }
 
     /// Subtraction of a float's exponent from its bits leaves the fraction.

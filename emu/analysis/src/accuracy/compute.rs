@@ -64,9 +64,10 @@ impl Explorer<'_> {
                 node = Node::new(self.own(*word, value), made.clone());
             }
         }
-        let Some(problem) = problem.filter(|problem| self.quiet == 0 && *problem != Problem::Told) else {
-            return node;
-        };
+        // Functions that take floats apart rely on wrapping sums and on the low bits of shift amounts.
+        let is_intended = node.is_of_bits() && matches!(problem, Some(Problem::Wrap | Problem::Shift));
+        let is_listed = |problem: &Problem| *problem != Problem::Told && !is_intended;
+        let Some(problem) = problem.filter(is_listed).filter(|_| self.quiet == 0) else { return node };
         // Case distinctions in the operands' histories may exclude the hazard.
         if broken {
             let value = self.by_cases(&node);
@@ -75,10 +76,14 @@ impl Explorer<'_> {
                 return Node::new(value, made.clone());
             }
         }
-        let range = |value: &Value| value.float().ok().map(|number| number.actual);
-        let reads = instruction.reads().iter().zip(&values);
-        let reads: Vec<_> = reads.map(|(register, operand)| (*register, range(operand))).collect();
-        self.hazards.entry((*word, problem)).or_insert(reads);
+        let row = instruction.op.row();
+        let range = |place: usize, value: &Value| match row.source_type(place) {
+            Type::I => Some(value.whole().actual),
+            Type::F | Type::B => value.float().ok().map(|number| number.actual),
+        };
+        let reads = instruction.reads().iter().zip(&values).enumerate();
+        let reads = reads.map(|(place, (register, operand))| (*register, range(place, operand)));
+        self.found.hazards.entry((*word, problem)).or_insert(reads.collect());
         node
     }
 
@@ -110,6 +115,7 @@ impl Explorer<'_> {
         let (op, row) = (instruction.op, instruction.op.row());
         let sources = row.shape.sources();
         let integer = row.result_type() == Type::I;
+        let hazard = bits::hazard(instruction, operands);
         if row.ulp.is_none() || integer {
             let raises = Cell::new(false);
             let known = patterns(operands, sources, |a, b, c| {
@@ -118,7 +124,7 @@ impl Explorer<'_> {
                 value.bits
             });
             if let Some(value) = known.filter(|_| !raises.get()) {
-                return (value, None);
+                return (value, hazard);
             }
         }
         let operand = |i: usize| Operand::of(operands[i].clone());
@@ -136,7 +142,7 @@ impl Explorer<'_> {
             }
             value => value,
         };
-        (self.own(word, value), problem)
+        (self.own(word, value), problem.or(hazard))
     }
 
     /// Caps a result's error, and gives an uncorrelated value a symbol of its own, so that later values can be correlated with it. Other

@@ -3,22 +3,27 @@
 
 use super::interval::Interval;
 use super::{Problem, ulp};
-use takt_isa::Register;
-use takt_isa::program::Range;
+use takt_isa::program::{ArrayRange, Range};
+use takt_isa::{Program, Register, Type};
 
-/// Error bound of an output.
+/// Range of an output, and for a float the bound of its error.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OutputBound {
     /// Name of the output port.
     pub name: String,
     /// Register of the output port.
     pub register: Register,
+    /// Type of the output: binary32, or a signed integer.
+    pub ty: Type,
     /// Range of the output's values; `None` if a problem leaves it open.
     pub range: Option<Interval>,
-    /// Bound on the error's magnitude, in the output's unit; `None` if a problem leaves it open.
+    /// Bound on the error's magnitude, in the output's unit; `None` if a problem leaves it open, and for an integer: integers are decisions,
+    /// which are taken from the run.
     pub error: Option<f64>,
     /// Bound on each operation's contribution to the error, by word, largest first.
     pub parts: Vec<(u32, f64)>,
+    /// Hazards that leave the range open, by the word of their operation.
+    pub open: Vec<u32>,
 }
 
 impl OutputBound {
@@ -39,6 +44,43 @@ pub struct Hazard {
     pub operands: Vec<(Register, Option<Interval>)>,
 }
 
+/// Promised range of a state.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum StateRange {
+    /// Of a register.
+    Register(Range),
+    /// Of every word of an array in data memory.
+    Array(ArrayRange),
+}
+
+impl StateRange {
+    /// The least and the largest value as numbers.
+    pub fn ends(&self) -> (f64, f64) {
+        match self {
+            StateRange::Register(range) => range.ends(),
+            StateRange::Array(range) => range.ends(),
+        }
+    }
+
+    /// Type of the values: binary32, or a signed integer.
+    pub fn ty(&self) -> Type {
+        match self {
+            StateRange::Register(range) => range.ty,
+            StateRange::Array(range) => range.ty,
+        }
+    }
+
+    /// Name of the state in the source.
+    pub fn name(&self, program: &Program) -> String {
+        match self {
+            StateRange::Register(range) => program.register_text(range.register),
+            StateRange::Array(range) => {
+                program.data_label(range.first).map_or_else(|| program.data_text(range.first), str::to_owned)
+            }
+        }
+    }
+}
+
 /// Point of the induction over periods at which a state must lie in its range.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Moment {
@@ -51,8 +93,8 @@ pub enum Moment {
 /// State that was not proved to lie in its range.
 #[derive(Clone, Debug, PartialEq)]
 pub struct UnprovedRange {
-    /// State's register and declared range.
-    pub range: Range,
+    /// State with its declared range.
+    pub range: StateRange,
     /// Point at which the proof fails.
     pub moment: Moment,
     /// Values that the state may have then; `None` if they are not known as numbers.
@@ -62,8 +104,8 @@ pub struct UnprovedRange {
 /// State whose range no single period keeps, but all periods together do: the period's map of the states is linear and converges.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Converging {
-    /// State's register and declared range.
-    pub range: Range,
+    /// State with its declared range.
+    pub range: StateRange,
     /// Values that the state may have at the end of any period.
     pub found: Interval,
 }
@@ -71,10 +113,10 @@ pub struct Converging {
 /// Statements about every period that begins with inputs and states within their ranges, the states free of error.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Enclosure {
-    /// Bounds of the outputs that carry binary32 and that a period writes.
+    /// Bounds of the outputs that carry binary32 or integers and that a period writes.
     pub outputs: Vec<OutputBound>,
-    /// Operations that may yield NaN or infinity, or convert out of range; only the first of each dependence chain. An empty list proves:
-    /// no NaN, no overflow, no division by zero, no conversion out of range.
+    /// Operations that may yield NaN or infinity, or convert out of range; only the first of each dependence chain. Sums of integers that may
+    /// wrap, shifts by more than 31, accesses that may leave their array. An empty list proves that there are none of these.
     pub hazards: Vec<Hazard>,
     /// States whose declared range is not proved, at one of the two points of an induction over periods.
     pub assumed: Vec<UnprovedRange>,

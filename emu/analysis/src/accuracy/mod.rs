@@ -15,6 +15,8 @@ mod converge;
 mod enclose;
 mod enclosure;
 mod interval;
+mod loops;
+mod memory;
 mod node;
 mod number;
 mod operand;
@@ -23,13 +25,14 @@ mod refine;
 mod relation;
 mod relative;
 mod shadow;
+mod states;
 mod value;
 
 use std::collections::BTreeMap;
 use takt_isa::{Instruction, Program, Register};
 
-pub use enclose::{MAX_BUNDLES, enclose};
-pub use enclosure::{Converging, Enclosure, Hazard, Moment, OutputBound, UnprovedRange};
+pub use enclose::{MAX_BUNDLES, MAX_UNROLLED, enclose, enclose_within};
+pub use enclosure::{Converging, Enclosure, Hazard, Moment, OutputBound, StateRange, UnprovedRange};
 pub use interval::Interval;
 pub use number::Problem;
 pub use shadow::{

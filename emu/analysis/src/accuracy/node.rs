@@ -2,10 +2,11 @@
 //! Values with the operations that computed them, so that a value can be computed again where more is known about its operands.
 
 use super::value::Value;
+use std::collections::HashSet;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 use std::rc::Rc;
-use takt_isa::Instruction;
 use takt_isa::fp::{Bitwise, Real};
+use takt_isa::{Instruction, Type};
 
 /// Limit on the length of a value's history, in dependent operations; a value beyond it has no history.
 const MAX_DEPTH: u32 = 200;
@@ -19,6 +20,8 @@ pub(super) struct Node {
     origin: Option<Rc<Node>>,
     /// Length of the history.
     depth: u32,
+    /// Computed as an integer from a float's bits, as functions do that take floats apart.
+    is_of_bits: bool,
 }
 
 /// Operation with its operands.
@@ -32,7 +35,16 @@ pub(super) struct Made {
 impl Node {
     /// Value without history.
     pub(super) fn leaf(value: Value) -> Rc<Node> {
-        Rc::new(Node { value, made: None, origin: None, depth: 0 })
+        Node::leaf_of(value, false)
+    }
+
+    fn leaf_of(value: Value, is_of_bits: bool) -> Rc<Node> {
+        Rc::new(Node { value, made: None, origin: None, depth: 0, is_of_bits })
+    }
+
+    /// Computed as an integer from a float's bits.
+    pub(super) fn is_of_bits(&self) -> bool {
+        self.is_of_bits
     }
 
     /// Length of the history.
@@ -43,16 +55,35 @@ impl Node {
     pub(super) fn new(value: Value, made: Made) -> Rc<Node> {
         let depth = 1 + made.operands.iter().map(|operand| operand.depth).max().unwrap_or(0);
         let known = matches!(&value, Value::Patterns(patterns) if patterns.len() == 1);
+        let is_of_bits = made.is_of_bits();
         if depth > MAX_DEPTH || known {
-            return Node::leaf(value);
+            return Node::leaf_of(value, is_of_bits);
         }
-        Rc::new(Node { value, made: Some(made), origin: None, depth })
+        Rc::new(Node { value, made: Some(made), origin: None, depth, is_of_bits })
     }
 
     /// Node that replaces `self` under a condition.
     pub(super) fn narrowed(self: &Rc<Node>, value: Value, made: Option<Made>) -> Rc<Node> {
         let origin = Some(Rc::clone(self));
-        Rc::new(Node { value, made, origin, depth: self.depth })
+        Rc::new(Node { value, made, origin, depth: self.depth, is_of_bits: self.is_of_bits })
+    }
+
+    /// The node is this one, or narrows it under conditions: it stands for the same value.
+    pub(super) fn narrows(self: &Rc<Node>, other: &Rc<Node>) -> bool {
+        let mut origins = std::iter::successors(Some(self), |node| node.origin.as_ref());
+        origins.any(|node| Rc::ptr_eq(node, other))
+    }
+
+    /// Visits the operations that the value depends on, as far as its history goes.
+    pub(super) fn each_operation(&self, visit: &mut dyn FnMut(&Made)) {
+        let mut seen = HashSet::new();
+        let mut open: Vec<&Made> = self.made.iter().collect();
+        while let Some(made) = open.pop() {
+            visit(made);
+            for operand in &made.operands {
+                open.extend(operand.made.as_ref().filter(|_| seen.insert(Rc::as_ptr(operand))));
+            }
+        }
     }
 
     /// Joins the nodes of a register on two paths that meet. If both narrow the same node under the paths' conditions, returns that node.
@@ -65,7 +96,27 @@ impl Node {
         };
         let (ours, theirs) = (origins(self), origins(other));
         let common = ours.iter().find(|node| theirs.iter().any(|other| Rc::ptr_eq(node, other)));
-        common.map_or_else(|| Node::leaf(self.value.join(&other.value)), Rc::clone)
+        let is_of_bits = self.is_of_bits && other.is_of_bits;
+        common.map_or_else(|| Node::leaf_of(self.value.join(&other.value), is_of_bits), Rc::clone)
+    }
+}
+
+impl Made {
+    /// The result is an integer computed from a float's bits.
+    fn is_of_bits(&self) -> bool {
+        let row = self.instruction.op.row();
+        let takes_bits = |place: usize| {
+            let node = &self.operands[place];
+            let is_float = matches!(node.value, Value::Float(_) | Value::Offset(_));
+            row.source_type(place) != Type::F && (is_float || node.is_of_bits)
+        };
+        match Meaning::of(&self.instruction) {
+            _ if row.result_type() == Type::F => false,
+            Some(Meaning::Bitwise(Bitwise::Equal | Bitwise::Less | Bitwise::LessUnsigned, _)) => false,
+            Some(Meaning::Choose(_)) => self.operands[1].is_of_bits && self.operands[2].is_of_bits,
+            Some(_) => (0..row.shape.sources()).any(takes_bits),
+            None => false,
+        }
     }
 }
 

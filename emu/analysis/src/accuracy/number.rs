@@ -292,8 +292,23 @@ pub enum Problem {
     Bits,
     /// A word that may be infinite or a NaN, or has no enclosure as a number, is written to an output of binary32.
     Output,
+    /// The integer sum may exceed 32 bits, so that it wraps. The analysis continues with the wrapped sum.
+    Wrap,
+    /// The shift amount may lie outside of 0 to 31; the machine takes its low five bits. The analysis continues with these.
+    Shift,
+    /// The address of a load or store may leave the array. The analysis continues with every word that it may be.
+    Address,
+    /// A loop may change the operand without a limit that the analysis finds.
+    Unbounded,
     /// An operand depends on a hazard that is already listed.
     Told,
+}
+
+impl Problem {
+    /// The operation has the machine's result in any case, which the analysis follows further.
+    pub fn is_defined(self) -> bool {
+        matches!(self, Problem::Conversion | Problem::Wrap | Problem::Shift | Problem::Address)
+    }
 }
 
 impl std::fmt::Display for Problem {
@@ -306,6 +321,12 @@ impl std::fmt::Display for Problem {
             Problem::NotFinite => "an operand may be infinite or a NaN",
             Problem::Bits => "an operand is bits that nothing encloses as a number",
             Problem::Output => "the value written to this output may be infinite or a NaN",
+            Problem::Wrap => "the integer sum may wrap",
+            Problem::Shift => "the shift amount may lie outside of 0 to 31",
+            Problem::Address => "the index may leave the array",
+            Problem::Unbounded => {
+                "this loop may change the operand without limit; a `sat` in the loop limits it"
+            }
             Problem::Told => "an earlier problem",
         })
     }

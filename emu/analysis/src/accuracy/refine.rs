@@ -92,9 +92,9 @@ impl Explorer<'_> {
     /// Evaluates without listing hazards or counting.
     fn quietly<T>(&mut self, evaluate: impl FnOnce(&mut Self) -> T) -> T {
         self.quiet += 1;
-        let operations = self.operations;
+        let operations = self.found.operations;
         let result = evaluate(self);
-        self.operations = operations;
+        self.found.operations = operations;
         self.quiet -= 1;
         result
     }

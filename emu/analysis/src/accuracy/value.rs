@@ -9,6 +9,9 @@ use std::rc::Rc;
 
 /// Limit on the bit patterns listed for a value; beyond it, the value is [`Value::Any`].
 pub(super) const MAX_PATTERNS: usize = 1024;
+/// Smallest normal binary32.
+const SMALLEST_NORMAL: f64 = f32::MIN_POSITIVE as f64;
+
 /// Abstract value: a set of values that a register may hold.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Value {
@@ -64,9 +67,12 @@ impl Value {
                 if joined.len() <= MAX_PATTERNS {
                     return Value::Patterns(Rc::new(joined));
                 }
+                // Small integers are subnormal numbers as floats.
                 match (self.float(), other.float()) {
-                    (Ok(a), Ok(b)) => Value::Float(Rc::new(a.join(&b))),
-                    _ => Value::Any,
+                    (Ok(a), Ok(b)) if a.join(&b).actual.magnitude() >= SMALLEST_NORMAL => {
+                        Value::Float(Rc::new(a.join(&b)))
+                    }
+                    _ => Value::Integer(Rc::new(self.whole().join(&other.whole()))),
                 }
             }
             (Value::Float(_), _) | (_, Value::Float(_)) => match (self.float(), other.float()) {

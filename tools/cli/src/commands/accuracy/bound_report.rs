@@ -11,7 +11,7 @@ use takt_analysis::accuracy::{
     Converging, Enclosure, ErrorShare, Hazard, Interval, Moment, OutputBound, UnprovedRange,
 };
 use takt_isa::program::Location;
-use takt_isa::{Program, Register};
+use takt_isa::{Program, Register, Type};
 
 /// Proved error bounds of a program, ready for output.
 pub(super) struct BoundReport<'a> {
@@ -39,6 +39,11 @@ impl BoundReport<'_> {
         by_line(self.program, &parts)
     }
 
+    /// Places of the hazards that leave an output's range open.
+    fn open(&self, output: &OutputBound) -> Vec<String> {
+        output.open.iter().map(|word| self.program.word_text(*word as usize)).collect()
+    }
+
     fn operands(&self, hazard: &Hazard) -> Vec<(String, Option<Interval>)> {
         let named = hazard.operands.iter();
         named.map(|(register, range)| (self.operand_text(*register), *range)).collect()
@@ -48,6 +53,10 @@ impl BoundReport<'_> {
     fn operand_text(&self, register: Register) -> String {
         let bits = self.program.constants.iter().find(|(constant, _)| *constant == register);
         match bits {
+            // Small integers are subnormal numbers as floats.
+            Some((_, bits)) if self.is_literal(register) && f32::from_bits(*bits).is_subnormal() => {
+                bits.cast_signed().to_string()
+            }
             Some((_, bits)) if self.is_literal(register) => format!("{:?}", f32::from_bits(*bits)),
             _ => self.program.register_text(register),
         }
@@ -70,10 +79,12 @@ impl BoundReport<'_> {
             });
             json!({
                 "name": output.name,
+                "type": output.ty.name(),
                 "range": ends(output.range),
                 "error": output.error,
                 "ulp": output.ulps(),
                 "lines": lines.collect::<Vec<_>>(),
+                "open": self.open(output),
             })
         };
         let hazard = |hazard: &Hazard| {
@@ -87,7 +98,7 @@ impl BoundReport<'_> {
         };
         let assumed = |UnprovedRange { range, moment, found }: &UnprovedRange| {
             json!({
-                "name": program.register_text(range.register),
+                "name": range.name(program),
                 "range": range.ends(),
                 "when": match moment {
                     Moment::First => "first period begins",
@@ -97,7 +108,7 @@ impl BoundReport<'_> {
             })
         };
         let converging = |Converging { range, found }: &Converging| {
-            let name = program.register_text(range.register);
+            let name = range.name(program);
             json!({ "name": name, "range": range.ends(), "found": ends(Some(*found)) })
         };
         json!({
@@ -129,7 +140,12 @@ impl BoundReport<'_> {
             let lines = lines.iter().take(SHOWN_PARTS);
             let lines =
                 lines.map(|(at, _, share)| format!("{} ({:.0} %)", line_text(program, *at), 100.0 * share));
-            let lines: Vec<String> = lines.collect();
+            let open = self.open(output);
+            let lines: Vec<String> = match open.first() {
+                Some(place) if open.len() > 1 => vec![format!("open by {place} and {} more", open.len() - 1)],
+                Some(place) => vec![format!("open by {place}")],
+                None => lines.collect(),
+            };
             let range = interval(output.range);
             writeln!(
                 out,
@@ -139,10 +155,14 @@ impl BoundReport<'_> {
             )?;
         }
         writeln!(out, "  ulp: of the largest value in the range")?;
+        if outputs.iter().any(|output| output.ty == Type::I) {
+            writeln!(out, "  an integer has no error: it counts as a decision of the run")?;
+        }
         if enclosure.hazards.is_empty() {
             writeln!(
                 out,
-                "\nno NaN, no overflow, no division by zero, no conversion out of range is possible"
+                "\nno NaN, no overflow, no division by zero, no conversion out of range is possible\n\
+                 no integer sum wraps, no shift and no index is out of range"
             )?;
         } else {
             writeln!(out, "\nnot excluded (operations that depend on these are not examined)")?;
@@ -159,7 +179,7 @@ impl BoundReport<'_> {
         }
         let states = |UnprovedRange { range, found, .. }: &UnprovedRange, found_text: &str, out: &mut Out| {
             let (low, high) = range.ends();
-            let name = program.register_text(range.register);
+            let name = range.name(program);
             writeln!(out, "  {name}: {}, {found_text} {}", ends_text(low, high), interval(*found))
         };
         if enclosure.first().next().is_some() {
@@ -174,7 +194,7 @@ impl BoundReport<'_> {
         }
         for Converging { range, found } in &enclosure.converging {
             let (low, high) = range.ends();
-            let name = program.register_text(range.register);
+            let name = range.name(program);
             writeln!(out, "  {name}: {}, always in {}", ends_text(low, high), interval(Some(*found)))?;
         }
         if enclosure.later().next().is_some() {
