@@ -2,11 +2,12 @@
 //! Checks of combinations: parameters of peripherals, ticks and the program's periods that are each in range but do not fit each other.
 
 mod drive;
+mod frames;
 
 use crate::application::Application;
 use crate::document::{Document, Mistake, Table};
 use crate::latency;
-use crate::wiring::{Peripheral, Starts, Wiring};
+use crate::wiring::{Peripheral, Wiring};
 use std::ops::Range;
 use takt_analysis::Bounds;
 use takt_system::latency::Passages;
@@ -63,11 +64,12 @@ impl Wiring {
             fit.pins(peripheral);
             fit.scales(peripheral);
             fit.latch(peripheral);
-            match (peripheral.kind.name, peripheral.starts) {
-                ("spi", Starts::At(instant)) => fit.sampled(peripheral, instant),
-                ("spi", _) => fit.spi(peripheral, busy),
-                ("pwm", _) => fit.pwm(peripheral),
-                ("pwm3", _) => fit.bridges(peripheral, busy),
+            if let Some(frame) = latency::frame(peripheral) {
+                fit.frame(peripheral, &frame, busy);
+            }
+            match peripheral.kind.name {
+                "pwm" => fit.pwm(peripheral),
+                "pwm3" => fit.bridges(peripheral, busy),
                 _ => {}
             }
         }
@@ -221,53 +223,6 @@ impl Fit<'_> {
                 self.mistakes.mistake(&place, text);
             }
         }
-    }
-
-    /// Compares the length of an SPI's frame with its lead and the tick.
-    fn spi(&self, peripheral: &Peripheral, busy: Option<PeriodCycles>) {
-        let at_publish = peripheral.starts == Starts::Publish;
-        let halves = u64::from(2 * peripheral.parameter("bits") + 1);
-        let frame = latency::frame(peripheral);
-        let (period, lead) = (u64::from(self.wiring.period), u64::from(self.wiring.lead));
-        let takes = format!("a frame of `{}` takes {frame} cycles: half · (2 · bits + 1)", peripheral.name);
-        if frame >= period {
-            let mend = match (period - 1) / halves {
-                fitting @ 3.. => format!("`half = {fitting}` at most"),
-                _ => format!("fewer `bits`, or `period = {}` or more", self.at_least(3 * halves + 1)),
-            };
-            let text =
-                format!("starts of frames are lost: {takes}, and one starts every {period} cycles: {mend}");
-            let place = self.place(peripheral, None, &["half", "bits", "kind"]);
-            return self.mistakes.mistake(&place, text);
-        }
-        if peripheral.reads.first().is_none_or(Option::is_none) {
-            return;
-        }
-        let (starts, earliest) = match at_publish {
-            true => {
-                let worst = busy.map_or(0, |busy| busy.worst);
-                (
-                    format!("starts with the outputs, up to {worst} cycles after the tick"),
-                    period.saturating_sub(worst),
-                )
-            }
-            false => (format!("starts {lead} cycles before the tick"), lead),
-        };
-        if frame < earliest {
-            return;
-        }
-        let mend = match at_publish {
-            true => "a smaller `half`, or a longer `period`".to_owned(),
-            false => format!("`lead = {}` or more, or a smaller `half`", self.at_least(frame + 1)),
-        };
-        let text = format!("`received` is a period old at each tick: {takes}, and {starts}: {mend}");
-        let place = match self.top(&["lead"]) {
-            place if place.is_empty() || at_publish => {
-                self.place(peripheral, None, &["half", "bits", "kind"])
-            }
-            place => place,
-        };
-        self.warnings.mistake(&place, text);
     }
 
     /// Compares the period and the dead time of a PWM with the tick and each other.

@@ -50,7 +50,12 @@ pub struct Parameter {
     pub text: &'static str,
     /// Names of the values from `least` on, with which a wiring states the parameter; empty if the parameter is a number.
     pub names: &'static [&'static str],
+    /// Half a bit in cycles, which a wiring may also state by [`RATE`], in MHz.
+    pub is_half_bit: bool,
 }
+
+/// Key of a wiring for the highest rate of bits, in MHz, in place of half a bit in cycles.
+pub const RATE: &str = "rate";
 
 /// Signals that a module takes besides clock, reset, pins and registers, or gives to other peripherals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -116,7 +121,7 @@ const fn at(pin: &'static str, register: Register) -> Register {
 }
 
 const fn parameter(name: &'static str, least: i64, most: i64, default: u32, text: &'static str) -> Parameter {
-    Parameter { name, least, most, default, text, names: &[] }
+    Parameter { name, least, most, default, text, names: &[], is_half_bit: false }
 }
 
 const fn choice(
@@ -125,12 +130,30 @@ const fn choice(
     default: u32,
     text: &'static str,
 ) -> Parameter {
-    Parameter { name, least: 0, most: names.len() as i64 - 1, default, text, names }
+    Parameter { names, ..parameter(name, 0, names.len() as i64 - 1, default, text) }
+}
+
+const fn half_bit(least: i64, most: i64, default: u32) -> Parameter {
+    let text = "half a bit in cycles; or `rate`: MHz, of which the highest is taken that the clock makes";
+    Parameter { is_half_bit: true, ..parameter("half", least, most, default, text) }
 }
 
 const FILTER: Parameter =
     parameter("filter", 1, 256, 3, "cycles for which a level must stand before it counts");
 const SIGNED: Parameter = parameter("signed", 0, 1, 1, "1: the value is signed, and 0 is 50 % duty");
+
+/// Bits of a position within a turn, of an absolute encoder. The bits above are a positive integer in any case.
+const TURN: Parameter = parameter(
+    "turn",
+    5,
+    32,
+    24,
+    "bits of `position`; a float holds 24 bits exactly, and the bits above are `turns`",
+);
+const POSITION: Register = register("position", "the lowest `turn` bits of the position");
+const TURNS: Register = register("turns", "the bits above them, 0 without any");
+const LOST: Register =
+    register("lost", "starts that came during a frame or the rest after it and were dropped");
 
 const PLAIN: Strobes = Strobes { enable: false, trip: false, start: false, carrier: false, trips: false };
 const ENABLED: Strobes = Strobes { enable: true, ..PLAIN };
@@ -285,12 +308,35 @@ pub const KINDS: &[Kind] = &[
         ],
         writes: &[at("out", scaled("send", "value to send in the next frames"))],
         parameters: &[
-            parameter("half", 3, 65535, 4, "half a bit in cycles"),
+            half_bit(3, 65535, 4),
             parameter("bits", 1, 32, 16, "bits of a frame"),
             parameter("polarity", 0, 1, 0, "level of the clock at rest"),
             parameter("phase", 0, 1, 0, "0: data is sampled at the clock's first edge, 1: at its second"),
             parameter("signed", 0, 1, 0, "1: the highest bit received is a sign"),
             parameter("send", 0, u32::MAX as i64, 0, "value to send until the program has written `send`"),
+        ],
+        strobes: STARTED,
+    },
+    Kind {
+        name: "ssi",
+        module: "takt_ssi",
+        text: "absolute encoder with a synchronous serial interface",
+        pins: &[output("clock"), input("data")],
+        reads: &[
+            POSITION,
+            TURNS,
+            register("frames", "valid frames so far"),
+            LOST,
+            register("errors", "frames that were not valid: data was 0 before, or the two parts differ"),
+        ],
+        writes: &[],
+        parameters: &[
+            half_bit(3, 65535, 30),
+            parameter("bits", 8, 36, 13, "bits of the encoder"),
+            TURN,
+            parameter("gray", 0, 1, 0, "1: the bits are Gray code"),
+            parameter("double", 0, 1, 0, "1: the encoder sends the bits twice, with a 0 between"),
+            parameter("pause", 1, 1 << 20, 1500, "cycles of rest after a frame, for the encoder's monoflop"),
         ],
         strobes: STARTED,
     },

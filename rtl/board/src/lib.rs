@@ -62,6 +62,7 @@ pub const VERILOG: &[(&str, &str)] = &[
     ("takt_shadow_memory.v", include_str!("../verilog/takt_shadow_memory.v")),
     ("takt_sigma_delta.v", include_str!("../verilog/takt_sigma_delta.v")),
     ("takt_spi.v", include_str!("../verilog/takt_spi.v")),
+    ("takt_ssi.v", include_str!("../verilog/takt_ssi.v")),
     ("takt_step.v", include_str!("../verilog/takt_step.v")),
     ("takt_tick.v", include_str!("../verilog/takt_tick.v")),
     ("takt_tick_divider.v", include_str!("../verilog/takt_tick_divider.v")),

@@ -11,5 +11,6 @@ mod harness;
 mod observe;
 mod peripherals;
 mod pins;
+mod sensors;
 mod system;
 mod top;

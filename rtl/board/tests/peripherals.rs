@@ -2,7 +2,8 @@
 //! Compares every peripheral's circuit with its model, in every cycle; faults planted in the circuits must be found.
 #![allow(clippy::print_stdout)]
 
-use crate::harness::{Part, build, compare, run};
+use crate::harness::encoders::{BehindPins, SsiEncoder};
+use crate::harness::{Part, RESET, build, compare, run};
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::{Rng as _, SeedableRng as _};
 use std::cell::RefCell;
@@ -68,6 +69,13 @@ fn variants(kind: &Kind) -> Vec<Vec<u32>> {
             vec![3, 32, 0, 1, 1, 0xdead_beef],
             vec![5, 12, 1, 1, 1, 0xfff],
         ],
+        "ssi" => vec![
+            vec![3, 8, 24, 0, 0, 1],
+            vec![4, 13, 24, 1, 0, 30],
+            vec![3, 25, 12, 1, 1, 20],
+            vec![5, 36, 5, 0, 1, 17],
+            vec![3, 36, 32, 0, 0, 9],
+        ],
         "digital-in" => vec![vec![1, 0], vec![20, 1], vec![300, 0]],
         "digital-out" => vec![vec![0], vec![1]],
         other => panic!("write the stimuli of {other}"),
@@ -84,6 +92,7 @@ fn stimulus(kind: &'static Kind, parameters: &[u32], seed: u64) -> Box<dyn FnMut
         "trip" => parameters[0].max(1),
         _ => 1,
     };
+    let mut behind = encoder(kind, parameters);
     let half = parameters.get(kind.parameters.len()).copied();
     let span = if kind.name == "pwm" { parameters[0] } else { half.unwrap_or(1 << 15) };
     // Most pins stay for about as long as the filter needs to pass a level; an encoder's pins change in order most of the time.
@@ -128,8 +137,29 @@ fn stimulus(kind: &'static Kind, parameters: &[u32], seed: u64) -> Box<dyn FnMut
                 *level
             }
         };
-        names.iter().enumerate().map(|(i, name)| value(i, name)).collect()
+        let mut inputs: Vec<u32> = names.iter().enumerate().map(|(i, name)| value(i, name)).collect();
+        if let Some((pin, behind)) = &mut behind {
+            inputs[*pin] = behind.level(&inputs, cycle < RESET);
+        }
+        inputs
     })
+}
+
+/// The encoder behind the pins of a kind that speaks with one, and the index of the input that its data pin is.
+fn encoder(kind: &'static Kind, parameters: &[u32]) -> Option<(usize, BehindPins)> {
+    let value = |name: &str| {
+        let at = kind.parameters.iter().position(|parameter| parameter.name == name).expect("a parameter");
+        parameters[at]
+    };
+    let of: Box<dyn crate::harness::encoders::Encoder> = match kind.name {
+        "ssi" => {
+            Box::new(SsiEncoder::new(value("bits"), value("half"), value("pause"), value("double") == 1))
+        }
+        _ => return None,
+    };
+    let (takes, _) = kind.ports();
+    let pin = takes.iter().position(|(name, _)| name.starts_with("pin_")).expect("a pin") - 1;
+    Some((pin, BehindPins::new(model::of(kind, parameters).expect("a model"), of, 3)))
 }
 
 /// Every kind with every variant of its parameters, then the parts that every board has.
@@ -291,6 +321,7 @@ const FAULTS: &[&[(&str, &str, &str)]] = &[
         ("takt_digital_in.v", "pin_in ^ (INVERT != 0)", "pin_in"),
         ("takt_digital_out.v", "SAFE != 0;", "1'b0;"),
         ("takt_spi.v", "~active & half != END - 7'd1", "~active"),
+        ("takt_ssi.v", "number == BETWEEN;", "number == END;"),
         ("takt_tick.v", "lead < period", "lead <= period"),
         ("takt_carrier.v", "START - HALF : START", "START - HALF : START + 1"),
         ("takt_pwm_phase.v", "on[16:1] + {15'd0, on[0]}", "on[16:1]"),
@@ -306,6 +337,7 @@ const FAULTS: &[&[(&str, &str, &str)]] = &[
         ("takt_digital_in.v", "level & ~was", "level ^ was"),
         ("takt_digital_out.v", "|w_level", "w_level[0]"),
         ("takt_spi.v", "if (start & busy) lost", "if (start & ~busy) lost"),
+        ("takt_ssi.v", "GRAY != 0 & above", "GRAY != 0 & word[0]"),
         ("takt_tick.v", "left == ahead + 32'd1", "left == ahead"),
         ("takt_carrier.v", "if (place == TOP) back", "if (place == TOP - 16'd1) back"),
         ("takt_pwm_phase.v", "(~first & was)", "(1'b0 & was)"),
@@ -327,6 +359,7 @@ const FAULTS: &[&[(&str, &str, &str)]] = &[
         ("takt_uart_receive.v", "left <= LAST;", "left <= {8'd0, LAST[7:0]};"),
         ("takt_uart_send.v", "left  <= LAST;", "left  <= {8'd0, LAST[7:0]};"),
         ("takt_spi.v", "(shift & mask) | extend", "shift & mask"),
+        ("takt_ssi.v", "bad       <= ~s1;", "bad       <= 1'b0;"),
     ],
 ];
 

@@ -168,10 +168,11 @@ fn paths_from_pin_to_pin_over_cores_have_bounds() {
         assert_eq!(way["total"][edge], parts.map(|part| part[edge].as_u64().unwrap()).sum::<u64>());
     }
 
-    // Encoders that differ only in their wires share a row; a converter has no edge; a queue has no bounded time.
+    // Encoders that differ only in their wires share a row; a converter that starts with the
+    // outputs has no sample before the tick; a queue has no bounded time.
     let more = "[peripheral.second]\nkind = \"quadrature\"\npins = { a = \"gp4\", b = \"gn4\" }\nports = { count = \"servo.n2\" }\n\
                 [peripheral.converter]\nkind = \"spi\"\npins = { clock = \"gp5\", select = \"gn5\", in = \"gp6\" }\n\
-                ports = { received = \"servo.n3\" }\n[peripheral.lamp]";
+                starts = \"publish\"\nports = { received = \"servo.n3\" }\n[peripheral.lamp]";
     let links = "[[wire]]\nfrom = \"host.n2\"\nto = \"servo.n2\"\n[[wire]]\nfrom = \"host.n3\"\nto = \"servo.n3\"\n\
                  [[fifo]]\nname = \"errors\"\nfrom = \"servo\"\nto = \"watch\"\nports = [\"error -> late\"]\npush = \"error\"\n\
                  pop = \"next\"\ndepth = 2\n[[wire]]\nfrom = \"host.limit\"";

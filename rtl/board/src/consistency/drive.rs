@@ -2,7 +2,7 @@
 //! Checks of combinations on carriers: periods against ticks, samples and duties against the program's time.
 
 use super::{Fit, PeriodCycles};
-use crate::carrier::{Carrier, Instant};
+use crate::carrier::Carrier;
 use crate::document::Table;
 use crate::kind::UPDATES;
 use crate::latency;
@@ -48,31 +48,6 @@ impl Fit<'_> {
                 _ => continue,
             };
             self.mistakes.mistake(&self.carrier_place(carrier), text);
-        }
-    }
-
-    /// Compares a frame that a carrier starts with the tick after it.
-    pub(super) fn sampled(&self, peripheral: &Peripheral, instant: Instant) {
-        let frame = latency::frame(peripheral);
-        let carrier = &self.wiring.carriers[instant.carrier];
-        let takes = format!("a frame of `{}` takes {frame} cycles: half · (2 · bits + 1)", peripheral.name);
-        let place = self.place(peripheral, None, &["half", "bits", "starts"]);
-        let period = carrier.period();
-        if frame >= period.into() {
-            let text = format!(
-                "starts of frames are lost: {takes}, and `{}` starts one every {period} cycles: a smaller `half`, or fewer `bits`",
-                carrier.name
-            );
-            return self.mistakes.mistake(&place, text);
-        }
-        let is_read = peripheral.reads.first().is_some_and(Option::is_some);
-        let (least, _) = self.wiring.cycles_to_tick(instant, 1);
-        if is_read && self.wiring.tick.is_some() && frame >= least.into() {
-            let text = format!(
-                "`received` is a period old at each tick: {takes}, and starts {least} cycles before the tick: `after` greater by {:.2} µs or more, or a smaller `half`",
-                self.at_least(frame + 1 - u64::from(least))
-            );
-            self.mistakes.mistake(&place, text);
         }
     }
 

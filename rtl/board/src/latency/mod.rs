@@ -7,11 +7,13 @@ mod links;
 mod peripherals;
 mod pin_path;
 mod ports;
+mod samples;
 
-pub(crate) use peripherals::{frame, update};
+pub(crate) use peripherals::{Frame, frame, update};
 pub use pin_path::{Answer, End, Part, PinPath, PinPaths, Sample, Until};
 pub(crate) use ports::copies;
 pub use ports::undivided;
+pub use samples::{Sampling, samples};
 
 use crate::application::Application;
 use crate::wiring::Wiring;

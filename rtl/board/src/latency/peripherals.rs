@@ -2,6 +2,7 @@
 //! Parts of a path within peripherals: from a pin's edge to a register, and from a register to a pin.
 
 use super::pin_path::{Answer, End, Part, Sample};
+use super::samples::significant;
 use crate::wiring::{Peripheral, Starts, Wiring};
 
 /// Cycles from the put of a duty to the first cycle in which it can act.
@@ -11,9 +12,81 @@ fn parameter(peripheral: &Peripheral, name: &str) -> u64 {
     peripheral.parameter(name).into()
 }
 
-/// Cycles of an SPI's frame, from the fall of its select pin to the new value of its register.
-pub(crate) fn frame(peripheral: &Peripheral) -> u64 {
-    parameter(peripheral, "half") * (2 * parameter(peripheral, "bits") + 1)
+/// Frame of a converter or an encoder. The fall of the select pin, or of the clock, in the cycle after its start, is the sample.
+pub(crate) struct Frame {
+    /// Least and greatest cycles from the sample to the new values of the registers.
+    pub(crate) cycles: [u64; 2],
+    /// Cycles from the new values to the first cycle in which a start is not dropped.
+    pub(crate) rest: u64,
+    /// The greatest cycles, and the rest, as formulas.
+    pub(crate) formulas: [&'static str; 2],
+    /// Registers with what was sampled.
+    registers: &'static [&'static str],
+}
+
+impl Frame {
+    /// The register has what a frame of this peripheral samples.
+    pub(crate) fn has(peripheral: &Peripheral, register: &str) -> bool {
+        frame(peripheral).is_some_and(|frame| frame.registers.contains(&register))
+    }
+}
+
+/// The frame of a peripheral, if the kind has frames.
+pub(crate) fn frame(peripheral: &Peripheral) -> Option<Frame> {
+    let [half, bits] = ["half", "bits"].map(|name| parameter(peripheral, name));
+    Some(match peripheral.kind.name {
+        "spi" => Frame {
+            cycles: [half * (2 * bits + 1); 2],
+            rest: 0,
+            formulas: ["half · (2 · bits + 1)", ""],
+            registers: &["received"],
+        },
+        "ssi" => {
+            let is_double = parameter(peripheral, "double") == 1;
+            let (line_bits, formula) = match is_double {
+                true => (2 * bits + 1, "2 · half · (2 · bits + 1)"),
+                false => (bits, "2 · half · bits"),
+            };
+            Frame {
+                cycles: [2 * half * line_bits; 2],
+                rest: parameter(peripheral, "pause"),
+                formulas: [formula, "pause"],
+                registers: &["position", "turns"],
+            }
+        }
+        _ => return None,
+    })
+}
+
+/// Rate of a peripheral's bits in MHz; `None` without frames.
+pub(crate) fn rate(wiring: &Wiring, peripheral: &Peripheral) -> Option<f64> {
+    let is_half_bit = peripheral.kind.parameters.iter().position(|parameter| parameter.is_half_bit)?;
+    Some(wiring.clock / f64::from(2 * peripheral.parameters.get(is_half_bit).copied()?))
+}
+
+/// Cycles from the start of a frame to the first tick at least `least` cycles later; `None` for a start that follows the program.
+fn start_to_tick(wiring: &Wiring, starts: Starts, least: u32) -> Option<(u32, u32)> {
+    match starts {
+        Starts::At(instant) => Some(wiring.cycles_to_tick(instant, least)),
+        Starts::Lead => {
+            let periods = least.saturating_sub(wiring.lead).div_ceil(wiring.period);
+            let cycles = wiring.lead + periods * wiring.period;
+            Some((cycles, cycles))
+        }
+        Starts::Publish => None,
+    }
+}
+
+/// Parts from the sample of a frame to the board's tick.
+fn sampled(wiring: &Wiring, peripheral: &Peripheral, frame: &Frame) -> Option<(Vec<Part>, Part)> {
+    let [least, most] = frame.cycles;
+    // The sample comes a cycle after the start.
+    let to_tick = |cycles: u64| start_to_tick(wiring, peripheral.starts, cycles as u32 + 1);
+    let ((best, _), (_, worst)) = (to_tick(least)?, to_tick(most)?);
+    let until = [best, worst].map(|cycles| u64::from(cycles) - 1 - least);
+    let rate = rate(wiring, peripheral)?;
+    let text = format!("from the sample: frame at {} MHz", significant(rate));
+    Some((vec![Part::new(text, least, least)], Part::new("until the tick", until[0], until[1])))
 }
 
 /// Parts from a pin's edge to the register, and then to the board's tick, for peripherals with such an edge; and the sample that a
@@ -23,15 +96,9 @@ fn edge_in(
     peripheral: &Peripheral,
     register: &str,
 ) -> Option<(Vec<Part>, Part, Option<Sample>)> {
-    let to_tick = |text: &str, (best, worst): (u32, u32), less: u64| {
-        Part::new(text, u64::from(best) - less, u64::from(worst) - less)
-    };
-    if let (Starts::At(instant), "spi", "received") = (peripheral.starts, peripheral.kind.name, register) {
-        // The pin falls in the cycle after the instant.
-        let frame = frame(peripheral);
-        let cycles = wiring.cycles_to_tick(instant, frame as u32 + 1);
-        let parts = vec![Part::new("the frame, from its sample on", frame, frame)];
-        return Some((parts, to_tick("until the tick", cycles, frame + 1), Some(Sample::Frame)));
+    if let Some(frame) = frame(peripheral).filter(|frame| frame.registers.contains(&register)) {
+        let (parts, until) = sampled(wiring, peripheral, &frame)?;
+        return Some((parts, until, Some(Sample::Frame)));
     }
     let cycles = match (peripheral.kind.name, register) {
         ("quadrature" | "step", _) => parameter(peripheral, "filter") + 3,
@@ -45,7 +112,8 @@ fn edge_in(
     };
     let period = u64::from(wiring.carriers[instant.carrier].period());
     parts.push(Part::new("until the carrier's sample", 0, period - 1));
-    let until = to_tick("from the sample to the tick", wiring.cycles_to_tick(instant, 0), 0);
+    let (best, worst) = wiring.cycles_to_tick(instant, 0);
+    let until = Part::new("from the sample to the tick", best.into(), worst.into());
     Some((parts, until, Some(Sample::Latch)))
 }
 

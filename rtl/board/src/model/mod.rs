@@ -10,6 +10,7 @@ mod inputs;
 mod motor;
 mod outputs;
 mod spi;
+mod ssi;
 
 pub use clocked::Model;
 pub use common::{Tick, UartReceive, UartSend};
@@ -18,6 +19,7 @@ pub use inputs::{DigitalIn, Quadrature, Step};
 pub use motor::{Bridges, Carrier, Pwm3, Trip};
 pub use outputs::{DigitalOut, Pwm, SigmaDelta};
 pub use spi::Spi;
+pub use ssi::{Ssi, SsiFrame};
 
 use crate::Kind;
 
@@ -45,6 +47,14 @@ pub fn of(kind: &Kind, parameters: &[u32]) -> Option<Box<dyn Model>> {
         "spi" => {
             Box::new(Spi::new(value(0), value(1), value(2) != 0, value(3) != 0, value(4) != 0, value(5)))
         }
+        "ssi" => Box::new(Ssi::new(SsiFrame {
+            half: value(0),
+            bits: value(1),
+            turn: value(2),
+            gray: value(3) != 0,
+            double: value(4) != 0,
+            pause: value(5),
+        })),
         "digital-in" => Box::new(DigitalIn::new(value(0), value(1) != 0)),
         "digital-out" => Box::new(DigitalOut::new(value(0) != 0)),
         _ => return None,

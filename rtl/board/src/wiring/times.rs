@@ -3,8 +3,8 @@
 
 use super::{Peripheral, Reader, Starts};
 use crate::carrier::{self, Instant};
-use crate::document::Table;
-use crate::kind::{Kind, Parameter};
+use crate::document::{Located, Table};
+use crate::kind::{Kind, Parameter, RATE};
 
 /// The places of carriers that a peripheral has.
 #[derive(Default)]
@@ -19,7 +19,18 @@ impl<'a> Reader<'a> {
     pub(super) fn parameter(&self, table: &Table<'a>, parameter: &Parameter) -> u32 {
         if parameter.names.is_empty() {
             let given = table.signed(parameter.name, parameter.least, parameter.most);
-            return given.map_or(parameter.default, |at| at.value as u32);
+            let rate = if parameter.is_half_bit { table.number(RATE, 1e-6, 1e6) } else { None };
+            return match (given, rate) {
+                (Some(given), None) => given.value as u32,
+                (None, Some(rate)) => self.half_bit(parameter, &rate),
+                (Some(_), Some(rate)) => {
+                    let text =
+                        format!("`{}` already determines the rate: leave out one of the two", parameter.name);
+                    self.document.mistake(&rate.place, text);
+                    parameter.default
+                }
+                (None, None) => parameter.default,
+            };
         }
         let Some(given) = table.string(parameter.name) else { return parameter.default };
         let value = parameter.names.iter().position(|name| *name == given.value);
@@ -30,6 +41,28 @@ impl<'a> Reader<'a> {
             self.document.mistake(&given.place, text);
         }
         value.unwrap_or_default() as u32
+    }
+
+    /// Half a bit in cycles at the highest rate that the clock makes, of at most the given one in MHz.
+    fn half_bit(&self, parameter: &Parameter, rate: &Located<f64>) -> u32 {
+        // A quotient that is a whole number but for rounding is that number.
+        let half = (self.clock / (2.0 * rate.value) - 1e-9).ceil();
+        if (parameter.least as f64..=parameter.most as f64).contains(&half) {
+            return half as u32;
+        }
+        let made = |half: i64| self.clock / (2 * half) as f64;
+        let text = format!(
+            "{} MHz are {:.2} cycles of {} MHz for half a bit; expected {} to {}: {:.6} to {:.3} MHz",
+            rate.value,
+            self.clock / (2.0 * rate.value),
+            self.clock,
+            parameter.least,
+            parameter.most,
+            made(parameter.most),
+            made(parameter.least)
+        );
+        self.document.mistake(&rate.place, text);
+        parameter.default
     }
 
     /// The places of carriers at which a peripheral starts, or captures, and the carrier that it is on.

@@ -2,6 +2,7 @@
 //! Simulates peripherals in Verilog: all in a single simulation, each compared with its model in every cycle.
 
 pub(crate) mod board;
+pub(crate) mod encoders;
 
 use std::fmt::Write as _;
 use std::io::{Read, Write};
@@ -23,7 +24,7 @@ pub(crate) struct Part {
 }
 
 /// Cycles of reset at the beginning, which are not compared: registers start with random values.
-const RESET: u32 = 40;
+pub(crate) const RESET: u32 = 40;
 
 const DRIVER: &str = r#"
 #include "Vparts.h"

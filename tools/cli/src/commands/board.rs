@@ -276,6 +276,15 @@ pub(crate) fn run(arguments: &Boards, color: bool, out: &mut Out) -> Result<()> 
                 wiring.period,
                 wiring.clock
             )?;
+            for sampling in takt_board::latency::samples(&wiring) {
+                writeln!(
+                    out,
+                    "{} ({}) sampled {}",
+                    sampling.peripheral,
+                    sampling.ports.join(", "),
+                    sampling.text
+                )?;
+            }
             Ok(())
         }
     }

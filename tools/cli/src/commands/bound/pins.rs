@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use std::io::Write;
 use std::path::Path;
 use takt_analysis::Bounds;
-use takt_board::latency::{Answer, End, Part, PinPath, PinPaths, Until};
+use takt_board::latency::{Answer, End, Part, PinPath, PinPaths, Sampling, Until, samples};
 use takt_board::{Application, Board, Wiring};
 
 /// Minimum width of a part's text, in characters.
@@ -55,8 +55,8 @@ pub(crate) fn run(
             );
         }
         let why = match application.is_program() {
-            true => "the wiring needs an input (quadrature, step, digital-in, or spi that a carrier starts) and an output (pwm, pwm3, sigma-delta, digital-out) that are connected to ports, the second of which depends on the first".to_owned(),
-            false => format!("the links of {} lead from no input of the wiring (quadrature, step, digital-in) to an output of it (pwm, sigma-delta, digital-out)", files::input_name(&arguments.file)),
+            true => "the wiring needs an input (quadrature, step, digital-in, ssi, or spi) and an output (pwm, pwm3, sigma-delta, digital-out) that are connected to ports, the second of which depends on the first".to_owned(),
+            false => format!("the links of {} lead from no input of the wiring (quadrature, step, digital-in, ssi, spi) to an output of it (pwm, sigma-delta, digital-out)", files::input_name(&arguments.file)),
         };
         bail!("{name}: no path from pin to pin: {why}");
     }
@@ -84,6 +84,13 @@ impl PinPathReport<'_> {
         };
         for group in groups {
             group.write(Table { clock: self.wiring.clock, width }, out)?;
+        }
+        let samples = samples(&self.wiring);
+        if !samples.is_empty() {
+            writeln!(out, "sampled")?;
+        }
+        for Sampling { peripheral, ports, text } in samples {
+            writeln!(out, "  {peripheral} ({}): {text}", ports.join(", "))?;
         }
         for late in &self.ways.late {
             writeln!(out, "a deadline can be missed: {late}; then a period or more is added")?;
@@ -124,7 +131,10 @@ impl PinPathReport<'_> {
             }
             value
         };
+        let sample =
+            |of: &Sampling| json!({ "peripheral": of.peripheral, "ports": of.ports, "instant": of.text });
         json!({
+            "samples": samples(&self.wiring).iter().map(sample).collect::<Vec<_>>(),
             "ways": self.ways.ways.iter().map(way).collect::<Vec<_>>(), "over_fifos": self.ways.queues,
             "deadlines_missed": self.ways.late, "board": self.board.name, "clock_mhz": self.wiring.clock,
             "period": self.wiring.period, "without_edges": self.ways.others,

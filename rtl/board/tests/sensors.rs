@@ -1,0 +1,231 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Encoders and currents in the complete top level, from the sample to a pin, to the cycle; mistakes in their wirings.
+
+use crate::harness::encoders::{Encoder, SsiEncoder};
+use rand_pcg::Pcg64;
+use rand_pcg::rand_core::SeedableRng as _;
+use std::path::Path;
+use takt_asm::{MemoryLoader, Options, assemble};
+use takt_board::latency::{PinPath, Sample, samples, ways};
+use takt_board::simulation::Simulation;
+use takt_board::{Application, Board, Findings, Mistake, Wiring};
+use takt_isa::{Program, T1};
+
+/// A carrier of 1000 cycles that gives ticks; the program shows the lowest bit of what it reads.
+const HEAD: &str = r#"
+clock = 50
+autostart = true
+[signals]
+drive = "gp12"
+[carrier.main]
+half = 500
+tick = "valley"
+after = 5
+[peripheral.lamp]
+kind = "digital-out"
+pins = { out = "gp1" }
+ports = { level = "y" }
+"#;
+
+const PROGRAM: &str = "
+.input x:int
+.output y:int
+.period
+p:      iand y, x, 1
+        wait p
+";
+
+fn program() -> Program {
+    let options = Options { machine: &T1, ..Options::default() };
+    let assembled = assemble("p.s", &MemoryLoader::new(&[("p.s", PROGRAM)]), &options);
+    assembled.unwrap_or_else(|errors| panic!("{}", errors.render(false))).program
+}
+
+fn board() -> Board {
+    Board::from_name("ulx3s-85f").expect("a board").expect("a right one")
+}
+
+fn read(text: &str) -> Result<Wiring, Vec<Mistake>> {
+    Wiring::read("w.toml", &format!("{HEAD}{text}"), &board())
+}
+
+fn wiring(text: &str) -> Wiring {
+    let wiring = read(text).unwrap_or_else(|mistakes| panic!("{mistakes:?}"));
+    wiring.check("w.toml", "", &program()).unwrap_or_else(|mistakes| panic!("{mistakes:?}"));
+    wiring
+}
+
+fn findings(text: &str) -> Findings {
+    let (wiring, program) = (wiring(text), program());
+    let bounds = [takt_analysis::bound(&program).ok()];
+    wiring.findings("w.toml", &format!("{HEAD}{text}"), &program, &bounds)
+}
+
+/// The path from the sensor to the lamp.
+fn path(wiring: &Wiring) -> PinPath {
+    let program = program();
+    let bounds = takt_analysis::bound(&program).expect("bounds");
+    let found = ways(wiring, &Application::from(&program), std::slice::from_ref(&bounds)).expect("ways");
+    assert!(found.late.is_empty() && found.others.is_empty(), "{found:?}");
+    let [path] = &found.ways[..] else { panic!("{found:?}") };
+    path.clone()
+}
+
+fn simulation(name: &str, wiring: &Wiring) -> Simulation {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("sensors-{name}"));
+    Simulation::new(&board(), wiring, &program(), &folder).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// Cycles from the clock's fall with which an encoder holds another position to the edge at the lamp, over some changes.
+fn measured(name: &str, wiring: &Wiring, [clock, data]: [&str; 2], encoder: &mut dyn Encoder) -> Vec<u64> {
+    let mut sim = simulation(name, wiring);
+    let mut random = Pcg64::seed_from_u64(1);
+    let (mut was, mut frames, mut found) = (true, 0, Vec::new());
+    let (mut sampled, mut lit) = (None, false);
+    sim.set(data, true);
+    sim.run(1, &[]).expect("it runs");
+    while found.len() < 4 {
+        assert!(sim.cycles < 200_000, "{name}: no edge at the lamp: {found:?}");
+        let now = sim.output(clock).expect("a pin").0;
+        let is_first = was && !now && !encoder.is_busy();
+        was = now;
+        if is_first {
+            frames += 1;
+            // The drive is on; the position is another one every fourth frame.
+            if frames > 12 && frames % 4 == 0 {
+                sampled = Some(sim.cycles);
+            }
+            encoder.holds(u64::from(frames > 11 && frames / 4 % 2 == 1));
+        }
+        let level = encoder.clock(now, &mut random);
+        sim.run(1, &[]).expect("it runs");
+        sim.set(data, level);
+        let lamp = sim.output("lamp_out").expect("a pin").0;
+        if lamp != lit
+            && let Some(sampled) = sampled.take()
+        {
+            found.push(sim.cycles - sampled);
+        }
+        lit = lamp;
+    }
+    found
+}
+
+const SSI: &str = r#"
+[peripheral.angle]
+kind = "ssi"
+pins = { clock = "gp0", data = "gn0" }
+rate = 5
+bits = 12
+pause = 100
+starts = "main.valley"
+ports = { position = "x" }
+"#;
+
+#[test]
+fn an_ssi_position_arrives_as_the_bound_says() {
+    let wiring = wiring(SSI);
+    assert_eq!(findings(SSI), Findings::default());
+    let path = path(&wiring);
+    let total = path.total().expect("an edge");
+    assert_eq!((path.inputs[0].sample, path.inputs[0].parts[0].best), (Some(Sample::Frame), 120));
+    assert_eq!(total.best, total.worst, "jitter 0");
+    let texts: Vec<String> = samples(&wiring).into_iter().map(|sampling| sampling.text).collect();
+    assert_eq!(texts, ["1 cycle after main.valley, by a frame of 120 cycles at 5 MHz"]);
+    let mut encoder = SsiEncoder::new(12, 5, 100, false);
+    assert_eq!(measured("ssi", &wiring, ["angle_clock", "angle_data"], &mut encoder), [total.best; 4]);
+}
+
+#[test]
+fn a_lead_counts_as_an_instant() {
+    let text = SSI.replace("starts = \"main.valley\"\n", "");
+    // Without `lead` a frame starts with the tick, and the next tick reads what it brings.
+    let lead = |lead: &str| {
+        let head = HEAD.replace("autostart = true\n", lead);
+        let wiring = Wiring::read("w.toml", &format!("{head}{text}"), &board()).expect("it is right");
+        let path = path(&wiring);
+        let text = samples(&wiring).remove(0).text;
+        (path.inputs[0].parts[0].best, path.inputs[0].until.best, path.inputs[0].until.worst, text)
+    };
+    let by = "by a frame of 120 cycles at 5 MHz";
+    assert_eq!(lead(""), (120, 879, 879, format!("1 cycle after the tick, {by}")));
+    assert_eq!(lead("lead = 4\n"), (120, 79, 79, format!("199 cycles before the tick, {by}")));
+    assert_eq!(lead("lead = 2.4\n"), (120, 999, 999, format!("119 cycles before the tick, {by}")));
+}
+
+fn lines(mistakes: &[Mistake]) -> Vec<String> {
+    mistakes.iter().map(Mistake::to_string).collect()
+}
+
+/// Replacements in a wiring, each with the mistake that it makes, with its line within the peripheral.
+fn each_is_refused(text: &str, replacements: &[(&str, &str, &str)]) {
+    let lines_before = HEAD.lines().count() + 1;
+    for (what, by, expected) in replacements {
+        assert!(text.contains(what), "{what}");
+        let wrong = text.replacen(what, by, 1);
+        let found = match read(&wrong) {
+            Err(mistakes) => lines(&mistakes),
+            Ok(_) => {
+                let found = findings(&wrong);
+                lines(&[found.mistakes, found.warnings].concat())
+            }
+        };
+        let (line, rest) = expected.split_once(':').expect("a line");
+        let line: usize = line.parse().expect("a number");
+        let expected = format!("w.toml:{}:{rest}", lines_before + line);
+        assert!(
+            found.iter().any(|found| found.starts_with(&expected)),
+            "{what} -> {by}: {expected}: {found:#?}"
+        );
+    }
+}
+
+#[test]
+fn what_does_not_fit_an_ssi_encoder_is_refused() {
+    each_is_refused(
+        SSI,
+        &[
+            ("bits = 12", "bits = 0", "5:8: `bits` must be a whole number from 8 to 36, not 0"),
+            ("bits = 12", "bits = 37", "5:8: `bits` must be a whole number from 8 to 36, not 37"),
+            (
+                "rate = 5",
+                "rate = 60",
+                "4:8: 60 MHz are 0.42 cycles of 50 MHz for half a bit; expected 3 to 65535: 0.000381 to 8.333 MHz",
+            ),
+            ("rate = 5", "rate = 0", "4:8: `rate` must be a number from 0.000001 to 1000000, not 0"),
+            ("rate = 5", "rate = 5\nhalf = 5", "4:8: `half` already determines the rate"),
+            (", data = \"gn0\"", "", "3:8: `data` is missing in [pins]"),
+            ("position = \"x\"", "value = \"x\"", "8:11: `value` is not a key of [ports]"),
+            (
+                "pause = 100",
+                "pause = 880",
+                "4:1: starts of frames are lost: a frame of `angle` takes 120 cycles: 2 · half · bits, and its rest 880: pause, and `main` starts one every 1000 cycles: a smaller `half`, or a carrier of 1001 cycles or more",
+            ),
+            (
+                "rate = 5",
+                "rate = 2",
+                "4:1: `position` is a period old at each tick: a frame of `angle` takes 312 cycles: 2 · half · bits, and starts 250 cycles before the tick: `after` greater by 1.26 µs or more",
+            ),
+            (
+                "bits = 12",
+                "bits = 12\ndouble = 1",
+                "4:1: `position` is a period old at each tick: a frame of `angle` takes 250 cycles: 2 · half · (2 · bits + 1)",
+            ),
+            (
+                "starts = \"main.valley\"\n",
+                "",
+                "4:1: `position` is a period old at each tick: a frame of `angle` takes 120 cycles: 2 · half · bits, and starts 0 cycles before the tick: `lead = 2.42` or more",
+            ),
+            (
+                "pause = 100\nstarts = \"main.valley\"\n",
+                "pause = 900\n",
+                "4:1: starts of frames are lost: a frame of `angle` takes 120 cycles: 2 · half · bits, and its rest 900: pause, and one starts every 1000 cycles: `half = 4` at most",
+            ),
+        ],
+    );
+    // The highest rate that the clock makes, of at most the given one.
+    for (rate, half) in [("5", 5), ("5.1", 5), ("4.9", 6), ("8.3333", 4), ("0.5", 50), ("2.5", 10)] {
+        let wiring = wiring(&SSI.replace("rate = 5", &format!("rate = {rate}")));
+        assert_eq!(wiring.peripherals[1].parameter("half"), half, "{rate} MHz");
+    }
+}
