@@ -45,6 +45,7 @@ pub use wiring::Wiring;
 /// The Verilog of the peripherals, and of the modules around the core, by file name.
 pub const VERILOG: &[(&str, &str)] = &[
     ("takt_align.v", include_str!("../verilog/takt_align.v")),
+    ("takt_biss_c.v", include_str!("../verilog/takt_biss_c.v")),
     ("takt_boot.v", include_str!("../verilog/takt_boot.v")),
     ("takt_bridge.v", include_str!("../verilog/takt_bridge.v")),
     ("takt_carrier.v", include_str!("../verilog/takt_carrier.v")),

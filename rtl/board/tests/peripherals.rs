@@ -2,7 +2,7 @@
 //! Compares every peripheral's circuit with its model, in every cycle; faults planted in the circuits must be found.
 #![allow(clippy::print_stdout)]
 
-use crate::harness::encoders::{BehindPins, SsiEncoder};
+use crate::harness::encoders::{BehindPins, BissEncoder, Encoder, SsiEncoder};
 use crate::harness::{Part, RESET, build, compare, run};
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::{Rng as _, SeedableRng as _};
@@ -75,6 +75,13 @@ fn variants(kind: &Kind) -> Vec<Vec<u32>> {
             vec![3, 25, 12, 1, 1, 20],
             vec![5, 36, 5, 0, 1, 17],
             vec![3, 36, 32, 0, 0, 9],
+        ],
+        "biss-c" => vec![
+            vec![2, 12, 24, 9, 1],
+            vec![3, 18, 12, 12, 40],
+            vec![4, 26, 13, 10, 25],
+            vec![2, 36, 5, 7, 60],
+            vec![2, 36, 32, 30, 30],
         ],
         "digital-in" => vec![vec![1, 0], vec![20, 1], vec![300, 0]],
         "digital-out" => vec![vec![0], vec![1]],
@@ -151,10 +158,11 @@ fn encoder(kind: &'static Kind, parameters: &[u32]) -> Option<(usize, BehindPins
         let at = kind.parameters.iter().position(|parameter| parameter.name == name).expect("a parameter");
         parameters[at]
     };
-    let of: Box<dyn crate::harness::encoders::Encoder> = match kind.name {
+    let of: Box<dyn Encoder> = match kind.name {
         "ssi" => {
             Box::new(SsiEncoder::new(value("bits"), value("half"), value("pause"), value("double") == 1))
         }
+        "biss-c" => Box::new(BissEncoder::new(value("bits"), value("half"), value("timeout"))),
         _ => return None,
     };
     let (takes, _) = kind.ports();
@@ -322,6 +330,7 @@ const FAULTS: &[&[(&str, &str, &str)]] = &[
         ("takt_digital_out.v", "SAFE != 0;", "1'b0;"),
         ("takt_spi.v", "~active & half != END - 7'd1", "~active"),
         ("takt_ssi.v", "number == BETWEEN;", "number == END;"),
+        ("takt_biss_c.v", "s1 ^ is_crc;", "s1;"),
         ("takt_tick.v", "lead < period", "lead <= period"),
         ("takt_carrier.v", "START - HALF : START", "START - HALF : START + 1"),
         ("takt_pwm_phase.v", "on[16:1] + {15'd0, on[0]}", "on[16:1]"),
@@ -338,6 +347,7 @@ const FAULTS: &[&[(&str, &str, &str)]] = &[
         ("takt_digital_out.v", "|w_level", "w_level[0]"),
         ("takt_spi.v", "if (start & busy) lost", "if (start & ~busy) lost"),
         ("takt_ssi.v", "GRAY != 0 & above", "GRAY != 0 & word[0]"),
+        ("takt_biss_c.v", "answers ? FIRST - 17'd1 :", "answers ? FIRST :"),
         ("takt_tick.v", "left == ahead + 32'd1", "left == ahead"),
         ("takt_carrier.v", "if (place == TOP) back", "if (place == TOP - 16'd1) back"),
         ("takt_pwm_phase.v", "(~first & was)", "(1'b0 & was)"),
@@ -360,6 +370,7 @@ const FAULTS: &[&[(&str, &str, &str)]] = &[
         ("takt_uart_send.v", "left  <= LAST;", "left  <= {8'd0, LAST[7:0]};"),
         ("takt_spi.v", "(shift & mask) | extend", "shift & mask"),
         ("takt_ssi.v", "bad       <= ~s1;", "bad       <= 1'b0;"),
+        ("takt_biss_c.v", "{31'd0, ~word[1]}", "{31'd0, word[1]}"),
     ],
 ];
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Encoders and currents in the complete top level, from the sample to a pin, to the cycle; mistakes in their wirings.
 
-use crate::harness::encoders::{Encoder, SsiEncoder};
+use crate::harness::encoders::{BissEncoder, Encoder, SsiEncoder};
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng as _;
 use std::path::Path;
 use takt_asm::{MemoryLoader, Options, assemble};
-use takt_board::latency::{PinPath, Sample, samples, ways};
+use takt_board::latency::{PinPath, Sample, Until, samples, ways};
 use takt_board::simulation::Simulation;
 use takt_board::{Application, Board, Findings, Mistake, Wiring};
 use takt_isa::{Program, T1};
@@ -136,6 +136,64 @@ fn an_ssi_position_arrives_as_the_bound_says() {
     assert_eq!(measured("ssi", &wiring, ["angle_clock", "angle_data"], &mut encoder), [total.best; 4]);
 }
 
+const BISS: &str = r#"
+[peripheral.angle]
+kind = "biss-c"
+pins = { ma = "gp0", slo = "gn0" }
+rate = 10
+bits = 12
+wait = 10
+timeout = 60
+starts = "main.valley"
+ports = { position = "x" }
+"#;
+
+#[test]
+fn a_biss_position_arrives_as_the_bound_says() {
+    let wiring = wiring(BISS);
+    assert_eq!(findings(BISS), Findings::default());
+    let path = path(&wiring);
+    let total = path.total().expect("an edge");
+    // However long the line delays the frame, the tick after the longest one reads it.
+    assert_eq!((path.inputs[0].parts[0].best, path.inputs[0].sample), (147, Some(Sample::Frame)));
+    assert_eq!(total.best, total.worst, "jitter 0");
+    let texts: Vec<String> = samples(&wiring).into_iter().map(|sampling| sampling.text).collect();
+    assert_eq!(texts, ["1 cycle after main.valley, by a frame of 147 to 196 cycles at 8.333 MHz"]);
+    let mut encoder = BissEncoder::new(12, 3, 60);
+    assert_eq!(measured("biss", &wiring, ["angle_ma", "angle_slo"], &mut encoder), [total.best; 4]);
+}
+
+#[test]
+fn what_does_not_fit_a_biss_encoder_is_refused() {
+    each_is_refused(
+        BISS,
+        &[
+            ("bits = 12", "bits = 11", "5:8: `bits` must be a whole number from 12 to 36, not 11"),
+            (
+                "rate = 10",
+                "rate = 30",
+                "4:8: 30 MHz are 0.83 cycles of 50 MHz for half a bit; expected 2 to 65535: 0.000381 to 12.500 MHz",
+            ),
+            ("wait = 10", "wait = 1", "6:8: `wait` must be a whole number from 2 to 255, not 1"),
+            ("ma = \"gp0\", ", "", "3:8: `ma` is missing in [pins]"),
+            (
+                "timeout = 60",
+                "timeout = 900",
+                "4:1: starts of frames are lost: a frame of `angle` takes 196 cycles: half · (2 · (wait + bits) + 21) + 1, and its rest 903: half + timeout, and `main` starts one every 1000 cycles",
+            ),
+            (
+                "wait = 10",
+                "wait = 20",
+                "4:1: `position` is a period old at each tick: a frame of `angle` takes 256 cycles: half · (2 · (wait + bits) + 21) + 1, and starts 250 cycles before the tick: `after` greater by 0.15 µs or more",
+            ),
+        ],
+    );
+    for (rate, half) in [("10", 3), ("13", 2), ("12.5", 2), ("8.33", 4), ("1", 25)] {
+        let wiring = wiring(&BISS.replace("rate = 10", &format!("rate = {rate}")));
+        assert_eq!(wiring.peripherals[1].parameter("half"), half, "{rate} MHz");
+    }
+}
+
 #[test]
 fn a_lead_counts_as_an_instant() {
     let text = SSI.replace("starts = \"main.valley\"\n", "");
@@ -227,5 +285,27 @@ fn what_does_not_fit_an_ssi_encoder_is_refused() {
     for (rate, half) in [("5", 5), ("5.1", 5), ("4.9", 6), ("8.3333", 4), ("0.5", 50), ("2.5", 10)] {
         let wiring = wiring(&SSI.replace("rate = 5", &format!("rate = {rate}")));
         assert_eq!(wiring.peripherals[1].parameter("half"), half, "{rate} MHz");
+    }
+}
+
+/// The example wirings with sensors fit a program, and their angle and currents reach the duties in a fixed time.
+#[test]
+fn the_examples_fit() {
+    let (text, source) = (
+        include_str!("../../../programs/examples/board/absolute.toml"),
+        include_str!("../../../programs/examples/board/absolute.s"),
+    );
+    let assembled =
+        assemble("absolute.s", &MemoryLoader::new(&[("absolute.s", source)]), &Options::default());
+    let program = assembled.unwrap_or_else(|errors| panic!("{}", errors.render(false))).program;
+    let wiring = Wiring::read("absolute.toml", text, &board()).unwrap_or_else(|wrong| panic!("{wrong:?}"));
+    wiring.check("absolute.toml", text, &program).unwrap_or_else(|wrong| panic!("{wrong:?}"));
+    let bounds = takt_analysis::bound(&program).expect("bounds");
+    let found = ways(&wiring, &Application::from(&program), std::slice::from_ref(&bounds)).expect("ways");
+    assert_eq!(wiring.findings("absolute.toml", text, &program, &[Some(bounds)]), Findings::default());
+    let sensed = |way: &&PinPath| way.inputs.iter().any(|end| ["n", "ca"].contains(&end.port.as_str()));
+    for way in found.ways.iter().filter(sensed) {
+        let acts = way.from_sample(Until::Acts);
+        assert!(acts.is_none_or(|acts| acts.best == acts.worst), "{way:?}");
     }
 }

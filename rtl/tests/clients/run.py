@@ -43,6 +43,12 @@ SSI = [
     {"HALF": 20, "BITS": 36, "TURN": 32, "GRAY": 1, "DOUBLE": 0, "PAUSE": 1300},
 ]
 
+BISS = [
+    {"HALF": 4, "BITS": 18, "TURN": 24, "WAIT": 32, "TIMEOUT": 1300},
+    {"HALF": 2, "BITS": 12, "TURN": 5, "WAIT": 20, "TIMEOUT": 400},
+    {"HALF": 9, "BITS": 36, "TURN": 20, "WAIT": 16, "TIMEOUT": 800},
+]
+
 
 def main():
     folder = Path(sys.argv[1])
@@ -57,6 +63,8 @@ def main():
     failed += run(folder / "board", "uart_client", "takt_board", files("board/files.f"))
     for parameters in SSI:
         failed += run(folder / "board", "ssi_client", "takt_ssi", ["board/takt_ssi.v"], parameters)
+    for parameters in BISS:
+        failed += run(folder / "board", "biss_client", "takt_biss_c", ["board/takt_biss_c.v"], parameters)
     return int(failed > 0)
 
 

@@ -54,6 +54,16 @@ pub(crate) fn frame(peripheral: &Peripheral) -> Option<Frame> {
                 registers: &["position", "turns"],
             }
         }
+        "biss-c" => Frame {
+            // The shortest has no line and an acknowledge of one bit; the longest has its start bit as late as it may.
+            cycles: [
+                2 * half * (bits + 12) + 3,
+                half * (2 * (parameter(peripheral, "wait") + bits) + 21) + 1,
+            ],
+            rest: half + parameter(peripheral, "timeout"),
+            formulas: ["half · (2 · (wait + bits) + 21) + 1", "half + timeout"],
+            registers: &["position", "turns", "error", "warning"],
+        },
         _ => return None,
     })
 }

@@ -3,6 +3,7 @@
 //!
 //! `rtl/board/tests/peripherals.rs` compares the circuits with the models in every cycle.
 
+mod biss_c;
 mod clocked;
 mod common;
 mod filter;
@@ -12,6 +13,7 @@ mod outputs;
 mod spi;
 mod ssi;
 
+pub use biss_c::{BissC, BissFrame};
 pub use clocked::Model;
 pub use common::{Tick, UartReceive, UartSend};
 pub use filter::Filter;
@@ -54,6 +56,13 @@ pub fn of(kind: &Kind, parameters: &[u32]) -> Option<Box<dyn Model>> {
             gray: value(3) != 0,
             double: value(4) != 0,
             pause: value(5),
+        })),
+        "biss-c" => Box::new(BissC::new(BissFrame {
+            half: value(0),
+            bits: value(1),
+            turn: value(2),
+            wait: value(3),
+            timeout: value(4),
         })),
         "digital-in" => Box::new(DigitalIn::new(value(0), value(1) != 0)),
         "digital-out" => Box::new(DigitalOut::new(value(0) != 0)),

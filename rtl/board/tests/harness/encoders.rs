@@ -116,3 +116,91 @@ impl Encoder for SsiEncoder {
         !self.left.is_empty()
     }
 }
+
+/// A BiSS C encoder with random positions, behind a line that is some cycles long, another number in each frame.
+pub(crate) struct BissEncoder {
+    bits: u32,
+    half: u32,
+    timeout: u32,
+    position: Option<u64>,
+    was: bool,
+    /// Rises of the clock in this frame; `None` at rest.
+    rises: Option<u32>,
+    left: Vec<bool>,
+    level: bool,
+    quiet: u32,
+    /// Levels on their way.
+    line: std::collections::VecDeque<bool>,
+}
+
+impl BissEncoder {
+    pub(crate) fn new(bits: u32, half: u32, timeout: u32) -> BissEncoder {
+        BissEncoder {
+            bits,
+            half,
+            timeout,
+            position: None,
+            was: true,
+            rises: None,
+            left: Vec::new(),
+            level: true,
+            quiet: 0,
+            line: std::collections::VecDeque::new(),
+        }
+    }
+
+    /// The bits from the acknowledge on: it lasts one bit, or a few more for a random position.
+    fn frame(&self, random: &mut Pcg64) -> Vec<bool> {
+        let mut data = word(self.position, self.bits, random);
+        data.extend(word(self.position.map(|_| 3), 2, random));
+        let rest = data.iter().chain(&[false; 6]).fold(0_u32, |rest, bit| {
+            let rest = rest << 1 | u32::from(*bit);
+            if rest & 64 == 0 { rest } else { rest ^ 0x43 }
+        });
+        data.extend((0..6).rev().map(|at| rest >> at & 1 == 0));
+        let busy =
+            if self.position.is_some() { 1 } else { 1 + random.next_u32() % 4 * (random.next_u32() % 2) };
+        let mut frame = vec![false; busy as usize];
+        frame.extend([true, false]);
+        frame.extend(data);
+        frame
+    }
+}
+
+impl Encoder for BissEncoder {
+    fn clock(&mut self, clock: bool, random: &mut Pcg64) -> bool {
+        let is_edge = clock != self.was;
+        self.was = clock;
+        self.quiet = if is_edge { 0 } else { self.quiet + 1 };
+        match self.rises {
+            None if is_edge && !clock => {
+                self.rises = Some(0);
+                self.left = self.frame(random);
+                let most = if random.next_u32().is_multiple_of(8) { 40 * self.half } else { 5 * self.half };
+                let cycles = if self.position.is_some() { self.half } else { random.next_u32() % most };
+                self.line = vec![true; cycles as usize].into();
+            }
+            Some(rises) if is_edge && clock => {
+                self.rises = Some(rises + 1);
+                if rises > 0 {
+                    self.level = !self.left.is_empty() && self.left.remove(0);
+                }
+            }
+            // The line rests behind the timeout.
+            Some(_) if self.quiet + 5 > self.timeout.max(self.half + 6) => {
+                (self.rises, self.level) = (None, true)
+            }
+            _ => {}
+        }
+        self.line.push_back(self.level);
+        self.line.pop_front().unwrap_or(self.level)
+    }
+
+    fn holds(&mut self, position: u64) {
+        self.position = Some(position);
+    }
+
+    fn is_busy(&self) -> bool {
+        self.rises.is_some()
+    }
+}
