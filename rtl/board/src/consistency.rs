@@ -3,6 +3,7 @@
 
 mod drive;
 mod frames;
+mod windows;
 
 use crate::application::Application;
 use crate::document::{Document, Mistake, Table};
@@ -66,6 +67,9 @@ impl Wiring {
             fit.latch(peripheral);
             if let Some(frame) = latency::frame(peripheral) {
                 fit.frame(peripheral, &frame, busy);
+            }
+            if let Some(window) = latency::window(peripheral) {
+                fit.window(peripheral, &window);
             }
             match peripheral.kind.name {
                 "pwm" => fit.pwm(peripheral),

@@ -66,6 +66,8 @@ pub struct Strobes {
     pub trip: bool,
     /// Input `start`: a conversion begins.
     pub start: bool,
+    /// A window begins at `start`; a wiring states the place of a carrier at its centre.
+    pub window: bool,
     /// Inputs `place` and `back`: the carrier, whose half period in cycles is the module's parameter `HALF`.
     pub carrier: bool,
     /// Input `clear` and output `trip`: the module trips other peripherals, until it is cleared.
@@ -155,11 +157,13 @@ const TURNS: Register = register("turns", "the bits above them, 0 without any");
 const LOST: Register =
     register("lost", "starts that came during a frame or the rest after it and were dropped");
 
-const PLAIN: Strobes = Strobes { enable: false, trip: false, start: false, carrier: false, trips: false };
+const PLAIN: Strobes =
+    Strobes { enable: false, trip: false, start: false, window: false, carrier: false, trips: false };
 const ENABLED: Strobes = Strobes { enable: true, ..PLAIN };
 const STARTED: Strobes = Strobes { start: true, ..PLAIN };
 const MODULATED: Strobes = Strobes { trip: true, carrier: true, ..ENABLED };
 const TRIPPING: Strobes = Strobes { trips: true, ..PLAIN };
+const WINDOWED: Strobes = Strobes { start: true, window: true, ..TRIPPING };
 
 /// Names of the levels of a half bridge at rest.
 const RESTS: &[&str] = &["off", "low", "high"];
@@ -365,6 +369,38 @@ pub const KINDS: &[Kind] = &[
             parameter("timeout", 1, 1 << 20, 1500, "cycles of rest after a frame, for the encoder's timeout"),
         ],
         strobes: STARTED,
+    },
+    Kind {
+        name: "sinc3",
+        module: "takt_sinc3",
+        text: "bits of a delta-sigma modulator: a sinc3 filter, and a faster one whose overcurrent is a trip",
+        pins: &[input("data"), optional(output("clock")), optional(input("clock_in"))],
+        reads: &[
+            register("value", "the filtered value, -osr³ to osr³"),
+            register("values", "values so far; wraps at 32 bits"),
+            register("state", "bit 0: the trip is held, bit 1: there is overcurrent"),
+            register("trips", "trips so far; wraps at 32 bits"),
+        ],
+        writes: &[register("clear", "not 0: clears the trip if there is no overcurrent")],
+        parameters: &[
+            half_bit(2, 255, 3),
+            choice(
+                "clock",
+                &["out", "in"],
+                0,
+                "`\"out\"`: the modulator takes its clock; `\"in\"`: it has its own",
+            ),
+            parameter("osr", 8, 256, 64, "bits from value to value, and a third of the bits in one"),
+            parameter("fast", 8, 32, 16, "the same of the sums for overcurrent"),
+            parameter(
+                "limit",
+                0,
+                32768,
+                0,
+                "least magnitude of such a sum that trips, at most fast³; 0: none does",
+            ),
+        ],
+        strobes: WINDOWED,
     },
     Kind {
         name: "digital-in",

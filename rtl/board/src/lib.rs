@@ -62,6 +62,7 @@ pub const VERILOG: &[(&str, &str)] = &[
     ("takt_scale.v", include_str!("../verilog/takt_scale.v")),
     ("takt_shadow_memory.v", include_str!("../verilog/takt_shadow_memory.v")),
     ("takt_sigma_delta.v", include_str!("../verilog/takt_sigma_delta.v")),
+    ("takt_sinc3.v", include_str!("../verilog/takt_sinc3.v")),
     ("takt_spi.v", include_str!("../verilog/takt_spi.v")),
     ("takt_ssi.v", include_str!("../verilog/takt_ssi.v")),
     ("takt_step.v", include_str!("../verilog/takt_step.v")),

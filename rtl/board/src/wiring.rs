@@ -63,8 +63,10 @@ pub enum Starts {
     Lead,
     /// With the outputs.
     Publish,
-    /// At a place of a carrier.
+    /// At a place of a carrier; of a filter, the centre of the window that is kept.
     At(Instant),
+    /// Never: a filter keeps each window.
+    Never,
 }
 
 /// A pin of the circuit that belongs to no peripheral.
@@ -106,7 +108,7 @@ pub struct Peripheral {
     pub parameters: Vec<u32>,
     /// The board's names of the pins, in the order of the kind's table; `None` for a pin that is not connected.
     pub pins: Vec<Option<String>>,
-    /// The start of an SPI's frames.
+    /// The start of frames, or the centre of windows.
     pub starts: Starts,
     /// The place of a carrier at which the registers that the program reads are captured; `None` for the tick.
     pub latch: Option<Instant>,

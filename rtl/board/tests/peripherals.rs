@@ -83,6 +83,13 @@ fn variants(kind: &Kind) -> Vec<Vec<u32>> {
             vec![2, 36, 5, 7, 60],
             vec![2, 36, 32, 30, 30],
         ],
+        "sinc3" => vec![
+            vec![2, 0, 8, 8, 200],
+            vec![3, 0, 11, 9, 729],
+            vec![2, 1, 16, 12, 600],
+            vec![2, 0, 256, 32, 20_000],
+            vec![4, 1, 64, 16, 0],
+        ],
         "digital-in" => vec![vec![1, 0], vec![20, 1], vec![300, 0]],
         "digital-out" => vec![vec![0], vec![1]],
         other => panic!("write the stimuli of {other}"),
@@ -99,6 +106,9 @@ fn stimulus(kind: &'static Kind, parameters: &[u32], seed: u64) -> Box<dyn FnMut
         "trip" => parameters[0].max(1),
         _ => 1,
     };
+    if kind.name == "sinc3" {
+        return modulated(kind, parameters, random);
+    }
     let mut behind = encoder(kind, parameters);
     let half = parameters.get(kind.parameters.len()).copied();
     let span = if kind.name == "pwm" { parameters[0] } else { half.unwrap_or(1 << 15) };
@@ -149,6 +159,42 @@ fn stimulus(kind: &'static Kind, parameters: &[u32], seed: u64) -> Box<dyn FnMut
             inputs[*pin] = behind.level(&inputs, cycle < RESET);
         }
         inputs
+    })
+}
+
+/// The inputs of a filter: bits whose density drifts, a clock of the modulator, and starts that come in step with the windows most of the
+/// time.
+fn modulated(kind: &'static Kind, parameters: &[u32], mut random: Random) -> Box<dyn FnMut(u32) -> Vec<u32>> {
+    let (takes, _) = kind.ports();
+    let names: Vec<String> = takes.into_iter().skip(1).map(|(name, _)| name).collect();
+    let window = 2 * parameters[0] * parameters[2];
+    let (mut density, mut step, mut next) = (500_u32, 1, 700);
+    let (mut clock, mut edge) = (0, 0);
+    Box::new(move |cycle| {
+        if random.one_in(200) {
+            step = random.bits() % 7;
+        }
+        density = (density + step).saturating_sub(3).min(1000);
+        if cycle >= edge {
+            clock ^= 1;
+            edge = cycle + 2 + random.bits() % 2;
+        }
+        let is_start = cycle == next;
+        if is_start {
+            next +=
+                if random.one_in(6) { 1 + random.bits() % window } else { window * (1 + random.bits() % 5) };
+        }
+        let mut value = |name: &str| match name {
+            "clear" => u32::from(random.one_in(90)),
+            "start" => is_start.into(),
+            "take" => random.one_in(5).into(),
+            "put" => random.one_in(60).into(),
+            "pin_data" => u32::from(random.bits() % 1000 < density),
+            "pin_clock_in" => clock,
+            "w_clear" => random.bits() % 2,
+            other => panic!("write the stimulus of {other}"),
+        };
+        names.iter().map(|name| value(name)).collect()
     })
 }
 
@@ -331,6 +377,7 @@ const FAULTS: &[&[(&str, &str, &str)]] = &[
         ("takt_spi.v", "~active & half != END - 7'd1", "~active"),
         ("takt_ssi.v", "number == BETWEEN;", "number == END;"),
         ("takt_biss_c.v", "s1 ^ is_crc;", "s1;"),
+        ("takt_sinc3.v", "first | bits == LAST;", "bits == LAST;"),
         ("takt_tick.v", "lead < period", "lead <= period"),
         ("takt_carrier.v", "START - HALF : START", "START - HALF : START + 1"),
         ("takt_pwm_phase.v", "on[16:1] + {15'd0, on[0]}", "on[16:1]"),
@@ -348,6 +395,7 @@ const FAULTS: &[&[(&str, &str, &str)]] = &[
         ("takt_spi.v", "if (start & busy) lost", "if (start & ~busy) lost"),
         ("takt_ssi.v", "GRAY != 0 & above", "GRAY != 0 & word[0]"),
         ("takt_biss_c.v", "answers ? FIRST - 17'd1 :", "answers ? FIRST :"),
+        ("takt_sinc3.v", "quick >= BOUND | quick <= -BOUND", "quick >= BOUND"),
         ("takt_tick.v", "left == ahead + 32'd1", "left == ahead"),
         ("takt_carrier.v", "if (place == TOP) back", "if (place == TOP - 16'd1) back"),
         ("takt_pwm_phase.v", "(~first & was)", "(1'b0 & was)"),
@@ -371,6 +419,7 @@ const FAULTS: &[&[(&str, &str, &str)]] = &[
         ("takt_spi.v", "(shift & mask) | extend", "shift & mask"),
         ("takt_ssi.v", "bad       <= ~s1;", "bad       <= 1'b0;"),
         ("takt_biss_c.v", "{31'd0, ~word[1]}", "{31'd0, word[1]}"),
+        ("takt_sinc3.v", "anew[2] ? 3'b001 : ", ""),
     ],
 ];
 

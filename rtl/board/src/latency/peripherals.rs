@@ -3,6 +3,7 @@
 
 use super::pin_path::{Answer, End, Part, Sample};
 use super::samples::significant;
+use crate::carrier::Instant;
 use crate::wiring::{Peripheral, Starts, Wiring};
 
 /// Cycles from the put of a duty to the first cycle in which it can act.
@@ -68,6 +69,56 @@ pub(crate) fn frame(peripheral: &Peripheral) -> Option<Frame> {
     })
 }
 
+/// Windows of a filter. Their centre is the sample.
+pub(crate) struct Window {
+    /// Cycles from a start to the centre of the window that begins.
+    pub(crate) from_start: u64,
+    /// Cycles from the centre to the new value.
+    pub(crate) delay: u64,
+    /// Cycles by which the centre may be off its place: the modulator's own clock.
+    pub(crate) spread: u64,
+    /// Cycles from window to window.
+    pub(crate) every: u64,
+}
+
+/// The windows of a peripheral, if the kind has windows.
+pub(crate) fn window(peripheral: &Peripheral) -> Option<Window> {
+    if !peripheral.kind.strobes.window {
+        return None;
+    }
+    let [half, osr, clock_in] = ["half", "osr", "clock"].map(|name| parameter(peripheral, name));
+    // A bit is sampled at a rise of the clock, and taken at the next. The synchroniser delays the modulator's own clock by two cycles;
+    // its first rise after a start comes half a period later on average.
+    Some(Window {
+        from_start: half * (3 * osr + 1) + if clock_in == 1 { half - 1 } else { 1 },
+        delay: half * (3 * osr - 1) + 6 + 2 * clock_in,
+        spread: half * clock_in,
+        every: 2 * half * osr,
+    })
+}
+
+/// Instant of a carrier at which windows start that are centred at the given one.
+pub(crate) fn window_start(wiring: &Wiring, peripheral: &Peripheral, centre: Instant) -> Instant {
+    let period = u64::from(wiring.carriers[centre.carrier].period());
+    let before = window(peripheral).map_or(0, |window| window.from_start) % period;
+    Instant { at: ((u64::from(centre.at) + period - before) % period) as u32, ..centre }
+}
+
+/// Parts from the centre of a filter's window to the board's tick.
+fn filtered(wiring: &Wiring, peripheral: &Peripheral, window: &Window) -> Option<(Vec<Part>, Part)> {
+    let Window { delay, spread, every, .. } = *window;
+    let until = match peripheral.starts {
+        Starts::At(centre) => {
+            let to_tick = |cycles: u64| wiring.cycles_to_tick(centre, cycles as u32);
+            let ((best, _), (_, worst)) = (to_tick(delay - spread), to_tick(delay + spread));
+            [u64::from(best).saturating_sub(delay + spread), u64::from(worst) + spread - delay]
+        }
+        _ => [0, every - 1],
+    };
+    let text = format!("from the sample: group delay, {} MHz", significant(rate(wiring, peripheral)?));
+    Some((vec![Part::new(text, delay, delay)], Part::new("until the tick", until[0], until[1])))
+}
+
 /// Rate of a peripheral's bits in MHz; `None` without frames.
 pub(crate) fn rate(wiring: &Wiring, peripheral: &Peripheral) -> Option<f64> {
     let is_half_bit = peripheral.kind.parameters.iter().position(|parameter| parameter.is_half_bit)?;
@@ -83,7 +134,7 @@ fn start_to_tick(wiring: &Wiring, starts: Starts, least: u32) -> Option<(u32, u3
             let cycles = wiring.lead + periods * wiring.period;
             Some((cycles, cycles))
         }
-        Starts::Publish => None,
+        Starts::Publish | Starts::Never => None,
     }
 }
 
@@ -109,6 +160,10 @@ fn edge_in(
     if let Some(frame) = frame(peripheral).filter(|frame| frame.registers.contains(&register)) {
         let (parts, until) = sampled(wiring, peripheral, &frame)?;
         return Some((parts, until, Some(Sample::Frame)));
+    }
+    if let Some(window) = window(peripheral).filter(|_| register == "value") {
+        let (parts, until) = filtered(wiring, peripheral, &window)?;
+        return Some((parts, until, Some(Sample::Window)));
     }
     let cycles = match (peripheral.kind.name, register) {
         ("quadrature" | "step", _) => parameter(peripheral, "filter") + 3,

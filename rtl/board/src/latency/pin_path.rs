@@ -64,6 +64,8 @@ pub struct End {
 pub enum Sample {
     /// Sample of a converter at the beginning of its frame, where the path begins.
     Frame,
+    /// Sample by a filter, the centre of its window, where the path begins.
+    Window,
     /// Sample of a register; the path begins with the pin's edge before it.
     Latch,
 }
@@ -120,7 +122,7 @@ impl PinPath {
             Until::Acts => "from the sample until the duty acts",
             Until::Edge => "from the sample to its first edge",
         };
-        self.total_of(outputs.collect(), sample == Sample::Frame, text)
+        self.total_of(outputs.collect(), sample != Sample::Latch, text)
     }
 
     fn total_to(&self, answer: Answer, text: &str) -> Option<Part> {

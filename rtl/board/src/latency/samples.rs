@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Instants at which peripherals sample what the program reads.
 
-use super::peripherals::{Frame, frame, rate};
+use super::peripherals::{Frame, Window, frame, rate, window};
 use crate::carrier::Instant;
 use crate::wiring::{Peripheral, Starts, Wiring};
 
@@ -47,7 +47,7 @@ fn framed(wiring: &Wiring, peripheral: &Peripheral, frame: &Frame) -> String {
         Starts::Lead if wiring.lead > 1 => format!("{} before the tick", cycles(u64::from(wiring.lead) - 1)),
         Starts::Lead if wiring.lead == 1 => "at the tick".to_owned(),
         Starts::Lead => "1 cycle after the tick".to_owned(),
-        Starts::Publish => "1 cycle after the outputs".to_owned(),
+        Starts::Publish | Starts::Never => "1 cycle after the outputs".to_owned(),
     };
     let [least, most] = frame.cycles;
     let length = if least == most { cycles(most) } else { format!("{least} to {}", cycles(most)) };
@@ -55,18 +55,37 @@ fn framed(wiring: &Wiring, peripheral: &Peripheral, frame: &Frame) -> String {
     format!("{instant}, by a frame of {length} at {rate} MHz")
 }
 
+/// Sampling by a filter's window.
+fn windowed(wiring: &Wiring, peripheral: &Peripheral, window: &Window) -> String {
+    let delay = cycles(window.delay);
+    let rate = rate(wiring, peripheral).map_or_else(String::new, significant);
+    let by = format!("by a window of {} at {rate} MHz, group delay {delay}", cycles(3 * window.every));
+    match peripheral.starts {
+        Starts::At(centre) if window.spread == 0 => format!("about {}, {by}", position(wiring, centre, 0)),
+        Starts::At(centre) => {
+            format!("about {}, {} before or after, {by}", position(wiring, centre, 0), cycles(window.spread))
+        }
+        _ => format!("every {}, {by}", cycles(window.every)),
+    }
+}
+
 /// The sampling of all peripherals that sample at another time than the tick.
 pub fn samples(wiring: &Wiring) -> Vec<Sampling> {
     let of = |peripheral: &Peripheral| {
-        let frame = frame(peripheral);
-        let text = match (&frame, peripheral.latch) {
-            (Some(frame), _) => framed(wiring, peripheral, frame),
-            (None, Some(instant)) => position(wiring, instant, 0),
-            (None, None) => return None,
+        let (frame, window) = (frame(peripheral), window(peripheral));
+        let text = match (&frame, &window, peripheral.latch) {
+            (Some(frame), ..) => framed(wiring, peripheral, frame),
+            (_, Some(window), _) => windowed(wiring, peripheral, window),
+            (.., Some(instant)) => position(wiring, instant, 0),
+            _ => return None,
         };
         let registers = peripheral.kind.reads.iter().zip(&peripheral.reads);
         let sampled = registers
-            .filter(|(register, _)| frame.is_none() || Frame::has(peripheral, register.name))
+            .filter(|(register, _)| match (&frame, &window) {
+                (Some(_), _) => Frame::has(peripheral, register.name),
+                (_, Some(_)) => register.name == "value",
+                _ => true,
+            })
             .filter_map(|(_, port)| port.clone());
         let ports: Vec<String> = sampled.collect();
         (!ports.is_empty()).then(|| Sampling { peripheral: peripheral.name.clone(), ports, text })

@@ -10,6 +10,7 @@ mod filter;
 mod inputs;
 mod motor;
 mod outputs;
+mod sinc3;
 mod spi;
 mod ssi;
 
@@ -20,6 +21,7 @@ pub use filter::Filter;
 pub use inputs::{DigitalIn, Quadrature, Step};
 pub use motor::{Bridges, Carrier, Pwm3, Trip};
 pub use outputs::{DigitalOut, Pwm, SigmaDelta};
+pub use sinc3::{Sinc3, Windows};
 pub use spi::Spi;
 pub use ssi::{Ssi, SsiFrame};
 
@@ -63,6 +65,13 @@ pub fn of(kind: &Kind, parameters: &[u32]) -> Option<Box<dyn Model>> {
             turn: value(2),
             wait: value(3),
             timeout: value(4),
+        })),
+        "sinc3" => Box::new(Sinc3::new(Windows {
+            half: value(0),
+            clock_in: value(1) != 0,
+            osr: value(2) as usize,
+            fast: value(3) as usize,
+            limit: value(4),
         })),
         "digital-in" => Box::new(DigitalIn::new(value(0), value(1) != 0)),
         "digital-out" => Box::new(DigitalOut::new(value(0) != 0)),

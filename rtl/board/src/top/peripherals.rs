@@ -5,6 +5,7 @@ use super::template::Values;
 use crate::application::Application;
 use crate::carrier::{Carrier, Instant};
 use crate::kind::Direction;
+use crate::latency::window_start;
 use crate::sinks::{Sink, sinks};
 use crate::wiring::{Peripheral, SIGNALS, Starts, Wiring, Write};
 use std::collections::BTreeMap;
@@ -166,7 +167,11 @@ impl<'a> PeripheralConnections<'a> {
             let start = match peripheral.starts {
                 Starts::Lead => "early | steps".to_owned(),
                 Starts::Publish => put.clone(),
+                Starts::At(centre) if kind.strobes.window => {
+                    at(wiring, window_start(wiring, peripheral, centre))
+                }
                 Starts::At(instant) => at(wiring, instant),
+                Starts::Never => "1'b0".to_owned(),
             };
             ports.push(format!(".start({start})"));
         }

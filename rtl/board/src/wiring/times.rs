@@ -78,14 +78,22 @@ impl<'a> Reader<'a> {
             times.carrier = given.and_then(|at| carrier::find(document, carriers, &at.value, &at));
             return times;
         }
-        let key = if kind.strobes.start { "starts" } else { "latch" };
+        let has_frames = kind.strobes.start && !kind.strobes.window;
+        let key = match (kind.strobes.window, kind.strobes.start) {
+            (true, _) => "centre",
+            (false, true) => "starts",
+            (false, false) => "latch",
+        };
+        if kind.strobes.window {
+            times.starts = Starts::Never;
+        }
         let given = table.string(key);
         let shift = table.number("shift", -1e6, 1e6);
         let cycles = shift.as_ref().map_or(0.0, |at| (at.value * self.clock).round());
         match given {
-            Some(at) if kind.strobes.start && at.value == "publish" => times.starts = Starts::Publish,
-            Some(at) if kind.strobes.start && at.value == "lead" => {}
-            Some(at) if kind.strobes.start && !at.value.contains('.') => document.mistake(
+            Some(at) if has_frames && at.value == "publish" => times.starts = Starts::Publish,
+            Some(at) if has_frames && at.value == "lead" => {}
+            Some(at) if has_frames && !at.value.contains('.') => document.mistake(
                 &at.place,
                 format!(
                     "`starts` must be \"lead\", \"publish\", or a place of a carrier as \"main.valley\", not \"{}\"",
@@ -95,7 +103,7 @@ impl<'a> Reader<'a> {
             Some(at) => {
                 let instant = carrier::instant(document, carriers, &at, cycles);
                 match kind.strobes.start {
-                    true => times.starts = instant.map_or(Starts::Lead, Starts::At),
+                    true => times.starts = instant.map_or(times.starts, Starts::At),
                     false => times.latch = instant,
                 }
                 return times;
