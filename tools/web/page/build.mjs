@@ -1,7 +1,9 @@
 // Bundles the page: `node build.mjs TAKT.WASM OUT`.
+import zopfli from "@gfx/zopfli";
 import { build } from "esbuild";
 import { cpSync, mkdirSync, readFileSync, writeFileSync } from "node:fs";
 import { join, resolve } from "node:path";
+import { promisify } from "node:util";
 import { gzipSync } from "node:zlib";
 
 const [wasm, out] = process.argv.slice(2).map((path) => resolve(path));
@@ -12,7 +14,8 @@ await build({
   outdir: out, bundle: true, minify: true, format: "esm", target: "es2022", legalComments: "eof", logLevel: "warning",
 });
 cpSync(join(page, "index.html"), join(out, "index.html"));
-writeFileSync(join(out, "takt.wasm.gz"), gzipSync(bare(readFileSync(wasm)), { level: 9 }));
+// Five percent smaller than gzip's best, for a few seconds; more iterations gain next to nothing.
+writeFileSync(join(out, "takt.wasm.gz"), await promisify(zopfli.gzip)(bare(readFileSync(wasm)), { numiterations: 1 }));
 let total = 0;
 for (const name of ["index.html", "main.css", "main.js", "worker.js", "takt.wasm.gz"]) {
   const bytes = readFileSync(join(out, name)), size = name.endsWith(".gz") ? bytes.length : gzipSync(bytes).length;
