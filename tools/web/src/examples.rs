@@ -12,6 +12,8 @@ use takt_programs::{EXAMPLES, SOURCES};
 const FIRST: [&str; 3] = ["pi.s", "foc.s", "blink.s"];
 /// Number of periods after which an example without inputs shows an effect.
 const PERIODS_OF: [(&str, usize); 1] = [("blink.s", 2000)];
+/// Seconds that assembling takes in a browser, for the page to announce until it has measured them.
+const SECONDS_OF: [(&str, u32); 2] = [("tracking.s", 3), ("statespace.s", 2)];
 /// Program that controls the robot.
 pub(crate) const TRACKING: &str = "hybrid/tracking.s";
 
@@ -50,17 +52,18 @@ pub(crate) fn about() -> Value {
     let text = |name: &str| EXAMPLES.iter().find(|(known, _)| *known == name).map(|(_, text)| *text);
     let rest =
         EXAMPLES.iter().map(|(name, _)| *name).filter(|name| name.ends_with(".s") && !FIRST.contains(name));
+    let seconds = |name: &str| SECONDS_OF.iter().find(|(known, _)| *known == name).map(|(_, seconds)| seconds);
     let example = |name: &str| {
         let source = text(name)?;
         let inputs = text(&name.replace(".s", ".csv"));
         let periods = PERIODS_OF.iter().find(|(known, _)| *known == name).map(|(_, periods)| periods);
         Some(
-            json!({ "name": name, "title": title(source), "source": source, "inputs": inputs, "periods": periods, "track": false }),
+            json!({ "name": name, "title": title(source), "source": source, "inputs": inputs, "periods": periods, "seconds": seconds(name), "track": false }),
         )
     };
     let mut examples: Vec<Value> = FIRST.into_iter().chain(rest).filter_map(example).collect();
     if let Some((path, source)) = SOURCES.iter().find(|(path, _)| *path == TRACKING) {
-        let tracking = json!({ "name": file_name(path), "title": title(source), "source": source, "inputs": takt_programs::TRACKING_INPUTS, "track": true });
+        let tracking = json!({ "name": file_name(path), "title": title(source), "source": source, "inputs": takt_programs::TRACKING_INPUTS, "seconds": seconds(file_name(path)), "track": true });
         examples.insert(2.min(examples.len()), tracking);
     }
     json!({

@@ -19,6 +19,7 @@
 //!
 //! The crate has no clock and never waits: the caller divides long work into calls.
 
+mod constants;
 mod examples;
 mod export;
 #[cfg(target_arch = "wasm32")]

@@ -2,6 +2,7 @@
 //! Units and limits of ports, for the axes of plots. The language has no units; by convention, the comment of a declaration begins with
 //! them, as in `.output u ; V`.
 
+use takt_asm::expr::Value as Number;
 use takt_isa::{BundleAddress, Instruction, Program, Register, SlotIndex};
 
 /// Maximum length of a unit in characters.
@@ -12,19 +13,55 @@ const COPIES: usize = 8;
 /// Unit at the beginning of the comment on a port's declaration; `None` if the comment does not begin with one. `directive` is `.input`
 /// or `.output`.
 pub(crate) fn unit(sources: &[(String, String)], directive: &str, port: &str) -> Option<String> {
+    let (at, names, comment) = declaration(sources, directive, port)?;
+    let comment = comment?;
+    let units: Vec<&str> = comment.split([':', ';']).next()?.split(',').map(str::trim).collect();
+    // If there are as many units as names, they correspond one to one; otherwise the first unit applies to all names.
+    let own =
+        units.len() > 1 && units.len() == names.split(',').count() && units.iter().all(|one| is_unit(one));
+    let unit = if own { units[at] } else { units[0] };
+    is_unit(unit).then(|| unit.to_owned())
+}
+
+/// Names that are declared with a port, as written: ports without a unit share an axis with these.
+pub(crate) fn declared_together(sources: &[(String, String)], directive: &str, port: &str) -> Option<String> {
+    declaration(sources, directive, port).map(|(_, names, _)| names.trim().to_owned())
+}
+
+/// Declaration of a port: position among the names, the names, and the comment.
+fn declaration<'s>(
+    sources: &'s [(String, String)],
+    directive: &str,
+    port: &str,
+) -> Option<(usize, &'s str, Option<&'s str>)> {
     let lines = sources.iter().flat_map(|(_, text)| text.lines());
-    let declared = lines.filter_map(|line| line.trim_start().strip_prefix(directive));
-    declared.filter_map(|rest| rest.split_once(';')).find_map(|(names, comment)| {
-        let at = names.split(',').map(|name| name.trim()).position(|name| names_it(name, port))?;
-        let comment = comment.trim();
-        let units: Vec<&str> = comment.split([':', ';']).next()?.split(',').map(str::trim).collect();
-        // If there are as many units as names, they correspond one to one; otherwise the first unit applies to all names.
-        let own = units.len() > 1
-            && units.len() == names.split(',').count()
-            && units.iter().all(|one| is_unit(one));
-        let unit = if own { units[at] } else { units[0] };
-        is_unit(unit).then(|| unit.to_owned())
+    let mut declared = lines.filter_map(|line| line.trim_start().strip_prefix(directive));
+    declared.find_map(|rest| {
+        let (names, comment) =
+            rest.split_once(';').map_or((rest, None), |(names, comment)| (names, Some(comment.trim())));
+        let at = names.split(',').map(str::trim).position(|name| names_it(name, port))?;
+        Some((at, names, comment))
     })
+}
+
+/// Sampling period in seconds: the constant `T` or `Ts` whose comment begins with `s`, or the reciprocal of `FS` or `fs` in Hz.
+pub(crate) fn sampling_period(sources: &[(String, String)], constants: &[(String, Number)]) -> Option<f64> {
+    const NAMES: [(&str, &str); 4] = [("T", "s"), ("Ts", "s"), ("FS", "Hz"), ("fs", "Hz")];
+    let of = |(name, wanted): (&str, &str)| {
+        let lines = sources.iter().flat_map(|(_, text)| text.lines());
+        let mut declared = lines.filter_map(|line| line.trim_start().strip_prefix(".const"));
+        let comment = declared.find_map(|rest| {
+            let (named, value) = rest.split_once('=')?;
+            if named.trim() == name { value.split_once(';').map(|(_, comment)| comment) } else { None }
+        })?;
+        if leading_unit(comment)? != wanted {
+            return None;
+        }
+        let value = constants.iter().find(|(known, _)| known == name)?.1.real();
+        let seconds = if wanted == "Hz" { value.recip() } else { value };
+        Some(seconds).filter(|seconds| seconds.is_finite() && *seconds > 0.0)
+    };
+    NAMES.into_iter().find_map(of)
 }
 
 /// A declared name, such as `x:int`, `y[3]` or `x{i}`, includes the port.
@@ -53,6 +90,12 @@ fn is_unit(word: &str) -> bool {
             let factor = factor.trim_end_matches(powers);
             BASE.contains(&factor)
         })
+}
+
+/// Unit at the beginning of a comment.
+pub(crate) fn leading_unit(comment: &str) -> Option<String> {
+    let unit = comment.split([':', ';', ',']).next()?.trim();
+    is_unit(unit).then(|| unit.to_owned())
 }
 
 /// Symmetric limit of an output port: the constant limit of the `fsat` that writes it, directly or through copies.

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Assembly of the page's program.
 
-use crate::{CYCLES, PERIODS, Playground, SOURCE_BYTES, examples, ports, view};
+use crate::{CYCLES, PERIODS, Playground, SOURCE_BYTES, constants, examples, ports, view};
 use serde::Deserialize;
 use serde_json::{Value, json};
 use std::io::Cursor;
@@ -16,7 +16,7 @@ use takt_debug::session::{self, Session};
 use takt_emu::Rows;
 use takt_isa::Machine;
 use takt_isa::program::Port;
-use takt_isa::timing::Span;
+use takt_isa::timing::{Cycle, Span};
 
 /// The loaded program with its inputs.
 pub(crate) struct LoadedProgram {
@@ -133,27 +133,23 @@ fn facts(loaded: &LoadedProgram) -> Value {
         json!({
             "name": port.name, "type": port.ty.name(), "unit": ports::unit(&sources, what, &port.name),
             "limit": ports::limit(program, port.register),
+            "together": ports::declared_together(&sources, what, &port.name),
         })
     };
     let ports = |ports: &[Port], what: &str| ports.iter().map(|one| port(one, what)).collect::<Vec<_>>();
     let span = |span: Span| json!({ "best": span.best, "worst": span.worst });
     let section = |section: &SectionBounds| {
         let cycles = if section.once { section.cycles } else { section.in_time };
-        json!({ "name": section.name, "once": section.once, "cycles": span(cycles) })
+        // Only of a section that is a single block, the block's bound is the section's.
+        let is_whole = |block: &&BlockReport| {
+            block.address == section.address && Cycle::from(block.cycles) == section.cycles.worst
+        };
+        let least = assembled.blocks.iter().find(is_whole).map(|block| block.bound.cycles());
+        json!({ "name": section.name, "once": section.once, "cycles": span(cycles), "least": least })
     };
     let (bounds, no_bound) = match takt_analysis::bound(program) {
         Ok(bounds) => (Some(bounds.sections.iter().map(section).collect::<Vec<_>>()), None),
         Err(error) => (None, Some(error.to_string())),
-    };
-    let block = |block: &BlockReport| {
-        json!({
-            "label": block.label,
-            "place": block.location.map(|at| program.place_text(at)),
-            "operations": block.operations,
-            "bundles": block.bundles,
-            "cycles": block.cycles,
-            "bound": block.bound.cycles(),
-        })
     };
     json!({
         "assembled": true,
@@ -163,7 +159,8 @@ fn facts(loaded: &LoadedProgram) -> Value {
         "machine": program.machine.name,
         "bundles": program.bundles(),
         "words": program.code.len(),
-        "constants": program.constants.len(),
+        "settable": constants::settable(assembled),
+        "sampling_period": ports::sampling_period(&sources, &assembled.constants),
         "data_words": program.data.len(),
         "inputs": ports(&program.inputs, ".input"),
         "outputs": ports(&program.outputs, ".output"),
@@ -171,7 +168,6 @@ fn facts(loaded: &LoadedProgram) -> Value {
         "rows": loaded.rows.as_ref().map(|rows| rows.len()),
         "bounds": bounds,
         "no_bound": no_bound,
-        "blocks": assembled.blocks.iter().map(block).collect::<Vec<_>>(),
         "tracks": takt_programs::hybrid::Binding::new(program).is_ok(),
     })
 }

@@ -32,6 +32,14 @@ fn every_example_assembles_and_runs() {
         assert_eq!(told["assembled"], true, "{}: {}", example["name"], told["text"]);
         assert_eq!(told["inputs_error"], Value::Null, "{}", example["name"]);
         assert!(told["bounds"].is_array(), "{}", example["name"]);
+        // A bound of the schedule is that of the whole period, or there is none.
+        let bounds = told["bounds"].as_array().expect("checked above");
+        let least: Vec<u64> = bounds.iter().filter_map(|section| section["least"].as_u64()).collect();
+        match example["name"].as_str() {
+            Some("statespace.s") => assert_eq!(least, [], "its period has several blocks"),
+            Some("pi.s") => assert_eq!(least.last(), Some(&38)),
+            _ => {}
+        }
         assert_eq!(told["tracks"], example["track"], "{}", example["name"]);
         let has_inputs = told["inputs"].as_array().is_some_and(|ports| !ports.is_empty());
         assert_eq!(has_inputs, example["inputs"].is_string(), "{}: inputs for its ports", example["name"]);
@@ -287,4 +295,38 @@ fn downloads_equal_the_command_lines_output() {
     }
     let picture = call(&mut playground, "picture", json!({ "period": 1 }));
     assert_eq!(picture["picture"]["program"], "a.s");
+}
+
+#[test]
+fn constants_of_the_text_can_be_set() {
+    let mut playground = Playground::default();
+    let source = "; µ, 𝜇\n.const T = 1e-3 ; s, the period\n.const N = 3\n.const K = 12 ; V/rad, gain\n.const w = 2*pi*50 ; rad/s\n\
+                  .const derived = K*T\n.const pi = 3\n.const own = 2*pi\n.if N > 2\n.const hidden = 5\n.endif\n.rep i, 1, 2\n.const c{i} = 4\n.endr\n\
+                  .include \"robot.s\"\n.output y\n.period\nstart:\n    mov y, zero\n    wait start\n";
+    let told = assemble(&mut playground, &source.replace(".const pi = 3\n.const own = 2*pi\n", ""), "");
+    let of = |told: &Value| -> Vec<String> {
+        let list = told["settable"].as_array().unwrap_or_else(|| panic!("{told}"));
+        list.iter().filter_map(|one| Some(one["name"].as_str()?.to_owned())).collect()
+    };
+    assert_eq!(of(&told), ["T", "N", "K", "w"]);
+    let [period, count, gain, speed] = [0, 1, 2, 3].map(|at| told["settable"][at].clone());
+    assert_eq!(
+        (&period["value"], &period["unit"], &period["whole"]),
+        (&json!(1e-3), &json!("s"), &json!(false))
+    );
+    assert_eq!((&count["value"], &count["unit"], &count["whole"]), (&json!(3.0), &Value::Null, &json!(true)));
+    assert_eq!(
+        (&gain["integer"], &gain["whole"], &gain["text"]),
+        (&json!(true), &json!(false), &json!("V/rad, gain"))
+    );
+    assert!(speed["value"].as_f64().is_some_and(|value| (value - 314.159).abs() < 0.001), "{speed}");
+    // Places are in UTF-16 units.
+    let units: Vec<u16> = source.encode_utf16().collect();
+    let text = |one: &Value| {
+        let place = |key: &str| one[key].as_u64().and_then(|at| usize::try_from(at).ok()).expect("a place");
+        String::from_utf16(&units[place("from")..place("to")]).expect("whole characters")
+    };
+    assert_eq!((text(&period), text(&speed)), ("1e-3".to_owned(), "2*pi*50".to_owned()));
+    let told = assemble(&mut playground, source, "");
+    assert!(!of(&told).contains(&"own".to_owned()), "its pi is the program's: {:?}", of(&told));
 }

@@ -18,6 +18,11 @@ const PAUSE = 60, LONG_PAUSE = 350;
 /** Time limit for an answer, after which the server is restarted; ms. */
 export const LANGUAGE_LIMIT = 20_000;
 
+/** Distance of the debugger's line from the editor's edges in pixels. */
+const MARGIN = 60;
+/** Changes by the sliders. */
+const TUNE = "input.tune";
+
 // ---- Colours, from semantic tokens.
 
 const setColours = StateEffect.define();
@@ -189,11 +194,14 @@ export class Editor {
     this.server = new Compartment();
     this.version = 0;
     this.scheduled = 0;
+    /** Places of the constants' values by name; they move with the text. */
+    this.places = new Map();
     const follow = EditorView.updateListener.of((update) => {
       if (update.selectionSet && !update.docChanged) moved(this.line);
       if (!update.docChanged) return;
       this.version++;
-      changed();
+      for (const place of this.places.values()) Object.assign(place, { from: update.changes.mapPos(place.from, -1), to: update.changes.mapPos(place.to, 1) });
+      changed(update.transactions.every((tr) => tr.isUserEvent(TUNE)) ? "tune" : undefined);
       this.later();
     });
     this.view = new EditorView({
@@ -214,6 +222,23 @@ export class Editor {
 
   get text() {
     return this.view.state.doc.toString();
+  }
+
+  /** Constants of the text as it was in a version. If the text has changed since, the places of before have moved with it. */
+  know(constants, version) {
+    if (version === this.version) this.places = new Map(constants.map(({ name, from, to }) => [name, { from, to }]));
+  }
+
+  /** Text of a constant's value. */
+  valueOf(name) {
+    const place = this.places.get(name);
+    return place && this.view.state.sliceDoc(place.from, place.to);
+  }
+
+  /** Gives constants other values: a map from names to texts. */
+  tune(texts) {
+    const changes = [...texts].filter(([name]) => this.places.has(name)).map(([name, insert]) => ({ ...this.places.get(name), insert }));
+    this.view.dispatch({ changes, userEvent: TUNE });
   }
 
   /** Opens a text under a name, for a machine. */
@@ -403,8 +428,12 @@ export class Editor {
     if (exists(line)) lines.push(Decoration.line({ class: "cm-next" }).range(doc.line(line).from));
     const markers = exists(line) ? RangeSet.of(arrow.range(doc.line(line).from)) : RangeSet.empty;
     const effects = [setPlace.of({ lines: Decoration.set(lines, true), markers })];
-    if (exists(line)) effects.push(EditorView.scrollIntoView(doc.line(line).from, { y: "nearest", yMargin: 60 }));
     this.view.dispatch({ effects });
+    if (!exists(line)) return;
+    // Only the editor scrolls: on a telephone, the page stays at the picture above.
+    const { scrollDOM } = this.view, block = this.view.lineBlockAt(doc.line(line).from), { scrollTop, clientHeight } = scrollDOM;
+    if (block.top < scrollTop + MARGIN) scrollDOM.scrollTop = block.top - MARGIN;
+    else if (block.bottom > scrollTop + clientHeight - MARGIN) scrollDOM.scrollTop = block.bottom - clientHeight + MARGIN;
   }
 
   /** Moves the cursor to a line (from 1) and a column (from 0). */

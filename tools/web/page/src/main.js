@@ -5,8 +5,9 @@ import { Drive } from "./drive.js";
 import { Editor, reader } from "./editor.js";
 import { LINK_CHARACTERS, pack, unpack } from "./link.js";
 import { Plots } from "./plot.js";
-import { taker } from "./take.js";
+import { save, taker } from "./take.js";
 import { Stopped, Thread, load } from "./thread.js";
+import { Tuning } from "./tuning.js";
 import "./style.css";
 
 const el = (id) => document.getElementById(id);
@@ -14,6 +15,8 @@ const text = (value) => (value === null || value === undefined ? "" : String(val
 const plural = (count, noun) => `${count.toLocaleString("en")} ${noun}${count === 1 ? "" : "s"}`;
 /** Delay from a change to the next run, which is automatic only if a run takes at most the second number; ms. */
 const PAUSE = 400, SOON = 1000;
+/** Delay after which a slider's result that is still to come dims the result before; ms. */
+const LATE = 400;
 /** Default number of periods of a program without inputs. */
 const PERIODS = 20;
 
@@ -21,7 +24,7 @@ const PERIODS = 20;
 const REPLACED = "another program was opened";
 
 const state = { works: 0, breaks: [], name: "main.s", about: null, program: null, stale: true, run: null, took: 0, document: null };
-let machine, editor, plots, pipeline, drive, documents;
+let machine, editor, plots, pipeline, drive, documents, tuning;
 
 /** Shows an error; with `act` (text and action of a button), a notice. */
 function notice(message, act) {
@@ -104,11 +107,22 @@ for (const [i, tab] of tabs.entries()) {
 const table = () => el("table").value;
 const periods = () => Math.max(1, Math.round(Number(el("periods").value)) || 1);
 
-/** Invalidates all results: dims them at once, and recomputes them after a pause if that is fast. */
+/**
+ * Invalidates all results: dims them at once, and recomputes them after a pause if that is fast. A slider's results follow one another so
+ * soon that only late ones dim those before.
+ */
 function changed(event) {
   if (!state.document) return;
   state.stale = true;
-  document.body.classList.add("stale");
+  state.tuning = event === "tune";
+  clearTimeout(state.dims);
+  const dim = () => state.stale && document.body.classList.add("stale");
+  if (state.tuning) state.dims = setTimeout(dim, LATE);
+  else {
+    dim();
+    tuning.enabled = false;
+    plots.before = null;
+  }
   // A reported mistake also belongs to the previous text.
   el("cycles").classList.remove("now");
   if (!state.opening) {
@@ -121,8 +135,22 @@ function changed(event) {
   clearTimeout(state.keeping);
   state.keeping = setTimeout(keep, 300);
   clearTimeout(state.soon);
+  if (state.tuning) return follow();
   if (event !== "later") state.soon = setTimeout(again, PAUSE);
   el("wait").hidden = state.took <= SOON;
+}
+
+/** Computes the results of a slider: each at once, or, if they take long, that of the slider's rest. */
+function follow() {
+  if (state.took > SOON) {
+    state.soon = setTimeout(() => (machine.busy && machine.stop(REPLACED), assemble(false)), PAUSE);
+  } else if (!state.following) {
+    state.following = true;
+    assemble(false).finally(() => {
+      state.following = false;
+      if (state.stale && state.tuning) follow();
+    });
+  }
 }
 
 /** Recomputes invalid results. */
@@ -205,13 +233,56 @@ async function open({ name, source, inputs, periods, machine: wanted }) {
   el("table").value = inputs ?? "";
   el("periods").value = periods ?? PERIODS;
   editor.stops = [];
-  drive.clear();
   const opened = editor.open(state.name, source, el("machine").value);
   changed("later");
   state.opening = false;
-  state.shown = null;
+  empty();
   await assemble();
   await opened;
+}
+
+/** Empties all panels until the result of the opened text is there. */
+function empty() {
+  const known = seconds(), why = `Assembling ${state.name}${known ? `, about ${known} s` : ""} …`;
+  state.shown = state.program = state.run = state.drawn = null;
+  document.body.classList.remove("stale");
+  drive.clear();
+  tuning.clear();
+  plots.clear(why);
+  pipeline.show(null);
+  clearView(why);
+  for (const id of ["ran", "fault", "text", "answer"]) el(id).textContent = "";
+  el("cycles").replaceChildren(why);
+  el("drawn").textContent = why;
+}
+
+/** Key of the times that assembling took here. */
+const TOOK = "takt-playground-took";
+
+const times = () => {
+  try {
+    return JSON.parse(localStorage.getItem(TOOK)) ?? {};
+  } catch {
+    return {};
+  }
+};
+const timed = () => `${state.name} ${el("machine").value.slice(0, 20)}`;
+
+/** Seconds that assembling the text took the last time, or takes elsewhere; undefined below one second. */
+function seconds() {
+  const took = times()[timed()] ?? state.about.examples.find(({ name, source }) => name === state.name && source === editor.text)?.seconds;
+  return took >= 1 ? Math.round(took) : undefined;
+}
+
+/** Keeps the time of a result that took long. */
+function took(milliseconds) {
+  state.took = milliseconds;
+  if (milliseconds < SOON) return;
+  try {
+    localStorage.setItem(TOOK, JSON.stringify({ ...times(), [timed()]: milliseconds / 1000 }));
+  } catch {
+    // The browser has no storage.
+  }
 }
 
 /** Shows cycles and bound in the summary, which is always visible. */
@@ -236,10 +307,8 @@ function showCycles() {
     put(least === most ? `${most.toLocaleString("en")} cycles` : `${least.toLocaleString("en")} to ${most.toLocaleString("en")} cycles`, "b");
     put(` a period, in ${plural(run.cycles.length, "period")}${run.missed ? `, ${plural(run.missed, "deadline")} missed` : ""}`);
   } else if (run) put(`${plural(run.total, "cycle")}`, "b");
-  // For a block that is a whole period, show the scheduler's bound: no schedule takes fewer cycles.
-  const whole = program.blocks.filter((block) => periods.some((section) => section.name === block.label));
-  const schedule = whole.reduce((most, block) => (most && most.cycles >= block.cycles ? most : block), null);
-  if (schedule) put(` · no schedule takes fewer than ${schedule.bound}`);
+  const least = Math.max(...periods.map((section) => section.least ?? 0));
+  if (least > 0) put(` · no schedule takes fewer than ${least}`);
   for (const section of periods) put(` · ${section.name} takes ${range(section.cycles)} whatever the inputs`);
   if (once) put(` · once ${range(once.cycles)}`);
   if (program.no_bound) put(` · no bound: ${program.no_bound}`);
@@ -250,18 +319,22 @@ function showCycles() {
 function showProgram(program) {
   state.program = program;
   const { inputs_error: wrong } = program, whole = program.assembled && !wrong;
-  el("text").textContent = program.text || (program.assembled ? "No errors, no warnings." : "");
-  if (program.inputs_of_others) el("text").textContent = `The table of inputs is for other ports, so that all are 0: ${program.inputs_of_others}\n\n${program.text}`;
-  if (wrong) el("text").textContent = `error: ${wrong}\n\n${el("text").textContent}`;
+  const others = program.inputs_of_others && `The table of inputs is for other ports, so that all are 0: ${program.inputs_of_others}`;
+  el("text").textContent = [wrong && `error: ${wrong}`, others, program.text].filter(Boolean).join("\n\n") || "No errors, no warnings.";
   el("tab-messages").classList.toggle("bad", !whole);
   el("wait").hidden = true;
+  clearTimeout(state.dims);
   document.body.classList.toggle("stale", !whole && state.shown !== null);
+  if (whole) tuning.show(program.settable);
   if (whole || state.shown === null) {
-    state.run = null;
-    el("fault").textContent = "";
-    el("ran").textContent = "";
     const why = program.assembled ? wrong && `The inputs cannot be read: ${wrong}` : "The program does not assemble: see Messages.";
-    plots.show(null, program, why);
+    // The curves before stay until those of a slider's new value are there.
+    if (!state.tuning) {
+      state.run = null;
+      el("fault").textContent = "";
+      el("ran").textContent = "";
+      plots.show(null, program, why);
+    }
     if (program.view) showView(program.view);
     else clearView(why ?? "The program has no instruction.");
     state.shown = whole ? program : null;
@@ -274,14 +347,16 @@ function showProgram(program) {
   drive.old = whole;
   if (whole) drive.fits = program.tracks;
   dimPipeline();
-  showCycles();
+  if (!whole || !state.tuning) showCycles();
 }
 
 const asked = () => ({ name: state.name, source: editor.text, machine: el("machine").value, inputs: table(), tick: Number(el("tick").value) || 0 });
 
 /** Assembles the program, and restores the breakpoints. */
 async function begin() {
+  const { version } = editor;
   state.program = await machine.call("assemble", asked());
+  if (state.program.settable) editor.know(state.program.settable, version);
   await setStops();
   showProgram(state.program);
 }
@@ -320,7 +395,7 @@ const assemble = (told = true) => work(async () => {
   const { program } = state;
   if (!program.assembled || program.inputs_error) return told && select("messages");
   await run();
-  state.took = performance.now() - begun;
+  took(performance.now() - begun);
 }).then(() => (pipelineInStep(), driveFirst()));
 
 /** Assembles if the text has changed. */
@@ -550,9 +625,10 @@ async function start() {
   machine = new Thread(module, new URL("worker.js", location.href));
   const language = new Thread(module, new URL("worker.js", location.href));
   documents = new Documents();
-  plots = new Plots(el("charts"), el("choice"));
+  plots = new Plots(el("charts"), el("choice"), { axis: el("axis"), length: el("length"), together: el("together") });
   pipeline = new Pipeline(el("pipeline-picture"), reveal);
   drive = new Drive({ machine, work, current });
+  tuning = new Tuning(el("tuning"), { begins: (differs) => plots.keep(differs), sets: (texts) => editor.tune(texts), textOf: (name) => editor.valueOf(name) });
   editor = new Editor(el("source"), { thread: language, told: notice, changed, stopped: toggleStop, showFile, moved: (line) => markPipeline(line, true) });
   state.about = await machine.call("about");
   el("machine").replaceChildren(...state.about.machines.map(({ name, text }) => new Option(name, name)), new Option("own…", OWN));
@@ -578,7 +654,8 @@ async function start() {
     const example = state.about.examples.find(({ name }) => name === el("example").value);
     el("example").value = "";
     if (!example) return;
-    select(example.track ? "robot" : "step");
+    if (example.track) select("robot");
+    else if (!["step", "pipeline"].includes(state.tab)) select("plot");
     openDocument(documents.open(example, "example", `example=${example.name}`));
   });
   for (const button of document.querySelectorAll("[data-step]")) button.addEventListener("click", () => step(button.dataset.step));
@@ -591,6 +668,9 @@ async function start() {
     el("command").select();
   });
   el("draw").addEventListener("click", draw);
+  for (const [id, ending, type] of [["plot-svg", "svg", "image/svg+xml"], ["plot-csv", "csv", "text/csv"]]) {
+    el(id).addEventListener("click", () => state.run?.cycles.length && save(state.name.replace(/\.s$/, `.${ending}`), plots[ending](), type));
+  }
   el("which").addEventListener("change", () => {
     state.which = Math.max(0, Math.round(Number(el("which").value)) || 0);
     draw();
@@ -620,7 +700,7 @@ async function start() {
     if (now && !state.dirty && now.source !== editor.text) openDocument(now);
     else showDocuments();
   });
-  select("step");
+  select("plot");
   await openAddress(true);
   document.body.dataset.ready = "";
 }

@@ -1,12 +1,23 @@
 // Plots of port values over periods, one chart below another, with synchronised cursors.
 import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
+import { Pen, drawing } from "./svg.js";
 
 const COLOURS = ["#2f6fbf", "#d9534f", "#5aa469", "#b07cd8", "#d98a1f", "#26a0a8", "#a3156b", "#8d6e63"];
-/** Number of curves that are shown initially. */
+/** Dashes of the curves in a chart, so that many differ in more than colour, and those of a reference. */
+const DASHES = [[], [], [7, 4], [9, 3, 2, 3]], REFERENCE = [2, 3];
+/** Maximum number of curves over one axis. */
+const TOGETHER = COLOURS.length;
+/** Number of outputs that are shown initially. */
 const SHOWN = 4;
+/** Time axis in ms up to this duration in s. */
+const BRIEF = 2;
+/** Height of a folded chart in pixels. */
+const FOLDED = 27;
 /** Minimum and maximum height of a chart in pixels. */
 const LOW = 96, HIGH = 420;
+/** Maximum height of a chart as a fraction of its width. */
+const TALL = 0.6;
 /** A limit is drawn if a value reaches this fraction of it. */
 const NEAR = 0.4;
 /** Tick distances of an integer axis. */
@@ -30,73 +41,141 @@ function runs(length, holds) {
 /** Indices of isolated numbers, which a line would not show. */
 const alone = (values) => values.flatMap((value, i) => (isNumber(value) && !isNumber(values[i - 1]) && !isNumber(values[i + 1]) ? [i] : []));
 
+/** The values are one number throughout. */
+const flat = (values) => values.length > 0 && values.every((value) => isNumber(value) && value === values[0]);
+/** A chart of the curves would be horizontal lines only. */
+const isFlat = (curves) => curves.every(({ values, before }) => flat(values) && (!before || before.every((value) => value === values[0])));
+
+const number = (value, unit) => `${isNumber(value) ? +value.toPrecision(7) : value ?? "not written"}${unit ? ` ${unit}` : ""}`;
+
+let measuring;
+/** Width of a text on an axis in pixels. */
+function widthOf(text) {
+  measuring ??= document.createElement("canvas").getContext("2d");
+  measuring.font = "11px system-ui, sans-serif";
+  return measuring.measureText(text).width;
+}
+
+/** Limits that a chart shows as lines: of each symmetric limit, the signs that the values approach. */
+function limitsOf(curves) {
+  const found = new Map();
+  for (const { limit, unit, values } of curves) {
+    if (!isNumber(limit)) continue;
+    for (const at of [limit, -limit]) {
+      if (values.some((value) => isNumber(value) && Math.sign(value) === Math.sign(at) && Math.abs(value) >= NEAR * limit)) found.set(at, { at, text: `limit ${at < 0 ? "−" : ""}${limit}${unit ? ` ${unit}` : ""}` });
+    }
+  }
+  return [...found.values()];
+}
+
+const isReference = (name) => name.endsWith("_ref");
+
+/** Colours and dashes of curves: a reference has the colour of what follows it, dotted. */
+function looks(curves) {
+  const bases = [...new Set(curves.map(({ name }) => name.replace(/_ref$/, "")))];
+  return curves.map(({ name }) => {
+    const i = bases.indexOf(name.replace(/_ref$/, "")), alone = !curves.some((other) => `${other.name}_ref` === name);
+    const dash = isReference(name) && !alone ? REFERENCE : DASHES[i % DASHES.length];
+    return { colour: COLOURS[i % COLOURS.length], dash, line: { 0: "solid", 2: dash === REFERENCE ? "dotted" : "dashed" }[dash.length] ?? "dashed" };
+  });
+}
+
+/** Creates a chart's heading: names with their colours, unit, remarks. Returns the element and a function that adds a remark. */
+function heading(curves, look) {
+  const head = document.createElement("p"), of = curves[0].unit;
+  head.className = "chart-head";
+  for (const [i, { name }] of curves.entries()) {
+    if (i) head.append(", ");
+    if (curves.length > 1) {
+      const swatch = document.createElement("i");
+      swatch.style.borderTop = `2px ${look[i].line} ${look[i].colour}`;
+      head.append(swatch);
+    }
+    head.append(Object.assign(document.createElement("b"), { textContent: name }));
+  }
+  if (of) head.append(`, ${of}`);
+  return { head, remark: (text, kind) => head.append(" ", Object.assign(document.createElement("span"), { textContent: text, className: kind })) };
+}
+
 /**
  * Creates a chart in a parent element.
- * `x`: abscissa values with `name`, `unit`, and optional `label` of the axis. `curves`: each with `name`, `unit`, `values` and optional `limit`;
- * the values `"NaN"`, `"inf"` and `"-inf"` are marked. `lines`: levels with a text. `sync`: key of charts with synchronised cursors.
- * `picked` is called with the index of a clicked point.
+ * `x`: abscissa values with `name`, `unit`, and optional `label` of the axis. `curves`: each with `name`, `unit`, `values`, optional `limit`
+ * and optional values `before`, which are drawn pale; the values `"NaN"`, `"inf"` and `"-inf"` are marked. `lines`: levels with a text.
+ * `sync`: key of charts with synchronised cursors. `place` names a point by its index. `picked` is called with the index of a clicked point.
+ * With `folds`, a chart of horizontal lines is its heading only.
  */
-export function chart(parent, { x, name: across, label, unit, curves, lines = [], height = () => 190, sync, picked }) {
+export function chart(parent, { x, name: across, label, unit, curves, lines = [], height = () => 190, sync, picked, place, folds }) {
   const axis = { stroke: style("--dim"), grid: { stroke: style("--edge"), width: 0.5 }, ticks: { stroke: style("--edge"), width: 0.5 }, labelSize: 17, labelGap: 0, labelFont: "12px system-ui, sans-serif", font: "11px system-ui, sans-serif" };
-  const [{ limit, unit: of }] = curves, name = curves.map((curve) => curve.name).join(", ");
-  const whole = curves.every((curve) => curve.stepped);
-  const numbers = curves.flatMap((curve) => curve.values.filter(isNumber));
-  const most = numbers.reduce((a, b) => Math.max(a, Math.abs(b)), 0);
-  const limits = isNumber(limit) && most >= NEAR * limit ? [{ at: limit, text: `limit ${limit}${of ? ` ${of}` : ""}`, signed: true }, { at: -limit, text: `limit −${limit}${of ? ` ${of}` : ""}`, signed: true }] : [];
-  // Of a symmetric limit, draw the sign that the values approach.
-  const near = ({ at, signed }) => !signed || numbers.some((value) => Math.sign(value) === Math.sign(at) && Math.abs(value) >= NEAR * Math.abs(at));
-  const levels = [...lines, ...limits].filter(near);
+  const of = curves[0].unit, whole = curves.every((curve) => curve.stepped);
+  const levels = [...lines, ...limitsOf(curves)];
   const lost = runs(x.length, (i) => curves.some(({ values }) => values[i] !== null && !isNumber(values[i])));
-  const saturated = isNumber(limit) ? runs(x.length, (i) => curves.some(({ values }) => isNumber(values[i]) && Math.abs(values[i]) >= limit)) : [];
+  const saturated = runs(x.length, (i) => curves.some(({ values, limit }) => isNumber(limit) && isNumber(values[i]) && Math.abs(values[i]) >= limit));
   const count = (list) => list.reduce((sum, [a, b]) => sum + b - a + 1, 0);
 
   const element = document.createElement("div");
   element.className = "chart";
-  const head = document.createElement("p");
-  head.className = "chart-head";
-  head.append(Object.assign(document.createElement("b"), { textContent: name }), of ? `, ${of}` : "");
-  const remark = (text, kind) => head.append(Object.assign(document.createElement("span"), { textContent: text, className: kind }));
+  const look = looks(curves), { head, remark } = heading(curves, look);
   if (saturated.length) remark(`at its limit in ${plural(count(saturated), "period")}`, "saturated");
   if (lost.length) remark(`no number in ${plural(count(lost), "period")}: ${[...new Set(curves.flatMap(({ values }) => values.filter((value) => value !== null && !isNumber(value))))].join(", ")}`, "lost");
   element.append(head);
-  const at = Object.assign(document.createElement("output"), { className: "at" });
-  head.append(at);
   parent.append(element);
-  if (!numbers.length) {
+  const fixed = { destroy: () => element.remove(), size() {}, cursor() {}, draw() {}, height: FOLDED, head };
+  if (!curves.some(({ values }) => values.some(isNumber))) {
     remark(lost.length ? "" : "it was written in no period", "lost");
-    return { destroy: () => element.remove(), size() {}, cursor() {} };
+    return fixed;
   }
-  const number = (value, unit) => `${isNumber(value) ? +value.toPrecision(7) : value ?? "not written"}${unit ? ` ${unit}` : ""}`;
-  const said = (i) => `${across} ${number(x[i], unit)}: ${curves.map((curve) => number(curve.values[i], curve.unit)).join(", ")}`;
+  if (folds && isFlat(curves)) {
+    element.classList.add("folded");
+    remark(`${curves.map(({ name, values }) => `${curves.length > 1 ? `${name} ` : ""}${number(values[0], of)}`).join(", ")} in ${x.length === 1 ? "the period" : "every period"}${lines.map(({ text }) => `; ${text}`).join("")}`);
+    return fixed;
+  }
+  const at = Object.assign(document.createElement("output"), { className: "at" });
+  head.append(" ", at);
+  place ??= (i) => `${across} ${number(x[i], unit)}`;
+  const said = (i) => `${place(i)}: ${curves.map((curve) => `${curves.length > 1 ? `${curve.name} ` : ""}${number(curve.values[i], curve.unit)}`).join(", ")}`;
   const width = () => Math.max(220, parent.clientWidth - 8);
   const range = (_, low, high) => {
     const [a, b] = levels.reduce(([a, b], { at }) => [Math.min(a, at), Math.max(b, at)], [low, high]);
     const gap = (b - a || Math.abs(a) || 1) * 0.06;
     return [a - gap, b + gap];
   };
+  // Axes of one width, where the values permit it: the times of all charts stand below one another.
+  const size = (_, values) => Math.ceil(Math.max(30, ...(values ?? []).map(widthOf))) + 12;
+  const ghosts = curves.map((curve, i) => ({ ...curve, i })).filter(({ before }) => before);
+  const stepped = uPlot.paths.stepped({ align: 1 });
+  const column = (values) => x.map((_, i) => (isNumber(values[i]) ? values[i] : null));
   const plot = new uPlot({
-    width: width(), height: height(), padding: [6, 10, 0, 0], scales: { x: { time: false }, y: { range } },
-    axes: [{ ...axis, ...(label && { label: unit ? `${label}, ${unit}` : label }), size: 26 }, { ...axis, label: of ? `${name}, ${of}` : name, size: 58, space: 22, ...(whole && { incrs: WHOLE }) }],
+    width: width(), height: height(), padding: [6, 18, 0, 0], scales: { x: { time: false }, y: { range } },
+    axes: [{ ...axis, ...(label && { label: unit ? `${label}, ${unit}` : label }), size: 26 }, { ...axis, label: of ?? " ", size, space: 22, ...(whole && { incrs: WHOLE }) }],
     legend: { show: false }, cursor: { ...(sync && { sync: { key: sync } }), points: { size: 7 }, drag: { x: true, y: false } },
-    series: [{}, ...curves.map(({ name, stepped }, i) => ({
-      label: name, stroke: COLOURS[i % COLOURS.length], width: 1.6, points: { show: true, filter: () => x.length < 40 ? null : alone(curves[i].values), size: 4 },
-      ...(stepped && { paths: uPlot.paths.stepped({ align: 1 }) }),
+    series: [{}, ...ghosts.map(({ i, ...curve }) => ({ stroke: `${look[i].colour}66`, width: 1.6, points: { show: false }, ...(curve.stepped && { paths: stepped, stepped: true }) })), ...curves.map((curve, i) => ({
+      label: curve.name, stroke: look[i].colour, width: 1.6, dash: look[i].dash, points: { show: true, filter: () => x.length < 40 ? null : alone(curve.values), size: 4 },
+      ...(curve.stepped && { paths: stepped, stepped: true }),
     }))],
-    hooks: { setCursor: [({ cursor: { idx } }) => (at.textContent = idx === null || idx === undefined ? "" : said(idx))], draw: [(plot) => mark(plot, { x, levels, lost, saturated })] },
-  }, [x, ...curves.map((curve) => curve.values.map((value) => (isNumber(value) ? value : null)))], element);
+    hooks: { setCursor: [({ cursor: { idx } }) => (at.textContent = idx === null || idx === undefined ? "" : said(idx))], draw: [(plot) => mark(plot.ctx, plot, { x, levels, lost, saturated })] },
+  }, [x, ...ghosts.map(({ before }) => column(before)), ...curves.map(({ values }) => column(values))], element);
   if (picked) plot.over.addEventListener("click", () => plot.cursor.idx !== null && plot.cursor.idx !== undefined && picked(plot.cursor.idx));
-  const size = () => parent.clientWidth && plot.setSize({ width: width(), height: height() });
-  const observer = new ResizeObserver(size);
+  const resize = () => parent.clientWidth && plot.setSize({ width: width(), height: height() });
+  const observer = new ResizeObserver(resize);
   observer.observe(parent);
   return {
-    destroy: () => (observer.disconnect(), plot.destroy(), element.remove()), size,
+    destroy: () => (observer.disconnect(), plot.destroy(), element.remove()), size: resize, head,
     cursor: (index) => plot.setCursor({ left: plot.valToPos(x[index], "x"), top: plot.bbox.height / devicePixelRatio / 2 }),
+    get height() {
+      return FOLDED + plot.height;
+    },
+    /** Draws the chart with a pen, for a file. */
+    draw(pen) {
+      pen.axes(plot, axis);
+      pen.curves(plot);
+      mark(pen, plot, { x, levels, lost, saturated });
+    },
   };
 }
 
 /** Draws levels as lines, and marks periods with saturated or non-finite values. */
-function mark(plot, { x, levels, lost, saturated }) {
-  const { ctx, bbox: { left, top, width, height } } = plot, ratio = devicePixelRatio || 1;
+function mark(ctx, plot, { x, levels, lost, saturated }) {
+  const { left, top, width, height } = plot.bbox, ratio = devicePixelRatio || 1;
   const half = x.length > 1 ? (x[1] - x[0]) / 2 : 0.5;
   const bands = (list, colour, alpha, tall) => {
     ctx.fillStyle = colour;
@@ -142,59 +221,120 @@ function mark(plot, { x, levels, lost, saturated }) {
 }
 
 export class Plots {
-  constructor(parent, choice) {
-    Object.assign(this, { parent, choice, charts: [], chosen: new Map(), units: new Map() });
+  /** @param tools controls: `axis` (periods, ms or s), `length` (of a period, in ms), `together` (curves over one axis: by unit, or each alone) */
+  constructor(parent, choice, tools) {
+    Object.assign(this, { parent, choice, tools, charts: [], chosen: new Map() });
+    tools.axis.addEventListener("change", () => (this.axis = tools.axis.value));
+    tools.length.addEventListener("change", () => (this.length = Number(tools.length.value) / 1e3));
+    for (const one of Object.values(tools)) one.addEventListener("change", () => this.draw());
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.draw());
     new ResizeObserver(() => this.size()).observe(parent.parentElement);
+  }
+
+  /** Forgets everything about the text before, and shows `why`. */
+  clear(why) {
+    Object.assign(this, { before: null, axis: undefined, length: undefined });
+    this.show(null, null, why);
+  }
+
+  /** Keeps the run for comparison: it is drawn pale behind the next. `with`: what differs. */
+  keep(differs) {
+    if (this.run) this.before = { ...this.run, differs };
   }
 
   /** Shows a run: columns of inputs and outputs by name, and cycles. Units and limits come from the program. Without a run, shows `why`. */
   show(run, program, why = "") {
     Object.assign(this, { run, program, why });
     // In declaration order.
-    const ports = run ? [...(program?.outputs ?? []).map(({ name }) => ["out", name]), ...(program?.inputs ?? []).map(({ name }) => ["in", name])] : [];
-    this.facts = new Map([...(program?.outputs ?? []).map((port) => [`out ${port.name}`, port]), ...(program?.inputs ?? []).map((port) => [`in ${port.name}`, port])]);
-    this.choice.replaceChildren(...ports.map(([kind, name], i) => {
-      const key = `${kind} ${name}`, label = document.createElement("label"), box = document.createElement("input");
+    const list = (kind, ports) => (ports ?? []).map((port) => [`${kind} ${port.name}`, port]);
+    this.facts = new Map(run ? [...list("out", program?.outputs), ...list("in", program?.inputs)] : []);
+    const first = this.initial();
+    this.choice.replaceChildren(...[...this.facts].map(([key, { name }]) => {
+      const label = document.createElement("label"), box = document.createElement("input");
       box.type = "checkbox";
-      box.checked = this.chosen.get(key) ?? (kind === "out" && i < SHOWN);
+      box.checked = this.chosen.get(key) ?? first.has(key);
       this.chosen.set(key, box.checked);
       box.addEventListener("change", () => (this.chosen.set(key, box.checked), this.draw()));
-      label.append(box, ` ${name}${kind === "in" ? " (in)" : ""}`);
+      label.append(box, ` ${name}${key.startsWith("in ") ? " (in)" : ""}`);
       return label;
     }));
     this.draw();
   }
 
+  /** Curves that are shown initially: some outputs, and every port with its reference (`w` and `w_ref`). */
+  initial() {
+    const keys = [...this.facts.keys()], outputs = keys.filter((key) => key.startsWith("out "));
+    const paired = keys.filter((key) => {
+      const name = this.facts.get(key).name, is = (other) => keys.some((key) => this.facts.get(key).name === other);
+      return isReference(name) ? is(name.slice(0, -4)) : is(`${name}_ref`);
+    });
+    return new Set([...outputs.slice(0, SHOWN), ...paired]);
+  }
+
   /** Height of a chart: the charts fill the panel, unless there are too many. */
-  height(count) {
+  height(count, folded) {
     const panel = this.parent.parentElement, above = this.parent.offsetTop - panel.offsetTop;
     // Space for a chart's title, and the gap below it.
-    const room = (panel.clientHeight - above - 16) / Math.max(1, count) - 32;
-    return Math.round(Math.min(HIGH, Math.max(LOW, room)));
+    const room = (panel.clientHeight - above - 16 - folded * FOLDED) / Math.max(1, count) - 32;
+    return Math.round(Math.min(HIGH, TALL * panel.clientWidth, Math.max(LOW, room)));
   }
 
   size() {
     for (const one of this.charts) one.size();
   }
 
+  /** Time of a period in seconds, if it is known. */
+  get seconds() {
+    const known = this.length ?? this.program?.sampling_period;
+    return known > 0 ? known : undefined;
+  }
+
+  /** Abscissa: periods, or the times at which they begin. */
+  abscissa() {
+    const { run, seconds, tools } = this, length = run.cycles.length;
+    const unit = !seconds ? "periods" : this.axis ?? (seconds * length <= BRIEF ? "ms" : "s");
+    tools.axis.value = unit;
+    for (const option of tools.axis.options) option.disabled = !seconds && option.value !== "periods";
+    tools.length.value = seconds ? Number((seconds * 1e3).toPrecision(6)) : "";
+    if (unit === "periods") return { x: run.cycles.map((_, i) => i + 1), name: "period", label: "period" };
+    const step = unit === "ms" ? seconds * 1e3 : seconds, x = run.cycles.map((_, i) => i * step);
+    return { x, name: "time", label: "time", unit, place: (i) => `period ${i + 1}, ${number(x[i], unit)}` };
+  }
+
+  /** The chosen curves, those of each chart together. */
+  groups() {
+    const { run, before, tools } = this, groups = new Map();
+    for (const [key, { name, unit, limit, together }] of this.facts) {
+      if (!this.chosen.get(key)) continue;
+      const kind = key.startsWith("out ") ? "outputs" : "inputs", old = before?.[kind][name];
+      const curve = { name, unit, limit, values: run[kind][name] ?? [], ...(old && { before: old }) };
+      // Ports with a unit share the axis with others of that unit; those without, with what is declared beside them.
+      let group = tools.together.value === "each" ? key : unit ?? `${kind}: ${together}`;
+      while (groups.get(group)?.length >= TOGETHER) group += " more";
+      groups.set(group, [...(groups.get(group) ?? []), curve]);
+    }
+    for (const curves of groups.values()) curves.sort((a, b) => isReference(a.name) - isReference(b.name));
+    return [...groups.values()];
+  }
+
   draw() {
     for (const one of this.charts) one.destroy();
     this.charts = [];
     this.parent.replaceChildren();
-    const { run, program } = this;
+    const { run, program, before, tools } = this;
     const say = (why) => why && this.parent.append(Object.assign(document.createElement("p"), { className: "why", textContent: why }));
+    tools.axis.closest(".tools").hidden = !run?.cycles.length;
     if (!run) return say(this.why);
     if (!this.parent.clientWidth) return;
     if (!run.cycles.length) return say("There is nothing to plot over periods: the program has run through no period.");
     const ports = program?.inputs?.length ?? 0;
     if (ports && !program.rows) say(`There are no inputs: ${ports === 1 ? "the input port is" : `all ${ports} input ports are`} 0 in every period. The tab Inputs takes a table.`);
-    const x = run.cycles.map((_, i) => i + 1);
-    const chosen = [...this.facts].filter(([key]) => this.chosen.get(key));
-    const curves = chosen.map(([key, { name, unit, limit }]) => ({ name, unit, limit, values: (key.startsWith("out ") ? run.outputs : run.inputs)[name] ?? [] }));
-    const height = () => this.height(curves.length + 1);
-    for (const curve of curves) this.charts.push(chart(this.parent, { x, name: "period", curves: [curve], height, sync: "ports" }));
-    this.charts.push(chart(this.parent, { x, name: "period", label: "period", curves: [{ name: "cycles", values: run.cycles, stepped: true }], lines: this.levels(), height, sync: "ports" }));
+    if (before) this.parent.append(Object.assign(document.createElement("p"), { className: "ghost", textContent: `pale: before, with ${before.differs}` }));
+    const cycles = [{ name: "cycles", values: run.cycles, stepped: true, ...(before && { before: before.cycles }) }];
+    const all = [...this.groups().map((curves) => ({ curves })), { curves: cycles, lines: this.levels() }];
+    const { label, ...common } = this.abscissa(), open = all.filter(({ curves }) => !isFlat(curves)), last = open.at(-1);
+    const height = () => this.height(open.length, all.length - open.length);
+    for (const one of all) this.charts.push(chart(this.parent, { ...one, ...common, ...(one === last && { label }), height, sync: "ports", folds: true }));
   }
 
   /** Horizontal lines in the chart of cycles: bound and deadline. */
@@ -207,5 +347,19 @@ export class Plots {
     const tick = program?.tick;
     if (tick && tick <= 4 * run.longest) lines.push({ at: tick, text: `deadline ${tick}` });
     return lines;
+  }
+
+  /** The run as a table: all ports and the cycles, a row for each period. The input table of the same program can be taken from it. */
+  csv() {
+    const { run, seconds } = this;
+    const columns = [...this.facts].map(([key, { name }]) => [name, run[key.startsWith("out ") ? "outputs" : "inputs"][name] ?? []]);
+    const head = ["period", ...(seconds ? ["time_s"] : []), ...columns.map(([name]) => name), "cycles"];
+    const row = (cycles, i) => [i + 1, ...(seconds ? [Number((i * seconds).toPrecision(12))] : []), ...columns.map(([, values]) => values[i] ?? ""), cycles];
+    return `${[head, ...run.cycles.map(row)].map((cells) => cells.join(",")).join("\n")}\n`;
+  }
+
+  /** The charts as a drawing. */
+  svg() {
+    return drawing(this.charts, { width: this.parent.clientWidth, ground: style("--bg"), text: style("--fg"), pen: () => new Pen() });
   }
 }

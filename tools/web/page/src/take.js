@@ -1,7 +1,8 @@
 // Downloads: source, image, listing, circuit, headers.
 import { zipSync, strToU8 } from "fflate";
 
-function save(name, content, type) {
+/** Offers a file for download. */
+export function save(name, content, type) {
   const link = document.createElement("a");
   link.href = URL.createObjectURL(new Blob([content], { type }));
   link.download = name;

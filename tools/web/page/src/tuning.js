@@ -1,0 +1,139 @@
+// Sliders for the constants of the text. A slider writes its value into the text, so that text, plots, links and exports agree.
+
+/** Significant digits of a slider's steps: a hundredth of the power of ten below its range. */
+const DIGITS = 2;
+/** Digits that a value keeps: those of a binary32 that people read. */
+const PRECISION = 6;
+
+const node = (name, set = {}, ...children) => {
+  const made = Object.assign(document.createElement(name), set);
+  made.append(...children);
+  return made;
+};
+
+const isNumber = (text) => text.trim() !== "" && Number.isFinite(Number(text));
+
+/** Range of a slider before the user gives another: from 0 to twice the value. */
+function initial(value) {
+  if (value === 0) return [-1, 1];
+  const end = Number((2 * value).toPrecision(3));
+  return value > 0 ? [0, end] : [end, 0];
+}
+
+/** Shortest text of a number. */
+function short(value) {
+  const plain = String(Number(value.toPrecision(PRECISION))), power = Number(value.toPrecision(PRECISION)).toExponential().replace("e+", "e");
+  return power.length < plain.length ? power : plain;
+}
+
+/** Text of a value in the source; a real number stays one. */
+function written(constant, value) {
+  const text = short(value);
+  return constant.integer || /[.e]/.test(text) ? text : `${text}.0`;
+}
+
+export class Tuning {
+  /**
+   * @param box element with the sliders
+   * @param begins called before the first change of a movement, with the constant and the text of its value
+   * @param sets called with a map from names to texts
+   * @param textOf returns the present text of a constant's value
+   */
+  constructor(box, { begins, sets, textOf }) {
+    Object.assign(this, { box, begins, sets, textOf, rows: new Map(), originals: new Map() });
+    this.list = box.querySelector("fieldset");
+    this.back = box.querySelector("button");
+    this.back.addEventListener("click", () => this.reset());
+  }
+
+  /** Shows the constants of an assembled text. Rows of the same names stay, so that a movement goes on. */
+  show(constants) {
+    this.box.hidden = !constants.length;
+    if (constants.map(({ name }) => name).join() !== [...this.rows.keys()].join()) {
+      this.rows = new Map(constants.map((constant) => [constant.name, this.row(constant)]));
+      this.list.replaceChildren(...[...this.rows.values()].map(({ element }) => element));
+    }
+    for (const constant of constants) {
+      const row = this.rows.get(constant.name);
+      Object.assign(row, { constant });
+      if (!this.moving) row.put(constant.value);
+    }
+    for (const [name, { last }] of this.originals) if (this.textOf(name) !== last) this.originals.delete(name);
+    this.back.disabled = !this.originals.size;
+    this.enabled = true;
+  }
+
+  set enabled(on) {
+    this.list.disabled = !on;
+  }
+
+  /** Forgets the values before the changes: another text is opened. */
+  clear() {
+    this.originals.clear();
+    this.rows.clear();
+    this.moving = false;
+    this.box.hidden = true;
+  }
+
+  row(constant) {
+    const { name, unit, text, whole, value } = constant, [low, high] = initial(value);
+    const number = (what, of, className) => node("input", { inputMode: "decimal", value: short(of), className, ariaLabel: `${what} of ${name}` });
+    const slider = node("input", { type: "range", ariaLabel: `${name}, slider` });
+    const least = number("Least value", low, "end"), most = number("Largest value", high, "end"), field = number("Value", value, "field");
+    const element = node("div", { className: "constant", title: text ?? "" }, node("b", { textContent: name }), least, slider, most, field, node("small", { textContent: unit ?? "" }));
+    const row = { element, slider, least, most, field, constant };
+    const fit = () => {
+      const range = Math.abs(most.value - least.value) || 1;
+      Object.assign(slider, { min: least.value, max: most.value, step: whole ? 1 : 10 ** (Math.floor(Math.log10(range)) - DIGITS) });
+    };
+    row.put = (value) => {
+      if (value < Number(least.value)) least.value = short(value);
+      if (value > Number(most.value)) most.value = short(value);
+      fit();
+      slider.value = value;
+      field.value = short(value);
+    };
+    for (const end of [least, most]) {
+      end.addEventListener("change", () => {
+        if (!isNumber(end.value)) end.value = short(initial(row.constant.value)[end === least ? 0 : 1]);
+        row.put(Number(field.value));
+      });
+    }
+    slider.addEventListener("input", () => {
+      if (!this.moving) this.start(row);
+      this.moving = true;
+      field.value = short(Number(slider.value));
+      this.set(row, Number(slider.value));
+    });
+    slider.addEventListener("change", () => (this.moving = false));
+    field.addEventListener("change", () => {
+      if (!isNumber(field.value)) return row.put(row.constant.value);
+      this.start(row);
+      row.put(Number(field.value));
+      this.set(row, Number(field.value));
+    });
+    return row;
+  }
+
+  start({ constant }) {
+    this.begins(`${constant.name} = ${this.textOf(constant.name)}`);
+  }
+
+  set({ constant }, value) {
+    const { name } = constant, text = written(constant, value), original = this.originals.get(name)?.text ?? this.textOf(name);
+    if (text === original) this.originals.delete(name);
+    else this.originals.set(name, { text: original, last: text });
+    this.back.disabled = !this.originals.size;
+    this.sets(new Map([[name, text]]));
+  }
+
+  /** Gives all constants the texts that they had before the changes. */
+  reset() {
+    if (!this.originals.size) return;
+    const texts = new Map([...this.originals].map(([name, { text }]) => [name, text]));
+    this.begins([...texts.keys()].map((name) => `${name} = ${this.textOf(name)}`).join(", "));
+    this.originals.clear();
+    this.back.disabled = true;
+    this.sets(texts);
+  }
+}

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Constants of the page's source that can be set while watching the plots: each `.const` whose value stands in the text itself. Constants
+//! that are computed from others follow them.
+
+use crate::ports;
+use serde_json::{Value, json};
+use std::collections::{HashMap, HashSet};
+use takt_asm::AssembledProgram;
+use takt_asm::expr::Value as Number;
+use takt_diagnostics::diag::Sink;
+use takt_diagnostics::source::Source;
+use takt_syntax::ast::{Ast, DirectiveKind, Expr, Name, NodeKind, StatementKind};
+use takt_syntax::intern::Interner;
+
+/// Maximum number of constants that are offered.
+const MOST: usize = 60;
+
+/// Settable constants in source order: name, value, and place of the value's text, in UTF-16 units as JavaScript counts them. `whole`: an
+/// integer without a unit, such as a number of elements.
+pub(crate) fn settable(assembled: &AssembledProgram) -> Vec<Value> {
+    let Some(source) = assembled.sources.files().first() else { return Vec::new() };
+    let mut names = Interner::new();
+    let ast = takt_syntax::parse::parse(source, &mut names, &mut Sink::default());
+    let mut offsets = Offsets { text: &source.text, byte: 0, units: 0 };
+    let declared = declarations(&ast, &names);
+    let known: HashSet<&str> = declared.iter().map(|(name, _)| *name).collect();
+    let numbers: HashMap<&str, Number> =
+        assembled.constants.iter().map(|(name, value)| (name.as_str(), *value)).collect();
+    let of = |(name, value): &(&str, Expr)| {
+        let number = *numbers.get(name)?;
+        let is_literal = ast.nodes[value.id.range()].iter().all(|node| is_own(node.kind, &names, &known));
+        if !is_literal || !number.real().is_finite() {
+            return None;
+        }
+        let start = (value.span.start - source.base) as usize;
+        let end = (value.span.end - source.base) as usize;
+        let comment = comment_after(source, end);
+        let unit = comment.and_then(ports::leading_unit);
+        let whole = matches!(number, Number::Int(_)) && unit.is_none();
+        let from = offsets.units_at(start);
+        let to = offsets.units_at(end);
+        Some(json!({
+            "name": name, "value": number.real(), "integer": matches!(number, Number::Int(_)), "whole": whole,
+            "from": from, "to": to, "unit": unit, "text": comment,
+        }))
+    };
+    declared.iter().filter_map(of).take(MOST).collect()
+}
+
+/// Constants that the source declares for every expansion: outside of macros, repetitions and conditions, under a plain name.
+fn declarations<'n>(ast: &Ast, names: &'n Interner) -> Vec<(&'n str, Expr)> {
+    let (mut depth, mut found) = (0_usize, Vec::new());
+    for statement in &ast.statements {
+        let StatementKind::Directive(index) = statement.kind else { continue };
+        match &ast.directives[index as usize].kind {
+            DirectiveKind::Macro { .. }
+            | DirectiveKind::Rep { .. }
+            | DirectiveKind::For { .. }
+            | DirectiveKind::If(..) => depth += 1,
+            DirectiveKind::End(_) => depth = depth.saturating_sub(1),
+            DirectiveKind::Const(Name { name, .. }, value) if depth == 0 => {
+                found.extend(name.resolve().ok().map(|id| (names.text(id), *value)));
+            }
+            _ => {}
+        }
+    }
+    found
+}
+
+/// The node depends on nothing that the source declares.
+fn is_own(kind: NodeKind, names: &Interner, declared: &HashSet<&str>) -> bool {
+    match kind {
+        NodeKind::Name(name) => {
+            name.resolve().is_ok_and(|id| id.builtin().is_some() && !declared.contains(names.text(id)))
+        }
+        NodeKind::Element(_) | NodeKind::All | NodeKind::Range => false,
+        _ => true,
+    }
+}
+
+/// Comment on the line of an offset.
+fn comment_after(source: &Source, offset: usize) -> Option<&str> {
+    let rest = source.text.get(offset..)?.lines().next()?;
+    rest.split_once(';').map(|(_, comment)| comment.trim())
+}
+
+/// Conversion of ascending byte offsets to UTF-16 units.
+struct Offsets<'t> {
+    text: &'t str,
+    byte: usize,
+    units: usize,
+}
+
+impl Offsets<'_> {
+    fn units_at(&mut self, byte: usize) -> usize {
+        self.units += self.text.get(self.byte..byte).map_or(0, |part| part.encode_utf16().count());
+        self.byte = byte;
+        self.units
+    }
+}
