@@ -6,9 +6,12 @@ const NS = "http://www.w3.org/2000/svg";
 const ROW = 18, AXIS = 22, NARROW = 1.5, WIDE = 48, GAP = 6;
 /** Rows that are drawn beyond the edges. */
 const BEYOND = 3;
-/** Colours of units, in the order of a processor's parts. Units of other names take those that are left. */
-const UNITS = ["multiply", "add", "fused", "addmul", "alu", "alu_late", "divroot", "convert", "memory", "sequencer", "sine", "arctangent", "arccosine"];
-const HUES = [212, 145, 262, 262, 40, 40, 352, 185, 90, 285, 318, 330, 12];
+/**
+ * Colours of units by name: numbers of the style sheet's `--u0` and so on, which also people with deuteranopia or protanopia tell apart.
+ * Alternatives, of which a machine has one, share a number. Units of other names take the colours that are left.
+ */
+const UNITS = { multiply: 0, add: 1, fused: 2, addmul: 2, alu: 3, alu_late: 3, divroot: 4, recurrence: 4, convert: 5, memory: 6, sequencer: 7, sine: 8, arctangent: 9, arccosine: 10 };
+const COLOURS = 11;
 /** Kinds of stalls, and what each means. */
 export const KINDS = {
   operand: "waits for an operand", destination: "its register is still to be written", unit: "its unit is busy", drain: "earlier results first",
@@ -205,8 +208,10 @@ export class Pipeline {
     Object.assign(this, layout(data?.bundles ?? []));
     this.chain = this.joined(data?.critical_path ?? data?.chain ?? []);
     const names = [...new Set(this.rows.flatMap(({ operation }) => operation?.unit ?? []))];
-    const rest = names.filter((name) => !UNITS.includes(name));
-    this.hues = new Map(names.map((name) => [name, UNITS.includes(name) ? HUES[UNITS.indexOf(name)] : (47 + 61 * rest.indexOf(name)) % 360]));
+    const free = [...Array(COLOURS).keys()].filter((number) => !names.some((name) => UNITS[name] === number));
+    const rest = names.filter((name) => !(name in UNITS));
+    const number = (name) => UNITS[name] ?? (free.length ? free[rest.indexOf(name) % free.length] : rest.indexOf(name) % COLOURS);
+    this.colours = new Map(names.map((name) => [name, `var(--u${number(name)})`]));
     this.longest = this.rows.reduce((most, { operation }) => Math.max(most, operation?.text.length ?? 3), 3);
     // Beside a stretch's first operation stands its name.
     for (const { from, rows: [first] } of this.stretches) this.longest = Math.max(this.longest, (this.rows[first]?.operation?.text.length ?? 3) + from.length + 1);
@@ -245,7 +250,7 @@ export class Pipeline {
     const counts = new Map();
     for (const { operation } of this.rows) if (operation) counts.set(operation.unit, (counts.get(operation.unit) ?? 0) + 1);
     const { kinds } = stalls(this.data ?? { bundles: [] });
-    const units = [...this.hues].map(([name, hue]) => entry(node("i", { class: "tp-unit", style: `--hue:${hue}` }), `${name} ${counts.get(name)}`));
+    const units = [...this.colours].map(([name, colour]) => entry(node("i", { class: "tp-unit", style: `--fill:${colour}` }), `${name} ${counts.get(name)}`));
     const lost = Object.keys(KINDS).filter((kind) => kinds[kind]).map((kind) => entry(node("i", { class: `tp-swatch tp-k-${kind.replace(" ", "-")}` }), `${KINDS[kind]} (${plural(kinds[kind], "cycle")})`));
     const chain = this.chain.length ? [entry(node("i", { class: "tp-swatch tp-chain" }), "longest chain")] : [];
     this.legend.replaceChildren(...(this.rows.length ? [...units, entry(node("i", { class: "tp-swatch tp-late" }), "pale: until the result"), ...lost, ...chain] : []));
@@ -386,7 +391,7 @@ export class Pipeline {
       }
     }
     const group = shape("g", { class: operation ? "tp-operation" : "tp-idle", "data-row": i });
-    if (operation) group.style.setProperty("--hue", this.hues.get(operation.unit));
+    if (operation) group.style.setProperty("--fill", this.colours.get(operation.unit));
     const latency = operation?.latency ?? 1;
     if (latency > 1) group.append(shape("rect", { class: "tp-run", x: x(column + 1), y: top + 4, width: (latency - 1) * w, height: ROW - 8 }));
     group.append(shape("rect", { class: "tp-issue", x: x(column), y: top + 2, width: Math.max(w, 2), height: ROW - 4, rx: 1 }));

@@ -7,6 +7,7 @@ import { extname, join, normalize } from "node:path";
 import { after, afterEach, before, test } from "node:test";
 import { deflateSync } from "node:zlib";
 import { chromium } from "playwright-core";
+import { VISIONS, ciede2000, distance } from "./colours.mjs";
 
 const FOLDER = process.env.TAKT_PAGE;
 const TYPES = { ".html": "text/html", ".js": "text/javascript", ".css": "text/css" };
@@ -353,6 +354,30 @@ test("the pipeline is drawn for the machine that is chosen; a click leads to the
   assert.ok(await page.locator(".tp-stalls").evaluate((box) => box.open));
   await shot(page, "pipeline-t4");
   assert.deepEqual(errors, []);
+});
+
+test("people with a colour deficiency tell the pipeline's units apart", limit, async () => {
+  // Two of the pairs that Sharma, Wu and Dalal publish.
+  assert.ok(Math.abs(ciede2000([50, 2.6772, -79.7751], [50, 0, -82.7485]) - 2.0425) < 1e-4);
+  assert.ok(Math.abs(ciede2000([22.7233, 20.0904, -46.694], [23.0331, 14.973, -42.5619]) - 2.0373) < 1e-4);
+  assert.ok(distance("#3077c0", "#9b4fc0", "deuteranopia") < 10, "the colours of multiply and sequencer before");
+  for (const colorScheme of ["light", "dark"]) {
+    const { page, errors } = await open("#example=tracking.s", { colorScheme });
+    await done(page);
+    await page.click("#tab-pipeline");
+    await page.waitForFunction(() => /tracking\.s on t3/.test(document.getElementById("drawn").textContent));
+    const { colours, legend } = await page.evaluate(() => {
+      const style = getComputedStyle(document.querySelector(".tp")), hex = (rgb) => `#${rgb.match(/\d+/g).slice(0, 3).map((one) => Number(one).toString(16).padStart(2, "0")).join("")}`;
+      const colours = [];
+      for (let i = 0; style.getPropertyValue(`--u${i}`); i++) colours.push(style.getPropertyValue(`--u${i}`).trim());
+      return { colours, legend: [...document.querySelectorAll(".tp-unit")].map((one) => hex(getComputedStyle(one).backgroundColor)) };
+    });
+    assert.equal(colours.length, 11);
+    assert.ok(legend.length > 5 && new Set(legend).size === legend.length && legend.every((one) => colours.includes(one)), `${legend}`);
+    for (const vision of VISIONS) for (const [i, one] of colours.entries()) for (const other of colours.slice(0, i)) assert.ok(distance(one, other, vision) >= 10, `${colorScheme}, ${vision}: ${one} and ${other} differ by ${distance(one, other, vision)}`);
+    await shot(page, `units-${colorScheme}`);
+    assert.deepEqual(errors, []);
+  }
 });
 
 test("time and labels of the pipeline stay in sight, on a telephone too", limit, async () => {
