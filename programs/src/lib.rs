@@ -7,6 +7,7 @@
 //! - [`path`]: geometry of a tool path;
 //! - [`arm`]: the six-axis arm of the second founding paper: kinematics in binary64, and the measurement of its programs;
 //! - [`three`]: the six-joint arm of the third founding paper: the computations of its three processors, in binary64;
+//! - [`plants`]: small plants that close the loop of a controller;
 //! - [`listings`]: assembler listings of documents;
 //! - [`accuracy`]: errors of binary32 results against binary64.
 //!
@@ -17,6 +18,7 @@ pub mod arm;
 pub mod hybrid;
 pub mod listings;
 pub mod path;
+pub mod plants;
 pub mod real;
 pub mod three;
 

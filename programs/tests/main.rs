@@ -8,5 +8,6 @@ mod common;
 mod examples;
 mod gcode;
 mod library;
+mod plants;
 mod three;
 mod trajectory;

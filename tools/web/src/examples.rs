@@ -14,6 +14,8 @@ const FIRST: [&str; 3] = ["pi.s", "foc.s", "blink.s"];
 const PERIODS_OF: [(&str, usize); 1] = [("blink.s", 2000)];
 /// Seconds that assembling takes in a browser, for the page to announce until it has measured them.
 const SECONDS_OF: [(&str, u32); 2] = [("tracking.s", 3), ("statespace.s", 2)];
+/// Plants that close the loops of examples.
+const PLANT_OF: [(&str, &str); 1] = [("pi.s", "dc_motor")];
 /// Program that controls the robot.
 pub(crate) const TRACKING: &str = "hybrid/tracking.s";
 
@@ -52,13 +54,17 @@ pub(crate) fn about() -> Value {
     let text = |name: &str| EXAMPLES.iter().find(|(known, _)| *known == name).map(|(_, text)| *text);
     let rest =
         EXAMPLES.iter().map(|(name, _)| *name).filter(|name| name.ends_with(".s") && !FIRST.contains(name));
-    let seconds = |name: &str| SECONDS_OF.iter().find(|(known, _)| *known == name).map(|(_, seconds)| seconds);
+    let seconds =
+        |name: &str| SECONDS_OF.iter().find(|(known, _)| *known == name).map(|(_, seconds)| seconds);
+    let plant = |name: &str| {
+        PLANT_OF.iter().find(|(known, _)| *known == name).map(|(_, plant)| json!({ "name": plant }))
+    };
     let example = |name: &str| {
         let source = text(name)?;
         let inputs = text(&name.replace(".s", ".csv"));
         let periods = PERIODS_OF.iter().find(|(known, _)| *known == name).map(|(_, periods)| periods);
         Some(
-            json!({ "name": name, "title": title(source), "source": source, "inputs": inputs, "periods": periods, "seconds": seconds(name), "track": false }),
+            json!({ "name": name, "title": title(source), "source": source, "inputs": inputs, "periods": periods, "seconds": seconds(name), "plant": plant(name), "track": false }),
         )
     };
     let mut examples: Vec<Value> = FIRST.into_iter().chain(rest).filter_map(example).collect();

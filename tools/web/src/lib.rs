@@ -25,6 +25,7 @@ mod export;
 #[cfg(target_arch = "wasm32")]
 mod exports;
 mod language;
+mod plant;
 mod ports;
 mod program;
 mod run;

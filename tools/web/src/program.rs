@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Assembly of the page's program.
 
-use crate::{CYCLES, PERIODS, Playground, SOURCE_BYTES, constants, examples, ports, view};
+use crate::plant::PlantRequest;
+use crate::run::ZERO_PERIODS;
+use crate::{CYCLES, PERIODS, Playground, SOURCE_BYTES, constants, examples, plant, ports, view};
 use serde::Deserialize;
 use serde_json::{Value, json};
 use std::io::Cursor;
@@ -39,6 +41,12 @@ pub(crate) struct AssembleRequest {
     /// Cycles between ticks; 0: a tick comes as soon as the program waits.
     #[serde(default)]
     tick: u64,
+    /// Plant that closes the loop: it fills its input ports, the table all others.
+    #[serde(default)]
+    plant: Option<PlantRequest>,
+    /// Number of periods of a closed loop without a table.
+    #[serde(default)]
+    periods: Option<usize>,
 }
 
 /// Machine given by its name, or by the text of a machine file, which has several lines.
@@ -90,8 +98,19 @@ impl Playground {
             Ok(rows) => (rows, None),
             Err(error) => (None, Some(error)),
         };
+        let recorded = rows.as_deref();
+        let periods = wanted.periods.unwrap_or(ZERO_PERIODS);
+        let plant = wanted.plant.filter(|_| inputs_error.is_none());
+        let closed = plant.map(|plant| (plant::close(&assembled, &plant, recorded, periods), plant));
+        let (rows, plant, plant_error) = match closed {
+            Some((Ok(closed), plant)) => (Some(Arc::new(closed)), Some(plant), None),
+            Some((Err(error), _)) => (rows, None, Some(error)),
+            None => (rows, None, None),
+        };
         let loaded = LoadedProgram { name, assembled, rows, tick: NonZeroU64::new(wanted.tick) };
         let mut told = facts(&loaded);
+        told["plant"] = json!(plant.map(|plant| json!({ "name": plant.name })));
+        told["plant_error"] = json!(plant_error);
         told["inputs_error"] = json!(inputs_error);
         told["inputs_of_others"] = json!(others);
         if !empty && inputs_error.is_none() {
@@ -168,6 +187,7 @@ fn facts(loaded: &LoadedProgram) -> Value {
         "rows": loaded.rows.as_ref().map(|rows| rows.len()),
         "bounds": bounds,
         "no_bound": no_bound,
+        "plants": plant::fitting(program),
         "tracks": takt_programs::hybrid::Binding::new(program).is_ok(),
     })
 }

@@ -13,7 +13,7 @@ use takt_isa::program::Port;
 use takt_isa::{Program, Register, Type};
 
 /// Default number of periods without recorded inputs.
-const ZERO_PERIODS: usize = 20;
+pub(crate) const ZERO_PERIODS: usize = 20;
 /// Maximum number of cycles in a call.
 const SLICE: u64 = 1_000_000;
 /// Maximum number of periods in a call.
@@ -57,7 +57,7 @@ impl LoadedProgram {
 }
 
 /// Sets the inputs of a period (from 0), and limits it to [`CYCLES`].
-fn prepare(emulator: &mut Emulator, rows: Option<&Rows>, period: u64) -> Result<(), String> {
+pub(crate) fn prepare(emulator: &mut Emulator, rows: Option<&Rows>, period: u64) -> Result<(), String> {
     let zeros: Vec<(Register, u32)>;
     let row = match rows {
         Some(rows) => rows.get(period as usize).map_or(&[][..], Vec::as_slice),

@@ -36,7 +36,7 @@ fn every_example_assembles_and_runs() {
         let bounds = told["bounds"].as_array().expect("checked above");
         let least: Vec<u64> = bounds.iter().filter_map(|section| section["least"].as_u64()).collect();
         match example["name"].as_str() {
-            Some("statespace.s") => assert_eq!(least, [], "its period has several blocks"),
+            Some("statespace.s") => assert!(least.is_empty(), "its period has several blocks: {least:?}"),
             Some("pi.s") => assert_eq!(least.last(), Some(&38)),
             _ => {}
         }
@@ -302,7 +302,7 @@ fn constants_of_the_text_can_be_set() {
     let mut playground = Playground::default();
     let source = "; µ, 𝜇\n.const T = 1e-3 ; s, the period\n.const N = 3\n.const K = 12 ; V/rad, gain\n.const w = 2*pi*50 ; rad/s\n\
                   .const derived = K*T\n.const pi = 3\n.const own = 2*pi\n.if N > 2\n.const hidden = 5\n.endif\n.rep i, 1, 2\n.const c{i} = 4\n.endr\n\
-                  .include \"robot.s\"\n.output y\n.period\nstart:\n    mov y, zero\n    wait start\n";
+                  .include \"robot.s\"\n.output last\n.period\nstart:\n    mov last, zero\n    wait start\n";
     let told = assemble(&mut playground, &source.replace(".const pi = 3\n.const own = 2*pi\n", ""), "");
     let of = |told: &Value| -> Vec<String> {
         let list = told["settable"].as_array().unwrap_or_else(|| panic!("{told}"));
@@ -329,4 +329,66 @@ fn constants_of_the_text_can_be_set() {
     assert_eq!((text(&period), text(&speed)), ("1e-3".to_owned(), "2*pi*50".to_owned()));
     let told = assemble(&mut playground, source, "");
     assert!(!of(&told).contains(&"own".to_owned()), "its pi is the program's: {:?}", of(&told));
+}
+
+#[test]
+fn a_plant_closes_the_loop() {
+    let mut playground = Playground::default();
+    let about = call(&mut playground, "about", Value::Null);
+    let pi = about["examples"][0].clone();
+    assert_eq!(pi["plant"]["name"], "dc_motor", "the first example closes its loop");
+    let with = |plant: Value, source: &str, inputs: &Value| json!({ "name": "pi.s", "source": source, "machine": "t3", "inputs": inputs, "plant": plant, "periods": 50 });
+    let source = pi["source"].as_str().expect("a text");
+    let told = call(&mut playground, "assemble", with(pi["plant"].clone(), source, &pi["inputs"]));
+    assert_eq!((&told["plant"]["name"], &told["plant_error"]), (&json!("dc_motor"), &Value::Null));
+    assert_eq!(told["plants"][0]["gives"], json!(["w"]));
+    assert_eq!(told["rows"], 400);
+    let ran = call(&mut playground, "run", json!({ "begin": true }));
+    let column = |kind: &str, name: &str| -> Vec<f64> {
+        let values = ran[kind][name].as_array().unwrap_or_else(|| panic!("{kind} {name}"));
+        values.iter().filter_map(Value::as_f64).collect()
+    };
+    // Each speed is what the voltages before have made of the motor.
+    let plant = takt_programs::plants::Plant::named("dc_motor").expect("it is one of them");
+    let mut motor = takt_programs::plants::Simulation::new(plant, [], 1e-3).expect("its own parameters");
+    let (speeds, voltages) = (column("inputs", "w"), column("outputs", "u"));
+    for (period, (speed, voltage)) in speeds.iter().zip(&voltages).enumerate() {
+        assert_eq!(*speed as f32, motor.sensors()[0] as f32, "period {period}");
+        motor.advance(&[*voltage]);
+    }
+    assert!((speeds[99] - 100.0).abs() < 3.0, "the controller reaches its reference: {}", speeds[99]);
+    assert!(speeds[120] < speeds[99] - 1.0, "the load comes after 0.1 s: {}", speeds[120]);
+    // The debugger and the pipeline see the same inputs.
+    let end = call(&mut playground, "execute", json!({ "line": "goto period 140" }));
+    let shown = end["view"]["inputs"][1]["value"].as_str().and_then(|text| text.parse::<f32>().ok());
+    assert_eq!(shown, Some(speeds[140] as f32), "{}", end["view"]["inputs"]);
+    // Another load gives another speed; without a table, the other inputs are 0.
+    let heavy = json!({ "name": "dc_motor", "parameters": { "load": 0.8 } });
+    call(&mut playground, "assemble", with(heavy.clone(), source, &pi["inputs"]));
+    let loaded = call(&mut playground, "run", json!({ "begin": true }));
+    assert!(loaded["inputs"]["w"][120].as_f64() < Some(speeds[120] - 1.0));
+    let told = call(&mut playground, "assemble", with(heavy, source, &json!("")));
+    assert_eq!(told["rows"], 50);
+    let error = |playground: &mut Playground, plant: Value, source: &str| {
+        let told = call(playground, "assemble", with(plant, source, &json!("")));
+        assert_eq!(told["plant"], Value::Null);
+        told["plant_error"].as_str().unwrap_or_default().to_owned()
+    };
+    let named = |name: &str| json!({ "name": name });
+    assert!(error(&mut playground, named("tank"), source).contains("no plant `tank`"));
+    assert!(error(&mut playground, named("dc_motor"), DOUBLE).contains("no output port `u`"));
+    let timeless = source.replace("T    = 1e-3  ", "T    = 1e-3 ;");
+    assert!(error(&mut playground, named("dc_motor"), &timeless).contains("`.const T = …"), "{timeless}");
+    let wild = json!({ "name": "dc_motor", "parameters": { "J": -1.0 } });
+    assert!(error(&mut playground, wild, source).contains("positive number"));
+    // A program that never ends its period ends the loop, and the run says why.
+    let endless =
+        source.replace("        fsub    e, w_ref, w\n", "turn: jmp turn\n        fsub    e, w_ref, w\n");
+    call(&mut playground, "assemble", with(named("dc_motor"), &endless, &json!("")));
+    let ran = call(&mut playground, "run", json!({ "begin": true }));
+    assert!(
+        ran["fault"].as_str().is_some_and(|fault| fault.contains(&CYCLES.to_string())),
+        "{}",
+        ran["fault"]
+    );
 }

@@ -24,7 +24,7 @@ const PERIODS = 20;
 const REPLACED = "another program was opened";
 
 const state = { works: 0, breaks: [], name: "main.s", about: null, program: null, stale: true, run: null, took: 0, document: null };
-let machine, editor, plots, pipeline, drive, documents, tuning;
+let machine, editor, plots, pipeline, drive, documents, tuning, plant;
 
 /** Shows an error; with `act` (text and action of a button), a notice. */
 function notice(message, act) {
@@ -120,7 +120,7 @@ function changed(event) {
   if (state.tuning) state.dims = setTimeout(dim, LATE);
   else {
     dim();
-    tuning.enabled = false;
+    tuning.enabled = plant.enabled = false;
     plots.before = null;
   }
   // A reported mistake also belongs to the previous text.
@@ -168,7 +168,7 @@ function keep() {
   // Do not overwrite another page's changes with a document that is merely displayed here.
   if (!state.document || !state.dirty) return;
   state.dirty = false;
-  Object.assign(state.document, { name: state.name, machine: el("machine").value, source: editor.text, inputs: table(), periods: periods() });
+  Object.assign(state.document, { name: state.name, machine: el("machine").value, source: editor.text, inputs: table(), periods: periods(), plant: state.plant });
   documents.write(state.document);
   showDocuments();
 }
@@ -223,11 +223,12 @@ function useMachine() {
   return assemble();
 }
 
-async function open({ name, source, inputs, periods, machine: wanted }) {
+async function open({ name, source, inputs, periods, plant, machine: wanted }) {
   if (machine.busy) machine.stop(REPLACED);
   clearTimeout(state.soon);
   state.opening = true;
   state.name = name || "main.s";
+  state.plant = plant ?? null;
   if (wanted?.includes("\n")) offer(wanted);
   else if ([...el("machine").options].some((option) => option.value === wanted)) el("machine").value = wanted;
   el("table").value = inputs ?? "";
@@ -248,6 +249,8 @@ function empty() {
   document.body.classList.remove("stale");
   drive.clear();
   tuning.clear();
+  plant.clear();
+  el("loop").hidden = true;
   plots.clear(why);
   pipeline.show(null);
   clearView(why);
@@ -312,6 +315,7 @@ function showCycles() {
   for (const section of periods) put(` · ${section.name} takes ${range(section.cycles)} whatever the inputs`);
   if (once) put(` · once ${range(once.cycles)}`);
   if (program.no_bound) put(` · no bound: ${program.no_bound}`);
+  if (program.plant_error) put(` · the loop is open: ${program.plant_error}`, "em");
   if (program.inputs_of_others) put(` · all inputs are 0: ${program.inputs_of_others}`, "em");
 }
 
@@ -319,13 +323,17 @@ function showCycles() {
 function showProgram(program) {
   state.program = program;
   const { inputs_error: wrong } = program, whole = program.assembled && !wrong;
+  const open = program.plant_error && `The loop is open: ${program.plant_error}`;
   const others = program.inputs_of_others && `The table of inputs is for other ports, so that all are 0: ${program.inputs_of_others}`;
-  el("text").textContent = [wrong && `error: ${wrong}`, others, program.text].filter(Boolean).join("\n\n") || "No errors, no warnings.";
+  el("text").textContent = [wrong && `error: ${wrong}`, open, others, program.text].filter(Boolean).join("\n\n") || "No errors, no warnings.";
   el("tab-messages").classList.toggle("bad", !whole);
   el("wait").hidden = true;
   clearTimeout(state.dims);
   document.body.classList.toggle("stale", !whole && state.shown !== null);
-  if (whole) tuning.show(program.settable);
+  if (whole) {
+    tuning.show(program.settable);
+    showPlants();
+  }
   if (whole || state.shown === null) {
     const why = program.assembled ? wrong && `The inputs cannot be read: ${wrong}` : "The program does not assemble: see Messages.";
     // The curves before stay until those of a slider's new value are there.
@@ -350,12 +358,34 @@ function showProgram(program) {
   if (!whole || !state.tuning) showCycles();
 }
 
-const asked = () => ({ name: state.name, source: editor.text, machine: el("machine").value, inputs: table(), tick: Number(el("tick").value) || 0 });
+const asked = () => ({ name: state.name, source: editor.text, machine: el("machine").value, inputs: table(), tick: Number(el("tick").value) || 0, plant: state.plant, periods: periods() });
+
+/** Shows the plants that the program's ports fit, and the parameters of the one that closes the loop. */
+function showPlants() {
+  const { plants } = state.program, here = plants.find(({ name }) => name === state.plant?.name), choice = el("plant-name");
+  el("loop").hidden = !plants.length;
+  choice.replaceChildren(...plants.map(({ name, text, gives }) => new Option(`${text} gives ${gives.join(", ")}`, name)), new Option("all inputs are the table's", ""));
+  choice.value = here?.name ?? "";
+  plant.show((here?.parameters ?? []).map((one) => ({ ...one, value: state.plant.parameters?.[one.name] ?? one.value, integer: true })));
+}
+
+/** Text of a parameter's present value. */
+function valueOf(name) {
+  const own = state.program?.plants?.find((one) => one.name === state.plant?.name)?.parameters.find((one) => one.name === name);
+  return String(state.plant?.parameters?.[name] ?? own?.value);
+}
+
+/** Chooses what closes the loop, or its parameters. */
+function usePlant(plant, event) {
+  state.plant = plant;
+  changed(event);
+}
 
 /** Assembles the program, and restores the breakpoints. */
 async function begin() {
   const { version } = editor;
-  state.program = await machine.call("assemble", asked());
+  const wanted = asked();
+  state.program = Object.assign(await machine.call("assemble", wanted), { blank: !wanted.inputs.trim() });
   if (state.program.settable) editor.know(state.program.settable, version);
   await setStops();
   showProgram(state.program);
@@ -555,7 +585,7 @@ async function reveal(operation) {
 
 async function link() {
   try {
-    const fragment = await pack({ name: state.name, machine: el("machine").value, source: editor.text, inputs: table(), periods: periods() });
+    const fragment = await pack({ name: state.name, machine: el("machine").value, source: editor.text, inputs: table(), periods: periods(), plant: state.plant });
     history.replaceState(null, "", `#${fragment}`);
     // A reload shows this document again.
     state.document.key = fragment;
@@ -625,6 +655,10 @@ async function start() {
   machine = new Thread(module, new URL("worker.js", location.href));
   const language = new Thread(module, new URL("worker.js", location.href));
   documents = new Documents();
+  plant = new Tuning(el("plant"), {
+    begins: (differs) => plots.keep(differs), textOf: (name) => valueOf(name),
+    sets: (texts) => usePlant({ ...state.plant, parameters: { ...state.plant.parameters, ...Object.fromEntries([...texts].map(([name, text]) => [name, Number(text)])) } }, "tune"),
+  });
   plots = new Plots(el("charts"), el("choice"), { axis: el("axis"), length: el("length"), together: el("together") });
   pipeline = new Pipeline(el("pipeline-picture"), reveal);
   drive = new Drive({ machine, work, current });
@@ -666,6 +700,10 @@ async function start() {
     event.preventDefault();
     execute(el("command").value);
     el("command").select();
+  });
+  el("plant-name").addEventListener("change", () => {
+    usePlant(el("plant-name").value ? { name: el("plant-name").value } : null, "later");
+    assemble();
   });
   el("draw").addEventListener("click", draw);
   for (const [id, ending, type] of [["plot-svg", "svg", "image/svg+xml"], ["plot-csv", "csv", "text/csv"]]) {

@@ -327,14 +327,22 @@ export class Plots {
     if (!run) return say(this.why);
     if (!this.parent.clientWidth) return;
     if (!run.cycles.length) return say("There is nothing to plot over periods: the program has run through no period.");
-    const ports = program?.inputs?.length ?? 0;
-    if (ports && !program.rows) say(`There are no inputs: ${ports === 1 ? "the input port is" : `all ${ports} input ports are`} 0 in every period. The tab Inputs takes a table.`);
+    say(this.silence());
     if (before) this.parent.append(Object.assign(document.createElement("p"), { className: "ghost", textContent: `pale: before, with ${before.differs}` }));
     const cycles = [{ name: "cycles", values: run.cycles, stepped: true, ...(before && { before: before.cycles }) }];
     const all = [...this.groups().map((curves) => ({ curves })), { curves: cycles, lines: this.levels() }];
     const { label, ...common } = this.abscissa(), open = all.filter(({ curves }) => !isFlat(curves)), last = open.at(-1);
     const height = () => this.height(open.length, all.length - open.length);
     for (const one of all) this.charts.push(chart(this.parent, { ...one, ...common, ...(one === last && { label }), height, sync: "ports", folds: true }));
+  }
+
+  /** What to say if inputs are 0 because nobody gives them. */
+  silence() {
+    const { plants, plant, inputs, rows, blank, inputs_of_others: others } = this.program;
+    const driven = plants.find(({ name }) => name === plant?.name)?.gives ?? [], silent = inputs.filter(({ name }) => !driven.includes(name));
+    if (!silent.length || (rows && !blank && !others)) return "";
+    const count = silent.length, those = driven.length ? silent.map(({ name }) => name).join(", ") : count === 1 ? "the input port" : `all ${count} input ports`;
+    return `There are no inputs${driven.length ? " but the plant's" : ""}: ${those} ${count === 1 ? "is" : "are"} 0 in every period. The tab Inputs takes a table.`;
   }
 
   /** Horizontal lines in the chart of cycles: bound and deadline. */

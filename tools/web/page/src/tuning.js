@@ -1,4 +1,5 @@
-// Sliders for the constants of the text. A slider writes its value into the text, so that text, plots, links and exports agree.
+// Sliders for the constants of the text, and for the parameters of a plant. A constant's slider writes its value into the text, so that
+// text, plots, links and exports agree.
 
 /** Significant digits of a slider's steps: a hundredth of the power of ten below its range. */
 const DIGITS = 2;
