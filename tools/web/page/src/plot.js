@@ -15,7 +15,7 @@ const BRIEF = 2;
 /** Height of a folded chart in pixels. */
 const FOLDED = 27;
 /** Minimum and maximum height of a chart in pixels. */
-const LOW = 96, HIGH = 420;
+const LOW = 120, HIGH = 420;
 /** Maximum height of a chart as a fraction of its width. */
 const TALL = 0.6;
 /** A limit is drawn if a value reaches this fraction of it. */

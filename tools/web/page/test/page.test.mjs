@@ -544,7 +544,7 @@ test("a slider writes a constant, moves a trace, and leaves the trace before pal
   await page.mouse.up();
   await page.waitForFunction(() => !takt.state.stale && !document.getElementById("assemble").disabled);
   const written = /\.const +KP += (\S+)/.exec(await page.evaluate(() => takt.text))[1];
-  assert.ok(Number(written) > 1 && Number(written) < 1.4, `KP = ${written} in the text`);
+  assert.ok(Number(written) > 1 && Number(written) <= 1.6, `KP = ${written} in the text`);
   assert.match(await page.textContent(".ghost"), /pale: before, with KP = 0\.8/);
   assert.ok((await pale()) > none + 40, `${await pale()} pale points, ${none} without a slider`);
   // The text that the slider has written is the text that runs elsewhere.
@@ -581,6 +581,7 @@ test("a plant closes the loop: its sliders move what it gives, and links carry i
   assert.ok(Math.abs(light[95] - 100) < 3, `the controller reaches its reference: ${light[95]}`);
   const load = page.locator("#plant .constant", { hasText: "load" }), field = load.locator(".field");
   assert.equal(await load.getAttribute("title"), "torque of the load, which comes after the delay");
+  await page.click("#plant summary");
   await field.fill("1.2");
   await field.press("Enter");
   await page.waitForFunction((light) => !takt.state.stale && takt.state.run?.inputs.w[130] < light[130] - 5, light);
@@ -600,6 +601,7 @@ test("a plant closes the loop: its sliders move what it gives, and links carry i
   await done(page);
   assert.deepEqual(await values(page, "w"), heavy);
   // A parameter that the plant cannot have opens the loop, and says so; so do other ports.
+  await page.click("#plant summary");
   await page.locator("#plant .constant", { hasText: "J" }).locator(".field").fill("-1");
   await page.keyboard.press("Enter");
   await page.waitForFunction(() => /the loop is open: the parameter `J` of `dc_motor` is -1; expected a positive number/.test(document.getElementById("cycles").textContent));
