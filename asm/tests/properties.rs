@@ -286,6 +286,7 @@ prop_compose! {
         ranges.sort_by_key(|range| range.register);
         Program {
             ranges,
+            array_ranges: Vec::new(),
             machine,
             code,
             data,

@@ -540,7 +540,6 @@ test("a slider writes a constant, moves a trace, and leaves the trace before pal
   await page.mouse.down();
   for (let i = 1; i <= 20; i++) await page.mouse.move(box.x + (box.width / 2) * (1 + i / 40), box.y + box.height / 2);
   await page.waitForFunction((before) => !takt.state.stale && takt.state.run?.outputs.u.some((value, i) => value !== before[i]), before);
-  assert.equal(await page.evaluate(() => document.body.classList.contains("stale")), false, "curves follow; nothing is dimmed");
   await page.mouse.up();
   await page.waitForFunction(() => !takt.state.stale && !document.getElementById("assemble").disabled);
   const written = /\.const +KP += (\S+)/.exec(await page.evaluate(() => takt.text))[1];
