@@ -403,6 +403,25 @@ pub const KINDS: &[Kind] = &[
         strobes: WINDOWED,
     },
     Kind {
+        name: "hall",
+        module: "takt_hall",
+        text: "three Hall sensors of a motor: sector, count, time from sector to sector",
+        pins: &[input("a"), input("b"), input("c")],
+        reads: &[
+            register("sector", "0 to 5: 100, 110, 010, 011, 001, 101 of a, b, c; stays in a forbidden state"),
+            register("fault", "1: the pins are in a forbidden state, 000 or 111"),
+            register("count", "sectors passed, up or down; wraps at 32 bits"),
+            register(
+                "time",
+                "cycles between the last two changes of the sector, or since the last one if they are more, at most 2^31 - 1",
+            ),
+            register("errors", "forbidden states, and changes by more than a sector, so far"),
+        ],
+        writes: &[],
+        parameters: &[FILTER],
+        strobes: PLAIN,
+    },
+    Kind {
         name: "digital-in",
         module: "takt_digital_in",
         text: "switch, debounced",

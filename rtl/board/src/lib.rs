@@ -53,6 +53,7 @@ pub const VERILOG: &[(&str, &str)] = &[
     ("takt_digital_out.v", include_str!("../verilog/takt_digital_out.v")),
     ("takt_exchange.v", include_str!("../verilog/takt_exchange.v")),
     ("takt_filter.v", include_str!("../verilog/takt_filter.v")),
+    ("takt_hall.v", include_str!("../verilog/takt_hall.v")),
     ("takt_interlock.v", include_str!("../verilog/takt_interlock.v")),
     ("takt_output_latch.v", include_str!("../verilog/takt_output_latch.v")),
     ("takt_pwm.v", include_str!("../verilog/takt_pwm.v")),

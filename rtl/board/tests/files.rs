@@ -139,7 +139,7 @@ const WRONG: &[(&str, &str, &str)] = &[
     (
         "\"pwm\"",
         "\"servo\"",
-        "22:8: `servo` is not a kind of peripheral; there are quadrature, step, pwm, pwm3, trip, sigma-delta, spi, ssi, biss-c, sinc3, digital-in, digital-out",
+        "22:8: `servo` is not a kind of peripheral; there are quadrature, step, pwm, pwm3, trip, sigma-delta, spi, ssi, biss-c, sinc3, hall, digital-in, digital-out",
     ),
     ("half = 1000", "half = 0", "24:8: `half` must be a whole number from 1 to 65535, not 0"),
     (

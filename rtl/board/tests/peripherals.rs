@@ -51,7 +51,7 @@ impl Random {
 fn variants(kind: &Kind) -> Vec<Vec<u32>> {
     match kind.name {
         "quadrature" => vec![vec![1, 0], vec![3, 3_572_338], vec![10, u32::MAX - 3]],
-        "step" => vec![vec![1], vec![3], vec![10]],
+        "step" | "hall" => vec![vec![1], vec![3], vec![10]],
         "pwm" => vec![vec![1, 0, 1], vec![20, 3, 1], vec![33, 0, 0], vec![50, 60, 0], vec![7, 1, 0]],
         "pwm3" => vec![
             vec![0, 0, 0, 0, 0, 0, 0, 0, 9],
@@ -101,8 +101,9 @@ fn stimulus(kind: &'static Kind, parameters: &[u32], seed: u64) -> Box<dyn FnMut
     let mut random = Random::new(seed);
     let (takes, _) = kind.ports();
     let names: Vec<String> = takes.into_iter().skip(1).map(|(name, _)| name).collect();
+    let is_hall = kind.name == "hall";
     let hold = match kind.name {
-        "quadrature" | "step" | "digital-in" => parameters[0],
+        "quadrature" | "step" | "hall" | "digital-in" => parameters[0],
         "trip" => parameters[0].max(1),
         _ => 1,
     };
@@ -141,6 +142,11 @@ fn stimulus(kind: &'static Kind, parameters: &[u32], seed: u64) -> Box<dyn FnMut
             "w_clear" => random.bits() % 2,
             "take" => random.one_in(11).into(),
             "put" => random.one_in(if cycle % 4096 < 1024 { 5 } else { 150 }).into(),
+            // A third of a turn between the pins of Hall sensors; a jump of the place makes a forbidden state now and then.
+            "pin_a" | "pin_b" | "pin_c" if is_hall => {
+                let at = (place + 4 * u32::from(name == "pin_b") + 2 * u32::from(name == "pin_c")) % 6;
+                u32::from(if random.one_in(4000) { at < 5 } else { at < 3 })
+            }
             "pin_a" => u32::from((place + 1) & 2 != 0),
             "pin_b" => u32::from(place & 2 != 0),
             "w_level" => random.bits() % 3,
@@ -378,6 +384,7 @@ const FAULTS: &[&[(&str, &str, &str)]] = &[
         ("takt_ssi.v", "number == BETWEEN;", "number == END;"),
         ("takt_biss_c.v", "s1 ^ is_crc;", "s1;"),
         ("takt_sinc3.v", "first | bits == LAST;", "bits == LAST;"),
+        ("takt_hall.v", "since > last ? since : last", "last"),
         ("takt_tick.v", "lead < period", "lead <= period"),
         ("takt_carrier.v", "START - HALF : START", "START - HALF : START + 1"),
         ("takt_pwm_phase.v", "on[16:1] + {15'd0, on[0]}", "on[16:1]"),
@@ -396,6 +403,7 @@ const FAULTS: &[&[(&str, &str, &str)]] = &[
         ("takt_ssi.v", "GRAY != 0 & above", "GRAY != 0 & word[0]"),
         ("takt_biss_c.v", "answers ? FIRST - 17'd1 :", "answers ? FIRST :"),
         ("takt_sinc3.v", "quick >= BOUND | quick <= -BOUND", "quick >= BOUND"),
+        ("takt_hall.v", "now == 3'd5 ? 3'd0 : now + 3'd1", "now + 3'd1"),
         ("takt_tick.v", "left == ahead + 32'd1", "left == ahead"),
         ("takt_carrier.v", "if (place == TOP) back", "if (place == TOP - 16'd1) back"),
         ("takt_pwm_phase.v", "(~first & was)", "(1'b0 & was)"),
@@ -420,6 +428,7 @@ const FAULTS: &[&[(&str, &str, &str)]] = &[
         ("takt_ssi.v", "bad       <= ~s1;", "bad       <= 1'b0;"),
         ("takt_biss_c.v", "{31'd0, ~word[1]}", "{31'd0, word[1]}"),
         ("takt_sinc3.v", "anew[2] ? 3'b001 : ", ""),
+        ("takt_hall.v", "(none & ~fault)", "none"),
     ],
 ];
 

@@ -267,6 +267,11 @@ kind = "digital-in"
 pins = { in = "gp3" }
 hold = 7
 ports = { level = "level", rises = "rises" }
+[peripheral.sensors]
+kind = "hall"
+pins = { a = "gp14", b = "gn14", c = "gp15" }
+filter = 6
+ports = { sector = "sector", fault = "broken", count = "sectors", errors = "jumps" }
 [peripheral.lamp0]
 kind = "digital-out"
 pins = { out = "gp4" }
@@ -295,6 +300,22 @@ ports = { level = "l5" }
 kind = "digital-out"
 pins = { out = "gp11" }
 ports = { level = "l6" }
+[peripheral.lamp7]
+kind = "digital-out"
+pins = { out = "gp16" }
+ports = { level = "l7" }
+[peripheral.lamp8]
+kind = "digital-out"
+pins = { out = "gp17" }
+ports = { level = "l8" }
+[peripheral.lamp9]
+kind = "digital-out"
+pins = { out = "gp18" }
+ports = { level = "l9" }
+[peripheral.lamp10]
+kind = "digital-out"
+pins = { out = "gp19" }
+ports = { level = "l10" }
 [peripheral.full]
 kind = "sigma-delta"
 pins = { out = "gp12" }
@@ -310,14 +331,16 @@ ports = { value = "faint" }
 /// Program of that wiring, in which the level also makes the stream `full` all ones, and `faint` a pulse in 32768 cycles.
 const KINDS_PROGRAM: &str = "
 .schedule on
-.input count:int at_index:int indices:int errors:int steps:int level:int rises:int
-.output l0:int l1:int l2:int l3:int l4:int l5:int l6:int full:int faint:int
+.input count:int at_index:int indices:int errors:int steps:int level:int rises:int sector:int broken:int sectors:int jumps:int
+.output l0:int l1:int l2:int l3:int l4:int l5:int l6:int l7:int l8:int l9:int l10:int full:int faint:int
 .once
         l0, l1, l2, l3, l4, l5, l6, full, faint = 0, 0, 0, 0, 0, 0, 0, 0, 0
+        l7, l8, l9, l10 = 0, 0, 0, 0
         wait    period
 .period
 period: l0, l1, l2, l3 = count & 1, at_index & 1, indices & 1, errors & 1
         l4, l5, l6 = steps & 1, level, rises & 1
+        l7, l8, l9, l10 = sector & 1, broken, sectors & 1, jumps & 1
         full, faint = level << 16, level << 1
         wait    period
 ";
@@ -371,9 +394,10 @@ fn each_peripheral_keeps_its_stated_latency() {
         let bound = Part::sum("", end.parts.iter().chain(&way.between).chain(&out.parts));
         for (before, expected) in [(end.parts[0].best, bound.best), (end.parts[0].best - 1, bound.worst)] {
             // The pins are at rest long enough for every filter; the pulse of an index comes at an odd count, and then at an even count.
-            for pin in ["encoder_index", "stepper_step"] {
+            for pin in ["encoder_index", "stepper_step", "sensors_b", "sensors_c"] {
                 sim.set(pin, false);
             }
+            sim.set("sensors_a", true);
             match &*end.port {
                 "rises" => sim.set("switch_in", false),
                 "at_index" => turn(&mut sim, 1),
@@ -386,6 +410,9 @@ fn each_peripheral_keeps_its_stated_latency() {
                 // A turn of both pins at once counts as an error.
                 "errors" => turn(sim, 2),
                 "steps" => sim.set("stepper_step", true),
+                "sector" | "sectors" => sim.set("sensors_b", true),
+                // Without any pin the state is forbidden.
+                "broken" | "jumps" => sim.set("sensors_a", false),
                 "level" => {
                     let (_, level) = sim.inputs().find(|(name, _)| *name == "switch_in").expect("a pin");
                     sim.set("switch_in", !level);

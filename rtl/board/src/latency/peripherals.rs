@@ -166,7 +166,7 @@ fn edge_in(
         return Some((parts, until, Some(Sample::Window)));
     }
     let cycles = match (peripheral.kind.name, register) {
-        ("quadrature" | "step", _) => parameter(peripheral, "filter") + 3,
+        ("quadrature" | "step" | "hall", _) => parameter(peripheral, "filter") + 3,
         ("digital-in", "level") => parameter(peripheral, "hold") + 2,
         ("digital-in", _) => parameter(peripheral, "hold") + 3,
         _ => return None,

@@ -135,3 +135,78 @@ impl Model for DigitalIn {
         self.pin.clock(rst, high(inputs, 2) != self.invert);
     }
 }
+
+/// Time of a [`Hall`] at standstill.
+const STANDSTILL: u32 = i32::MAX as u32;
+
+/// Model of the circuit `takt_hall`.
+#[derive(Clone, Debug)]
+pub struct Hall {
+    pins: [Filter; 3],
+    /// Number of the last state that was not forbidden.
+    sector: Option<u32>,
+    fault: bool,
+    count: u32,
+    errors: u32,
+    /// Cycles since the last change, and between the last two.
+    times: [u32; 2],
+    taken: [u32; 5],
+}
+
+impl Hall {
+    /// Sensors with filters that pass levels of `filter` cycles.
+    pub fn new(filter: u32) -> Hall {
+        Hall {
+            pins: [(); 3].map(|()| Filter::new(filter)),
+            sector: None,
+            fault: false,
+            count: 0,
+            errors: 0,
+            times: [STANDSTILL; 2],
+            taken: [0, 0, 0, STANDSTILL, 0],
+        }
+    }
+}
+
+impl Model for Hall {
+    fn outputs(&self) -> Vec<u32> {
+        self.taken.to_vec()
+    }
+
+    fn clock(&mut self, inputs: &[u32]) {
+        let rst = high(inputs, 0);
+        let levels = [0, 1, 2].map(|i| u32::from(self.pins[i].level()));
+        if high(inputs, 1) {
+            let time = self.times[0].max(self.times[1]);
+            let sector = self.sector.unwrap_or(0);
+            self.taken = [sector, self.fault.into(), self.count, time, self.errors];
+        }
+        let now = [[1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 1, 1], [0, 0, 1], [1, 0, 1]]
+            .iter()
+            .zip(0..)
+            .find_map(|(state, sector)| (*state == levels).then_some(sector));
+        let mut times = [(self.times[0] + 1).min(STANDSTILL), self.times[1]];
+        match (self.sector, now) {
+            (Some(old), Some(new)) if old != new => {
+                times = [1, self.times[0]];
+                match (6 + new - old) % 6 {
+                    1 => self.count = self.count.wrapping_add(1),
+                    5 => self.count = self.count.wrapping_sub(1),
+                    _ => self.errors = self.errors.wrapping_add(1),
+                }
+            }
+            (_, None) if !self.fault => self.errors = self.errors.wrapping_add(1),
+            _ => {}
+        }
+        self.times = times;
+        self.fault = now.is_none();
+        self.sector = now.or(self.sector);
+        if rst {
+            let (pins, fault) = (self.pins.clone(), self.fault);
+            *self = Hall { pins, fault, ..Hall::new(1) };
+        }
+        for (i, pin) in self.pins.iter_mut().enumerate() {
+            pin.clock(rst, high(inputs, 2 + i));
+        }
+    }
+}

@@ -18,7 +18,7 @@ pub use biss_c::{BissC, BissFrame};
 pub use clocked::Model;
 pub use common::{Tick, UartReceive, UartSend};
 pub use filter::Filter;
-pub use inputs::{DigitalIn, Quadrature, Step};
+pub use inputs::{DigitalIn, Hall, Quadrature, Step};
 pub use motor::{Bridges, Carrier, Pwm3, Trip};
 pub use outputs::{DigitalOut, Pwm, SigmaDelta};
 pub use sinc3::{Sinc3, Windows};
@@ -73,6 +73,7 @@ pub fn of(kind: &Kind, parameters: &[u32]) -> Option<Box<dyn Model>> {
             fast: value(3) as usize,
             limit: value(4),
         })),
+        "hall" => Box::new(Hall::new(value(0))),
         "digital-in" => Box::new(DigitalIn::new(value(0), value(1) != 0)),
         "digital-out" => Box::new(DigitalOut::new(value(0) != 0)),
         _ => return None,

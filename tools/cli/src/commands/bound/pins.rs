@@ -55,8 +55,8 @@ pub(crate) fn run(
             );
         }
         let why = match application.is_program() {
-            true => "the wiring needs an input (quadrature, step, digital-in, ssi, biss-c, sinc3, or spi) and an output (pwm, pwm3, sigma-delta, digital-out) that are connected to ports, the second of which depends on the first".to_owned(),
-            false => format!("the links of {} lead from no input of the wiring (quadrature, step, digital-in, ssi, biss-c, sinc3, spi) to an output of it (pwm, sigma-delta, digital-out)", files::input_name(&arguments.file)),
+            true => "the wiring needs an input (quadrature, step, hall, digital-in, ssi, biss-c, sinc3, or spi) and an output (pwm, pwm3, sigma-delta, digital-out) that are connected to ports, the second of which depends on the first".to_owned(),
+            false => format!("the links of {} lead from no input of the wiring (quadrature, step, hall, digital-in, ssi, biss-c, sinc3, spi) to an output of it (pwm, sigma-delta, digital-out)", files::input_name(&arguments.file)),
         };
         bail!("{name}: no path from pin to pin: {why}");
     }
