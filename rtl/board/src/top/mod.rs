@@ -91,7 +91,7 @@ pub fn circuit<'a>(
     })
 }
 
-/// The files of carriers and trips that a wiring does not need.
+/// The files of carriers, filters and trips that a wiring does not need.
 fn unused(wiring: &Wiring) -> Vec<&'static str> {
     let has = |strobe: fn(&Strobes) -> bool| {
         wiring.peripherals.iter().any(|peripheral| strobe(&peripheral.kind.strobes))
@@ -101,6 +101,7 @@ fn unused(wiring: &Wiring) -> Vec<&'static str> {
         ("takt_align.v", wiring.tick.is_some()),
         ("takt_pwm3.v", has(|strobes| strobes.carrier)),
         ("takt_pwm_phase.v", has(|strobes| strobes.carrier)),
+        ("takt_sinc3.v", has(|strobes| strobes.window)),
         ("takt_trip.v", has(|strobes| strobes.trips)),
     ];
     needed.into_iter().filter(|(_, is_needed)| !is_needed).map(|(name, _)| name).collect()
