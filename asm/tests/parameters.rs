@@ -7,8 +7,11 @@ use takt_emu::{Emulator, Number, PortError};
 use takt_isa::program::ParameterError;
 use takt_isa::{F1, F3, Type};
 
-/// The value and the range of each parameter, in the order of declaration.
-fn parameters(text: &str) -> Vec<(String, u32, Option<(f64, f64)>)> {
+/// Name, bits at the start, and range of a parameter.
+type Found = (String, u32, Option<(f64, f64)>);
+
+/// The parameters of a source, in the order of declaration.
+fn parameters(text: &str) -> Vec<Found> {
     let program = good(text).program;
     let of = |port: &takt_isa::program::Port| {
         let range = program.range(port.register).map(takt_isa::program::Range::ends);

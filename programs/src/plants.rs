@@ -28,6 +28,9 @@ pub struct Parameter {
     pub positive: bool,
 }
 
+/// Time derivative of a state.
+type Derivative = fn(&[f64], f64, [f64; ORDER], &[f64]) -> [f64; ORDER];
+
 /// A plant with its parameters.
 #[derive(Debug)]
 pub struct Plant {
@@ -42,7 +45,7 @@ pub struct Plant {
     /// Parameters in the order in which the equations take them.
     pub parameters: &'static [Parameter],
     /// Time derivative of the state, from parameters, the time at which a step of integration begins, state and inputs.
-    derivative: fn(&[f64], f64, [f64; ORDER], &[f64]) -> [f64; ORDER],
+    derivative: Derivative,
     /// Sensor values of a state.
     sensors: fn([f64; ORDER]) -> Vec<f64>,
     /// Bound of the fastest motion, 1/s.

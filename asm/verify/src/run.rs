@@ -358,9 +358,15 @@ impl<'a> Side<'a> {
             Effect::Loop => {
                 let cut = self.loops.last().is_some_and(|(_, end)| *end > self.at && *end <= target);
                 let known = world.terms.constant_value(value);
-                let count = known.is_some_and(|count| count == 0 || count > u32::from(u16::MAX));
-                if cut || count || self.loops.len() >= machine.loop_depth as usize {
+                if cut || self.loops.len() >= machine.loop_depth as usize {
                     return Err(self.wrong(Some(operation), "starts a loop that the machine cannot execute"));
+                }
+                if known.is_some_and(|count| count == 0 || count > u32::from(u16::MAX)) {
+                    return Err(self.fault(
+                        operation,
+                        "starts a loop of no iteration, or of too many",
+                        world,
+                    ));
                 }
                 let bound = self.code.bounds.get(&next).map(|bound| bound.most);
                 match (known, bound) {

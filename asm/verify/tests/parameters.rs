@@ -5,12 +5,15 @@ use crate::common::{build, check, text};
 use takt_asm::{MemoryLoader, Options};
 use takt_isa::{Instruction, Program, T1, T3, T4, Type};
 
+/// A word of the refusal, and the change.
+type Change = (&'static str, fn(&mut Program));
+
 const SOURCE: &str = ".param kp = 2 range 0..50\n.param ki = 2 range 0..50\n.param n:int = 3\n.input x\n.output F, G, k:int\n.state s\n\
                       .once\n s = kp*ki\n wait p\n.period\np: F = kp*x + s\n G = ki*x\n k = n\n wait p\n";
 
 #[test]
 fn changed_parameters_are_refused_by_name() {
-    let changes: [(&str, fn(&mut Program)); 9] = [
+    let changes: [Change; 9] = [
         ("parameter", |program| program.parameters[0].name.push('_')),
         ("parameter", |program| program.parameters[2].ty = Type::F),
         ("parameter", |program| _ = program.parameters.pop()),

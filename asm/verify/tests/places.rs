@@ -203,6 +203,19 @@ fn paths_that_leave_an_array_end_there() {
     verified_unless_changed(source, &changes);
 }
 
+/// The check joins the iterations of the outer loop, and follows one that never comes: the inner loop would begin with the count 0, where
+/// the source faults.
+#[test]
+fn paths_that_begin_a_loop_of_no_iteration_end_there() {
+    let source = "\
+.schedule on\n.input x, m:int\n.output y\n.state s c:int\n.preset c = 0\n.preset s = 0.5\n.reg f g n:int b:int\n\
+.data\ntab: .float 1.0, -2.5\n.period\np: n = m & 1\n .for i, 1, n max 7\n .endfor\n .for i, 1, 4\n .endfor\n\
+ .for i, 6, 1 step -1 unroll 2\n .for j, 1, i\n iand b, m, 1\n bz b, skip\nskip:\n .endfor\n\
+ .for k, 1, i unroll 1\n n = c & 1\n ld g, tab+1\n f = ((x / (1.5 + abs(g))) * sat(s, 8.0))\n .endfor\n .endfor\n\
+ y = f\n wait p\n";
+    verified_unless_changed(source, &[["tab+1", "tab"], ["sat(s, 8.0)", "sat(s, 7.0)"], ["y = f", "y = g"]]);
+}
+
 /// The four copies of the inner loop have counts that differ by constants, so that a case of one decides all of them.
 #[test]
 fn counts_that_differ_by_constants_share_their_cases() {

@@ -410,6 +410,7 @@ impl Program {
 
     /// Parameters: name, type, bits at the start, and the range of the source.
     #[getter]
+    #[allow(clippy::type_complexity)]
     fn parameters(&self) -> Vec<(String, &'static str, u32, Option<(f64, f64)>)> {
         let parameter = |port: &Port| {
             let range = self.program.range(port.register).map(takt_isa::program::Range::ends);

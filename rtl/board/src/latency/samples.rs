@@ -51,7 +51,7 @@ fn framed(wiring: &Wiring, peripheral: &Peripheral, frame: &Frame) -> String {
     };
     let [least, most] = frame.cycles;
     let length = if least == most { cycles(most) } else { format!("{least} to {}", cycles(most)) };
-    let rate = rate(wiring, peripheral).map_or_else(String::new, |rate| significant(rate));
+    let rate = rate(wiring, peripheral).map_or_else(String::new, significant);
     format!("{instant}, by a frame of {length} at {rate} MHz")
 }
 

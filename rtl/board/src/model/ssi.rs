@@ -88,7 +88,7 @@ impl Ssi {
 
 impl Model for Ssi {
     fn outputs(&self) -> Vec<u32> {
-        let is_low = matches!(self.activity, Activity::Frame(at) if at / self.of.half % 2 == 0);
+        let is_low = matches!(self.activity, Activity::Frame(at) if (at / self.of.half).is_multiple_of(2));
         [u32::from(!is_low)].into_iter().chain(self.taken).collect()
     }
 
