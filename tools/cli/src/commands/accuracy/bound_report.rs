@@ -8,7 +8,7 @@ use anyhow::Result;
 use serde_json::{Value, json};
 use std::io::Write;
 use takt_analysis::accuracy::{
-    Converging, Enclosure, ErrorShare, Hazard, Interval, Moment, OutputBound, UnprovedRange,
+    Converging, Enclosure, ErrorShare, Hazard, Interval, Moment, OutputBound, Problem, UnprovedRange,
 };
 use takt_isa::program::Location;
 use takt_isa::{Program, Register, Type};
@@ -46,28 +46,26 @@ impl BoundReport<'_> {
 
     fn operands(&self, hazard: &Hazard) -> Vec<(String, Option<Interval>)> {
         let named = hazard.operands.iter();
-        named.map(|(register, range)| (self.operand_text(*register), *range)).collect()
+        named.map(|(register, range)| (self.operand_text(*register, hazard.problem), *range)).collect()
     }
 
     /// Name of an operand; for a literal, its value.
-    fn operand_text(&self, register: Register) -> String {
-        let bits = self.program.constants.iter().find(|(constant, _)| *constant == register);
-        match bits {
-            // Small integers are subnormal numbers as floats.
-            Some((_, bits)) if self.is_literal(register) && f32::from_bits(*bits).is_subnormal() => {
-                bits.cast_signed().to_string()
-            }
-            Some((_, bits)) if self.is_literal(register) => format!("{:?}", f32::from_bits(*bits)),
-            _ => self.program.register_text(register),
+    fn operand_text(&self, register: Register, problem: Problem) -> String {
+        let Some(bits) = self.program.initial(register).filter(|_| self.is_literal(register)) else {
+            return self.program.register_text(register);
+        };
+        // Small integers are subnormal numbers as floats.
+        let is_integer = matches!(problem, Problem::Wrap | Problem::Shift | Problem::Address);
+        match f32::from_bits(bits) {
+            value if is_integer || value.is_subnormal() => bits.cast_signed().to_string(),
+            value => format!("{value:?}"),
         }
     }
 
     /// The register holds a literal from the source.
     fn is_literal(&self, register: Register) -> bool {
-        let Program { constants, registers, inputs, outputs, .. } = self.program;
-        let mut named = registers.iter().chain(inputs).chain(outputs);
-        constants.iter().any(|(constant, _)| *constant == register)
-            && !named.any(|port| port.register == register)
+        let is_named = self.program.named_registers().any(|port| port.register == register);
+        self.program.initial(register).is_some() && !is_named
     }
 
     pub(super) fn json(&self) -> Value {
@@ -168,7 +166,8 @@ impl BoundReport<'_> {
             writeln!(out, "\nnot excluded (operations that depend on these are not examined)")?;
         }
         for hazard in &enclosure.hazards {
-            let shown = |(register, range): &(Register, Option<Interval>)| match self.operand_text(*register)
+            let shown = |(register, range): &(Register, Option<Interval>)| match self
+                .operand_text(*register, hazard.problem)
             {
                 literal if self.is_literal(*register) => literal,
                 name => format!("{name} in {}", interval(*range)),
