@@ -41,6 +41,13 @@ impl Ticks {
         *self = Ticks { every: self.every, ..Ticks::default() };
     }
 
+    /// Forgets all ticks: the machine waits since a cycle.
+    pub(crate) fn wait_since(&mut self, cycle: Cycle) {
+        self.reset();
+        self.waited = Some(cycle);
+        self.start(cycle);
+    }
+
     /// Cycle of the next tick.
     #[inline]
     pub(crate) fn next(&self) -> Option<Cycle> {

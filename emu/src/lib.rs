@@ -56,5 +56,5 @@ pub use event::{Event, PortWrite, Retire};
 pub use fault::{Fault, FaultDisplay, FaultKind, LoadError};
 pub use io::{LONGEST_TICK, Number, PeriodError, PeriodReport, PortError, Row, Rows};
 pub use machine::MAX_NAN_WRITES;
-pub use restore::{MachineState, Position};
+pub use restore::{MachineState, Position, WaitingState};
 pub use statistics::Statistics;

@@ -89,3 +89,68 @@ fn rejects_restoring_a_wait_without_a_wait_instruction() {
     assert!(emulator.restore(&MachineState { at: Position::Stopped(BundleAddress::new(2)), ..fresh }));
     assert!(matches!(emulator.status(), Status::Halted { .. }));
 }
+
+/// Periods of a run that goes on, beside one whose states are taken from another run before each period.
+#[test]
+fn resumed_emulator_continues_like_the_original() {
+    let (mut compared, mut nested) = (0, 0);
+    for seed in 0..80 {
+        let machine = MACHINES[seed as usize % MACHINES.len()];
+        let mut program = random_program(seed, machine, Options::TAME);
+        program.latched = seed % 3 == 0;
+        let mut random = Random::new(seed);
+        let (mut original, mut other) = (Emulator::new(&program).unwrap(), Emulator::new(&program).unwrap());
+        for port in input_ports(machine) {
+            original.set_input_bits(port, 0).unwrap();
+        }
+        for period in 0..6 {
+            let Ok(report) = original.run_period(&[]) else { break };
+            assert!(original.in_flight().next().is_none() || original.waiting_state().is_none());
+            drain(&mut original);
+            if period > 0 {
+                // The other machine has meanwhile gone on, into a later period or a fault.
+                let again = other.run_period(&[]).unwrap();
+                drain(&mut other);
+                assert_eq!(again.cycles, report.cycles, "seed {seed}, period {period}");
+                assert!(seen(&other) == seen(&original), "seed {seed}, period {period}");
+                assert_eq!(other.waiting_state(), original.waiting_state(), "seed {seed}, period {period}");
+                let _ = other.run_period(&[]);
+                compared += 1;
+            }
+            for port in input_ports(machine) {
+                original.set_input_bits(port, random.word()).unwrap();
+            }
+            let Some(state) = original.waiting_state() else { break };
+            nested += usize::from(!state.stack.is_empty() || !state.loops.is_empty());
+            assert!(other.resume(&state), "seed {seed}, period {period}");
+        }
+    }
+    assert!(compared > 150, "only {compared} periods were compared; {nested} within a call or loop");
+}
+
+#[test]
+fn rejects_states_of_other_programs() {
+    let program = random_program(2, MACHINES[0], Options::TAME);
+    let mut emulator = Emulator::new(&program).unwrap();
+    assert_eq!(emulator.waiting_state(), None);
+    for port in input_ports(MACHINES[0]) {
+        emulator.set_input_bits(port, 0).unwrap();
+    }
+    emulator.run_period(&[]).unwrap();
+    drain(&mut emulator);
+    let state = emulator.waiting_state().unwrap();
+    let before = seen(&emulator);
+    let past = BundleAddress::new(program.bundles());
+    let mut wrong = vec![state.clone(); 6];
+    wrong[0].at = past;
+    wrong[1].memory.pop();
+    wrong[2].turns.push(1);
+    wrong[3].loops.push((BundleAddress::RESET, BundleAddress::RESET, 0));
+    wrong[4].loops.push((BundleAddress::RESET, past, 1));
+    wrong[5].stack = vec![BundleAddress::RESET; 1000];
+    for (index, state) in wrong.iter().enumerate() {
+        assert!(!emulator.resume(state), "{index}");
+        assert!(seen(&emulator) == before, "{index}");
+    }
+    assert!(emulator.resume(&state));
+}
