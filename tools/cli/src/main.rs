@@ -61,6 +61,7 @@ enum Command {
     Accuracy(commands::accuracy::Accuracy),
     Eval(commands::eval::Eval),
     Fmt(commands::fmt::Fmt),
+    Fmu(commands::fmu::ToFmu),
     Lsp(commands::lsp::Lsp),
     Dap(commands::dap::Dap),
     Rtl(commands::rtl::Rtl),
@@ -79,7 +80,7 @@ impl Command {
     /// The results are tables and sentences, which are folded to the terminal's width. Other commands print sources, or are interactive.
     fn is_for_people(&self) -> bool {
         use Command::{
-            Accuracy, Analyse, Arm, Asm, Bound, Cosim, Explore, Isa, Machines, Robot, Run, Track, Verify,
+            Accuracy, Analyse, Arm, Asm, Bound, Cosim, Explore, Fmu, Isa, Machines, Robot, Run, Track, Verify,
         };
         matches!(
             self,
@@ -91,6 +92,7 @@ impl Command {
                 | Cosim(_)
                 | Isa(_)
                 | Explore(_)
+                | Fmu(_)
                 | Machines(_)
                 | Robot(_)
                 | Run(_)
@@ -117,6 +119,7 @@ fn run(arguments: &Arguments, color: bool, out: &mut Out) -> Result<()> {
         Command::Accuracy(accuracy) => commands::accuracy::run(accuracy, color, out),
         Command::Eval(eval) => commands::eval::run(eval, out),
         Command::Fmt(fmt) => commands::fmt::run(fmt, out),
+        Command::Fmu(fmu) => commands::fmu::run(fmu, color, out),
         Command::Lsp(lsp) => commands::lsp::run(lsp, color, out),
         Command::Dap(dap) => commands::dap::run(dap, color, out),
         Command::Rtl(rtl) => commands::rtl::run(rtl, color, out),

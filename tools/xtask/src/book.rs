@@ -57,7 +57,7 @@ const PARTS: &[(&str, &[&str])] = &[
     ("Start", &["first-controller", "tour", "coming-from", "what-fits", "examples", "figures"]),
     ("Writing programs", &["language", "editors", "playground", "library", "fast-code", "scheduling"]),
     ("Time and accuracy", &["analysis", "accuracy", "timing", "verify"]),
-    ("Running programs", &["debugging", "python", "plant", "mujoco", "batch", "traces"]),
+    ("Running programs", &["debugging", "python", "plant", "fmi", "mujoco", "batch", "traces"]),
     ("Programs from models and C", &["model", "models", "readers", "c"]),
     ("Motors and boards", &["motor", "power-stage", "board", "protocol", "linuxcnc"]),
     ("Several cores, your own design", &["system", "hardware", "headers", "image"]),

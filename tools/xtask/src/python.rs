@@ -11,7 +11,7 @@ use takt_automation::venv::{MODELS, Venv};
 /// Wheel builder, pinned. (`pip install .` would fetch another version.)
 pub(crate) const MATURIN: &str = "maturin==1.16.0";
 /// Packages of the Python tests, in addition to [`MODELS`].
-const TESTS: [&str; 5] = [
+const TESTS: [&str; 7] = [
     "numpy==2.4.6",
     "pytest==9.2.0",
     "mypy==2.4.1",
@@ -19,6 +19,9 @@ const TESTS: [&str; 5] = [
     "matplotlib==3.11.2",
     // Provides motor, bridge and carrier for the closed loop of `programs/servo`.
     "motulator==0.5.0",
+    // A master for FMUs, and a maker of others.
+    "fmpy==0.3.32",
+    "pythonfmu==0.7.0",
 ];
 
 #[derive(clap::Args)]

@@ -38,6 +38,7 @@ module!("model", model, Model by run);
 module!("model", cc, Cc by run);
 module!("editor", lsp, Lsp by run);
 module!("editor", dap, Dap by run);
+module!("fmu", fmu, ToFmu by run);
 module!("board", board, Boards by run);
 module!("board", live, LoadBoard by load, Live by live);
 module!("robot", robot, Robot by run);

@@ -19,6 +19,8 @@ pub(crate) mod disasm;
 pub(crate) mod eval;
 pub(crate) mod explore;
 pub(crate) mod fmt;
+#[cfg(feature = "fmu")]
+pub(crate) mod fmu;
 pub(crate) mod friction;
 pub(crate) mod isa;
 pub(crate) mod left_out;
@@ -39,6 +41,8 @@ pub(crate) mod run;
 pub(crate) mod track;
 pub(crate) mod verify;
 
+#[cfg(not(feature = "fmu"))]
+pub(crate) use left_out::fmu;
 #[cfg(not(feature = "robot"))]
 pub(crate) use left_out::robot;
 #[cfg(not(feature = "board"))]
