@@ -6,12 +6,11 @@ use crate::run::system::LoadedSystem;
 use crate::terminal::files;
 use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
-use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use takt_debug::{inputs, value};
+use takt_debug::inputs;
+use takt_isa::Program;
 use takt_isa::program::Port;
-use takt_isa::{Program, Type};
 use toml::Value;
 
 /// Largest file of parameters, in bytes.
@@ -101,7 +100,7 @@ pub(crate) fn read(path: &Path) -> Result<Vec<(String, String)>> {
 }
 
 /// Names and texts of values in the text of a file of parameters.
-fn parse(name: &str, text: &str) -> Result<Vec<(String, String)>> {
+pub(crate) fn parse(name: &str, text: &str) -> Result<Vec<(String, String)>> {
     let table: toml::Table = toml::from_str(text).map_err(|error| anyhow!("{name}: {error}"))?;
     let mut settings = Vec::new();
     let mut put = |parameter: String, value: &Value| {
@@ -124,39 +123,4 @@ fn parse(name: &str, text: &str) -> Result<Vec<(String, String)>> {
         }
     }
     Ok(settings)
-}
-
-/// A line of a file of parameters. Bits are written as text, which TOML's integers would not hold in hexadecimal.
-pub(crate) fn line(name: &str, ty: Type, bits: u32) -> String {
-    let mut line = String::new();
-    // `K[1,2]` is no bare key.
-    let bare = name.chars().all(|c| c.is_ascii_alphanumeric() || matches!(c, '_' | '.'));
-    let quote = if bare { "" } else { "\"" };
-    let value = value::text(ty, bits);
-    let value = if ty == Type::B { format!("\"{value}\"") } else { value };
-    let _ = writeln!(line, "{quote}{name}{quote} = {value}");
-    line
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn lines_read_back_as_the_same_bits() {
-        let values = [
-            ("kp", Type::F, 0.1f32.to_bits()),
-            ("K[1,2]", Type::F, (-1.5e-42f32).to_bits()),
-            ("n", Type::I, (-7i32).cast_unsigned()),
-            ("mask", Type::B, 0xffff_fff0),
-            ("servo.ki", Type::F, 3.0f32.to_bits()),
-        ];
-        let text: String = values.iter().map(|(name, ty, bits)| line(name, *ty, *bits)).collect();
-        let read = parse("p.toml", &text).expect("it is TOML");
-        assert_eq!(read.len(), values.len());
-        for (name, ty, expected) in values {
-            let (_, text) = read.iter().find(|(known, _)| known == name).expect(name);
-            assert_eq!(inputs::parse(ty, text), Ok(expected), "{name} = {text}");
-        }
-    }
 }

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Subcommand `param` of `takt live`: shows, sets, saves and loads the parameters of a program on a board.
 
-use crate::run::parameters::{ParameterArguments, bits, line};
+use crate::run::parameters::{ParameterArguments, bits};
 use crate::terminal::files::Out;
 use anyhow::{Result, anyhow, bail};
+use std::fmt::Write as _;
 use std::io::Write;
 use std::path::Path;
 use takt_board::protocol::{LinkError, WORDS};
@@ -112,4 +113,41 @@ pub(super) fn run(
         }
     }
     Ok(())
+}
+
+/// A line of a file of parameters. Bits are written as text, which TOML's integers would not hold in hexadecimal.
+fn line(name: &str, ty: Type, bits: u32) -> String {
+    let mut line = String::new();
+    // `K[1,2]` is no bare key.
+    let bare = name.chars().all(|c| c.is_ascii_alphanumeric() || matches!(c, '_' | '.'));
+    let quote = if bare { "" } else { "\"" };
+    let value = value::text(ty, bits);
+    let value = if ty == Type::B { format!("\"{value}\"") } else { value };
+    let _ = writeln!(line, "{quote}{name}{quote} = {value}");
+    line
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::run::parameters::parse;
+    use takt_debug::inputs;
+
+    #[test]
+    fn lines_read_back_as_the_same_bits() {
+        let values = [
+            ("kp", Type::F, 0.1f32.to_bits()),
+            ("K[1,2]", Type::F, (-1.5e-42f32).to_bits()),
+            ("n", Type::I, (-7i32).cast_unsigned()),
+            ("mask", Type::B, 0xffff_fff0),
+            ("servo.ki", Type::F, 3.0f32.to_bits()),
+        ];
+        let text: String = values.iter().map(|(name, ty, bits)| line(name, *ty, *bits)).collect();
+        let read = parse("p.toml", &text).expect("it is TOML");
+        assert_eq!(read.len(), values.len());
+        for (name, ty, expected) in values {
+            let (_, text) = read.iter().find(|(known, _)| known == name).expect(name);
+            assert_eq!(inputs::parse(ty, text), Ok(expected), "{name} = {text}");
+        }
+    }
 }
