@@ -79,7 +79,7 @@ class Program:
         settings = []
         for name, value in mapping_of("values", values).items():
             if name not in self.parameters:
-                raise ValueError(f"the program has no parameter `{name}`{near(name, self.parameters)}")
+                raise ValueError(f"the program has no parameter `{name}`{near(name, list(self.parameters))}")
             settings.append((name, word_of(name, value, self.parameters[name])))
         return Program(
             self._core.with_parameters(settings), self.input_arrays, self.output_arrays, self.model, self._data

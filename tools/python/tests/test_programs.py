@@ -1,6 +1,7 @@
 """Programs: assembled, run over arrays, in batches, stepped, bounded, and what is said of mistakes."""
 
 import os
+import pickle
 from pathlib import Path
 
 import numpy as np
@@ -403,3 +404,27 @@ def test_paths_of_bytes(tmp_path):
     for include in [str(tmp_path), parts, tmp_path]:
         with pytest.raises(TypeError, match="include is a list of folders"):
             takt.load(path, include=include)
+
+
+def test_parameters() -> None:
+    """Parameters have a value and a range, and change between two periods."""
+    law = takt.assemble(
+        ".param kp = 2.0 range 0..50\n.param n:int = 3\n.input x\n.output y, k:int\n.period\np: y = kp*x\n k = n\n wait p\n"
+    )
+    assert law.parameters["kp"].value == 2.0 and law.parameters["kp"].limits == (0.0, 50.0)
+    assert law.parameters["n"].value == 3 and law.parameters["n"].limits is None
+    tuned = law.with_parameters({"kp": 4, "n": -1})
+    assert (tuned.parameters["kp"].value, law.parameters["kp"].value) == (4.0, 2.0)
+    assert tuned.run({"x": [1.0]}).outputs["y"].tolist() == [4.0]
+    restored = pickle.loads(pickle.dumps(tuned))
+    assert restored.parameters["n"].value == -1
+    sim = tuned.sim()
+    assert sim.step({"x": 1.0}) == {"y": 4.0, "k": -1}
+    assert sim.step({"kp": 0.5}) == {"y": 0.5, "k": -1}
+    assert sim.step() == {"y": 0.5, "k": -1}, "it keeps its value"
+    with pytest.raises(ValueError, match="51 is no value of the parameter `kp`"):
+        sim.step({"kp": 51})
+    with pytest.raises(ValueError, match="no parameter `kq`; did you mean `kp`"):
+        law.with_parameters({"kq": 1})
+    with pytest.raises(ValueError, match="the source states the range 0 to 50"):
+        law.with_parameters({"kp": -1})
