@@ -118,8 +118,7 @@ impl<'p> Writer<'p> {
         }
         for Port { name, register, ty } in parameters {
             let (suffix, place) = (type_suffix(*ty), self.place(*register));
-            let bits =
-                constants.iter().find(|constant| constant.0 == *register).map_or(0, |constant| constant.1);
+            let bits = self.program.initial(*register).unwrap_or(0);
             self.line(format_args!(".param  {name}{suffix} @ {place} = {}", value_text(*ty, bits)));
         }
         let is_parameter = |register| parameters.iter().any(|port| port.register == register);

@@ -289,7 +289,7 @@ fn compare_constants(
             let same = |other: &&PlainRegister| known.pinned.is_some() && other.pinned == known.pinned;
             plain.registers.iter().filter(same).find_map(|other| other.preset)
         });
-        let found = constants.iter().find(|constant| constant.0 == place).map(|constant| constant.1);
+        let found = program.initial(place);
         // If an operation writes the register, the loader may preset a constant of `once` there; the tick compares its value.
         if said != found && !written.contains(&id) {
             let text = |bits: Option<u32>| bits.map(|bits| format!("0x{bits:08x}"));

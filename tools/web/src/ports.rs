@@ -125,8 +125,8 @@ fn saturated(
     match instruction.op.row().mnemonic {
         "fsat" => {
             let limit = *instruction.reads().get(1)?;
-            let (_, bits) = program.constants.iter().find(|(register, _)| *register == limit)?;
-            Some(f32::from_bits(*bits).abs()).filter(|limit| limit.is_finite())
+            let bits = program.initial(limit)?;
+            Some(f32::from_bits(bits).abs()).filter(|limit| limit.is_finite())
         }
         "mov" if copies > 0 => {
             let source = *instruction.reads().first()?;

@@ -431,10 +431,7 @@ impl<'m> Checker<'m> {
             (None, None) => Type::B,
         };
         let initial = match (&from.port, ends.0) {
-            (Some(port), End::Core(number)) => {
-                let constants = &self.cores[number].program.constants;
-                constants.iter().find(|(register, _)| *register == port.register).map_or(0, |(_, bits)| *bits)
-            }
+            (Some(port), End::Core(number)) => self.cores[number].program.initial(port.register).unwrap_or(0),
             _ => 0,
         };
         let register = |found: &EndPort| found.port.as_ref().map(|port| port.register);
