@@ -178,48 +178,10 @@ extern "C" fn fmi2SetInteger(
     })
 }
 
-#[unsafe(no_mangle)]
-extern "C" fn fmi2GetFMUstate(component: Component, state: Out<State>) -> Status {
-    call(&component, |handle| state.hand_over(handle.instance.save()?))
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2SetFMUstate(component: Component, state: State) -> Status {
-    call(&component, |handle| handle.instance.restore(state.read()?))
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2FreeFMUstate(component: Component, state: Out<State>) -> Status {
-    call(&component, |_| {
-        state.free();
-        Ok(())
-    })
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2SerializedFMUstateSize(component: Component, state: State, size: Out<usize>) -> Status {
-    super::serialised_size(&component, state, &size)
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2SerializeFMUstate(
-    component: Component,
-    state: State,
-    bytes: Out<u8>,
-    size: usize,
-) -> Status {
-    super::serialise(&component, state, &bytes, size)
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2DeSerializeFMUstate(
-    component: Component,
-    bytes: In<u8>,
-    size: usize,
-    state: Out<State>,
-) -> Status {
-    call(&component, |handle| state.hand_over(handle.instance.state_from_bytes(bytes.read(size)?)?))
-}
+states!(
+    fmi2GetFMUstate fmi2SetFMUstate fmi2FreeFMUstate fmi2SerializedFMUstateSize
+    fmi2SerializeFMUstate fmi2DeSerializeFMUstate
+);
 
 #[unsafe(no_mangle)]
 extern "C" fn fmi2DoStep(component: Component, time: f64, size: f64, _no_return: c_int) -> Status {

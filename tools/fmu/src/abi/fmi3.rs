@@ -116,7 +116,7 @@ extern "C" fn fmi3Reset(component: Component) -> Status {
     })
 }
 
-/// As many values as variables: none is an array.
+/// Checks that each variable has one value: none is an array.
 fn same(count: usize, values: usize) -> Result<(), Mistake> {
     match count == values {
         true => Ok(()),
@@ -189,48 +189,10 @@ no_variables!(
     fmi3GetClock fmi3SetClock
 );
 
-#[unsafe(no_mangle)]
-extern "C" fn fmi3GetFMUState(component: Component, state: Out<State>) -> Status {
-    call(&component, |handle| state.hand_over(handle.instance.save()?))
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi3SetFMUState(component: Component, state: State) -> Status {
-    call(&component, |handle| handle.instance.restore(state.read()?))
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi3FreeFMUState(component: Component, state: Out<State>) -> Status {
-    call(&component, |_| {
-        state.free();
-        Ok(())
-    })
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi3SerializedFMUStateSize(component: Component, state: State, size: Out<usize>) -> Status {
-    super::serialised_size(&component, state, &size)
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi3SerializeFMUState(
-    component: Component,
-    state: State,
-    bytes: Out<u8>,
-    size: usize,
-) -> Status {
-    super::serialise(&component, state, &bytes, size)
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi3DeserializeFMUState(
-    component: Component,
-    bytes: In<u8>,
-    size: usize,
-    state: Out<State>,
-) -> Status {
-    call(&component, |handle| state.hand_over(handle.instance.state_from_bytes(bytes.read(size)?)?))
-}
+states!(
+    fmi3GetFMUState fmi3SetFMUState fmi3FreeFMUState fmi3SerializedFMUStateSize
+    fmi3SerializeFMUState fmi3DeserializeFMUState
+);
 
 #[unsafe(no_mangle)]
 extern "C" fn fmi3DoStep(

@@ -26,6 +26,49 @@ macro_rules! refused {
     };
 }
 
+/// Functions for states, under the names of a version of the standard: get, set, free, size in bytes, to bytes, from bytes.
+macro_rules! states {
+    ($get:ident $set:ident $free:ident $size:ident $to_bytes:ident $from_bytes:ident) => {
+        #[unsafe(no_mangle)]
+        extern "C" fn $get(component: Component, state: Out<State>) -> Status {
+            call(&component, |handle| state.hand_over(handle.instance.save()?))
+        }
+
+        #[unsafe(no_mangle)]
+        extern "C" fn $set(component: Component, state: State) -> Status {
+            call(&component, |handle| handle.instance.restore(state.read()?))
+        }
+
+        #[unsafe(no_mangle)]
+        extern "C" fn $free(component: Component, state: Out<State>) -> Status {
+            call(&component, |_| {
+                state.free();
+                Ok(())
+            })
+        }
+
+        #[unsafe(no_mangle)]
+        extern "C" fn $size(component: Component, state: State, size: Out<usize>) -> Status {
+            crate::abi::serialised_size(&component, state, &size)
+        }
+
+        #[unsafe(no_mangle)]
+        extern "C" fn $to_bytes(component: Component, state: State, bytes: Out<u8>, size: usize) -> Status {
+            crate::abi::serialise(&component, state, &bytes, size)
+        }
+
+        #[unsafe(no_mangle)]
+        extern "C" fn $from_bytes(
+            component: Component,
+            bytes: In<u8>,
+            size: usize,
+            state: Out<State>,
+        ) -> Status {
+            call(&component, |handle| state.hand_over(handle.instance.state_from_bytes(bytes.read(size)?)?))
+        }
+    };
+}
+
 mod fmi2;
 mod fmi3;
 mod raw;
