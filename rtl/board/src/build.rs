@@ -266,7 +266,7 @@ fn placed(
             if all.len() > 1 {
                 step(&format!("seed {}: {:.1} MHz", found.seed, ratio(&found) * wiring.clock));
             }
-            // Of equals, the first: the result does not depend on the processors.
+            // The first of equal placements is kept: the result does not depend on the processors.
             if best.as_ref().is_none_or(|best| ratio(&found) > ratio(best) && ratio(best) < 1.0) {
                 best = Some(found);
             }

@@ -160,7 +160,7 @@ fn a_biss_position_arrives_as_the_bound_says() {
     assert_eq!(findings(BISS), Findings::default());
     let path = path(&wiring);
     let total = path.total().expect("an edge");
-    // However long the line delays the frame, the tick after the longest one reads it.
+    // The tick comes after the longest frame, whatever the line's delay.
     assert_eq!((path.inputs[0].parts[0].best, path.inputs[0].sample), (147, Some(Sample::Frame)));
     assert_eq!(total.best, total.worst, "jitter 0");
     let texts: Vec<String> = samples(&wiring).into_iter().map(|sampling| sampling.text).collect();

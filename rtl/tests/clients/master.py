@@ -6,7 +6,7 @@ import cocotb
 from cocotb.clock import Clock
 from cocotb.triggers import ReadOnly, RisingEdge, Timer
 
-# Of the clock.
+# Frequency of the clock, in MHz.
 MHZ = 62.5
 
 

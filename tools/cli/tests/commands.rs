@@ -1017,7 +1017,7 @@ fn accuracy_shows_literals_by_their_values() {
     assert_eq!(done.status, Some(1));
     assert!(done.stdout.contains("6:8-22: the divisor may be zero: 0.3, "), "{}", done.stdout);
     assert!(!done.stdout.contains("x14"), "{}", done.stdout);
-    // Of a sum of integers, literals are integers; a parameter has its name.
+    // Literals in a sum of integers are integers; a parameter has its name.
     folder.write(
         "sum.s",
         ".param n:int = 2 range 0..3\n.output k:int\n.period\np: k = n + 2147483647\n wait p\n",

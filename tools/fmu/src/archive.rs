@@ -24,7 +24,7 @@ pub enum ArchiveError {
     Write(#[from] std::io::Error),
 }
 
-/// What goes into an FMU.
+/// Contents of an FMU.
 #[derive(Clone, Copy, Debug)]
 pub struct Fmu<'a> {
     /// Program and settings.

@@ -259,7 +259,7 @@ impl Instance {
     /// Sets an input or a parameter that carries binary32 to a binary64 number, rounded to nearest.
     ///
     /// # Errors
-    /// As of [`Instance::set`], and for a finite number that binary32 does not reach.
+    /// The errors of [`Instance::set`], and a finite number that binary32 does not reach.
     #[inline]
     pub fn set_real(&mut self, reference: u32, value: f64) -> Result<(), Mistake> {
         let rounded = value as f32;

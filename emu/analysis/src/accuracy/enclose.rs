@@ -42,7 +42,7 @@ pub fn enclose(program: &Program) -> Result<Enclosure, BoundError> {
 /// Encloses the results like [`enclose`]; loops of more than `unrolled` bundles, iterations included, are summarised.
 ///
 /// # Errors
-/// As those of [`enclose`].
+/// The errors of [`enclose`].
 pub fn enclose_within(program: &Program, unrolled: u64) -> Result<Enclosure, BoundError> {
     let mut stored = BTreeSet::new();
     loop {

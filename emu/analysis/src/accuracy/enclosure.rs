@@ -47,9 +47,9 @@ pub struct Hazard {
 /// Promised range of a state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum StateRange {
-    /// Of a register.
+    /// Range of a register.
     Register(Range),
-    /// Of every word of an array in data memory.
+    /// Range of every word of an array in data memory.
     Array(ArrayRange),
 }
 
