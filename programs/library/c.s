@@ -69,4 +69,60 @@
         q1 = a1*b1
         d = ftoi(p0) + (ftoi(p1) << 11) + ((ftoi(p2) + ftoi(q1)) << 22)
 .endm
+
+; ---- Quotients ----------------------------------------------------------------------------------------------------------------
+
+; a/b of integers from -2^24 to 2^24, truncated: between a/b and the next integer lies a float, so that none is rounded to it.
+.macro  quotient_short d:int, a:int, b:int
+        d = to_int(itof(a)/itof(b))
+.endm
+
+; n + 1, n or n - 1: the one whose remainder has the sign of a. The remainder of n by b is rest, at most b in size.
+.macro  truncated d:int, n:int, rest:int, a:int, b:int
+.reg    beyond:int same:int
+        beyond = a < 0 ? rest > 0 : rest < 0
+        same = xor(rest, b) >= 0
+        d = n + (beyond & same) - (beyond & !same)
+.endm
+
+; a/b of integers, truncated. The floats' quotient is off by 385 at most, which the rest's quotient mends but for one; the factor keeps
+; 2^31 out of ftoi's operand.
+.macro  quotient d:int, a:int, b:int
+.reg    y near:int rest:int step:int
+        y = itof(b)
+        near = ftoi(0.9999999*itof(a)/y)
+        rest = a - product(near, b)
+        step = ftoi(itof(rest)/y)
+        d = truncated(near + step, rest - product(step, b), a, b)
+.endm
+
+; The same by a number b, neither 0, 1 nor -1, whose inverse is given.
+.macro  quotient_by d:int, a:int, b:int, inverse:float
+.reg    near:int rest:int step:int
+        near = ftoi(inverse*itof(a))
+        rest = a - near*b
+        step = ftoi(inverse*itof(rest))
+        d = truncated(near + step, rest - step*b, a, b)
+.endm
+
+; The same for a from -2^22 to 2^22: the nearest integer is off by one at most.
+.macro  quotient_short_by d:int, a:int, b:int, inverse:float
+.reg    near:int
+        near = ftoi(inverse*itof(a))
+        d = truncated(near, a - near*b, a, b)
+.endm
+
+; a/b of integers from 0 to 2^32 - 1: twice the quotient of a/2, and one more if the rest has b in it. From 2^31 on b fits once or not.
+.macro  quotient_unsigned d:int, a:int, b:int
+.reg    half:int
+        half = quotient(shift_right(a, 1), b) << 1
+        d = b < 0 ? !below(a, b) : half + !below(a - product(half, b), b)
+.endm
+
+; The same by a number b from 2 to 2^31 - 1, whose inverse is given.
+.macro  quotient_unsigned_by d:int, a:int, b:int, inverse:float
+.reg    half:int
+        half = quotient_by(shift_right(a, 1), b, inverse) << 1
+        d = half + !below(a - half*b, b)
+.endm
 ; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -43,8 +43,10 @@ operations! {
     Fmod Float; Floor Float; Ceil Float; Trunc Float; Round Float; Rint Float;
     Equal Int; Less Int; LessEqual Int;
     IntAdd Int; IntSub Int; IntMul Int;
-    #[doc = "Quotient by a power of two, as in C."]
+    #[doc = "Quotient of signed integers, truncated."]
     IntDiv Int;
+    #[doc = "Quotient of unsigned integers by one that is no power of two."]
+    UnsignedDiv Int;
     #[doc = "Remainder by a power of two, as in C."]
     IntRem Int;
     And Int; Or Int; Xor Int;

@@ -58,16 +58,48 @@ pub struct Translation {
     pub outputs: Vec<Port>,
 }
 
+/// A function that the sources define, and the result of its translation as the step.
+#[derive(Clone, Debug)]
+pub struct Candidate {
+    /// Name of the function.
+    pub name: String,
+    /// Its file and line.
+    pub file: String,
+    /// Line of its definition.
+    pub line: usize,
+    /// The program, or the reason why there is none.
+    pub translation: Result<Translation, Error>,
+}
+
 /// Translates C.
 ///
 /// # Errors
 /// If the text is not supported C: with file, line, reason and remedy.
 pub fn translate(sources: &[Source], options: &Options) -> Result<Translation, Error> {
-    // Execution recurses with the nesting of the C: on a stack of its own.
+    on_own_stack(|| translated(&units(sources)?, options))
+}
+
+/// Tries every function that the sources themselves define (not their includes) as the step; `options.step` is not read.
+///
+/// # Errors
+/// If a source cannot be read as C. A function that is refused is no error of the list.
+pub fn candidates(sources: &[Source], options: &Options) -> Result<Vec<Candidate>, Error> {
+    let units = on_own_stack(|| units(sources))?;
+    let mut candidates = Vec::new();
+    for unit in &units {
+        for (name, line) in unit.functions() {
+            let options = Options { step: name.clone(), ..options.clone() };
+            let translation = on_own_stack(|| translated(&units, &options));
+            candidates.push(Candidate { name, file: unit.files[0].clone(), line, translation });
+        }
+    }
+    Ok(candidates)
+}
+
+/// Parsing and execution recurse with the nesting of the C: on a stack of their own.
+fn on_own_stack<T: Send>(work: impl FnOnce() -> Result<T, Error> + Send) -> Result<T, Error> {
     std::thread::scope(|scope| {
-        let thread = std::thread::Builder::new()
-            .stack_size(STACK)
-            .spawn_scoped(scope, || translated(sources, options));
+        let thread = std::thread::Builder::new().stack_size(STACK).spawn_scoped(scope, work);
         match thread {
             Ok(thread) => thread
                 .join()
@@ -77,14 +109,14 @@ pub fn translate(sources: &[Source], options: &Options) -> Result<Translation, E
     })
 }
 
-fn translated(sources: &[Source], options: &Options) -> Result<Translation, Error> {
-    let mut units = Vec::new();
-    for source in sources {
-        units.push(Unit::read(&source.name, &source.text)?);
-    }
+fn units(sources: &[Source]) -> Result<Vec<Unit>, Error> {
+    sources.iter().map(|source| Unit::read(&source.name, &source.text)).collect()
+}
+
+fn translated(units: &[Unit], options: &Options) -> Result<Translation, Error> {
     let mut facts = Facts::default();
     for _ in 0..MAX_ROUNDS {
-        let mut exec = Exec::new(&units, options.double_is_float, facts);
+        let mut exec = Exec::new(units, options.double_is_float, facts);
         match round(&mut exec, options) {
             Err(error) if !exec.again => return Err(error),
             Ok(Some(translation)) if !exec.again => return Ok(translation),

@@ -82,6 +82,9 @@ fn bits(value: &Value) -> Option<u32> {
 impl Exec<'_> {
     /// The function with a name, in any file.
     pub(super) fn entry(&self, name: &str, option: &str) -> Result<(String, Rc<Signature>), Error> {
+        if let Some(reason) = self.scopes.iter().find_map(|scope| scope.refused.get(name)) {
+            return Err(reason.clone());
+        }
         let mut keys: Vec<&String> =
             self.functions.keys().filter(|key| super::exec::plain(key) == name).collect();
         keys.sort();
@@ -233,9 +236,7 @@ impl Exec<'_> {
                 }
                 self.start(object, leaf, &value, &mut starts)?;
             }
-            if found.origin != Origin::Parameter {
-                self.settle(object)?;
-            }
+            self.settle(object)?;
             if let Some(array) = self.objects[object].array {
                 self.fill(object, array)?;
             }

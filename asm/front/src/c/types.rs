@@ -137,12 +137,17 @@ impl Structs {
         }
     }
 
-    /// Sets members, their places, and the size.
-    pub(super) fn complete(&mut self, index: usize, members: Vec<(Option<String>, Type)>) {
+    /// Sets members, their places, and the size; `most` is the largest alignment of a packed structure's members.
+    pub(super) fn complete(
+        &mut self,
+        index: usize,
+        members: Vec<(Option<String>, Type)>,
+        most: Option<usize>,
+    ) {
         let union = self.0[index].union;
         let (mut offset, mut size, mut align, mut fields) = (0_usize, 0, 1, Vec::new());
         for (name, ty) in members {
-            let own = self.align(&ty);
+            let own = self.align(&ty).min(most.unwrap_or(usize::MAX));
             offset = if union { 0 } else { offset.next_multiple_of(own) };
             let length = self.size(&ty).unwrap_or(0);
             fields.push(Field { name, ty, offset });

@@ -2,8 +2,11 @@
 //! A translation unit: preprocessed text, its tree, and the places of its lines in the files.
 
 use crate::Error;
-use lang_c::ast::TranslationUnit;
+use lang_c::ast::{Declarator, DeclaratorKind, ExternalDeclaration, TranslationUnit};
 use lang_c::driver::{Config, Flavor, parse_preprocessed};
+use std::collections::HashMap;
+
+mod packing;
 
 /// Maximum nesting depth of parentheses and braces: the parser recurses.
 const MAX_NESTING: usize = 200;
@@ -18,6 +21,8 @@ pub(super) struct Unit {
     pub(super) files: Vec<String>,
     /// Bounds of loops with the offsets of their pragmas.
     pub(super) bounds: Vec<(usize, u64)>,
+    /// Structures whose members lie closer than their types ask, by the offsets of `struct` or `union`, with the largest alignment.
+    pub(super) packed: HashMap<usize, usize>,
     /// Preprocessed text, for lines of files that are not available.
     text: String,
 }
@@ -29,6 +34,7 @@ impl Unit {
             return Err(Error::plain(format!("{name}: more than {MAX_TEXT} bytes after preprocessing")));
         }
         let (mut files, mut lines, mut bounds) = (vec![name.to_owned()], Vec::new(), Vec::new());
+        let mut packs = packing::Packs::default();
         let (mut file, mut line, mut offset, mut clean) = (0, 1, 0, String::with_capacity(text.len()));
         for row in text.split_inclusive('\n') {
             let plain = row.trim();
@@ -42,12 +48,14 @@ impl Unit {
                         files.len() - 1
                     });
                 } else if let Some(rest) = rest.trim_start().strip_prefix("pragma") {
-                    pragma(rest, offset, &mut bounds).map_err(|text| Error {
-                        file: Some(files[file].clone()),
-                        line: Some(line - 1),
-                        text,
-                        place: None,
-                    })?;
+                    pragma(rest, offset, &mut bounds).and_then(|()| packs.pragma(rest, offset)).map_err(
+                        |text| Error {
+                            file: Some(files[file].clone()),
+                            line: Some(line - 1),
+                            text,
+                            place: None,
+                        },
+                    )?;
                 }
                 // Blanks in place of directives, which the parser does not take everywhere.
                 clean.extend(
@@ -61,10 +69,12 @@ impl Unit {
             }
             offset += row.len();
         }
-        let unit = Unit { tree: TranslationUnit(Vec::new()), lines, files, bounds, text: clean.clone() };
+        let tree = TranslationUnit(Vec::new());
+        let mut unit = Unit { tree, lines, files, bounds, packed: HashMap::new(), text: clean };
         unit.nesting()?;
+        unit.packed = packing::packed(&mut unit.text, &packs);
         let config = Config { cpp_command: String::new(), cpp_options: Vec::new(), flavor: Flavor::GnuC11 };
-        match parse_preprocessed(&config, clean) {
+        match parse_preprocessed(&config, unit.text.clone()) {
             Ok(parse) => Ok(Unit { tree: parse.unit, ..unit }),
             Err(error) => {
                 let found: String = unit.text[error.offset.min(unit.text.len())..]
@@ -108,6 +118,21 @@ impl Unit {
         }
     }
 
+    /// Functions that the file itself defines, with their lines.
+    pub(super) fn functions(&self) -> Vec<(String, usize)> {
+        let mut found = Vec::new();
+        for external in &self.tree.0 {
+            let (file, line) = self.line(external.span.start);
+            if let ExternalDeclaration::FunctionDefinition(definition) = &external.node
+                && file == self.files[0]
+                && let Some(name) = declared_name(&definition.node.declarator.node)
+            {
+                found.push((name.to_owned(), line));
+            }
+        }
+        found
+    }
+
     /// Only blanks stand between a pragma's line and a place.
     pub(super) fn between(&self, pragma: usize, place: usize) -> bool {
         self.text.get(pragma..place).is_some_and(|text| text.trim().is_empty())
@@ -124,6 +149,15 @@ impl Unit {
     pub(super) fn error(&self, offset: usize, text: impl Into<String>) -> Error {
         let (file, line) = self.line(offset);
         Error { file: Some(file.to_owned()), line: Some(line), text: text.into(), place: None }
+    }
+}
+
+/// The name that a declarator declares.
+pub(super) fn declared_name(declarator: &Declarator) -> Option<&str> {
+    match &declarator.kind.node {
+        DeclaratorKind::Identifier(name) => Some(&name.node.name),
+        DeclaratorKind::Declarator(inner) => declared_name(&inner.node),
+        DeclaratorKind::Abstract => None,
     }
 }
 

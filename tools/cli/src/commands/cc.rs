@@ -7,7 +7,7 @@ use crate::terminal::progress::DelayedActivity;
 use anyhow::{Result, anyhow};
 use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
-use takt_front::c::{Options, Preprocessor, translate};
+use takt_front::c::{Candidate, Options, Preprocessor, candidates, translate};
 
 /// Turn a step function in C into a program: a period is one call.
 ///
@@ -21,8 +21,14 @@ pub(crate) struct Cc {
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
     /// The function that a period calls.
-    #[arg(long, value_name = "NAME")]
-    step: String,
+    #[arg(long, value_name = "NAME", required_unless_present = "list")]
+    step: Option<String>,
+    /// Try every function of the files as the step, and list which are translated and why the others are not.
+    #[arg(long, conflicts_with_all = ["step", "output"])]
+    list: bool,
+    /// Print the list as JSON.
+    #[arg(long, requires = "list")]
+    json: bool,
     /// The function that sets the states before the first period; it takes pointers to the same structures.
     #[arg(long, value_name = "NAME")]
     init: Option<String>,
@@ -44,6 +50,7 @@ const EXAMPLES: &str = "\
 Examples:
   takt cc pid.c --step pid_step --init pid_init -o pid.s
   takt bound pid.s                                  what it makes is a program
+  takt cc pid.c --list                              which functions can be the step
   takt cc foc.c math.c --step foc --double=float -I inc -DNDEBUG -o foc.s";
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -51,7 +58,7 @@ enum Double {
     Float,
 }
 
-pub(crate) fn run(arguments: &Cc, _: bool, _: &mut Out) -> Result<()> {
+pub(crate) fn run(arguments: &Cc, _: bool, out: &mut Out) -> Result<()> {
     let inputs: Vec<OptionPath<'_>> = arguments.files.iter().map(|file| ("FILE", file.as_path())).collect();
     files::check(&inputs, &[("--output", arguments.output.as_path())])?;
     if arguments.files.iter().any(|file| files::is_dash(file)) {
@@ -72,8 +79,58 @@ pub(crate) fn run(arguments: &Cc, _: bool, _: &mut Out) -> Result<()> {
         DelayedActivity::new(format!("translating {}", files::input_name(Path::new(&arguments.files[0]))));
     let preprocessor = Preprocessor::new(&options).map_err(shown)?;
     let sources = arguments.files.iter().map(|file| preprocessor.run(file)).collect::<Result<Vec<_>, _>>();
-    let options = Options { step: arguments.step.clone(), init: arguments.init.clone(), double_is_float };
+    let step = arguments.step.clone().unwrap_or_default();
+    let options = Options { step, init: arguments.init.clone(), double_is_float };
+    if arguments.list {
+        let candidates = sources.and_then(|sources| candidates(&sources, &options)).map_err(shown)?;
+        drop(waiting);
+        return if arguments.json { list_json(&candidates, out) } else { list(&candidates, out) };
+    }
     let translation = sources.and_then(|sources| translate(&sources, &options)).map_err(shown)?;
     drop(waiting);
     files::write(&arguments.output, translation.text.as_bytes())
+}
+
+/// A line for each function: the program's ports, or the reason why there is none.
+fn list(candidates: &[Candidate], out: &mut Out) -> Result<()> {
+    let widest = candidates.iter().map(|candidate| candidate.name.len()).max().unwrap_or(0).min(40);
+    for Candidate { name, file, line, translation } in candidates {
+        let text = match translation {
+            Ok(program) => {
+                format!("{} inputs, {} outputs", program.inputs.len(), program.outputs.len())
+            }
+            Err(error) => refusal(error, file),
+        };
+        out.lines(&format!("{name:<widest$}  line {line:<5} {text}\n"))?;
+    }
+    let good = candidates.iter().filter(|candidate| candidate.translation.is_ok()).count();
+    out.lines(&format!("{good} of {} functions can be the step\n", candidates.len()))?;
+    Ok(())
+}
+
+/// The reason with its place, unless the place is in the function's own file: then its line alone.
+fn refusal(error: &takt_front::Error, own: &str) -> String {
+    match (&error.file, error.line) {
+        (Some(file), Some(line)) if file == own => format!("refused, line {line}: {}", error.text),
+        (Some(file), Some(line)) => format!("refused, {file}:{line}: {}", error.text),
+        _ => format!("refused: {}", error.text),
+    }
+}
+
+fn list_json(candidates: &[Candidate], out: &mut Out) -> Result<()> {
+    let rows: Vec<serde_json::Value> = candidates
+        .iter()
+        .map(|Candidate { name, file, line, translation }| match translation {
+            Ok(program) => serde_json::json!({
+                "name": name, "file": file, "line": line,
+                "inputs": program.inputs.iter().map(|port| &port.name).collect::<Vec<_>>(),
+                "outputs": program.outputs.iter().map(|port| &port.name).collect::<Vec<_>>(),
+            }),
+            Err(error) => serde_json::json!({
+                "name": name, "file": file, "line": line,
+                "refused": { "file": error.file, "line": error.line, "reason": error.text },
+            }),
+        })
+        .collect();
+    files::json(&rows, out)
 }

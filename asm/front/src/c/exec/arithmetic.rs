@@ -3,7 +3,7 @@
 
 use super::Exec;
 use crate::Error;
-use crate::c::ir::{Id, Op};
+use crate::c::ir::{Id, Node, Op};
 use crate::c::types::{INT, Integer, Type};
 use crate::c::value::{Condition, Pointer, Typed, Value};
 use lang_c::ast::BinaryOperator as B;
@@ -144,47 +144,60 @@ impl Exec<'_> {
             B::BitwiseAnd => self.op(Op::And, &[x, y])?,
             B::BitwiseOr => self.op(Op::Or, &[x, y])?,
             B::BitwiseXor => self.op(Op::Xor, &[x, y])?,
-            B::Divide | B::Modulo => self.divided(operator, ty, x, known)?,
+            B::Divide | B::Modulo => self.divided(operator, ty, (x, y), known)?,
             _ => return self.fail("this operator does not take integers"),
         };
         Ok(Value::Node(id))
     }
 
-    /// Quotient or remainder of integers; the divisor must be a power of two.
-    fn divided(&mut self, operator: &B, ty: Integer, a: Id, by: Option<i64>) -> Result<Id, Error> {
+    /// Quotient or remainder of integers; `by` is the divisor, if it is known.
+    fn divided(&mut self, operator: &B, ty: Integer, (a, b): (Id, Id), by: Option<i64>) -> Result<Id, Error> {
         if by == Some(0) {
             return self.fail("division by zero");
         }
+        let signed = ty.signed || self.nodes.range(a).0 >= 0 && self.nodes.range(b).0 >= 0;
         let power = by.filter(|by| by.unsigned_abs().is_power_of_two());
-        let Some(by) = power else {
-            return self.fail(
-                "the machine divides no integers: divide by a power of two, or in float: `(int)((float)a / (float)b)` is exact \
-                 up to 2^24",
-            );
-        };
-        let signed = ty.signed || self.nodes.range(a).0 >= 0;
-        if !signed {
-            // By shift and mask.
-            let shift = self.nodes.int(by.trailing_zeros() as i32);
-            let mask = self.nodes.int((by - 1) as i32);
-            return match operator {
-                B::Divide => self.op(Op::ShiftRightLogical, &[a, shift]),
-                _ => self.op(Op::And, &[a, mask]),
-            };
-        }
-        if by == i64::from(i32::MIN) {
-            return self.fail("division by -2^31 is not supported: compare with -2^31 instead");
-        }
-        let divisor = self.nodes.int(by.unsigned_abs() as u32 as i32);
-        match operator {
-            B::Divide => {
-                let quotient = self.op(Op::IntDiv, &[a, divisor])?;
-                let zero = self.nodes.int(0);
-                if by < 0 { self.op(Op::IntSub, &[zero, quotient]) } else { Ok(quotient) }
+        let quotient = match (power, by) {
+            // No more than one such divisor is in a: an end of the type's range.
+            (_, Some(by)) if signed && by == i64::from(i32::MIN) => self.op(Op::IntEqual, &[a, b])?,
+            (_, Some(by)) if !signed && by > i64::from(i32::MAX) => {
+                let below = self.op(Op::Below, &[a, b])?;
+                self.op(Op::Not, &[below])?
             }
-            _ if by.unsigned_abs() == 1 => Ok(self.nodes.int(0)),
-            _ => self.op(Op::IntRem, &[a, divisor]),
+            // By shift and mask.
+            (Some(by), _) if !signed => {
+                let shift = self.nodes.int(by.trailing_zeros() as i32);
+                let mask = self.nodes.int((by - 1) as i32);
+                return match operator {
+                    B::Divide => self.op(Op::ShiftRightLogical, &[a, shift]),
+                    _ => self.op(Op::And, &[a, mask]),
+                };
+            }
+            (Some(by), _) => {
+                let divisor = self.nodes.int(by.unsigned_abs() as i32);
+                return match operator {
+                    B::Divide => {
+                        let quotient = self.op(Op::IntDiv, &[a, divisor])?;
+                        let zero = self.nodes.int(0);
+                        if by < 0 { self.op(Op::IntSub, &[zero, quotient]) } else { Ok(quotient) }
+                    }
+                    _ if by.unsigned_abs() == 1 => Ok(self.nodes.int(0)),
+                    _ => self.op(Op::IntRem, &[a, divisor]),
+                };
+            }
+            _ => self.op(if signed { Op::IntDiv } else { Op::UnsignedDiv }, &[a, b])?,
+        };
+        if *operator == B::Divide {
+            return Ok(quotient);
         }
+        let product = self.op(Op::IntMul, &[quotient, b])?;
+        let rest = self.op(Op::IntSub, &[a, product])?;
+        if signed && let Node::Op(..) = self.nodes.node(rest) {
+            let ((least, _), (low, high)) = (self.nodes.range(a), self.nodes.range(b));
+            let most = low.abs().max(high.abs()) - 1;
+            self.nodes.get_mut(rest).range = (if least >= 0 { 0 } else { -most }, most);
+        }
+        Ok(rest)
     }
 
     fn known(&self, operator: &B, ty: Integer, a: i64, b: i64) -> Result<i64, Error> {
@@ -369,7 +382,8 @@ impl Exec<'_> {
             let count = self.structs.leaves(to).map_or(1, |leaves| leaves.len());
             let (x, y) = (self.scalars(x)?, self.scalars(y)?);
             let words = self.op(Op::IntSub, &[x, y])?;
-            let id = self.divided(&B::Divide, INT, words, Some(count as i64))?;
+            let size = self.nodes.int(count as i32);
+            let id = self.divided(&B::Divide, INT, (words, size), Some(count as i64))?;
             return Ok(Typed { ty: Type::Int(INT), value: Value::Node(id) });
         }
         let (pointer, index) = if matches!(a.ty, Type::Pointer(_)) { (a, b) } else { (b, a) };

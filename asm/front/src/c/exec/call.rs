@@ -24,6 +24,9 @@ impl<'a> Exec<'a> {
                 Some(_) => true,
                 None => false,
             };
+            if !defined && self.scopes[self.unit()].refused.contains_key(name) {
+                return self.unknown(name);
+            }
             if !defined {
                 return self.builtin(name, &call.arguments);
             }

@@ -4,11 +4,13 @@
 use super::{Defined, Exec, Key, Named};
 use crate::Error;
 use crate::c::types::{BOOL, INT, Integer, Signature, Struct, Type, UNSIGNED};
+use crate::c::unit::declared_name;
 use crate::c::value::{Origin, Typed, Value};
 use lang_c::ast::{
     ArraySize, Declaration, DeclarationSpecifier, Declarator, DeclaratorKind, DerivedDeclarator, Ellipsis,
-    EnumType, ExternalDeclaration, InitDeclarator, Initializer, SpecifierQualifier, StorageClassSpecifier,
-    StructDeclaration, StructKind, StructType, TypeName, TypeOf, TypeQualifier, TypeSpecifier,
+    EnumType, ExternalDeclaration, FunctionDefinition, InitDeclarator, Initializer, SpecifierQualifier,
+    StorageClassSpecifier, StructDeclaration, StructKind, StructType, TypeName, TypeOf, TypeQualifier,
+    TypeSpecifier,
 };
 use lang_c::span::Node;
 use std::rc::Rc;
@@ -30,29 +32,51 @@ impl<'a> Exec<'a> {
             self.go(external.span);
             match &external.node {
                 ExternalDeclaration::StaticAssert(_) => {}
-                ExternalDeclaration::Declaration(declaration) => self.declaration(&declaration.node)?,
+                ExternalDeclaration::Declaration(declaration) => {
+                    if let Err(reason) = self.declaration(&declaration.node) {
+                        for declarator in &declaration.node.declarators {
+                            self.refuse(&declarator.node.declarator.node, &reason);
+                        }
+                    }
+                }
                 ExternalDeclaration::FunctionDefinition(node) => {
-                    let definition = &node.node;
-                    let base = self.base(&definition.specifiers)?;
-                    let (name, ty) = self.declared(&definition.declarator.node, base.ty.clone())?;
-                    let (Some(name), Type::Function(signature)) = (name, ty) else {
-                        return self.fail("expected a function");
-                    };
-                    if !definition.declarations.is_empty() {
-                        return self.fail(format!("`{name}` declares its parameters in the old style: put their types into the parentheses"));
+                    if let Err(reason) = self.function(unit, &node.node) {
+                        self.refuse(&node.node.declarator.node, &reason);
                     }
-                    let key = match base.storage {
-                        Some(StorageClassSpecifier::Static) => format!("{name}@{unit}"),
-                        _ => name.clone(),
-                    };
-                    if self.functions.contains_key(&key) {
-                        return self.fail(format!("`{name}` is defined twice"));
-                    }
-                    self.functions.insert(key.clone(), Defined { unit, definition });
-                    self.scope().names.insert(name, Named::Function(key, signature));
                 }
             }
         }
+        Ok(())
+    }
+
+    /// A declaration that is not translated: an error only if its name is used.
+    fn refuse(&mut self, declarator: &Declarator, reason: &Error) {
+        if let Some(name) = declared_name(declarator) {
+            self.scope().names.remove(name);
+            self.scope().refused.insert(name.to_owned(), reason.clone());
+        }
+    }
+
+    fn function(&mut self, unit: usize, definition: &'a FunctionDefinition) -> Result<(), Error> {
+        let base = self.base(&definition.specifiers)?;
+        let (name, ty) = self.declared(&definition.declarator.node, base.ty.clone())?;
+        let (Some(name), Type::Function(signature)) = (name, ty) else {
+            return self.fail("expected a function");
+        };
+        if !definition.declarations.is_empty() {
+            return self.fail(format!(
+                "`{name}` declares its parameters in the old style: put their types into the parentheses"
+            ));
+        }
+        let key = match base.storage {
+            Some(StorageClassSpecifier::Static) => format!("{name}@{unit}"),
+            _ => name.clone(),
+        };
+        if self.functions.contains_key(&key) {
+            return self.fail(format!("`{name}` is defined twice"));
+        }
+        self.functions.insert(key.clone(), Defined { unit, definition });
+        self.scope().names.insert(name, Named::Function(key, signature));
         Ok(())
     }
 
@@ -291,13 +315,14 @@ impl<'a> Exec<'a> {
                 TypeSpecifier::Long => long += 1,
                 TypeSpecifier::Signed => signed = true,
                 TypeSpecifier::Unsigned => unsigned = true,
-                TypeSpecifier::Struct(node) => return self.structure(&node.node),
+                TypeSpecifier::Struct(node) => return self.structure(node),
                 TypeSpecifier::Enum(node) => return self.enumeration(&node.node),
                 TypeSpecifier::TypedefName(name) => {
                     return match self.looked_up(&name.node.name) {
                         Some(Named::Type(ty)) => Ok(ty.clone()),
                         _ if name.node.name.starts_with("__builtin") => Ok(Type::Void),
-                        _ => self.fail(format!("`{}` is not a type", name.node.name)),
+                        Some(_) => self.fail(format!("`{}` is not a type", name.node.name)),
+                        None => self.unknown(&name.node.name),
                     };
                 }
                 TypeSpecifier::TypeOf(node) => {
@@ -326,7 +351,9 @@ impl<'a> Exec<'a> {
         Ok(Type::Int(Integer::new(bits, !unsigned)))
     }
 
-    fn structure(&mut self, node: &'a StructType) -> Result<Type, Error> {
+    fn structure(&mut self, node: &'a Node<StructType>) -> Result<Type, Error> {
+        let most = self.units[self.unit()].packed.get(&node.span.start).copied();
+        let node = &node.node;
         let union = node.kind.node == StructKind::Union;
         let tag = node.identifier.as_ref().map(|name| name.node.name.clone());
         let own = tag.as_ref().and_then(|tag| self.scope().tags.get(tag).cloned());
@@ -376,7 +403,7 @@ impl<'a> Exec<'a> {
                     members.push((name, ty));
                 }
             }
-            self.structs.complete(index, members);
+            self.structs.complete(index, members, most);
         }
         Ok(Type::Struct(index))
     }

@@ -7,9 +7,9 @@ use crate::c::ir::Op;
 use crate::c::types::{INT, Integer, Type, UNSIGNED};
 use crate::c::value::{Condition, Lvalue, Origin, Outcome, Pointer, Typed, Value};
 use lang_c::ast::{
-    BinaryOperator, BinaryOperatorExpression, ConditionalExpression, Constant, Expression, FloatBase,
-    FloatFormat, IntegerBase, IntegerSize, MemberExpression, MemberOperator, OffsetMember,
-    OffsetOfExpression, UnaryOperator, UnaryOperatorExpression,
+    BinaryOperator, BinaryOperatorExpression, BlockItem, ConditionalExpression, Constant, Expression,
+    FloatBase, FloatFormat, IntegerBase, IntegerSize, MemberExpression, MemberOperator, OffsetMember,
+    OffsetOfExpression, Statement, UnaryOperator, UnaryOperatorExpression,
 };
 use lang_c::span::Node;
 
@@ -138,10 +138,32 @@ impl<'a> Exec<'a> {
             Expression::GenericSelection(_) | Expression::VaArg(_) => {
                 self.fail("`_Generic` and `va_arg` are not translated: call the function that is meant")
             }
-            Expression::Statement(_) => {
-                self.fail("statement expressions are not part of C99: write a function")
-            }
+            Expression::Statement(statement) => self.statement_expression(statement),
         }
+    }
+
+    /// GNU's `({ …; x; })`: a block whose last expression is the value.
+    pub(super) fn statement_expression(&mut self, statement: &'a Node<Statement>) -> Result<Typed, Error> {
+        let Statement::Compound(items) = &statement.node else { return self.fail("expected a block") };
+        let last = items.split_last().and_then(|(last, rest)| match &last.node {
+            BlockItem::Statement(statement) => match &statement.node {
+                Statement::Expression(Some(value)) => Some((value, rest)),
+                _ => None,
+            },
+            _ => None,
+        });
+        let Some((last, rest)) = last else {
+            return self.fail("the last statement of `({ … })` must be an expression: it is the value");
+        };
+        self.open();
+        let mut outcomes = Vec::new();
+        let reached = self.items(rest, &mut outcomes)?;
+        if reached != Condition::Known(true) || !outcomes.is_empty() {
+            return self.fail("`({ … })` is left by a jump: write a function");
+        }
+        let value = self.value(last);
+        self.close();
+        value
     }
 
     fn size_value(&self, ty: &Type) -> Result<Typed, Error> {
@@ -260,7 +282,7 @@ impl<'a> Exec<'a> {
             Expression::Identifier(name) => match self.looked_up(&name.node.name) {
                 Some(Named::Object(object)) => Ok(self.place_of(*object)),
                 Some(_) => self.fail(format!("`{}` is not a variable", name.node.name)),
-                None => self.fail(format!("`{}` is declared nowhere", name.node.name)),
+                None => self.unknown(&name.node.name),
             },
             Expression::Member(member) => {
                 let place = match member.node.operator.node {

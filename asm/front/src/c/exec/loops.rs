@@ -232,10 +232,8 @@ impl<'a> Exec<'a> {
                     Condition::Known(false) => return self.ended(out),
                     Condition::Known(true) => {}
                     Condition::Node(id) => {
-                        if parts.bound.is_some_and(|bound| count >= bound) {
-                            return self.ended(out);
-                        }
-                        if count >= OPEN {
+                        // A bound from a pragma is kept by the loop alone, which faults beyond it.
+                        if count >= OPEN || parts.bound.is_some_and(|bound| count >= bound) {
                             self.at = at;
                             return self.endless();
                         }

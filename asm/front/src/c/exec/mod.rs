@@ -61,6 +61,8 @@ pub(super) enum Named {
 pub(super) struct Scope {
     pub(super) names: HashMap<String, Named>,
     pub(super) tags: HashMap<String, Type>,
+    /// Names whose declarations are not translated, with the reasons: an error where they are used.
+    pub(super) refused: HashMap<String, Error>,
 }
 
 /// A function under execution.
@@ -191,6 +193,14 @@ impl<'a> Exec<'a> {
     fn looked_up(&self, name: &str) -> Option<&Named> {
         let own = self.frames.last().into_iter().flat_map(|frame| frame.scopes.iter().rev());
         own.chain(self.scopes.get(self.unit())).find_map(|scope| scope.names.get(name))
+    }
+
+    /// The error of a name that is looked up and has no meaning.
+    fn unknown<T>(&self, name: &str) -> Result<T, Error> {
+        match self.scopes.get(self.unit()).and_then(|scope| scope.refused.get(name)) {
+            Some(reason) => Err(reason.clone()),
+            None => self.fail(format!("`{name}` is declared nowhere")),
+        }
     }
 
     fn tag(&self, name: &str) -> Option<&Type> {

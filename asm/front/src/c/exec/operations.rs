@@ -47,6 +47,13 @@ fn range_of(op: Op, ranges: &[Range]) -> Range {
         Op::IntDiv if ranges[1].0 == ranges[1].1 && ranges[1].0 > 0 => {
             (ranges[0].0 / ranges[1].0, ranges[0].1 / ranges[1].0)
         }
+        Op::IntDiv => {
+            let most = wide(0).0.abs().max(wide(0).1.abs());
+            fits((if ranges[0].0 >= 0 && ranges[1].0 >= 0 { 0 } else { -most }, most))
+        }
+        Op::UnsignedDiv if ranges[1].0 == ranges[1].1 && ranges[1].0 > 0 => {
+            (0, i64::from(u32::MAX) / ranges[1].0)
+        }
         Op::IntRem if ranges[1].0 == ranges[1].1 && ranges[1].0 > 0 => {
             let most = ranges[1].0 - 1;
             (if ranges[0].0 >= 0 { 0 } else { -most }, if ranges[0].1 <= 0 { 0 } else { most })

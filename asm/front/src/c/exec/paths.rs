@@ -48,7 +48,8 @@ fn cost(op: Op) -> usize {
         | Op::Ceil
         | Op::Rint
         | Op::Trunc => 20,
-        Op::IntMul | Op::ToInt | Op::ToUnsigned | Op::UnsignedToFloat => 10,
+        Op::IntMul | Op::IntDiv | Op::ToInt | Op::ToUnsigned | Op::UnsignedToFloat => 10,
+        Op::UnsignedDiv => 40,
         _ => 1,
     }
 }

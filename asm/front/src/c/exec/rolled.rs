@@ -4,7 +4,7 @@
 use super::Exec;
 use super::loops::Repetition;
 use crate::Error;
-use crate::c::ir::{FULL, Id, Kind, Node, Statement};
+use crate::c::ir::{FULL, Id, Kind, Node, Op, Statement};
 use crate::c::types::{INT, Type};
 use crate::c::value::{Condition, Exit, Memory, Origin, Outcome, Pointer, Value};
 use lang_c::ast::{BinaryOperator, Expression, UnaryOperator};
@@ -14,6 +14,8 @@ use std::rc::Rc;
 
 /// Limit on the trials that determine what a body changes.
 const TRIALS: usize = 16;
+/// Maximum number of iterations of a loop that brings a number, such as an angle, back into its range: more are a fault.
+const WRAPS: u64 = 8;
 /// Maximum number of iterations of a loop.
 const MOST: i64 = 65_535;
 
@@ -62,7 +64,10 @@ impl<'a> Exec<'a> {
                 Err(error) => return Err(error),
             }
         }
-        let bound = parts.bound.or(counter.map(|counter| counter.count.max(1) as u64));
+        let mut bound = parts.bound.or(counter.map(|counter| counter.count.max(1) as u64));
+        if bound.is_none() && self.is_wrap(&parts) {
+            bound = Some(WRAPS);
+        }
         let Some(bound) = bound else {
             return self.fail(
                 "data decide how often this loop runs, and no bound is known: write `#pragma takt loop_bound(N)` before it",
@@ -81,6 +86,54 @@ impl<'a> Exec<'a> {
                 out,
             ),
         }
+    }
+
+    /// The loop brings a number back into a range, as an angle: it compares with a constant, and each iteration adds one that leads there.
+    fn is_wrap(&mut self, parts: &Repetition<'a>) -> bool {
+        let saved = self.saved();
+        self.blocks.push(Vec::new());
+        let found = self.wraps(parts).unwrap_or(false);
+        self.restore(saved);
+        found
+    }
+
+    fn wraps(&mut self, parts: &Repetition<'a>) -> Result<bool, Error> {
+        let Condition::Node(condition) = self.goes_on(parts)? else { return Ok(false) };
+        let before = self.memory.clone();
+        let normal = self.statement(parts.body, &mut Vec::new())?;
+        self.stepped(parts)?;
+        let mut changed = Vec::new();
+        for object in 0..before.0.len() {
+            let leaves = before.0[object].iter().zip(self.memory.0[object].iter());
+            changed
+                .extend(leaves.filter(|(old, new)| old != new).map(|(old, new)| (old.clone(), new.clone())));
+        }
+        let [(Value::Node(old), Value::Node(new))] = changed[..] else { return Ok(false) };
+        let constant = |id| match self.nodes.node(id) {
+            Node::Int(value) => Some(f64::from(value)),
+            Node::Float(bits) => Some(f64::from(f32::from_bits(bits))),
+            _ => None,
+        };
+        // From above, the number must fall.
+        let falls = match self.nodes.node(condition) {
+            Node::Op(Op::Less | Op::LessEqual | Op::IntLess, [a, b, _], _) => {
+                if constant(a).is_some() && b == old {
+                    true
+                } else if a == old && constant(b).is_some() {
+                    false
+                } else {
+                    return Ok(false);
+                }
+            }
+            _ => return Ok(false),
+        };
+        let by = match self.nodes.node(new) {
+            Node::Op(Op::Add | Op::IntAdd, [a, b, _], _) if a == old => constant(b),
+            Node::Op(Op::Add | Op::IntAdd, [a, b, _], _) if b == old => constant(a),
+            Node::Op(Op::Sub | Op::IntSub, [a, b, _], _) if a == old => constant(b).map(|by| -by),
+            _ => None,
+        };
+        Ok(normal == Condition::Known(true) && by.is_some_and(|by| if falls { by < 0.0 } else { by > 0.0 }))
     }
 
     /// The counter of a loop: a variable that the step advances and the condition compares with a known number.
@@ -174,6 +227,17 @@ impl<'a> Exec<'a> {
         };
         match self.value(end)?.value {
             Value::Int(end) => Ok(Some((operator, end, true))),
+            // An end that depends on data: the farthest that its type or its computation allows.
+            Value::Node(id) if self.nodes.kind(id) == Kind::Int => {
+                let (low, high) = self.nodes.range(id);
+                match operator {
+                    BinaryOperator::Less | BinaryOperator::LessOrEqual => Ok(Some((operator, high, false))),
+                    BinaryOperator::Greater | BinaryOperator::GreaterOrEqual => {
+                        Ok(Some((operator, low, false)))
+                    }
+                    _ => Ok(None),
+                }
+            }
             _ => Ok(None),
         }
     }

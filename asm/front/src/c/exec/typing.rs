@@ -3,6 +3,7 @@
 
 use super::{Exec, Named};
 use crate::Error;
+use crate::c::ir::Block;
 use crate::c::types::{INT, Type, UNSIGNED};
 use lang_c::ast::{BinaryOperator, Expression, MemberOperator, UnaryOperator};
 use lang_c::span::Node;
@@ -17,7 +18,7 @@ impl<'a> Exec<'a> {
                 Some(Named::Constant(_)) => Type::Int(INT),
                 Some(Named::Function(_, signature)) => Type::Function(signature.clone()),
                 Some(Named::Type(_)) => return self.fail(format!("`{}` is a type", name.node.name)),
-                None => return self.fail(format!("`{}` is declared nowhere", name.node.name)),
+                None => return self.unknown(&name.node.name),
             },
             Expression::Member(member) => {
                 let whole = self.type_of(&member.node.expression)?;
@@ -80,10 +81,18 @@ impl<'a> Exec<'a> {
                     (yes, no) => Self::common(&yes, &no),
                 }
             }
-            Expression::StringLiteral(_)
-            | Expression::GenericSelection(_)
-            | Expression::VaArg(_)
-            | Expression::Statement(_) => return self.fail("unsupported expression: string literals, _Generic, va_arg and statement expressions cannot be used here"),
+            Expression::StringLiteral(_) | Expression::GenericSelection(_) | Expression::VaArg(_) => {
+                return self.fail(
+                    "unsupported expression: string literals, _Generic and va_arg cannot be used here",
+                );
+            }
+            Expression::Statement(statement) => {
+                let saved = self.saved();
+                self.blocks.push(Block::new());
+                let value = self.statement_expression(statement);
+                self.restore(saved);
+                value?.ty
+            }
         })
     }
 

@@ -88,6 +88,7 @@ fn form(op: Op) -> Form {
         Op::Round => Form::Call("round", MATH),
         Op::Rint => Form::Call("rint", MATH),
         Op::ShiftRightLogical => Form::Call("shift_right", C),
+        Op::UnsignedDiv => Form::Call("quotient_unsigned", C),
         Op::Below => Form::Call("below", C),
         Op::UnsignedToFloat => Form::Call("unsigned_to_float", C),
         Op::ToInt => Form::Call("to_int", C),
@@ -164,6 +165,10 @@ impl Speller<'_> {
                 let name = if small(*a) && small(*b) { "product_short" } else { "product" };
                 Text::atom(format!("{name}({}, {})", self.operand(*a), self.operand(*b)))
             }
+            (_, [a, b]) if matches!(op, Op::IntDiv | Op::UnsignedDiv) && !self.is_power_of_two(*b) => {
+                self.library.borrow_mut().insert("c.s");
+                Text::atom(self.quotient(op, *a, *b))
+            }
             (Form::Infix(operator, binding), [a, b]) => self.infix(operator, binding, *a, *b),
             (Form::Prefix(operator), [a]) => {
                 let text = format!("{operator}{}", self.of(*a).at_least(Binding::Atom));
@@ -176,6 +181,33 @@ impl Speller<'_> {
             }
             _ => Text::atom("zero".to_owned()),
         }
+    }
+
+    /// A quotient by the cheapest macro of `<c.s>` that takes operands of these ranges.
+    fn quotient(&self, op: Op, a: Id, b: Id) -> String {
+        let within = |id: Id, most: i64| {
+            let (low, high) = self.nodes.range(id);
+            low >= -most && high <= most
+        };
+        let (first, second) = (self.operand(a), self.operand(b));
+        let Node::Int(by) = self.nodes.node(b) else {
+            let name = match op {
+                Op::UnsignedDiv => "quotient_unsigned",
+                _ if within(a, 1 << 24) && within(b, 1 << 24) => "quotient_short",
+                _ => "quotient",
+            };
+            return format!("{name}({first}, {second})");
+        };
+        let name = match op {
+            Op::UnsignedDiv => "quotient_unsigned_by",
+            _ if within(a, 1 << 22) => "quotient_short_by",
+            _ => "quotient_by",
+        };
+        format!("{name}({first}, {second}, {})", real((1.0 / by as f32).to_bits()))
+    }
+
+    fn is_power_of_two(&self, id: Id) -> bool {
+        matches!(self.nodes.node(id), Node::Int(value) if value > 0 && value.count_ones() == 1)
     }
 
     fn is_known(&self, id: Id) -> bool {
