@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! C through `takt cc` on t1, t3, t4 against gcc, construct by construct, bit for bit; and the messages about refused programs.
 
-use crate::common::gcc::{Program, folder, matches_gcc, translated};
+use crate::common::gcc::{Program, emulated, folder, matches_gcc, translated};
 use rand_pcg::Pcg32;
 use rand_pcg::rand_core::{Rng, SeedableRng};
+use takt_isa::T3;
 
 /// Periods of a case.
 const PERIODS: usize = 40;
@@ -337,6 +338,53 @@ float step(float a) {
     for part in [":1:", "bit-fields"] {
         assert!(message.contains(part), "{message}");
     }
+}
+
+/// An index that data decide extends what a pointer points to, by its range.
+#[test]
+fn indexes_what_pointers_point_to() {
+    let translation = check(
+        "indexes_what_pointers_point_to",
+        r#"struct point { float x, y; };
+float step(const float *x, int i, float *y) { y[i & 3] = x[i & 7]; return x[(i >> 3) & 7]; }
+"#,
+    );
+    assert_eq!(translation.inputs.len(), 8 + 1 + 4);
+    let message =
+        refused("refuses_an_index_without_a_range", "float step(const float *x, int i) { return x[i]; }\n");
+    for part in [":1:", "`x[N]`"] {
+        assert!(message.contains(part), "{message}");
+    }
+}
+
+/// A pointer in the caller's structure that nothing sets points to something of the caller's.
+#[test]
+fn follows_pointers_in_structures() {
+    let program = Program::new(
+        "follows_pointers_in_structures",
+        r#"struct limits { float low, high; };
+struct conf { float gain; struct limits *limits; };
+struct motor { struct conf *conf; float *table; float sum; };
+float step(struct motor *m, float x) { struct conf *c = m->conf; m->sum += c->gain*x; if (m->sum > c->limits->high) m->sum = c->limits->high; return m->sum + m->table[2]; }
+"#,
+    );
+    let folder = folder(&program.name);
+    let translation = translated(&program, &folder).expect("it is translated");
+    let value = |name: &str, period: u16| match name {
+        "m_conf_gain" => 0.5,
+        "m_conf_limits_high" => 3.0,
+        "m_table[3]" => 100.0,
+        "x" => f32::from(period),
+        name => panic!("{name}\n{}", translation.text),
+    };
+    let row = |period| translation.inputs.iter().map(|port| value(&port.name, period).to_bits()).collect();
+    let rows: Vec<Vec<u32>> = (0..6).map(row).collect();
+    let c: Vec<&str> = translation.inputs.iter().map(|port| port.c.as_str()).collect();
+    assert!(c.contains(&"m->conf->limits->high") && c.contains(&"m->table[2]"), "{c:?}");
+    let found = emulated(&program, &translation, &T3, &rows).concat();
+    let found: Vec<f32> = found.into_iter().map(f32::from_bits).collect();
+    assert_eq!(found, [100.0, 100.5, 101.5, 103.0, 103.0, 103.0]);
+    let _ = std::fs::remove_dir_all(folder);
 }
 
 #[test]

@@ -143,6 +143,7 @@ fn round(exec: &mut Exec<'_>, options: &Options) -> Result<Option<Translation>, 
         exec.bound(&init, &signature, &own)?;
         exec.run(&init)?;
     }
+    exec.behind()?;
     exec.bound(&step, &signature, &objects)?;
     exec.here(&step);
     let begun = exec.begin()?;

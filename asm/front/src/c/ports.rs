@@ -5,9 +5,9 @@
 //! an output. A scalar with both is a state, if it belongs to a structure or a variable of the files; in an array or number that a
 //! parameter points to, an input and an output. A scalar that some paths write and none reads is an output that keeps its value.
 
-use super::exec::Exec;
 use super::exec::call::adjusted;
 use super::exec::places::kind_of;
+use super::exec::{Exec, Key};
 use super::ir::{Block, FULL, Id, Kind, Node, Op, Statement};
 use super::live::Live;
 use super::types::{Signature, Type};
@@ -151,18 +151,48 @@ impl Exec<'_> {
                     self.object(&name, &ty, Origin::Pointee, false, key)?
                 }
                 (_, Type::Pointer(to)) => {
-                    if matches!(*to, Type::Void | Type::Function(_)) {
+                    let Some(object) = self.pointed_to(&name, &to, key)? else {
                         return self.fail(format!("`{name}` does not point to data: a parameter of the step is a number, a structure, or a pointer to these"));
-                    }
-                    let extent = *self.facts.extents.entry(key.clone()).or_insert(1);
-                    let ty = if extent == 1 { (*to).clone() } else { Type::Array(to.clone(), Some(extent)) };
-                    self.object(&name, &ty, Origin::Pointee, false, key)?
+                    };
+                    object
                 }
                 (_, ty) => self.object(&name, &ty, Origin::Parameter, false, key)?,
             };
             found.push((name, object));
         }
         Ok(found)
+    }
+
+    /// An object behind a pointer to data of unknown number: as many as the step uses. `None` for what is no data.
+    fn pointed_to(&mut self, name: &str, to: &Rc<Type>, key: Key) -> Result<Option<usize>, Error> {
+        if matches!(**to, Type::Void | Type::Function(_)) || self.structs.size(to).is_none() {
+            return Ok(None);
+        }
+        let extent = *self.facts.extents.entry(key.clone()).or_insert(1);
+        let ty = if extent == 1 { (**to).clone() } else { Type::Array(to.clone(), Some(extent)) };
+        self.object(name, &ty, Origin::Pointee, false, key).map(Some)
+    }
+
+    /// Puts objects behind the pointers that the step follows and nothing sets, and behind those in these objects.
+    pub(super) fn behind(&mut self) -> Result<(), Error> {
+        let mut object = 0;
+        while object < self.objects.len() {
+            let found = self.objects[object].clone();
+            for (leaf, scalar) in found.leaves.iter().enumerate() {
+                let followed = self.facts.behind.contains(&(found.key.clone(), leaf));
+                let Type::Pointer(to) = &scalar.ty else { continue };
+                if !followed || *self.memory.get(object, leaf) != Value::Unset {
+                    continue;
+                }
+                let key = (format!("{}->{leaf}", found.key.0), found.key.1, found.key.2);
+                let Some(pointee) = self.pointed_to(&found.leaf_name(leaf), to, key)? else { continue };
+                self.objects[pointee].spelling = self.spelled(object, scalar);
+                let value = Value::Pointer(Pointer { object: pointee, offset: 0, dynamic: None });
+                self.memory.set(object, leaf, value);
+            }
+            object += 1;
+        }
+        Ok(())
     }
 
     fn pointee_type(&self, ty: &Type) -> Option<Type> {
@@ -615,7 +645,7 @@ impl Exec<'_> {
     /// A scalar as C writes it.
     fn spelled(&self, object: usize, leaf: &super::types::Leaf) -> String {
         let found = &self.objects[object];
-        let (mut text, mut ty, mut rest) = (found.name.clone(), found.ty.clone(), leaf.offset);
+        let (mut text, mut ty, mut rest) = (found.spelling.clone(), found.ty.clone(), leaf.offset);
         let mut joint = if found.origin == Origin::Pointee { "->" } else { "." };
         loop {
             match ty.clone() {
@@ -641,7 +671,7 @@ impl Exec<'_> {
                 _ => break,
             }
         }
-        let plain = text == found.name && found.origin == Origin::Pointee;
+        let plain = text == found.spelling && found.origin == Origin::Pointee;
         if plain { format!("*{text}") } else { text }
     }
 }

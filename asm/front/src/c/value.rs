@@ -88,6 +88,8 @@ pub(super) enum Origin {
 #[derive(Clone, Debug)]
 pub(super) struct Object {
     pub(super) name: String,
+    /// The name as C spells it, as `motor->conf`.
+    pub(super) spelling: String,
     pub(super) ty: Type,
     pub(super) leaves: Rc<Vec<Leaf>>,
     pub(super) origin: Origin,

@@ -44,6 +44,8 @@ pub(super) struct Facts {
     pub(super) written: HashSet<(Key, usize)>,
     /// Number of elements behind a pointer such as `float *x`.
     pub(super) extents: HashMap<Key, usize>,
+    /// Pointers, by object and scalar, that the step follows and nothing sets: something of the caller's lies behind them.
+    pub(super) behind: HashSet<(Key, usize)>,
     /// Functions with `static` variables that the step calls.
     pub(super) called: HashSet<String>,
 }

@@ -37,6 +37,7 @@ impl Exec<'_> {
         let count = leaves.len();
         self.objects.push(Object {
             name: name.to_owned(),
+            spelling: name.to_owned(),
             ty: ty.clone(),
             leaves: Rc::new(leaves),
             origin,
@@ -203,10 +204,29 @@ impl Exec<'_> {
             }
         };
         let known = self.nodes.int(leaf as i32);
-        match pointer.dynamic {
-            Some(dynamic) => self.op(Op::IntAdd, &[dynamic, known]),
-            None => Ok(known),
+        let Some(dynamic) = pointer.dynamic else { return Ok(known) };
+        let index = self.op(Op::IntAdd, &[dynamic, known])?;
+        self.extend(pointer.object, index)?;
+        Ok(index)
+    }
+
+    /// Extends an object of unknown length to the greatest index, in the next translation.
+    fn extend(&mut self, object: usize, index: Id) -> Result<(), Error> {
+        let found = &self.objects[object];
+        let Some(extent) = self.facts.extents.get(&found.key).copied() else { return Ok(()) };
+        let most = usize::try_from(self.nodes.range(index).1).unwrap_or(0);
+        let wanted = most / (found.leaves.len() / extent.max(1)).max(1) + 1;
+        if wanted > MAX_EXTENT {
+            return self.fail(format!(
+                "data index `{0}`, whose length is not known: declare its length (`{0}[N]`), or mask the index",
+                found.name
+            ));
         }
+        if wanted > extent {
+            self.facts.extents.insert(found.key.clone(), wanted);
+            self.again = true;
+        }
+        Ok(())
     }
 
     /// Reads a scalar; a part of a structure may be unset.
@@ -219,6 +239,9 @@ impl Exec<'_> {
             };
             let own = self.objects[object].leaves[leaf].ty.clone();
             let mut value = self.memory.get(object, leaf).clone();
+            if value == Value::Unset && !part && matches!(own, Type::Pointer(_)) {
+                self.follows(object, leaf)?;
+            }
             if value == Value::Unset && !self.stepping && self.objects[object].origin == Origin::Global {
                 // Before the step, variables of the files begin as zeros.
                 value = if kind_of(&own) == Kind::Float { Value::Real(0.0) } else { Value::Int(0) };
@@ -248,6 +271,20 @@ impl Exec<'_> {
         let serial = self.nodes.serial();
         let id = self.put(Node::Load(array, index, serial), kind_of(&own), range)?;
         self.punned(Value::Node(id), &own, ty)
+    }
+
+    /// Demands that something lies behind a pointer of the caller's, in the next translation.
+    fn follows(&mut self, object: usize, leaf: usize) -> Result<(), Error> {
+        let found = &self.objects[object];
+        let fact = (found.key.clone(), leaf);
+        if self.stepping
+            && matches!(found.origin, Origin::Pointee | Origin::Parameter | Origin::Global)
+            && self.facts.behind.insert(fact)
+        {
+            self.again = true;
+            return self.fail("a pointer is followed for the first time");
+        }
+        Ok(())
     }
 
     /// The type of the scalar at a place in an array.
