@@ -388,6 +388,30 @@ float step(struct motor *m, float x) { struct conf *c = m->conf; m->sum += c->ga
 }
 
 #[test]
+fn takes_numbers_that_hold_in_every_period() {
+    let mut program = Program::new(
+        "takes_numbers_that_hold_in_every_period",
+        r#"struct fir { int taps; float *c; };
+float step(const struct fir *f, const float *x, int n) { float s = 0.0f; for (int i = 0; i < f->taps; i++) s += f->c[i]*x[i + n]; return s; }
+"#,
+    );
+    let folder = folder(&program.name);
+    let names = |program: &Program| {
+        let ports = translated(program, &folder)?.inputs;
+        Ok::<_, String>(ports.into_iter().map(|port| port.c).collect::<Vec<_>>().join(" "))
+    };
+    assert!(names(&program).is_err());
+    program.set = vec![("f->taps".to_owned(), 2.0), ("n".to_owned(), 1.0)];
+    assert_eq!(names(&program).expect("it is translated"), "x[1] x[2] f->c[0] f->c[1]");
+    for (name, number, part) in [("m", 1.0, "no such scalar"), ("n", 0.5, "int does not hold it")] {
+        program.set = vec![(name.to_owned(), number)];
+        let message = names(&program).expect_err("it is refused");
+        assert!(message.contains(part), "{message}");
+    }
+    let _ = std::fs::remove_dir_all(folder);
+}
+
+#[test]
 fn indexes_structures_by_value() {
     check(
         "indexes_structures_by_value",

@@ -356,6 +356,7 @@ fn generated(seed: u64) -> Program {
         code,
         step: format!("{prefix}step"),
         init: None,
+        set: Vec::new(),
         double_is_float: false,
     }
 }

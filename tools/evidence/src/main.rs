@@ -3,6 +3,7 @@
 //! documents. `cargo evidence --help` lists the commands.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
+mod c;
 mod campaign;
 mod check;
 mod clients;
@@ -61,6 +62,9 @@ enum Task {
     /// Count the cycles of the kernels of programs/taclebench on a RISC-V core, simulated, and by llvm-mca's model of a Cortex-M7, and
     /// write them beside Takt's into docs/library.md (installs missing tools).
     Others,
+    /// Count the functions of C projects that `takt cc` translates, each as the step, in checkouts at the commits of tools/evidence/c.toml,
+    /// and write the table into docs/c.md (clones 300 MB from GitHub).
+    C(c::Arguments),
     /// Measure how fast emulator, assembler and lockstep are beside native code, GNU `as` and one another; print it and write
     /// docs/speed.md (a few minutes on an idle machine). The emulator is compared with the last release's, too, which is built in
     /// target/releases the first time.
@@ -94,6 +98,7 @@ fn task(task: Task) -> Result<()> {
         Task::Synth(arguments) => synth::synth(&arguments),
         Task::Netlist(arguments) => netlist::lockstep(&arguments),
         Task::Linuxcnc(arguments) => linuxcnc::linuxcnc(&arguments),
+        Task::C(arguments) => c::count(&arguments),
         Task::Others => other_processors::compare(),
         Task::Speed(arguments) => speed::speed(arguments),
         Task::Campaign(arguments) => campaign::campaign(&arguments),

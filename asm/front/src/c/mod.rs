@@ -43,6 +43,9 @@ pub struct Options {
     pub step: String,
     /// Name of the function that runs once, before the first period.
     pub init: Option<String>,
+    /// Numbers that the step is given in every period, by the scalars as C writes them (`n`, `conf->taps`): they are computed with while
+    /// translating.
+    pub set: Vec<(String, f64)>,
     /// Read `double` as `float`, and every number as binary32.
     pub double_is_float: bool,
 }
@@ -76,10 +79,11 @@ pub struct Candidate {
 /// # Errors
 /// If the text is not supported C: with file, line, reason and remedy.
 pub fn translate(sources: &[Source], options: &Options) -> Result<Translation, Error> {
-    on_own_stack(|| translated(&units(sources)?, options))
+    on_own_stack(|| translated(&units(sources)?, options, true))
 }
 
-/// Tries every function that the sources themselves define (not their includes) as the step; `options.step` is not read.
+/// Tries every function that the sources themselves define (not their includes) as the step; `options.step` is not read, and
+/// `options.set` holds where a function has such a scalar.
 ///
 /// # Errors
 /// If a source cannot be read as C. A function that is refused is no error of the list.
@@ -89,7 +93,7 @@ pub fn candidates(sources: &[Source], options: &Options) -> Result<Vec<Candidate
     for unit in &units {
         for (name, line) in unit.functions() {
             let options = Options { step: name.clone(), ..options.clone() };
-            let translation = on_own_stack(|| translated(&units, &options));
+            let translation = on_own_stack(|| translated(&units, &options, false));
             candidates.push(Candidate { name, file: unit.files[0].clone(), line, translation });
         }
     }
@@ -113,11 +117,11 @@ fn units(sources: &[Source]) -> Result<Vec<Unit>, Error> {
     sources.iter().map(|source| Unit::read(&source.name, &source.text)).collect()
 }
 
-fn translated(units: &[Unit], options: &Options) -> Result<Translation, Error> {
+fn translated(units: &[Unit], options: &Options, strict: bool) -> Result<Translation, Error> {
     let mut facts = Facts::default();
     for _ in 0..MAX_ROUNDS {
         let mut exec = Exec::new(units, options.double_is_float, facts);
-        match round(&mut exec, options) {
+        match round(&mut exec, options, strict) {
             Err(error) if !exec.again => return Err(error),
             Ok(Some(translation)) if !exec.again => return Ok(translation),
             _ => facts = exec.facts,
@@ -129,7 +133,7 @@ fn translated(units: &[Unit], options: &Options) -> Result<Translation, Error> {
 }
 
 /// One translation, with the facts of the earlier ones.
-fn round(exec: &mut Exec<'_>, options: &Options) -> Result<Option<Translation>, Error> {
+fn round(exec: &mut Exec<'_>, options: &Options, strict: bool) -> Result<Option<Translation>, Error> {
     let before = exec.facts.clone();
     for unit in 0..exec.units.len() {
         exec.file(unit)?;
@@ -144,6 +148,7 @@ fn round(exec: &mut Exec<'_>, options: &Options) -> Result<Option<Translation>, 
         exec.run(&init)?;
     }
     exec.behind()?;
+    exec.set(&options.set, strict)?;
     exec.bound(&step, &signature, &objects)?;
     exec.here(&step);
     let begun = exec.begin()?;

@@ -195,6 +195,42 @@ impl Exec<'_> {
         Ok(())
     }
 
+    /// Sets scalars of the step's parameters, and of objects behind them, to numbers that hold in every period.
+    pub(super) fn set(&mut self, numbers: &[(String, f64)], strict: bool) -> Result<(), Error> {
+        for (name, number) in numbers {
+            let mut found = None;
+            for (object, of) in self.objects.iter().enumerate() {
+                if matches!(of.origin, Origin::Parameter | Origin::Pointee | Origin::Global) {
+                    let leaf = of.leaves.iter().position(|leaf| self.spelled(object, leaf) == *name);
+                    found = found.or(leaf.map(|leaf| (object, leaf)));
+                }
+            }
+            let Some((object, leaf)) = found else {
+                if strict && !self.again {
+                    return Err(Error::plain(format!(
+                        "--set {name}: the step reads no such scalar; write it as C does: `n`, `conf->taps`, `x[0]`"
+                    )));
+                }
+                continue;
+            };
+            let value = match &self.objects[object].leaves[leaf].ty {
+                Type::Int(integer)
+                    if number.fract() == 0.0 && integer.wrap(*number as i64) == *number as i64 =>
+                {
+                    Value::Int(*number as i64)
+                }
+                Type::Float => Value::Real(f64::from(*number as f32)),
+                Type::Double => Value::Real(*number),
+                ty => {
+                    let ty = self.structs.shown(ty);
+                    return Err(Error::plain(format!("--set {name}={number}: {ty} does not hold it")));
+                }
+            };
+            self.memory.set(object, leaf, value);
+        }
+        Ok(())
+    }
+
     fn pointee_type(&self, ty: &Type) -> Option<Type> {
         match adjusted(ty) {
             Type::Pointer(to) => Some((*to).clone()),

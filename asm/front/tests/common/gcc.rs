@@ -18,6 +18,7 @@ pub(crate) struct Program {
     pub(crate) code: String,
     pub(crate) step: String,
     pub(crate) init: Option<String>,
+    pub(crate) set: Vec<(String, f64)>,
     pub(crate) double_is_float: bool,
 }
 
@@ -28,6 +29,7 @@ impl Program {
             code: code.to_owned(),
             step: "step".to_owned(),
             init: code.contains("void init(").then(|| "init".to_owned()),
+            set: Vec::new(),
             double_is_float: code.contains("double"),
         }
     }
@@ -75,6 +77,7 @@ pub(crate) fn translated_text(program: &Program, source: Source) -> Result<Trans
     let options = Options {
         step: program.step.clone(),
         init: program.init.clone(),
+        set: program.set.clone(),
         double_is_float: program.double_is_float,
     };
     translate(&[source], &options).map_err(|error| {

@@ -32,6 +32,9 @@ pub(crate) struct Cc {
     /// The function that sets the states before the first period; it takes pointers to the same structures.
     #[arg(long, value_name = "NAME")]
     init: Option<String>,
+    /// Give a scalar of the step's parameters a number that holds in every period, as C writes it: `n=8`, `conf->taps=16`.
+    #[arg(long, value_name = "SCALAR=NUMBER", value_parser = scalar)]
+    set: Vec<(String, f64)>,
     /// Define a macro of the preprocessor.
     #[arg(short = 'D', value_name = "NAME[=VALUE]")]
     defines: Vec<String>,
@@ -50,8 +53,15 @@ const EXAMPLES: &str = "\
 Examples:
   takt cc pid.c --step pid_step --init pid_init -o pid.s
   takt bound pid.s                                  what it makes is a program
+  takt cc fir.c --step fir --set n=16 -o fir.s      a parameter that is the same in every period
   takt cc pid.c --list                              which functions can be the step
   takt cc foc.c math.c --step foc --double=float -I inc -DNDEBUG -o foc.s";
+
+fn scalar(text: &str) -> Result<(String, f64), String> {
+    let (name, number) = text.split_once('=').ok_or("expected SCALAR=NUMBER")?;
+    let number = number.trim().parse().map_err(|_| format!("`{number}` is not a number"))?;
+    Ok((name.trim().to_owned(), number))
+}
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Double {
@@ -80,7 +90,7 @@ pub(crate) fn run(arguments: &Cc, _: bool, out: &mut Out) -> Result<()> {
     let preprocessor = Preprocessor::new(&options).map_err(shown)?;
     let sources = arguments.files.iter().map(|file| preprocessor.run(file)).collect::<Result<Vec<_>, _>>();
     let step = arguments.step.clone().unwrap_or_default();
-    let options = Options { step, init: arguments.init.clone(), double_is_float };
+    let options = Options { step, init: arguments.init.clone(), set: arguments.set.clone(), double_is_float };
     if arguments.list {
         let candidates = sources.and_then(|sources| candidates(&sources, &options)).map_err(shown)?;
         drop(waiting);
