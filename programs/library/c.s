@@ -70,6 +70,19 @@
         d = ftoi(p0) + (ftoi(p1) << 11) + ((ftoi(p2) + ftoi(q1)) << 22)
 .endm
 
+; The high word of a·b, both from 0 to 2^32 - 1: the digits of 11 bits from the second on, with the carry of the first two.
+.macro  product_high d:int, a:int, b:int
+.reg    a0 a1 a2 b0 b1 b2 p0:int p1:int p2:int p3:int p4:int
+        a0, a1, a2 = itof(a & 2047), itof((a >> 11) & 2047), itof(shift_right(a, 22))
+        b0, b1, b2 = itof(b & 2047), itof((b >> 11) & 2047), itof(shift_right(b, 22))
+        p0 = ftoi(a0*b0)
+        p1 = ftoi(a0*b1 + a1*b0) + (p0 >> 11)
+        p2 = ftoi(a0*b2 + a2*b0) + ftoi(a1*b1) + (p1 >> 11)
+        p3 = ftoi(a1*b2 + a2*b1)
+        p4 = ftoi(a2*b2)
+        d = (p2 >> 10) + (p3 << 1) + (p4 << 12)
+.endm
+
 ; ---- Quotients ----------------------------------------------------------------------------------------------------------------
 
 ; a/b of integers from -2^24 to 2^24, truncated: between a/b and the next integer lies a float, so that none is rounded to it.

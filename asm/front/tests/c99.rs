@@ -412,6 +412,35 @@ float step(const struct fir *f, const float *x, int n) { float s = 0.0f; for (in
 }
 
 #[test]
+fn computes_in_64_bits() {
+    check(
+        "computes_in_64_bits",
+        r#"#include <stdint.h>
+int step(int a, int b, unsigned c, unsigned d) {
+  int64_t x = ((int64_t)a << 20) + b, y = (int64_t)a*b - x, z = -y; uint64_t u = (uint64_t)c*d + c, v = ((uint64_t)d << 32) | c;
+  int r = (int)(x ^ y) + (int)((x & z) >> 13) + (int)(~z >> 32) + (int)(u >> 31) + (int)((u*v) >> 40) + (int)(v%256u) + (int)(v/1024u);
+  return r + (x < y) + 2*(u < v) + 4*(x <= z) + 8*(u == v) + 16*!!y + (y > 0 ? (int)(x << 35 >> 33) : (int)(u >> 45)) + (x == a); }
+"#,
+    );
+}
+
+/// A clock of microseconds that goes on over the periods, and an accumulator in fixed point.
+#[test]
+fn keeps_states_of_64_bits() {
+    check(
+        "keeps_states_of_64_bits",
+        r#"#include <stdint.h>
+static uint64_t now, last[3]; static int64_t sum = -5;
+float step(unsigned passed, int x, int i) {
+  now += passed; if (x > 100) sum = 0; else sum += (int64_t)x*x; if (sum > 1000000000000) sum = 1000000000000;
+  uint32_t since = (uint32_t)(now - last[i & 1]); last[(i >> 1) & 1] = now; last[2] = last[0];
+  for (long long k = 0; k < 40; k++) sum += k*x;
+  return (float)since + (float)(int32_t)(sum >> 16) + (last[2] >= last[1]); }
+"#,
+    );
+}
+
+#[test]
 fn indexes_structures_by_value() {
     check(
         "indexes_structures_by_value",
@@ -861,15 +890,36 @@ fn refuses_unset_values() {
 }
 
 #[test]
-fn refuses_64_bits_of_data() {
+fn refuses_division_of_64_bits() {
     let message = refused(
-        "refuses_64_bits_of_data",
-        r#"long long step(int a) {
+        "refuses_division_of_64_bits",
+        r#"int step(int a) {
   long long x = a;
-  return x; }
+  return (int)(x/3); }
 "#,
     );
-    assert!(message.contains("64-bit"), "{message}");
+    for part in [":3:", "64-bit"] {
+        assert!(message.contains(part), "{message}");
+    }
+}
+
+/// Ports have 32 bits: an integer of 64 bits is two of them.
+#[test]
+fn splits_64_bits_at_ports() {
+    let program = Program::new(
+        "splits_64_bits_at_ports",
+        "long long step(unsigned long long a, int b) { return a + b; }\n",
+    );
+    let folder = folder(&program.name);
+    let translation = translated(&program, &folder).expect("it is translated");
+    let names = |ports: &[takt_front::c::Port]| {
+        ports.iter().map(|port| port.name.clone()).collect::<Vec<_>>().join(" ")
+    };
+    assert_eq!(names(&translation.inputs), "a_low a_high b");
+    assert_eq!(names(&translation.outputs), "step_low step_high");
+    let rows: Vec<Vec<u32>> = [[u32::MAX, 7, 1], [5, 0, -6_i32 as u32]].map(Vec::from).into();
+    assert_eq!(emulated(&program, &translation, &T3, &rows), [[0, 8], [u32::MAX, u32::MAX]]);
+    let _ = std::fs::remove_dir_all(folder);
 }
 
 #[test]

@@ -13,9 +13,8 @@ use takt_automation::command::{root, run};
 use takt_front::c::{Candidate, Options, Preprocessor, candidates};
 
 const PROJECTS: &str = include_str!("../c.toml");
-/// Document with the table, and the marker before it.
+/// Document with the tables.
 const DOCUMENT: &str = "docs/c.md";
-const NAME: &str = "c";
 /// Number of reasons in the table of refusals.
 const REASONS: usize = 12;
 
@@ -71,7 +70,8 @@ pub(crate) fn count(arguments: &Arguments) -> Result<()> {
         let found = tried(project, &folder).with_context(|| project.name.clone())?;
         let good = found.iter().filter(|candidate| candidate.translation.is_ok()).count();
         (functions, translated) = (functions + found.len(), translated + good);
-        let _ = writeln!(table, "| {} | {} | {good} | {} |", project.name, found.len(), share(good, found.len()));
+        let _ =
+            writeln!(table, "| {} | {} | {good} | {} |", project.name, found.len(), share(good, found.len()));
         for candidate in &found {
             if let Err(error) = &candidate.translation {
                 if arguments.refused {
@@ -95,7 +95,7 @@ pub(crate) fn count(arguments: &Arguments) -> Result<()> {
     print!("{table}");
     let path = root().join(DOCUMENT);
     let text = fs::read_to_string(&path)?;
-    fs::write(&path, crate::documents::between(DOCUMENT, &text, NAME, &table)?)?;
+    fs::write(&path, crate::documents::between(DOCUMENT, &text, ("functions", "c"), &table)?)?;
     Ok(())
 }
 
@@ -151,7 +151,8 @@ fn tried(project: &Project, folder: &Path) -> Result<Vec<Candidate>> {
     };
     let mut found = Vec::new();
     for files in &project.files {
-        let sources = files.iter().map(|file| preprocessor.run(&folder.join(file))).collect::<Result<Vec<_>, _>>();
+        let sources =
+            files.iter().map(|file| preprocessor.run(&folder.join(file))).collect::<Result<Vec<_>, _>>();
         found.extend(sources.and_then(|sources| candidates(&sources, &options))?);
     }
     Ok(found)

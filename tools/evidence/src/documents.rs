@@ -28,13 +28,20 @@ fn with_record() -> Result<String> {
     let document = campaign::DOCUMENT;
     let text =
         std::fs::read_to_string(root().join(document)).with_context(|| format!("cannot read {document}"))?;
-    between(document, &text, "campaigns", &campaign::table()?)
+    between(document, &text, ("campaigns", "docs"), &campaign::table()?)
 }
 
-/// Replaces the text between two marker comments of a document.
-pub(crate) fn between(document: &str, text: &str, name: &str, new: &str) -> Result<String> {
-    let (begin, end) =
-        (format!("<!-- {name}: written by `cargo evidence docs` -->\n"), format!("<!-- end of {name} -->\n"));
+/// Replaces the text between two marker comments of a document, which name the table and the command that writes it.
+pub(crate) fn between(
+    document: &str,
+    text: &str,
+    (name, command): (&str, &str),
+    new: &str,
+) -> Result<String> {
+    let (begin, end) = (
+        format!("<!-- {name}: written by `cargo evidence {command}` -->\n"),
+        format!("<!-- end of {name} -->\n"),
+    );
     let (head, rest) = text.split_once(&begin).with_context(|| format!("{document}: no {begin}"))?;
     let (_, tail) = rest.split_once(&end).with_context(|| format!("{document}: no {end}"))?;
     Ok(format!("{head}{begin}\n{new}\n{end}{tail}"))

@@ -43,6 +43,8 @@ operations! {
     Fmod Float; Floor Float; Ceil Float; Trunc Float; Round Float; Rint Float;
     Equal Int; Less Int; LessEqual Int;
     IntAdd Int; IntSub Int; IntMul Int;
+    #[doc = "High word of the product of unsigned integers."]
+    ProductHigh Int;
     #[doc = "Quotient of signed integers, truncated."]
     IntDiv Int;
     #[doc = "Quotient of unsigned integers by one that is no power of two."]

@@ -355,9 +355,6 @@ impl Exec<'_> {
     ) -> Result<(), Error> {
         let (ty, origin) = (self.objects[object].leaves[leaf].ty.clone(), self.objects[object].origin);
         let unfit = match &ty {
-            Type::Int(integer) if integer.bits > 32 => {
-                Some("a 64-bit integer that outlives the step: use 32 bits")
-            }
             Type::Double => Some("a double: give --double=float"),
             Type::Pointer(_) => match value {
                 Value::Unset => return Ok(()),
@@ -703,6 +700,9 @@ impl Exec<'_> {
                     }
                     rest -= field.offset;
                     ty = field.ty.clone();
+                }
+                Type::Int(integer) if integer.bits > 32 => {
+                    return if rest == 0 { format!("(unsigned){text}") } else { format!("{text} >> 32") };
                 }
                 _ => break,
             }

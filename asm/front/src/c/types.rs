@@ -171,7 +171,7 @@ impl Structs {
         })
     }
 
-    /// Scalars of a type in the order of their places; `None` if there are more than [`MAX_LEAVES`] or its size is unknown. A union has
+    /// Scalars of a type in the order of their places, two of an integer of 64 bits; `None` if there are more than [`MAX_LEAVES`] or its size is unknown. A union has
     /// the scalars of its largest member.
     pub(super) fn leaves(&self, ty: &Type) -> Option<Vec<Leaf>> {
         let mut leaves = Vec::new();
@@ -216,6 +216,15 @@ impl Structs {
                 Some(())
             }
             Type::Void | Type::Function(_) => None,
+            Type::Int(integer) if integer.bits > 32 => {
+                // Two words, each a scalar of its own.
+                for (word, signed, at) in [("low", false, 0), ("high", integer.signed, 4)] {
+                    let name = if name.is_empty() { word.to_owned() } else { format!("{name}_{word}") };
+                    let word = Type::Int(Integer::new(32, signed));
+                    self.collect(&word, offset + at, &name, indices, leaves)?;
+                }
+                Some(())
+            }
             scalar => {
                 leaves.push(Leaf {
                     offset,

@@ -23,6 +23,8 @@ pub(super) enum Value {
     /// A known number: of type float it is a binary32 number.
     Real(f64),
     Node(Id),
+    /// An integer of 64 bits that depends on data: low and high word. Memory holds the words.
+    Wide(Id, Id),
     Pointer(Pointer),
     /// A function, by its key.
     Function(String),
@@ -40,6 +42,7 @@ impl PartialEq for Value {
             (Value::Int(a), Value::Int(b)) => a == b,
             (Value::Real(a), Value::Real(b)) => a.to_bits() == b.to_bits(),
             (Value::Node(a), Value::Node(b)) => a == b,
+            (Value::Wide(a, c), Value::Wide(b, d)) => a == b && c == d,
             (Value::Pointer(a), Value::Pointer(b)) => a == b,
             (Value::Function(a), Value::Function(b)) => a == b,
             (Value::Struct(a), Value::Struct(b)) => a == b,

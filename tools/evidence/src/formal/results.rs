@@ -32,13 +32,18 @@ pub(crate) fn document() -> Result<(&'static str, String)> {
     let members =
         manifest.lines().find(|line| line.starts_with("members")).context("the workspace has members")?;
     let members: Vec<&str> = members.split('"').skip(1).step_by(2).collect();
-    let whole = between(DOCUMENT, &text, "proofs", &table(&results))?;
-    let whole = between(DOCUMENT, &whole, "tests", &modules(&members)?)?;
+    let whole = between(DOCUMENT, &text, ("proofs", "docs"), &table(&results))?;
+    let whole = between(DOCUMENT, &whole, ("tests", "docs"), &modules(&members)?)?;
     let rows = page::rows()?;
-    let whole = ["units", "core", "tools", "programs"]
-        .into_iter()
-        .try_fold(whole, |whole, section| between(DOCUMENT, &whole, section, &page::table(&rows, section)))?;
-    let whole = between(DOCUMENT, &whole, "mutants", &page::mutants(&crate::mutants::results::results()?)?)?;
+    let whole = ["units", "core", "tools", "programs"].into_iter().try_fold(whole, |whole, section| {
+        between(DOCUMENT, &whole, (section, "docs"), &page::table(&rows, section))
+    })?;
+    let whole = between(
+        DOCUMENT,
+        &whole,
+        ("mutants", "docs"),
+        &page::mutants(&crate::mutants::results::results()?)?,
+    )?;
     for unit in UNITS {
         ensure!(
             whole.contains(&format!("`{}`", unit.name)),

@@ -124,7 +124,7 @@ impl Exec<'_> {
             return self.known(operator, ty, *a, *b).map(Value::Int);
         }
         if ty.bits > 32 {
-            return self.wide();
+            return self.wide_arithmetic(operator, ty, &a, &b);
         }
         let of = Type::Int(ty);
         let (Some(x), Some(y)) = (self.register(&a, &of), self.register(&b, &of)) else {
@@ -242,8 +242,14 @@ impl Exec<'_> {
             return Ok(Typed { ty: Type::Int(ty), value: Value::Int(ty.wrap(shifted)) });
         }
         if ty.bits > 32 {
-            return self.wide();
+            let Value::Int(by) = b.value else { return self.wide() };
+            let value = self.wide_shift(operator, ty, &a.value, by as u32)?;
+            return Ok(Typed { ty: Type::Int(ty), value });
         }
+        let b = match b.value {
+            Value::Wide(..) => Typed { ty: b.ty, value: Value::Node(self.low_word(&b.value)?) },
+            _ => b,
+        };
         let of = Type::Int(ty);
         let (Some(x), Some(by)) = (self.register(&a.value, &of), self.register(&b.value, &of)) else {
             return self.fail("shifts take integers");
@@ -293,7 +299,7 @@ impl Exec<'_> {
             }));
         }
         if integer.bits > 32 {
-            return self.wide();
+            return self.wide_compared(op, integer, &a, &b);
         }
         let (Some(a), Some(b)) = (self.register(&a, &ty), self.register(&b, &ty)) else {
             return self.fail("expected a number that is known at compile time or held in a register");
@@ -401,7 +407,10 @@ impl Exec<'_> {
                 _ => self.fail("the object that this pointer points to is not known"),
             };
         };
-        let index = self.promoted(index)?;
+        let mut index = self.promoted(index)?;
+        if let Value::Wide(..) = index.value {
+            index.value = Value::Node(self.low_word(&index.value)?);
+        }
         let moved = match index.value {
             Value::Int(index) => {
                 let by = index.checked_mul(size).map(|by| if back { -by } else { by });
@@ -424,7 +433,9 @@ impl Exec<'_> {
                     Some(before) => self.op(Op::IntAdd, &[before, words])?,
                     None => words,
                 };
-                Pointer { dynamic: Some(dynamic), ..place }
+                let moved = Pointer { dynamic: Some(dynamic), ..place };
+                self.extend(&moved, &to)?;
+                moved
             }
             _ => return self.fail("expected an integer as the index"),
         };

@@ -16,7 +16,7 @@ impl Exec<'_> {
         }
         match (&ty, to) {
             (_, Type::Void) => Ok(Value::Unset),
-            (Type::Int(_), Type::Int(to)) => self.narrowed(value, *to),
+            (Type::Int(from), Type::Int(to)) => self.narrowed(value, *from, *to),
             (Type::Int(from), Type::Float | Type::Double) => self.real_of(value, *from, to),
             (Type::Float | Type::Double, Type::Int(to)) => self.truncated(value, *to),
             (Type::Float, Type::Float) | (Type::Double, Type::Double) => Ok(value),
@@ -45,9 +45,15 @@ impl Exec<'_> {
         }
     }
 
-    fn narrowed(&mut self, value: Value, to: Integer) -> Result<Value, Error> {
+    fn narrowed(&mut self, value: Value, from: Integer, to: Integer) -> Result<Value, Error> {
         let id = match value {
             Value::Int(value) => return Ok(Value::Int(to.wrap(value))),
+            Value::Wide(..) if to.bits > 32 => return Ok(value),
+            Value::Wide(..) if to.boolean => {
+                let condition = self.wide_truth(&value)?;
+                return Ok(self.value_of(condition));
+            }
+            Value::Wide(..) => self.low_word(&value)?,
             Value::Node(id) => id,
             other => return Ok(other),
         };
@@ -56,7 +62,7 @@ impl Exec<'_> {
             return Ok(self.value_of(condition));
         }
         if to.bits > 32 {
-            return self.wide();
+            return self.widened(id, from);
         }
         Ok(Value::Node(self.wrapped(id, to)?))
     }
@@ -81,10 +87,6 @@ impl Exec<'_> {
         self.op(Op::ShiftRight, &[up, by])
     }
 
-    pub(super) fn wide<T>(&self) -> Result<T, Error> {
-        self.fail("a 64-bit integer depends on inputs or states: only known ones are computed; use 32 bits or float")
-    }
-
     fn real_of(&mut self, value: Value, from: Integer, to: &Type) -> Result<Value, Error> {
         Ok(match value {
             Value::Int(value) => {
@@ -95,6 +97,10 @@ impl Exec<'_> {
                     (_, true) => value as u64 as f64,
                     (_, false) => value as f64,
                 })
+            }
+            Value::Wide(..) => {
+                let value = self.wide_to_float(&value)?;
+                return self.converted(Typed { ty: Type::Float, value }, to);
             }
             Value::Node(id) => {
                 if *to == Type::Double {
@@ -180,6 +186,7 @@ impl Exec<'_> {
                 }
                 _ => self.is_not_zero(*id)?,
             },
+            Value::Wide(..) => self.wide_truth(&from.value)?,
             Value::Mixed(reason) => return self.fail(format!("this is {reason}")),
             Value::Unset | Value::Struct(_) => return self.fail("expected a number as the condition"),
         })

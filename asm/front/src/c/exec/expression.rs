@@ -432,6 +432,12 @@ impl<'a> Exec<'a> {
                 let ones = self.nodes.int(-1);
                 Value::Node(self.op(Op::Xor, &[id, ones])?)
             }
+            (UnaryOperator::Minus, Type::Int(integer), value @ Value::Wide(..)) => {
+                self.wide_arithmetic(&BinaryOperator::Minus, *integer, &Value::Int(0), &value)?
+            }
+            (UnaryOperator::Complement, Type::Int(integer), value @ Value::Wide(..)) => {
+                self.wide_arithmetic(&BinaryOperator::BitwiseXor, *integer, &value, &Value::Int(-1))?
+            }
             _ => return self.fail("this operator takes numbers"),
         };
         Ok(Typed { ty, value })

@@ -15,6 +15,7 @@ pub(super) mod places;
 mod rolled;
 mod statement;
 mod typing;
+mod wide;
 
 use super::ir::{Block, Id, Kind, Nodes, Place, Range, Statement};
 use super::types::{Signature, Structs, Type};

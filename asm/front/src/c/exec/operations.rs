@@ -117,9 +117,8 @@ impl Exec<'_> {
             ) => Some(first),
             (Op::IntMul | Op::IntDiv, _, Some(1)) => Some(first),
             (Op::IntMul, Some(1), _) => Some(second),
-            (Op::IntMul | Op::And, Some(0), _) | (Op::IntMul | Op::And, _, Some(0)) => {
-                Some(self.nodes.int(0))
-            }
+            (Op::IntMul | Op::ProductHigh | Op::And, Some(0), _)
+            | (Op::IntMul | Op::ProductHigh | Op::And, _, Some(0)) => Some(self.nodes.int(0)),
             (Op::And, Some(1), _) if bit(self, second) => Some(second),
             (Op::And, _, Some(1)) if bit(self, first) => Some(first),
             (Op::And | Op::Or, ..) if first == second => Some(first),

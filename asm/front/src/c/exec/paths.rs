@@ -50,6 +50,7 @@ fn cost(op: Op) -> usize {
         | Op::Trunc => 20,
         Op::IntMul | Op::IntDiv | Op::ToInt | Op::ToUnsigned | Op::UnsignedToFloat => 10,
         Op::UnsignedDiv => 40,
+        Op::ProductHigh => 30,
         _ => 1,
     }
 }
@@ -528,7 +529,6 @@ const MIXED_POINTER: Value =
 
 fn mixed(ty: &Type) -> Value {
     match ty {
-        Type::Int(_) => Value::Mixed("a 64-bit integer that depends on data: only known ones are computed"),
         Type::Double => Value::Mixed("a double that depends on data: give --double=float"),
         Type::Function(_) | Type::Pointer(_) => {
             Value::Mixed("a pointer that data choose: use `if` or `switch`")

@@ -64,8 +64,7 @@ impl Exec<'_> {
         let first = kinds.next().unwrap_or(Kind::Int);
         let kind = kinds.all(|kind| kind == first).then_some(first);
         let unfit = |leaf: &&Leaf| match &leaf.ty {
-            Type::Int(integer) => integer.bits > 32,
-            Type::Float => false,
+            Type::Int(_) | Type::Float => false,
             _ => true,
         };
         if let Some(leaf) = object.leaves.iter().find(unfit) {
@@ -204,18 +203,29 @@ impl Exec<'_> {
             }
         };
         let known = self.nodes.int(leaf as i32);
-        let Some(dynamic) = pointer.dynamic else { return Ok(known) };
-        let index = self.op(Op::IntAdd, &[dynamic, known])?;
-        self.extend(pointer.object, index)?;
-        Ok(index)
+        match pointer.dynamic {
+            Some(dynamic) => self.op(Op::IntAdd, &[dynamic, known]),
+            None => Ok(known),
+        }
     }
 
-    /// Extends an object of unknown length to the greatest index, in the next translation.
-    fn extend(&mut self, object: usize, index: Id) -> Result<(), Error> {
-        let found = &self.objects[object];
+    /// Extends an object of unknown length to the greatest place of a pointer to its elements, in the next translation.
+    pub(super) fn extend(&mut self, pointer: &Pointer, element: &Type) -> Result<(), Error> {
+        let Pointer { object, offset, dynamic: Some(dynamic) } = pointer else { return Ok(()) };
+        let found = &self.objects[*object];
         let Some(extent) = self.facts.extents.get(&found.key).copied() else { return Ok(()) };
-        let most = usize::try_from(self.nodes.range(index).1).unwrap_or(0);
-        let wanted = most / (found.leaves.len() / extent.max(1)).max(1) + 1;
+        let own = match &found.ty {
+            Type::Array(own, _) if extent > 1 => &**own,
+            own => own,
+        };
+        if own != element {
+            // An array inside of an element.
+            return Ok(());
+        }
+        let size = self.structs.size(element).unwrap_or(4).max(1) as i64;
+        let each = (found.leaves.len() / extent.max(1)).max(1) as i64;
+        let most = self.nodes.range(*dynamic).1 / each + offset / size;
+        let wanted = usize::try_from(most).unwrap_or(0) + 1;
         if wanted > MAX_EXTENT {
             return self.fail(format!(
                 "data index `{0}`, whose length is not known: declare its length (`{0}[N]`), or mask the index",
@@ -223,7 +233,8 @@ impl Exec<'_> {
             ));
         }
         if wanted > extent {
-            self.facts.extents.insert(found.key.clone(), wanted);
+            let key = found.key.clone();
+            self.facts.extents.insert(key, wanted);
             self.again = true;
         }
         Ok(())
@@ -231,6 +242,11 @@ impl Exec<'_> {
 
     /// Reads a scalar; a part of a structure may be unset.
     fn scalar(&mut self, pointer: &Pointer, ty: &Type, part: bool) -> Result<Value, Error> {
+        if let Type::Int(integer) = ty
+            && integer.bits > 32
+        {
+            return self.joined_words(pointer, *integer, |exec, at, ty| exec.scalar(at, ty, part));
+        }
         let object = pointer.object;
         let is_known = self.objects[object].constant || !self.stepping;
         if pointer.dynamic.is_none() && (self.objects[object].array.is_none() || is_known) {
@@ -336,6 +352,17 @@ impl Exec<'_> {
     }
 
     fn put_scalar(&mut self, pointer: &Pointer, ty: &Type, value: Value) -> Result<(), Error> {
+        if let Type::Int(integer) = ty
+            && integer.bits > 32
+        {
+            let words = self.split_words(&value, *integer)?;
+            let types = self.structs.leaves(ty).unwrap_or_default();
+            for (word, leaf) in words.into_iter().zip(types) {
+                let at = Pointer { offset: pointer.offset + leaf.offset as i64, ..pointer.clone() };
+                self.put_scalar(&at, &leaf.ty, word)?;
+            }
+            return Ok(());
+        }
         let object = pointer.object;
         if self.objects[object].constant && self.stepping {
             return self.fail(format!("`{}` is const", self.objects[object].name));

@@ -6,7 +6,7 @@ use super::loops::Repetition;
 use crate::Error;
 use crate::c::ir::{FULL, Id, Kind, Node, Op, Statement};
 use crate::c::types::{INT, Type};
-use crate::c::value::{Condition, Exit, Memory, Origin, Outcome, Pointer, Value};
+use crate::c::value::{Condition, Exit, Memory, Origin, Outcome, Pointer, Typed, Value};
 use lang_c::ast::{BinaryOperator, Expression, UnaryOperator};
 use lang_c::span::Node as Spanned;
 use std::collections::BTreeMap;
@@ -142,7 +142,11 @@ impl<'a> Exec<'a> {
         let Some((name, by)) = self.advance(step)? else { return Ok(None) };
         let Some(super::Named::Object(object)) = self.looked_up(name).cloned() else { return Ok(None) };
         let Type::Int(integer) = self.objects[object].ty else { return Ok(None) };
-        let Value::Int(first) = self.memory.get(object, 0).clone() else { return Ok(None) };
+        let place = self.place_of(object);
+        let unset = self.memory.0[object].contains(&Value::Unset);
+        let Value::Int(first) = (if unset { Value::Unset } else { self.load(&place)?.value }) else {
+            return Ok(None);
+        };
         let Some((operator, end, alone)) = self.comparison(condition, name)? else { return Ok(None) };
         let count = match operator {
             BinaryOperator::Less if by > 0 => (end - first + by - 1).div_euclid(by),
@@ -155,7 +159,8 @@ impl<'a> Exec<'a> {
         let count = count.max(0);
         let last = first + count * by;
         let (least, most) = integer.limits();
-        if count > MOST || last < least || last > most || last > i64::from(i32::MAX) {
+        let narrow = integer.bits <= 32 || first.min(last) >= 0;
+        if !narrow || count > MOST || last < least || last > most || last > i64::from(i32::MAX) {
             return Ok(None);
         }
         Ok(Some(Counter { object, first, step: by, count, alone }))
@@ -258,12 +263,13 @@ impl<'a> Exec<'a> {
             let number = self.nodes.indices.len() - 1;
             let (index, _) = self.nodes.add(Node::Index(number), Kind::Int, range);
             self.memory.set(counter.object, 0, Value::Node(index));
+            let counting = self.memory.0[counter.object].clone();
             let mut outcomes = Vec::new();
             let normal = self.statement(parts.body, &mut outcomes)?;
             let mut leaves = Vec::new();
             let normal = self.absorbed(normal, outcomes, &|exit| *exit == Exit::Continue, &mut leaves)?;
             let regular = normal == Condition::Known(true) && leaves.is_empty();
-            let kept = self.memory.get(counter.object, 0) == &Value::Node(index);
+            let kept = self.memory.0[counter.object] == counting;
             let same_end =
                 match parts.condition.map(|condition| self.comparison(condition, &name)).transpose()? {
                     Some(Some(_)) => self.ends_alike(counter, parts)?,
@@ -273,7 +279,7 @@ impl<'a> Exec<'a> {
                 self.restore(saved);
                 return Ok(false);
             }
-            self.memory.set(counter.object, 0, before.get(counter.object, 0).clone());
+            self.memory.0[counter.object] = before.0[counter.object].clone();
             if self.grow(&mut cells, &before)? {
                 self.restore(saved);
                 continue;
@@ -285,16 +291,22 @@ impl<'a> Exec<'a> {
             self.emit(Statement::For { index: number, first, last, step, body });
             self.leave_cells(&cells, before);
             let end = counter.first + counter.count * counter.step;
-            self.memory.set(counter.object, 0, Value::Int(end));
+            self.set_counter(counter.object, end)?;
             return Ok(true);
         }
         self.fail("cannot determine what this loop changes: split its body")
     }
 
+    /// Sets a counter.
+    fn set_counter(&mut self, object: usize, value: i64) -> Result<(), Error> {
+        let place = self.place_of(object);
+        self.store(&place, Typed { ty: place.ty.clone(), value: Value::Int(value) })
+    }
+
     /// The loop has the same number of iterations after the body as before it.
     fn ends_alike(&mut self, counter: Counter, parts: &Repetition<'a>) -> Result<bool, Error> {
         let saved = self.memory.clone();
-        self.memory.set(counter.object, 0, Value::Int(counter.first));
+        self.set_counter(counter.object, counter.first)?;
         let again = self.counter(parts)?;
         self.memory = saved;
         Ok(again.is_some_and(|again| again.count == counter.count))

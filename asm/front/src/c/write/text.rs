@@ -89,6 +89,7 @@ fn form(op: Op) -> Form {
         Op::Rint => Form::Call("rint", MATH),
         Op::ShiftRightLogical => Form::Call("shift_right", C),
         Op::UnsignedDiv => Form::Call("quotient_unsigned", C),
+        Op::ProductHigh => Form::Call("product_high", C),
         Op::Below => Form::Call("below", C),
         Op::UnsignedToFloat => Form::Call("unsigned_to_float", C),
         Op::ToInt => Form::Call("to_int", C),
