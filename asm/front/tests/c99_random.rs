@@ -101,7 +101,7 @@ impl Generator {
         }
         let p = self.prefix.clone();
         let a = self.integer(names, depth - 1);
-        match self.below(19) {
+        match self.below(24) {
             0 | 1 => format!("({a} + {})", self.integer(names, depth - 1)),
             2 | 3 => format!("({a} - {})", self.integer(names, depth - 1)),
             4 => format!("({a}) * {}", [3, 5, -2, 10, 255][self.below(5)]),
@@ -122,8 +122,35 @@ impl Generator {
                     [self.below(6)];
                 format!("({ty})({a})")
             }
+            18 => {
+                let operator = ["/", "%"][self.below(2)];
+                // No divisor is 0 or -1.
+                let by = match self.below(3) {
+                    0 => ["3", "10", "-7", "1000", "12345", "60u"][self.below(6)].to_owned(),
+                    1 => format!("((({}) & 1023) + 1)", self.integer(names, depth - 1)),
+                    _ => format!("(({}) | 0x40000002u)", self.integer(names, depth - 1)),
+                };
+                format!("(({a}) {operator} {by})")
+            }
+            19 => {
+                let (b, ty) = (self.integer(names, depth - 1), self.wide());
+                let operator = ["*", "+", "-", "^", "&", "|"][self.below(6)];
+                format!("(int)((({ty})({a}) {operator} ({b})) >> {})", self.below(64))
+            }
+            20 => {
+                let (b, ty, c) =
+                    (self.integer(names, depth - 1), self.wide(), self.integer(names, depth - 1));
+                let compare = ["<", "<=", ">", "==", "!="][self.below(5)];
+                format!("((({ty})({a}) << {}) {compare} ({ty})({b})*({c}))", self.below(40))
+            }
+            21 => format!("(int)({p}w >> {})", self.below(64)),
+            22 => format!("(int)-~({p}w - ({a}))"),
             _ => format!("({} ? {a} : {})", self.condition(names, depth - 1), self.integer(names, depth - 1)),
         }
+    }
+
+    fn wide(&mut self) -> &'static str {
+        ["long long", "unsigned long long"][self.below(2)]
     }
 
     fn condition(&mut self, names: &Names, depth: usize) -> String {
@@ -170,6 +197,16 @@ impl Generator {
                 let (to, value) = (self.pick(&names.integer_places), self.integer(names, 3));
                 let operator = ["=", "=", "+=", "-=", "^=", "|=", "&="][self.below(7)];
                 self.line(depth, &format!("{to} {operator} {value};"));
+            }
+            9 if self.chance(2) => {
+                let (a, p) = (self.integer(names, 2), self.prefix.clone());
+                let line = match self.below(4) {
+                    0 => format!("{p}w = ({a});"),
+                    1 => format!("{p}w += (long long)({a})*({});", self.integer(names, 2)),
+                    2 => format!("{p}w ^= {p}w << {};", self.below(64)),
+                    _ => format!("{p}w++;"),
+                };
+                self.line(depth, &line);
             }
             9 => {
                 let to = self.pick(&names.integer_places);
@@ -286,7 +323,11 @@ impl Generator {
             0 => 30 + self.below(60),
             _ => 2 + self.below(7),
         };
-        let head = match self.below(4) {
+        let head = match self.below(5) {
+            4 => {
+                let end = self.integer(names, 1);
+                format!("for (int {index} = 0; {index} < (({end}) & 7); {index}++) {{")
+            }
             0 => format!("for (int {index} = {count}; {index} > 0; {index}--) {{"),
             1 => {
                 let condition = self.condition(names, 1);
@@ -312,6 +353,7 @@ impl Generator {
             "struct {p}s {{ float f; int n; short h; float a[4]; }};
 static float {p}g = 0.75f;
 static int {p}k;
+static long long {p}w = -3;
 static unsigned char {p}c = 7;
 static float {p}m[8] = {{ 1, 2, 3 }};
 static int {p}q[4];

@@ -10,12 +10,16 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Headers of the supported part of C's library: name and text.
 pub const HEADERS: &[(&str, &str)] = &[
+    ("assert.h", include_str!("headers/assert.h")),
     ("float.h", include_str!("headers/float.h")),
+    ("inttypes.h", include_str!("headers/inttypes.h")),
     ("limits.h", include_str!("headers/limits.h")),
     ("math.h", include_str!("headers/math.h")),
+    ("stdarg.h", include_str!("headers/stdarg.h")),
     ("stdbool.h", include_str!("headers/stdbool.h")),
     ("stddef.h", include_str!("headers/stddef.h")),
     ("stdint.h", include_str!("headers/stdint.h")),
+    ("stdio.h", include_str!("headers/stdio.h")),
     ("stdlib.h", include_str!("headers/stdlib.h")),
     ("string.h", include_str!("headers/string.h")),
 ];

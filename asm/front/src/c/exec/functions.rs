@@ -82,7 +82,7 @@ impl<'a> Exec<'a> {
                 return self
                     .fail(format!("`{name}` rounds once, and only some machines do: write `a*b + c`"));
             }
-            ("printf" | "puts" | "fprintf" | "assert" | "__assert_fail", _) => {
+            ("printf" | "puts" | "fprintf" | "snprintf" | "__assert_fail", _) => {
                 return self.fail(format!("`{name}`: nothing can be printed while running; leave it out with `#ifndef`, or write to an output"));
             }
             _ => {}

@@ -63,6 +63,32 @@ fn range_of(op: Op, ranges: &[Range]) -> Range {
     }
 }
 
+/// The value of an operation on known integers.
+fn computed(op: Op, operands: &[i32]) -> Option<i32> {
+    let (a, b) = (operands[0], operands.get(1).copied().unwrap_or(0));
+    let shift = b as u32 & 31;
+    Some(match op {
+        Op::IntAdd => a.wrapping_add(b),
+        Op::IntSub => a.wrapping_sub(b),
+        Op::IntMul => a.wrapping_mul(b),
+        Op::ProductHigh => (u64::from(a as u32) * u64::from(b as u32) >> 32) as i32,
+        Op::IntDiv => a.checked_div(b)?,
+        Op::IntRem => a.checked_rem(b)?,
+        Op::UnsignedDiv => (a as u32).checked_div(b as u32)? as i32,
+        Op::And => a & b,
+        Op::Or => a | b,
+        Op::Xor => a ^ b,
+        Op::ShiftLeft => a << shift,
+        Op::ShiftRight => a >> shift,
+        Op::ShiftRightLogical => (a as u32 >> shift) as i32,
+        Op::IntEqual => i32::from(a == b),
+        Op::IntLess => i32::from(a < b),
+        Op::Below => i32::from((a as u32) < b as u32),
+        Op::Not => i32::from(a == 0),
+        _ => return None,
+    })
+}
+
 impl Exec<'_> {
     /// Adds an operation, or returns a simpler node of equal value.
     pub(super) fn op(&mut self, op: Op, operands: &[Id]) -> Result<Id, Error> {
@@ -98,6 +124,12 @@ impl Exec<'_> {
     }
 
     fn simplified(&mut self, op: Op, operands: &[Id]) -> Option<Id> {
+        let constants: Vec<i32> = operands.iter().filter_map(|id| self.constant(*id)).collect();
+        if constants.len() == operands.len()
+            && let Some(value) = computed(op, &constants)
+        {
+            return Some(self.nodes.int(value));
+        }
         let first = operands[0];
         let (a, b) = (self.constant(first), operands.get(1).and_then(|id| self.constant(*id)));
         let second = operands.get(1).copied().unwrap_or(first);
