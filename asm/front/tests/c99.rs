@@ -440,6 +440,57 @@ float step(unsigned passed, int x, int i) {
     );
 }
 
+/// The member of a union that the program uses lays it out.
+#[test]
+fn lays_unions_out_by_use() {
+    check(
+        "lays_unions_out_by_use",
+        r#"#include <stdint.h>
+struct control { union { struct { int16_t roll, pitch; float thrust; }; struct { float force; float torque[3]; }; float motors[4]; }; int mode; };
+float step(struct control *c, float x) { c->roll = (int16_t)(c->roll + 3); c->pitch = -5; c->thrust = 0.5f*c->thrust + x; return c->thrust + c->roll; }
+"#,
+    );
+    let message = refused(
+        "refuses_a_union_in_two_ways",
+        r#"union both { short a[2]; float b; };
+float step(int n) {
+  union both u; u.a[0] = n; u.a[1] = n;
+  return u.b; }
+"#,
+    );
+    assert!(message.contains("is read as"), "{message}");
+}
+
+#[test]
+fn reads_strings() {
+    check(
+        "reads_strings",
+        r#"static void copy(char *to, const char *from) { while ((*to++ = *from++)) {} }
+const char *names[] = { "", "solved", "unsolved" };
+static char name[16];
+int step(int n) { copy(name, names[1]); return name[0] + name[n & 3] + "abc"[n & 1]; }
+"#,
+    );
+}
+
+#[test]
+fn leaves_out_calls() {
+    let mut program = Program::new(
+        "leaves_out_calls",
+        r#"extern void toggle(int pin); extern int read(int pin);
+float step(float a) { toggle(3); return 2.0f*a; }
+float other(float a) { return a + read(3); }
+"#,
+    );
+    let folder = folder(&program.name);
+    program.ignore = vec!["toggle".to_owned(), "read".to_owned()];
+    assert!(translated(&program, &folder).is_ok());
+    program.step = "other".to_owned();
+    let message = translated(&program, &folder).expect_err("it is refused");
+    assert!(message.contains("--ignore read"), "{message}");
+    let _ = std::fs::remove_dir_all(folder);
+}
+
 #[test]
 fn indexes_structures_by_value() {
     check(

@@ -399,6 +399,7 @@ fn generated(seed: u64) -> Program {
         step: format!("{prefix}step"),
         init: None,
         set: Vec::new(),
+        ignore: Vec::new(),
         double_is_float: false,
     }
 }

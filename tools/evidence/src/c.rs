@@ -147,6 +147,7 @@ fn tried(project: &Project, folder: &Path) -> Result<Vec<Candidate>> {
         step: String::new(),
         init: None,
         set: project.set.iter().map(|(name, number)| (name.clone(), *number)).collect(),
+        ignore: Vec::new(),
         double_is_float: true,
     };
     let mut found = Vec::new();

@@ -46,6 +46,8 @@ pub struct Options {
     /// Numbers that the step is given in every period, by the scalars as C writes them (`n`, `conf->taps`): they are computed with while
     /// translating.
     pub set: Vec<(String, f64)>,
+    /// Functions without a result whose calls are left out.
+    pub ignore: Vec<String>,
     /// Read `double` as `float`, and every number as binary32.
     pub double_is_float: bool,
 }
@@ -120,7 +122,7 @@ fn units(sources: &[Source]) -> Result<Vec<Unit>, Error> {
 fn translated(units: &[Unit], options: &Options, strict: bool) -> Result<Translation, Error> {
     let mut facts = Facts::default();
     for _ in 0..MAX_ROUNDS {
-        let mut exec = Exec::new(units, options.double_is_float, facts);
+        let mut exec = Exec::new(units, options, facts);
         match round(&mut exec, options, strict) {
             Err(error) if !exec.again => return Err(error),
             Ok(Some(translation)) if !exec.again => return Ok(translation),

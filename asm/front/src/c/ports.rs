@@ -319,7 +319,7 @@ impl Exec<'_> {
     }
 
     /// An object in memory whose words the loader sets.
-    fn table(&mut self, object: usize) -> Result<(), Error> {
+    pub(super) fn table(&mut self, object: usize) -> Result<(), Error> {
         self.settle(object)?;
         let Some(array) = self.objects[object].array else { return Ok(()) };
         for leaf in 0..self.objects[object].leaves.len() {
@@ -690,10 +690,12 @@ impl Exec<'_> {
                     joint = ".";
                 }
                 Type::Struct(index) => {
-                    let fields = &self.structs.0[index].fields;
-                    let Some(field) = fields.iter().rev().find(|field| field.offset <= rest) else {
-                        return text;
+                    let fields = &self.structs.list[index].fields;
+                    let field = match self.structs.list[index].union {
+                        true => fields.get(self.structs.laid_out(index)),
+                        false => fields.iter().rev().find(|field| field.offset <= rest),
                     };
+                    let Some(field) = field else { return text };
                     if let Some(name) = &field.name {
                         text = format!("{text}{joint}{name}");
                         joint = ".";

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! C's types: sizes, the places of members, and the scalars that an object consists of. ILP32.
 
+use std::collections::HashMap;
 use std::rc::Rc;
 
 /// An integer type.
@@ -106,7 +107,11 @@ pub(super) const MAX_LEAVES: usize = 65_536;
 
 /// All structures of a program.
 #[derive(Default)]
-pub(super) struct Structs(pub(super) Vec<Struct>);
+pub(super) struct Structs {
+    pub(super) list: Vec<Struct>,
+    /// Members by which unions are laid out, by structure, where it is not the largest.
+    pub(super) members: HashMap<usize, usize>,
+}
 
 impl Structs {
     /// Size in bytes; `None` if the type is incomplete.
@@ -118,7 +123,7 @@ impl Structs {
             Type::Double => 8,
             Type::Array(element, count) => self.size(element)?.checked_mul((*count)?)?,
             Type::Struct(index) => {
-                let found = &self.0[*index];
+                let found = &self.list[*index];
                 if !found.complete {
                     return None;
                 }
@@ -130,7 +135,7 @@ impl Structs {
     pub(super) fn align(&self, ty: &Type) -> usize {
         match ty {
             Type::Array(element, _) => self.align(element),
-            Type::Struct(index) => self.0[*index].align,
+            Type::Struct(index) => self.list[*index].align,
             // The ABI of 32-bit x86 aligns 64-bit values of a structure at 4.
             Type::Void | Type::Function(_) => 1,
             other => self.size(other).unwrap_or(1).min(4),
@@ -144,7 +149,7 @@ impl Structs {
         members: Vec<(Option<String>, Type)>,
         most: Option<usize>,
     ) {
-        let union = self.0[index].union;
+        let union = self.list[index].union;
         let (mut offset, mut size, mut align, mut fields) = (0_usize, 0, 1, Vec::new());
         for (name, ty) in members {
             let own = self.align(&ty).min(most.unwrap_or(usize::MAX));
@@ -155,14 +160,14 @@ impl Structs {
             size = size.max(offset);
             align = align.max(own);
         }
-        let found = &mut self.0[index];
+        let found = &mut self.list[index];
         (found.fields, found.align, found.complete) = (fields, align, true);
         found.size = size.next_multiple_of(align);
     }
 
     /// A member with its place, through anonymous structures.
     pub(super) fn member(&self, index: usize, name: &str) -> Option<(usize, Type)> {
-        self.0[index].fields.iter().find_map(|field| match (&field.name, &field.ty) {
+        self.list[index].fields.iter().find_map(|field| match (&field.name, &field.ty) {
             (Some(own), ty) if own == name => Some((field.offset, ty.clone())),
             (None, Type::Struct(inner)) => {
                 self.member(*inner, name).map(|(offset, ty)| (field.offset + offset, ty))
@@ -198,12 +203,10 @@ impl Structs {
                 Some(())
             }
             Type::Struct(index) => {
-                let found = &self.0[*index];
+                let found = &self.list[*index];
                 let mut fields: Vec<&Field> = found.fields.iter().collect();
                 if found.union {
-                    let largest =
-                        fields.iter().copied().rev().max_by_key(|field| self.size(&field.ty).unwrap_or(0));
-                    fields = largest.into_iter().collect();
+                    fields = fields.get(self.laid_out(*index)).copied().into_iter().collect();
                 }
                 for field in fields {
                     let inner = match (&field.name, name) {
@@ -237,6 +240,41 @@ impl Structs {
         }
     }
 
+    /// The member of a union that its scalars are of.
+    pub(super) fn laid_out(&self, index: usize) -> usize {
+        let fields = &self.list[index].fields;
+        let largest =
+            || (0..fields.len()).rev().max_by_key(|field| self.size(&fields[*field].ty).unwrap_or(0));
+        self.members.get(&index).copied().or_else(largest).unwrap_or(0)
+    }
+
+    /// The union on the way to a member, and the field that leads there, if the union's scalars are not those of the field.
+    pub(super) fn unlike(&self, index: usize, name: &str) -> Option<(usize, usize)> {
+        let found = &self.list[index];
+        let field = found.fields.iter().position(|field| match (&field.name, &field.ty) {
+            (Some(own), _) => own == name,
+            (None, Type::Struct(inner)) => self.member(*inner, name).is_some(),
+            _ => false,
+        })?;
+        let own = &found.fields[field];
+        if found.union {
+            let scalars = |ty| self.leaves(ty).unwrap_or_default();
+            let laid_out = scalars(&found.fields[self.laid_out(index)].ty);
+            let same = |leaf: &Leaf| {
+                laid_out
+                    .iter()
+                    .any(|other| other.offset == leaf.offset && self.size(&other.ty) == self.size(&leaf.ty))
+            };
+            if !scalars(&own.ty).iter().all(same) {
+                return Some((index, field));
+            }
+        }
+        match (&own.name, &own.ty) {
+            (None, Type::Struct(inner)) => self.unlike(*inner, name),
+            _ => None,
+        }
+    }
+
     /// Spells a type for messages.
     pub(super) fn shown(&self, ty: &Type) -> String {
         match ty {
@@ -257,7 +295,7 @@ impl Structs {
             Type::Array(element, Some(count)) => format!("{}[{count}]", self.shown(element)),
             Type::Array(element, None) => format!("{}[]", self.shown(element)),
             Type::Struct(index) => {
-                let found = &self.0[*index];
+                let found = &self.list[*index];
                 format!("{} {}", if found.union { "union" } else { "struct" }, found.name)
             }
             Type::Function(_) => "a function".to_owned(),

@@ -19,6 +19,7 @@ pub(crate) struct Program {
     pub(crate) step: String,
     pub(crate) init: Option<String>,
     pub(crate) set: Vec<(String, f64)>,
+    pub(crate) ignore: Vec<String>,
     pub(crate) double_is_float: bool,
 }
 
@@ -30,6 +31,7 @@ impl Program {
             step: "step".to_owned(),
             init: code.contains("void init(").then(|| "init".to_owned()),
             set: Vec::new(),
+            ignore: Vec::new(),
             double_is_float: code.contains("double"),
         }
     }
@@ -78,6 +80,7 @@ pub(crate) fn translated_text(program: &Program, source: Source) -> Result<Trans
         step: program.step.clone(),
         init: program.init.clone(),
         set: program.set.clone(),
+        ignore: program.ignore.clone(),
         double_is_float: program.double_is_float,
     };
     translate(&[source], &options).map_err(|error| {

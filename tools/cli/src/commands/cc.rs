@@ -35,6 +35,9 @@ pub(crate) struct Cc {
     /// Give a scalar of the step's parameters a number that holds in every period, as C writes it: `n=8`, `conf->taps=16`.
     #[arg(long, value_name = "SCALAR=NUMBER", value_parser = scalar)]
     set: Vec<(String, f64)>,
+    /// Leave out calls of a function that has no result, as one that prints, logs or toggles a pin.
+    #[arg(long, value_name = "NAME")]
+    ignore: Vec<String>,
     /// Define a macro of the preprocessor.
     #[arg(short = 'D', value_name = "NAME[=VALUE]")]
     defines: Vec<String>,
@@ -90,7 +93,13 @@ pub(crate) fn run(arguments: &Cc, _: bool, out: &mut Out) -> Result<()> {
     let preprocessor = Preprocessor::new(&options).map_err(shown)?;
     let sources = arguments.files.iter().map(|file| preprocessor.run(file)).collect::<Result<Vec<_>, _>>();
     let step = arguments.step.clone().unwrap_or_default();
-    let options = Options { step, init: arguments.init.clone(), set: arguments.set.clone(), double_is_float };
+    let options = Options {
+        step,
+        init: arguments.init.clone(),
+        set: arguments.set.clone(),
+        ignore: arguments.ignore.clone(),
+        double_is_float,
+    };
     if arguments.list {
         let candidates = sources.and_then(|sources| candidates(&sources, &options)).map_err(shown)?;
         drop(waiting);

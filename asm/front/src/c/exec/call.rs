@@ -19,6 +19,14 @@ impl<'a> Exec<'a> {
     pub(super) fn call(&mut self, call: &'a CallExpression) -> Result<Typed, Error> {
         if let Expression::Identifier(name) = &call.callee.node {
             let name = name.node.name.as_str();
+            if self.ignored.iter().any(|ignored| ignored == name) {
+                return match self.looked_up(name) {
+                    Some(Named::Function(_, signature)) if signature.result != Type::Void => {
+                        self.fail(format!("--ignore {name}: its result is a value"))
+                    }
+                    _ => Ok(Typed { ty: Type::Void, value: Value::Unset }),
+                };
+            }
             let defined = match self.looked_up(name) {
                 Some(Named::Function(key, _)) => self.functions.contains_key(key),
                 Some(_) => true,

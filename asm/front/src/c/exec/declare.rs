@@ -367,7 +367,7 @@ impl<'a> Exec<'a> {
             Some(_) => return self.fail("this tag names an enumeration"),
             None => {
                 let name = tag.clone().unwrap_or_else(|| "without a name".to_owned());
-                self.structs.0.push(Struct {
+                self.structs.list.push(Struct {
                     name,
                     union,
                     fields: Vec::new(),
@@ -375,7 +375,7 @@ impl<'a> Exec<'a> {
                     align: 1,
                     complete: false,
                 });
-                let index = self.structs.0.len() - 1;
+                let index = self.structs.list.len() - 1;
                 if let Some(tag) = tag {
                     self.scope().tags.insert(tag, Type::Struct(index));
                 }

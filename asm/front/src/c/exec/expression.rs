@@ -13,6 +13,8 @@ use lang_c::ast::{
 };
 use lang_c::span::Node;
 
+const CHAR: Type = Type::Int(Integer::new(8, true));
+
 /// Bytes of a text, without the final zero.
 pub(super) fn text(parts: &[String]) -> Vec<u8> {
     let mut bytes = Vec::new();
@@ -132,9 +134,7 @@ impl<'a> Exec<'a> {
                 Ok(Typed { ty: Type::Int(UNSIGNED), value })
             }
             Expression::OffsetOf(offset) => self.offset_of(&offset.node),
-            Expression::StringLiteral(_) => self.fail(
-                "a string is not a number: strings are only supported as initial values of arrays of char",
-            ),
+            Expression::StringLiteral(parts) => self.string(&parts.node, expression.span.start),
             Expression::GenericSelection(_) | Expression::VaArg(_) => {
                 self.fail("`_Generic` and `va_arg` are not translated: call the function that is meant")
             }
@@ -164,6 +164,20 @@ impl<'a> Exec<'a> {
         let value = self.value(last);
         self.close();
         value
+    }
+
+    /// A string as a pointer to its first character.
+    fn string(&mut self, parts: &[String], place: usize) -> Result<Typed, Error> {
+        let bytes = text(parts);
+        let ty = Type::Array(CHAR.into(), Some(bytes.len() + 1));
+        let key = ("string".to_owned(), place, self.unit());
+        let object = self.object("text", &ty, Origin::Static, true, key)?;
+        for (leaf, byte) in bytes.into_iter().chain([0]).enumerate() {
+            self.memory.set(object, leaf, Value::Int(i64::from(byte as i8)));
+        }
+        self.table(object)?;
+        let place = self.place_of(object);
+        self.load(&place)
     }
 
     fn size_value(&self, ty: &Type) -> Result<Typed, Error> {
@@ -329,8 +343,16 @@ impl<'a> Exec<'a> {
         Ok(object)
     }
 
-    fn member(&self, place: Lvalue, member: &MemberExpression) -> Result<Lvalue, Error> {
+    fn member(&mut self, place: Lvalue, member: &MemberExpression) -> Result<Lvalue, Error> {
         let name = &member.identifier.node.name;
+        if let Type::Struct(index) = place.ty
+            && let Some((union, field)) = self.structs.unlike(index, name)
+            && !self.facts.unions.contains_key(&union)
+        {
+            self.facts.unions.insert(union, field);
+            self.again = true;
+            return self.fail("a union is laid out by another member");
+        }
         let found = match place.ty {
             Type::Struct(index) => self.structs.member(index, name),
             _ => None,

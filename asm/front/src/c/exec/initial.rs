@@ -79,8 +79,8 @@ impl<'a> Exec<'a> {
     fn members(&self, ty: &Type) -> usize {
         match ty {
             Type::Array(_, count) => count.unwrap_or(0),
-            Type::Struct(index) if self.structs.0[*index].union => 1,
-            Type::Struct(index) => self.structs.0[*index].fields.len(),
+            Type::Struct(index) if self.structs.list[*index].union => 1,
+            Type::Struct(index) => self.structs.list[*index].fields.len(),
             _ => 1,
         }
     }
@@ -89,7 +89,7 @@ impl<'a> Exec<'a> {
         let (offset, ty) = match &place.ty {
             Type::Array(element, _) => (index * self.size_of(element)?, (**element).clone()),
             Type::Struct(which) => {
-                let field = &self.structs.0[*which].fields[index];
+                let field = &self.structs.list[*which].fields[index];
                 (field.offset, field.ty.clone())
             }
             other => (0, other.clone()),
@@ -178,14 +178,14 @@ impl<'a> Exec<'a> {
                     let index = self.known_integer(index)?;
                     usize::try_from(index).ok()
                 }
-                (Designator::Member(name), Type::Struct(which)) => self.structs.0[*which]
+                (Designator::Member(name), Type::Struct(which)) => self.structs.list[*which]
                     .fields
                     .iter()
                     .position(|field| field.name.as_ref() == Some(&name.node.name)),
                 _ => None,
             };
             let count = match &found.ty {
-                Type::Struct(which) => self.structs.0[*which].fields.len(),
+                Type::Struct(which) => self.structs.list[*which].fields.len(),
                 other => self.members(other),
             };
             let Some(index) = index.filter(|index| *index < count) else {

@@ -17,6 +17,7 @@ mod statement;
 mod typing;
 mod wide;
 
+use super::Options;
 use super::ir::{Block, Id, Kind, Nodes, Place, Range, Statement};
 use super::types::{Signature, Structs, Type};
 use super::unit::Unit;
@@ -47,6 +48,8 @@ pub(super) struct Facts {
     pub(super) extents: HashMap<Key, usize>,
     /// Pointers, by object and scalar, that the step follows and nothing sets: something of the caller's lies behind them.
     pub(super) behind: HashSet<(Key, usize)>,
+    /// Members by which unions are laid out, by structure: the first that the program uses, if the largest does not have its scalars.
+    pub(super) unions: HashMap<usize, usize>,
     /// Functions with `static` variables that the step calls.
     pub(super) called: HashSet<String>,
 }
@@ -87,6 +90,8 @@ pub(super) struct Exec<'a> {
     pub(super) units: &'a [Unit],
     /// `double` is binary32.
     pub(super) double_is_float: bool,
+    /// Functions without a result whose calls are left out.
+    ignored: &'a [String],
     pub(super) facts: Facts,
     /// Facts have grown: this translation is not the last.
     pub(super) again: bool,
@@ -119,15 +124,16 @@ pub(super) struct Exec<'a> {
 }
 
 impl<'a> Exec<'a> {
-    pub(super) fn new(units: &'a [Unit], double_is_float: bool, facts: Facts) -> Exec<'a> {
+    pub(super) fn new(units: &'a [Unit], options: &'a Options, facts: Facts) -> Exec<'a> {
         Exec {
             units,
-            double_is_float,
+            double_is_float: options.double_is_float,
+            ignored: &options.ignore,
+            structs: Structs { list: Vec::new(), members: facts.unions.clone() },
             facts,
             again: false,
             stepping: false,
             nodes: Nodes::default(),
-            structs: Structs::default(),
             objects: Vec::new(),
             memory: Memory::default(),
             functions: HashMap::new(),
