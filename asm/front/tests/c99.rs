@@ -845,7 +845,19 @@ fn refuses_loops_without_bound() {
   return x; }
 "#,
     );
-    assert!(message.contains("#pragma takt loop_bound"), "{message}");
+    for part in [":2:", "#pragma takt loop_bound", "--loop-bound"] {
+        assert!(message.contains(part), "{message}");
+    }
+    let mut program = Program::new(
+        "bounds_loops_by_an_option",
+        r#"float step(float x) { while (x > 1.0f) x *= 0.5f; return x; }
+"#,
+    );
+    program.loop_bound = Some(12);
+    let folder = folder(&program.name);
+    let text = translated(&program, &folder).expect("it is translated").text;
+    assert!(text.contains(".loop_bound 12\n"), "{text}");
+    let _ = std::fs::remove_dir_all(folder);
 }
 
 #[test]

@@ -400,6 +400,7 @@ fn generated(seed: u64) -> Program {
         init: None,
         set: Vec::new(),
         ignore: Vec::new(),
+        loop_bound: None,
         double_is_float: false,
     }
 }

@@ -148,6 +148,7 @@ fn tried(project: &Project, folder: &Path) -> Result<Vec<Candidate>> {
         init: None,
         set: project.set.iter().map(|(name, number)| (name.clone(), *number)).collect(),
         ignore: Vec::new(),
+        loop_bound: None,
         double_is_float: true,
     };
     let mut found = Vec::new();

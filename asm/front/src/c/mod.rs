@@ -48,6 +48,8 @@ pub struct Options {
     pub set: Vec<(String, f64)>,
     /// Functions without a result whose calls are left out.
     pub ignore: Vec<String>,
+    /// Bound of the loops whose end data decide and that have no other; more iterations are a fault.
+    pub loop_bound: Option<u64>,
     /// Read `double` as `float`, and every number as binary32.
     pub double_is_float: bool,
 }

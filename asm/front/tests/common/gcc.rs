@@ -20,6 +20,7 @@ pub(crate) struct Program {
     pub(crate) init: Option<String>,
     pub(crate) set: Vec<(String, f64)>,
     pub(crate) ignore: Vec<String>,
+    pub(crate) loop_bound: Option<u64>,
     pub(crate) double_is_float: bool,
 }
 
@@ -32,6 +33,7 @@ impl Program {
             init: code.contains("void init(").then(|| "init".to_owned()),
             set: Vec::new(),
             ignore: Vec::new(),
+            loop_bound: None,
             double_is_float: code.contains("double"),
         }
     }
@@ -81,6 +83,7 @@ pub(crate) fn translated_text(program: &Program, source: Source) -> Result<Trans
         init: program.init.clone(),
         set: program.set.clone(),
         ignore: program.ignore.clone(),
+        loop_bound: program.loop_bound,
         double_is_float: program.double_is_float,
     };
     translate(&[source], &options).map_err(|error| {

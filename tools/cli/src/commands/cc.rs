@@ -38,6 +38,9 @@ pub(crate) struct Cc {
     /// Leave out calls of a function that has no result, as one that prints, logs or toggles a pin.
     #[arg(long, value_name = "NAME")]
     ignore: Vec<String>,
+    /// Bound the loops whose end data decide and that have no bound of their own; more iterations are a fault.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=65_535))]
+    loop_bound: Option<u64>,
     /// Define a macro of the preprocessor.
     #[arg(short = 'D', value_name = "NAME[=VALUE]")]
     defines: Vec<String>,
@@ -98,6 +101,7 @@ pub(crate) fn run(arguments: &Cc, _: bool, out: &mut Out) -> Result<()> {
         init: arguments.init.clone(),
         set: arguments.set.clone(),
         ignore: arguments.ignore.clone(),
+        loop_bound: arguments.loop_bound,
         double_is_float,
     };
     if arguments.list {

@@ -289,7 +289,7 @@ impl<'a> Exec<'a> {
             self.exhausted = Some(level);
         }
         self.fail(
-            "data decide how often this loop runs, and no bound is known: write `#pragma takt loop_bound(N)` before it",
+            "data decide how often this loop runs, and no bound is known: write `#pragma takt loop_bound(N)` before it, or give --loop-bound N",
         )
     }
 }

@@ -92,6 +92,8 @@ pub(super) struct Exec<'a> {
     pub(super) double_is_float: bool,
     /// Functions without a result whose calls are left out.
     ignored: &'a [String],
+    /// Bound of the loops that have no other.
+    loop_bound: Option<u64>,
     pub(super) facts: Facts,
     /// Facts have grown: this translation is not the last.
     pub(super) again: bool,
@@ -129,6 +131,7 @@ impl<'a> Exec<'a> {
             units,
             double_is_float: options.double_is_float,
             ignored: &options.ignore,
+            loop_bound: options.loop_bound,
             structs: Structs { list: Vec::new(), members: facts.unions.clone() },
             facts,
             again: false,

@@ -68,9 +68,10 @@ impl<'a> Exec<'a> {
         if bound.is_none() && self.is_wrap(&parts) {
             bound = Some(WRAPS);
         }
+        let bound = bound.or(self.loop_bound);
         let Some(bound) = bound else {
             return self.fail(
-                "data decide how often this loop runs, and no bound is known: write `#pragma takt loop_bound(N)` before it",
+                "data decide how often this loop runs, and no bound is known: write `#pragma takt loop_bound(N)` before it, or give --loop-bound N",
             );
         };
         if parts.body_first {
