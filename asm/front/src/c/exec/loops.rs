@@ -23,6 +23,8 @@ pub(super) struct Repetition<'a> {
     pub(super) body_first: bool,
     /// Bound from a pragma.
     pub(super) bound: Option<u64>,
+    /// Place of the loop, for messages.
+    pub(super) head: super::Place,
 }
 
 /// State that a trial may change, saved before it.
@@ -101,6 +103,7 @@ impl<'a> Exec<'a> {
     }
 
     fn parts(&mut self, statement: &'a Node<Statement>, bound: Option<u64>) -> Result<Repetition<'a>, Error> {
+        let head = super::Place { unit: self.unit(), offset: statement.span.start };
         Ok(match &statement.node {
             Statement::While(node) => Repetition {
                 condition: Some(&node.node.expression),
@@ -108,6 +111,7 @@ impl<'a> Exec<'a> {
                 body: &node.node.statement,
                 body_first: false,
                 bound,
+                head,
             },
             Statement::DoWhile(node) => Repetition {
                 condition: Some(&node.node.expression),
@@ -115,6 +119,7 @@ impl<'a> Exec<'a> {
                 body: &node.node.statement,
                 body_first: true,
                 bound,
+                head,
             },
             Statement::For(node) => {
                 match &node.node.initializer.node {
@@ -128,6 +133,7 @@ impl<'a> Exec<'a> {
                     body: &node.node.statement,
                     body_first: false,
                     bound,
+                    head,
                 }
             }
             _ => return self.fail("expected a loop"),
@@ -227,15 +233,13 @@ impl<'a> Exec<'a> {
         let (mut first, mut count) = (body_first, count);
         loop {
             if !first {
-                let at = self.at;
                 match self.goes_on(&parts)? {
                     Condition::Known(false) => return self.ended(out),
                     Condition::Known(true) => {}
                     Condition::Node(id) => {
                         // A bound from a pragma is kept by the loop alone, which faults beyond it.
                         if count >= OPEN || parts.bound.is_some_and(|bound| count >= bound) {
-                            self.at = at;
-                            return self.endless();
+                            return self.endless(&parts);
                         }
                         return self.fork(
                             id,
@@ -256,7 +260,7 @@ impl<'a> Exec<'a> {
                 Condition::Known(true) => self.stepped(&parts)?,
                 Condition::Node(_) => {
                     if count >= OPEN {
-                        return self.endless();
+                        return self.endless(&parts);
                     }
                     return self.guarded(
                         normal,
@@ -284,10 +288,11 @@ impl<'a> Exec<'a> {
     }
 
     /// Gives up a loop whose number of iterations depends on data: spends the budget around it, if any, and fails.
-    fn endless(&mut self) -> Result<Condition, Error> {
+    fn endless(&mut self, parts: &Repetition<'a>) -> Result<Condition, Error> {
         if let Some(level) = self.budgets.len().checked_sub(1) {
             self.exhausted = Some(level);
         }
+        self.at = parts.head;
         self.fail(
             "data decide how often this loop runs, and no bound is known: write `#pragma takt loop_bound(N)` before it, or give --loop-bound N",
         )

@@ -70,6 +70,7 @@ impl<'a> Exec<'a> {
         }
         let bound = bound.or(self.loop_bound);
         let Some(bound) = bound else {
+            self.at = parts.head;
             return self.fail(
                 "data decide how often this loop runs, and no bound is known: write `#pragma takt loop_bound(N)` before it, or give --loop-bound N",
             );
