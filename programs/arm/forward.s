@@ -203,4 +203,13 @@ period:
         sel     config2, good, k2, config2
 
         wait    period
+
+; For `takt accuracy`: 63 turns of every joint, the sum of the second and the third too; a tool of up to 0.5 m. An output keeps its value where
+; an input is no number.
+.range  th1, th4, th5, th6 = -22680, 22680
+.range  th2, th3 = -11340, 11340
+.range  tx, ty, tz = -500, 500
+.range  x, y, z = -3000, 3000
+.range  roll, pitch, yaw = -180, 180
+.range  config0, config1, config2 = 0, 1
 ; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -232,4 +232,14 @@ period:
         .endr
 
         wait    period
+
+; For `takt accuracy`: a tool within the arm's reach, 1.5 m; 63 turns; a tool point of up to 0.5 m. An output keeps its value where there is no
+; solution.
+.range  x, y, z = -1500, 1500
+.range  roll, pitch, yaw = -22680, 22680
+.range  tx, ty, tz = -500, 500
+.range  config0, config1, config2 = 0, 1
+        .rep i, 1, 6
+.range  th{i} = -360, 360
+        .endr
 ; SPDX-License-Identifier: MIT OR Apache-2.0

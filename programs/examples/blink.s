@@ -24,4 +24,8 @@ period:
         iadd    count, count, 1
         sel     count, full, 0, count
         wait    period
+
+; For `takt accuracy`: the lamp is on or off, and its counter is cleared at LAST.
+.range  lamp = 0, 1
+.range  count = 0, LAST
 ; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -121,4 +121,12 @@ period:
         fadd    db, vb, 0.5
         fadd    dc, vc, 0.5
         wait    period
+
+; For `takt accuracy`: sensors of ±40 A, a bridge between 12 V and 60 V, 63 turns, at most 10,000 rpm of four pole pairs. The integrators hold
+; what the decoupling of these asks for beyond the bridge.
+.range  ia, ib, id_ref, iq_ref = -40, 40
+.range  theta = -126*pi, 126*pi
+.range  we = -4200, 4200
+.range  udc = 12, 60
+.range  sd, sq = -1000, 1000
 ; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -127,4 +127,12 @@ period:
         mov     p11, P11
         mov     p33, P33
         wait    period
+
+; For `takt accuracy`: positions within 100 m, speeds within 50 m/s. A variance begins at P0 and ends below it; the two directions have
+; nothing to do with one another, so that what they have in common stays zero.
+.range  z1, z2, s1, s2 = -100, 100
+.range  s3, s4 = -50, 50
+.range  P11, P22, P33, P44 = 0, P0
+.range  P13, P24 = 0, 1
+.range  P12, P14, P23, P34 = 0, 0
 ; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -114,4 +114,13 @@ period:
         sel     x{i}, good, y{i}, x{i}
 .endr
         wait    period
+
+; For `takt accuracy`: elements up to 20, right-hand sides up to 10, as in lu.csv. Outputs keep their values where the matrix is singular.
+.rep i, 1, N
+.rep j, 1, N
+.range  A{i}{j} = -20, 20
+.endr
+.range  b{i} = -10, 10
+.range  x{i} = -1e6, 1e6
+.endr
 ; SPDX-License-Identifier: MIT OR Apache-2.0

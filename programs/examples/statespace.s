@@ -33,4 +33,8 @@ period: .for    i, 1, P                 ; outputs first: the plant waits for the
         .endfor
         x[:] = next[:]
         wait    period
+
+; For `takt accuracy`: measurements in units of their full scale, and the states that these lead to.
+.range  y = -1, 1
+.range  x = -4, 4
 ; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -47,4 +47,7 @@ period:
         fmul    dt, dt, part
         fadd    temp, t0, dt
         wait    period
+
+; For `takt accuracy`: what a converter of 5 V can say, beyond the divider's supply.
+.range  u = -1, 5
 ; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -207,4 +207,35 @@ begun:
         standing = k == N
         k = k + (k == N ? 0 : 1)
         wait    period
+
+; For `takt accuracy`: blocks within 1 m of the origin and 5 turns, arcs of up to a turn, moves of 1 mm/s to 1 m/s and of up to an hour.
+.range  empty, ready, arc, narc = 0, 1
+.range  kind = PLACE, ARC
+.range  line, now, nline = 0, 0x7fffffff
+.range  taken = 0, 0x7ffffffe
+        .rep i, 1, 3
+.range  to_{i}, end[i], nt[i] = -1/um, 1/um
+.range  fh[i], th[i] = -1, 1
+.range  fl[i], tl[i] = 0, 255*um
+.range  o[i], no[i] = -2, 2
+        .endr
+        .rep i, 4, 5
+.range  to_{i}, end[i], nt[i] = -32/ua, 32/ua
+.range  fh[i], th[i] = -32, 32
+.range  fl[i], tl[i] = 0, 255*ua
+.range  o[i], no[i] = -64, 64
+        .endr
+.range  centre_1, centre_2, nc = -1/um, 1/um
+.range  ch = -1, 1
+.range  cl = 0, 255*um
+.range  r0, r1, nr0, nr1 = 0, 3
+.range  a0, a1, na0, na1 = -pi, pi
+.range  sweep, turn, nturn = -2*pi, 2*pi
+.range  feed = 0.001, 1
+.range  periods = 0, 36000000
+.range  k, N, nN = 0, 36000000
+.range  c1, nc1 = 0, pi
+.range  A, nA = 0, 1
+.range  B = 0, 1e4
+.range  C = 0, 1e8
 ; SPDX-License-Identifier: MIT OR Apache-2.0

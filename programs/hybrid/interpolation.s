@@ -122,3 +122,21 @@ onward:
         next = k == N - 1 ? 0 : k + 1
         k = moves == 0 ? 0 : next
         wait    period
+
+; For `takt accuracy`: knots within 1 m of the origin and 16 turns, speeds of 1 m/s and 20 rad/s; encoders as in robot.s.
+.range  empty = 0, 1
+.range  count = 0, 255
+        .rep i, 1, 3
+.range  to_{i}, p[i], e[i] = -1/um, 1/um
+.range  speed_{i}, u[i], w[i] = -1, 1
+.range  n{i} = 3160000, 3800000
+        .endr
+        .rep i, 4, 5
+.range  to_{i}, p[i], e[i] = -31, 31
+.range  speed_{i}, u[i], w[i] = -20, 20
+        .endr
+.range  n4 = -131072, 131072
+.range  n5 = -262144, 262144
+.range  k = 0, N - 1
+.range  taken, lacks = 0, 0x7ffffffe
+.range  moves = 0, 1

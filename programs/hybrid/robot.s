@@ -50,4 +50,17 @@
 .output th4d, th5d                      ; rad
 .output om4d, om5d                      ; rad/s
 .output ep4d, ep5d                      ; rad/s²
+
+; Ranges, on which `takt accuracy` rests: the workspace of the letters with room to spare.
+.range  x, y = -0.1, 0.1
+.range  z = 0.65, 0.75
+.range  vx, vy, vz = -0.3, 0.3
+.range  ax, ay, az = -10, 10
+.range  alpha = -pi, pi
+.range  gamma = -2*pi, 2*pi
+.range  omega_alpha, omega_gamma = -20, 20
+.range  eps_alpha, eps_gamma = -1000, 1000
+.range  n1, n2, n3 = 3160000, 3800000   ; 0.79 m to 0.95 m
+.range  n4 = -131072, 131072            ; half a turn either way
+.range  n5 = -262144, 262144            ; a turn
 ; SPDX-License-Identifier: MIT OR Apache-2.0

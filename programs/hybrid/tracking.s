@@ -275,21 +275,12 @@ period:
 
         wait    period
 
-; ---- Ranges, on which `takt accuracy` rests: the workspace of the letters with room to spare -----------------------------------
-.range  x, y = -0.1, 0.1
-.range  z = 0.65, 0.75
-.range  vx, vy, vz = -0.3, 0.3
-.range  ax, ay, az = -10, 10
-.range  alpha = -pi, pi
-.range  gamma = -2*pi, 2*pi
-.range  omega_alpha, omega_gamma = -20, 20
-.range  eps_alpha, eps_gamma = -1000, 1000
+; ---- Ranges, on which `takt accuracy` rests; robot.s has those of the inputs --------------------------------------------------
 .rep i, 1, 3
-.range  n{i} = 3160000, 3800000         ; 0.79 m to 0.95 m
 .range  np{i} = 3160000, 3800000
 .endr
-.range  n4, np4 = -131072, 131072       ; half a turn either way
-.range  n5, np5 = -262144, 262144
+.range  np4 = -131072, 131072
+.range  np5 = -262144, 262144
 .rep i, 1, 5
 .range  s{i} = -smax{i}*KI, smax{i}*KI
 .range  boost{i} = gain, (2*xc - 1)*gain

@@ -119,4 +119,16 @@ period: .late n1, n2, n3, n4, n5 = 1
         tau5 = acc[5]*J55
 
         wait    period
+
+; For `takt accuracy`; robot.s has the inputs' ranges.
+.rep i, 1, 5
+.range  s[i] = -smax{i}*KI, smax{i}*KI
+.range  boost[i] = gain, (2*xc - 1)*gain
+.range  sg[i] = -1, 1
+.endr
+.rep i, 1, 3
+.range  np[i] = 3160000, 3800000
+.endr
+.range  np[4] = -131072, 131072
+.range  np[5] = -262144, 262144
 ; SPDX-License-Identifier: MIT OR Apache-2.0

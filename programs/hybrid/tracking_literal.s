@@ -282,4 +282,16 @@ period:
         fadd    tau5, acc5, zero        ; G_5 = 0
 
         wait    period
+
+; For `takt accuracy`; robot.s has the inputs' ranges.
+.rep i, 1, 3
+.range  pp{i} = 3160000*lcount, 3800000*lcount
+.endr
+.range  pp4 = -pi, pi
+.range  pp5 = -2*pi, 2*pi
+.rep i, 1, 5
+.range  s{i} = -smax{i}, smax{i}
+.range  tc{i} = 0, 1
+.range  sg{i} = -1, 1
+.endr
 ; SPDX-License-Identifier: MIT OR Apache-2.0

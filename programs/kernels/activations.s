@@ -17,4 +17,7 @@ period:
         activate d, 64, elu
         done = 1
         wait    period
+
+; For `takt accuracy`: sums of a layer; beyond 8, tanh is 1 to the last digit but one.
+.range  a, b, c, d = -8, 8
 ; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -18,4 +18,10 @@ period:
         biquads y[1], u[1], c, s, 4
         done = 1
         wait    period
+
+; For `takt accuracy`: a signal in units of its full scale; coefficients of sections whose poles lie within the unit circle, and states of
+; sections that do not resonate.
+.range  c = -2, 2
+.range  u = -1, 1
+.range  s = -8, 8
 ; SPDX-License-Identifier: MIT OR Apache-2.0

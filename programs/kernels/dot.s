@@ -13,4 +13,7 @@ period:
         array_dot d[1], x, y, 256
         done = 1
         wait    period
+
+; For `takt accuracy`: data in units of their full scale.
+.range  x, y = -1, 1
 ; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -32,4 +32,11 @@ period:
         ekf_step x, P, m, F, Q, e, H, R, 5, 2
         done = 1
         wait    period
+
+; For `takt accuracy`: places within 100 m and a heading, speeds within 20 m/s, rates within 3 rad/s: 100 covers them all.
+.range  x, beacon, z = -100, 100
+.range  P = -10, 10
+.range  F = -1, 1
+.range  Q, R = 0, 1
+.range  H = -1, 1
 ; SPDX-License-Identifier: MIT OR Apache-2.0

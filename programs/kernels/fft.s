@@ -15,4 +15,8 @@ period:
         fft256  r, m, u, v, c, s
         done = 1
         wait    period
+
+; For `takt accuracy`: data in units of their full scale.
+.range  r, m = -1, 1
+.range  c, s = -1, 1
 ; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -17,4 +17,9 @@ period:
         fir     y[1], u[1], h, s, 64
         done = 1
         wait    period
+
+; For `takt accuracy`: a signal in units of its full scale; taps up to 1/16, so that the filter's gain is at most 4.
+.range  u = -1, 1
+.range  h = -1/16, 1/16
+.range  s = -4, 4
 ; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -13,4 +13,9 @@ period:
         kalman_step x, P, F, Q, H, R, z, 12, 3
         done = 1
         wait    period
+
+; For `takt accuracy`: a model whose states and measurements are in units of their full scale.
+.range  F, H, Q, R = -1, 1
+.range  P = -1, 1
+.range  x, z = -1, 1
 ; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -14,4 +14,7 @@ period:
         dense   y, W2, b2, v, 12, 24, linear
         done = 1
         wait    period
+
+; For `takt accuracy`: observations and weights of a network whose inputs are normalised.
+.range  W1, W2, b1, b2, x = -1, 1
 ; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -17,4 +17,7 @@ period:
 .endr
         done = 1
         wait    period
+
+; For `takt accuracy`: a matrix and a right side in units of the largest element.
+.range  A, b = -1, 1
 ; SPDX-License-Identifier: MIT OR Apache-2.0

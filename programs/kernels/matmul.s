@@ -13,4 +13,7 @@ period:
         array_matmul C, A, B, 12, 12, 12, 4
         done = 1
         wait    period
+
+; For `takt accuracy`: data in units of their full scale.
+.range  A, B = -1, 1
 ; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -13,4 +13,7 @@ period:
         array_matvec y, A, x, 12, 12
         done = 1
         wait    period
+
+; For `takt accuracy`: data in units of their full scale.
+.range  A, x = -1, 1
 ; SPDX-License-Identifier: MIT OR Apache-2.0

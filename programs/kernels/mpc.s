@@ -14,4 +14,12 @@ period:
         mpc_admm u, x, A, B, K, C, M, g, y, q, r, 0.75, 0.25, 2, 12, 4, 10, 10
         done = 1
         wait    period
+
+; For `takt accuracy`: a model whose states and inputs are in units of their full scale; duals and costs that remain from the period before
+; are within the bounds' sum.
+.range  A, B, K, C, M = -1, 1
+.range  x = -0.75, 0.75
+.range  u = -100, 100
+.range  g, y = -100, 100
+.range  q, r = -400, 400
 ; SPDX-License-Identifier: MIT OR Apache-2.0

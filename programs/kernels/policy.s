@@ -16,4 +16,7 @@ period:
         dense   y, W3, b3, w, 12, 128, linear
         done = 1
         wait    period
+
+; For `takt accuracy`: observations and weights of a network whose inputs are normalised.
+.range  W1, W2, W3, b1, b2, b3, x = -1, 1
 ; SPDX-License-Identifier: MIT OR Apache-2.0

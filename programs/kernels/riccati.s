@@ -13,4 +13,7 @@ period:
         riccati_step P, K, A, B, Q, R, 12, 4
         done = 1
         wait    period
+
+; For `takt accuracy`: a model whose states and inputs are in units of their full scale.
+.range  A, B, Q, R, P = -1, 1
 ; SPDX-License-Identifier: MIT OR Apache-2.0

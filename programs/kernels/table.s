@@ -13,4 +13,8 @@ period:
         table1  y[1], T, x[1], 33
         done = 1
         wait    period
+
+; For `takt accuracy`: values in units of the largest; a place on the table, and as far beyond either end.
+.range  T = -1, 1
+.range  x = -32, 64
 ; SPDX-License-Identifier: MIT OR Apache-2.0

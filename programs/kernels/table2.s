@@ -13,4 +13,8 @@ period:
         table2  y[1], T, x[1], x[2], 17, 9
         done = 1
         wait    period
+
+; For `takt accuracy`: values in units of the largest; a place on the table, and as far beyond either end.
+.range  T = -1, 1
+.range  x = -16, 32
 ; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -74,3 +74,21 @@ slow:
         iq[i], w[i], bad[i] = k == i ? q : iq[i], k == i ? we : w[i], k == i ? f : bad[i]
         .endr
         wait    period
+
+; For `takt accuracy`: as in servo.s.
+.range  ia, ib = -ITRIP, ITRIP
+.range  count = -(64 << DIGITS), 64 << DIGITS
+.range  goal = -64, 64
+.range  udc = 0, UMAX
+.range  error, enable = 0, (1 << AXES) - 1
+.range  turn = 0, EVERY
+.range  bad = 0, 15
+.range  runs = 0, 1
+.range  iq = -IMAX, IMAX
+.range  w = -2*pi*PAIRS*2*VMAX, 2*pi*PAIRS*2*VMAX
+.range  sd, sq = -UMAX, UMAX
+.range  rt = -128, 128
+.range  rp, x = 0, 1
+.range  v, speed = -2*VMAX, 2*VMAX
+.range  s = -IMAX, IMAX
+.range  n1, n2 = -4*IMAX, 4*IMAX

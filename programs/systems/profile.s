@@ -28,4 +28,9 @@ period:
         mov     done, zero
 idle:
         wait    period
+
+; For `takt accuracy`: speeds of a motor of 10,000 rpm.
+.range  target, x, w_ref = -1000, 1000
+.range  rate = 0, 1000
+.range  empty = 0, 1
 ; SPDX-License-Identifier: MIT OR Apache-2.0

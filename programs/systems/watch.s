@@ -18,4 +18,9 @@ period:
         fmax    peak, peak, a
         iadd    values, values, 1
         wait    period
+
+; For `takt accuracy`: the amplifier of pi.s. The number of values wraps after 2³² periods.
+.range  u = -24, 24
+.range  peak = 0, 24
+.range  values = 0, 0x7ffffffe
 ; SPDX-License-Identifier: MIT OR Apache-2.0

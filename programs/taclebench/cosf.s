@@ -14,4 +14,7 @@ period:
 .endfor
         done = 1
         wait    period
+
+; For `takt accuracy`: angles within 63 turns; the unit takes 64.
+.range  x = -126*pi, 126*pi
 ; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -14,4 +14,7 @@ period:
 .endfor
         done = 1
         wait    period
+
+; For `takt accuracy`: the degrees of a circle.
+.range  x = 0, 360
 ; SPDX-License-Identifier: MIT OR Apache-2.0

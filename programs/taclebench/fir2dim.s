@@ -21,4 +21,8 @@ period:
 .endfor
         done = 1
         wait    period
+
+; For `takt accuracy`: data in units of their full scale; the border is zeros.
+.range  c, image = -1, 1
+.range  a = -1, 1
 ; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -18,4 +18,8 @@ period:
         y[1] = v[5]
         done = 1
         wait    period
+
+; For `takt accuracy`: data in units of their full scale, coefficients of sections whose poles lie within the unit circle.
+.range  c = -2, 2
+.range  w, x = -1, 1
 ; SPDX-License-Identifier: MIT OR Apache-2.0

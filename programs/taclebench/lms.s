@@ -25,4 +25,7 @@ period:
 .endfor
         done = 1
         wait    period
+
+; For `takt accuracy`: a signal in units of its full scale.
+.range  x = -1, 1
 ; SPDX-License-Identifier: MIT OR Apache-2.0

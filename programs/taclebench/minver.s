@@ -46,4 +46,7 @@ period:
         determinant[1] = d
         done = 1
         wait    period
+
+; For `takt accuracy`: a matrix in units of the largest element.
+.range  A = -1, 1
 ; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -39,4 +39,7 @@ period:
         result[9] = q[1]/(sqrt(q[2])*sqrt(q[3]))
         done = 1
         wait    period
+
+; For `takt accuracy`: data in units of their full scale.
+.range  A, B = -1, 1
 ; SPDX-License-Identifier: MIT OR Apache-2.0

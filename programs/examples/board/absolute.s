@@ -89,4 +89,14 @@ period:
         db = (vb - mid)*scale + 0.5*FULL
         dc = (vc - mid)*scale + 0.5*FULL
         wait    period
+
+; For `takt accuracy`: converters of 12 bits; an encoder of 13 bits with as many turns as frames hold; integrators within their limit.
+.range  ca, cb = 0, 4095
+.range  n = 0, 8191
+.range  turns = -2048, 2047
+.range  seen, last = 0, 0x7fffffff
+.range  missing = 0, 0x7ffffffe
+.range  tripped = 0, 1
+.range  id_ref, iq_ref = -20, 20
+.range  sd, sq = -MOST, MOST
 ; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -75,4 +75,12 @@ period:
         db = (vb - mid)*(FULL/UDC) + 0.5*FULL
         dc = (vc - mid)*(FULL/UDC) + 0.5*FULL
         wait    period
+
+; For `takt accuracy`: converters of 12 bits; counts of any number of turns; as much current as the converters measure; integrators
+; within their limit.
+.range  ca, cb = 0, 4095
+.range  n = -0x80000000, 0x7fffffff
+.range  tripped = 0, 1
+.range  id_ref, iq_ref = -20, 20
+.range  sd, sq = -MOST, MOST
 ; SPDX-License-Identifier: MIT OR Apache-2.0

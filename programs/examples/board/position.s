@@ -19,4 +19,7 @@
 period: error = wanted - n
         duty = max(min(itof(error)*gain, 1), -1)
         wait    period
+
+; For `takt accuracy`: counts whose difference is one.
+.range  n, wanted = -0x40000000, 0x3fffffff
 ; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -48,4 +48,28 @@ period:
         tau[i] = sat(id_tau[i] + friction[i], i <= 4 ? 87 : 12)
         .endr
         wait    period
+
+; For `takt accuracy`: joints and speeds within the limits of panda.urdf, accelerations within those of the maker's data sheet.
+.const  lower1 = -2.8973
+.const  upper1 = 2.8973
+.const  lower2 = -1.7628
+.const  upper2 = 1.7628
+.const  lower3 = -2.8973
+.const  upper3 = 2.8973
+.const  lower4 = -3.0718
+.const  upper4 = -0.0698
+.const  lower5 = -2.8973
+.const  upper5 = 2.8973
+.const  lower6 = -0.0175
+.const  upper6 = 3.7525
+.const  lower7 = -2.8973
+.const  upper7 = 2.8973
+.rep i, 1, 7
+.const  fastest{i} = i <= 4 ? 2.175 : 2.61
+.range  n[i], before[i] = floor(lower{i}/COUNT), ceil(upper{i}/COUNT)
+.range  qr[i] = lower{i}, upper{i}
+.range  qdr[i] = -fastest{i}, fastest{i}
+.range  v[i] = -1.2*fastest{i}, 1.2*fastest{i}
+.range  qddr[i] = -20, 20
+.endr
 ; SPDX-License-Identifier: MIT OR Apache-2.0

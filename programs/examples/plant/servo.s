@@ -47,4 +47,10 @@ period: itof    q, n
         fadd    integral, integral, step
         fadd    integral, integral, give
         wait    period
+
+; For `takt accuracy`: 64 turns of an encoder of 4096 counts, at most 12,000 rpm.
+.range  n, last = -64*4096, 64*4096
+.range  ref = -128*pi, 128*pi
+.range  w = -1300, 1300
+.range  integral = -2000, 2000
 ; SPDX-License-Identifier: MIT OR Apache-2.0

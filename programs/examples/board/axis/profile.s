@@ -29,4 +29,9 @@ period:
         mov     done, zero
 idle:
         wait    period
+
+; For `takt accuracy`: positions that binary32 holds to a count; the whole way in one period at most.
+.range  target, x, wanted = -0x1000000, 0x1000000
+.range  rate = 0, 0x1000000
+.range  empty = 0, 1
 ; SPDX-License-Identifier: MIT OR Apache-2.0

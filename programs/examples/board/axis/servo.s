@@ -16,4 +16,8 @@
 period: error = wanted - itof(n)
         duty = max(min(error*gain, 1), -1)
         wait    period
+
+; For `takt accuracy`: positions that binary32 holds to a count.
+.range  wanted = -0x1000000, 0x1000000
+.range  n = -0x1000000, 0x1000000
 ; SPDX-License-Identifier: MIT OR Apache-2.0

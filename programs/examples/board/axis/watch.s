@@ -21,4 +21,9 @@ period:
         iadd    values, values, 1
         flt     lit, limit, a
         wait    period
+
+; For `takt accuracy`: errors of positions that binary32 holds to a count. The number of values wraps after 2³² periods.
+.range  error = -0x2000000, 0x2000000
+.range  limit, peak = 0, 0x2000000
+.range  values = 0, 0x7ffffffe
 ; SPDX-License-Identifier: MIT OR Apache-2.0
