@@ -7,7 +7,7 @@
 //! - [`path`]: geometry of a tool path;
 //! - [`arm`]: the six-axis arm of the second founding paper: kinematics in binary64, and the measurement of its programs;
 //! - [`three`]: the six-joint arm of the third founding paper: the computations of its three processors, in binary64;
-//! - [`plants`]: small plants that close the loop of a controller;
+//! - [`plants`]: plants that close the loop of a controller;
 //! - [`listings`]: assembler listings of documents;
 //! - [`accuracy`]: errors of binary32 results against binary64.
 //!
@@ -78,6 +78,15 @@ pub const EXAMPLES: &[(&str, &str)] = &[
     ("statespace.s", include_str!("../examples/statespace.s")),
     ("table.csv", include_str!("../examples/table.csv")),
     ("table.s", include_str!("../examples/table.s")),
+];
+
+/// Plants that close the loops of examples: name and text of every TOML file in `examples/plant/`.
+pub const PLANTS: &[(&str, &str)] = &[
+    ("cart_pendulum.toml", include_str!("../examples/plant/cart_pendulum.toml")),
+    ("dc_motor.toml", include_str!("../examples/plant/dc_motor.toml")),
+    ("pmsm.toml", include_str!("../examples/plant/pmsm.toml")),
+    ("servo.toml", include_str!("../examples/plant/servo.toml")),
+    ("tank.toml", include_str!("../examples/plant/tank.toml")),
 ];
 
 /// Programs over arrays, built from the library's macros, with their costs in `docs/library.md`: name and text of every file in `kernels/`.

@@ -72,6 +72,9 @@ enum Command {
     Isa(commands::isa::Isa),
     Machines(commands::machines::Machines),
     Explore(commands::explore::Explore),
+    #[cfg(all(unix, feature = "fmu"))]
+    #[command(hide = true)]
+    FmuProcess(commands::fmu_process::FmuProcess),
     Completions(commands::completions::Completions),
     Man(commands::man::Man),
 }
@@ -130,6 +133,8 @@ fn run(arguments: &Arguments, color: bool, out: &mut Out) -> Result<()> {
         Command::Isa(isa) => commands::isa::run(isa, out),
         Command::Machines(machines) => commands::machines::run(machines, color, out),
         Command::Explore(explore) => commands::explore::run(explore, color, out),
+        #[cfg(all(unix, feature = "fmu"))]
+        Command::FmuProcess(process) => commands::fmu_process::run(process),
         Command::Completions(completions) => commands::completions::run(completions, out),
         Command::Man(man) => commands::man::run(man, out),
     }

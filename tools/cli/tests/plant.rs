@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A user's plant connected by two pipes to `takt run` as the controller.
+//! Plants: those of `takt run --plant`, and a user's, connected by two pipes to `takt run` as the controller.
 
 use crate::common::{Folder, RunOutput};
 use std::f64::consts::TAU;
@@ -236,4 +236,28 @@ fn standard_output_has_rows_only() {
     assert_eq!((done.status, done.stdout.as_str()), (Some(0), "F,k,cycles\nNaN,2,12\n"));
     assert!(done.stderr.contains("warning: NaN written to F"), "{}", done.stderr);
     assert!(done.stderr.contains("1 period on f3") && done.stderr.contains("operations:"), "{}", done.stderr);
+}
+
+/// Inputs and outputs of the examples' closed loops, in CSV; the playground's tests compare with the same files.
+#[test]
+fn loops_have_the_bits_of_the_playground() {
+    let folder = Folder::new();
+    let programs = concat!(env!("CARGO_MANIFEST_DIR"), "/../../programs");
+    for (name, plant) in [("pi", "dc_motor"), ("foc", "pmsm")] {
+        let (program, inputs) =
+            (format!("{programs}/examples/{name}.s"), format!("{programs}/examples/{name}.csv"));
+        let plant = format!("{programs}/examples/plant/{plant}.toml");
+        let told =
+            folder.takt(&["run", &program, "--plant", &plant, "--inputs", &inputs, "--outputs", "-"]).ok();
+        let rows: Vec<Vec<&str>> = told.lines().map(|line| line.split(',').collect()).collect();
+        let keep = |title: &&str| !title.contains('.') && *title != "cycles";
+        let kept: Vec<usize> = (0..rows[0].len()).filter(|at| keep(&rows[0][*at])).collect();
+        let line = |row: &Vec<&str>| kept.iter().map(|at| row[*at]).collect::<Vec<_>>().join(",") + "\n";
+        let table: String = rows.iter().map(line).collect();
+        let path = format!("{programs}/tests/loops/{name}.csv");
+        if std::env::var_os("TAKT_BLESS").is_some() {
+            std::fs::write(&path, &table).unwrap();
+        }
+        assert!(std::fs::read_to_string(&path).unwrap() == table, "{path} is stale: TAKT_BLESS=1 writes it");
+    }
 }

@@ -87,7 +87,22 @@ impl Table {
     /// # Errors
     /// If the header does not have exactly one column for each port.
     pub fn new(name: String, source: Box<dyn Read>, ports: &[Port]) -> Result<Table, String> {
-        let OpenTable { reader, header, found, missing } = OpenTable::of(&name, source, ports)?;
+        Table::with_optional(name, source, ports, &[])
+    }
+
+    /// Reads the header of a table like [`Table::new`]; it may also have columns for other ports.
+    ///
+    /// # Errors
+    /// If the header does not have exactly one column for each of `ports`, or more than one for one of `optional`.
+    pub fn with_optional(
+        name: String,
+        source: Box<dyn Read>,
+        ports: &[Port],
+        optional: &[Port],
+    ) -> Result<Table, String> {
+        let all = [ports, optional].concat();
+        let OpenTable { reader, header, found, mut missing } = OpenTable::of(&name, source, &all)?;
+        missing.retain(|name| ports.iter().any(|port| port.name == *name));
         if let [first, ..] = missing[..] {
             // A title that is the name of a port is not a misspelling of another port.
             let near =

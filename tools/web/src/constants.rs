@@ -2,11 +2,11 @@
 //! Constants of the page's source that can be set while watching the plots: each `.const` whose value stands in the text itself. Constants
 //! that are computed from others follow them.
 
-use crate::ports;
 use serde_json::{Value, json};
 use std::collections::{HashMap, HashSet};
 use takt_asm::AssembledProgram;
 use takt_asm::expr::Value as Number;
+use takt_debug::units;
 use takt_diagnostics::diag::Sink;
 use takt_diagnostics::source::Source;
 use takt_syntax::ast::{Ast, DirectiveKind, Expr, Name, NodeKind, StatementKind};
@@ -35,7 +35,7 @@ pub(crate) fn settable(assembled: &AssembledProgram) -> Vec<Value> {
         let start = (value.span.start - source.base) as usize;
         let end = (value.span.end - source.base) as usize;
         let comment = comment_after(source, end);
-        let unit = comment.and_then(ports::leading_unit);
+        let unit = comment.and_then(units::leading_unit);
         let whole = matches!(number, Number::Int(_)) && unit.is_none();
         let from = offsets.units_at(start);
         let to = offsets.units_at(end);

@@ -14,8 +14,8 @@ const FIRST: [&str; 3] = ["pi.s", "foc.s", "blink.s"];
 const PERIODS_OF: [(&str, usize); 1] = [("blink.s", 2000)];
 /// Seconds that assembling takes in a browser, for the page to announce until it has measured them.
 const SECONDS_OF: [(&str, u32); 2] = [("tracking.s", 3), ("statespace.s", 2)];
-/// Plants that close the loops of examples.
-const PLANT_OF: [(&str, &str); 1] = [("pi.s", "dc_motor")];
+/// Plants that close the loops of examples: files of [`takt_programs::PLANTS`], without the extension.
+const PLANT_OF: [(&str, &str); 2] = [("foc.s", "pmsm"), ("pi.s", "dc_motor")];
 /// Program that controls the robot.
 pub(crate) const TRACKING: &str = "hybrid/tracking.s";
 

@@ -15,6 +15,7 @@ use takt_asm::{AssembledProgram, MemoryLoader, Options, Search};
 use takt_debug::console::Console;
 use takt_debug::inputs::{self, Table};
 use takt_debug::session::{self, Session};
+use takt_debug::units;
 use takt_emu::Rows;
 use takt_isa::Machine;
 use takt_isa::program::Port;
@@ -150,9 +151,9 @@ fn facts(loaded: &LoadedProgram) -> Value {
     let sources = assembled.debug_info().sources;
     let port = |port: &Port, what: &str| {
         json!({
-            "name": port.name, "type": port.ty.name(), "unit": ports::unit(&sources, what, &port.name),
+            "name": port.name, "type": port.ty.name(), "unit": units::unit(&sources, what, &port.name),
             "limit": ports::limit(program, port.register),
-            "together": ports::declared_together(&sources, what, &port.name),
+            "together": units::declared_together(&sources, what, &port.name),
         })
     };
     let ports = |ports: &[Port], what: &str| ports.iter().map(|one| port(one, what)).collect::<Vec<_>>();
@@ -179,7 +180,7 @@ fn facts(loaded: &LoadedProgram) -> Value {
         "bundles": program.bundles(),
         "words": program.code.len(),
         "settable": constants::settable(assembled),
-        "sampling_period": ports::sampling_period(&sources, &assembled.constants),
+        "sampling_period": units::sampling_period(&sources, &assembled.constants),
         "data_words": program.data.len(),
         "inputs": ports(&program.inputs, ".input"),
         "outputs": ports(&program.outputs, ".output"),

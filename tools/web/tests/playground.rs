@@ -2,6 +2,7 @@
 //! Playground methods as the page calls them, but without a browser.
 
 use serde_json::{Value, json};
+use takt_programs::plants::Plant as _;
 use takt_web::{CYCLES, Playground};
 
 fn call(playground: &mut Playground, method: &str, params: Value) -> Value {
@@ -331,6 +332,41 @@ fn constants_of_the_text_can_be_set() {
     assert!(!of(&told).contains(&"own".to_owned()), "its pi is the program's: {:?}", of(&told));
 }
 
+/// The loops of the examples have the bits of `takt run --plant` (`tools/cli/tests/plant.rs` compares with the same files).
+#[test]
+fn loops_have_the_bits_of_takt_run() {
+    let mut playground = Playground::default();
+    let about = call(&mut playground, "about", Value::Null);
+    let tables = [
+        ("pi.s", include_str!("../../../programs/tests/loops/pi.csv")),
+        ("foc.s", include_str!("../../../programs/tests/loops/foc.csv")),
+    ];
+    for (name, table) in tables {
+        let examples = about["examples"].as_array().expect("a list");
+        let example = examples.iter().find(|example| example["name"] == name).expect("an example");
+        let params = json!({ "name": name, "source": example["source"], "machine": "t3", "inputs": example["inputs"], "plant": example["plant"] });
+        let told = call(&mut playground, "assemble", params);
+        assert_eq!(told["plant_error"], Value::Null, "{name}");
+        let ran = call(&mut playground, "run", json!({ "begin": true }));
+        let mut lines = table.lines();
+        let titles: Vec<&str> = lines.next().expect("a header").split(',').collect();
+        let columns: Vec<&Value> = titles
+            .iter()
+            .map(|title| {
+                if ran["outputs"][title].is_array() { &ran["outputs"][title] } else { &ran["inputs"][title] }
+            })
+            .collect();
+        assert!(table.lines().count() > 300, "{name}");
+        for (period, line) in lines.enumerate() {
+            for ((title, column), text) in titles.iter().zip(&columns).zip(line.split(',')) {
+                let expected: f32 = text.parse().expect("a number");
+                let found = column[period].as_f64().map(|value| (value as f32).to_bits());
+                assert_eq!(found, Some(expected.to_bits()), "{name}, {title} of period {period}");
+            }
+        }
+    }
+}
+
 #[test]
 fn a_plant_closes_the_loop() {
     let mut playground = Playground::default();
@@ -349,12 +385,14 @@ fn a_plant_closes_the_loop() {
         values.iter().filter_map(Value::as_f64).collect()
     };
     // Each speed is what the voltages before have made of the motor.
-    let plant = takt_programs::plants::Plant::named("dc_motor").expect("it is one of them");
-    let mut motor = takt_programs::plants::Simulation::new(plant, [], 1e-3).expect("its own parameters");
+    let text = include_str!("../../../programs/examples/plant/dc_motor.toml");
+    let file = takt_programs::plants::PlantFile::read("dc_motor.toml", text).expect("it is right");
+    let (mut motor, _) = file.simulation(1e-3).expect("it is slow enough");
     let (speeds, voltages) = (column("inputs", "w"), column("outputs", "u"));
     for (period, (speed, voltage)) in speeds.iter().zip(&voltages).enumerate() {
         assert_eq!(*speed as f32, motor.sensors()[0] as f32, "period {period}");
-        motor.advance(&[*voltage]);
+        let load = if period >= 100 { 0.4 } else { 0.0 };
+        motor.advance(&[*voltage, load]).expect("it cannot fail");
     }
     assert!((speeds[99] - 100.0).abs() < 3.0, "the controller reaches its reference: {}", speeds[99]);
     assert!(speeds[120] < speeds[99] - 1.0, "the load comes after 0.1 s: {}", speeds[120]);
@@ -375,8 +413,8 @@ fn a_plant_closes_the_loop() {
         told["plant_error"].as_str().unwrap_or_default().to_owned()
     };
     let named = |name: &str| json!({ "name": name });
-    assert!(error(&mut playground, named("tank"), source).contains("no plant `tank`"));
-    assert!(error(&mut playground, named("dc_motor"), DOUBLE).contains("no output port `u`"));
+    assert!(error(&mut playground, named("train"), source).contains("no plant `train`"));
+    assert!(error(&mut playground, named("dc_motor"), DOUBLE).contains("no output port of that name"));
     let timeless = source.replace("T    = 1e-3  ", "T    = 1e-3 ;");
     assert!(error(&mut playground, named("dc_motor"), &timeless).contains("`.const T = …"), "{timeless}");
     let wild = json!({ "name": "dc_motor", "parameters": { "J": -1.0 } });

@@ -204,7 +204,8 @@ fn shadow(arguments: &Accuracy, program: &Program) -> Shadow {
 fn measure(arguments: &Accuracy, inputs: &Path, program: &Program) -> Result<Vec<Shadow>> {
     let (emulator, shadow) = (Emulator::new(program)?, shadow(arguments, program));
     let mut shadowed = Shadowed { program, emulator, shadow, once: true };
-    Tables { inputs: Some(inputs), outputs: None, most: arguments.periods }.drive(&mut shadowed)?;
+    Tables { inputs: Some(inputs), outputs: None, curves: None, most: arguments.periods }
+        .drive(&mut shadowed)?;
     Ok(vec![shadowed.shadow])
 }
 
@@ -212,7 +213,7 @@ fn measure(arguments: &Accuracy, inputs: &Path, program: &Program) -> Result<Vec
 fn measure_cores(arguments: &Accuracy, inputs: &Path, description: &Description) -> Result<Vec<Shadow>> {
     let mut run = SystemRun::new(description)?;
     run.observer = Observer::Recording(Recording::new(&mut run.system));
-    Tables { inputs: Some(inputs), outputs: None, most: arguments.periods }.drive(&mut run)?;
+    Tables { inputs: Some(inputs), outputs: None, curves: None, most: arguments.periods }.drive(&mut run)?;
     let Observer::Recording(recording) = &run.observer else { return Ok(Vec::new()) };
     let measure = |(number, core): (usize, &Core)| -> Result<Shadow> {
         let Replay { mut emulator, mut inputs, end } = recording.replay(&run.system, number)?;

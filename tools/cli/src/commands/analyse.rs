@@ -95,7 +95,7 @@ pub(crate) fn run(arguments: &Analyse, color: bool, out: &mut Out) -> Result<()>
     ])?;
     let (inputs, html, name) =
         (arguments.inputs.as_deref(), arguments.html.as_deref(), files::input_name(&arguments.file));
-    let tables = Tables { inputs, outputs: None, most: arguments.periods };
+    let tables = Tables { inputs, outputs: None, curves: None, most: arguments.periods };
     let analysed = system::analyse::analyse(&system.description, tables, html, &name);
     let (json, text) = analysed.map_err(|error| application.located_error(error, color))?;
     if arguments.json {

@@ -118,19 +118,16 @@ pub(crate) fn run(arguments: &ToFmu, color: bool, out: &mut Out) -> Result<()> {
     Ok(())
 }
 
-/// Removes the last binary digits, which come from the unit: 50us are 50·10⁻⁶ s, a number that binary64 prints with five digits more.
-fn shortest(seconds: f64) -> f64 {
-    format!("{seconds:.14e}").parse().unwrap_or(seconds)
-}
-
 impl ToFmu {
     /// Period in seconds and in cycles.
     fn settings(&self) -> Result<Settings> {
         let hertz = self.clock * 1e6;
         let (period, cycles) = match self.period {
-            Time::Cycles(cycles) => (shortest(cycles as f64 / hertz), cycles),
+            Time::Cycles(cycles) => (number::shortest(cycles as f64 / hertz), cycles),
             // A tick between two cycles is seen in the second; the product's rounding error is less than a thousandth of a cycle.
-            Time::Seconds(seconds) => (shortest(seconds), (seconds * hertz - 1e-3).ceil().max(0.0) as u64),
+            Time::Seconds(seconds) => {
+                (number::shortest(seconds), (seconds * hertz - 1e-3).ceil().max(0.0) as u64)
+            }
         };
         if cycles == 0 || cycles > LONGEST_TICK {
             return Err(Failure::Usage(format!(

@@ -21,6 +21,8 @@ pub(crate) mod explore;
 pub(crate) mod fmt;
 #[cfg(feature = "fmu")]
 pub(crate) mod fmu;
+#[cfg(all(unix, feature = "fmu"))]
+pub(crate) mod fmu_process;
 pub(crate) mod friction;
 pub(crate) mod isa;
 pub(crate) mod left_out;

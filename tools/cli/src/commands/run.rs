@@ -8,8 +8,9 @@ use crate::run::load::is_system;
 use crate::run::loaded_program::LoadedProgram;
 use crate::run::memory;
 use crate::run::nan::NanWrites;
-use crate::run::outcome::{CoreOutcome, Execution, OutcomeOptions, RunOutcome};
+use crate::run::outcome::{CoreOutcome, Execution, OutcomeOptions, PlantOutcome, RunOutcome};
 use crate::run::parameters::ParameterArguments;
+use crate::run::plant::{PlantArguments, ProgramLoop};
 use crate::run::ports;
 use crate::run::system::LoadedSystem;
 use crate::run::system::observers::Observer;
@@ -20,8 +21,10 @@ use crate::terminal::files::{self, Out};
 use crate::terminal::number;
 use crate::terminal::options::{OptionalMachine, SourceArguments};
 use crate::terminal::output::{self, Failure};
+use crate::terminal::plot::curves::Curves;
 use anyhow::{Context, Result, bail};
 use clap::Args;
+use std::cell::RefCell;
 use std::num::NonZeroU64;
 use std::path::{Path, PathBuf};
 use takt_analysis::period::PERIOD_LIMIT;
@@ -30,6 +33,7 @@ use takt_emu::{Emulator, Row, Stop};
 use takt_isa::program::Port;
 use takt_isa::timing::Cycle;
 use takt_isa::{Program, Type};
+use takt_programs::plants::{Interface, Plant as _};
 use takt_system::CorePeriods;
 
 /// Run a program, counting cycles.
@@ -56,7 +60,7 @@ pub(crate) struct Run {
     #[arg(
         long,
         value_name = "DIR|CSV",
-        conflicts_with_all = ["inputs", "periods", "trace", "deny", "stats"]
+        conflicts_with_all = ["inputs", "periods", "plant", "trace", "deny", "stats"]
     )]
     batch: Option<PathBuf>,
     /// Run at most this many periods.
@@ -76,6 +80,12 @@ pub(crate) struct Run {
     #[command(flatten)]
     parameters: ParameterArguments,
     #[command(flatten)]
+    plant: PlantArguments,
+    /// Draw the columns of the table of --outputs over time, as SVG: the output ports; with --plant, the input ports and the plant's states,
+    /// too.
+    #[arg(long, value_name = "SVG", conflicts_with = "batch")]
+    plot: Option<PathBuf>,
+    #[command(flatten)]
     trace: TraceArguments,
     #[command(flatten)]
     deny: DenyArguments,
@@ -89,6 +99,7 @@ Examples:
   takt run prog.s --inputs in.csv --stats         a period for each row; where did the cycles go?
   takt run prog.takt --inputs in.csv --outputs -  outputs and cycles of every period
   takt run prog.s --periods 3 --trace out.vcd     waveforms for GTKWave or Surfer
+  takt run law.s --plant motor.toml --periods 400 --outputs loop.csv   in closed loop (docs/plant.md)
   takt run prog.s --inputs in.csv --deny all      for CI: status 3 if a flag is raised, …
   takt run prog.s --batch runs --outputs out.csv  a run for each CSV in the folder `runs`
   takt run system.toml --inputs in.csv --stats    several cores: a base tick for each row (docs/system.md)";
@@ -97,11 +108,13 @@ pub(crate) fn run(arguments: &Run, color: bool, out: &mut Out) -> Result<()> {
     let mut reads = vec![("FILE", arguments.file.as_path())];
     reads.extend(arguments.inputs.as_deref().map(|path| ("--inputs", path)));
     reads.extend(arguments.parameters.file.as_deref().map(|path| ("--params", path)));
+    reads.extend(arguments.plant.file());
     // An output folder is not checked: it cannot be overwritten by accident.
     let batch = arguments.batch.as_deref();
     reads.extend(batch.filter(|path| !path.is_dir()).map(|path| ("--batch", path)));
     let mut writes = Vec::new();
     writes.extend(arguments.shown.outputs.as_deref().map(|path| ("--outputs", path)));
+    writes.extend(arguments.plot.as_deref().map(|path| ("--plot", path)));
     writes.extend(arguments.trace.file_with_option());
     if arguments.shown.json {
         writes.push(("--json", Path::new("-")));
@@ -112,6 +125,11 @@ pub(crate) fn run(arguments: &Run, color: bool, out: &mut Out) -> Result<()> {
         refuse(&[
             ("--tick", arguments.tick.is_some(), "the system's file has it"),
             ("--batch", batch.is_some(), "the lanes of a batch are runs of one program"),
+            (
+                "--plant",
+                arguments.plant.plant.is_some(),
+                "it closes the loop of one program; run the core's program",
+            ),
             ("--memory", !arguments.memory.is_empty(), "a system shows its outputs; run the core's program"),
             ("--deny and --trace", traced, "both take the cores' events; run it once with each"),
         ])?;
@@ -119,6 +137,18 @@ pub(crate) fn run(arguments: &Run, color: bool, out: &mut Out) -> Result<()> {
     if arguments.shown.outputs.is_some() && !arguments.has_rows() {
         return Err(Failure::Usage(
             "--outputs has a row for each period: give --inputs or --periods".to_owned(),
+        )
+        .into());
+    }
+    if arguments.plot.is_some() && !arguments.has_rows() {
+        return Err(Failure::Usage(
+            "--plot draws from period to period: give --inputs or --periods".to_owned(),
+        )
+        .into());
+    }
+    if arguments.plant.plant.is_some() && !arguments.has_rows() {
+        return Err(Failure::Usage(
+            "--plant moves from period to period: give --periods or --inputs".to_owned(),
         )
         .into());
     }
@@ -133,7 +163,9 @@ pub(crate) fn run(arguments: &Run, color: bool, out: &mut Out) -> Result<()> {
     }
     let mut trace = arguments.trace.create()?;
     let (result, mut ran) = match &application {
-        Application::Program(loaded) => arguments.execute(arguments.of(loaded, trace.as_mut())?, color)?,
+        Application::Program(loaded) => {
+            arguments.execute(arguments.of(loaded, trace.as_mut(), color)?, color)?
+        }
         Application::System(system) => {
             arguments.execute(arguments.of_system(system, trace.as_mut())?, color)?
         }
@@ -144,7 +176,7 @@ pub(crate) fn run(arguments: &Run, color: bool, out: &mut Out) -> Result<()> {
         Err(error) if output::is_closed_pipe(&error) => return ran.verdict(),
         result => result?,
     };
-    ran.zeros &= arguments.inputs.is_none();
+    ran.zeros &= arguments.inputs.is_none() && arguments.plant.plant.is_none();
     ran.warn(color);
     ran.print(&arguments.file, &arguments.shown, rows, out)?;
     ran.verdict()
@@ -163,7 +195,19 @@ impl Run {
     ) -> Result<(Result<Option<u64>>, RunOutcome<'a>)> {
         let (inputs, outputs) = (self.inputs.as_deref(), self.shown.outputs.as_deref());
         let result = match self.has_rows() {
-            true => Tables { inputs, outputs, most: self.periods }.drive(&mut run).map(Some),
+            true => {
+                let curves =
+                    self.plot.is_some().then(|| RefCell::new(Curves::new(run.titles(), run.period())));
+                let tables = Tables { inputs, outputs, curves: curves.as_ref(), most: self.periods };
+                let result = tables.drive(&mut run);
+                // What came before a fault is worth a picture.
+                if let (Some(path), Some(curves)) =
+                    (&self.plot, curves.filter(|curves| !curves.borrow().is_empty()))
+                {
+                    files::write(path, curves.into_inner().draw(&files::input_name(&self.file))?.as_bytes())?;
+                }
+                result.map(Some)
+            }
             false => run.run_to_halt().map(|()| None),
         };
         // Keep the trace: it shows the events before a fault.
@@ -174,7 +218,9 @@ impl Run {
         &self,
         loaded: &'a LoadedProgram,
         trace: Option<&'t mut Out>,
+        color: bool,
     ) -> Result<ProgramRun<'a, 't>> {
+        let plant = self.plant.close(loaded, self.inputs.is_some(), color)?;
         let mut emulator = Emulator::new(&loaded.program)?;
         emulator.set_tick_period(self.tick);
         let tracer = trace.map(|file| self.trace.begin(&emulator, file)).transpose()?;
@@ -182,7 +228,19 @@ impl Run {
         let (program, max_cycles) = (&loaded.program, self.max_cycles);
         let words =
             self.memory.iter().map(|name| memory::words(loaded, name)).collect::<Result<Vec<_>>>()?.concat();
-        Ok(ProgramRun { program, words, emulator, max_cycles, tracer, nans, watch, periods, last: 0 })
+        Ok(ProgramRun {
+            program,
+            words,
+            emulator,
+            max_cycles,
+            tracer,
+            nans,
+            watch,
+            periods,
+            last: 0,
+            plant,
+            states: Vec::new(),
+        })
     }
 
     fn of_system<'a, 't>(
@@ -213,6 +271,9 @@ struct ProgramRun<'a, 't> {
     periods: CorePeriods,
     /// Cycles of the last period.
     last: Cycle,
+    plant: Option<ProgramLoop>,
+    /// State of the plant at the beginning of the last period.
+    states: Vec<f64>,
 }
 
 impl ProgramRun<'_, '_> {
@@ -240,16 +301,37 @@ impl TableApplication for ProgramRun<'_, '_> {
     const ROWS: &'static str = "periods";
 
     fn inputs(&self) -> Vec<Port> {
-        self.program.inputs.clone()
+        match &self.plant {
+            None => self.program.inputs.clone(),
+            Some(plant) => plant.connection().rest.clone(),
+        }
+    }
+
+    fn optional_inputs(&self) -> Vec<Port> {
+        self.plant.as_ref().map_or(Vec::new(), |plant| plant.connection().optional())
     }
 
     fn titles(&self) -> Vec<String> {
         let names = self.outputs().map(|(name, ..)| name.to_owned());
-        names.chain(["cycles".to_owned()]).collect()
+        let Some(plant) = &self.plant else { return names.chain(["cycles".to_owned()]).collect() };
+        let inputs = self.program.inputs.iter().map(|port| port.name.clone());
+        inputs.chain(names).chain(plant.state_names()).chain(["cycles".to_owned()]).collect()
     }
 
     fn row(&mut self, row: &Row) -> Result<bool> {
-        self.set_inputs(row)?;
+        match &mut self.plant {
+            None => self.set_inputs(row)?,
+            Some(plant) => {
+                // Only a period that is run needs the plant's motion in the one before.
+                if self.periods.count > 0 {
+                    plant.advance(|register| self.emulator.output_bits(register))?;
+                }
+                let mut row = row.clone();
+                plant.set_inputs(&mut row);
+                self.states = plant.plant().states();
+                self.set_inputs(&row)?;
+            }
+        }
         self.emulator.set_cycle_limit(self.max_cycles.unwrap_or(self.emulator.now() + PERIOD_LIMIT));
         let report = self.watch.run_period(&mut self.emulator, self.tracer.as_mut(), None);
         let report = report.with_context(|| format!("period {}", self.periods.count))?;
@@ -267,13 +349,23 @@ impl TableApplication for ProgramRun<'_, '_> {
     }
 
     fn values(&self) -> Vec<String> {
-        let values =
-            self.outputs().map(|(_, ty, bits)| bits.map_or(String::new(), |bits| ports::format(ty, bits)));
-        values.chain([self.last.to_string()]).collect()
+        let text = |ty: Type, bits: Option<u32>| bits.map_or(String::new(), |bits| ports::format(ty, bits));
+        let outputs = self.outputs().map(|(_, ty, bits)| text(ty, bits));
+        let cycles = [self.last.to_string()];
+        if self.plant.is_none() {
+            return outputs.chain(cycles).collect();
+        }
+        let inputs = self.program.inputs.iter();
+        let inputs = inputs.map(|port| text(port.ty, self.emulator.register(port.register)));
+        inputs.chain(outputs).chain(self.states.iter().map(f64::to_string)).chain(cycles).collect()
     }
 }
 
 impl<'a> Execution<'a> for ProgramRun<'a, '_> {
+    fn period(&self) -> Option<f64> {
+        self.plant.as_ref().map(ProgramLoop::period)
+    }
+
     fn run_to_halt(&mut self) -> Result<()> {
         let zeros: Row = self.program.inputs.iter().map(|port| (port.register, 0)).collect();
         self.set_inputs(&zeros)?;
@@ -295,6 +387,10 @@ impl<'a> Execution<'a> for ProgramRun<'a, '_> {
         let denials = self.watch.end(&self.emulator, "");
         let core = CoreOutcome::new("", self.program, &self.emulator, self.periods, denials);
         let (zeros, nans) = (!self.program.inputs.is_empty(), self.nans);
-        Ok(RunOutcome { cores: vec![core], outputs, zeros, nans, system: None })
+        let plant = self.plant.map(|plant| {
+            let Interface { name, states, .. } = plant.interface().clone();
+            PlantOutcome { name, states: states.into_iter().zip(self.states).collect() }
+        });
+        Ok(RunOutcome { cores: vec![core], outputs, zeros, nans, system: None, plant })
     }
 }

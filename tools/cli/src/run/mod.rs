@@ -15,6 +15,7 @@ pub(crate) mod memory;
 pub(crate) mod nan;
 pub(crate) mod outcome;
 pub(crate) mod parameters;
+pub(crate) mod plant;
 pub(crate) mod ports;
 pub(crate) mod spills;
 pub(crate) mod synthesis;

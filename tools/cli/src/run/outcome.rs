@@ -8,6 +8,7 @@ use crate::run::ports;
 use crate::run::table_run::TableApplication;
 use crate::run::trace::TraceArguments;
 use crate::terminal::files::{self, Out};
+use crate::terminal::number;
 use crate::terminal::output;
 use anyhow::Result;
 use clap::Args;
@@ -22,6 +23,11 @@ use takt_system::{CorePeriods, Description, FifoCounts};
 
 /// Execution of an application, from reset to its end.
 pub(crate) trait Execution<'a>: TableApplication {
+    /// Length of a period in s, if it is known.
+    fn period(&self) -> Option<f64> {
+        None
+    }
+
     /// Runs without input rows until all cores halt.
     fn run_to_halt(&mut self) -> Result<()>;
 
@@ -77,6 +83,13 @@ pub(crate) struct RunOutcome<'a> {
     pub(crate) nans: NanWrites,
     /// Outcome of a system apart from its cores; `None` for a single program.
     pub(crate) system: Option<SystemOutcome<'a>>,
+    pub(crate) plant: Option<PlantOutcome>,
+}
+
+/// Last state of a plant.
+pub(crate) struct PlantOutcome {
+    pub(crate) name: String,
+    pub(crate) states: Vec<(String, f64)>,
 }
 
 impl<'a> CoreOutcome<'a> {
@@ -199,6 +212,11 @@ impl RunOutcome<'_> {
             let mut value = self.cores[0].json();
             value["program"] = file.into();
             value["outputs"] = outputs.into();
+            if let Some(PlantOutcome { name, states }) = &self.plant {
+                let states: Map<_, _> =
+                    states.iter().map(|(name, value)| (name.clone(), json!(value))).collect();
+                value["plant"] = json!({ "name": name, "states": states });
+            }
             return value;
         };
         let cores = self.cores.iter().zip(&system.description.cores).map(|(ran, core)| {
@@ -246,6 +264,11 @@ impl RunOutcome<'_> {
             for (name, value) in &self.outputs {
                 let value = value.map(|(ty, bits)| ports::format(ty, bits));
                 writeln!(out, "  {name} = {}", value.as_deref().unwrap_or(none))?;
+            }
+        }
+        if let Some(PlantOutcome { name, states }) = self.plant.as_ref().filter(|_| shown.outputs.is_none()) {
+            for (state, value) in states {
+                writeln!(out, "  {name}.{state} = {}", number::rounded(*value, 7))?;
             }
         }
         if let ([core], None) = (&self.cores[..], &self.system) {

@@ -9,6 +9,7 @@ use std::path::Path;
 use takt_debug::inputs::Table;
 use takt_emu::{Fault, Row, Rows};
 use takt_isa::program::Port;
+use takt_programs::plants::LoopError;
 use takt_system::SystemFault;
 
 /// Formats of a value in CSV and JSON.
@@ -38,10 +39,10 @@ pub(crate) enum Inputs {
 }
 
 impl Inputs {
-    /// Opens a CSV file (`-` for standard input) and reads its header.
-    pub(crate) fn open(path: Option<&Path>, ports: &[Port]) -> Result<Inputs> {
+    /// Opens a CSV file (`-` for standard input) and reads its header, which may have columns for `optional` ports, too.
+    pub(crate) fn open(path: Option<&Path>, ports: &[Port], optional: &[Port]) -> Result<Inputs> {
         match path {
-            Some(path) => Ok(Inputs::Table(Box::new(open(path, ports)?))),
+            Some(path) => Ok(Inputs::Table(Box::new(open(path, ports, optional)?))),
             None => Ok(Inputs::Zero(ports.iter().map(|port| (port.register, 0)).collect())),
         }
     }
@@ -78,8 +79,9 @@ pub(crate) fn open_both<I>(
 /// Finishes the outputs of a run that ended with `result` after some rows. After a fault, the preceding rows are kept as evidence;
 /// without rows, and after any other error, the file is left unchanged.
 pub(crate) fn finish(outputs: Option<Out>, rows: u64, result: Result<()>) -> Result<()> {
-    let is_fault =
-        |error: &anyhow::Error| error.chain().any(|cause| cause.is::<Fault>() || cause.is::<SystemFault>());
+    let is_fault = |error: &anyhow::Error| {
+        error.chain().any(|cause| cause.is::<Fault>() || cause.is::<SystemFault>() || cause.is::<LoopError>())
+    };
     let keeps = result.as_ref().err().is_none_or(|error| rows > 0 && is_fault(error));
     let finished = outputs.filter(|_| keeps).map_or(Ok(()), Out::finish);
     // The first error takes precedence.
@@ -100,7 +102,7 @@ pub(crate) fn rows(
     if path.is_none() && most > MOST_PERIODS {
         bail!("{most} periods: without --inputs there are at most {MOST_PERIODS}");
     }
-    let mut inputs = Inputs::open(path, ports)?;
+    let mut inputs = Inputs::open(path, ports, &[])?;
     let mut rows = Rows::new();
     while (rows.len() as u64) < most
         && let Some(row) = inputs.next()?
@@ -120,7 +122,7 @@ pub(crate) fn runs(
     most: usize,
     most_periods: usize,
 ) -> Result<Vec<(String, Rows)>> {
-    let mut table = open(path, ports)?;
+    let mut table = open(path, ports, &[])?;
     let name = table.name().to_owned();
     if ports.iter().any(|port| port.name == RUN) {
         bail!("{name}: column `{RUN}` would be an input port's; give a folder with a file for each run");
@@ -152,6 +154,7 @@ pub(crate) fn runs(
 }
 
 /// Opens a table and reads its header.
-fn open(path: &Path, ports: &[Port]) -> Result<Table> {
-    Table::new(files::input_name(path), files::open(path)?, ports).map_err(|error| anyhow!(error))
+fn open(path: &Path, ports: &[Port], optional: &[Port]) -> Result<Table> {
+    Table::with_optional(files::input_name(path), files::open(path)?, ports, optional)
+        .map_err(|error| anyhow!(error))
 }

@@ -3,8 +3,10 @@
 
 use crate::run::ports::{self, Inputs};
 use crate::terminal::files;
+use crate::terminal::plot::curves::Curves;
 use crate::terminal::progress::{self, DelayedProgress};
 use anyhow::Result;
+use std::cell::RefCell;
 use std::io::Write;
 use std::path::Path;
 use takt_emu::Row;
@@ -17,6 +19,11 @@ pub(crate) trait TableApplication {
 
     /// Columns of the input table.
     fn inputs(&self) -> Vec<Port>;
+
+    /// Further columns that the input table may have.
+    fn optional_inputs(&self) -> Vec<Port> {
+        Vec::new()
+    }
 
     /// Columns of the output table.
     fn titles(&self) -> Vec<String> {
@@ -43,6 +50,8 @@ pub(crate) struct Tables<'a> {
     /// Input table; `None` sets every input to 0.
     pub(crate) inputs: Option<&'a Path>,
     pub(crate) outputs: Option<&'a Path>,
+    /// Gets the rows of the output table, too.
+    pub(crate) curves: Option<&'a RefCell<Curves>>,
     /// Maximum number of rows.
     pub(crate) most: Option<u64>,
 }
@@ -51,8 +60,8 @@ impl Tables<'_> {
     /// Runs an application once per row; returns the number of rows.
     pub(crate) fn drive<D: TableApplication>(&self, driven: &mut D) -> Result<u64> {
         let live = self.inputs.is_some_and(files::is_live);
-        let (columns, titles) = (driven.inputs(), driven.titles());
-        let open = || Inputs::open(self.inputs, &columns);
+        let (columns, optional, titles) = (driven.inputs(), driven.optional_inputs(), driven.titles());
+        let open = || Inputs::open(self.inputs, &columns, &optional);
         let (mut inputs, mut outputs) =
             ports::open_both(self.inputs, open, self.outputs, titles.into_iter())?;
         driven.begin()?;
@@ -68,6 +77,9 @@ impl Tables<'_> {
             }
             *rows += 1;
             bar.add(1);
+            if let Some(curves) = self.curves {
+                curves.borrow_mut().add(&driven.values());
+            }
             if let Some(outputs) = &mut outputs {
                 ports::write_row(outputs, driven.values())?;
                 if live {

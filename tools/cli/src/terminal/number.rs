@@ -160,6 +160,16 @@ pub(crate) fn time(text: &str) -> Result<Time, String> {
     }
 }
 
+/// Parses a time with a unit into seconds, for clap.
+pub(crate) fn seconds(text: &str) -> Result<f64, String> {
+    quantity(text, TIME, false, 1e-9..=1e6).map(shortest)
+}
+
+/// Removes the last binary digits, which come from the unit: 50us are 50·10⁻⁶ s, a number that binary64 prints with five digits more.
+pub(crate) fn shortest(seconds: f64) -> f64 {
+    format!("{seconds:.14e}").parse().unwrap_or(seconds)
+}
+
 impl Time {
     /// Number of cycles at a clock in MHz, rounded to a whole number if it is within rounding error of one.
     pub(crate) fn cycles(self, clock: f64) -> u64 {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! SVG plots: tool path and tracking error over time; an arm's tool path in space, and joint angles over time.
 
+pub(crate) mod curves;
 mod terminal;
 
 use anyhow::{Result, anyhow};
@@ -464,8 +465,11 @@ pub(crate) type Axes =
 
 pub(crate) fn mesh(chart: &mut ChartContext<'_, SVGBackend<'_>, Axes>, x: &str, y: &str) -> Outcome<()> {
     let label = |value: &f64| format!("{}", (value * 1e6).round() / 1e6);
+    // In a low chart, as many labels as do not touch.
+    let height = chart.plotting_area().dim_in_pixel().1;
     chart
         .configure_mesh()
+        .y_labels((height / px(22)).clamp(2, 11) as usize)
         .light_line_style(TRANSPARENT)
         .bold_line_style(BLACK.mix(0.15).stroke_width(px(1)))
         .axis_style(BLACK.stroke_width(px(1)))

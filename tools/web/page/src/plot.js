@@ -339,7 +339,7 @@ export class Plots {
   /** What to say if inputs are 0 because nobody gives them. */
   silence() {
     const { plants, plant, inputs, rows, blank, inputs_of_others: others } = this.program;
-    const driven = plants.find(({ name }) => name === plant?.name)?.gives ?? [], silent = inputs.filter(({ name }) => !driven.includes(name));
+    const here = plants.find(({ name }) => name === plant?.name), driven = [...(here?.gives ?? []), ...(here?.states ?? [])], silent = inputs.filter(({ name }) => !driven.includes(name));
     if (!silent.length || (rows && !blank && !others)) return "";
     const count = silent.length, those = driven.length ? silent.map(({ name }) => name).join(", ") : count === 1 ? "the input port" : `all ${count} input ports`;
     return `There are no inputs${driven.length ? " but the plant's" : ""}: ${those} ${count === 1 ? "is" : "are"} 0 in every period. The tab Inputs takes a table.`;

@@ -25,7 +25,7 @@ pub(crate) fn console(
     let columns = host.columns(&description);
     let mut turns = None;
     if let Some(path) = inputs {
-        let mut inputs = Inputs::open(Some(path), &columns)?;
+        let mut inputs = Inputs::open(Some(path), &columns, &[])?;
         let mut rows = Vec::new();
         while let Some(row) = inputs.next()? {
             if rows.len() == most {

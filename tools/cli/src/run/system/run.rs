@@ -148,6 +148,7 @@ impl<'a> Execution<'a> for SystemRun<'a, '_> {
         let (first_tick, cycles) = (system.start(), system.now());
         let fifos = fifos.collect();
         Ok(RunOutcome {
+            plant: None,
             cores: cores.collect(),
             outputs: outputs.collect(),
             zeros: !host.inputs.is_empty(),

@@ -1,0 +1,555 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! A plant's file in TOML (docs/plant.md): every mistake with its place.
+
+use super::models::MODELS;
+use super::{Interface, MOST_STEPS, Model, Quantity, Simulation, SimulationError};
+use std::ops::Range;
+use std::sync::Arc;
+use takt_diagnostics::diag::{Diagnostic, Diagnostics};
+use takt_diagnostics::source::{Sources, Span};
+use takt_diagnostics::{nearest, toml_mistake};
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+/// Longest file, in bytes.
+pub const TEXT_BYTES: usize = 1 << 20;
+/// Seconds that an FMU may take for a step, unless its file says otherwise.
+pub const STEP_LIMIT: f64 = 10.0;
+/// Code of all mistakes.
+pub(super) const CODE: &str = "plant";
+
+/// A value over time: steps from value to value, 0 before the first.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub struct Course {
+    /// Times in s, increasing, and values from then on.
+    steps: Vec<(f64, f64)>,
+}
+
+impl Course {
+    /// Value in a period of the given length in s. A step acts from the first period on that does not begin before it.
+    pub(super) fn at(&self, period: u64, length: f64) -> f64 {
+        // Rounding must not put off a step at a multiple of the period.
+        let begins = (period as f64 + 1e-6) * length;
+        let index = self.steps.partition_point(|(time, _)| *time <= begins);
+        index.checked_sub(1).map_or(0.0, |last| self.steps[last].1)
+    }
+}
+
+/// A program's port that belongs to a signal of the plant.
+#[derive(Clone, PartialEq, Debug)]
+pub(super) struct PortOf {
+    pub(super) port: String,
+    /// Of a sensor the port is signal · scale + offset; of an input the signal is port · scale + offset.
+    pub(super) scale: f64,
+    pub(super) offset: f64,
+}
+
+impl PortOf {
+    pub(super) fn named(port: &str) -> PortOf {
+        PortOf { port: port.to_owned(), scale: 1.0, offset: 0.0 }
+    }
+}
+
+/// An entry of a table, with the places of its name and its value.
+#[derive(Clone, Debug)]
+pub(super) struct Entry<T> {
+    pub(super) name: String,
+    pub(super) place: Span,
+    pub(super) value: T,
+}
+
+/// The plant that a file names.
+#[derive(Clone, Debug)]
+pub enum Kind {
+    /// A small plant.
+    Model {
+        /// Its row.
+        model: &'static Model,
+        /// Parameters in the order of the model.
+        parameters: Vec<f64>,
+        /// State at the beginning, in the order of the model.
+        initial: Vec<f64>,
+    },
+    /// An FMU.
+    Fmu {
+        /// Path as the file states it, relative to the file's folder.
+        path: String,
+        /// Parameters and other variables to be set before the initialisation, by name, with their places.
+        start: Vec<(String, f64, Span)>,
+        /// Seconds that a step may take.
+        limit: f64,
+    },
+}
+
+/// A number of a plant's file that a user may set.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Setting {
+    /// Name, as in the file.
+    pub name: String,
+    /// Its value.
+    pub value: f64,
+    /// SI unit; empty for a pure number.
+    pub unit: &'static str,
+    /// Meaning in words.
+    pub text: String,
+}
+
+/// A plant's file.
+#[derive(Clone, Debug)]
+pub struct PlantFile {
+    pub(super) sources: Arc<Sources>,
+    /// The plant.
+    pub kind: Kind,
+    /// Steps of the plant in a period, at least.
+    pub steps: u32,
+    pub(super) ports: Vec<Entry<PortOf>>,
+    pub(super) disturbances: Vec<Entry<Course>>,
+    pub(super) inputs: Vec<Entry<Course>>,
+}
+
+impl PlantFile {
+    /// Reads the text of a file.
+    ///
+    /// # Errors
+    /// All mistakes in it.
+    pub fn read(name: &str, text: &str) -> Result<PlantFile, Diagnostics> {
+        let mut sources = Sources::default();
+        sources.add(name, text.to_owned());
+        let mut reader = Reader { sources: Arc::new(sources), mistakes: Vec::new() };
+        let file = match text.len() {
+            length if length > TEXT_BYTES => {
+                reader.mistakes.push(Diagnostic::placeless(
+                    CODE,
+                    format!("{name} is longer than {} MiB", TEXT_BYTES >> 20),
+                ));
+                None
+            }
+            _ => match DeTable::parse(text) {
+                Ok(table) => reader.file(table.get_ref()),
+                Err(error) => {
+                    reader.mistakes.push(toml_mistake(&error, text));
+                    None
+                }
+            },
+        };
+        let Reader { sources, mistakes } = reader;
+        file.filter(|_| mistakes.is_empty()).ok_or_else(|| diagnostics(sources, mistakes))
+    }
+
+    /// An FMU by itself, whose signals have the names of the ports.
+    pub fn of_fmu(path: &str) -> PlantFile {
+        PlantFile {
+            sources: Arc::default(),
+            kind: Kind::Fmu { path: path.to_owned(), start: Vec::new(), limit: STEP_LIMIT },
+            steps: 1,
+            ports: Vec::new(),
+            disturbances: Vec::new(),
+            inputs: Vec::new(),
+        }
+    }
+
+    /// A mistake at a place of this file.
+    pub fn mistake(&self, place: Span, message: String) -> Diagnostics {
+        diagnostics(Arc::clone(&self.sources), vec![Diagnostic::error(CODE, place, message)])
+    }
+
+    /// Numbers of a small plant's file that a user may set: parameters, and value and time of the last step of each disturbance, called
+    /// `load` and `load.at`.
+    pub fn settings(&self) -> Vec<Setting> {
+        let Kind::Model { model, parameters, .. } = &self.kind else { return Vec::new() };
+        let own = model.parameters.iter().zip(parameters).map(|(parameter, value)| Setting {
+            name: parameter.name.to_owned(),
+            value: *value,
+            unit: parameter.unit,
+            text: parameter.text.to_owned(),
+        });
+        let disturbances = model.inputs.iter().filter(|input| input.is_disturbance).flat_map(|input| {
+            let Quantity { name, unit, text } = input.quantity;
+            let course = self.disturbances.iter().find(|entry| entry.name == name);
+            let (time, value) =
+                course.and_then(|entry| entry.value.steps.last().copied()).unwrap_or_default();
+            let at = Setting {
+                name: format!("{name}.at"),
+                value: time,
+                unit: "s",
+                text: format!("time from which {name} acts"),
+            };
+            [Setting { name: name.to_owned(), value, unit, text: text.to_owned() }, at]
+        });
+        own.chain(disturbances).collect()
+    }
+
+    /// Replaces a number of [`PlantFile::settings`].
+    ///
+    /// # Errors
+    /// If there is no such number, or if the value makes no sense.
+    pub fn set(&mut self, name: &str, value: f64) -> Result<(), String> {
+        let unknown = || Err(format!("the plant has no parameter `{name}`"));
+        let Kind::Model { model, parameters, .. } = &mut self.kind else { return unknown() };
+        if let Some(at) = model.parameters.iter().position(|parameter| parameter.name == name) {
+            let check = model.parameters[at].check(value);
+            check.map_err(|expected| {
+                format!("the parameter `{name}` of `{}` is {value}; {expected}", model.name)
+            })?;
+            parameters[at] = value;
+            return Ok(());
+        }
+        let (signal, is_time) = name.strip_suffix(".at").map_or((name, false), |signal| (signal, true));
+        let known = model.inputs.iter().any(|input| input.is_disturbance && input.quantity.name == signal);
+        if !known {
+            return unknown();
+        }
+        let at = self.disturbances.iter().position(|entry| entry.name == signal).unwrap_or_else(|| {
+            let value = Course { steps: vec![(0.0, 0.0)] };
+            self.disturbances.push(Entry { name: signal.to_owned(), place: Span::default(), value });
+            self.disturbances.len() - 1
+        });
+        let steps = &mut self.disturbances[at].value.steps;
+        let before = steps.len().checked_sub(2).map_or(0.0, |index| steps[index].0);
+        if !value.is_finite() || is_time && value < before {
+            let expected = if is_time { format!("a time from {before} s on") } else { "a number".to_owned() };
+            return Err(format!("`{name}` is {value}; expected {expected}"));
+        }
+        if let Some((time, level)) = steps.last_mut() {
+            *(if is_time { time } else { level }) = value;
+        }
+        Ok(())
+    }
+
+    /// The small plant; `None` for an FMU.
+    pub fn model(&self) -> Option<&'static Model> {
+        match self.kind {
+            Kind::Model { model, .. } => Some(model),
+            Kind::Fmu { .. } => None,
+        }
+    }
+
+    /// The small plant in motion, with its signals. `period` is in seconds.
+    ///
+    /// # Errors
+    /// If the plant is an FMU, or too fast for the period.
+    pub fn simulation(&self, period: f64) -> Result<(Simulation, Interface), SimulationError> {
+        let Kind::Model { model, parameters, initial } = &self.kind else {
+            return Err(SimulationError::Fmu);
+        };
+        let simulation = Simulation::new(model, parameters.clone(), initial, period, self.steps)?;
+        Ok((simulation, model.interface()))
+    }
+}
+
+/// Mistakes in the order of their places.
+pub(super) fn diagnostics(sources: Arc<Sources>, mut list: Vec<Diagnostic>) -> Diagnostics {
+    list.sort_by_key(|one| one.labels.first().map(|label| label.span));
+    Diagnostics { sources, list, ..Diagnostics::default() }
+}
+
+/// Names in quotes, as a list for a message; the first ones if there are many.
+pub(super) fn listed<'n>(names: impl IntoIterator<Item = &'n str>) -> String {
+    const MOST: usize = 12;
+    let names: Vec<&str> = names.into_iter().collect();
+    let mut text = names.iter().take(MOST).map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
+    match names.len() {
+        0 => text.push_str("none"),
+        count if count > MOST => text.push_str(&format!(" and {} more", count - MOST)),
+        _ => {}
+    }
+    text
+}
+
+fn span(range: Range<usize>) -> Span {
+    Span::new(range.start as u32, range.end as u32)
+}
+
+/// Powers of ten of SI prefixes.
+const PREFIXES: [(&str, i32); 9] =
+    [("p", -12), ("n", -9), ("u", -6), ("µ", -6), ("m", -3), ("c", -2), ("k", 3), ("M", 6), ("G", 9)];
+
+/// Number in the SI unit `unit` from a text such as `0.9 mH`.
+fn quantity(text: &str, unit: &str) -> Option<f64> {
+    let text = text.trim();
+    let is_digit = |c: char| c.is_ascii_digit() || ".eE+-".contains(c);
+    let most = text.find(|c| !is_digit(c)).unwrap_or(text.len());
+    let end = (1..=most).rev().find(|&end| text[..end].parse::<f64>().is_ok())?;
+    let written = text[end..].trim();
+    let written = written.replace('*', "·").replace("^2", "²").replace("^3", "³").replace("ohm", "Ω");
+    // A prefix belongs to the first symbol, and to its power: that is written out.
+    let first = unit.split(['·', '/']).next().unwrap_or_default();
+    let takes_prefix = !first.is_empty() && !first.starts_with("kg") && !first.ends_with(['²', '³']);
+    let prefixed = |(prefix, power): &(&str, i32)| (written.strip_prefix(prefix)? == unit).then_some(*power);
+    let power = match written == unit {
+        true => 0,
+        false if takes_prefix => PREFIXES.iter().find_map(prefixed)?,
+        false => return None,
+    };
+    // Read as one decimal, so that 0.9 mH has the bits of 0.9e-3.
+    let (mantissa, exponent) = text[..end].split_once(['e', 'E']).unwrap_or((&text[..end], "0"));
+    let exponent = exponent.parse::<i32>().ok()?.checked_add(power)?;
+    format!("{mantissa}e{exponent}").parse().ok()
+}
+
+struct Reader {
+    sources: Arc<Sources>,
+    mistakes: Vec<Diagnostic>,
+}
+
+/// Entries of a table in the order of the file.
+fn entries<'t, 'i>(table: &'t DeTable<'i>) -> Vec<(&'t str, Span, &'t Spanned<DeValue<'i>>)> {
+    let mut entries: Vec<_> =
+        table.iter().map(|(name, value)| (name.get_ref().as_ref(), span(name.span()), value)).collect();
+    entries.sort_by_key(|(_, place, _)| *place);
+    entries
+}
+
+impl Reader {
+    fn mistake(&mut self, place: Span, message: impl Into<String>) -> &mut Diagnostic {
+        self.mistakes.push(Diagnostic::error(CODE, place, message));
+        let last = self.mistakes.len() - 1;
+        &mut self.mistakes[last]
+    }
+
+    /// Reports an unknown name among known ones.
+    fn unknown<'n>(&mut self, what: &str, name: &str, place: Span, known: impl IntoIterator<Item = &'n str>) {
+        let known: Vec<&str> = known.into_iter().collect();
+        let near = nearest(name, known.iter().copied());
+        let help = format!("known: {}", listed(known));
+        let mistake = self.mistake(place, format!("{what} `{name}`"));
+        *mistake = mistake.clone().help(help).did_you_mean(near);
+    }
+
+    fn file(&mut self, table: &DeTable<'_>) -> Option<PlantFile> {
+        const KEYS: [&str; 9] =
+            ["model", "fmu", "steps", "limit", "parameters", "initial", "ports", "disturbance", "inputs"];
+        for (name, place, _) in entries(table) {
+            if !KEYS.contains(&name) {
+                self.unknown("a plant's file has no key", name, place, KEYS);
+            }
+        }
+        let get = |key: &str| table.get(key);
+        let steps = get("steps").map_or(Some(1), |value| self.whole("steps", value, 1, MOST_STEPS));
+        let kind = self.kind(table);
+        let ports = self.table(get("ports"), "ports", |reader, _, value| reader.port(value));
+        let inputs = self.table(get("inputs"), "inputs", |reader, _, value| reader.course(value, None));
+        let model = match &kind {
+            Some(Kind::Model { model, .. }) => Some(*model),
+            _ => None,
+        };
+        let disturbances = self.table(get("disturbance"), "disturbance", |reader, (name, _), value| {
+            let unit = model.and_then(|model| {
+                let known = model.inputs.iter().find(|one| one.quantity.name == name);
+                known.map(|one| one.quantity.unit)
+            });
+            reader.course(value, unit)
+        });
+        let sources = Arc::clone(&self.sources);
+        Some(PlantFile { sources, kind: kind?, steps: steps?, ports, disturbances, inputs })
+    }
+
+    fn kind(&mut self, table: &DeTable<'_>) -> Option<Kind> {
+        let get = |key: &str| table.get(key);
+        match (get("model"), get("fmu")) {
+            (Some(name), None) => {
+                let (name, place) = (self.text("model", name)?, span(name.span()));
+                let Some(model) = Model::named(name) else {
+                    self.unknown("there is no model", name, place, MODELS.map(|model| model.name));
+                    return None;
+                };
+                if let Some(limit) = get("limit") {
+                    let _ = self.mistake(
+                        span(limit.span()),
+                        "`limit` is the time of an FMU's step; a model has none",
+                    );
+                }
+                let mut parameters: Vec<f64> = model.parameters.iter().map(|one| one.value).collect();
+                self.table(get("parameters"), "parameters", |reader, name, value| {
+                    let Some(at) = model.parameters.iter().position(|one| one.name == name.0) else {
+                        let known = model.parameters.iter().map(|one| one.name);
+                        reader.unknown(&format!("`{}` has no parameter", model.name), name.0, name.1, known);
+                        return None;
+                    };
+                    let parameter = &model.parameters[at];
+                    parameters[at] = reader.number(value, Some(parameter.unit))?;
+                    if let Err(expected) = parameter.check(parameters[at]) {
+                        let text = format!("`{}` is {}: {expected}", name.0, parameters[at]);
+                        let _ = reader.mistake(span(value.span()), text);
+                    }
+                    Some(())
+                });
+                let mut initial = vec![0.0; model.states.len()];
+                self.table(get("initial"), "initial", |reader, name, value| {
+                    let Some(at) = model.states.iter().position(|one| one.name == name.0) else {
+                        let known = model.states.iter().map(|one| one.name);
+                        reader.unknown(&format!("`{}` has no state", model.name), name.0, name.1, known);
+                        return None;
+                    };
+                    initial[at] = reader.number(value, Some(model.states[at].unit))?;
+                    Some(())
+                });
+                Some(Kind::Model { model, parameters, initial })
+            }
+            (None, Some(path)) => {
+                let path = self.text("fmu", path)?.to_owned();
+                if let Some(initial) = get("initial") {
+                    let text = "`initial` is for the states of a model; variables of an FMU start as [parameters] says";
+                    let _ = self.mistake(span(initial.span()), text);
+                }
+                let start = self
+                    .table(get("parameters"), "parameters", |reader, _, value| reader.number(value, None));
+                let start =
+                    start.into_iter().map(|Entry { name, place, value }| (name, value, place)).collect();
+                let limit = match get("limit") {
+                    None => STEP_LIMIT,
+                    Some(value) => {
+                        let limit = self.number(value, Some("s"))?;
+                        if !(limit > 0.0 && limit <= 86_400.0) {
+                            let _ =
+                                self.mistake(span(value.span()), "`limit` must be a time up to a day, in s");
+                        }
+                        limit
+                    }
+                };
+                Some(Kind::Fmu { path, start, limit })
+            }
+            (Some(model), Some(fmu)) => {
+                let later = span(model.span()).max(span(fmu.span()));
+                let _ = self.mistake(later, "a plant is a `model` or an `fmu`, not both");
+                None
+            }
+            (None, None) => {
+                let known = format!("models: {}", listed(MODELS.map(|model| model.name)));
+                let text = "expected `model = \"…\"` or `fmu = \"….fmu\"`: the plant of this file";
+                self.mistakes.push(Diagnostic::error(CODE, Span::new(0, 0), text).help(known));
+                None
+            }
+        }
+    }
+
+    /// Reads the entries of a table; `read` gets name and place of the name, and the value.
+    fn table<'i, T>(
+        &mut self,
+        table: Option<&Spanned<DeValue<'i>>>,
+        name: &str,
+        mut read: impl FnMut(&mut Reader, (&str, Span), &Spanned<DeValue<'i>>) -> Option<T>,
+    ) -> Vec<Entry<T>> {
+        let Some(table) = table else { return Vec::new() };
+        let Some(entries_of) = table.get_ref().as_table() else {
+            let text = format!("`{name}` must be a table, as in `[{name}]` in a line of its own");
+            let _ = self.mistake(span(table.span()), text);
+            return Vec::new();
+        };
+        let read = |(name, place, value): (&str, Span, &Spanned<DeValue<'i>>)| {
+            let value = read(self, (name, place), value)?;
+            Some(Entry { name: name.to_owned(), place, value })
+        };
+        entries(entries_of).into_iter().filter_map(read).collect()
+    }
+
+    fn text<'t>(&mut self, key: &str, value: &'t Spanned<DeValue<'_>>) -> Option<&'t str> {
+        let text = value.get_ref().as_str();
+        if text.is_none() {
+            let found = value.get_ref().type_str();
+            let _ =
+                self.mistake(span(value.span()), format!("`{key}` must be a text in quotes, found {found}"));
+        }
+        text
+    }
+
+    fn whole(&mut self, key: &str, value: &Spanned<DeValue<'_>>, least: u32, most: u32) -> Option<u32> {
+        let number = value.get_ref().as_integer();
+        let number = number.and_then(|number| i64::from_str_radix(number.as_str(), number.radix()).ok());
+        let number = number.and_then(|number| u32::try_from(number).ok());
+        let number = number.filter(|number| (least..=most).contains(number));
+        if number.is_none() {
+            let text = format!("`{key}` must be a whole number from {least} to {most}");
+            let _ = self.mistake(span(value.span()), text);
+        }
+        number
+    }
+
+    /// A finite number in the unit, or a text with the unit or one with a prefix; `None` for numbers without a known unit.
+    fn number(&mut self, value: &Spanned<DeValue<'_>>, unit: Option<&str>) -> Option<f64> {
+        let number = match (value.get_ref(), unit) {
+            (DeValue::Integer(number), _) => {
+                i64::from_str_radix(number.as_str(), number.radix()).ok().map(|number| number as f64)
+            }
+            (DeValue::Float(number), _) => number.as_str().parse().ok(),
+            (DeValue::String(text), Some(unit)) => quantity(text, unit),
+            _ => None,
+        };
+        let number = number.filter(|number| number.is_finite());
+        if number.is_none() {
+            let expected = match unit {
+                None => "expected a number".to_owned(),
+                Some("") => "expected a number without a unit".to_owned(),
+                Some(unit) => {
+                    format!("expected a number in {unit}, or a text with the unit, as in \"1 {unit}\"")
+                }
+            };
+            let found = match value.get_ref() {
+                DeValue::String(text) => format!("\"{text}\""),
+                DeValue::Float(number) => number.as_str().to_owned(),
+                DeValue::Integer(number) => number.as_str().to_owned(),
+                other => other.type_str().to_owned(),
+            };
+            let _ = self.mistake(span(value.span()), format!("{expected}; found {found}"));
+        }
+        number
+    }
+
+    fn course(&mut self, value: &Spanned<DeValue<'_>>, unit: Option<&str>) -> Option<Course> {
+        let Some(list) = value.get_ref().as_array() else {
+            let value = self.number(value, unit)?;
+            return Some(Course { steps: vec![(0.0, value)] });
+        };
+        let mut steps: Vec<(f64, f64)> = Vec::new();
+        for step in list.iter() {
+            let pair = step.get_ref().as_array();
+            let Some([time, value]) = pair
+                .map(|pair| [pair.get(0), pair.get(1)])
+                .filter(|_| pair.is_some_and(|pair| pair.len() == 2))
+            else {
+                let text = "expected a list of [time in s, value], as in [[0, 1], [0.1, 2]]";
+                let _ = self.mistake(span(step.span()), text);
+                return None;
+            };
+            let (time, value) = (time?, value?);
+            let at = self.number(time, Some("s"))?;
+            if at < 0.0 || steps.last().is_some_and(|(last, _)| at <= *last) {
+                let text = format!("the times must begin with 0 or more and increase; {at} s does not");
+                let _ = self.mistake(span(time.span()), text);
+                return None;
+            }
+            steps.push((at, self.number(value, unit)?));
+        }
+        if steps.is_empty() {
+            let _ =
+                self.mistake(span(value.span()), "expected a list of [time in s, value]; found an empty one");
+            return None;
+        }
+        Some(Course { steps })
+    }
+
+    fn port(&mut self, value: &Spanned<DeValue<'_>>) -> Option<PortOf> {
+        if let Some(port) = value.get_ref().as_str() {
+            return Some(PortOf::named(port));
+        }
+        let expected = "expected a port's name in quotes, or { port = \"…\", scale = 1.0, offset = 0.0 }";
+        let Some(table) = value.get_ref().as_table() else {
+            let _ = self.mistake(span(value.span()), expected);
+            return None;
+        };
+        const KEYS: [&str; 3] = ["port", "scale", "offset"];
+        for (name, place, _) in entries(table) {
+            if !KEYS.contains(&name) {
+                self.unknown("a port of a plant has no key", name, place, KEYS);
+            }
+        }
+        let Some(port) = table.get("port") else {
+            let _ = self.mistake(span(value.span()), expected);
+            return None;
+        };
+        let port = self.text("port", port)?.to_owned();
+        let scale = table.get("scale").map_or(Some(1.0), |value| self.number(value, None))?;
+        let offset = table.get("offset").map_or(Some(0.0), |value| self.number(value, None))?;
+        Some(PortOf { port, scale, offset })
+    }
+}

@@ -1,0 +1,263 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Plants that close the loop of a controller.
+//!
+//! - [`models`]: small plants: parameters, and equations in binary64;
+//! - [`file`](mod@file): a plant's file in TOML: its model, or an FMU, parameters, ports, disturbances;
+//! - [`ClosedLoop`]: a plant between the output and the input ports of a program.
+//!
+//! In each period, the program reads what the plant's sensors give, and the plant then moves for a period under the values that the program
+//! has written (zero-order hold; the program's own cycles are neglected). The small plants are integrated by the classical Runge-Kutta
+//! method, in steps much shorter than their fastest motion. Sums, products, square roots, and the sines of the crate libm make the result
+//! the same on every host.
+
+pub mod file;
+pub mod inverter;
+mod loops;
+pub mod models;
+
+pub use file::PlantFile;
+pub use loops::{ClosedLoop, Connection, LoopError};
+use models::{ORDER, State};
+
+/// Steps of integration in the time constant of the fastest motion: errors below 10⁻⁶ of the values.
+const RESOLUTION: f64 = 16.0;
+/// Maximum number of steps in a period.
+pub const MOST_STEPS: u32 = 100_000;
+
+/// A parameter of a model.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Parameter {
+    /// Symbol, as in the equations.
+    pub name: &'static str,
+    /// Value unless the user gives another.
+    pub value: f64,
+    /// SI unit; empty for a pure number.
+    pub unit: &'static str,
+    /// Meaning in words.
+    pub text: &'static str,
+    /// Least value that makes sense: 0, or the least positive number.
+    pub least: f64,
+}
+
+impl Parameter {
+    /// Checks a value.
+    ///
+    /// # Errors
+    /// If it makes no sense; the message is an expectation: `expected a positive number`.
+    pub fn check(&self, value: f64) -> Result<(), &'static str> {
+        match () {
+            () if value.is_finite() && value >= self.least => Ok(()),
+            () if self.least > 0.0 => Err("expected a positive number"),
+            () => Err("expected a number, 0 or more"),
+        }
+    }
+}
+
+/// A quantity of a model: a sensor's or a state.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Quantity {
+    /// Name in files.
+    pub name: &'static str,
+    /// SI unit; empty for a pure number.
+    pub unit: &'static str,
+    /// Meaning in words.
+    pub text: &'static str,
+}
+
+/// An input of a model.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Input {
+    /// Name, unit, meaning.
+    pub quantity: Quantity,
+    /// The input is 0 unless a file states another value; all others need a port.
+    pub is_disturbance: bool,
+}
+
+/// A stretch of time in seconds with the inputs of [`Model::derivative`] in it.
+type Stretch = (f64, Vec<f64>);
+
+/// A small plant.
+#[derive(Debug)]
+pub struct Model {
+    /// Name in files.
+    pub name: &'static str,
+    /// Description in words.
+    pub text: &'static str,
+    /// Inputs: actuators, which output ports of a program drive, then disturbances.
+    pub inputs: &'static [Input],
+    /// Sensors, which fill input ports of a program.
+    pub sensors: &'static [Quantity],
+    /// State variables; at most [`ORDER`].
+    pub states: &'static [Quantity],
+    /// Parameters in the order in which the equations take them.
+    pub parameters: &'static [Parameter],
+    /// Time derivative of the state, from parameters, inputs and state.
+    derivative: fn(&[f64], &[f64], State) -> State,
+    /// Sensor values from parameters and state.
+    sense: fn(&[f64], State) -> Vec<f64>,
+    /// Bound of the fastest motion in 1/s, from parameters and the period in seconds.
+    rate: fn(&[f64], f64) -> f64,
+    /// Stretches that make up a period, from parameters, inputs and the period in seconds; `None`: one, with the inputs as they are.
+    stretches: Option<fn(&[f64], &[f64], f64) -> Vec<Stretch>>,
+}
+
+impl Model {
+    /// The model of a name.
+    pub fn named(name: &str) -> Option<&'static Model> {
+        models::MODELS.into_iter().find(|model| model.name == name)
+    }
+
+    /// Signals of the model.
+    pub fn interface(&self) -> Interface {
+        let names = |quantities: &[Quantity]| quantities.iter().map(|one| one.name.to_owned()).collect();
+        let inputs = self.inputs.iter();
+        Interface {
+            name: self.name.to_owned(),
+            inputs: inputs.map(|one| (one.quantity.name.to_owned(), one.is_disturbance)).collect(),
+            sensors: names(self.sensors),
+            states: names(self.states),
+        }
+    }
+}
+
+/// Names of a plant's signals.
+#[derive(Clone, PartialEq, Eq, Debug, Default)]
+pub struct Interface {
+    /// Name of the plant in messages.
+    pub name: String,
+    /// Inputs; true for those that are 0 unless a file states another value.
+    pub inputs: Vec<(String, bool)>,
+    /// Sensors.
+    pub sensors: Vec<String>,
+    /// Variables to be recorded in each period.
+    pub states: Vec<String>,
+}
+
+/// A plant in motion.
+pub trait Plant: Send {
+    /// Moves for a period under constant inputs, in the order of [`Interface::inputs`].
+    ///
+    /// # Errors
+    /// If the plant failed, in words.
+    fn advance(&mut self, inputs: &[f64]) -> Result<(), String>;
+
+    /// Values of the sensors, in the order of [`Interface::sensors`].
+    fn sensors(&self) -> Vec<f64>;
+
+    /// Values of the states, in the order of [`Interface::states`].
+    fn states(&self) -> Vec<f64>;
+}
+
+impl<P: Plant + ?Sized> Plant for Box<P> {
+    fn advance(&mut self, inputs: &[f64]) -> Result<(), String> {
+        (**self).advance(inputs)
+    }
+
+    fn sensors(&self) -> Vec<f64> {
+        (**self).sensors()
+    }
+
+    fn states(&self) -> Vec<f64> {
+        (**self).states()
+    }
+}
+
+/// A small plant in motion.
+#[derive(Clone, Debug)]
+pub struct Simulation {
+    model: &'static Model,
+    parameters: Vec<f64>,
+    /// Length of a period, s.
+    period: f64,
+    /// Longest step of integration, s.
+    longest: f64,
+    state: State,
+}
+
+/// Reason why there is no small plant in motion.
+#[derive(Clone, PartialEq, Debug, thiserror::Error)]
+pub enum SimulationError {
+    /// The plant is an FMU.
+    #[error("the plant is an FMU, which runs in a process of its own")]
+    Fmu,
+    /// A period is too long for the plant's fastest motion.
+    #[error(
+        "the plant `{name}` moves too fast for a period of {period} s: its parameters ask for {steps:.0} steps of integration in a \
+         period, and at most {MOST_STEPS} are made"
+    )]
+    TooFast {
+        /// Name of the model.
+        name: &'static str,
+        /// Length of a period, s.
+        period: f64,
+        /// Number of steps.
+        steps: f64,
+    },
+}
+
+impl Simulation {
+    /// A plant with parameters in the order of [`Model::parameters`] and an initial state in the order of [`Model::states`] (missing ones
+    /// are 0). `period` is in seconds; it has at least `steps` steps of integration.
+    ///
+    /// # Errors
+    /// If the plant is too fast for the period.
+    pub fn new(
+        model: &'static Model,
+        parameters: Vec<f64>,
+        initial: &[f64],
+        period: f64,
+        steps: u32,
+    ) -> Result<Simulation, SimulationError> {
+        let asked = period * (model.rate)(&parameters, period) * RESOLUTION;
+        let asked = asked.max(f64::from(steps)).max(1.0);
+        if !(period > 0.0 && asked <= f64::from(MOST_STEPS)) {
+            return Err(SimulationError::TooFast { name: model.name, period, steps: asked });
+        }
+        let state = std::array::from_fn(|at| initial.get(at).copied().unwrap_or_default());
+        // A step that is a rounding error longer is no further step.
+        let longest = period / asked.ceil() * (1.0 + 1e-9);
+        Ok(Simulation { model, parameters, period, longest, state })
+    }
+
+    /// Moves under constant inputs of the equations.
+    fn integrate(&mut self, duration: f64, inputs: &[f64]) {
+        let steps = (duration / self.longest).ceil().max(1.0);
+        let step = duration / steps;
+        // `new` bounds the number.
+        for _ in 0..steps as u32 {
+            let slope = |by: f64, slope: State| {
+                let state = std::array::from_fn(|at| self.state[at] + by * slope[at]);
+                (self.model.derivative)(&self.parameters, inputs, state)
+            };
+            let first = slope(0.0, [0.0; ORDER]);
+            let second = slope(step / 2.0, first);
+            let third = slope(step / 2.0, second);
+            let fourth = slope(step, third);
+            self.state = std::array::from_fn(|at| {
+                self.state[at] + step / 6.0 * (first[at] + 2.0 * (second[at] + third[at]) + fourth[at])
+            });
+        }
+    }
+}
+
+impl Plant for Simulation {
+    fn advance(&mut self, inputs: &[f64]) -> Result<(), String> {
+        match self.model.stretches {
+            None => self.integrate(self.period, inputs),
+            Some(stretches) => {
+                for (duration, inputs) in stretches(&self.parameters, inputs, self.period) {
+                    self.integrate(duration, &inputs);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn sensors(&self) -> Vec<f64> {
+        (self.model.sense)(&self.parameters, self.state)
+    }
+
+    fn states(&self) -> Vec<f64> {
+        self.state[..self.model.states.len()].to_vec()
+    }
+}

@@ -1,0 +1,330 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Equations of the small plants, one row of [`MODELS`] each. Sine and cosine are the crate libm's, so that they are the same on every host.
+
+use super::inverter::{self, Leg};
+use super::{Input, Model, Parameter, Quantity};
+
+/// Number of state variables of the largest model; smaller ones leave the last at 0.
+pub(super) const ORDER: usize = 4;
+/// State variables.
+pub(super) type State = [f64; ORDER];
+
+/// All models.
+pub static MODELS: [&Model; 7] =
+    [&DC_MOTOR, &PMSM, &PMSM_SWITCHED, &INERTIA, &MASS_SPRING, &CART_PENDULUM, &TANK];
+
+const fn positive(name: &'static str, value: f64, unit: &'static str, text: &'static str) -> Parameter {
+    Parameter { name, value, unit, text, least: f64::MIN_POSITIVE }
+}
+
+const fn natural(name: &'static str, value: f64, unit: &'static str, text: &'static str) -> Parameter {
+    Parameter { name, value, unit, text, least: 0.0 }
+}
+
+const fn quantity(name: &'static str, unit: &'static str, text: &'static str) -> Quantity {
+    Quantity { name, unit, text }
+}
+
+const fn actuator(name: &'static str, unit: &'static str, text: &'static str) -> Input {
+    Input { quantity: quantity(name, unit, text), is_disturbance: false }
+}
+
+const fn disturbance(name: &'static str, unit: &'static str, text: &'static str) -> Input {
+    Input { quantity: quantity(name, unit, text), is_disturbance: true }
+}
+
+const SPEED: Quantity = quantity("w", "rad/s", "speed of the shaft");
+const ANGLE: Quantity = quantity("angle", "rad", "angle of the shaft, which counts turns");
+const LOAD: Input = disturbance("load", "N·m", "torque of the load, against the motor's");
+const INERTIA_OF_SHAFT: Parameter = positive("J", 7e-4, "kg·m²", "moment of inertia, with the load's");
+const FRICTION: Parameter = natural("B", 1e-4, "N·m·s/rad", "viscous friction");
+
+/// L·di/dt = u - R·i - K·w, J·dw/dt = K·i - B·w - load.
+static DC_MOTOR: Model = Model {
+    name: "dc_motor",
+    text: "DC motor with a load",
+    inputs: &[actuator("u", "V", "voltage of the armature"), LOAD],
+    sensors: &[SPEED, quantity("i", "A", "current of the armature"), ANGLE],
+    states: &[quantity("i", "A", "current of the armature"), SPEED, ANGLE],
+    parameters: &[
+        positive("R", 1.0, "Ω", "resistance of the armature"),
+        positive("L", 1e-3, "H", "inductance of the armature"),
+        positive("K", 0.08, "V·s/rad", "back EMF per speed, and torque per current in N·m/A"),
+        INERTIA_OF_SHAFT,
+        FRICTION,
+    ],
+    derivative: |p, input, [current, speed, ..]| {
+        let (&[r, l, k, j, b], &[u, load]) = (p, input) else { return [0.0; ORDER] };
+        [(u - r * current - k * speed) / l, (k * current - b * speed - load) / j, speed, 0.0]
+    },
+    sense: |_, [current, speed, angle, _]| vec![speed, current, angle],
+    rate: |p, _| {
+        let [r, l, k, j, b] = *p else { return 0.0 };
+        r / l + b / j + k / (l * j).sqrt()
+    },
+    stretches: None,
+};
+
+const PHASES: &str = "duty of the half bridge, 0 to 1";
+const CURRENT: &str = "current into the phase";
+static PMSM_INPUTS: [Input; 4] =
+    [actuator("da", "", PHASES), actuator("db", "", PHASES), actuator("dc", "", PHASES), LOAD];
+static PMSM_SENSORS: [Quantity; 9] = [
+    quantity("ia", "A", CURRENT),
+    quantity("ib", "A", CURRENT),
+    quantity("ic", "A", CURRENT),
+    quantity("theta", "rad", "electrical angle, from -π to π"),
+    quantity("we", "rad/s", "electrical speed"),
+    quantity("udc", "V", "voltage of the bridge"),
+    SPEED,
+    ANGLE,
+    quantity("torque", "N·m", "torque of the motor"),
+];
+static PMSM_STATES: [Quantity; 4] = [
+    quantity("id", "A", "current along the magnets"),
+    quantity("iq", "A", "current across them"),
+    SPEED,
+    ANGLE,
+];
+static PMSM_PARAMETERS: [Parameter; 10] = [
+    positive("R", 0.35, "Ω", "resistance of a phase"),
+    positive("Ld", 0.9e-3, "H", "inductance along the magnets"),
+    positive("Lq", 1.1e-3, "H", "inductance across them"),
+    positive("psi", 0.012, "V·s", "flux of the magnets in a phase"),
+    positive("p", 4.0, "", "pairs of poles"),
+    positive("J", 2e-5, "kg·m²", "moment of inertia, with the load's"),
+    natural("B", 1e-5, "N·m·s/rad", "viscous friction"),
+    positive("udc", 24.0, "V", "voltage of the bridge"),
+    natural("dead", 0.5e-6, "s", "dead time of the half bridges"),
+    positive(
+        "knee",
+        0.05,
+        "A",
+        "current below which a leg's capacitance, and no diode, decides its voltage in the dead time",
+    ),
+];
+
+/// Permanent-magnet synchronous machine in the rotor's axes, amplitudes invariant, behind an inverter: the mean voltages of a period.
+static PMSM: Model = Model {
+    name: "pmsm",
+    text: "synchronous motor with an inverter, averaged over each period",
+    inputs: &PMSM_INPUTS,
+    sensors: &PMSM_SENSORS,
+    states: &PMSM_STATES,
+    parameters: &PMSM_PARAMETERS,
+    derivative: pmsm,
+    sense: pmsm_sensors,
+    rate: |p, period| pmsm_rate(p, p[DEAD] / period),
+    stretches: Some(|p, input, period| {
+        vec![(period, legs(inverter::averaged(duties(input), p[DEAD] / period), input))]
+    }),
+};
+
+/// The same behind the switches of the inverter, each of which has its edges.
+static PMSM_SWITCHED: Model = Model {
+    name: "pmsm_switched",
+    text: "synchronous motor with an inverter, switch by switch",
+    rate: |p, _| pmsm_rate(p, 0.5),
+    stretches: Some(|p, input, period| {
+        let edges = inverter::switched(duties(input), p[DEAD], period);
+        edges.into_iter().map(|(duration, state)| (duration, legs(state, input))).collect()
+    }),
+    ..PMSM
+};
+
+/// Places of parameters.
+const UDC: usize = 7;
+const DEAD: usize = 8;
+
+fn duties(input: &[f64]) -> [f64; 3] {
+    std::array::from_fn(|phase| input[phase])
+}
+
+/// Inputs of [`pmsm`]: level and loss of each leg, and the load.
+fn legs(legs: [Leg; 3], input: &[f64]) -> Vec<f64> {
+    let legs = legs.into_iter().flat_map(|leg| [leg.level, leg.loss]);
+    legs.chain(input.last().copied()).collect()
+}
+
+/// Sine and cosine of the electrical angle.
+fn electrical(p: &[f64], state: State) -> (f64, f64) {
+    libm::sincos(p[4] * state[3])
+}
+
+/// Currents of the three phases.
+fn phase_currents(p: &[f64], state: State) -> [f64; 3] {
+    let (sine, cosine) = electrical(p, state);
+    let [id, iq, ..] = state;
+    let (alpha, beta) = (id * cosine - iq * sine, id * sine + iq * cosine);
+    [alpha, HALF_ROOT * beta - 0.5 * alpha, -HALF_ROOT * beta - 0.5 * alpha]
+}
+
+/// √3/2.
+const HALF_ROOT: f64 = 0.866_025_403_784_438_6;
+
+fn pmsm_torque(p: &[f64], [id, iq, ..]: State) -> f64 {
+    1.5 * p[4] * (p[3] * iq + (p[1] - p[2]) * id * iq)
+}
+
+/// Ld·did/dt = ud - R·id + we·Lq·iq, Lq·diq/dt = uq - R·iq - we·(Ld·id + psi), J·dw/dt = torque - B·w - load.
+fn pmsm(p: &[f64], input: &[f64], state: State) -> State {
+    let [r, ld, lq, psi, pairs, j, b, udc, _, knee] = *p else { return [0.0; ORDER] };
+    let (sine, cosine) = electrical(p, state);
+    let currents = phase_currents(p, state);
+    let voltage = |phase: usize| {
+        let leg = Leg { level: input[2 * phase], loss: input[2 * phase + 1] };
+        leg.voltage(currents[phase], knee) * udc
+    };
+    let [a, b_phase, c] = [voltage(0), voltage(1), voltage(2)];
+    // The star point floats: what the legs have in common drives no current.
+    let alpha = (2.0 * a - b_phase - c) / 3.0;
+    let beta = (b_phase - c) / (2.0 * HALF_ROOT);
+    let (ud, uq) = (alpha * cosine + beta * sine, beta * cosine - alpha * sine);
+    let [id, iq, speed, _] = state;
+    let we = pairs * speed;
+    let load = input[6];
+    [
+        (ud - r * id + we * lq * iq) / ld,
+        (uq - r * iq - we * (ld * id + psi)) / lq,
+        (pmsm_torque(p, state) - b * speed - load) / j,
+        speed,
+    ]
+}
+
+fn pmsm_sensors(p: &[f64], state: State) -> Vec<f64> {
+    let [ia, ib, ic] = phase_currents(p, state);
+    let turn = 2.0 * std::f64::consts::PI;
+    let angle = p[4] * state[3];
+    let wrapped = angle - turn * (angle / turn).round();
+    vec![ia, ib, ic, wrapped, p[4] * state[2], p[UDC], state[2], state[3], pmsm_torque(p, state)]
+}
+
+/// Windings, electrical speed at which the magnets alone give the bridge's voltage, shaft, and the knee of the dead time.
+fn pmsm_rate(p: &[f64], loss: f64) -> f64 {
+    let [r, ld, lq, psi, pairs, j, b, udc, _, knee] = *p else { return 0.0 };
+    let least = ld.min(lq);
+    r / least + udc / psi + b / j + 1.5 * pairs * psi / (least * j).sqrt() + loss * udc / (knee * least)
+}
+
+/// J·dw/dt = torque - B·w - load.
+static INERTIA: Model = Model {
+    name: "inertia",
+    text: "shaft with a load, driven by a torque",
+    inputs: &[actuator("torque", "N·m", "torque of the motor"), LOAD],
+    sensors: &[ANGLE, SPEED],
+    states: &[SPEED, ANGLE],
+    parameters: &[positive("J", 2e-5, "kg·m²", "moment of inertia, with the load's"), FRICTION],
+    derivative: |p, input, [speed, ..]| {
+        let (&[j, b], &[torque, load]) = (p, input) else { return [0.0; ORDER] };
+        [(torque - b * speed - load) / j, speed, 0.0, 0.0]
+    },
+    sense: |_, [speed, angle, ..]| vec![angle, speed],
+    rate: |p, _| p[1] / p[0],
+    stretches: None,
+};
+
+/// m·dv/dt = force + push - k·x - d·v.
+static MASS_SPRING: Model = Model {
+    name: "mass_spring",
+    text: "mass on a spring",
+    inputs: &[
+        actuator("force", "N", "force of the actuator"),
+        disturbance("push", "N", "another force on the mass"),
+    ],
+    sensors: &[quantity("x", "m", "position"), quantity("v", "m/s", "velocity")],
+    states: &[quantity("x", "m", "position"), quantity("v", "m/s", "velocity")],
+    parameters: &[
+        positive("m", 1.0, "kg", "mass"),
+        natural("k", 100.0, "N/m", "stiffness of the spring"),
+        natural("d", 0.5, "N·s/m", "damping"),
+    ],
+    derivative: |p, input, [x, v, ..]| {
+        let (&[m, k, d], &[force, push]) = (p, input) else { return [0.0; ORDER] };
+        [v, (force + push - k * x - d * v) / m, 0.0, 0.0]
+    },
+    sense: |_, [x, v, ..]| vec![x, v],
+    rate: |p, _| p[2] / p[0] + (p[1] / p[0]).sqrt(),
+    stretches: None,
+};
+
+/// Standard gravity, m/s².
+const GRAVITY: f64 = 9.806_65;
+
+/// A point mass at the end of a rod on a cart; the angle is 0 upright. With l the rod's length, a the cart's acceleration:
+/// l·d²angle/dt² = g·sin - a·cos - c·rate/(m·l), (M + m·sin²)·a = force + push - b·v + m·sin·(l·rate² - g·cos) + c·rate·cos/l.
+static CART_PENDULUM: Model = Model {
+    name: "cart_pendulum",
+    text: "pendulum on a cart",
+    inputs: &[
+        actuator("force", "N", "force on the cart"),
+        disturbance("push", "N", "another force on the cart"),
+    ],
+    sensors: &[
+        quantity("x", "m", "position of the cart"),
+        quantity("v", "m/s", "velocity of the cart"),
+        quantity("angle", "rad", "angle of the pendulum; 0 is upright"),
+        quantity("rate", "rad/s", "angular velocity of the pendulum"),
+    ],
+    states: &[
+        quantity("x", "m", "position of the cart"),
+        quantity("v", "m/s", "velocity of the cart"),
+        quantity("angle", "rad", "angle of the pendulum; 0 is upright"),
+        quantity("rate", "rad/s", "angular velocity of the pendulum"),
+    ],
+    parameters: &[
+        positive("M", 0.5, "kg", "mass of the cart"),
+        positive("m", 0.2, "kg", "mass of the pendulum"),
+        positive("l", 0.3, "m", "length of the rod"),
+        natural("b", 0.1, "N·s/m", "friction of the cart"),
+        natural("c", 1e-3, "N·m·s/rad", "friction of the joint"),
+    ],
+    derivative: |p, input, [_, v, angle, rate]| {
+        let (&[cart, mass, length, b, c], &[force, push]) = (p, input) else { return [0.0; ORDER] };
+        let (sine, cosine) = libm::sincos(angle);
+        let joint = c * rate / length;
+        let inner = mass * sine * (length * rate * rate - GRAVITY * cosine);
+        let acceleration = (force + push - b * v + inner + joint * cosine) / (cart + mass * sine * sine);
+        let turning = (GRAVITY * sine - acceleration * cosine - joint / mass) / length;
+        [v, acceleration, rate, turning]
+    },
+    sense: |_, state| state.to_vec(),
+    rate: |p, _| {
+        let [cart, mass, length, b, c] = *p else { return 0.0 };
+        b / cart + c / (mass * length * length) + (GRAVITY / length * (cart + mass) / cart).sqrt()
+    },
+    stretches: None,
+};
+
+/// A·dh/dt = q + inflow - a·√(2·g·h), within the tank.
+static TANK: Model = Model {
+    name: "tank",
+    text: "tank with an outlet",
+    inputs: &[
+        actuator("q", "m³/s", "flow of the pump, which gives no negative one"),
+        disturbance("inflow", "m³/s", "another flow into the tank; negative is a leak"),
+    ],
+    sensors: &[quantity("h", "m", "level")],
+    states: &[quantity("h", "m", "level")],
+    parameters: &[
+        positive("A", 0.05, "m²", "area of the tank"),
+        positive("a", 1e-4, "m²", "area of the outlet's jet"),
+        positive("height", 1.0, "m", "level at which the tank flows over"),
+    ],
+    derivative: |p, input, [h, ..]| {
+        let (&[area, outlet, height], &[q, inflow]) = (p, input) else { return [0.0; ORDER] };
+        let flow = q.max(0.0) + inflow - outlet * (2.0 * GRAVITY * h.max(0.0)).sqrt();
+        // An empty tank gives nothing, a full one keeps nothing.
+        let held = if h <= 0.0 {
+            flow.max(0.0)
+        } else if h >= height {
+            flow.min(0.0)
+        } else {
+            flow
+        };
+        [held / area, 0.0, 0.0, 0.0]
+    },
+    sense: |p, [h, ..]| vec![h.clamp(0.0, p[2])],
+    // The outlet's time constant at a hundredth of the height.
+    rate: |p, _| p[1] / p[0] * (GRAVITY / (0.02 * p[2])).sqrt(),
+    stretches: None,
+};

@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Plants that close a program's loop (`--plant`): the file, its connection to the ports, the length of a period.
+
+use crate::run::load::is_system;
+use crate::run::loaded_program::LoadedProgram;
+use crate::terminal::files;
+use crate::terminal::number;
+use crate::terminal::output::Failure;
+use anyhow::{Result, anyhow};
+use clap::Args;
+use std::path::{Path, PathBuf};
+use takt_debug::units;
+use takt_diagnostics::Span;
+use takt_programs::plants::file::{Kind, TEXT_BYTES};
+use takt_programs::plants::{ClosedLoop, Interface, Plant, PlantFile};
+
+/// Options of a plant.
+#[derive(Args, Clone, Default)]
+pub(crate) struct PlantArguments {
+    /// Close the loop with a plant: a TOML file with a model and its numbers (docs/plant.md), or an FMU, which runs in a process of its own.
+    /// Its signals belong to the ports of their names, or as the file maps them; --inputs gives the other ports.
+    #[arg(long, value_name = "TOML|FMU")]
+    pub(crate) plant: Option<PathBuf>,
+    /// Connect a signal of the plant with a port of another name, in place of the file's map; may be given several times.
+    #[arg(long, value_name = "SIGNAL=PORT", requires = "plant")]
+    connect: Vec<String>,
+    /// Length of a period for the plant: `50us` [default: the program's constant `T` in s, or `FS` in Hz, whose comment begins with the
+    /// unit].
+    #[arg(long, value_name = "TIME", requires = "plant", value_parser = number::seconds, allow_hyphen_values = true)]
+    period: Option<f64>,
+}
+
+/// A program's loop that a plant closes.
+pub(crate) type ProgramLoop = ClosedLoop<Box<dyn Plant>>;
+
+impl PlantArguments {
+    /// Path with its option, for [`files::check`].
+    pub(crate) fn file(&self) -> Option<files::OptionPath<'_>> {
+        self.plant.as_deref().map(|path| ("--plant", path))
+    }
+
+    /// Loop of a program, if there is a plant. `has_table`: a table gives the ports that the plant leaves.
+    pub(crate) fn close(
+        &self,
+        loaded: &LoadedProgram,
+        has_table: bool,
+        color: bool,
+    ) -> Result<Option<ProgramLoop>> {
+        let Some(path) = &self.plant else { return Ok(None) };
+        let file = read(path, color)?;
+        let options = self.options()?;
+        let period = self.period.or_else(|| units::sampling_period(&loaded.sources, &loaded.constants));
+        let period = period.ok_or_else(|| {
+            Failure::Usage(
+                "--plant needs the length of a period: give it with --period, as in `--period 1ms`, or in the source, as in `.const T = \
+                 1e-3 ; s`"
+                    .to_owned(),
+            )
+        })?;
+        let (plant, interface) = open(&file, path, period, color)?;
+        let program = &loaded.program;
+        let connection = file.connect(&interface, &program.inputs, &program.outputs, &options);
+        let connection = connection.map_err(|mistakes| Failure::Diagnostics(mistakes.render(color)))?;
+        connection.complete(has_table).map_err(Failure::Usage)?;
+        Ok(Some(ClosedLoop::new(plant, interface, connection, period)))
+    }
+
+    /// Signals and ports of --connect.
+    fn options(&self) -> Result<Vec<(String, String)>> {
+        let mut options: Vec<(String, String)> = Vec::new();
+        for text in &self.connect {
+            let Some((signal, port)) = text.split_once('=') else {
+                return Err(Failure::Usage(format!(
+                    "--connect {text}: expected SIGNAL=PORT, as in `w=speed`"
+                ))
+                .into());
+            };
+            let (signal, port) = (signal.trim().to_owned(), port.trim().to_owned());
+            if options.iter().any(|(known, _)| *known == signal) {
+                return Err(Failure::Usage(format!("--connect connects `{signal}` twice")).into());
+            }
+            options.push((signal, port));
+        }
+        Ok(options)
+    }
+}
+
+/// Reads a plant's file, or takes an FMU by itself.
+fn read(path: &Path, color: bool) -> Result<PlantFile> {
+    let is = |wanted: &str| path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(wanted));
+    let name = files::input_name(path);
+    if is("fmu") {
+        // The path is relative to the current folder, as the command line states it.
+        return Ok(PlantFile::of_fmu(&name));
+    }
+    if !is_system(path) {
+        return Err(Failure::Usage(format!("--plant {name}: expected a file `….toml` or `….fmu`")).into());
+    }
+    let text = String::from_utf8(files::read(path, TEXT_BYTES)?).map_err(|error| {
+        anyhow!("{name} is not text: byte {} is not UTF-8", error.utf8_error().valid_up_to())
+    })?;
+    PlantFile::read(&name, &text).map_err(|mistakes| Failure::Diagnostics(mistakes.render(color)).into())
+}
+
+/// The plant in motion, with its signals.
+fn open(file: &PlantFile, path: &Path, period: f64, color: bool) -> Result<(Box<dyn Plant>, Interface)> {
+    match &file.kind {
+        Kind::Model { .. } => {
+            let (plant, interface) = file.simulation(period)?;
+            Ok((Box::new(plant), interface))
+        }
+        Kind::Fmu { path: fmu, start, limit } => {
+            // An FMU of a file lies beside it.
+            let is_file = is_system(path);
+            let folder = path.parent().filter(|_| is_file).unwrap_or(Path::new(""));
+            open_fmu(file, &folder.join(fmu), start, period, *limit, color)
+        }
+    }
+}
+
+/// Starts an FMU in a process of its own, which is this program with the command `fmu-process`.
+#[cfg(all(unix, feature = "fmu"))]
+fn open_fmu(
+    file: &PlantFile,
+    path: &Path,
+    start: &[(String, f64, Span)],
+    period: f64,
+    limit: f64,
+    color: bool,
+) -> Result<(Box<dyn Plant>, Interface)> {
+    use anyhow::Context;
+    use takt_fmu_plant::{Fmu, FmuError, FmuPlant};
+    let program = std::env::current_exe().context("cannot find takt's own file")?;
+    let mut command = std::process::Command::new(program);
+    command.arg("fmu-process");
+    let values: Vec<(String, f64)> = start.iter().map(|(name, value, _)| (name.clone(), *value)).collect();
+    match FmuPlant::new(Fmu::open(path)?, command, &values, period, file.steps, limit) {
+        Ok(plant) => {
+            let interface = plant.interface();
+            Ok((Box::new(plant), interface))
+        }
+        Err(FmuError::Start { index, text }) => {
+            let place = start.get(index).map_or(Span::default(), |(_, _, place)| *place);
+            Err(Failure::Diagnostics(file.mistake(place, text).render(color)).into())
+        }
+        Err(error) => Err(error.into()),
+    }
+}
+
+#[cfg(not(all(unix, feature = "fmu")))]
+fn open_fmu(
+    _: &PlantFile,
+    path: &Path,
+    _: &[(String, f64, Span)],
+    _: f64,
+    _: f64,
+    _: bool,
+) -> Result<(Box<dyn Plant>, Interface)> {
+    anyhow::bail!(
+        "{}: this takt was built without FMUs; `cargo install --path tools/cli --all-features` builds it with them, for Linux and macOS",
+        path.display()
+    )
+}
