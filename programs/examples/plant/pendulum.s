@@ -27,3 +27,4 @@
 period: force = max(min(KX*(x - x_ref) + KV*v + KA*angle + KR*rate + s, FMAX), -FMAX)
         s = s + (x - x_ref)*(KI*T)
         wait    period
+; SPDX-License-Identifier: MIT OR Apache-2.0
