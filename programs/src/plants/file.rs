@@ -502,16 +502,12 @@ impl Reader {
         };
         let mut steps: Vec<(f64, f64)> = Vec::new();
         for step in list.iter() {
-            let pair = step.get_ref().as_array();
-            let Some([time, value]) = pair
-                .map(|pair| [pair.get(0), pair.get(1)])
-                .filter(|_| pair.is_some_and(|pair| pair.len() == 2))
-            else {
+            let pair = step.get_ref().as_array().filter(|pair| pair.len() == 2);
+            let Some((Some(time), Some(value))) = pair.map(|pair| (pair.first(), pair.get(1))) else {
                 let text = "expected a list of [time in s, value], as in [[0, 1], [0.1, 2]]";
                 let _ = self.mistake(span(step.span()), text);
                 return None;
             };
-            let (time, value) = (time?, value?);
             let at = self.number(time, Some("s"))?;
             if at < 0.0 || steps.last().is_some_and(|(last, _)| at <= *last) {
                 let text = format!("the times must begin with 0 or more and increase; {at} s does not");

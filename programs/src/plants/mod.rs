@@ -75,6 +75,8 @@ pub struct Input {
 
 /// A stretch of time in seconds with the inputs of [`Model::derivative`] in it.
 type Stretch = (f64, Vec<f64>);
+/// Stretches that make up a period, from parameters, inputs and the period in seconds.
+type Stretches = fn(&[f64], &[f64], f64) -> Vec<Stretch>;
 
 /// A small plant.
 #[derive(Debug)]
@@ -97,8 +99,8 @@ pub struct Model {
     sense: fn(&[f64], State) -> Vec<f64>,
     /// Bound of the fastest motion in 1/s, from parameters and the period in seconds.
     rate: fn(&[f64], f64) -> f64,
-    /// Stretches that make up a period, from parameters, inputs and the period in seconds; `None`: one, with the inputs as they are.
-    stretches: Option<fn(&[f64], &[f64], f64) -> Vec<Stretch>>,
+    /// Stretches that make up a period; `None`: one, with the inputs as they are.
+    stretches: Option<Stretches>,
 }
 
 impl Model {
