@@ -91,7 +91,11 @@ impl Curves {
             let (low, high) = all.fold((f64::MAX, f64::MIN), |(low, high), (a, b)| (low.min(a), high.max(b)));
             let (low, high) = if low > high { (0.0, 1.0) } else { (low, high) };
             // A constant has an axis, too.
-            let margin = if high > low { 0.06 * (high - low) } else { 0.5 * low.abs().max(1e-9) };
+            let margin = match () {
+                () if high > low => 0.06 * (high - low),
+                () if low == 0.0 => 1.0,
+                () => 0.5 * low.abs(),
+            };
             let mut chart = chart(area).build_cartesian_2d(0.0..end, low - margin..high + margin)?;
             let name = self.titles.get(column).map_or("", String::as_str);
             mesh(&mut chart, if column + 1 == count as usize { label } else { "" }, name)?;
