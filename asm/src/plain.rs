@@ -10,7 +10,7 @@ use std::collections::HashMap;
 use std::sync::Arc;
 use takt_diagnostics::diag::Diagnostics;
 use takt_diagnostics::source::Sources;
-use takt_isa::program::{ArrayRange, Location, Space};
+use takt_isa::program::{ArrayRange, ArrayResult, Location, Space};
 use takt_isa::{Machine, Op, Register, Type};
 
 /// A program in source order, before any transformation.
@@ -38,6 +38,10 @@ pub struct PlainProgram {
     pub ranges: Vec<(u32, [u32; 2])>,
     /// `.range`s of arrays in data memory, by ascending word.
     pub array_ranges: Vec<ArrayRange>,
+    /// Arrays whose words are results when a period ends, by ascending word.
+    pub results: Vec<ArrayResult>,
+    /// Assumptions about values that operations write: types and ends.
+    pub assumptions: Vec<(Type, [u32; 2])>,
     /// `.deadline`s: the output, the last cycle in which it may be written, and whether the demand is on `.period`.
     pub deadlines: Vec<(u32, u32, bool)>,
     /// Source files that locations name.
@@ -165,6 +169,8 @@ fn of(ir: &Ir, contract: Contract) -> PlainProgram {
         labels: ir.labels.iter().filter(|label| !label.name.is_empty()).map(label).collect(),
         ranges: ir.ranges.iter().map(|(id, ends)| (id.index() as u32, *ends)).collect(),
         array_ranges: ir.array_ranges.clone(),
+        results: ir.results.clone(),
+        assumptions: ir.assumptions.iter().map(|assumed| (assumed.ty, assumed.ends)).collect(),
         deadlines: ir.demands.iter().flat_map(deadlines).collect(),
         files: ir.files.clone(),
     }

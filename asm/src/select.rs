@@ -167,7 +167,8 @@ impl SelectInstruction {
             ir.registers.push(VirtualRegister { ty, ..VirtualRegister::unnamed(branch.span) });
             let own = RegisterId::new(ir.registers.len() - 1);
             now.insert(dest, own);
-            new.push(bundle(Operation { dest: Some(own), ..operation }));
+            // It now executes whatever the condition, and the assumption was for one side of it.
+            new.push(bundle(Operation { dest: Some(own), assumed: None, ..operation }));
         }
         for dest in written {
             let (value, mut sources) = (now[&dest], [RegisterId::ZERO; 3]);

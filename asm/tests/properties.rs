@@ -287,6 +287,8 @@ prop_compose! {
         Program {
             ranges,
             array_ranges: Vec::new(),
+            results: Vec::new(),
+            assumptions: Vec::new(),
             machine,
             code,
             data,

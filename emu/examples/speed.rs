@@ -132,6 +132,8 @@ fn period() -> Program {
         symbols: Vec::new(),
         ranges: Vec::new(),
         array_ranges: Vec::new(),
+        results: Vec::new(),
+        assumptions: Vec::new(),
         loop_bounds: Vec::new(),
         parts: Vec::new(),
         parameters: Vec::new(),

@@ -307,6 +307,8 @@ impl Generator {
             loop_bounds: self.loop_bounds,
             ranges: Vec::new(),
             array_ranges: Vec::new(),
+            results: Vec::new(),
+            assumptions: Vec::new(),
             parts: Vec::new(),
             parameters: Vec::new(),
             latched: false,

@@ -41,6 +41,10 @@ pub struct Program {
     pub ranges: Vec<Range>,
     /// The ranges in which the words of arrays in data memory lie when a period begins, by ascending word; they do not overlap.
     pub array_ranges: Vec<ArrayRange>,
+    /// Arrays in data memory whose words are results when a period ends, by ascending word; they do not overlap.
+    pub results: Vec<ArrayResult>,
+    /// Assumptions about the values that operations write, by ascending word.
+    pub assumptions: Vec<Assumption>,
     /// Source files, as the source names them.
     pub files: Vec<String>,
     /// The source location of each operation, parallel to `code`; `None` for filler.
@@ -154,11 +158,7 @@ impl Range {
 
     /// The value with these bits lies in the range. A NaN lies in none.
     pub fn holds(&self, bits: u32) -> bool {
-        let (low, high) = self.ends();
-        match self.ty {
-            Type::F => (low..=high).contains(&f64::from(f32::from_bits(bits))),
-            Type::I | Type::B => (low..=high).contains(&f64::from(bits.cast_signed())),
-        }
+        holds(self.ty, [self.low, self.high], bits)
     }
 
     /// The reason why the range is invalid; `None` if it is valid.
@@ -188,6 +188,11 @@ impl ArrayRange {
         ends(self.ty, [self.low, self.high])
     }
 
+    /// The value with these bits lies in the range. A NaN lies in none.
+    pub fn holds(&self, bits: u32) -> bool {
+        holds(self.ty, [self.low, self.high], bits)
+    }
+
     /// The reason why the range is invalid; `None` if it is valid.
     pub fn mistake(&self) -> Option<&'static str> {
         mistake(self.ty, [self.low, self.high])
@@ -196,6 +201,79 @@ impl ArrayRange {
     /// Words of the array.
     pub fn span(&self) -> std::ops::Range<u32> {
         self.first..self.first.saturating_add(self.words)
+    }
+}
+
+/// The range of the value that an operation writes whenever it executes, promised by the source. Static bounds of errors rely on it, and a
+/// run with `--deny range` checks it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Assumption {
+    /// Word of the operation, an index into [`Program::code`]; it writes a register.
+    pub word: u32,
+    /// The type of the ends: binary32, or a signed integer.
+    pub ty: Type,
+    /// The least value's bits.
+    pub low: u32,
+    /// The largest value's bits.
+    pub high: u32,
+}
+
+impl Assumption {
+    /// The least and the largest value as numbers.
+    pub fn ends(&self) -> (f64, f64) {
+        ends(self.ty, [self.low, self.high])
+    }
+
+    /// The value with these bits is as assumed. A NaN is not.
+    pub fn holds(&self, bits: u32) -> bool {
+        holds(self.ty, [self.low, self.high], bits)
+    }
+
+    /// The reason why the assumption is invalid; `None` if it is valid.
+    pub fn mistake(&self) -> Option<&'static str> {
+        mistake(self.ty, [self.low, self.high])
+    }
+
+    /// The assumption as comparisons: an operator of the source, and the bound.
+    pub fn bounds(&self) -> Vec<(&'static str, String)> {
+        let (low, high) = self.ends();
+        let open = match self.ty {
+            Type::F => (f64::from(f32::MIN), f64::from(f32::MAX)),
+            Type::I | Type::B => (f64::from(i32::MIN), f64::from(i32::MAX)),
+        };
+        let end = |bits: u32| match self.ty {
+            Type::F => format!("{:?}", f32::from_bits(bits)),
+            Type::I | Type::B => bits.cast_signed().to_string(),
+        };
+        let least = (low > open.0 || high >= open.1).then(|| (">=", end(self.low)));
+        let largest = (high < open.1).then(|| ("<=", end(self.high)));
+        least.into_iter().chain(largest).collect()
+    }
+}
+
+/// An array in data memory whose words are results when a period ends, as an output port's value is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ArrayResult {
+    /// First word of the array, which has a label.
+    pub first: u32,
+    /// Number of words, at least 1: up to the next label or the end of the data.
+    pub words: u32,
+    /// Type of the words: binary32, or a signed integer.
+    pub ty: Type,
+}
+
+impl ArrayResult {
+    /// Words of the array.
+    pub fn span(&self) -> std::ops::Range<u32> {
+        self.first..self.first.saturating_add(self.words)
+    }
+}
+
+fn holds(ty: Type, range: [u32; 2], bits: u32) -> bool {
+    let (low, high) = ends(ty, range);
+    match ty {
+        Type::F => (low..=high).contains(&f64::from(f32::from_bits(bits))),
+        Type::I | Type::B => (low..=high).contains(&f64::from(bits.cast_signed())),
     }
 }
 
@@ -275,6 +353,12 @@ impl Program {
     /// Range that the source states for a register.
     pub fn range(&self, register: Register) -> Option<&Range> {
         self.ranges.iter().find(|range| range.register == register)
+    }
+
+    /// Assumption that the source states about the value that an operation writes.
+    pub fn assumption(&self, word: u32) -> Option<&Assumption> {
+        let found = self.assumptions.binary_search_by_key(&word, |assumption| assumption.word).ok()?;
+        self.assumptions.get(found)
     }
 
     /// Bits that the loader writes to a register.
@@ -507,11 +591,15 @@ impl Program {
 
     /// A word of data memory, with the last label before it and the distance from there: ``data word 12 (`A+5`)``.
     pub fn data_text(&self, word: u32) -> String {
-        match self.nearest(Space::Data, word) {
-            Some((label, 0)) => format!("data word {word} (`{label}`)"),
-            Some((label, distance)) => format!("data word {word} (`{label}+{distance}`)"),
-            None => format!("data word {word}"),
-        }
+        let element = self.element_text(word);
+        element
+            .map_or_else(|| format!("data word {word}"), |element| format!("data word {word} (`{element}`)"))
+    }
+
+    /// A word of data memory by its array, as an address in the source: `A+5`. `None` before the first label.
+    pub fn element_text(&self, word: u32) -> Option<String> {
+        let (label, distance) = self.nearest(Space::Data, word)?;
+        Some(if distance == 0 { label.to_owned() } else { format!("{label}+{distance}") })
     }
 
     /// Label at a word of data memory.

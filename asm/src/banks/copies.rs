@@ -49,6 +49,7 @@ pub(crate) fn insert(ir: &mut Ir, assignment: &mut BankAssignment, copies: &[Ban
                 sources: [copy.from, RegisterId::ZERO, RegisterId::ZERO],
                 constant: Constant::None,
                 access: None,
+                assumed: None,
                 made: true,
                 ..from
             };

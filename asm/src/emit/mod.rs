@@ -13,7 +13,7 @@ use foldhash::{HashSet, HashSetExt as _};
 use std::collections::BTreeMap;
 use takt_diagnostics::diag::{Diagnostic, Sink};
 use takt_diagnostics::source::Span;
-use takt_isa::program::{LoopBound, Port, Range, Section, Symbol};
+use takt_isa::program::{Assumption, LoopBound, Port, Range, Section, Symbol};
 use takt_isa::{BundleAddress, Instruction, Program, Register, SlotIndex, Type};
 
 /// A program, with the words that a macro, a repetition or the assembler itself made (indices into its code, ascending).
@@ -33,7 +33,7 @@ pub(crate) fn emit(ir: &mut Ir, allocation: &Allocation, sink: &mut Sink) -> Emi
     let mut code = vec![filler; ir.bundles.len() * slots];
     let mut lines = vec![None; ir.bundles.len() * slots];
     let (mut expanded, mut parts) = (Vec::new(), Vec::new());
-    let mut columns = Vec::new();
+    let (mut columns, mut assumptions) = (Vec::new(), Vec::new());
     let mut origins = vec![None; ir.bundles.len() * slots];
     for (address, bundle) in ir.bundles.iter().enumerate() {
         let words = address * slots..(address + 1) * slots;
@@ -47,6 +47,12 @@ pub(crate) fn emit(ir: &mut Ir, allocation: &Allocation, sink: &mut Sink) -> Emi
             let (location, part) = (ir.location(operation), ir.columns(operation));
             lines[index] = location;
             origins[index] = location.map(|_| Position::new(operation.order, operation.expansion));
+            assumptions.extend(ir.assumed(operation).map(|assumed| Assumption {
+                word: index as u32,
+                ty: assumed.ty,
+                low: assumed.ends[0],
+                high: assumed.ends[1],
+            }));
             columns.extend(part.map(|part| (index as u32, part)));
             if operation.is_computed() && part.is_none() {
                 parts.push((index as u32, operation.span));
@@ -59,6 +65,7 @@ pub(crate) fn emit(ir: &mut Ir, allocation: &Allocation, sink: &mut Sink) -> Emi
     limits(ir, sink);
     expanded.sort_unstable();
     parts.sort_unstable_by_key(|(word, _)| *word);
+    assumptions.sort_unstable_by_key(|assumption: &Assumption| assumption.word);
     let mut program = Program {
         machine: ir.machine,
         code,
@@ -74,6 +81,8 @@ pub(crate) fn emit(ir: &mut Ir, allocation: &Allocation, sink: &mut Sink) -> Emi
         loop_bounds: loop_bounds(ir),
         ranges: ranges(ir, allocation),
         array_ranges: ir.array_ranges.clone(),
+        results: ir.results.clone(),
+        assumptions,
         files: ir.files.clone(),
         lines,
         // Columns of equations are added where the sources are at hand.

@@ -51,6 +51,16 @@ pub(crate) struct Item {
     pub(crate) fast: Fast,
 }
 
+/// A `.assume`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Assumption {
+    pub(crate) at: AstPlace,
+    pub(crate) directive: u32,
+    pub(crate) section: Section,
+    /// Number of items of the section before it.
+    pub(crate) item: u32,
+}
+
 /// Part of a statement.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Part {
@@ -141,7 +151,9 @@ pub(crate) struct ExpandedSource {
     pub(crate) parameters: Vec<Parameters>,
     pub(crate) loop_bounds: Vec<LoopBound>,
     pub(crate) timing: Vec<Timing>,
-    /// Each `.range`: its scope, and the directive.
+    /// Assumptions, in the order of the expansion.
+    pub(crate) assumptions: Vec<Assumption>,
+    /// Each `.range` and `.result`: its scope, and the directive.
     pub(crate) ranges: Vec<(AstPlace, u32)>,
     /// The `.ports` directive: whether it says `latched`, and its place.
     pub(crate) ports: Option<(bool, Span)>,
@@ -249,6 +261,7 @@ impl<'l> Expander<'l> {
             loop_bounds: Vec::new(),
             timing: Vec::new(),
             ranges: Vec::new(),
+            assumptions: Vec::new(),
             ports: None,
             locs: vec![Vec::new()],
             files: Vec::new(),
@@ -417,6 +430,19 @@ impl<'l> Expander<'l> {
             Section::Period => self.flat.period.len(),
             Section::Data => 0,
         }
+    }
+
+    /// An assumption about a value of the operations before it.
+    fn assume(&mut self, at: AstPlace, directive: u32, span: Span) -> Result<(), ErrorReported> {
+        let section = self.section;
+        if section == Section::Data {
+            let error = Diagnostic::error("section", span, "an assumption in `.data`");
+            let error = error.help("write it behind the operation that computes the value");
+            return Err(self.context.report(at.scope, error));
+        }
+        let item = self.bundles(section) as u32;
+        self.flat.assumptions.push(Assumption { at, directive, section, item });
+        Ok(())
     }
 
     fn loop_bound(
@@ -619,12 +645,13 @@ impl<'l> Expander<'l> {
             DirectiveKind::Ports(word) => self.ports(at, *word)?,
             DirectiveKind::LoopBound(most, total) => self.loop_bound(at, *most, total.as_ref(), span)?,
             // Registers may be declared further down.
-            DirectiveKind::Range { .. } => {
+            DirectiveKind::Range { .. } | DirectiveKind::Result(_) => {
                 let is_same = |(before, other): &(AstPlace, u32)| (before.ast, *other) == (at.ast, directive);
                 if !(self.context.again && self.flat.ranges.iter().any(is_same)) {
                     self.flat.ranges.push((at, directive));
                 }
             }
+            DirectiveKind::Assume { .. } => self.assume(at, directive, span)?,
             DirectiveKind::Deadline(..) | DirectiveKind::Order(_) | DirectiveKind::Late(..) => {
                 self.demand(at, directive, span)?;
             }

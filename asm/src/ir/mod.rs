@@ -27,7 +27,7 @@ use smallvec::SmallVec;
 use std::collections::BTreeMap;
 use std::num::NonZeroU32;
 use takt_diagnostics::source::Span;
-use takt_isa::program::{ArrayRange, Columns, Location, Space};
+use takt_isa::program::{ArrayRange, ArrayResult, Columns, Location, Space};
 use takt_isa::{Effect, Machine, Op, Operand, ROWS, Register, Row, SlotIndex, Slots, Type};
 
 /// A register of [`Ir::registers`].
@@ -144,6 +144,31 @@ impl Attribution {
     }
 }
 
+/// An assumption of [`Ir::assumptions`].
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct AssumptionId(NonZeroU32);
+
+impl AssumptionId {
+    /// The assumption with an index; `None` beyond 2³² of them.
+    pub(crate) fn new(index: usize) -> Option<AssumptionId> {
+        NonZeroU32::new(u32::try_from(index).ok()?.checked_add(1)?).map(AssumptionId)
+    }
+
+    /// Index of the assumption in [`Ir::assumptions`].
+    pub(crate) const fn index(self) -> usize {
+        self.0.get() as usize - 1
+    }
+}
+
+/// Range of a value that an operation writes, as `.assume` states it.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Assumed {
+    /// Type of the ends: binary32, or a signed integer.
+    pub ty: Type,
+    /// Least and largest value.
+    pub ends: [u32; 2],
+}
+
 /// An operation on virtual registers.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Operation {
@@ -164,6 +189,8 @@ pub struct Operation {
     pub access: Option<AccessId>,
     /// Source line that the operation is attributed to.
     pub(crate) attribution: Attribution,
+    /// Assumption about the value that the operation writes: [`Ir::assumptions`].
+    pub(crate) assumed: Option<AssumptionId>,
     /// Place in the source.
     pub span: Span,
     /// The use of a macro, or iteration of a repetition, that made the operation; 0 if the source contains it directly.
@@ -201,6 +228,7 @@ impl Operation {
             constant: Constant::None,
             access: None,
             attribution,
+            assumed: None,
             span,
             expansion,
             made: false,
@@ -255,6 +283,7 @@ impl Operation {
             constant: Constant::None,
             access: None,
             attribution: Attribution::NONE,
+            assumed: None,
             expansion: 0,
             ..*self
         }
@@ -406,6 +435,10 @@ pub struct Ir {
     pub ranges: Vec<(RegisterId, [u32; 2])>,
     /// Ranges of arrays in data memory when a period begins, by ascending word.
     pub array_ranges: Vec<ArrayRange>,
+    /// Arrays in data memory whose words are results when a period ends, by ascending word.
+    pub results: Vec<ArrayResult>,
+    /// Assumptions about values that operations write: [`Operation::assumed`].
+    pub assumptions: Vec<Assumed>,
     /// Timing demands on ports, in source order.
     pub demands: Vec<Demand>,
     /// Inputs are latched together at the tick, and outputs published together at `wait`.
@@ -434,6 +467,11 @@ impl Ir {
     #[inline]
     pub fn register(&self, id: RegisterId) -> &VirtualRegister {
         &self.registers[id.index()]
+    }
+
+    /// Assumption about the value that an operation writes.
+    pub(crate) fn assumed(&self, operation: &Operation) -> Option<&Assumed> {
+        self.assumptions.get(operation.assumed?.index())
     }
 
     /// Attribution to a line, or to a part of it.

@@ -149,6 +149,10 @@ impl<'p> Writer<'p> {
             };
             self.line(format_args!(".range  {label} = {ends}"));
         }
+        for result in &self.program.results {
+            let Some(label) = self.program.data_label(result.first) else { continue };
+            self.line(format_args!(".result {label}"));
+        }
         // The order of the first `.loc` lines is the order of the files in the program.
         for file in files {
             self.line(format_args!(".loc {} 1", quoted(file)));
@@ -185,9 +189,29 @@ impl<'p> Writer<'p> {
                 loc = Some(wanted);
             }
             self.line(format_args!("        {text}"));
+            self.assumptions(address);
         }
         for label in labels {
             self.line(format_args!("{}:", label.name));
+        }
+    }
+
+    /// The assumptions about what a bundle writes.
+    fn assumptions(&mut self, address: BundleAddress) {
+        let program = self.program;
+        let Some(Ok(instructions)) = program.bundle(address) else { return };
+        let slots = program.machine.slots;
+        for ((slot, instruction), word) in
+            slots.iter().zip(&instructions).zip(address.index() * slots.len()..)
+        {
+            let Some(assumption) = program.assumption(word as u32) else { continue };
+            let Some(register) = instruction.writes(slot) else { continue };
+            // A name with the assumption's type, or the place, which is a float.
+            let named = self.registers.get(&register).map(|name| (*name).to_owned());
+            let name = named.unwrap_or_else(|| self.place(register));
+            for (bound, ends) in assumption.bounds() {
+                self.line(format_args!("        .assume {name} {bound} {ends}"));
+            }
         }
     }
 

@@ -151,6 +151,8 @@ fn empty(machine: &'static Machine, flat: &ExpandedSource) -> Ir {
         accesses: Vec::new(),
         ranges: Vec::new(),
         array_ranges: Vec::new(),
+        results: Vec::new(),
+        assumptions: Vec::new(),
         demands: Vec::new(),
         latched: flat.ports.is_some_and(|(latched, _)| latched),
         numbers: BTreeMap::new(),
@@ -262,8 +264,15 @@ impl Resolver<'_> {
         let mut bounds = self.flat.loop_bounds.clone();
         bounds.retain(|bound| bound.section == section);
         let mut bounds = bounds.into_iter().peekable();
+        let mut assumptions = self.flat.assumptions.clone();
+        assumptions.retain(|assumption| assumption.section == section);
+        let mut assumptions = assumptions.into_iter().peekable();
         let mut next = self.place_labels(section, 0);
         for (index, item) in items.iter().enumerate() {
+            while let Some(assumption) = assumptions.next_if(|assumption| assumption.item <= index as u32) {
+                // Errors have been reported.
+                let _ = self.assume(&assumption);
+            }
             if index as u32 >= next {
                 next = self.place_labels(section, index as u32);
             }
@@ -275,6 +284,9 @@ impl Resolver<'_> {
             }
             self.item(item);
             self.ir.contracted.resize(self.ir.bundles.len(), item.contracted);
+        }
+        for assumption in assumptions {
+            let _ = self.assume(&assumption);
         }
         self.place_labels(section, u32::MAX);
     }

@@ -2,14 +2,14 @@
 //! Ranges that the source promises (`.range`), and parameters with their values and ranges (`.param`).
 
 use crate::context::{AstPlace, Binding, ErrorReported};
-use crate::expand::Parameters;
-use crate::ir::RegisterId;
+use crate::expand::{Assumption, Parameters};
+use crate::ir::{Assumed, AssumptionId, RegisterId};
 use crate::resolve::Resolver;
 use foldhash::HashMap;
 use std::rc::Rc;
 use takt_diagnostics::diag::Diagnostic;
 use takt_diagnostics::source::Span;
-use takt_isa::program::{ArrayRange, Range, Space};
+use takt_isa::program::{ArrayRange, ArrayResult, Range, Space};
 use takt_isa::{Register, Type};
 use takt_syntax::ast::*;
 use takt_syntax::expr::Value;
@@ -95,6 +95,61 @@ impl Resolver<'_> {
         self.context.error(at.scope, "range", span, format!("this range is invalid: {mistake}"))
     }
 
+    /// A `.assume`: the operation before it that writes the register last gets the assumption. Operations in front of a label, a jump or a
+    /// branch do not count: they execute on other paths, too.
+    pub(super) fn assume(&mut self, assumption: &Assumption) -> Result<(), ErrorReported> {
+        let Assumption { at, directive, .. } = *assumption;
+        let ast = Rc::clone(&self.context.asts[at.ast as usize]);
+        let DirectiveKind::Assume { register, least, bound } = &ast.directives[directive as usize].kind
+        else {
+            return Err(ErrorReported);
+        };
+        let (id, ty) = self.preset_register(at, *register, false)?;
+        // A place has no type: its bound is a float.
+        let ty = if ty == Type::I { Type::I } else { Type::F };
+        let value = self.context.value(at, bound.id)?;
+        let end = self.bits(at, value, ty, (*bound).into())?;
+        let open = match ty {
+            Type::F => [f32::MIN.to_bits(), f32::MAX.to_bits()],
+            Type::I | Type::B => [i32::MIN.cast_unsigned(), i32::MAX.cast_unsigned()],
+        };
+        let ends = if *least { [end, open[1]] } else { [open[0], end] };
+        let labels = self.context.declared.labels[..self.label].iter().chain(&self.made_labels);
+        let code = labels.filter(|label| label.space == Space::Code).map(|label| label.position);
+        let start = code.filter(|position| *position as usize <= self.ir.bundles.len()).max().unwrap_or(0);
+        let start = if self.ir.period > 0 { start.max(self.ir.period) } else { start };
+        let mut found = None;
+        for index in (start as usize..self.ir.bundles.len()).rev() {
+            let operations = &self.ir.bundles[index].operations;
+            found = operations.iter().position(|operation| operation.dest == Some(id)).map(|at| (index, at));
+            if found.is_some() || operations.iter().any(|operation| operation.redirects()) {
+                break;
+            }
+        }
+        let Some((bundle, number)) = found else {
+            let name = self.context.reports.sources.text(register.span).to_owned();
+            let message = format!("no operation since the last label or jump writes `{name}`");
+            let error = Diagnostic::error("assume", register.span, message)
+                .help("write `.assume` behind the operation that computes the value");
+            return Err(self.context.report(at.scope, error));
+        };
+        let operation = &mut self.ir.bundles[bundle].operations[number];
+        let known = operation.assumed.and_then(|id| self.ir.assumptions.get(id.index()));
+        let ends = known.map_or(ends, |known| tightest(ty, known.ends, ends));
+        let range = Range { register: Register::ZERO, ty, low: ends[0], high: ends[1] };
+        if let Some(mistake) = range.mistake() {
+            return Err(self.context.error(
+                at.scope,
+                "range",
+                bound.span,
+                format!("this assumption is invalid: {mistake}"),
+            ));
+        }
+        self.ir.assumptions.push(Assumed { ty, ends });
+        operation.assumed = AssumptionId::new(self.ir.assumptions.len() - 1);
+        Ok(())
+    }
+
     pub(super) fn ranges(&mut self) {
         let declared = |(register, _): &(RegisterId, [u32; 2])| {
             (*register, self.context.declared.registers[register.index()].span)
@@ -102,10 +157,15 @@ impl Resolver<'_> {
         let mut seen: HashMap<RegisterId, Span> = self.ir.ranges.iter().map(declared).collect();
         for (at, directive) in std::mem::take(&mut self.flat.ranges) {
             let ast = Rc::clone(&self.context.asts[at.ast as usize]);
-            let DirectiveKind::Range { registers, placed, low, high } =
-                &ast.directives[directive as usize].kind
-            else {
-                continue;
+            let (registers, placed, low, high) = match &ast.directives[directive as usize].kind {
+                DirectiveKind::Range { registers, placed, low, high } => (registers, placed, low, high),
+                DirectiveKind::Result(arrays) => {
+                    for name in arrays {
+                        self.result(at, *name);
+                    }
+                    continue;
+                }
+                _ => continue,
             };
             for name in registers {
                 if !*placed && let Some(array) = self.ranged_array(at, *name, [low, high]) {
@@ -142,20 +202,70 @@ impl Resolver<'_> {
         [low, high]: [&Expr; 2],
     ) -> Option<(std::ops::Range<u32>, Type)> {
         let OperandKind::Name(name) = operand.kind else { return None };
-        let id = self.context.spelled(at, name, operand.span).ok()?;
-        match self.context.lookup(at.scope, id) {
+        let (words, ty) = self.words_of(at, Name { name, span: operand.span }).ok()??;
+        let mut is_integer = |end: &Expr| matches!(self.context.value(at, end.id), Ok(Value::Int(_)));
+        let mut by_ends = || if is_integer(low) && is_integer(high) { Type::I } else { Type::F };
+        Some((words, ty.unwrap_or_else(&mut by_ends)))
+    }
+
+    /// Words of an array or a label of data memory, with an array's type; `None` if the name means anything else.
+    fn words_of(
+        &mut self,
+        at: AstPlace,
+        Name { name, span }: Name,
+    ) -> Result<Option<(std::ops::Range<u32>, Option<Type>)>, ErrorReported> {
+        let id = self.context.spelled(at, name, span)?;
+        Ok(match self.context.lookup(at.scope, id) {
             Binding::Table(number) => {
                 let array = &self.context.declared.tables[number as usize].array;
-                Some((array.base..array.base + array.words, array.ty))
+                Some((array.base..array.base + array.words, Some(array.ty)))
             }
             Binding::Data(label) => {
                 let first = self.context.declared.labels[label.0 as usize].position;
-                let mut is_integer = |end: &Expr| matches!(self.context.value(at, end.id), Ok(Value::Int(_)));
-                let ty = if is_integer(low) && is_integer(high) { Type::I } else { Type::F };
-                Some((first..self.words_end(first), ty))
+                Some((first..self.words_end(first), None))
             }
             _ => None,
+        })
+    }
+
+    /// An array of a `.result`. The words of a label are binary32.
+    fn result(&mut self, at: AstPlace, name: Name) {
+        let Ok(words) = self.words_of(at, name) else { return };
+        let Some((words, ty)) = words else {
+            let text = self.context.reports.sources.text(name.span).to_owned();
+            let message = format!("`{text}` is no array in data memory");
+            let error = Diagnostic::error("array", name.span, message).help(
+                "`.result` names arrays of `.array` or labels of data; an output port is a result by itself",
+            );
+            self.context.report(at.scope, error);
+            return;
+        };
+        if !self.is_whole(at, name.span, &words) {
+            return;
         }
+        let count = words.end - words.start;
+        let result = ArrayResult { first: words.start, words: count, ty: ty.unwrap_or(Type::F) };
+        let known = self.ir.results.partition_point(|known| known.first < result.first);
+        if self.ir.results.get(known).is_some_and(|known| known.first == result.first) {
+            self.context.error(at.scope, "declared-twice", name.span, "this array is a result already");
+        } else {
+            self.ir.results.insert(known, result);
+        }
+    }
+
+    /// The words are those of a label, which an image can name; otherwise reports an error.
+    fn is_whole(&mut self, at: AstPlace, span: Span, words: &std::ops::Range<u32>) -> bool {
+        if words.is_empty() {
+            let message = "no words of data follow this label: expected an array or a label before words";
+            self.context.error(at.scope, "range", span, message);
+        } else if self.words_end(words.start) != words.end {
+            let message = "words without a label follow this array, so that it has no end in an image";
+            let error = Diagnostic::error("range", span, message).help("put a label before these words");
+            self.context.report(at.scope, error);
+        } else {
+            return true;
+        }
+        false
     }
 
     /// End of the words that follow a label of data memory: the next label, or the end of the data.
@@ -181,15 +291,7 @@ impl Resolver<'_> {
             self.invalid(at, [low, high], mistake);
         } else if has_range {
             self.context.error(at.scope, "declared-twice", operand.span, "this array has a range already");
-        } else if count == 0 {
-            let message = "no words of data follow this label: expected an array or a label before words";
-            self.context.error(at.scope, "range", operand.span, message);
-        } else if self.words_end(range.first) != words.end {
-            let message = "words without a label follow this array, so that its range has no end in an image";
-            let error =
-                Diagnostic::error("range", operand.span, message).help("put a label before these words");
-            self.context.report(at.scope, error);
-        } else {
+        } else if self.is_whole(at, operand.span, &words) {
             self.ir.array_ranges.insert(known, range);
         }
     }
@@ -205,4 +307,13 @@ impl Resolver<'_> {
         // A place has no type: its range is one of floats.
         Ok((members, if placed { Type::F } else { ty }))
     }
+}
+
+/// Ends of the values in both of two ranges.
+fn tightest(ty: Type, [low, high]: [u32; 2], [least, largest]: [u32; 2]) -> [u32; 2] {
+    let is_above = |a: u32, b: u32| match ty {
+        Type::F => f32::from_bits(a) > f32::from_bits(b),
+        Type::I | Type::B => a.cast_signed() > b.cast_signed(),
+    };
+    [if is_above(least, low) { least } else { low }, if is_above(high, largest) { largest } else { high }]
 }

@@ -403,6 +403,17 @@ pub enum DirectiveKind {
         /// Largest value of each register.
         high: Expr,
     },
+    /// `.result` and the arrays.
+    Result(Vec<Name>),
+    /// `.assume`, the register, and the bound of the value that the operation before it writes there.
+    Assume {
+        /// Register by its name, or an element of an array of registers.
+        register: Operand,
+        /// The bound is the least value; otherwise the largest.
+        least: bool,
+        /// Bound of the value.
+        bound: Expr,
+    },
     /// `.deadline`, the ports, and the cycle.
     Deadline(Vec<Name>, Expr),
     /// `.order` and the ports.
@@ -486,6 +497,8 @@ directives! {
     Ports ".ports" "latched|direct" "Latches ports: inputs are taken together at the tick, outputs published together at `wait`.";
     LoopBound ".loop_bound" "n total m" "The bundle that follows heads a loop of at most n iterations, in one section at most m.";
     Range ".range" "a, b = least, largest" "Between which values inputs or states lie when a period begins: `takt accuracy` rests on it.";
+    Result ".result" "A, B" "Arrays in data memory whose words are results when a period ends, as output ports are: `takt accuracy` bounds their worst element.";
+    Assume ".assume" "a >= least|a <= largest" "What the author knows of the value that the operation before writes into a register: `takt accuracy` relies on it, `takt run --deny range` checks it.";
     Deadline ".deadline" "port, port = cycle" "Each output is written for the last time in that cycle or before.";
     Order ".order" "port, port, …" "Every use of one port comes before the first of the next.";
     Late ".late" "port, port = cycles" "The inputs are read as late as the length of the schedule allows.";

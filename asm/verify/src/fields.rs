@@ -9,7 +9,7 @@ use crate::code::{inputs_of, named, refuse};
 use crate::labels::{self, Labels};
 use foldhash::{HashMap, HashMapExt as _, HashSet, HashSetExt as _};
 use takt_asm::plain::{PlainKind, PlainProgram, PlainRegister};
-use takt_isa::program::{ArrayRange, LoopBound, Port, Range, Section, Space};
+use takt_isa::program::{ArrayRange, Assumption, LoopBound, Port, Range, Section, Space};
 use takt_isa::{Instruction, Machine, Program, Register, Type};
 
 /// Locations in the image of the source's declarations.
@@ -68,6 +68,8 @@ pub(crate) fn compare(program: &Program, plain: &PlainProgram) -> Result<Layout,
         loop_bounds,
         ranges,
         array_ranges,
+        results,
+        assumptions,
         // File names and line numbers serve messages only.
         files: _,
         lines: _,
@@ -97,6 +99,16 @@ pub(crate) fn compare(program: &Program, plain: &PlainProgram) -> Result<Layout,
     compare_constants(program, constants, plain, &layout)?;
     compare_ranges(ranges, plain, &layout)?;
     compare_array_ranges(program, array_ranges, plain)?;
+    if *results != plain.results {
+        return Err(refuse("image and source differ in the arrays that are results".to_owned()));
+    }
+    let is_said = |&&Assumption { ty, low, high, .. }: &&Assumption| {
+        plain.assumptions.iter().any(|said| *said == (ty, [low, high]))
+    };
+    if let Some(assumption) = assumptions.iter().find(|assumption| !is_said(assumption)) {
+        let place = program.word_text(assumption.word as usize);
+        return Err(refuse(format!("the image assumes a range at {place} that the source does not")));
+    }
     Ok(layout)
 }
 

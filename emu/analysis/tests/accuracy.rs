@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use takt_analysis::Refusal;
-use takt_analysis::accuracy::{Enclosure, Problem, Shadow, enclose, ulp};
+use takt_analysis::accuracy::{Enclosure, OutputBound, OutputPlace, Problem, Shadow, enclose, ulp};
 use takt_asm::{MemoryLoader, Options, Search, assemble};
 use takt_emu::Emulator;
 use takt_emu::testing::Random;
@@ -44,6 +44,12 @@ fn run(program: &Program, mut shadow: Shadow, inputs: &[Vec<(Register, u32)>]) -
 
 fn floats(program: &Program, values: &[(&str, f32)]) -> Vec<(Register, u32)> {
     values.iter().map(|(name, value)| (input(program, name), value.to_bits())).collect()
+}
+
+/// Register of an output that is a port.
+pub(crate) fn port(bound: &OutputBound) -> Register {
+    let OutputPlace::Port(register) = bound.place else { panic!("{} is no port", bound.name) };
+    register
 }
 
 pub(crate) const HEAD: &str = ".once\n wait p\n.period\np:\n";
@@ -142,7 +148,7 @@ pub(crate) fn check(program: &Program, enclosure: &Enclosure, periods: usize, ra
     let mut most: f64 = 0.0;
     for bound in &enclosure.outputs {
         let (Some(error), Some(range)) = (bound.error, bound.range) else { continue };
-        let measured = shadow.outputs().iter().find(|output| output.register == bound.register).unwrap();
+        let measured = shadow.outputs().iter().find(|output| output.place == bound.place).unwrap();
         let Some(worst) = measured.absolute else { continue };
         // Allowance for the rounding of binary64 itself.
         let slack = 1e-12 * range.magnitude() + 1e-40;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Enclosures of programs over arrays, of long loops, and of integers.
 
-use crate::accuracy::source;
+use crate::accuracy::{port, source};
 use takt_analysis::Refusal;
 use takt_analysis::accuracy::{Enclosure, Moment, Problem, Shadow, StateRange, enclose};
 use takt_emu::Emulator;
@@ -55,12 +55,12 @@ fn check(program: &Program, enclosure: &Enclosure, written: &[&str], periods: us
             }
         }
         for bound in enclosure.outputs.iter().filter(|bound| bound.ty == Type::I) {
-            let value = f64::from(emulator.register(bound.register).unwrap().cast_signed());
+            let value = f64::from(emulator.register(port(bound)).unwrap().cast_signed());
             assert!(bound.range.unwrap().contains(value), "{} is {value}", bound.name);
         }
     }
     for bound in enclosure.outputs.iter().filter(|bound| bound.ty == Type::F) {
-        let measured = shadow.outputs().iter().find(|output| output.register == bound.register).unwrap();
+        let measured = shadow.outputs().iter().find(|output| output.place == bound.place).unwrap();
         let (worst, range) = (measured.absolute.unwrap(), bound.range.unwrap());
         assert!(
             worst.error <= bound.error.unwrap() + 1e-12 * range.magnitude(),

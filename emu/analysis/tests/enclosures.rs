@@ -5,6 +5,7 @@
 //! Campaign: `TAKT_PROGRAMS=10000 cargo test --release -p takt-analysis --test suite enclosures::`; `TAKT_SEED` moves its seeds.
 #![allow(clippy::print_stdout)]
 
+use crate::accuracy::port;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use takt_analysis::accuracy::{Enclosure, MAX_UNROLLED, Problem, Shadow, StateRange, enclose_within};
@@ -585,7 +586,7 @@ impl Run<'_> {
     fn integers(&self, emulator: &Emulator, checked: &mut CheckCounts) {
         for bound in self.enclosure.outputs.iter().filter(|bound| bound.ty == Type::I) {
             let Some(range) = bound.range else { continue };
-            let value = f64::from(emulator.register(bound.register).unwrap().cast_signed());
+            let value = f64::from(emulator.register(port(bound)).unwrap().cast_signed());
             checked.integers += 1;
             assert!(range.contains(value), "{} is {value}, of {range:?}", bound.name);
         }
@@ -686,7 +687,7 @@ impl Run<'_> {
             }
         }
         for bound in self.enclosure.outputs.iter().filter(|bound| bound.ty == Type::F) {
-            let measured = shadow.outputs().iter().find(|output| output.register == bound.register).unwrap();
+            let measured = shadow.outputs().iter().find(|output| output.place == bound.place).unwrap();
             let (Some(error), Some(range), Some(worst)) = (bound.error, bound.range, measured.absolute)
             else {
                 continue;

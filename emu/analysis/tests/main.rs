@@ -3,6 +3,7 @@
 
 mod accuracy;
 mod arrays;
+mod assumptions;
 mod bound;
 mod dependence;
 mod enclosures;

@@ -31,6 +31,8 @@ pub(crate) fn program(machine: &'static Machine, source: &str) -> Program {
         loop_bounds: Vec::new(),
         ranges: Vec::new(),
         array_ranges: Vec::new(),
+        results: Vec::new(),
+        assumptions: Vec::new(),
         parts: Vec::new(),
         parameters: Vec::new(),
         latched: false,

@@ -146,3 +146,53 @@ fn names() {
     folder.write("falls.s", ".output F\n fadd F, zero, zero\n");
     assert_eq!(folder.line("run falls.s --deny all").status, Some(1));
 }
+
+/// Ranges that the source promises: of an input, of a state at the end of a period, of a value.
+#[test]
+fn promised_ranges() {
+    let law = "\
+.input  x
+.range  x = -1, 1
+.state  s
+.range  s = -2, 2
+.output y
+.reg    d
+.once
+        s = 0
+        wait    p
+.period
+p:      d = 2 + x
+        .assume d >= 1.5
+        s = s + x
+        y = s*d
+        wait    p
+";
+    let folder = Folder::new();
+    folder.write("law.s", law);
+    let deny = |rows: &str, what: &str| {
+        folder.write("in.csv", &format!("x\n{rows}"));
+        let done = folder.line(&format!("run law.s --inputs in.csv --json --deny {what}"));
+        let json: Value = serde_json::from_str(&done.stdout).unwrap();
+        (done.status, json["denied"].clone(), done.stderr)
+    };
+    assert_eq!(deny("1\n-0.5\n0.5\n", "all").0, Some(0));
+    let (status, json, text) = deny("0\n-1\n0\n", "range");
+    assert_eq!(
+        (status, &json[0]["count"], &json[0]["first"]["place"]),
+        (Some(3), &1.into(), &"law.s:11".into())
+    );
+    assert!(
+        text.contains("a promised range left once, in period 1") && text.contains("to d by fadd"),
+        "{text}"
+    );
+    // The state leaves its range in period 2 and is back in period 4.
+    let (status, json, text) = deny("1\n1\n0.5\n0\n-1\n", "range");
+    assert_eq!(
+        (status, &json[0]["count"], &json[0]["first"]["place"]),
+        (Some(3), &2.into(), &"law.s:13".into())
+    );
+    assert!(text.contains("left 2 times, first in period 2") && text.contains("to s by fadd"), "{text}");
+    let (status, _, text) = deny("0\n1.5\n", "range");
+    assert!(status == Some(3) && text.contains("in period 1") && text.contains("by the input x"), "{text}");
+    assert_eq!(deny("0\n1.5\n", "missed,nan").0, Some(0));
+}

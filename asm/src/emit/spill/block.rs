@@ -282,6 +282,7 @@ impl Block<'_> {
             sources: [RegisterId::ZERO; 3],
             constant: Constant::Value(word),
             access: None,
+            assumed: None,
             made: true,
             ..*computing
         }

@@ -169,6 +169,13 @@ impl Expander<'_> {
                 let named = registers.find_map(|register| self.operand_needs(ast, *register, known));
                 named.or_else(|| mentions(&[*low, *high], known))
             }
+            DirectiveKind::Result(arrays) => {
+                let mut arrays = arrays.iter();
+                arrays.find(|array| self.mentions_name(ast, array.name, known)).map(|array| array.span)
+            }
+            DirectiveKind::Assume { register, bound, .. } => {
+                self.operand_needs(ast, *register, known).or_else(|| mentions(&[*bound], known))
+            }
             DirectiveKind::Float(values) | DirectiveKind::Word(values) => mentions(values, known),
             DirectiveKind::Space(value) => mentions(&[*value], known),
             DirectiveKind::LoopBound(value, total) => {

@@ -6,7 +6,9 @@ use super::{ImageError, VERSION};
 use serde::{Deserialize, Serialize};
 use takt_diagnostics::diag::Diagnostics;
 use takt_diagnostics::machine;
-use takt_isa::program::{ArrayRange, Columns, Location, Port, Range, Section, Symbol};
+use takt_isa::program::{
+    ArrayRange, ArrayResult, Assumption, Columns, Location, Port, Range, Section, Symbol,
+};
 use takt_isa::{BundleAddress, Machine, Program, Register, Type};
 
 #[derive(Serialize, Deserialize)]
@@ -32,6 +34,12 @@ pub(super) struct Meta {
     /// Left out if empty.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     array_ranges: Vec<MetaArrayRange>,
+    /// Left out if empty.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    results: Vec<MetaResult>,
+    /// Left out if empty.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    assumptions: Vec<MetaAssumption>,
     sections: Vec<MetaSection>,
     files: Vec<String>,
     /// File and line of each word of code.
@@ -80,6 +88,25 @@ struct MetaRange {
 struct MetaArrayRange {
     first: u32,
     words: u32,
+    #[serde(rename = "type")]
+    ty: MetaType,
+    low: u32,
+    high: u32,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct MetaResult {
+    first: u32,
+    words: u32,
+    #[serde(rename = "type")]
+    ty: MetaType,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct MetaAssumption {
+    word: u32,
     #[serde(rename = "type")]
     ty: MetaType,
     low: u32,
@@ -142,6 +169,14 @@ impl Meta {
             low,
             high,
         };
+        let result =
+            |&ArrayResult { first, words, ty }: &ArrayResult| MetaResult { first, words, ty: ty.into() };
+        let assumption = |&Assumption { word, ty, low, high }: &Assumption| MetaAssumption {
+            word,
+            ty: ty.into(),
+            low,
+            high,
+        };
         let section = |section: &Section| MetaSection {
             name: section.name.clone(),
             start: section.start,
@@ -158,6 +193,8 @@ impl Meta {
             registers: ports(&program.registers),
             ranges: program.ranges.iter().map(range).collect(),
             array_ranges: program.array_ranges.iter().map(array_range).collect(),
+            results: program.results.iter().map(result).collect(),
+            assumptions: program.assumptions.iter().map(assumption).collect(),
             sections: program.sections.iter().map(section).collect(),
             files: program.files.clone(),
             lines: program
@@ -225,6 +262,9 @@ impl Meta {
             low,
             high,
         };
+        let result = |MetaResult { first, words, ty }| ArrayResult { first, words, ty: ty.into() };
+        let assumption =
+            |MetaAssumption { word, ty, low, high }| Assumption { word, ty: ty.into(), low, high };
         let section = |MetaSection { name, start, end }| Section { name, start, end };
         Ok(Program {
             machine,
@@ -240,6 +280,8 @@ impl Meta {
             loop_bounds: Vec::new(),
             ranges: self.ranges.into_iter().map(range).collect::<Result<_, ImageError>>()?,
             array_ranges: self.array_ranges.into_iter().map(array_range).collect(),
+            results: self.results.into_iter().map(result).collect(),
+            assumptions: self.assumptions.into_iter().map(assumption).collect(),
             sections: self.sections.into_iter().map(section).collect(),
             files: self.files,
             lines: self

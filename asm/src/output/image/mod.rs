@@ -172,6 +172,22 @@ pub enum ImageError {
         /// Reason against the range.
         reason: &'static str,
     },
+    /// A result is not a label's words, or is out of order.
+    #[error("the result at data word {first}: {reason}")]
+    Result {
+        /// First word of the array.
+        first: u32,
+        /// Reason against the result.
+        reason: &'static str,
+    },
+    /// An assumption concerns no register, is empty, or is out of order.
+    #[error("the assumption about word {word}: {reason}")]
+    Assumption {
+        /// Word of the operation.
+        word: u32,
+        /// Reason against the assumption.
+        reason: &'static str,
+    },
     /// The format cannot hold the program.
     #[error("an image cannot hold this program: {0}")]
     Unwritable(String),

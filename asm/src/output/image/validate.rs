@@ -7,7 +7,7 @@ use crate::limits;
 use std::collections::HashSet;
 use takt_isa::encode::WORD_MASK;
 use takt_isa::program::{LoopBound, Port, Space};
-use takt_isa::{BundleAddress, Machine, Program, Register, Type};
+use takt_isa::{BundleAddress, Instruction, Machine, Program, Register, Type};
 
 /// Maximum length of a source file's name, in bytes.
 pub(super) const FILE_NAME: usize = 4096;
@@ -88,6 +88,8 @@ pub(super) fn program(program: &Program) -> Result<(), ImageError> {
     loops(program)?;
     ranges(program)?;
     array_ranges(program)?;
+    results(program)?;
+    assumptions(program)?;
     lines(program)
 }
 
@@ -141,6 +143,44 @@ fn array_ranges(program: &Program) -> Result<(), ImageError> {
             return Err(ImageError::ArrayRange { first, reason });
         }
         last = Some(first);
+    }
+    Ok(())
+}
+
+/// Each result is one label's words, as for ranges.
+fn results(program: &Program) -> Result<(), ImageError> {
+    let mut last = None;
+    for result in &program.results {
+        let first = result.first;
+        let reason = match () {
+            () if program.label_words(first) != Some(result.span()) => "it is not the words of a label",
+            () if last.is_some_and(|last| last >= first) => "results are not in ascending order",
+            () => "",
+        };
+        if !reason.is_empty() {
+            return Err(ImageError::Result { first, reason });
+        }
+        last = Some(first);
+    }
+    Ok(())
+}
+
+fn assumptions(program: &Program) -> Result<(), ImageError> {
+    let slots = program.machine.slots;
+    let mut last = None;
+    for assumption in &program.assumptions {
+        let word = assumption.word;
+        let code = program.code.get(word as usize).and_then(|code| Instruction::decode(*code).ok());
+        let writes = code.is_some_and(|code| code.writes(&slots[word as usize % slots.len()]).is_some());
+        let reason = match assumption.mistake() {
+            _ if !writes => "no operation there writes a register",
+            _ if last.is_some_and(|last| last >= word) => "assumptions are not in ascending order",
+            mistake => mistake.unwrap_or_default(),
+        };
+        if !reason.is_empty() {
+            return Err(ImageError::Assumption { word, reason });
+        }
+        last = Some(word);
     }
     Ok(())
 }

@@ -352,6 +352,21 @@ impl<'t, 'a: 't> Parts<'t, 'a> {
             .then_ignore(just(Token::Assign).labelled(ExpectedItem::Assign))
             .then(expr.clone().labelled(ExpectedItem::Cycle))
             .map(|(ports, cycle)| DirectiveKind::Deadline(ports, cycle));
+        let arrays =
+            name.clone().labelled(ExpectedItem::Array).then(more.clone()).map(|(first, mut more)| {
+                more.insert(0, first);
+                more
+            });
+        let result = is(Directive::Result).ignore_then(arrays).map(DirectiveKind::Result);
+        let compared = select! {
+            Token::Operator(Operator::Ge) => true,
+            Token::Operator(Operator::Le) => false,
+        };
+        let assume = is(Directive::Assume)
+            .ignore_then(register.clone().labelled(ExpectedItem::Register))
+            .then(compared.labelled(ExpectedItem::Compared))
+            .then(expr.clone())
+            .map(|((register, least), bound)| DirectiveKind::Assume { register, least, bound });
         let order = is(Directive::Order).ignore_then(ports.clone()).map(DirectiveKind::Order);
         let late = is(Directive::Late)
             .ignore_then(ports.clone())
@@ -362,6 +377,6 @@ impl<'t, 'a: 't> Parts<'t, 'a> {
                     .or_not(),
             )
             .map(|(ports, cost)| DirectiveKind::Late(ports, cost));
-        vec![rule(range), rule(deadline), rule(order), rule(late)]
+        vec![rule(range), rule(result), rule(assume), rule(deadline), rule(order), rule(late)]
     }
 }

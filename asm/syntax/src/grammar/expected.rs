@@ -65,7 +65,9 @@ whats! {
     Allowed "`reassociate`, `reciprocal` or `off`";
     LoopOption "`step`, `unroll` or `max`";
     LoopTotal "`total`";
+    Compared "`>=` or `<=`";
     Port "a port";
+    Array "an array";
     Cycle "a cycle";
     Cycles "cycles";
     Least "the least value";

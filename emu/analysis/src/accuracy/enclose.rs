@@ -6,7 +6,8 @@
 //! instructions gives the results (`compute.rs`), and their `ulp` the rounding error. Conditions narrow what was computed before
 //! (`refine.rs`).
 
-use super::enclosure::{Enclosure, Hazard, OutputBound};
+use super::assume::View;
+use super::enclosure::{Enclosure, Hazard, OutputBound, OutputPlace, Relied};
 use super::interval::Interval;
 use super::memory::array_starts;
 use super::node::{Made, Node};
@@ -18,7 +19,7 @@ use crate::error::{BoundError, Refusal, place};
 use crate::graph::{Edge, Graph};
 use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
-use takt_isa::program::Port;
+use takt_isa::program::{ArrayResult, Assumption, Port};
 use takt_isa::{BundleAddress, Effect, Flow, Instruction, Program, Register, SlotIndex, Type};
 
 /// Limit on the bundles executed abstractly, over all sections.
@@ -100,10 +101,10 @@ fn explored<'p>(
         sections.extend(targets.iter().map(|target| (false, *target)));
         if once {
             // Bounds hold for periods: keep the outputs of `.once` apart, for programs that have no period.
-            let Found { hazards, operations, left, .. } = explorer.found.clone();
+            let Found { hazards, operations, relied, left, .. } = explorer.found.clone();
             explorer.initial = left;
-            of_once =
-                std::mem::replace(&mut explorer.found, Found { hazards, operations, ..Found::default() });
+            let found = Found { hazards, operations, relied, ..Found::default() };
+            of_once = std::mem::replace(&mut explorer.found, found);
             explorer.first.extend(targets);
         }
     }
@@ -160,17 +161,21 @@ impl Walk {
 #[derive(Clone, Default)]
 pub(super) struct Found {
     pub(super) hazards: BTreeMap<(u32, Problem), Operands>,
-    outputs: BTreeMap<Register, Value>,
+    outputs: BTreeMap<Place, Value>,
     /// Outputs as the period computes them, before cases are distinguished: with the operations that errors come from.
-    computed: BTreeMap<Register, Value>,
+    computed: BTreeMap<Place, Value>,
     /// Operations in the histories of outputs without a range.
-    open: BTreeMap<Register, BTreeSet<u32>>,
+    open: BTreeMap<Place, BTreeSet<u32>>,
     /// Values of the states at the end of a period.
     pub(super) left: BTreeMap<Place, Value>,
     /// First array that each access touched: by its word, and the calls of its subroutine.
     pub(super) touched: BTreeMap<(u32, Vec<BundleAddress>), Option<u32>>,
     /// A path has ended.
     ended: bool,
+    /// Assumptions that narrow a value: the words of their operations, with the registers that these write.
+    relied: BTreeMap<u32, Register>,
+    /// Operations in the histories of outputs, if there are assumptions.
+    histories: BTreeMap<Place, BTreeSet<u32>>,
     pub(super) operations: u64,
 }
 
@@ -315,7 +320,9 @@ impl Explorer<'_> {
             Flow::Branch { register, .. } => Some(self.read(&state, register, address)?),
             _ => None,
         };
-        self.execute(address, &mut state)?;
+        if !self.execute(address, &mut state)? {
+            return Ok(());
+        }
         let next = address.next();
         match flow {
             Flow::Next | Flow::Loop { .. } => self.go(walk, address, next, false, state)?,
@@ -495,8 +502,9 @@ impl Explorer<'_> {
         }
     }
 
-    fn execute(&mut self, address: BundleAddress, state: &mut State) -> Result<(), BoundError> {
-        let Some(Ok(instructions)) = self.program.bundle(address) else { return Ok(()) };
+    /// Executes the operations of a bundle. Returns false if no run executes it: an assumption does not hold.
+    fn execute(&mut self, address: BundleAddress, state: &mut State) -> Result<bool, BoundError> {
+        let Some(Ok(instructions)) = self.program.bundle(address) else { return Ok(true) };
         let machine = self.program.machine;
         let mut written = Vec::new();
         for ((number, slot), instruction) in machine.numbered_slots().zip(&instructions) {
@@ -510,14 +518,47 @@ impl Explorer<'_> {
                         .entry((self.word(address, number), Problem::Output))
                         .or_insert_with(|| vec![(register, None)]);
                 }
-                written.push((register, node));
+                written.push((register, self.word(address, number), node));
             }
         }
-        for (register, node) in written {
+        let mut kept = Vec::new();
+        for (register, word, node) in written {
             state.unshown.remove(&register);
+            kept.extend(
+                self.program.assumption(word).map(|assumption| (*assumption, register, Rc::clone(&node))),
+            );
             state.registers.insert(register, node);
         }
-        Ok(())
+        Ok(kept
+            .into_iter()
+            .all(|(assumption, register, node)| self.rely(&assumption, register, &node, state)))
+    }
+
+    /// Narrows the values of a state by an assumption. Returns false if no run keeps it.
+    fn rely(
+        &mut self,
+        assumption: &Assumption,
+        register: Register,
+        node: &Rc<Node>,
+        state: &mut State,
+    ) -> bool {
+        let (low, high) = assumption.ends();
+        let (view, known) = match assumption.ty {
+            Type::F => (View::Float, node.value.float().ok().map(|number| number.actual)),
+            Type::I | Type::B => (View::Integer, Some(node.value.whole().actual)),
+        };
+        let promised = Interval::new(low, high);
+        if known.is_none_or(|known| known.within(promised)) {
+            return true;
+        }
+        self.found.relied.insert(assumption.word, register);
+        let Some(mut scene) = self.scene(|context| context.narrow(node, promised, view)) else {
+            return false;
+        };
+        for node in state.registers.values_mut().chain(state.memory.values_mut()) {
+            *node = self.under(node, &mut scene);
+        }
+        true
     }
 
     pub(super) fn word(&self, address: BundleAddress, slot: SlotIndex) -> u32 {
@@ -562,18 +603,16 @@ impl Explorer<'_> {
     fn end(&mut self, state: &State) {
         for register in numbers(self.program).map(|port| port.register) {
             if let Some(node) = state.registers.get(&register).filter(|node| node.value != Value::Unknown) {
-                let value = self.by_cases(node);
-                if value.float().is_err() {
-                    let words = self.found.open.entry(register).or_default();
-                    node.each_operation(&mut |made| _ = words.insert(made.word));
-                }
-                join_into(&mut self.found.outputs, register, &value);
-                join_into(&mut self.found.computed, register, &node.value);
+                self.leaves(Place::Register(register), &Rc::clone(node));
             }
+        }
+        let program = self.program;
+        for word in program.results.iter().flat_map(ArrayResult::span) {
+            let node = self.word_of(state, word);
+            self.leaves(Place::Word(word), &node);
         }
         // Unread states pass to the next period, which may read them.
         self.needed.extend(&state.unshown);
-        let program = self.program;
         for range in &program.ranges {
             let Some(node) = state.registers.get(&range.register) else { continue };
             let kept = is_shown(range, Some(&node.value)) || node.value == Value::Unknown;
@@ -601,6 +640,36 @@ impl Explorer<'_> {
         self.found.ended = true;
     }
 
+    /// Joins the value that a path leaves in an output.
+    fn leaves(&mut self, place: Place, node: &Rc<Node>) {
+        let value = self.by_cases(node);
+        if value.float().is_err() {
+            let words = self.found.open.entry(place).or_default();
+            node.each_operation(&mut |made| _ = words.insert(made.word));
+        }
+        if !self.program.assumptions.is_empty() {
+            let words = self.found.histories.entry(place).or_default();
+            node.each_operation(&mut |made| _ = words.insert(made.word));
+        }
+        join_into(&mut self.found.outputs, place, &value);
+        join_into(&mut self.found.computed, place, &node.value);
+    }
+
+    /// Assumptions that narrow a value, with the outputs whose histories contain it.
+    fn relied(&self) -> Vec<Relied> {
+        let relied = |(word, register): (&u32, &Register)| {
+            let depends = |place: &Place| self.found.histories.get(place).is_some_and(|of| of.contains(word));
+            let ports = numbers(self.program).filter(|port| depends(&Place::Register(port.register)));
+            let arrays = self.program.results.iter();
+            let arrays = arrays.filter(|array| array.span().any(|word| depends(&Place::Word(word))));
+            let names = arrays.filter_map(|array| self.program.element_text(array.first));
+            let outputs = ports.map(|port| port.name.clone()).chain(names).collect();
+            let assumption = *self.program.assumption(*word)?;
+            Some(Relied { assumption, register: *register, outputs })
+        };
+        self.found.relied.iter().filter_map(relied).collect()
+    }
+
     fn finish(self) -> Enclosure {
         let converging = self.converging();
         let hazard = |((word, problem), operands): (&(u32, Problem), &Vec<_>)| Hazard {
@@ -609,24 +678,46 @@ impl Explorer<'_> {
             operands: operands.clone(),
         };
         Enclosure {
-            outputs: numbers(self.program).filter_map(|port| self.output(port)).collect(),
+            outputs: numbers(self.program)
+                .filter_map(|port| self.port(port))
+                .chain(self.program.results.iter().filter_map(|array| self.array(array)))
+                .collect(),
             hazards: self.found.hazards.iter().map(hazard).collect(),
             assumed: self.unproved(&converging),
+            relied: self.relied(),
             converging,
             operations: self.found.operations,
         }
     }
 
-    /// Range and error of an output; `None` if no path writes it.
-    fn output(&self, port: &Port) -> Option<OutputBound> {
-        let value = self.found.outputs.get(&port.register)?;
-        let is_float = port.ty == Type::F;
+    /// Range and error of an output port; `None` if no path writes it.
+    fn port(&self, port: &Port) -> Option<OutputBound> {
+        let place = Place::Register(port.register);
+        self.output(port.name.clone(), OutputPlace::Port(port.register), place, port.ty)
+    }
+
+    /// Range of an array, with the error of its worst element: one without a bound, or that with the largest.
+    fn array(&self, array: &ArrayResult) -> Option<OutputBound> {
+        let name = |word| self.program.element_text(word).unwrap_or_default();
+        let element = |word| self.output(name(word), OutputPlace::Element(word), Place::Word(word), array.ty);
+        let elements: Vec<OutputBound> = array.span().filter_map(element).collect();
+        let ranges: Option<Vec<Interval>> = elements.iter().map(|element| element.range).collect();
+        let range = ranges.and_then(|ranges| ranges.into_iter().reduce(Interval::hull));
+        let size = |element: &OutputBound| element.range.map_or(f64::INFINITY, Interval::magnitude);
+        let error = |element: &OutputBound| element.error.unwrap_or_else(|| size(element));
+        let worst = elements.into_iter().reduce(|a, b| if error(&b) > error(&a) { b } else { a })?;
+        Some(OutputBound { range, ..worst })
+    }
+
+    fn output(&self, name: String, shown: OutputPlace, place: Place, ty: Type) -> Option<OutputBound> {
+        let value = self.found.outputs.get(&place)?;
+        let is_float = ty == Type::F;
         let range = match is_float {
             true => value.float().ok().map(|number| number.actual),
             false => integers(value),
         };
         let number = value.float().ok().filter(|_| is_float);
-        let computed = self.found.computed.get(&port.register).filter(|_| is_float);
+        let computed = self.found.computed.get(&place).filter(|_| is_float);
         let mut shares: BTreeMap<u32, f64> = BTreeMap::new();
         if let Some(number) = computed.and_then(|value| value.float().ok()) {
             let (terms, rest) = number.error.shares();
@@ -639,21 +730,21 @@ impl Explorer<'_> {
         let mut parts: Vec<(u32, f64)> = shares.into_iter().collect();
         parts.sort_by(|a, b| b.1.total_cmp(&a.1));
         Some(OutputBound {
-            name: port.name.clone(),
-            register: port.register,
-            ty: port.ty,
+            name,
+            place: shown,
+            ty,
             error: number.map(|number| number.error_range().magnitude()),
             parts,
-            open: if range.is_none() { self.open(port.register) } else { Vec::new() },
+            open: if range.is_none() { self.open(place) } else { Vec::new() },
             range,
         })
     }
 
     /// Hazards that leave an output open: those that its history names, or all if that is not known.
-    fn open(&self, register: Register) -> Vec<u32> {
+    fn open(&self, place: Place) -> Vec<u32> {
         let opens = self.found.hazards.keys().filter(|(_, problem)| !problem.is_defined());
         let all: BTreeSet<u32> = opens.map(|(word, _)| *word).collect();
-        let known = self.found.open.get(&register);
+        let known = self.found.open.get(&place);
         let named: Vec<u32> =
             all.iter().copied().filter(|word| known.is_some_and(|of| of.contains(word))).collect();
         if named.is_empty() { all.into_iter().collect() } else { named }

@@ -3,19 +3,28 @@
 
 use super::interval::Interval;
 use super::{Problem, ulp};
-use takt_isa::program::{ArrayRange, Range};
+use takt_isa::program::{ArrayRange, Assumption, Range};
 use takt_isa::{Program, Register, Type};
+
+/// Place of an output.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum OutputPlace {
+    /// Register of an output port.
+    Port(Register),
+    /// Word of data memory: the worst element of an array that is a result.
+    Element(u32),
+}
 
 /// Range of an output, and for a float the bound of its error.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OutputBound {
-    /// Name of the output port.
+    /// Name of the output port; of an array that is a result, that of its worst element.
     pub name: String,
-    /// Register of the output port.
-    pub register: Register,
+    /// Output port, or element of an array.
+    pub place: OutputPlace,
     /// Type of the output: binary32, or a signed integer.
     pub ty: Type,
-    /// Range of the output's values; `None` if a problem leaves it open.
+    /// Range of the output's values, over all elements of an array; `None` if a problem leaves it open.
     pub range: Option<Interval>,
     /// Bound on the error's magnitude, in the output's unit; `None` if a problem leaves it open, and for an integer: integers are decisions,
     /// which are taken from the run.
@@ -110,10 +119,21 @@ pub struct Converging {
     pub found: Interval,
 }
 
+/// Assumption that bounds rely on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Relied {
+    /// Assumption of the source.
+    pub assumption: Assumption,
+    /// Register that the operation writes.
+    pub register: Register,
+    /// Outputs that depend on the value, by name.
+    pub outputs: Vec<String>,
+}
+
 /// Statements about every period that begins with inputs and states within their ranges, the states free of error.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Enclosure {
-    /// Bounds of the outputs that carry binary32 or integers and that a period writes.
+    /// Bounds of the outputs that carry binary32 or integers and that a period writes, and of the arrays that are results.
     pub outputs: Vec<OutputBound>,
     /// Operations that may yield NaN or infinity, or convert out of range; only the first of each dependence chain. Sums of integers that may
     /// wrap, shifts by more than 31, accesses that may leave their array. An empty list proves that there are none of these.
@@ -122,6 +142,8 @@ pub struct Enclosure {
     pub assumed: Vec<UnprovedRange>,
     /// States whose declared range is proved for all periods together.
     pub converging: Vec<Converging>,
+    /// Assumptions of the source that narrow a value, in the order of the code. The bounds hold for periods that keep them.
+    pub relied: Vec<Relied>,
     /// Operations executed abstractly, iterations of loops included.
     pub operations: u64,
 }

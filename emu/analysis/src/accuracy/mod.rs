@@ -32,7 +32,9 @@ use std::collections::BTreeMap;
 use takt_isa::{Instruction, Program, Register};
 
 pub use enclose::{MAX_BUNDLES, MAX_UNROLLED, enclose, enclose_within};
-pub use enclosure::{Converging, Enclosure, Hazard, Moment, OutputBound, StateRange, UnprovedRange};
+pub use enclosure::{
+    Converging, Enclosure, Hazard, Moment, OutputBound, OutputPlace, Relied, StateRange, UnprovedRange,
+};
 pub use interval::Interval;
 pub use number::Problem;
 pub use shadow::{

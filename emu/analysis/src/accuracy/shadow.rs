@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Shadow execution: binary64 alongside the bit-exact run, with the rounding error of each operation propagated to first order.
 
+use super::enclosure::OutputPlace;
 use super::probe::Probe;
 use super::{LARGEST_ROUNDED, ROUNDERS, fixed, is_rounder, ulp};
 use std::cmp::Ordering;
@@ -8,6 +9,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 use takt_emu::{Emulator, Fault, Status, Step};
 use takt_isa::fp::Host;
+use takt_isa::program::ArrayResult;
 use takt_isa::timing::Cycle;
 use takt_isa::{BundleAddress, Effect, Instruction, Program, Register, Type, compute, real};
 
@@ -36,10 +38,10 @@ pub struct LargestError {
 /// Errors of an output at the ends of the periods.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OutputAccuracy {
-    /// Name of the output port.
+    /// Name of the output port; of an array that is a result, that of the element with the largest absolute error.
     pub name: String,
-    /// Register of the output port.
-    pub register: Register,
+    /// Output port, or first word of an array that is a result.
+    pub place: OutputPlace,
     /// Largest error in the output's unit; `None` if the output was never a finite number.
     pub absolute: Option<LargestError>,
     /// Largest error in ulps.
@@ -131,6 +133,13 @@ impl Outcome {
     }
 }
 
+/// Value in the run, in binary64, and the shares of the operations in the difference.
+type Measured = (f64, f64, Rc<[ErrorShare]>);
+
+fn finite(operand: Operand) -> Option<Measured> {
+    operand.value.is_finite().then_some((operand.value, operand.real, operand.parts))
+}
+
 /// Operand in the run and in binary64.
 struct Operand {
     bits: u32,
@@ -149,9 +158,14 @@ impl Shadow {
     /// Shadow for a run from reset.
     pub fn new(program: &Program) -> Shadow {
         let ports = program.outputs.iter().filter(|port| port.ty == Type::F);
-        let output = |port: &takt_isa::program::Port| OutputAccuracy {
-            name: port.name.clone(),
-            register: port.register,
+        let ports = ports.map(|port| (port.name.clone(), OutputPlace::Port(port.register)));
+        let arrays = program.results.iter().filter(|array| array.ty == Type::F).map(|array| {
+            let name = program.element_text(array.first).unwrap_or_default();
+            (name, OutputPlace::Element(array.first))
+        });
+        let output = |(name, place): (String, OutputPlace)| OutputAccuracy {
+            name,
+            place,
             absolute: None,
             ulp: None,
             relative: None,
@@ -159,7 +173,7 @@ impl Shadow {
             periods: 0,
         };
         Shadow {
-            outputs: ports.map(output).collect(),
+            outputs: ports.chain(arrays).map(output).collect(),
             rounders: fixed(program)
                 .into_iter()
                 .filter(|(_, bits)| is_rounder(*bits))
@@ -381,31 +395,53 @@ impl Shadow {
     /// Compares the outputs at the end of a period.
     pub fn compare(&mut self, emulator: &Emulator) {
         let mut outputs = std::mem::take(&mut self.outputs);
+        let program = Rc::clone(&self.program);
         for output in &mut outputs {
-            let Some((value, exact, parts)) = self.value(emulator, output.register) else { continue };
-            output.periods += 1;
-            let error = (value - exact).abs();
-            let worst = |error| LargestError { error, period: self.period, value, exact };
-            if output.absolute.is_none_or(|known| error > known.error) {
-                output.absolute = Some(worst(error));
-                output.parts = parts.to_vec();
-                output.parts.sort_by(|a, b| b.error.abs().total_cmp(&a.error.abs()));
+            let mut compared = false;
+            let mut compare = |value: Option<Measured>, element: Option<u32>| {
+                let Some((value, exact, parts)) = value else { return };
+                compared = true;
+                let error = (value - exact).abs();
+                let worst = |error| LargestError { error, period: self.period, value, exact };
+                if output.absolute.is_none_or(|known| error > known.error) {
+                    output.absolute = Some(worst(error));
+                    output.parts = parts.to_vec();
+                    output.parts.sort_by(|a, b| b.error.abs().total_cmp(&a.error.abs()));
+                    if let Some(name) = element.and_then(|word| program.element_text(word)) {
+                        output.name = name;
+                    }
+                }
+                keep(&mut output.ulp, worst(error / ulp(exact)));
+                if exact != 0.0 {
+                    keep(&mut output.relative, worst(error / exact.abs()));
+                }
+            };
+            match output.place {
+                OutputPlace::Port(register) => compare(self.value(emulator, register), None),
+                OutputPlace::Element(first) => {
+                    let array = program.results.iter().find(|array| array.first == first);
+                    for word in array.into_iter().flat_map(ArrayResult::span) {
+                        compare(self.word(emulator, word), Some(word));
+                    }
+                }
             }
-            keep(&mut output.ulp, worst(error / ulp(exact)));
-            if exact != 0.0 {
-                keep(&mut output.relative, worst(error / exact.abs()));
-            }
+            output.periods += u64::from(compared);
         }
         self.outputs = outputs;
     }
 
-    /// Value of a register that holds a finite number, its value in binary64, and the shares of the difference.
-    pub fn value(&self, emulator: &Emulator, register: Register) -> Option<(f64, f64, Rc<[ErrorShare]>)> {
-        let operand = Operand::of(self.registers.get(&register), emulator.register(register)?);
-        operand.value.is_finite().then_some((operand.value, operand.real, operand.parts))
+    /// Value of a data word that holds a finite number, its value in binary64, and the shares of the difference.
+    fn word(&self, emulator: &Emulator, word: u32) -> Option<Measured> {
+        let bits = emulator.memory().get(word as usize).copied()?;
+        finite(Operand::of(self.memory.get(&word), bits))
     }
 
-    /// Accuracy of the outputs that carry binary32, in the order of their declaration.
+    /// Value of a register that holds a finite number, its value in binary64, and the shares of the difference.
+    pub fn value(&self, emulator: &Emulator, register: Register) -> Option<(f64, f64, Rc<[ErrorShare]>)> {
+        finite(Operand::of(self.registers.get(&register), emulator.register(register)?))
+    }
+
+    /// Accuracy of the outputs that carry binary32, in the order of their declaration; then of the arrays that are results.
     pub fn outputs(&self) -> &[OutputAccuracy] {
         &self.outputs
     }

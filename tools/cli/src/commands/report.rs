@@ -12,7 +12,7 @@ use anyhow::Result;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::io::Write;
-use takt_analysis::accuracy::enclose;
+use takt_analysis::accuracy::{OutputPlace, enclose};
 use takt_emu::PeriodReport;
 use takt_isa::Program;
 use takt_isa::program::Port;
@@ -270,7 +270,7 @@ fn bounds(program: &Program) -> Vec<Option<f64>> {
     let enclosure = enclose(program).ok();
     let bound = |output: &Port| {
         let mut bounds = enclosure.iter().flat_map(|enclosure| &enclosure.outputs);
-        bounds.find(|bound| bound.register == output.register)?.error
+        bounds.find(|bound| bound.place == OutputPlace::Port(output.register))?.error
     };
     let first = program.outputs.len().saturating_sub(ERRORS.len());
     program.outputs[first..].iter().map(bound).collect()

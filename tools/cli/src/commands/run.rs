@@ -224,7 +224,7 @@ impl Run {
         let mut emulator = Emulator::new(&loaded.program)?;
         emulator.set_tick_period(self.tick);
         let tracer = trace.map(|file| self.trace.begin(&emulator, file)).transpose()?;
-        let (nans, watch, periods) = (NanWrites::default(), self.deny.watch(), NO_PERIODS);
+        let (nans, watch, periods) = (NanWrites::default(), self.deny.watch(&loaded.program), NO_PERIODS);
         let (program, max_cycles) = (&loaded.program, self.max_cycles);
         let words =
             self.memory.iter().map(|name| memory::words(loaded, name)).collect::<Result<Vec<_>>>()?.concat();
@@ -251,7 +251,7 @@ impl Run {
         let mut run = SystemRun::new(&system.description)?;
         run.max_cycles = self.max_cycles;
         run.tracer = trace.map(|file| self.trace.begin_system(&run.system, file)).transpose()?;
-        run.observer = Observer::watching(&mut run.system, self.deny.watch());
+        run.observer = Observer::watching(&mut run.system, &self.deny);
         Ok(run)
     }
 }

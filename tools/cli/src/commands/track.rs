@@ -299,7 +299,8 @@ impl Drive<'_> {
         let arguments = self.arguments;
         let mut emulator = Emulator::new(&loaded.program)?;
         emulator.set_tick_period(period_cycles(arguments.clock));
-        let controller = EmulatorController::new(emulator, arguments.deny.watch(), self.periods - 1);
+        let watch = arguments.deny.watch(&loaded.program);
+        let controller = EmulatorController::new(emulator, watch, self.periods - 1);
         let robot = arguments.robot.robot(&self.trajectory)?;
         let controller = controller.with_context(|| name.clone())?;
         let mut closed_loop = ClosedLoop::with(robot, &self.trajectory, controller);
@@ -373,8 +374,7 @@ impl Drive<'_> {
             .plant()
             .counts()
             .context("the robot's start position is outside the range of its encoders")?;
-        let watch = arguments.deny.watch();
-        let mut controller = SystemController::new(description, blocks(&self.trajectory)?, watch)?;
+        let mut controller = SystemController::new(description, blocks(&self.trajectory)?, &arguments.deny)?;
         if arguments.csv.is_some() {
             controller.system.keep_host_actions();
         }

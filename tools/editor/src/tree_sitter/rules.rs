@@ -136,7 +136,7 @@ fn operands(directive: Directive) -> Option<Rule> {
         Error => symbol("text"),
         Loc => separated(symbol("_bars"), choice([symbol("location"), name()])),
         Schedule | Contract | Ports => name(),
-        Fast | Order => blanks(name()),
+        Fast | Order | Result => blanks(name()),
         Deadline => seq([blanks(name()), assigned()]),
         Range => seq([
             optional(text("@")),
@@ -145,6 +145,12 @@ fn operands(directive: Directive) -> Option<Rule> {
             field("least", expression()),
             text(","),
             field("largest", expression()),
+        ]),
+        Assume => seq([
+            named(),
+            optional(indices()),
+            choice([Operator::Ge, Operator::Le].map(|operator| text(operator.text()))),
+            expression(),
         ]),
         Late => seq([blanks(name()), optional(assigned())]),
         Macro | EndMacro | Rep | EndRep | For | EndFor | If | Elif | Else | EndIf | Raw => return None,

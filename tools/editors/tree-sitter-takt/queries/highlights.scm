@@ -5,7 +5,7 @@
 (library) @string.special.path
 (number) @number
 
-[".machine" ".reg" ".state" ".input" ".output" ".array" ".const" ".param" ".preset" ".once" ".period" ".data" ".float" ".word" ".space" ".macro" ".endm" ".rep" ".endr" ".for" ".endfor" ".if" ".elif" ".else" ".endif" ".include" ".loc" ".error" ".schedule" ".contract" ".fast" ".ports" ".loop_bound" ".range" ".deadline" ".order" ".late" ".raw"] @keyword.directive
+[".machine" ".reg" ".state" ".input" ".output" ".array" ".const" ".param" ".preset" ".once" ".period" ".data" ".float" ".word" ".space" ".macro" ".endm" ".rep" ".endr" ".for" ".endfor" ".if" ".elif" ".else" ".endif" ".include" ".loc" ".error" ".schedule" ".contract" ".fast" ".ports" ".loop_bound" ".range" ".result" ".assume" ".deadline" ".order" ".late" ".raw"] @keyword.directive
 
 (operation mnemonic: (identifier) @keyword (#any-of? @keyword "nop" "jmp" "bz" "bnz" "call" "ret" "wait" "halt" "loop" "ld" "st" "mov" "li" "iadd" "isub" "iand" "ior" "ixor" "ishl" "ishr" "isar" "ieq" "ilt" "iltu" "sel" "rdflags" "clrflags" "fabs" "fneg" "fsign" "fmin" "fmax" "fsat" "feq" "flt" "fle" "fadd" "fsub" "itof" "ftoi" "fmul" "fdiv" "fsqrt" "fma" "fms" "fnma" "fnms" "fsin" "fcos" "fatan2" "facos"))
 (operation mnemonic: (identifier) @function.macro (#not-any-of? @function.macro "nop" "jmp" "bz" "bnz" "call" "ret" "wait" "halt" "loop" "ld" "st" "mov" "li" "iadd" "isub" "iand" "ior" "ixor" "ishl" "ishr" "isar" "ieq" "ilt" "iltu" "sel" "rdflags" "clrflags" "fabs" "fneg" "fsign" "fmin" "fmax" "fsat" "feq" "flt" "fle" "fadd" "fsub" "itof" "ftoi" "fmul" "fdiv" "fsqrt" "fma" "fms" "fnma" "fnms" "fsin" "fcos" "fatan2" "facos"))

@@ -8,7 +8,7 @@ use anyhow::Result;
 use serde_json::{Value, json};
 use std::io::Write;
 use takt_analysis::accuracy::{
-    Converging, Enclosure, ErrorShare, Hazard, Interval, Moment, OutputBound, Problem, UnprovedRange,
+    Converging, Enclosure, ErrorShare, Hazard, Interval, Moment, OutputBound, Problem, Relied, UnprovedRange,
 };
 use takt_isa::program::Location;
 use takt_isa::{Program, Register, Type};
@@ -109,12 +109,21 @@ impl BoundReport<'_> {
             let name = range.name(program);
             json!({ "name": name, "range": range.ends(), "found": ends(Some(*found)) })
         };
+        let relied = |relied: &Relied| {
+            json!({
+                "place": program.word_text(relied.assumption.word as usize),
+                "name": program.register_text(relied.register),
+                "range": relied.assumption.ends(),
+                "outputs": relied.outputs,
+            })
+        };
         json!({
             "machine": program.machine.name,
             "outputs": enclosure.outputs.iter().map(output).collect::<Vec<_>>(),
             "hazards": enclosure.hazards.iter().map(hazard).collect::<Vec<_>>(),
             "assumed": enclosure.assumed.iter().map(assumed).collect::<Vec<_>>(),
             "converging": enclosure.converging.iter().map(converging).collect::<Vec<_>>(),
+            "relied": enclosure.relied.iter().map(relied).collect::<Vec<_>>(),
             "operations": enclosure.operations,
         })
     }
@@ -195,6 +204,16 @@ impl BoundReport<'_> {
             let (low, high) = range.ends();
             let name = range.name(program);
             writeln!(out, "  {name}: {}, always in {}", ends_text(low, high), interval(Some(*found)))?;
+        }
+        if !enclosure.relied.is_empty() {
+            writeln!(out, "\nrelied on, as the source assumes (`takt run --deny range` checks it)")?;
+        }
+        for Relied { assumption, register, outputs } in &enclosure.relied {
+            let name = program.register_text(*register);
+            let bounds = assumption.bounds().into_iter().map(|(sign, end)| format!("{name} {sign} {end}"));
+            let bounds = bounds.collect::<Vec<_>>().join(", ");
+            let place = program.word_text(assumption.word as usize);
+            writeln!(out, "  {place}: {bounds}, for {}", outputs.join(", "))?;
         }
         if enclosure.later().next().is_some() {
             writeln!(out, "\nranges that a period is not shown to keep; they are taken as promised")?;

@@ -12,8 +12,8 @@ use std::io::Write;
 use takt_analysis::accuracy::{
     Decision, ErrorShare, LargestError, LostComparison, OperationAccuracy, OutputAccuracy, Shadow,
 };
-use takt_isa::Program;
 use takt_isa::program::Location;
+use takt_isa::{Program, Type};
 
 /// Accuracy of a source line, over all its operations.
 #[derive(Default)]
@@ -156,7 +156,7 @@ impl<'a> MeasurementReport<'a> {
                     .map(|(worst, ulps)| cell(worst, ulps));
             writeln!(out, "  {:<width$}  {absolute}  {ulp}  {relative}", output.name)?;
         }
-        let others = program.outputs.len() - outputs.len();
+        let others = program.outputs.iter().filter(|port| port.ty != Type::F).count();
         if others > 0 {
             writeln!(out, "  {others} more carry integers or bits")?;
         }

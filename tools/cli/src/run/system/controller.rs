@@ -2,7 +2,7 @@
 //! Controller of the hybrid robot: a system in which one core computes the points of the path.
 
 use super::observers::Observer;
-use crate::run::deny::{Denials, Watch};
+use crate::run::deny::{Denials, DenyArguments};
 use anyhow::{Context, Result, bail};
 use takt_analysis::period::PERIOD_LIMIT;
 use takt_isa::Register;
@@ -49,7 +49,11 @@ pub(crate) enum StepError {
 }
 
 impl SystemController {
-    pub(crate) fn new(description: &Description, path: Vec<Block>, watch: Watch) -> Result<SystemController> {
+    pub(crate) fn new(
+        description: &Description,
+        path: Vec<Block>,
+        deny: &DenyArguments,
+    ) -> Result<SystemController> {
         let inputs: Vec<String> = description.inputs().into_iter().map(|port| port.name).collect();
         let given = |name: &str| inputs.iter().any(|known| known == name);
         let fields = FIELDS.map(|field| format!("{BLOCKS}.{field}"));
@@ -87,7 +91,7 @@ impl SystemController {
             *register = found.register;
         }
         let mut system = System::new(description)?;
-        let mut observer = Observer::watching(&mut system, watch);
+        let mut observer = Observer::watching(&mut system, deny);
         let start = system.run_to_start(PERIOD_LIMIT)?;
         let start = start.context("the cores do not reach their first ticks")?;
         observer.observe(&mut system);

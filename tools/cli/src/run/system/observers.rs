@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Observers of a system's cores: for `--deny`, or to replay each core alone.
 
-use crate::run::deny::{Denials, Watch};
+use crate::run::deny::{Denials, DenyArguments, Watch};
 use takt_system::{Recording, System};
 
 /// An observer; with `Idle`, the system keeps its full speed.
@@ -15,13 +15,14 @@ pub(crate) enum Observer {
 }
 
 impl Observer {
-    /// Watches each core for the events denied in `watch`.
-    pub(crate) fn watching(system: &mut System, watch: Watch) -> Observer {
-        if watch.denies_nothing() {
+    /// Watches each core for the denied events.
+    pub(crate) fn watching(system: &mut System, deny: &DenyArguments) -> Observer {
+        if !deny.is_given() {
             return Observer::Idle;
         }
         system.keep_core_events();
-        Observer::Watches(vec![watch; system.description().cores.len()])
+        let cores = system.description().cores.iter();
+        Observer::Watches(cores.map(|core| deny.watch(&core.program)).collect())
     }
 
     /// Observes the part of the run since the previous call.
