@@ -20,4 +20,5 @@ period:
 
 ; For `takt accuracy`: sums of a layer; beyond 8, tanh is 1 to the last digit but one.
 .range  a, b, c, d = -8, 8
+.result a, b, c, d
 ; SPDX-License-Identifier: MIT OR Apache-2.0

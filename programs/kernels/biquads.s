@@ -24,4 +24,5 @@ period:
 .range  c = -2, 2
 .range  u = -1, 1
 .range  s = -8, 8
+.result y
 ; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -16,4 +16,5 @@ period:
 
 ; For `takt accuracy`: data in units of their full scale.
 .range  x, y = -1, 1
+.result d
 ; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -25,6 +25,7 @@ period:
 ; e = z - h(m); H its derivatives.
         dx, dy = beacon[1] - m[1], beacon[2] - m[2]
         square = dx*dx + dy*dy
+        .assume square >= 1             ; m²: the vehicle does not reach the beacon
         distance = sqrt(square)
         e[1], e[2] = z[1] - distance, z[2] - (atan2(dy, dx) - m[3])
         H[1,1], H[1,2] = -dx/distance, -dy/distance
@@ -39,4 +40,5 @@ period:
 .range  F = -1, 1
 .range  Q, R = 0, 1
 .range  H = -1, 1
+.result x, P
 ; SPDX-License-Identifier: MIT OR Apache-2.0

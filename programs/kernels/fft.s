@@ -19,4 +19,5 @@ period:
 ; For `takt accuracy`: data in units of their full scale.
 .range  r, m = -1, 1
 .range  c, s = -1, 1
+.result r, m
 ; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -22,4 +22,5 @@ period:
 .range  u = -1, 1
 .range  h = -1/16, 1/16
 .range  s = -4, 4
+.result y
 ; SPDX-License-Identifier: MIT OR Apache-2.0

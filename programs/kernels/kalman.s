@@ -18,4 +18,5 @@ period:
 .range  F, H, Q, R = -1, 1
 .range  P = -1, 1
 .range  x, z = -1, 1
+.result x, P
 ; SPDX-License-Identifier: MIT OR Apache-2.0

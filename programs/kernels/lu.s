@@ -20,4 +20,5 @@ period:
 
 ; For `takt accuracy`: a matrix and a right side in units of the largest element.
 .range  A, b = -1, 1
+.result x
 ; SPDX-License-Identifier: MIT OR Apache-2.0

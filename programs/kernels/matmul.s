@@ -16,4 +16,5 @@ period:
 
 ; For `takt accuracy`: data in units of their full scale.
 .range  A, B = -1, 1
+.result C
 ; SPDX-License-Identifier: MIT OR Apache-2.0

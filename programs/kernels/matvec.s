@@ -16,4 +16,5 @@ period:
 
 ; For `takt accuracy`: data in units of their full scale.
 .range  A, x = -1, 1
+.result y
 ; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -22,4 +22,5 @@ period:
 .range  u = -100, 100
 .range  g, y = -100, 100
 .range  q, r = -400, 400
+.result u
 ; SPDX-License-Identifier: MIT OR Apache-2.0

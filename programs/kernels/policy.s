@@ -19,4 +19,5 @@ period:
 
 ; For `takt accuracy`: observations and weights of a network whose inputs are normalised.
 .range  W1, W2, W3, b1, b2, b3, x = -1, 1
+.result y
 ; SPDX-License-Identifier: MIT OR Apache-2.0

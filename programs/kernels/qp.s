@@ -21,4 +21,5 @@ period:
 .range  high = 0, 1
 .range  z = -1, 1
 .range  y = -20, 20
+.result z
 ; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -16,4 +16,5 @@ period:
 
 ; For `takt accuracy`: a model whose states and inputs are in units of their full scale.
 .range  A, B, Q, R, P = -1, 1
+.result P, K
 ; SPDX-License-Identifier: MIT OR Apache-2.0

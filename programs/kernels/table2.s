@@ -17,4 +17,5 @@ period:
 ; For `takt accuracy`: values in units of the largest; a place on the table, and as far beyond either end.
 .range  T = -1, 1
 .range  x = -16, 32
+.result y
 ; SPDX-License-Identifier: MIT OR Apache-2.0

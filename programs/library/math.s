@@ -484,6 +484,7 @@
         fsub    Hl, 1.0, h1
         fadd    Hl, Hl, v
         fadd    D, H, Hl
+        .assume D >= 1.0                ; e^2|x| + 1, which is at least 2
         ixor    num, sg, bits(-2.0)
         fdiv    corr, num, D
         ixor    base, sg, bits(1.0)

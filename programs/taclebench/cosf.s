@@ -17,4 +17,5 @@ period:
 
 ; For `takt accuracy`: angles within 63 turns; the unit takes 64.
 .range  x = -126*pi, 126*pi
+.result y
 ; SPDX-License-Identifier: MIT OR Apache-2.0

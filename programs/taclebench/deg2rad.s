@@ -17,4 +17,5 @@ period:
 
 ; For `takt accuracy`: the degrees of a circle.
 .range  x = 0, 360
+.result y
 ; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -25,4 +25,5 @@ period:
 ; For `takt accuracy`: data in units of their full scale; the border is zeros.
 .range  c, image = -1, 1
 .range  a = -1, 1
+.result y
 ; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -22,4 +22,5 @@ period:
 ; For `takt accuracy`: data in units of their full scale, coefficients of sections whose poles lie within the unit circle.
 .range  c = -2, 2
 .range  w, x = -1, 1
+.result y
 ; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -28,4 +28,5 @@ period:
 
 ; For `takt accuracy`: a signal in units of its full scale.
 .range  x = -1, 1
+.result y
 ; SPDX-License-Identifier: MIT OR Apache-2.0

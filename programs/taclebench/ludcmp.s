@@ -14,6 +14,7 @@ period:
 .rep j, i, 6
         u[i,j] = A[i,j] - sum(k, 1, i - 1, l[i,k]*u[k,j])
 .endr
+        .assume u[i,i] >= 0.1           ; of a matrix that needs no pivoting, in units of its largest element
         r[i] = 1/u[i,i]
 .rep j, i + 1, 6
         l[j,i] = (A[j,i] - sum(k, 1, i - 1, l[j,k]*u[k,i]))*r[i]
@@ -29,4 +30,5 @@ period:
 
 ; For `takt accuracy`: a matrix and a right side in units of the largest element.
 .range  A, b = -1, 1
+.result x
 ; SPDX-License-Identifier: MIT OR Apache-2.0

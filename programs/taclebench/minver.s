@@ -49,4 +49,5 @@ period:
 
 ; For `takt accuracy`: a matrix in units of the largest element.
 .range  A = -1, 1
+.result B, determinant
 ; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -33,6 +33,8 @@ period:
 .endr
 .endfor
         q[1], q[2], q[3] = (n[1] + n[2]) + (n[3] + n[4]), (v[1] + v[2]) + (v[3] + v[4]), (w[1] + w[2]) + (w[3] + w[4])
+        .assume q[2] >= 1               ; of data that vary
+        .assume q[3] >= 1
         result[5], result[6] = q[2]*(1/1000), q[3]*(1/1000)
         d[1], d[2] = sqrt(q[2]*(1/1000)), sqrt(q[3]*(1/1000))
         result[7], result[8] = d[1], d[2]
@@ -42,4 +44,5 @@ period:
 
 ; For `takt accuracy`: data in units of their full scale.
 .range  A, B = -1, 1
+.result result
 ; SPDX-License-Identifier: MIT OR Apache-2.0
