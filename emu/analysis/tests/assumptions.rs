@@ -160,7 +160,7 @@ fn results_in_arrays_are_outputs() {
     assert_eq!(names, ["y", "A+1", "B+1"]);
     let [_, a, b] = &enclosure.outputs[..] else { panic!() };
     let first = program.results[0].first;
-    assert_eq!(a.place, OutputPlace::Element(first + 1));
+    assert_eq!(a.place, OutputPlace::Array(first));
     let range = a.range.unwrap();
     assert!(range.low == 1.0 && range.high >= 8.0 && range.high < 8.001, "{range:?}");
     let range = b.range.unwrap();
@@ -173,6 +173,7 @@ fn results_in_arrays_are_outputs() {
         shadow.run_period(&mut emulator).unwrap();
     }
     let measured = &shadow.outputs()[1];
+    assert_eq!(measured.place, a.place);
     assert_eq!((shadow.outputs().len(), measured.name.as_str()), (2, "A+1"));
     let error = measured.absolute.unwrap().error;
     assert!(error > 0.0 && error <= a.error.unwrap(), "{error} of {:?}", a.error);

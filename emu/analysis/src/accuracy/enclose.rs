@@ -699,7 +699,8 @@ impl Explorer<'_> {
     /// Range of an array, with the error of its worst element: one without a bound, or that with the largest.
     fn array(&self, array: &ArrayResult) -> Option<OutputBound> {
         let name = |word| self.program.element_text(word).unwrap_or_default();
-        let element = |word| self.output(name(word), OutputPlace::Element(word), Place::Word(word), array.ty);
+        let shown = OutputPlace::Array(array.first);
+        let element = |word| self.output(name(word), shown, Place::Word(word), array.ty);
         let elements: Vec<OutputBound> = array.span().filter_map(element).collect();
         let ranges: Option<Vec<Interval>> = elements.iter().map(|element| element.range).collect();
         let range = ranges.and_then(|ranges| ranges.into_iter().reduce(Interval::hull));

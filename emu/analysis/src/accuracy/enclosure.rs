@@ -11,8 +11,8 @@ use takt_isa::{Program, Register, Type};
 pub enum OutputPlace {
     /// Register of an output port.
     Port(Register),
-    /// Word of data memory: the worst element of an array that is a result.
-    Element(u32),
+    /// First word of an array that is a result.
+    Array(u32),
 }
 
 /// Range of an output, and for a float the bound of its error.
@@ -20,7 +20,7 @@ pub enum OutputPlace {
 pub struct OutputBound {
     /// Name of the output port; of an array that is a result, that of its worst element.
     pub name: String,
-    /// Output port, or element of an array.
+    /// Output port, or array.
     pub place: OutputPlace,
     /// Type of the output: binary32, or a signed integer.
     pub ty: Type,

@@ -161,7 +161,7 @@ impl Shadow {
         let ports = ports.map(|port| (port.name.clone(), OutputPlace::Port(port.register)));
         let arrays = program.results.iter().filter(|array| array.ty == Type::F).map(|array| {
             let name = program.element_text(array.first).unwrap_or_default();
-            (name, OutputPlace::Element(array.first))
+            (name, OutputPlace::Array(array.first))
         });
         let output = |(name, place): (String, OutputPlace)| OutputAccuracy {
             name,
@@ -418,7 +418,7 @@ impl Shadow {
             };
             match output.place {
                 OutputPlace::Port(register) => compare(self.value(emulator, register), None),
-                OutputPlace::Element(first) => {
+                OutputPlace::Array(first) => {
                     let array = program.results.iter().find(|array| array.first == first);
                     for word in array.into_iter().flat_map(ArrayResult::span) {
                         compare(self.word(emulator, word), Some(word));
