@@ -436,7 +436,14 @@ impl Writer<'_> {
                 }
             }
             Schedule | Contract | Ports => self.name(In::Line, 1),
-            Fast | Order => self.names(),
+            Fast | Order | Result => self.names(),
+            Assume => {
+                self.name(In::Line, 1);
+                self.indices();
+                let compared = [">=", "<="][usize::from(self.chance(2))];
+                self.put(compared);
+                self.expression(In::Line, 2);
+            }
             Deadline => {
                 self.names();
                 self.assigned();
