@@ -12,6 +12,17 @@ const FILES: &[(&str, &str)] = &[
     ("colorlight-i5", include_str!("../boards/colorlight-i5.toml")),
     ("colorlight-i9", include_str!("../boards/colorlight-i9.toml")),
     ("icepi-zero", include_str!("../boards/icepi-zero.toml")),
+    ("orangecrab", include_str!("../boards/orangecrab.toml")),
+    ("ecpix5-45f", include_str!("../boards/ecpix5-45f.toml")),
+    ("ecpix5-85f", include_str!("../boards/ecpix5-85f.toml")),
+    ("tang-nano-20k", include_str!("../boards/tang-nano-20k.toml")),
+    ("tang-primer-20k", include_str!("../boards/tang-primer-20k.toml")),
+    ("tang-primer-25k", include_str!("../boards/tang-primer-25k.toml")),
+    ("icebreaker", include_str!("../boards/icebreaker.toml")),
+    ("icesugar", include_str!("../boards/icesugar.toml")),
+    ("gatemate-evb", include_str!("../boards/gatemate-evb.toml")),
+    ("olimex-gatemate", include_str!("../boards/olimex-gatemate.toml")),
+    ("crosslink-nx-evn", include_str!("../boards/crosslink-nx-evn.toml")),
 ];
 
 /// FPGA board, as described by its file.

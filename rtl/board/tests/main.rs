@@ -5,6 +5,7 @@ mod carrier;
 mod consistency;
 mod drive;
 mod emulated;
+mod families;
 mod family;
 mod files;
 mod harness;

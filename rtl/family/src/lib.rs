@@ -11,8 +11,10 @@ mod confinement;
 mod count;
 pub mod cyclone_v;
 pub mod ecp5;
+pub mod gatemate;
 pub mod gowin;
 pub mod ice40;
+pub mod nexus;
 mod pins;
 mod place;
 mod pll;
@@ -21,7 +23,7 @@ mod synthesis;
 
 pub use count::{Cells, Resources};
 pub use pins::{Constraints, Pin, Pinout, Pull, Sites};
-pub use place::{MeasurementDevice, Models, Pack, Place, Proof, YosysFile};
+pub use place::{MeasurementDevice, Models, Pack, Place, Proof, ROUTED, YosysFile};
 pub use pll::{Pll, PllError};
 pub use synthesis::{Mapping, Synthesis};
 
@@ -112,8 +114,16 @@ impl PartialEq for Family {
 }
 
 /// All families, in the order of the documents.
-pub static FAMILIES: &[&Family] =
-    &[&ecp5::FAMILY, &gowin::FAMILY, &cyclone_v::FAMILY, &series_7::FAMILY, &ice40::FAMILY];
+pub static FAMILIES: &[&Family] = &[
+    &ecp5::FAMILY,
+    &gowin::FAMILY,
+    &gowin::arora_v::FAMILY,
+    &ice40::FAMILY,
+    &gatemate::FAMILY,
+    &nexus::FAMILY,
+    &cyclone_v::FAMILY,
+    &series_7::FAMILY,
+];
 
 /// Family on which the clock and area of machines are measured, and for which they are estimated.
 pub static REFERENCE: &Family = &ecp5::FAMILY;
@@ -149,19 +159,17 @@ impl Family {
     }
 }
 
-/// Names of the resources that a device lacks for a design; empty if the design fits, or if the device stands for a family.
-pub fn lacks(part: &Part, taken: &Resources) -> Vec<&'static str> {
+/// Resources that a device lacks for a design: name, number needed, number available. Empty if the design fits, or if the device stands
+/// for a family.
+pub fn lacks(part: &Part, taken: &Resources) -> Vec<(&'static str, u64, u64)> {
     let Some(room) = part.room else { return Vec::new() };
-    [
+    let all = [
         ("LUTs", taken.luts, room.luts),
         ("flip-flops", taken.flip_flops, room.flip_flops),
         ("multipliers", taken.multipliers, room.multipliers),
         ("block RAMs", taken.block_rams, room.block_rams),
-    ]
-    .into_iter()
-    .filter(|(_, taken, room)| taken > room)
-    .map(|(name, ..)| name)
-    .collect()
+    ];
+    all.into_iter().filter(|(_, taken, room)| taken > room).collect()
 }
 
 const fn room(luts: u64, flip_flops: u64, multipliers: u64, block_rams: u64) -> Option<Resources> {

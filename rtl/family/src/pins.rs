@@ -67,6 +67,11 @@ pub(crate) fn is_ball(site: &str) -> bool {
         && digits.chars().all(|c| c.is_ascii_digit())
 }
 
+/// The name is a number, like a pin of a package with pins at its edges: `88`.
+pub(crate) fn is_number(site: &str) -> bool {
+    (1..=3).contains(&site.len()) && !site.starts_with('0') && site.bytes().all(|c| c.is_ascii_digit())
+}
+
 /// Sites of a ball grid.
 pub(crate) const BALLS: Sites =
     Sites { form: "a letter or two and a number, as in \"A10\"", is_site: is_ball };

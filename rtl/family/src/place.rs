@@ -5,6 +5,9 @@ use crate::{File, Part};
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
 
+/// nextpnr's netlist, in the folder where a design is built.
+pub const ROUTED: &str = "routed.json";
+
 /// Place and route with nextpnr.
 #[derive(Clone, Copy, Debug)]
 pub struct Place {
@@ -24,6 +27,8 @@ pub struct Place {
     pub places_any_pin: bool,
     /// Arguments that weigh timing in the placement, for boards and for measurements.
     pub timing: &'static [&'static str],
+    /// Factor between nextpnr's clocks and those that may be relied on: 1 unless its delays of the family are too short.
+    pub margin: f64,
     /// Device on which cores are measured.
     pub measured: &'static MeasurementDevice,
 }
@@ -49,14 +54,14 @@ pub struct MeasurementDevice {
 /// Packing of a placed design into a bitstream.
 #[derive(Clone, Copy, Debug)]
 pub struct Pack {
-    /// Arguments of place and route that write the placed design.
+    /// Arguments of place and route that write the placed design. A file stands at the end of an argument.
     pub placed: &'static [&'static str],
-    /// File of the placed design.
+    /// File of the placed design; [`ROUTED`] if it is the netlist.
     pub from: &'static str,
-    /// Program that packs it, of the package of place and route.
+    /// Program that packs it; the package of place and route installs it.
     pub program: &'static str,
-    /// Arguments of the packing program.
-    pub arguments: &'static [&'static str],
+    /// Arguments of the packing program for a device.
+    pub arguments: fn(&Part) -> Vec<&'static str>,
     /// File of the bitstream.
     pub bitstream: &'static str,
 }

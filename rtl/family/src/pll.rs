@@ -42,3 +42,28 @@ pub enum PllError {
         input: f64,
     },
 }
+
+/// The first of a PLL's settings that makes exactly the clock `wanted` from `input`, both in MHz; each of the settings comes with its
+/// clock.
+///
+/// # Errors
+/// The nearest clocks, if no setting makes this one.
+pub(crate) fn exact<T>(
+    input: f64,
+    wanted: f64,
+    settings: impl Iterator<Item = (f64, T)>,
+) -> Result<T, PllError> {
+    let (mut below, mut above) = (0.0_f64, f64::INFINITY);
+    for (output, setting) in settings {
+        if (output / wanted - 1.0).abs() < 1e-9 {
+            return Ok(setting);
+        }
+        if output < wanted {
+            below = below.max(output);
+        } else {
+            above = above.min(output);
+        }
+    }
+    let places = |mhz: f64| (mhz * 1e4).round() / 1e4;
+    Err(PllError::Dividers { wanted, input, below: places(below), above: places(above) })
+}

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Lattice ECP5, without transceivers.
+//! Lattice ECP5; transceivers of ECP5-5G are not used.
 
 mod bank;
 mod netlist;
@@ -19,7 +19,9 @@ pub static FAMILY: Family = Family {
     parts: &[
         Part { name: "LFE5U-25F", tool: "--25k", room: room(24_288, 24_288, 28, 56) },
         Part { name: "LFE5U-45F", tool: "--45k", room: room(43_848, 43_848, 72, 108) },
+        Part { name: "LFE5UM5G-45F", tool: "--um5g-45k", room: room(43_848, 43_848, 72, 108) },
         Part { name: "LFE5U-85F", tool: "--85k", room: room(83_640, 83_640, 156, 208) },
+        Part { name: "LFE5UM5G-85F", tool: "--um5g-85k", room: room(83_640, 83_640, 156, 208) },
     ],
     grades: (6, 8),
     modules: &[
@@ -54,13 +56,14 @@ pub static FAMILY: Family = Family {
         places_any_pin: true,
         // More weight on the longest paths than by default: 137.7 MHz instead of about 133 with t3's seed 1.
         timing: &["--placer-heap-critexp", "4", "--placer-heap-timingweight", "20"],
+        margin: 1.0,
         measured: &MEASURED,
     }),
     pack: Some(Pack {
         placed: &["--textcfg", "takt.config"],
         from: "takt.config",
         program: "yowasp-ecppack",
-        arguments: &["--input", "takt.config", "--bit", "takt.bit", "--compress"],
+        arguments: |_| vec!["--input", "takt.config", "--bit", "takt.bit", "--compress"],
         bitstream: "takt.bit",
     }),
     models: Some(Models {

@@ -2,6 +2,7 @@
 //! PLL cell EHXPLLL: dividers and instance.
 
 use crate::PllError;
+use crate::pll::exact;
 
 /// Dividers of the PLL: its output is `input / reference * feedback`, and its oscillator runs at `output * outputs`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,31 +25,17 @@ impl Dividers {
     /// # Errors
     /// The nearest possible clocks, if no dividers make this one.
     fn new(input: f64, wanted: f64) -> Result<Dividers, PllError> {
-        let (mut below, mut above) = (0.0_f64, f64::INFINITY);
-        for reference in 1..=128_u32 {
+        let all = (1..=128_u32).flat_map(|reference| (1..=80_u32).map(move |feedback| (reference, feedback)));
+        let settings = all.filter_map(|(reference, feedback)| {
             let detector = input / f64::from(reference);
-            if !(DETECTOR.0..=DETECTOR.1).contains(&detector) {
-                continue;
-            }
-            for feedback in 1..=80_u32 {
-                let output = detector * f64::from(feedback);
-                // Place the oscillator in the middle of its range, if possible.
-                let outputs = (600.0 / output).round().clamp(1.0, 128.0);
-                if !(OSCILLATOR.0..=OSCILLATOR.1).contains(&(output * outputs)) {
-                    continue;
-                }
-                if (output / wanted - 1.0).abs() < 1e-9 {
-                    return Ok(Dividers { reference, feedback, outputs: outputs as u32 });
-                }
-                if output < wanted {
-                    below = below.max(output);
-                } else {
-                    above = above.min(output);
-                }
-            }
-        }
-        let places = |mhz: f64| (mhz * 1e4).round() / 1e4;
-        Err(PllError::Dividers { wanted, input, below: places(below), above: places(above) })
+            let output = detector * f64::from(feedback);
+            // Place the oscillator in the middle of its range, if possible.
+            let outputs = (600.0 / output).round().clamp(1.0, 128.0);
+            let runs = (DETECTOR.0..=DETECTOR.1).contains(&detector)
+                && (OSCILLATOR.0..=OSCILLATOR.1).contains(&(output * outputs));
+            runs.then_some((output, Dividers { reference, feedback, outputs: outputs as u32 }))
+        });
+        exact(input, wanted, settings)
     }
 }
 

@@ -307,7 +307,7 @@ fn list(arguments: &List, color: bool, out: &mut Out) -> Result<()> {
     for board in boards {
         writeln!(
             out,
-            "{:<14} {}-{} {}, {} MHz, {} pins\n{:<14} {}\n{:<14} from {}",
+            "{:<16} {}-{} {}, {} MHz, {} pins\n{:<16} {}\n{:<16} from {}",
             board.name,
             board.device.name,
             board.grade,
@@ -318,7 +318,7 @@ fn list(arguments: &List, color: bool, out: &mut Out) -> Result<()> {
             board.text,
             "",
             // Put each source on its own line, so that a terminal does not wrap them.
-            board.source.replace("; ", &format!(",\n{:<19} ", ""))
+            board.source.replace("; ", &format!(",\n{:<21} ", ""))
         )?;
     }
     Ok(())
@@ -363,6 +363,8 @@ fn build(arguments: &Build, color: bool, out: &mut Out) -> Result<()> {
     }
     let step = |what: &str| output::message(&format!("{what} …"));
     let packages = takt_board::build::packages(&board)?;
+    // A design that cannot be built is refused before tools are installed.
+    takt_board::top::circuit(&board, &wiring, application.clone())?;
     step("tools");
     let venv = Venv::with(&tools_folder()?, &packages)?;
     let time = arguments.time.map(|minutes| Duration::from_secs(60 * u64::from(minutes)));
@@ -377,6 +379,10 @@ fn build(arguments: &Build, color: bool, out: &mut Out) -> Result<()> {
             report.seed,
             (reached / needed - 1.0) * 100.0
         )?;
+    }
+    if report.margin > 1.0 {
+        let (family, margin) = (board.family.text, report.margin);
+        writeln!(out, "clocks are nextpnr's divided by {margin}: its delays of {family} are too short")?;
     }
     for (name, (used, there)) in &report.used {
         writeln!(out, "{name:<16} {used:>7} of {there}")?;

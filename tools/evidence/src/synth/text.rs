@@ -203,6 +203,11 @@ fn family_row(family: &Family) -> String {
     )
 }
 
+/// Names of the resources that a device lacks.
+pub(super) fn lacking(lacks: &[(&str, u64, u64)]) -> String {
+    lacks.iter().map(|(name, ..)| *name).collect::<Vec<_>>().join(", ")
+}
+
 /// Table of devices of other families.
 fn other_families(rows: &[&Synthesis]) -> String {
     let names = FAMILIES.iter().filter(|family| **family != REFERENCE).map(|family| family.name);
@@ -224,7 +229,7 @@ nearest open relative of the paper's Stratix III. `cargo evidence synth --family
                 let seeds = row.mhz.len();
                 format!("{mhz:.1} ({seeds} seed{})", if seeds == 1 { "" } else { "s" })
             });
-            let lacks = lacks(part, &row.resources).join(", ");
+            let lacks = lacking(&lacks(part, &row.resources));
             let _ = writeln!(
                 text,
                 "| {} | {}{grade} | {luts} | {flip_flops} | {multipliers} | {block_rams} | {median} | {lacks} | {} |",

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Calls of the synthesis tools.
 
-use super::text::parts_in_words;
+use super::text::{lacking, parts_in_words};
 use super::{Arguments, Design, system};
 use anyhow::{Context, Result};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -70,7 +70,7 @@ pub(super) fn measure(venv: &Venv, design: Design, arguments: &Arguments) -> Res
     row.resources = less(resources(family, &statistics, None)?, design.wrapper);
     let lacks = lacks(part, &row.resources);
     if !lacks.is_empty() {
-        progress.suspend(|| eprintln!("{device} has too few {} for it", lacks.join(", ")));
+        progress.suspend(|| eprintln!("{device} has too few {} for it", lacking(&lacks)));
     }
     if !design.parts.is_empty() {
         let netlist = fs::read_to_string(folder.join(place::NETLIST)).context("cannot read netlist.json")?;
