@@ -3,7 +3,8 @@
 
 module PLLA #(
     parameter FCLKIN = "", IDIV_SEL = 1, FBDIV_SEL = 1, MDIV_SEL = 8, MDIV_FRAC_SEL = 0, ODIV0_SEL = 8, ODIV0_FRAC_SEL = 0,
-    parameter CLKOUT0_EN = "", CLKFB_SEL = ""
+    parameter CLKOUT0_EN = "", CLKFB_SEL = "", ODIV1_SEL = 8, ODIV2_SEL = 8, ODIV3_SEL = 8, ODIV4_SEL = 8, ODIV5_SEL = 8,
+    parameter ODIV6_SEL = 8
 ) (
     input  wire CLKIN, CLKFB, RESET, PLLPWD, RESET_I, RESET_O, PSDIR, PSPULSE, SSCPOL, SSCON, MDCLK, MDAINC,
     input  wire [2:0] PSSEL, SSCMDSEL_FRAC,

@@ -106,13 +106,14 @@ impl AroraV {
     }
 }
 
-/// Instance of PLLA, for frequencies in MHz.
+/// Instance of PLLA, for frequencies in MHz. gowin_pack 0.32 cannot read its own defaults of the unused outputs' dividers.
 pub(super) fn arora_v(input: f64, wanted: f64) -> Result<String, PllError> {
     let AroraV { reference, multiplier, outputs } = AroraV::new(input, wanted)?;
     Ok(format!(
         "    PLLA #(
         .FCLKIN(\"{input}\"), .IDIV_SEL({reference}), .FBDIV_SEL(1), .MDIV_SEL({multiplier}), .MDIV_FRAC_SEL(0),
-        .ODIV0_SEL({outputs}), .ODIV0_FRAC_SEL(0), .CLKOUT0_EN(\"TRUE\"), .CLKFB_SEL(\"INTERNAL\")
+        .ODIV0_SEL({outputs}), .ODIV0_FRAC_SEL(0), .CLKOUT0_EN(\"TRUE\"), .CLKFB_SEL(\"INTERNAL\"),
+        .ODIV1_SEL(8), .ODIV2_SEL(8), .ODIV3_SEL(8), .ODIV4_SEL(8), .ODIV5_SEL(8), .ODIV6_SEL(8)
     ) pll (
         .CLKIN(clk_in), .CLKOUT0(clk), .LOCK(locked), .CLKOUT1(), .CLKOUT2(), .CLKOUT3(), .CLKOUT4(), .CLKOUT5(), .CLKOUT6(),
         .CLKFBOUT(), .MDRDO(), .CLKFB(1'b0), .RESET(1'b0), .PLLPWD(1'b0), .RESET_I(1'b0), .RESET_O(1'b0), .PSSEL(3'd0),
