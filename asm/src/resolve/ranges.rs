@@ -14,6 +14,9 @@ use takt_isa::{Register, Type};
 use takt_syntax::ast::*;
 use takt_syntax::expr::Value;
 
+/// Words of data memory, with the type of their array.
+type Words = (std::ops::Range<u32>, Option<Type>);
+
 impl Resolver<'_> {
     /// Values and ranges of the parameters.
     pub(super) fn parameters(&mut self) {
@@ -209,11 +212,7 @@ impl Resolver<'_> {
     }
 
     /// Words of an array or a label of data memory, with an array's type; `None` if the name means anything else.
-    fn words_of(
-        &mut self,
-        at: AstPlace,
-        Name { name, span }: Name,
-    ) -> Result<Option<(std::ops::Range<u32>, Option<Type>)>, ErrorReported> {
+    fn words_of(&mut self, at: AstPlace, Name { name, span }: Name) -> Result<Option<Words>, ErrorReported> {
         let id = self.context.spelled(at, name, span)?;
         Ok(match self.context.lookup(at.scope, id) {
             Binding::Table(number) => {

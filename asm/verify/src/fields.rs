@@ -102,9 +102,8 @@ pub(crate) fn compare(program: &Program, plain: &PlainProgram) -> Result<Layout,
     if *results != plain.results {
         return Err(refuse("image and source differ in the arrays that are results".to_owned()));
     }
-    let is_said = |&&Assumption { ty, low, high, .. }: &&Assumption| {
-        plain.assumptions.iter().any(|said| *said == (ty, [low, high]))
-    };
+    let is_said =
+        |&&Assumption { ty, low, high, .. }: &&Assumption| plain.assumptions.contains(&(ty, [low, high]));
     if let Some(assumption) = assumptions.iter().find(|assumption| !is_said(assumption)) {
         let place = program.word_text(assumption.word as usize);
         return Err(refuse(format!("the image assumes a range at {place} that the source does not")));

@@ -170,7 +170,7 @@ p:      d = 2 + x
     let folder = Folder::new();
     folder.write("law.s", law);
     let deny = |rows: &str, what: &str| {
-        folder.write("in.csv", &format!("x\n{rows}"));
+        folder.write("in.csv", format!("x\n{rows}"));
         let done = folder.line(&format!("run law.s --inputs in.csv --json --deny {what}"));
         let json: Value = serde_json::from_str(&done.stdout).unwrap();
         (done.status, json["denied"].clone(), done.stderr)

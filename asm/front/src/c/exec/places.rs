@@ -63,10 +63,7 @@ impl Exec<'_> {
         let mut kinds = object.leaves.iter().map(|leaf| kind_of(&leaf.ty));
         let first = kinds.next().unwrap_or(Kind::Int);
         let kind = kinds.all(|kind| kind == first).then_some(first);
-        let unfit = |leaf: &&Leaf| match &leaf.ty {
-            Type::Int(_) | Type::Float => false,
-            _ => true,
-        };
+        let unfit = |leaf: &&Leaf| !matches!(leaf.ty, Type::Int(_) | Type::Float);
         if let Some(leaf) = object.leaves.iter().find(unfit) {
             return self.fail(format!(
                 "`{}` is indexed by data, but its scalars {} cannot lie in data memory: index only arrays of 32-bit numbers by data",
