@@ -98,7 +98,7 @@ enum Site {
     Bundle,
     /// An operation of the bundle: its slot and destination.
     Operation(SlotIndex, Option<Register>),
-    /// An input, as a period begins.
+    /// An input, as a period has used it.
     Input(Register),
 }
 
@@ -247,13 +247,6 @@ impl Watch {
         mut also: ExtraObserver<'_>,
     ) -> Result<PeriodReport, PeriodError> {
         self.period = Some(self.period.map_or(0, |period| period + 1));
-        let promises = Rc::clone(&self.promises);
-        for range in &promises.inputs {
-            if !emulator.register(range.register).is_some_and(|bits| range.holds(bits)) {
-                let cause = Site::Input(range.register);
-                self.note(emulator.now(), self.at, cause, |what| what == DeniedEvent::Range);
-            }
-        }
         let heard = also.is_some() || !self.findings.is_empty();
         let mut sink = |event: &Event| {
             self.hear(event);
@@ -266,6 +259,14 @@ impl Watch {
             None if heard => emulator.observed(&mut sink).run_period(&[]),
             None => emulator.run_period(&[]),
         };
+        // Latched ports have the period's values from its tick to the next one's.
+        let promises = Rc::clone(&self.promises);
+        for range in &promises.inputs {
+            if !emulator.register(range.register).is_some_and(|bits| range.holds(bits)) {
+                let cause = Site::Input(range.register);
+                self.note(emulator.now(), self.at, cause, |what| what == DeniedEvent::Range);
+            }
+        }
         // Operations that issued with the `wait` write their states after it.
         for retire in emulator.in_flight() {
             self.kept(retire);
