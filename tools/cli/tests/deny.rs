@@ -179,17 +179,17 @@ p:      d = 2 + x
     let (status, json, text) = deny("0\n-1\n0\n", "range");
     assert_eq!(
         (status, &json[0]["count"], &json[0]["first"]["place"]),
-        (Some(3), &1.into(), &"law.s:11".into())
+        (Some(3), &1.into(), &"law.s:11:13-17".into())
     );
     assert!(
         text.contains("a promised range left once, in period 1") && text.contains("to d by fadd"),
         "{text}"
     );
     // The state leaves its range in period 2 and is back in period 4.
-    let (status, json, text) = deny("1\n1\n0.5\n0\n-1\n", "range");
+    let (status, json, text) = deny("1\n1\n0.5\n0\n-0.5\n", "range");
     assert_eq!(
         (status, &json[0]["count"], &json[0]["first"]["place"]),
-        (Some(3), &2.into(), &"law.s:13".into())
+        (Some(3), &2.into(), &"law.s:13:13-17".into())
     );
     assert!(text.contains("left 2 times, first in period 2") && text.contains("to s by fadd"), "{text}");
     let (status, _, text) = deny("0\n1.5\n", "range");
