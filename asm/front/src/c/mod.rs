@@ -70,7 +70,7 @@ pub struct Translation {
 pub struct Candidate {
     /// Name of the function.
     pub name: String,
-    /// Its file and line.
+    /// File that defines the function.
     pub file: String,
     /// Line of its definition.
     pub line: usize,

@@ -215,7 +215,7 @@ impl Exec<'_> {
         self.is_not_zero(any)
     }
 
-    /// As a float, if the high word is known to be empty.
+    /// Converts an integer whose high word is known to be zero to a float.
     pub(super) fn wide_to_float(&mut self, value: &Value) -> Result<Value, Error> {
         let (low, high) = self.pair(value)?;
         match self.nodes.node(high) {
