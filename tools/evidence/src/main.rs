@@ -63,7 +63,7 @@ enum Task {
     /// write them beside Takt's into docs/library.md (installs missing tools).
     Others,
     /// Count the functions of C projects that `takt cc` translates, each as the step, in checkouts at the commits of tools/evidence/c.toml,
-    /// and write the table into docs/c.md (clones 300 MB from GitHub).
+    /// and write the table into docs/c.md (clones what it lacks from GitHub).
     C(c::Arguments),
     /// Measure how fast emulator, assembler and lockstep are beside native code, GNU `as` and one another; print it and write
     /// docs/speed.md (a few minutes on an idle machine). The emulator is compared with the last release's, too, which is built in
