@@ -76,10 +76,36 @@ operations! {
     BitsOf Int;
     #[doc = "A float of these bits."]
     FloatOf Float;
+    #[doc = "The same, in a register of its own."]
+    Copy Int;
     #[doc = "Choice of integers."]
     Select Int;
     #[doc = "Choice of floats."]
     SelectFloat Float;
+}
+
+impl Op {
+    /// Operations of the machine that it takes, roughly.
+    pub(super) fn cost(self) -> usize {
+        match self {
+            Op::Pow => 168,
+            Op::Fmod => 392,
+            Op::Tan | Op::Tanh | Op::Log1p | Op::Log => 50,
+            Op::Exp
+            | Op::Expm1
+            | Op::Asin
+            | Op::Erf
+            | Op::Round
+            | Op::Floor
+            | Op::Ceil
+            | Op::Rint
+            | Op::Trunc => 20,
+            Op::IntMul | Op::IntDiv | Op::ToInt | Op::ToUnsigned | Op::UnsignedToFloat => 10,
+            Op::UnsignedDiv => 40,
+            Op::ProductHigh => 30,
+            _ => 1,
+        }
+    }
 }
 
 /// A value of 32 bits.
@@ -255,6 +281,14 @@ impl Nodes {
     /// A mark for [`Nodes::forget`].
     pub(super) fn mark(&self) -> usize {
         self.log.len()
+    }
+
+    /// Removes all nodes since a mark, when there were `count`: nothing refers to them.
+    pub(super) fn undo(&mut self, mark: usize, count: usize) {
+        for node in self.log.drain(mark..) {
+            self.known.remove(&node);
+        }
+        self.list.truncate(count);
     }
 
     /// Forgets the nodes since a mark, so that later uses compute them again: a branch may have skipped them. Constants stay.

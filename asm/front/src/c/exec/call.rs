@@ -4,7 +4,7 @@
 use super::{Exec, Frame, Named, Scope, plain};
 use crate::Error;
 use crate::c::types::{Signature, Type};
-use crate::c::value::{Condition, Exit, Origin, Typed, Value};
+use crate::c::value::{Condition, Exit, Memory, Origin, Typed, Value};
 use lang_c::ast::{
     BlockItem, CallExpression, Declaration, DeclarationSpecifier, Expression, ForInitializer, Statement,
     StorageClassSpecifier,
@@ -103,6 +103,7 @@ impl<'a> Exec<'a> {
             values.push(Typed { ty, value });
         }
         let (at, depth) = (self.at, self.depth);
+        let (before, first) = (self.memory.clone(), self.objects.len());
         self.enter_function(key, signature)?;
         for (index, (value, (name, _))) in values.into_iter().zip(&signature.parameters).enumerate() {
             let object =
@@ -117,16 +118,47 @@ impl<'a> Exec<'a> {
         let result = self.body(key)?;
         self.frames.pop();
         (self.at, self.depth) = (at, depth);
-        match result {
+        let mut result = match result {
             Some(object) => {
                 let place = self.place_of(object);
                 match (&place.ty, self.memory.get(object, 0)) {
-                    (Type::Struct(_), _) => self.load(&place),
-                    (_, Value::Unset) => Ok(Typed { ty: place.ty, value: Value::Unset }),
-                    _ => self.load(&place),
+                    (Type::Struct(_), _) => self.load(&place)?,
+                    (_, Value::Unset) => Typed { ty: place.ty, value: Value::Unset },
+                    _ => self.load(&place)?,
                 }
             }
-            None => Ok(Typed { ty: Type::Void, value: Value::Unset }),
+            None => Typed { ty: Type::Void, value: Value::Unset },
+        };
+        self.release(first);
+        self.left_behind(&before, &mut result.value);
+        Ok(result)
+    }
+
+    /// Removes the last objects if they are local and not among the first: nothing uses them any more.
+    pub(super) fn release(&mut self, first: usize) {
+        let others = self.objects.iter().rposition(|object| object.origin != Origin::Local);
+        let kept = others.map_or(0, |last| last + 1).max(first);
+        self.objects.truncate(kept);
+        self.memory.0.truncate(kept);
+    }
+
+    /// Pointers to local variables of a function that has returned are known to point nowhere.
+    fn left_behind(&mut self, before: &Memory, result: &mut Value) {
+        let kept = self.objects.len();
+        let dangles = |value: &Value| matches!(value, Value::Pointer(pointer) if pointer.object >= kept);
+        const NOWHERE: Value = Value::Mixed("a pointer to a variable of a function that has returned");
+        if dangles(result) {
+            *result = NOWHERE;
+        }
+        for object in 0..self.memory.0.len() {
+            if before.0.get(object).is_some_and(|old| Rc::ptr_eq(old, &self.memory.0[object])) {
+                continue;
+            }
+            for leaf in 0..self.memory.0[object].len() {
+                if dangles(self.memory.get(object, leaf)) {
+                    self.memory.set(object, leaf, NOWHERE);
+                }
+            }
         }
     }
 

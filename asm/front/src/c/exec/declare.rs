@@ -204,11 +204,11 @@ impl<'a> Exec<'a> {
                 self.refuse_double(&name, &ty)?;
             }
             let object = self.object(&name, &ty, Origin::Static, constant, key.clone())?;
-            self.statics.insert(key, object);
             self.zeros(object);
             if let Some(initializer) = initializer {
                 self.initialised(object, initializer)?;
             }
+            self.made(key, object);
             // Later declarations of the function may name it in their initial values.
             self.scope().names.insert(name, Named::Object(object));
         }

@@ -13,7 +13,7 @@ use lang_c::ast::{
 };
 use lang_c::span::Node;
 
-const CHAR: Type = Type::Int(Integer::new(8, true));
+pub(super) const CHAR: Type = Type::Int(Integer::new(8, true));
 
 /// Bytes of a text, without the final zero.
 pub(super) fn text(parts: &[String]) -> Vec<u8> {
@@ -171,11 +171,18 @@ impl<'a> Exec<'a> {
         let bytes = text(parts);
         let ty = Type::Array(CHAR.into(), Some(bytes.len() + 1));
         let key = ("string".to_owned(), place, self.unit());
-        let object = self.object("text", &ty, Origin::Static, true, key)?;
-        for (leaf, byte) in bytes.into_iter().chain([0]).enumerate() {
-            self.memory.set(object, leaf, Value::Int(i64::from(byte as i8)));
-        }
-        self.table(object)?;
+        let object = match self.statics.get(&key) {
+            Some(object) => *object,
+            None => {
+                let object = self.object("text", &ty, Origin::Static, true, key.clone())?;
+                for (leaf, byte) in bytes.into_iter().chain([0]).enumerate() {
+                    self.memory.set(object, leaf, Value::Int(i64::from(byte as i8)));
+                }
+                self.table(object)?;
+                self.made(key, object);
+                object
+            }
+        };
         let place = self.place_of(object);
         self.load(&place)
     }

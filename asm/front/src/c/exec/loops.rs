@@ -13,6 +13,9 @@ const SHORT: usize = 320;
 /// Limit on the iterations of a written-out loop that are entered under conditions.
 const OPEN: u64 = 24;
 
+/// The message about a loop that nothing bounds.
+pub(super) const NO_BOUND: &str = "data decide how often this loop runs, and no bound is known: write `#pragma takt loop_bound(N)` before it, or give --loop-bound N";
+
 /// A loop of any kind.
 #[derive(Clone, Copy)]
 pub(super) struct Repetition<'a> {
@@ -33,6 +36,8 @@ pub(super) struct Saved {
     blocks: usize,
     frames: Vec<usize>,
     mark: usize,
+    nodes: usize,
+    objects: usize,
     depth: usize,
     at: super::Place,
     budgets: usize,
@@ -45,6 +50,8 @@ impl<'a> Exec<'a> {
             blocks: self.blocks.len(),
             frames: self.frames.iter().map(|frame| frame.scopes.len()).collect(),
             mark: self.nodes.mark(),
+            nodes: self.nodes.len(),
+            objects: self.objects.len(),
             depth: self.depth,
             at: self.at,
             budgets: self.budgets.len(),
@@ -66,15 +73,16 @@ impl<'a> Exec<'a> {
         (result, saved, block)
     }
 
-    /// Undoes a trial.
+    /// Undoes a trial, with all nodes and local objects that it made.
     pub(super) fn restore(&mut self, saved: Saved) {
         self.blocks.truncate(saved.blocks);
         self.frames.truncate(saved.frames.len());
         for (frame, scopes) in self.frames.iter_mut().zip(saved.frames) {
             frame.scopes.truncate(scopes);
         }
+        self.release(saved.objects);
         self.memory = saved.memory;
-        self.nodes.forget(saved.mark);
+        self.nodes.undo(saved.mark, saved.nodes);
         self.depth = saved.depth;
         self.at = saved.at;
         self.budgets.truncate(saved.budgets);
@@ -186,8 +194,9 @@ impl<'a> Exec<'a> {
                     Ok((normal, outcomes)) => {
                         self.absorbed(normal, outcomes, &|exit| *exit == Exit::Break, out)
                     }
-                    Err(Some(error)) => Err(error),
-                    Err(None) => Err(reason),
+                    // A loop without bound cannot be written out: the reason why it is no loop says more.
+                    Err(Some(error)) if !error.text.starts_with(NO_BOUND) => Err(error),
+                    Err(_) => Err(reason),
                 }
             }
         }
@@ -293,8 +302,6 @@ impl<'a> Exec<'a> {
             self.exhausted = Some(level);
         }
         self.at = parts.head;
-        self.fail(
-            "data decide how often this loop runs, and no bound is known: write `#pragma takt loop_bound(N)` before it, or give --loop-bound N",
-        )
+        self.fail(NO_BOUND)
     }
 }

@@ -21,11 +21,12 @@ use super::Options;
 use super::ir::{Block, Id, Kind, Nodes, Place, Range, Statement};
 use super::types::{Signature, Structs, Type};
 use super::unit::Unit;
-use super::value::{Memory, Object};
+use super::value::{Memory, Object, Value};
 use crate::Error;
 use lang_c::ast::FunctionDefinition;
 use lang_c::span::{Node, Span};
 use std::collections::{HashMap, HashSet};
+use std::rc::Rc;
 
 /// Limit on the nodes of a program.
 const MAX_NODES: usize = 400_000;
@@ -42,6 +43,8 @@ pub(super) type Key = (String, usize, usize);
 pub(super) struct Facts {
     /// Objects with indices that depend on data: they lie in memory.
     pub(super) arrays: HashSet<Key>,
+    /// Arrays of these whose elements would be ports if there were enough.
+    pub(super) kept: HashSet<Key>,
     /// Scalars of states that the step writes.
     pub(super) written: HashSet<(Key, usize)>,
     /// Number of elements behind a pointer such as `float *x`.
@@ -110,6 +113,8 @@ pub(super) struct Exec<'a> {
     pub(super) globals: HashMap<String, usize>,
     /// Objects of `static` variables in functions.
     statics: HashMap<Key, usize>,
+    /// First contents of the objects in `statics` that functions made.
+    contents: HashMap<usize, Rc<Vec<Value>>>,
     frames: Vec<Frame>,
     pub(super) blocks: Vec<Block>,
     pub(super) at: Place,
@@ -143,6 +148,7 @@ impl<'a> Exec<'a> {
             scopes: Vec::new(),
             globals: HashMap::new(),
             statics: HashMap::new(),
+            contents: HashMap::new(),
             frames: Vec::new(),
             blocks: vec![Block::new()],
             at: Place::default(),

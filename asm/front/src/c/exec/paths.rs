@@ -6,7 +6,7 @@ use super::Exec;
 use crate::Error;
 use crate::c::ir::{Block, Id, Kind, Node, Op, Statement};
 use crate::c::types::Type;
-use crate::c::value::{Condition, Exit, Memory, Outcome, Pointer, Value};
+use crate::c::value::{Condition, Exit, Memory, Origin, Outcome, Pointer, Value};
 use std::collections::HashMap;
 use std::rc::Rc;
 
@@ -31,28 +31,6 @@ struct Exported {
     first: usize,
     sets: [Vec<(usize, Id)>; 2],
     known: HashMap<[Option<Id>; 2], Id>,
-}
-
-/// Operations that a value costs.
-fn cost(op: Op) -> usize {
-    match op {
-        Op::Pow => 168,
-        Op::Fmod => 392,
-        Op::Tan | Op::Tanh | Op::Log1p | Op::Log => 50,
-        Op::Exp
-        | Op::Expm1
-        | Op::Asin
-        | Op::Erf
-        | Op::Round
-        | Op::Floor
-        | Op::Ceil
-        | Op::Rint
-        | Op::Trunc => 20,
-        Op::IntMul | Op::IntDiv | Op::ToInt | Op::ToUnsigned | Op::UnsignedToFloat => 10,
-        Op::UnsignedDiv => 40,
-        Op::ProductHigh => 30,
-        _ => 1,
-    }
 }
 
 impl<'a> Exec<'a> {
@@ -109,7 +87,7 @@ impl<'a> Exec<'a> {
     fn work(&self, block: &Block) -> Option<usize> {
         block.iter().try_fold(0, |sum, (statement, _)| match statement {
             Statement::Def(id) => match self.nodes.node(*id) {
-                Node::Op(op, ..) => Some(sum + cost(op)),
+                Node::Op(op, ..) => Some(sum + op.cost()),
                 _ => Some(sum + 1),
             },
             Statement::Store { .. } => Some(sum + 2),
@@ -204,7 +182,7 @@ impl<'a> Exec<'a> {
         Ok(())
     }
 
-    fn stays_within(&self, array: usize, index: Id) -> bool {
+    pub(super) fn stays_within(&self, array: usize, index: Id) -> bool {
         let (low, high) = self.nodes.range(index);
         low >= 0 && high < self.nodes.arrays[array].words.len() as i64
     }
@@ -410,7 +388,7 @@ impl<'a> Exec<'a> {
     fn joint_memory(&mut self, exported: &mut Exported, yes: &Memory, no: &Memory) -> Result<Memory, Error> {
         let shared = yes.0.len().min(no.0.len());
         let longer = if yes.0.len() > no.0.len() { yes.clone() } else { no.clone() };
-        let mut memory = Exec::without_locals(longer, shared);
+        let mut memory = self.without_locals(longer, shared);
         for object in 0..shared {
             if Rc::ptr_eq(&yes.0[object], &no.0[object]) {
                 continue;
@@ -424,10 +402,12 @@ impl<'a> Exec<'a> {
         Ok(memory)
     }
 
-    /// Unsets objects that exist in one side only: they end with the side, and need no variable.
-    fn without_locals(mut memory: Memory, shared: usize) -> Memory {
-        for cells in memory.0.iter_mut().skip(shared) {
-            *cells = Rc::new(vec![Value::Unset; cells.len()]);
+    /// Unsets local objects that exist in one side only: they end with the side, and need no variable.
+    fn without_locals(&self, mut memory: Memory, shared: usize) -> Memory {
+        for (cells, object) in memory.0.iter_mut().zip(&self.objects).skip(shared) {
+            if object.origin == Origin::Local {
+                *cells = Rc::new(vec![Value::Unset; cells.len()]);
+            }
         }
         memory
     }

@@ -50,6 +50,24 @@ impl Exec<'_> {
         Ok(index)
     }
 
+    /// Remembers an object that came into being while functions run, with its contents: trials and sides of branches that began before do
+    /// not have it in their memory.
+    pub(super) fn made(&mut self, key: Key, object: usize) {
+        self.statics.insert(key, object);
+        self.contents.insert(object, self.memory.0[object].clone());
+    }
+
+    /// Puts an object that this memory does not have into it.
+    fn restored(&mut self, object: usize) {
+        if self.memory.0.get(object).is_none_or(|cells| cells.is_empty())
+            && let Some(contents) = self.contents.get(&object)
+        {
+            let count = self.memory.0.len().max(object + 1);
+            self.memory.0.resize(count, Rc::new(Vec::new()));
+            self.memory.0[object] = contents.clone();
+        }
+    }
+
     /// Puts an object into data memory if an index into it depends on data.
     pub(in crate::c) fn settle(&mut self, index: usize) -> Result<(), Error> {
         let object = &self.objects[index];
@@ -169,6 +187,26 @@ impl Exec<'_> {
         self.again = true;
     }
 
+    /// The index of a word of an array. One that only loops count, and that is outside in some iterations, stands in a register: a
+    /// condition may guard it, where the assembler refuses such a subscript.
+    fn subscript(&mut self, array: usize, pointer: &Pointer) -> Result<Id, Error> {
+        let index = self.word(pointer)?;
+        if self.stays_within(array, index) || !self.is_counted(index) {
+            return Ok(index);
+        }
+        self.op(Op::Copy, &[index])
+    }
+
+    fn is_counted(&self, id: Id) -> bool {
+        match self.nodes.node(id) {
+            Node::Int(_) | Node::Index(_) => true,
+            Node::Op(Op::IntAdd | Op::IntSub | Op::IntMul, [a, b, _], _) => {
+                self.is_counted(a) && self.is_counted(b)
+            }
+            _ => false,
+        }
+    }
+
     /// The word of an array at a place.
     fn word(&mut self, pointer: &Pointer) -> Result<Id, Error> {
         // The known part may lie outside, as in a[i - 1]: in whole elements of the object's last array.
@@ -251,6 +289,7 @@ impl Exec<'_> {
                 return Ok(Value::Node(self.placeholder(kind_of(ty), FULL)));
             };
             let own = self.objects[object].leaves[leaf].ty.clone();
+            self.restored(object);
             let mut value = self.memory.get(object, leaf).clone();
             if value == Value::Unset && !part && matches!(own, Type::Pointer(_)) {
                 self.follows(object, leaf)?;
@@ -275,7 +314,7 @@ impl Exec<'_> {
         if pointer.dynamic.is_none() && self.leaf(pointer)?.is_none() {
             return Ok(Value::Node(self.placeholder(kind_of(ty), FULL)));
         }
-        let index = self.word(pointer)?;
+        let index = self.subscript(array, pointer)?;
         let own = self.word_type(pointer);
         let range = match &own {
             Type::Int(integer) if integer.bits < 32 => integer.limits(),
@@ -369,6 +408,7 @@ impl Exec<'_> {
             let own = self.objects[object].leaves[leaf].ty.clone();
             let value = self.punned(value, ty, &own)?;
             self.changes(object, leaf);
+            self.restored(object);
             if let Value::Node(id) = value {
                 let name = self.objects[object].leaf_name(leaf);
                 self.label(id, &name);
@@ -384,7 +424,7 @@ impl Exec<'_> {
         if pointer.dynamic.is_none() && self.leaf(pointer)?.is_none() {
             return Ok(());
         }
-        let index = self.word(pointer)?;
+        let index = self.subscript(array, pointer)?;
         let own = self.word_type(pointer);
         let value = self.punned(value, ty, &own)?;
         self.changes_all(object);

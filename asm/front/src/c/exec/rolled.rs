@@ -2,7 +2,7 @@
 //! Loops that stay loops: the body is executed once, with variables for everything that it changes, which trials determine.
 
 use super::Exec;
-use super::loops::Repetition;
+use super::loops::{NO_BOUND, Repetition};
 use crate::Error;
 use crate::c::ir::{FULL, Id, Kind, Node, Op, Statement};
 use crate::c::types::{INT, Type};
@@ -30,14 +30,21 @@ struct Counter {
     alone: bool,
 }
 
-/// A scalar that the body changes: its variable, and the value before the loop.
-#[derive(Clone)]
-struct Carried {
-    var: usize,
-    before: Id,
-    /// Object of a pointer, whose place the variable holds.
-    pointer: Option<usize>,
+/// A scalar that the body changes.
+#[derive(Clone, Copy)]
+enum Carried {
+    /// A variable holds it.
+    Value(usize),
+    /// A pointer into an object; the variable holds its place.
+    Place { var: usize, object: usize },
+    /// No variable can hold it: the text gives the reason where it is used.
+    Lost(&'static str),
 }
+
+/// Reasons of [`Carried::Lost`].
+const MANY: &str = "a pointer to several objects in a loop that is too long to be written out";
+const NONE: &str =
+    "a value that a loop changes, which is too long to be written out, and that no register holds";
 
 type Cells = BTreeMap<(usize, usize), Carried>;
 
@@ -71,9 +78,7 @@ impl<'a> Exec<'a> {
         let bound = bound.or(self.loop_bound);
         let Some(bound) = bound else {
             self.at = parts.head;
-            return self.fail(
-                "data decide how often this loop runs, and no bound is known: write `#pragma takt loop_bound(N)` before it, or give --loop-bound N",
-            );
+            return self.fail(NO_BOUND);
         };
         if parts.body_first {
             return self.repeated(&parts, bound, out);
@@ -282,13 +287,13 @@ impl<'a> Exec<'a> {
                 return Ok(false);
             }
             self.memory.0[counter.object] = before.0[counter.object].clone();
-            if self.grow(&mut cells, &before)? {
+            if self.grow(&mut cells, &before) {
                 self.restore(saved);
                 continue;
             }
             let body = self.close_body(&cells)?;
             self.nodes.forget(mark);
-            self.begin_cells(&cells);
+            self.set_cells(&cells, &before)?;
             let (first, step) = (counter.first, counter.step);
             self.emit(Statement::For { index: number, first, last, step, body });
             self.leave_cells(&cells, before);
@@ -371,7 +376,7 @@ impl<'a> Exec<'a> {
             }
             let goes_on = self.memory.get(again, 0).clone();
             self.memory.set(again, 0, Value::Int(0));
-            if self.grow(&mut cells, &before)? {
+            if self.grow(&mut cells, &before) {
                 self.restore(saved);
                 continue;
             }
@@ -381,7 +386,7 @@ impl<'a> Exec<'a> {
             };
             let mut body = self.close_body(&cells)?;
             self.nodes.forget(mark);
-            self.begin_cells(&cells);
+            self.set_cells(&cells, &before)?;
             // The test stands in a register that the writes at the end of the body do not change.
             let at = self.at;
             let var = self.nodes.var("again", Kind::Int);
@@ -413,25 +418,28 @@ impl<'a> Exec<'a> {
     /// Puts the variables into memory, as a body finds them.
     fn enter_cells(&mut self, cells: &Cells) {
         for ((object, leaf), carried) in cells {
-            let value = self.carried(*object, *leaf, carried);
+            let value = self.carried(*object, *leaf, *carried);
             self.memory.set(*object, *leaf, value);
         }
     }
 
-    fn carried(&mut self, object: usize, leaf: usize, carried: &Carried) -> Value {
+    fn carried(&mut self, object: usize, leaf: usize, carried: Carried) -> Value {
         let range = match &self.objects[object].leaves[leaf].ty {
             Type::Int(integer) if integer.bits < 32 => integer.limits(),
             _ => FULL,
         };
-        let id = self.nodes.read(carried.var, range);
-        match carried.pointer {
-            Some(object) => Value::Pointer(Pointer { object, offset: 0, dynamic: Some(id) }),
-            None => Value::Node(id),
+        match carried {
+            Carried::Value(var) => Value::Node(self.nodes.read(var, range)),
+            Carried::Place { var, object } => {
+                let dynamic = Some(self.nodes.read(var, FULL));
+                Value::Pointer(Pointer { object, offset: 0, dynamic })
+            }
+            Carried::Lost(reason) => Value::Mixed(reason),
         }
     }
 
     /// Adds the body's changes beyond the cells; returns false if there are none.
-    fn grow(&mut self, cells: &mut Cells, before: &Memory) -> Result<bool, Error> {
+    fn grow(&mut self, cells: &mut Cells, before: &Memory) -> bool {
         let mut grown = false;
         for object in 0..before.0.len() {
             if Rc::ptr_eq(&before.0[object], &self.memory.0[object]) {
@@ -439,91 +447,96 @@ impl<'a> Exec<'a> {
             }
             for leaf in 0..before.0[object].len() {
                 let (old, new) = (before.get(object, leaf).clone(), self.memory.get(object, leaf).clone());
-                if old == new || cells.contains_key(&(object, leaf)) {
-                    continue;
-                }
-                let carried = self.new_cell(object, leaf, &old, &new)?;
+                let carried = match (cells.get(&(object, leaf)), &new) {
+                    (None, _) if old == new => continue,
+                    (None, _) => self.new_cell(object, leaf, &old, &new),
+                    (Some(Carried::Place { object, .. }), Value::Pointer(new)) if new.object == *object => {
+                        continue;
+                    }
+                    (Some(Carried::Value(_)), Value::Int(_) | Value::Real(_) | Value::Node(_)) => continue,
+                    (Some(Carried::Lost(_)), _) => continue,
+                    (Some(Carried::Place { .. }), _) | (_, Value::Pointer(_)) => Carried::Lost(MANY),
+                    (Some(Carried::Value(_)), _) => Carried::Lost(NONE),
+                };
                 cells.insert((object, leaf), carried);
                 grown = true;
             }
         }
-        Ok(grown)
+        grown
     }
 
-    fn new_cell(&mut self, object: usize, leaf: usize, old: &Value, new: &Value) -> Result<Carried, Error> {
-        let name = self.objects[object].leaf_name(leaf);
-        if let (Value::Pointer(old), Value::Pointer(new)) = (old, new) {
-            if old.object != new.object {
-                return self.fail(format!(
-                    "`{name}` points to several objects in a loop that is too long to be written out"
-                ));
-            }
-            let before = self.scalars(old)?;
-            let var = self.nodes.var(&name, Kind::Int);
-            return Ok(Carried { var, before, pointer: Some(old.object) });
-        }
+    fn new_cell(&mut self, object: usize, leaf: usize, old: &Value, new: &Value) -> Carried {
         let ty = self.objects[object].leaves[leaf].ty.clone();
-        let zero = match ty {
-            Type::Float => Value::Real(0.0),
-            _ => Value::Int(0),
-        };
-        let old = if *old == Value::Unset { &zero } else { old };
-        let Some(before) = self.register(old, &ty) else {
-            return self.fail(format!(
-                "`{name}` changes in a loop that is too long to be written out, and no register holds {}",
-                self.structs.shown(&ty)
-            ));
-        };
-        let var = self.nodes.var(&name, super::places::kind_of(&ty));
-        Ok(Carried { var, before, pointer: None })
+        let name = self.objects[object].leaf_name(leaf);
+        match (old, new) {
+            (Value::Pointer(old), Value::Pointer(new)) if old.object == new.object => {
+                Carried::Place { var: self.nodes.var(&name, Kind::Int), object: old.object }
+            }
+            (Value::Pointer(_), _) | (_, Value::Pointer(_)) => Carried::Lost(MANY),
+            (Value::Mixed(reason), _) | (_, Value::Mixed(reason)) => Carried::Lost(reason),
+            _ if matches!(ty, Type::Float) || matches!(ty, Type::Int(integer) if integer.bits <= 32) => {
+                Carried::Value(self.nodes.var(&name, super::places::kind_of(&ty)))
+            }
+            _ => Carried::Lost(NONE),
+        }
+    }
+
+    /// The register of a carried scalar; a scalar without a value is 0.
+    fn cell_register(
+        &mut self,
+        (object, leaf): (usize, usize),
+        carried: Carried,
+        memory: &Memory,
+    ) -> Result<Option<(usize, Id)>, Error> {
+        let value = memory.get(object, leaf);
+        Ok(match (carried, value) {
+            (Carried::Lost(_), _) => None,
+            (Carried::Place { var, object }, Value::Pointer(pointer)) if pointer.object == object => {
+                Some((var, self.scalars(pointer)?))
+            }
+            (Carried::Place { .. }, _) => {
+                return self
+                    .fail("a pointer in a loop that is too long to be written out has no known object");
+            }
+            (Carried::Value(var), value) => {
+                let ty = self.objects[object].leaves[leaf].ty.clone();
+                let zero = if ty == Type::Float { Value::Real(0.0) } else { Value::Int(0) };
+                let value = if *value == Value::Unset { &zero } else { value };
+                match self.register(value, &ty) {
+                    Some(id) => Some((var, id)),
+                    None => {
+                        return self
+                            .fail("a value in a loop that is too long to be written out has no register");
+                    }
+                }
+            }
+        })
+    }
+
+    /// Writes the variables from a memory.
+    fn set_cells(&mut self, cells: &Cells, memory: &Memory) -> Result<(), Error> {
+        let mut sets = Vec::new();
+        for (cell, carried) in cells {
+            sets.extend(self.cell_register(*cell, *carried, memory)?);
+        }
+        if !sets.is_empty() {
+            self.emit(Statement::Set(sets));
+        }
+        Ok(())
     }
 
     /// Ends the body with the writes of its variables.
     fn close_body(&mut self, cells: &Cells) -> Result<crate::c::ir::Block, Error> {
-        let mut sets = Vec::new();
-        for ((object, leaf), carried) in cells {
-            let value = self.memory.get(*object, *leaf).clone();
-            let id = match (&value, carried.pointer) {
-                (Value::Pointer(pointer), Some(object)) if pointer.object == object => {
-                    self.scalars(pointer)?
-                }
-                (value, None) => {
-                    let ty = self.objects[*object].leaves[*leaf].ty.clone();
-                    match self.register(value, &ty) {
-                        Some(id) => id,
-                        None => {
-                            return self.fail(
-                                "a value in a loop that is too long to be written out has no register",
-                            );
-                        }
-                    }
-                }
-                _ => {
-                    return self
-                        .fail("a pointer in a loop that is too long to be written out has no known object");
-                }
-            };
-            sets.push((carried.var, id));
-        }
-        if !sets.is_empty() {
-            self.emit(Statement::Set(sets));
-        }
+        let memory = self.memory.clone();
+        self.set_cells(cells, &memory)?;
         Ok(self.blocks.pop().expect("it was pushed"))
-    }
-
-    /// Sets the variables before the loop.
-    fn begin_cells(&mut self, cells: &Cells) {
-        let sets: Vec<(usize, Id)> = cells.values().map(|carried| (carried.var, carried.before)).collect();
-        if !sets.is_empty() {
-            self.emit(Statement::Set(sets));
-        }
     }
 
     /// Memory after the loop.
     fn leave_cells(&mut self, cells: &Cells, before: Memory) {
         self.memory = before;
         for ((object, leaf), carried) in cells {
-            let value = self.carried(*object, *leaf, carried);
+            let value = self.carried(*object, *leaf, *carried);
             self.memory.set(*object, *leaf, value);
         }
     }

@@ -81,10 +81,12 @@ impl<'a> Exec<'a> {
                     (yes, no) => Self::common(&yes, &no),
                 }
             }
-            Expression::StringLiteral(_) | Expression::GenericSelection(_) | Expression::VaArg(_) => {
-                return self.fail(
-                    "unsupported expression: string literals, _Generic and va_arg cannot be used here",
-                );
+            Expression::StringLiteral(literal) => {
+                let count = super::expression::text(&literal.node).len() + 1;
+                Type::Array(super::expression::CHAR.into(), Some(count))
+            }
+            Expression::GenericSelection(_) | Expression::VaArg(_) => {
+                return self.fail("unsupported expression: _Generic and va_arg cannot be used here");
             }
             Expression::Statement(statement) => {
                 let saved = self.saved();
