@@ -3,7 +3,8 @@
 //!
 //! A scalar whose value from before the step is read and that the step does not write is an input; a scalar that the step only writes,
 //! an output. A scalar with both is a state, if it belongs to a structure or a variable of the files; in an array or number that a
-//! parameter points to, an input and an output. A scalar that some paths write and none reads is an output that keeps its value.
+//! parameter points to, an input and an output. A scalar that some paths write and none reads is an output that keeps its value. If there
+//! are more inputs or outputs than ports, the largest arrays among them stay in data memory.
 
 use super::exec::call::adjusted;
 use super::exec::places::kind_of;
@@ -14,7 +15,7 @@ use super::types::{Signature, Type};
 use super::value::{Origin, Pointer, Typed, Value};
 use crate::Error;
 use crate::sink::Names;
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::rc::Rc;
 
 /// Maximum number of ports of a program.
@@ -282,8 +283,10 @@ impl Exec<'_> {
             let array = found.origin != Origin::Parameter && self.facts.arrays.contains(&found.key);
             let written = |leaf| self.facts.written.contains(&(found.key.clone(), leaf));
             let any = (0..found.leaves.len()).any(written);
-            if array && (any || found.origin == Origin::Static) {
+            let kept = self.facts.kept.contains(&found.key);
+            if kept || array && (any || found.origin == Origin::Static) {
                 let own = matches!(found.origin, Origin::Static | Origin::Global)
+                    || kept
                     || is_struct
                     || self.has_struct(&found.ty);
                 let set = self.memory.0[object].iter().all(|value| *value != Value::Unset);
@@ -403,7 +406,7 @@ impl Exec<'_> {
             let after = self.after(start.object, start.leaf)?;
             finals.push(after);
         }
-        let results = self.results(result)?;
+        let results = self.returned(result)?;
         let mut roots: Vec<Id> = results.iter().map(|(_, id)| *id).collect();
         for (start, after) in begun.starts.iter().zip(&finals) {
             if self.objects[start.object].origin != Origin::Parameter
@@ -425,17 +428,43 @@ impl Exec<'_> {
             let var = groups.port(self, object, leaf, "", &mut roles, Way::Out);
             sets.push((var, id));
         }
-        for (way, count, most) in
-            [("inputs", roles.inputs.len(), MAX_INPUTS), ("outputs", roles.outputs.len(), MAX_OUTPUTS)]
-        {
+        for (way, name, most) in [(Way::In, "inputs", MAX_INPUTS), (Way::Out, "outputs", MAX_OUTPUTS)] {
+            let count: usize =
+                groups.0.iter().filter(|group| group.way == way).map(|group| group.declared).sum();
             if count > most {
+                if self.kept_in_memory(&groups, way) {
+                    return Ok(roles);
+                }
                 return Err(Error::plain(format!(
-                    "the step has {count} {way}, and a program has {most} at most: keep what only the step uses in `static` variables"
+                    "the step has {count} {name}, and a program has {most} at most: keep what only the step uses in `static` variables, or \
+                     let arrays hold what is alike"
                 )));
             }
         }
         self.emit(Statement::Set(sets));
         Ok(roles)
+    }
+
+    /// Lets the array with the most ports of a direction stay in data memory, in the next translation. False if there is none whose
+    /// elements are all inputs or all outputs, or that is a variable of the files.
+    fn kept_in_memory(&mut self, groups: &Groups, way: Way) -> bool {
+        let mut counts: BTreeMap<usize, usize> = BTreeMap::new();
+        for group in groups.0.iter().filter(|group| group.way == way) {
+            let found = &self.objects[group.object];
+            let both = groups.0.iter().any(|other| other.object == group.object && other.way != way);
+            if matches!(found.ty, Type::Array(..)) && (!both || found.origin == Origin::Global) {
+                *counts.entry(group.object).or_default() += group.declared;
+            }
+        }
+        let Some((object, _)) =
+            counts.into_iter().max_by_key(|(object, count)| (*count, usize::MAX - object))
+        else {
+            return false;
+        };
+        let key = self.objects[object].key.clone();
+        let new = self.facts.arrays.insert(key.clone()) | self.facts.kept.insert(key);
+        self.again |= new;
+        new
     }
 
     /// A scalar after the step; `None` if it has no register then.
@@ -457,7 +486,7 @@ impl Exec<'_> {
         Ok(self.register(&value, &ty))
     }
 
-    fn results(&mut self, result: Option<usize>) -> Result<Vec<(usize, Id)>, Error> {
+    fn returned(&mut self, result: Option<usize>) -> Result<Vec<(usize, Id)>, Error> {
         let Some(object) = result else { return Ok(Vec::new()) };
         let mut found = Vec::new();
         for leaf in 0..self.objects[object].leaves.len() {
@@ -609,9 +638,22 @@ enum Way {
     Out,
 }
 
-/// Declarations of ports so far: object, name of the member, suffix, direction, and the name in the program.
+/// Declarations of ports so far.
 #[derive(Default)]
-struct Groups(Vec<(usize, String, String, bool, String)>);
+struct Groups(Vec<Group>);
+
+/// A declaration: the ports of a scalar, or of an array's.
+struct Group {
+    object: usize,
+    /// Name of the member.
+    member: String,
+    suffix: String,
+    way: Way,
+    /// Name in the program.
+    name: String,
+    /// Number of ports that the declaration makes.
+    declared: usize,
+}
 
 impl Groups {
     /// The variable of a port for a scalar.
@@ -647,19 +689,20 @@ impl Groups {
         let leaf = &found.leaves[leaf];
         let base =
             if leaf.name.is_empty() { found.name.clone() } else { format!("{}_{}", found.name, leaf.name) };
-        let is_input = way == Way::In;
-        let known = self.0.iter().find(|(own, name, end, input, _)| {
-            *own == object && *name == leaf.name && end == suffix && *input == is_input
+        let dims: Vec<usize> = leaf.indices.iter().map(|(_, count)| *count).collect();
+        let known = self.0.iter().find(|group| {
+            group.object == object && group.member == leaf.name && group.suffix == suffix && group.way == way
         });
         let name = match known {
-            Some((.., name)) => name.clone(),
+            Some(group) => group.name.clone(),
             None => {
                 let name = roles.names.unique(&format!("{base}{suffix}"));
-                self.0.push((object, leaf.name.clone(), suffix.to_owned(), is_input, name.clone()));
+                let (member, suffix, name_too) = (leaf.name.clone(), suffix.to_owned(), name.clone());
+                let declared = dims.iter().product();
+                self.0.push(Group { object, member, suffix, way, name: name_too, declared });
                 name
             }
         };
-        let dims: Vec<usize> = leaf.indices.iter().map(|(_, count)| *count).collect();
         let place: Vec<String> = leaf.indices.iter().map(|(index, _)| (index + 1).to_string()).collect();
         let own = if place.is_empty() { name.clone() } else { format!("{name}[{}]", place.join(",")) };
         let kind = exec.nodes.vars[var].kind;
@@ -675,6 +718,16 @@ impl Groups {
 }
 
 impl Exec<'_> {
+    /// Arrays that stay in data memory for want of ports: C's name, and whether the step writes them.
+    pub(super) fn kept(&self) -> HashMap<usize, (&str, bool)> {
+        let kept = self.objects.iter().filter(|object| self.facts.kept.contains(&object.key));
+        kept.filter_map(|object| {
+            let written = self.facts.written.iter().any(|(key, _)| *key == object.key);
+            Some((object.array?, (object.spelling.as_str(), written)))
+        })
+        .collect()
+    }
+
     /// A scalar as C writes it.
     fn spelled(&self, object: usize, leaf: &super::types::Leaf) -> String {
         let found = &self.objects[object];

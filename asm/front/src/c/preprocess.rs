@@ -117,7 +117,7 @@ impl Preprocessor {
         if text.contains("No such file") || text.contains("file not found") {
             let names: Vec<&str> = HEADERS.iter().map(|(name, _)| *name).collect();
             return format!(
-                "{text}\nheaders of C's library are {}; give folders of others with -I",
+                "{text}\nheaders of C's library are {}; give folders of others with -I; for a header of which nothing is needed, an empty file does",
                 names.join(", ")
             );
         }

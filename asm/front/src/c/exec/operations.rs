@@ -58,6 +58,7 @@ fn range_of(op: Op, ranges: &[Range]) -> Range {
             let most = ranges[1].0 - 1;
             (if ranges[0].0 >= 0 { 0 } else { -most }, if ranges[0].1 <= 0 { 0 } else { most })
         }
+        Op::Copy => ranges[0],
         Op::Select => (ranges[1].0.min(ranges[2].0), ranges[1].1.max(ranges[2].1)),
         _ => FULL,
     }
@@ -95,6 +96,9 @@ impl Exec<'_> {
         if let Some(simple) = self.simplified(op, operands) {
             return Ok(simple);
         }
+        if let Some(sum) = self.offset(op, operands) {
+            return self.op(Op::IntAdd, &sum);
+        }
         let mut places = [Id(0); 3];
         places[..operands.len()].copy_from_slice(operands);
         let ranges: Vec<Range> = operands.iter().map(|id| self.nodes.range(*id)).collect();
@@ -119,6 +123,31 @@ impl Exec<'_> {
     fn constant(&self, id: Id) -> Option<i32> {
         match self.nodes.node(id) {
             Node::Int(value) => Some(value),
+            _ => None,
+        }
+    }
+
+    /// Sums with a number in one form, modulo 2³²: a value and a number last, as subscripts are encoded.
+    fn offset(&mut self, op: Op, operands: &[Id]) -> Option<[Id; 2]> {
+        let &[a, b] = operands else { return None };
+        match (op, self.constant(a), self.constant(b)) {
+            (Op::IntSub, None, Some(by)) => Some([a, self.nodes.int(by.wrapping_neg())]),
+            (Op::IntMul, None, Some(by)) => match self.nodes.node(a) {
+                Node::Op(Op::IntAdd, [x, before, _], _) => {
+                    let before = self.constant(before)?;
+                    let product = self.op(Op::IntMul, &[x, b]).ok()?;
+                    Some([product, self.nodes.int(before.wrapping_mul(by))])
+                }
+                _ => None,
+            },
+            (Op::IntAdd, Some(_), None) => Some([b, a]),
+            (Op::IntAdd, None, Some(by)) => match self.nodes.node(a) {
+                Node::Op(Op::IntAdd, [x, before, _], _) => {
+                    let before = self.constant(before)?;
+                    Some([x, self.nodes.int(before.wrapping_add(by))])
+                }
+                _ => None,
+            },
             _ => None,
         }
     }

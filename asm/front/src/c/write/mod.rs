@@ -17,6 +17,8 @@ use text::{Speller, real};
 
 /// Column of comments.
 const COMMENT: usize = 56;
+/// Limit on the operations of an unrolled loop's iteration.
+const UNROLLED: usize = 200;
 /// Maximum length of a comment, in characters.
 const COMMENT_LENGTH: usize = 72;
 
@@ -74,9 +76,20 @@ pub(super) fn program(exec: &mut Exec<'_>, roles: Roles, options: &Options) -> R
         };
         head.lines(&format!(".state  {}{ty}\n.preset {} = {value}\n", state.name, state.name));
     }
-    for (array, used) in exec.nodes.arrays.iter().zip(arrays) {
+    let kept = exec.kept();
+    for (index, (array, used)) in exec.nodes.arrays.iter().zip(arrays).enumerate() {
         if used {
             head.lines(&declared_array(array));
+        }
+        match kept.get(&index) {
+            Some((c, true)) if used => {
+                head.lines(&format!("{:<32}; {c}\n", format!(".result {}", array.name)))
+            }
+            Some((c, false)) if used => head.comment(&format!(
+                "{c}: more inputs than ports. The host writes the array {} into data memory.",
+                array.name
+            )),
+            _ => {}
         }
     }
     let registers: Vec<String> = plan
@@ -172,6 +185,8 @@ impl Writer<'_, '_> {
                 Statement::If { condition, then, other } => self.branch(*condition, then, other, *place)?,
                 Statement::For { index, first, last, step, body } => {
                     let by = if *step == 1 { String::new() } else { format!(" step {step}") };
+                    let count = (last - first) / step + 1;
+                    let by = by + &self.unrolled(body, count);
                     let name = self.speller.nodes.indices[*index].clone();
                     self.line(&format!(".for    {name}, {first}, {last}{by}"), *place);
                     self.block(body)?;
@@ -189,6 +204,21 @@ impl Writer<'_, '_> {
             }
         }
         Ok(())
+    }
+
+    /// How far an innermost loop is unrolled: so that its iterations overlap, in a text of some hundred operations.
+    fn unrolled(&self, body: &Block, count: i64) -> String {
+        let work = body.iter().try_fold(0, |sum, (statement, _)| match statement {
+            Statement::Def(id) => match self.speller.nodes.node(*id) {
+                Node::Op(op, ..) => Some(sum + op.cost()),
+                _ => Some(sum + 1),
+            },
+            Statement::Store { .. } => Some(sum + 1),
+            Statement::Set(pairs) => Some(sum + pairs.len()),
+            Statement::If { .. } | Statement::For { .. } | Statement::Loop { .. } => None,
+        });
+        let fits = |by: &i64| 2 * by <= count && work.is_some_and(|work| work * *by as usize <= UNROLLED);
+        [8, 4, 2].iter().find(|by| fits(by)).map(|by| format!(" unroll {by}")).unwrap_or_default()
     }
 
     fn uses(&mut self, id: Id) {

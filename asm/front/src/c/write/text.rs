@@ -41,6 +41,7 @@ pub(super) type Library = BTreeSet<&'static str>;
 enum Form {
     Infix(&'static str, Binding),
     Prefix(&'static str),
+    Same,
     Call(&'static str, Option<&'static str>),
 }
 
@@ -60,6 +61,7 @@ fn form(op: Op) -> Form {
         Op::Equal | Op::IntEqual => Form::Infix("==", Binding::Comparison),
         Op::Less | Op::IntLess => Form::Infix("<", Binding::Comparison),
         Op::LessEqual => Form::Infix("<=", Binding::Comparison),
+        Op::Copy => Form::Same,
         Op::Neg => Form::Prefix("-"),
         Op::Not => Form::Prefix("!"),
         Op::Xor => Form::Call("xor", None),
@@ -171,6 +173,7 @@ impl Speller<'_> {
                 Text::atom(self.quotient(op, *a, *b))
             }
             (Form::Infix(operator, binding), [a, b]) => self.infix(operator, binding, *a, *b),
+            (Form::Same, [a]) => self.of(*a),
             (Form::Prefix(operator), [a]) => {
                 let text = format!("{operator}{}", self.of(*a).at_least(Binding::Atom));
                 Text { text, binding: Binding::Sign }
@@ -228,6 +231,12 @@ impl Speller<'_> {
         let first = self.of(a);
         let first = if chain && first.binding == binding { first.text } else { first.at_least(above) };
         let second = self.of(b).at_least(above);
+        let (operator, second) = match self.nodes.node(b) {
+            Node::Int(by) if operator == "+" && by < 0 && by > i32::MIN => {
+                ("-", by.unsigned_abs().to_string())
+            }
+            _ => (operator, second),
+        };
         // A constant comes first in a product.
         let (first, second) = match operator == "*" && self.nodes.kind(a) == Kind::Float && self.is_known(b) {
             true => (self.of(b).at_least(Binding::Sign), self.of(a).at_least(above)),
