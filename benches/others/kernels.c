@@ -268,7 +268,7 @@ void start(void)
 }
 
 __asm__(".section .text.entry\n.globl _start\n_start:\nli sp, 0x20000\nli t0, 0x2000\ncsrs mstatus, t0\nj start\n");
-#else
+#elif !defined __TAKT__
 static void show(const void *bytes, unsigned count);
 
 int main(void)

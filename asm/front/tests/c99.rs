@@ -531,6 +531,106 @@ fn iterates_to_convergence() {
     );
 }
 
+/// Subscripts of a loop's index that a condition guards: outside of the array in other iterations.
+#[test]
+fn guards_subscripts_of_counters() {
+    check(
+        "guards_subscripts_of_counters",
+        r#"static const int at[5] = { 3, 1, 4, 1, 5 };
+float step(const float x[40], int n) {
+  float sum = 0;
+  for (int i = 0; i < 40; i++) {
+    if (i < 5) sum += x[i]*at[i];
+    else if (i > 35) sum -= x[i]/at[i - 35];
+    else sum = 0.5f*sum + x[i ^ (n & 3)]; }
+  return sum; }
+"#,
+    );
+}
+
+/// More results than ports: the largest array stays in data memory.
+#[test]
+fn keeps_many_results_in_memory() {
+    let translation = check(
+        "keeps_many_results_in_memory",
+        r#"struct parts { float low, high; };
+void step(float x, float y[40], float *sum, struct parts *p) {
+  float s = 0;
+  for (int i = 0; i < 40; i++) y[i] = x*i + 1.0f;
+  for (int i = 0; i < 40; i++) s += y[i];
+  *sum = s; p->low = y[0]; p->high = y[39]; }
+"#,
+    );
+    let names: Vec<&str> = translation.outputs.iter().map(|port| port.name.as_str()).collect();
+    assert_eq!(names, ["sum", "p_low", "p_high"]);
+    assert!(translation.text.contains(".array  y[40]\n.result y"), "{}", translation.text);
+    let message = refused(
+        "refuses_many_results_apart",
+        &format!(
+            "struct all {{ float {}; }};\nvoid step(struct all *a, float x) {{ {} }}\n",
+            (0..33).map(|i| format!("m{i}")).collect::<Vec<_>>().join(", "),
+            (0..33).map(|i| format!("a->m{i} = x*{i};")).collect::<String>()
+        ),
+    );
+    assert!(message.contains("33 outputs"), "{message}");
+}
+
+/// A pointer that changes in a loop that stays a loop, and what it points to: known within an iteration, lost between iterations.
+#[test]
+fn loses_pointers_between_iterations() {
+    check(
+        "loses_pointers_between_iterations",
+        r#"float step(float x, int n) {
+  float a[3] = { x, 1.0f, 2.0f }, b[3] = { 4.0f, x, 5.0f };
+  const char *said = 0; float sum = 0;
+  for (int i = 0; i < 500 && i < n; i++) {
+    const float *p = (i & 1) ? a : a + 1;
+    said = "even"; sum = 0.5f*sum + *p;
+    p = b; sum += p[2]*0.125f;
+    if (sum > 100.0f) said = "large";
+  }
+  return sum; }
+"#,
+    );
+    let message = refused(
+        "refuses_a_lost_pointer",
+        r#"float step(float x, int n) {
+  float a = x, b = 2.0f*x, sum = 0; float *p = &a;
+  for (int i = 0; i < 500 && i < n; i++) {
+    sum = 0.5f*sum + *p;
+    p = &b; }
+  return sum; }
+"#,
+    );
+    for part in [":4:", "`p` is a pointer to several objects in a loop"] {
+        assert!(message.contains(part), "{message}");
+    }
+}
+
+/// Objects of a call end with it: others take their places, and pointers to them are known to point nowhere.
+#[test]
+fn forgets_variables_of_calls() {
+    check(
+        "forgets_variables_of_calls",
+        r#"static const float *kept; static const char *text;
+static float f(float x) { float a[4] = { x, 1, 2, 3 }; kept = a; if (x > 0) text = "plus"; else text = "minus"; return kept[1] + a[0]; }
+static float g(float x) { float b[4] = { 7, x, 8, 9 }; for (int i = 0; i < 4; i++) b[i] *= x; return b[1] + b[3]; }
+float step(float x, float y) { float r = f(x); if (y > 0) r += g(y); else r -= f(y) + g(x); return r + f(r); }
+"#,
+    );
+    let message = refused(
+        "refuses_a_pointer_that_dangles",
+        r#"static int *f(int x) { int a = x; return &a; }
+int step(int x) {
+  int *p = f(x);
+  return *p; }
+"#,
+    );
+    for part in [":3:", "a variable of a function that has returned"] {
+        assert!(message.contains(part), "{message}");
+    }
+}
+
 #[test]
 fn switches() {
     check(

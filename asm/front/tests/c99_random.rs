@@ -3,7 +3,7 @@
 #![allow(clippy::print_stdout)]
 
 use crate::c99::word;
-use crate::common::gcc::{Program, compiled, difference, emulated, folder, translated_text};
+use crate::common::gcc::{Program, compiled, difference, emulated, folder, run, translated_text};
 use rand_pcg::Pcg32;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 use std::fmt::Write as _;
@@ -457,4 +457,79 @@ fn programs_compute_what_gcc_does() {
     println!(
         "figures: programs={count} refused={refused} with_branches={branches} with_loops={loops} with_arrays={memory}"
     );
+}
+
+/// The text with one line of the period changed, the first for which there is a change.
+fn planted(text: &str, change: fn(&str) -> Option<String>) -> Option<String> {
+    let at = text.find("\nperiod:\n")?;
+    let (head, code) = text.split_at(at + 9);
+    let mut done = false;
+    let lines = code.split_inclusive('\n').map(|line| {
+        let changed = if done { None } else { change(line.split(';').next().unwrap_or(line)) };
+        done |= changed.is_some();
+        changed.map_or_else(|| line.to_owned(), |line| line.trim_end().to_owned() + "\n")
+    });
+    let code: String = lines.collect();
+    done.then(|| head.to_owned() + &code)
+}
+
+/// `a ? b : c` with its alternatives exchanged, where the line has one choice.
+fn exchanged(line: &str) -> Option<String> {
+    let (condition, rest) = line.split_once(" ? ")?;
+    let (yes, no) = rest.split_once(" : ")?;
+    let single = !rest.contains('?') && !condition.contains(['(', '?']) && !no.contains(')');
+    single.then(|| format!("{condition} ? {} : {yes}", no.trim_end()))
+}
+
+/// A cut to a narrow type that is gone.
+fn uncut(line: &str) -> Option<String> {
+    let cuts = [
+        ("<< 24) >> 24", "<< 0) >> 0"),
+        ("<< 16) >> 16", "<< 0) >> 0"),
+        ("& 255", "& -1"),
+        ("& 65535", "& -1"),
+    ];
+    cuts.iter().find(|(cut, _)| line.contains(cut)).map(|(cut, none)| line.replacen(cut, none, 1))
+}
+
+/// A store into an array that is gone.
+fn unstored(line: &str) -> Option<String> {
+    let (place, _) = line.split_once(" = ")?;
+    place.contains('[').then(String::new)
+}
+
+/// Faults of a translation, planted into its text, are noticed: exchanged alternatives, a lost cut to a narrow type, a lost store.
+#[test]
+fn faults_of_the_translation_are_noticed() {
+    let folder = folder("planted");
+    let kinds: [(&str, fn(&str) -> Option<String>); 3] =
+        [("exchanged", exchanged), ("uncut", uncut), ("unstored", unstored)];
+    let mut counts = [(0, 0); 3];
+    let mut ready = Vec::new();
+    for seed in 0..60 {
+        let program = generated(seed);
+        let source = Source { name: format!("{}.c", program.name), text: program.code.clone() };
+        let Ok(translation) = translated_text(&program, source) else { continue };
+        let mut random = Pcg32::seed_from_u64(seed);
+        let row = |_| translation.inputs.iter().map(|port| word(&mut random, port.float)).collect();
+        let inputs: Vec<Vec<u32>> = (0..PERIODS).map(row).collect();
+        ready.push((program, translation, inputs));
+    }
+    let batch: Vec<_> =
+        ready.iter().map(|(program, text, inputs)| (program, text, inputs.as_slice())).collect();
+    let expected = compiled(&batch, &folder);
+    for ((program, translation, inputs), expected) in ready.iter().zip(&expected) {
+        for ((_, change), (of, noticed)) in kinds.iter().zip(&mut counts) {
+            let Some(text) = planted(&translation.text, *change) else { continue };
+            let changed = Translation { text, ..translation.clone() };
+            let Ok(found) = run(&changed, &T3, inputs) else { continue };
+            *of += 1;
+            *noticed += usize::from(difference(program, &changed, inputs, expected, &found).is_some());
+        }
+    }
+    let _ = std::fs::remove_dir_all(folder);
+    for ((kind, _), (of, noticed)) in kinds.iter().zip(counts) {
+        println!("figures: kind={kind} planted={of} noticed={noticed}");
+        assert!(noticed >= 5 && 4 * noticed > of, "{kind}: {noticed} of {of}");
+    }
 }

@@ -6,6 +6,11 @@ from pathlib import Path
 
 import casadi as ca
 
+sys.path.append(str(Path(__file__).parents[1]))
+from reference import Robot, Textbook  # noqa: E402
+
+PANDA = Path(__file__).parents[4] / "programs/examples/panda/panda.urdf"
+
 
 def write(folder, name, function):
     """C of a function, and a step whose parameters are its inputs and outputs."""
@@ -31,37 +36,12 @@ void step({", ".join(parameters)})
     print(name)
 
 
-def arm():
-    """Inverse dynamics of an arm of six axes, by Newton and Euler, with numbers for links."""
-    q, v, a = (ca.SX.sym(n, 6) for n in "qva")
-    axes = [(0, 0, 1), (0, 1, 0), (0, 1, 0), (1, 0, 0), (0, 1, 0), (1, 0, 0)]
-    at = [(0, 0, 0.3), (0, 0.1, 0.2), (0.05, 0, 0.4), (0.3, 0, 0.02), (0.1, 0, 0), (0.1, 0, 0)]
-    def skew(x):
-        return ca.skew(x)
-    def turn(axis, angle):
-        k = skew(ca.DM(axis))
-        return ca.DM.eye(3) + ca.sin(angle) * k + (1 - ca.cos(angle)) * (k @ k)
-    w, dw, acc = ca.SX.zeros(3), ca.SX.zeros(3), ca.DM([0, 0, 9.81])
-    links = []
-    for i in range(6):
-        r, p = turn(axes[i], q[i]), ca.DM(at[i])
-        axis = ca.DM(axes[i])
-        acc = r.T @ (acc + ca.cross(dw, p) + ca.cross(w, ca.cross(w, p)))
-        w, dw = r.T @ w + axis * v[i], r.T @ dw + axis * a[i] + ca.cross(r.T @ w, axis * v[i])
-        m, c, inertia = 3.0 / (i + 1), ca.DM([0.05, 0.02 * i, 0.1]), ca.diag(ca.DM([0.1, 0.08, 0.05]) / (i + 1))
-        force = m * (acc + ca.cross(dw, c) + ca.cross(w, ca.cross(w, c)))
-        moment = inertia @ dw + ca.cross(w, inertia @ w) + ca.cross(c, force)
-        links.append((r, p, force, moment))
-    tau, f, n = [None] * 6, ca.SX.zeros(3), ca.SX.zeros(3)
-    for i in reversed(range(6)):
-        r, p, force, moment = links[i]
-        if i + 1 < 6:
-            r1, p1 = links[i + 1][0], links[i + 1][1]
-            f, n = force + r1 @ f, moment + r1 @ n + ca.cross(p1, r1 @ f)
-        else:
-            f, n = force, moment
-        tau[i] = ca.dot(n, ca.DM(axes[i]))
-    return ca.Function("rnea", [q, v, a], [ca.vertcat(*tau)], ["q", "v", "a"], ["tau"])
+def panda():
+    """Inverse dynamics of a Panda, of seven axes, by Newton and Euler."""
+    names = [f"panda_joint{i}" for i in range(1, 8)]
+    robot = Robot({"urdf": str(PANDA), "joints": names, "base": "panda_link0", "tip": "panda_hand"})
+    q, v, a = (ca.SX.sym(name, 7) for name in "qva")
+    return ca.Function("rnea", [q, v, a], [ca.cse(Textbook(robot).rnea(q, v, a))], ["q", "v", "a"], ["tau"])
 
 
 def shooting():
@@ -90,11 +70,22 @@ def filter_step():
     return ca.Function("kalman", [x, p, y], [xp + k @ (y - c @ xp), pp - k @ c @ pp], ["x", "p", "y"], ["xn", "pn"])
 
 
+def program():
+    """A quadratic program, solved with its active set by CasADi's own QRQP."""
+    x, p = ca.SX.sym("x", 3), ca.SX.sym("p", 3)
+    problem = {"x": x, "p": p, "f": ca.sumsqr(x - p) + 0.5 * x[0] * x[1], "g": x[0] + x[1] + x[2]}
+    quiet = {name: False for name in ("print_iter", "print_header", "print_info", "error_on_fail")}
+    solver = ca.qpsol("solver", "qrqp", problem, quiet | {"constr_viol_tol": 1e-5, "dual_inf_tol": 1e-5, "max_iter": 40})
+    p = ca.MX.sym("p", 3)
+    return ca.Function("program", [p], [solver(p=p, lbx=0, ubx=1, lbg=0.2, ubg=2)["x"]], ["p"], ["x"])
+
+
 def main():
     folder = Path(sys.argv[1])
-    write(folder, "rnea", arm())
+    write(folder, "rnea", panda())
     write(folder, "shooting", shooting())
     write(folder, "kalman", filter_step())
+    write(folder, "program", program())
 
 
 main()

@@ -99,21 +99,23 @@ pub(crate) fn emulated(
     machine: &'static Machine,
     inputs: &[Vec<u32>],
 ) -> Vec<Vec<u32>> {
+    run(translation, machine, inputs).unwrap_or_else(|error| {
+        panic!("{} on {}: {error}\n{}\n{}", program.name, machine.name, translation.text, program.code)
+    })
+}
+
+/// The same, or the reason why the source is not assembled or does not run to its end.
+pub(crate) fn run(
+    translation: &Translation,
+    machine: &'static Machine,
+    inputs: &[Vec<u32>],
+) -> Result<Vec<Vec<u32>>, String> {
     let loader = Search::new(MemoryLoader::default()).library(takt_programs::LIBRARY);
     let machine = machine.holding(16_384, 8_192).expect("memories");
     let options = Assembling { machine, effort: 0, ..Assembling::default() };
     let text = translation.text.clone().into_bytes();
     let assembled = takt_asm::assemble_bytes("c.s", text, &loader, &options);
-    let assembled = assembled.unwrap_or_else(|errors| {
-        panic!(
-            "{} on {}: {}\n{}\n{}",
-            program.name,
-            machine.name,
-            errors.render(false),
-            translation.text,
-            program.code
-        )
-    });
+    let assembled = assembled.map_err(|errors| errors.render(false))?;
     let mut emulator = Emulator::new(&assembled.program).expect("it fits");
     let mut rows = Vec::new();
     for row in inputs {
@@ -123,21 +125,22 @@ pub(crate) fn emulated(
             .zip(row)
             .map(|(port, word)| (port.name.as_str(), Number::Bits(*word)))
             .collect();
-        emulator.run_period(&set).unwrap_or_else(|error| {
-            panic!("{} on {}: {error:?}\n{}\n{}", program.name, machine.name, translation.text, program.code)
-        });
+        emulator.run_period(&set).map_err(|error| format!("{error:?}"))?;
         let word = |port: &takt_front::c::Port| {
             let port = emulator.output_port(&port.name).unwrap_or_else(|| panic!("no port {}", port.name));
-            emulator.output_bits(port.register).expect("written")
+            emulator.output_bits(port.register).ok_or("an output that nothing writes")
         };
-        rows.push(translation.outputs.iter().map(word).collect());
+        rows.push(translation.outputs.iter().map(word).collect::<Result<Vec<u32>, &str>>()?);
     }
-    rows
+    Ok(rows)
 }
 
 /// The signature's parameters: type, name and elements.
 fn parameters(code: &str, step: &str) -> (String, Vec<(String, String, Option<usize>)>) {
-    let at = code.find(&format!("{step}(")).unwrap_or_else(|| panic!("no {step} in {code}"));
+    let begins = |at: &usize| !code[..*at].ends_with(|c: char| c.is_alphanumeric() || c == '_');
+    let call = format!("{step}(");
+    let mut places = code.match_indices(call.as_str()).map(|(at, _)| at);
+    let at = places.find(begins).unwrap_or_else(|| panic!("no {step} in {code}"));
     let line = code[..at].rfind(['\n', '}', ';']).map_or(0, |at| at + 1);
     let result = code[line..at].trim().trim_start_matches("static ").to_owned();
     let list = &code[at + step.len() + 1..];
