@@ -122,11 +122,14 @@ fn kernels_beside_assembly() {
     let library = std::fs::read_to_string(root.join("docs/library.md")).expect("docs/library.md");
     let folder = folder("kernels");
     let mut table = "| kernel | by hand | from C | |\n|---|---|---|---|\n".to_owned();
-    for name in ["cosf", "deg2rad", "fir2dim", "iir", "lms", "ludcmp", "minver", "st"] {
-        let code = format!(
-            "#ifndef __TAKT__\n#define __TAKT__ 1\n#endif\n#define KERNEL_{name} 1\n{kernels}\n\
-             float checked(int n) {{ kernel(); return result[(unsigned)n % RESULTS]; }}\n"
-        );
+    for name in ["cosf", "deg2rad", "fir2dim", "iir", "lms", "ludcmp", "minver", "st", "qp"] {
+        let code = match name {
+            "qp" => read("qp.c"),
+            _ => format!(
+                "#ifndef __TAKT__\n#define __TAKT__ 1\n#endif\n#define KERNEL_{name} 1\n{kernels}\n\
+                 float checked(int n) {{ kernel(); return result[(unsigned)n % RESULTS]; }}\n"
+            ),
+        };
         // Results that the kernel leaves in memory, of known inputs.
         let mut program = Program::new(name, &code);
         (program.step, program.init) = ("checked".to_owned(), Some("prepare".to_owned()));
