@@ -9,4 +9,5 @@ mod dependence;
 mod enclosures;
 mod parameters;
 mod refined;
+mod shipped;
 mod trace;

@@ -27,4 +27,12 @@
 period: force = max(min(KX*(x - x_ref) + KV*v + KA*angle + KR*rate + s, FMAX), -FMAX)
         s = s + (x - x_ref)*(KI*T)
         wait    period
+
+; For `takt accuracy`: a track of 2 m, a cart of at most 5 m/s, and a pendulum that turns within 20 rad/s.
+.range  x = -1, 1
+.range  v = -5, 5
+.range  angle = -pi, pi
+.range  rate = -20, 20
+.range  x_ref = -1, 1
+.range  s = -20, 20                     ; more than FMAX does nothing
 ; SPDX-License-Identifier: MIT OR Apache-2.0
