@@ -763,3 +763,86 @@ fn neovim_uses_the_language_server() {
     );
     assert_eq!(code("tracking.s"), code(&source("tracking.s")));
 }
+
+/// Signature help names the operand that is typed: of instructions, macros, functions and directives.
+#[test]
+fn operands_are_shown_in_their_order() {
+    let mut session = Session::new(&[("main.s", MAIN), ("part.s", PART)]);
+    session.open("main.s", MAIN);
+    let mut told = |from: &str, to: &str| {
+        let text = session.edit("main.s", MAIN, from, to);
+        let at = json!({ "textDocument": { "uri": session.uri("main.s") }, "position": position(&text, to, to.len()) });
+        let help = session.ask("textDocument/signatureHelp", at);
+        session.edit("main.s", &text, to, from);
+        let Some(signature) = help["signatures"].get(0) else { return String::new() };
+        let label: Vec<u16> = signature["label"].as_str().unwrap().encode_utf16().collect();
+        let active = help["activeParameter"].as_u64().unwrap() as usize;
+        let range = signature["parameters"][active]["label"].as_array().cloned().unwrap_or_default();
+        let range: Vec<usize> = range.iter().map(|end| end.as_u64().unwrap() as usize).collect();
+        let operand = if let [from, to] = range[..] { &label[from..to] } else { &[] };
+        format!("{} | {}", String::from_utf16(&label).unwrap(), String::from_utf16(operand).unwrap())
+    };
+    assert_eq!(told("fadd    F, p1, p2", "fadd    F, p1, "), "fadd d, a, b | b");
+    assert_eq!(told("fadd    F, p1, p2", "fadd "), "fadd d, a, b | d");
+    assert_eq!(told("scale   p{i}, 2", "scale   p{i}, "), "scale to, by | by");
+    assert_eq!(told("fadd    F, p1, p2", "F = p1 + max(p2, "), "max(a, …) | …");
+    assert_eq!(told("fadd    F, p1, p2", "F = p1 + sqrt(max(p2, 1) + "), "sqrt(a) | a");
+    assert!(told(".rep i, 1, 3", ".rep i, ").starts_with(".rep "));
+    assert_eq!(told("fadd    F, p1, p2", "fadd"), "", "before a blank, completion helps");
+    assert_eq!(told("fadd    F, p1, p2", "; fadd F, "), "");
+    session.end();
+}
+
+/// Links, names of all programs, selections and formatting at the end of a line.
+#[test]
+fn places_are_linked_found_and_selected() {
+    let mut session = Session::new(&[("main.s", MAIN), ("part.s", PART)]);
+    session.open("main.s", MAIN);
+    let document = json!({ "uri": session.uri("main.s") });
+    let links = session.ask("textDocument/documentLink", json!({ "textDocument": document }));
+    assert_eq!(links[0]["target"], *session.uri("part.s"));
+    assert_eq!(links.as_array().unwrap().len(), 1);
+
+    let names = |found: &Value| -> Vec<String> {
+        found.as_array().unwrap().iter().map(|one| one["name"].as_str().unwrap().to_owned()).collect()
+    };
+    assert_eq!(names(&session.ask("workspace/symbol", json!({ "query": "SCL" }))), ["scale"]);
+    let all = names(&session.ask("workspace/symbol", json!({ "query": "" })));
+    assert!(
+        ["F", "K", "p{i}", "never", "period"].iter().all(|name| all.iter().any(|one| one == name)),
+        "{all:?}"
+    );
+
+    let at = position(MAIN, "i*K", 1);
+    let chain =
+        session.ask("textDocument/selectionRange", json!({ "textDocument": document, "positions": [at] }));
+    let (mut selected, mut next) = (Vec::new(), &chain[0]);
+    let lines: Vec<&str> = MAIN.split('\n').collect();
+    while !next.is_null() {
+        let (start, end) = (&next["range"]["start"], &next["range"]["end"]);
+        let (first, last) =
+            (start["line"].as_u64().unwrap() as usize, end["line"].as_u64().unwrap() as usize);
+        let column = |at: &Value| at["character"].as_u64().unwrap() as usize;
+        selected.push(match first == last {
+            true => lines[first][column(start)..column(end)].to_owned(),
+            false => format!("{} … {}", lines[first], lines[last]),
+        });
+        next = &next["parent"];
+    }
+    let wanted = ["i", "i*K", "fmul    p{i}, x, i*K", "        fmul    p{i}, x, i*K", ".rep i, 1, 3 … .endr"];
+    assert_eq!(selected[..5], wanted);
+    assert_eq!(selected.last().unwrap(), ".include \"part.s\" … ");
+
+    let text = session.edit("main.s", MAIN, "        fadd    F, p1, p2\n", "fadd F,p1 ,p2\n");
+    let line = position(&text, "fadd F,p1", 0)["line"].as_u64().unwrap();
+    let edits = session.ask(
+        "textDocument/onTypeFormatting",
+        json!({
+            "textDocument": document, "position": { "line": line + 1, "character": 0 }, "ch": "\n",
+            "options": { "tabSize": 8, "insertSpaces": true },
+        }),
+    );
+    assert_eq!(edits.as_array().unwrap().len(), 1);
+    assert_eq!(edits[0]["newText"], "        fadd    F, p1, p2");
+    session.end();
+}

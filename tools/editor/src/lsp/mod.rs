@@ -17,6 +17,7 @@ mod outline;
 mod pipeline;
 mod program;
 mod requests;
+mod signature;
 mod text;
 mod timing;
 mod uri;

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Structure of a file: document symbols, folds, semantic tokens.
+//! Structure of a file: document symbols, folds, selections, semantic tokens.
 
 use crate::lsp::program::{File, Front};
 use crate::lsp::text::{Encoding, width};
 use lsp_types::{
-    DocumentSymbol, FoldingRange, FoldingRangeKind, Range, SemanticToken, SemanticTokenModifier,
-    SemanticTokenType, SymbolKind as ValueNotations,
+    DocumentSymbol, FoldingRange, FoldingRangeKind, Range, SelectionRange, SemanticToken,
+    SemanticTokenModifier, SemanticTokenType, SymbolKind as ValueNotations,
 };
 use std::collections::BTreeMap;
 use takt_asm::Directive;
@@ -44,6 +44,19 @@ pub(crate) fn head_line(file: &File, name: &str) -> Option<u32> {
     line.map(|line| line as u32)
 }
 
+/// Kind of a symbol in the protocol; `None` for names within a macro or a repetition.
+pub(crate) fn protocol_kind(kind: SymbolKind) -> Option<ValueNotations> {
+    Some(match kind {
+        SymbolKind::Register | SymbolKind::State => ValueNotations::VARIABLE,
+        SymbolKind::Input | SymbolKind::Output | SymbolKind::Tunable => ValueNotations::PROPERTY,
+        SymbolKind::Constant => ValueNotations::CONSTANT,
+        SymbolKind::Code => ValueNotations::METHOD,
+        SymbolKind::Data | SymbolKind::Array | SymbolKind::Table => ValueNotations::ARRAY,
+        SymbolKind::Macro => ValueNotations::FUNCTION,
+        SymbolKind::Parameter | SymbolKind::Count => return None,
+    })
+}
+
 /// Symbols that a file declares, and its sections.
 #[allow(deprecated, reason = "the protocol's type has the field")]
 pub(crate) fn symbols(front: &Front, file: &File, encoding: Encoding) -> Vec<DocumentSymbol> {
@@ -76,15 +89,7 @@ pub(crate) fn symbols(front: &Front, file: &File, encoding: Encoding) -> Vec<Doc
     // Enclosing macro: its last line, and its index in the list.
     let mut within: Option<(usize, usize)> = None;
     for ((start, end), what) in declared {
-        let kind = match what.kind {
-            SymbolKind::Register | SymbolKind::State => ValueNotations::VARIABLE,
-            SymbolKind::Input | SymbolKind::Output | SymbolKind::Tunable => ValueNotations::PROPERTY,
-            SymbolKind::Constant => ValueNotations::CONSTANT,
-            SymbolKind::Code => ValueNotations::METHOD,
-            SymbolKind::Data | SymbolKind::Array | SymbolKind::Table => ValueNotations::ARRAY,
-            SymbolKind::Macro => ValueNotations::FUNCTION,
-            SymbolKind::Parameter | SymbolKind::Count => continue,
-        };
+        let Some(kind) = protocol_kind(what.kind) else { continue };
         let line = file.text.line_of(start);
         let selection = file.text.range(start..end, encoding);
         let block = front.index.blocks.iter().find(|block| {
@@ -145,6 +150,77 @@ pub(crate) fn folds(front: &Front, file: &File) -> Vec<FoldingRange> {
     }
     out.sort_by_key(|fold| (fold.start_line, fold.end_line));
     out
+}
+
+/// Selections at a byte, each within the next: word, brackets, operand, operation, line, blocks, section, file.
+pub(crate) fn selection(front: &Front, file: &File, byte: usize, encoding: Encoding) -> SelectionRange {
+    let text = &file.text.text;
+    let lines = tokens::lines(text);
+    let number = file.text.line_of(byte);
+    let mut ranges: Vec<std::ops::Range<usize>> = Vec::new();
+    if let (Some(tokens), Some(line)) = (lines.get(number), file.text.line(number)) {
+        let holds = |range: &std::ops::Range<usize>| range.start <= byte && byte <= range.end;
+        ranges.extend(tokens.iter().map(|token| token.range.clone()).find(|range| holds(range)));
+        ranges.extend(brackets(text, tokens, byte));
+        let code: Vec<&Token> = tokens.iter().filter(|token| token.kind != TokenKind::Comment).collect();
+        for separators in
+            [&[TokenKind::Comma, TokenKind::Bars, TokenKind::Colon][..], &[TokenKind::Bars], &[]]
+        {
+            let mut groups = code.split(|token| separators.contains(&token.kind));
+            ranges.extend(groups.find_map(|group| {
+                let range = group.first()?.range.start..group.last()?.range.end;
+                holds(&range).then_some(range)
+            }));
+        }
+        ranges.push(line);
+    }
+    let from_to = |first: usize, last: usize| {
+        Some(file.text.line(first)?.start..file.text.line(last).map_or(text.len(), |line| line.end))
+    };
+    for block in &front.index.blocks {
+        let Some((of, bytes)) = front.files.place(block.open) else { continue };
+        let first = file.text.line_of(bytes.start);
+        if std::ptr::eq(&front.files.0[of], file) && (first..block.last_line as usize).contains(&number) {
+            ranges.extend(from_to(first, block.last_line as usize - 1));
+        }
+    }
+    for (_, range, end) in sections(file, &lines) {
+        let first = file.text.line_of(range.start);
+        if (first..=end).contains(&number) {
+            ranges.extend(from_to(first, end));
+        }
+    }
+    ranges.push(0..text.len());
+    ranges.sort_by_key(ExactSizeIterator::len);
+    // From the outermost inwards, each within the one before.
+    let mut found: Option<SelectionRange> = None;
+    let mut outer = 0..usize::MAX;
+    for range in ranges.into_iter().rev() {
+        if range != outer && outer.start <= range.start && range.end <= outer.end {
+            let parent = found.take().map(Box::new);
+            found = Some(SelectionRange { range: file.text.range(range.clone(), encoding), parent });
+            outer = range;
+        }
+    }
+    found.expect("the file itself is a selection")
+}
+
+/// Pairs of brackets of a line around a byte, with what stands between them and with the brackets.
+fn brackets(text: &str, tokens: &[Token], byte: usize) -> Vec<std::ops::Range<usize>> {
+    let (mut open, mut found) = (Vec::new(), Vec::new());
+    for token in tokens {
+        match &text[token.range.clone()] {
+            "(" | "[" => open.push(token.range.clone()),
+            ")" | "]" => {
+                let Some(begin) = open.pop() else { continue };
+                if begin.end <= byte && byte <= token.range.start {
+                    found.extend([begin.end..token.range.start, begin.start..token.range.end]);
+                }
+            }
+            _ => {}
+        }
+    }
+    found
 }
 
 /// Types and modifiers of semantic tokens, in the order announced to the client.

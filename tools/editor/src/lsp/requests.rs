@@ -4,14 +4,15 @@
 use crate::lsp::pipeline::{self, Pipeline, ProgramFacts};
 use crate::lsp::program::{AssemblyResult, CountedProgram, File, Front};
 use crate::lsp::text::Text;
-use crate::lsp::{Server, complete, diagnostics, hover, names, outline, timing, uri};
+use crate::lsp::{Server, complete, diagnostics, hover, names, outline, signature, timing, uri};
 use lsp_server::ErrorCode;
 use lsp_types::{
     CodeActionParams, CodeLens, Command, CompletionList, CompletionParams, DocumentFormattingParams,
-    DocumentHighlight, DocumentRangeFormattingParams, FoldingRangeParams, Hover, HoverContents, InlayHint,
-    InlayHintLabel, InlayHintParams, InlayHintTooltip, Location, MarkupContent, MarkupKind, Position, Range,
-    ReferenceParams, RenameParams, SemanticTokens, SemanticTokensParams, SemanticTokensRangeParams,
-    TextDocumentIdentifier, TextDocumentPositionParams, TextEdit, Uri, WorkspaceEdit,
+    DocumentHighlight, DocumentLink, DocumentOnTypeFormattingParams, DocumentRangeFormattingParams,
+    FoldingRangeParams, Hover, HoverContents, InlayHint, InlayHintLabel, InlayHintParams, InlayHintTooltip,
+    Location, MarkupContent, MarkupKind, Position, Range, ReferenceParams, RenameParams,
+    SelectionRangeParams, SemanticTokens, SemanticTokensParams, SemanticTokensRangeParams, SymbolInformation,
+    TextDocumentIdentifier, TextDocumentPositionParams, TextEdit, Uri, WorkspaceEdit, WorkspaceSymbolParams,
 };
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -22,6 +23,15 @@ use takt_asm::source::{Span, line_feeds};
 
 /// Error response: code and message.
 pub(crate) struct Failed(pub(crate) ErrorCode, pub(crate) String);
+
+/// Limit on the names of an answer to `workspace/symbol`.
+const SYMBOLS: usize = 500;
+
+/// A name contains the letters of a query in their order, whatever their case.
+fn within(query: &str, name: &str) -> bool {
+    let mut letters = name.chars().flat_map(char::to_lowercase);
+    query.chars().flat_map(char::to_lowercase).all(|wanted| letters.any(|letter| letter == wanted))
+}
 
 /// Deserialises the parameters of a message.
 pub(crate) fn parameters<P: DeserializeOwned>(method: &str, params: Value) -> Result<P, Failed> {
@@ -74,6 +84,35 @@ impl Server {
                 let params: FoldingRangeParams = parameters(method, params)?;
                 let here = self.request_context(&params.text_document.uri)?;
                 value(outline::folds(here.front, here.file))
+            }
+            "textDocument/selectionRange" => {
+                let params: SelectionRangeParams = parameters(method, params)?;
+                let here = self.request_context(&params.text_document.uri)?;
+                let of = |position| here.file.text.byte(position, self.client.encoding);
+                let places = params.positions.into_iter().map(of);
+                let ranges =
+                    places.map(|at| outline::selection(here.front, here.file, at, self.client.encoding));
+                value(ranges.collect::<Vec<_>>())
+            }
+            "textDocument/signatureHelp" => {
+                let (here, byte) = self.at(&parameters(method, params)?)?;
+                value(signature::signature(here.front, here.file, byte))
+            }
+            "textDocument/documentLink" => {
+                let document = self.document_of(&params)?;
+                value(self.links(&document)?)
+            }
+            "workspace/symbol" => {
+                let params: WorkspaceSymbolParams = parameters(method, params)?;
+                value(self.symbols(&params.query))
+            }
+            "textDocument/onTypeFormatting" => {
+                let params: DocumentOnTypeFormattingParams = parameters(method, params)?;
+                let at = params.text_document_position;
+                // The line that has ended: the cursor stands in the next.
+                let line = at.position.line.saturating_sub(1);
+                let ended = Range::new(Position::new(line, 0), Position::new(line, 0));
+                value(self.format(&at.text_document.uri, Some(ended))?)
             }
             "textDocument/semanticTokens/full" => {
                 let params: SemanticTokensParams = parameters(method, params)?;
@@ -200,6 +239,54 @@ impl Server {
         let mut spans: Vec<Span> = symbols.iter().map(|symbol| here.front.symbol(*symbol).span).collect();
         spans.dedup();
         Ok(spans.into_iter().filter_map(|span| self.location(here.front, span)).collect())
+    }
+
+    /// Links from `.include`s to their files.
+    fn links(&self, uri: &Uri) -> Result<Vec<DocumentLink>, Failed> {
+        let here = self.request_context(uri)?;
+        let links = here.front.index.includes.iter().filter_map(|(span, file)| {
+            let (of, range) = here.front.files.range(*span, self.client.encoding)?;
+            let to = here.front.files.0.get(*file)?;
+            let target = self.location(here.front, Span::new(to.base, to.base))?.uri;
+            std::ptr::eq(of, here.file).then(|| DocumentLink {
+                range,
+                target: Some(target),
+                tooltip: Some(to.name.to_string()),
+                data: None,
+            })
+        });
+        Ok(links.collect())
+    }
+
+    /// Names that the programs declare and whose letters contain those of a query, in their order.
+    #[allow(deprecated, reason = "the protocol's type has the field")]
+    fn symbols(&self, query: &str) -> Vec<SymbolInformation> {
+        let mut found: Vec<SymbolInformation> = Vec::new();
+        for program in self.programs.values() {
+            let front = &program.front;
+            for symbol in &front.index.symbols {
+                // As written, once for all expansions.
+                let name = front.files.text(symbol.span);
+                let kind = outline::protocol_kind(symbol.kind).filter(|_| within(query, name));
+                let (Some(kind), Some(location)) = (kind, self.location(front, symbol.span)) else {
+                    continue;
+                };
+                if found.len() == SYMBOLS || found.iter().any(|known| known.location == location) {
+                    continue;
+                }
+                let file = front.files.place(symbol.span).map(|(file, _)| &front.files.0[file]);
+                found.push(SymbolInformation {
+                    name: name.to_owned(),
+                    kind,
+                    tags: None,
+                    deprecated: None,
+                    location,
+                    container_name: file.map(|file| file.name.to_string()),
+                });
+            }
+        }
+        found.sort_by(|a, b| (a.name.len(), &a.name).cmp(&(b.name.len(), &b.name)));
+        found
     }
 
     /// All programs that contain a file.
