@@ -14,7 +14,7 @@
 //! there are as many operands (`a`, `b`, `c`) as its instructions have sources. If a machine's row uses only a part of the unit's
 //! functions, the ports are the same.
 
-use crate::files;
+use crate::{files, tables};
 use std::collections::BTreeMap;
 use std::fmt;
 use std::path::Path;
@@ -145,10 +145,10 @@ fn computes(unit: &Unit, row: &Row) -> bool {
 }
 
 impl Library {
-    /// Files embedded in this crate.
+    /// Files embedded in this crate, and the tables.
     pub fn builtin() -> Library {
         let files = files::UNITS.iter().map(|&(name, text)| (name.to_owned(), text.to_owned()));
-        Library { files: files.collect() }
+        Library { files: files.chain(tables::texts().iter().cloned()).collect() }
     }
 
     /// Reads the files of a folder and of its subfolder `common`.

@@ -10,6 +10,7 @@ pub mod reciprocal;
 pub mod sine;
 
 use std::fmt::Write;
+use std::sync::OnceLock;
 
 /// Read-only memory within a table's module.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -40,16 +41,28 @@ pub struct Table {
 /// # Errors
 /// A word beyond such a bound.
 pub fn checked() -> Result<Vec<Table>, String> {
-    let reciprocals = reciprocal::Tables::new();
-    reciprocals.check()?;
+    reciprocal::Tables::new().check()?;
     angle::check()?;
-    Ok(vec![
-        reciprocals.table(),
+    Ok(all())
+}
+
+fn all() -> Vec<Table> {
+    vec![
+        reciprocal::Tables::new().table(),
         sine::multiples(),
         sine::polynomials(),
         angle::arctangents(),
         angle::arccosines(),
-    ])
+    ]
+}
+
+/// Names of the tables' files in `units` and their texts, computed once: embedded, they would be a twentieth of the playground.
+pub(crate) fn texts() -> &'static [(String, String)] {
+    static TEXTS: OnceLock<Vec<(String, String)>> = OnceLock::new();
+    TEXTS.get_or_init(|| {
+        let file = |table: Table| (format!("common/{}.v", table.name), table.verilog());
+        all().into_iter().map(file).collect()
+    })
 }
 
 impl Table {

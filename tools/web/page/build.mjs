@@ -23,7 +23,7 @@ for (const name of ["index.html", "main.css", "main.js", "worker.js", "takt.wasm
   console.log(`${name.padEnd(14)} ${String(bytes.length).padStart(9)} bytes, ${String(size).padStart(9)} compressed`);
 }
 console.log(`${"all".padEnd(14)} ${" ".repeat(16)} ${String(total).padStart(9)} compressed`);
-const LIMIT = 2_050_000;
+const LIMIT = 2_000_000;
 if (total >= LIMIT) {
   console.error(`the page has ${total} bytes compressed; it may have ${LIMIT}`);
   process.exit(1);
