@@ -55,7 +55,7 @@ use takt_isa::{Machine, Program, T3};
 pub use banks::{Adjustment, Transfer};
 pub use contract::Contraction;
 pub use emit::spill::{SpilledValue, Spills};
-pub use expand::load::{FileLoader, LoadError, Loader, MemoryLoader, Open, Search};
+pub use expand::load::{EXTENSIONS, FileLoader, LoadError, Loader, MemoryLoader, Open, Search, is_source};
 pub use output::{disasm, format, image, listing, names};
 pub use takt_diagnostics::{Diagnostic, Diagnostics, Levels, diag, levels, machine, nearest, source};
 pub use takt_syntax::ast::{Directive, Operator};

@@ -337,6 +337,14 @@ fn system(error: std::io::Error) -> LoadError {
     }
 }
 
+/// Extensions of sources: Takt's own, and the one that assemblers share.
+pub const EXTENSIONS: [&str; 2] = ["tks", "s"];
+
+/// A file's name has an extension of sources.
+pub fn is_source(name: &str) -> bool {
+    name.rsplit_once('.').is_some_and(|(_, extension)| EXTENSIONS.contains(&extension))
+}
+
 impl Loader for FileLoader {
     fn names(&self, folder: &str) -> Vec<String> {
         if !Path::new(folder).components().all(|part| matches!(part, Component::Normal(_))) {
@@ -344,8 +352,7 @@ impl Loader for FileLoader {
         }
         let entries = std::fs::read_dir(self.root.join(folder)).into_iter().flatten().flatten();
         let names = entries.filter_map(|entry| entry.file_name().into_string().ok());
-        let mut names: Vec<String> =
-            names.filter(|name| name.ends_with(".s")).take(limits::CANDIDATES).collect();
+        let mut names: Vec<String> = names.filter(|name| is_source(name)).take(limits::CANDIDATES).collect();
         names.sort();
         names
     }

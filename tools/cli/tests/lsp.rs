@@ -703,6 +703,64 @@ fn cancelled_requests_are_not_answered() {
     session.end();
 }
 
+const GNU: &str = "\t.file \"a.c\"\n\t.text\n\t.globl main\nmain:\n\tret\n";
+
+/// Editors take `.tks` and what is written in Takt for sources, and leave GNU's assembly alone.
+#[test]
+fn editors_leave_other_assemblers_alone() {
+    let folder = Folder::new();
+    folder.write("gnu.s", GNU);
+    folder.write("takt.s", MAIN);
+    folder.write("own.tks", "; nothing yet\n");
+    let editors = concat!(env!("CARGO_MANIFEST_DIR"), "/../editors");
+    let path = |name: &str| folder.path().join(name);
+    for (file, is_own) in [("gnu.s", false), ("takt.s", true), ("own.tks", true)] {
+        let output = Command::new("nvim")
+            .args([
+                "--headless",
+                "--clean",
+                "-n",
+                "--cmd",
+                "filetype on",
+                "--cmd",
+                "lua vim.lsp.start = nil; vim.lsp.start_client = function() end",
+            ])
+            .args(["--cmd", &format!("luafile {editors}/neovim/takt.lua")])
+            .arg(path(file))
+            .args(["-c", "lua io.stdout:write(vim.bo.filetype)", "-c", "qall!"])
+            .env("XDG_STATE_HOME", folder.path())
+            .output()
+            .expect("nvim is there: `cargo xtask test` installs it");
+        let found = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert_eq!(
+            found == "takt",
+            is_own,
+            "Neovim, {file}: {found} {}",
+            String::from_utf8_lossy(&output.stderr)
+        );
+        let output = Command::new("emacs")
+            .args(["--batch", "-L", &format!("{editors}/emacs"), "--eval", "(require 'takt)"])
+            .arg(format!("--visit={}", path(file).display()))
+            .args(["--eval", "(princ major-mode)"])
+            .output()
+            .expect("emacs is there: `cargo xtask test` installs it");
+        let found = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert_eq!(
+            found == "takt-mode",
+            is_own,
+            "Emacs, {file}: {found} {}",
+            String::from_utf8_lossy(&output.stderr)
+        );
+    }
+    let helix = std::fs::read_to_string(format!("{editors}/helix/languages.toml")).unwrap();
+    assert!(helix.contains("file-types = [\"tks\"]"), "{helix}");
+    // The path that its first lines name exists in a copy of Takt.
+    let grammar =
+        helix.lines().find_map(|line| line.split_once("/path/to/takt/")).expect("the grammar's path");
+    let grammar = grammar.1.trim_end_matches(&['"', ' ', '}'][..]);
+    assert!(std::path::Path::new(editors).join("../..").join(grammar).is_dir(), "{grammar}");
+}
+
 /// Neovim's built-in client, from the first keystroke to the end.
 #[test]
 fn neovim_uses_the_language_server() {

@@ -33,7 +33,18 @@
   (setq-local indent-line-function #'indent-relative-first-indent-point))
 
 ;;;###autoload
-(add-to-list 'auto-mode-alist '("\\.s\\'" . takt-mode))
+(add-to-list 'auto-mode-alist '("\\.tks\\'" . takt-mode))
+
+(defun takt-source-p ()
+  "The buffer is a file *.s with a directive that GNU's assembler does not know."
+  (and buffer-file-name
+       (string-suffix-p ".s" buffer-file-name)
+       (save-excursion
+         (goto-char (point-min))
+         (re-search-forward "^[ \t]*\\.\\(period\\|once\\|schedule\\|ports\\|input\\|output\\|state\\|rep\\|endfor\\)\\>" 65536 t))))
+
+;;;###autoload
+(add-to-list 'magic-mode-alist '(takt-source-p . takt-mode))
 
 (defun takt--server (&rest _)
   "The command line of the language server."

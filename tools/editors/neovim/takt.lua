@@ -1,9 +1,17 @@
 -- Takt in Neovim: ~/.config/nvim/plugin/takt.lua
 local options = vim.g.takt_lsp_arguments or {}
 
+-- Sources of Takt are those called *.tks, and those called *.s that have a directive which GNU's assembler does not know.
+local own = vim.regex([[^\s*\.\(period\|once\|schedule\|ports\|input\|output\|state\|rep\|endfor\)\>]])
 vim.api.nvim_create_autocmd({ 'BufRead', 'BufNewFile' }, {
-  pattern = '*.s',
-  callback = function(event) vim.bo[event.buf].filetype = 'takt' end,
+  pattern = { '*.tks', '*.s' },
+  callback = function(event)
+    local is_own = vim.endswith(event.match, '.tks')
+    for _, line in ipairs(is_own and {} or vim.api.nvim_buf_get_lines(event.buf, 0, 1000, false)) do
+      is_own = is_own or own:match_str(line) ~= nil
+    end
+    if is_own then vim.bo[event.buf].filetype = 'takt' end
+  end,
 })
 
 -- Colours and folds by tree-sitter, if its parser is installed (docs/editors.md).

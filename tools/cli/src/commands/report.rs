@@ -74,7 +74,10 @@ impl Totals {
 /// Short name of a program for tables: the last part of its path, without the common extension.
 pub(crate) fn variant(name: &str) -> &str {
     let file = name.rsplit(['/', '\\']).next().unwrap_or(name);
-    file.strip_suffix(".s").unwrap_or(file)
+    match file.rsplit_once('.') {
+        Some((stem, extension)) if takt_asm::EXTENSIONS.contains(&extension) => stem,
+        _ => file,
+    }
 }
 
 /// Table 2 of the paper: platform, clock in MHz, period in µs.

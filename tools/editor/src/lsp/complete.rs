@@ -369,7 +369,7 @@ fn includes(wanted: &CompletionOptions<'_>, file: &File, before: &str, head: &To
     let beside = folder.and_then(|folder| std::fs::read_dir(folder).ok()).into_iter().flatten().flatten();
     let mut beside: Vec<String> = beside
         .filter_map(|entry| entry.file_name().into_string().ok())
-        .filter(|name| name.ends_with(".s"))
+        .filter(|name| takt_asm::is_source(name))
         .take(200)
         .collect();
     beside.sort();

@@ -88,7 +88,7 @@ impl Workspace {
                     name.to_string_lossy().starts_with('.') || name == "target" || name == "node_modules";
                 if about.is_dir() && depth > 0 && !hidden {
                     folders.push((path, depth - 1));
-                } else if about.is_file() && path.extension().is_some_and(|extension| extension == "s") {
+                } else if about.is_file() && name.to_str().is_some_and(takt_asm::is_source) {
                     let time = about.modified().ok();
                     let known = self.on_disk.remove(&path).filter(|known| known.0 == time && time.is_some());
                     let read = || {

@@ -3,6 +3,7 @@ import * as vscode from 'vscode';
 import { LanguageClient } from 'vscode-languageclient/node';
 import { Beside } from './beside';
 import type { Pipeline } from './pipeline';
+import { isSource } from './recognise';
 import { reason } from './reason';
 import { Status } from './status';
 import { COMMANDS, words, type Definition } from './tasks';
@@ -26,7 +27,7 @@ async function start() {
       documentSelector: [{ language: 'takt' }],
       // Owner of the problem matcher: diagnostics of the server replace those of a task for the same file, so that none appears twice.
       diagnosticCollectionName: 'takt',
-      synchronize: { fileEvents: vscode.workspace.createFileSystemWatcher('**/*.s') },
+      synchronize: { fileEvents: vscode.workspace.createFileSystemWatcher('**/*.{s,tks}') },
     },
   );
   client.registerFeature({
@@ -50,6 +51,11 @@ async function start() {
       if (chosen === open) void vscode.commands.executeCommand('workbench.action.openSettings', 'takt.command');
     });
   }
+}
+
+/** Starts the server with the first source of Takt: a window of other texts needs none. */
+async function begin() {
+  if (!client && vscode.workspace.textDocuments.some((document) => document.languageId === 'takt')) await start();
 }
 
 async function restart() {
@@ -108,6 +114,13 @@ const configurations: vscode.DebugConfigurationProvider = {
   },
 };
 
+/** A document called *.s with a directive that GNU's assembler does not know is a source of Takt; others stay as they are. */
+async function recognise(document: vscode.TextDocument) {
+  if (document.languageId !== 'takt' && document.fileName.endsWith('.s') && isSource(document.getText())) {
+    await vscode.languages.setTextDocumentLanguage(document, 'takt');
+  }
+}
+
 export async function activate(context: vscode.ExtensionContext) {
   const ask = async (uri: vscode.Uri) => {
     const textDocument = { uri: client!.code2ProtocolConverter.asUri(uri) };
@@ -118,6 +131,10 @@ export async function activate(context: vscode.ExtensionContext) {
   context.subscriptions.push(
     beside,
     status,
+    vscode.workspace.onDidOpenTextDocument(async (document) => {
+      await recognise(document);
+      await begin();
+    }),
     vscode.debug.registerDebugAdapterDescriptorFactory('takt', {
       createDebugAdapterDescriptor: () => new vscode.DebugAdapterExecutable(settings().program, ['dap']),
     }),
@@ -135,7 +152,8 @@ export async function activate(context: vscode.ExtensionContext) {
       if (change.affectsConfiguration('takt')) void restart();
     }),
   );
-  await start();
+  await Promise.all(vscode.workspace.textDocuments.map(recognise));
+  await begin();
 }
 
 export function deactivate() {
