@@ -378,6 +378,11 @@ impl Emulator {
         self.ticks.next()
     }
 
+    /// Cycles of the single ticks to come ([`Emulator::tick_at`]), ascending.
+    pub fn single_ticks(&self) -> impl Iterator<Item = Cycle> {
+        self.ticks.asked.iter().copied()
+    }
+
     /// Cycle of the tick that the program waits for: the next scheduled tick or, without one, the tick that [`Emulator::run_period`] would
     /// schedule, in the first cycle in which the front end has refilled. `None` if the program does not wait.
     pub fn due_tick(&self) -> Option<Cycle> {
@@ -389,6 +394,11 @@ impl Emulator {
     /// A tick came before the program waited: a deadline was missed since reset.
     pub fn deadline_missed(&self) -> bool {
         self.ticks.missed > 0
+    }
+
+    /// Number of ticks since reset that came before the program waited: remembered ones ([`crate::Statistics::missed`]), and lost ones.
+    pub fn missed_ticks(&self) -> u64 {
+        self.ticks.missed + self.ticks.lost
     }
 
     /// Handles the tick that the machine sees in `cycle`, before all else in that cycle. A tick starts the waiting program; the first tick

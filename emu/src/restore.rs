@@ -2,7 +2,7 @@
 //! Restores an emulated machine to the state of another one with the same program: a circuit, as far as a debugger can read it, or an
 //! emulator that waits for the tick.
 
-use crate::emulator::{Emulator, Front, IterationCounts, Recent, Status};
+use crate::emulator::{Emulator, Front, IterationCounts, MAX_CYCLE, Recent, Status};
 use crate::machine::{Loop, State};
 use std::collections::BTreeMap;
 use takt_isa::fp::Flags;
@@ -83,6 +83,17 @@ impl Emulator {
     ///
     /// Returns false, and changes nothing, if the program has no such state.
     pub fn resume(&mut self, saved: &WaitingState) -> bool {
+        let now = self.now.max(1);
+        self.resume_at(saved, now - 1, now)
+    }
+
+    /// Sets the machine to a state as [`Emulator::resume`] does, at the beginning of cycle `now`, with a `wait` that issued in `since`.
+    ///
+    /// Returns false, and changes nothing, if the program has no such state, or no machine such cycles.
+    pub fn resume_at(&mut self, saved: &WaitingState, since: Cycle, now: Cycle) -> bool {
+        if since >= now || now > MAX_CYCLE {
+            return false;
+        }
         let machine = self.program.machine;
         let bundle = self.program.bundle(saved.at).and_then(Result::ok);
         let Some(Flow::Wait(target)) = bundle.map(|bundle| Flow::of(&bundle)) else { return false };
@@ -114,8 +125,8 @@ impl Emulator {
         for (turns, &run) in self.turns.iter_mut().zip(&saved.turns) {
             *turns = IterationCounts { run, section: 0 };
         }
-        self.now = self.now.max(1);
-        self.wait_since(self.now - 1, saved.at, target);
+        self.now = now;
+        self.wait_since(since, saved.at, target);
         true
     }
 

@@ -317,6 +317,24 @@ impl Description {
         self.host_ports(|link| link.to, |field| &field.to)
     }
 
+    /// Input ports of cores that an input of the system drives, each with its core.
+    pub fn receivers(&self, input: &SystemPort) -> Vec<(usize, Register)> {
+        let mut found = Vec::new();
+        for (number, link) in self.links.iter().enumerate().filter(|(_, link)| link.from == End::Host) {
+            // Several wires may carry the same value of the host.
+            let is_driven = |(index, field): &(usize, &Field)| match link.kind {
+                LinkKind::Wire => field.from == input.name,
+                _ => (number, *index) == (input.link, input.field),
+            };
+            let driven = link.fields.iter().enumerate().filter(is_driven);
+            found.extend(driven.filter_map(|(_, field)| match link.to {
+                End::Core(core) => Some((core, field.input?)),
+                End::Host => None,
+            }));
+        }
+        found
+    }
+
     fn host_ports(&self, end: impl Fn(&Link) -> End, name: impl Fn(&Field) -> &String) -> Vec<SystemPort> {
         let mut ports: Vec<SystemPort> = Vec::new();
         for (number, link) in self.links.iter().enumerate().filter(|(_, link)| end(link) == End::Host) {

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! FIFO link: entries leave in the order in which they entered; refused pushes and pops are counted.
 
+use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 use takt_isa::timing::Cycle;
 
 use takt_isa::system::Status;
 
 /// Event counts of a FIFO.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct FifoCounts {
     /// Entries accepted by the FIFO.
     pub pushed: u64,
@@ -22,7 +23,7 @@ pub struct FifoCounts {
 }
 
 /// Entries of a FIFO and its counts.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Store {
     depth: u32,
     pub(crate) entries: VecDeque<Vec<u32>>,
@@ -88,7 +89,7 @@ impl Store {
 }
 
 /// FIFO between two sides that run ahead independently: the pending actions of each side, and the cycle up to which they are performed.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Fifo {
     pub(crate) store: Store,
     pushes: VecDeque<(Cycle, Vec<u32>)>,
@@ -100,6 +101,17 @@ pub(crate) struct Fifo {
 impl Fifo {
     pub(crate) fn new(depth: u32) -> Fifo {
         Fifo { store: Store::new(depth), ..Fifo::default() }
+    }
+
+    /// A FIFO of this depth, with so many fields, may be in this state, with all cycles up to `last`.
+    pub(crate) fn fits(&self, depth: u32, fields: usize, last: Cycle) -> bool {
+        let Fifo { store, pushes, pops, done } = self;
+        store.depth == depth
+            && store.entries.len() <= depth as usize
+            && store.entries.iter().all(|entry| entry.len() == fields)
+            && pushes.iter().all(|(cycle, entry)| *cycle <= last && entry.len() == fields)
+            && pops.iter().all(|cycle| *cycle <= last)
+            && *done <= last
     }
 
     pub(crate) fn push(&mut self, cycle: Cycle, entry: Vec<u32>) {

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Gate before a core's input pins: values arrive in several mailboxes, and one per cycle enters.
 
+use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 use takt_isa::timing::Cycle;
 
 /// Gate of one core. The waiting mailbox with the lowest number enters first. A mailbox holds the newest value.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Gate {
     /// Future arrivals by cycle, each with its mailbox and value.
     arrivals: VecDeque<(Cycle, usize, u32)>,
@@ -22,6 +23,14 @@ impl Gate {
         // Arrivals are nearly always in order.
         let place = self.arrivals.iter().rposition(|&(known, ..)| known <= cycle).map_or(0, |last| last + 1);
         self.arrivals.insert(place, (cycle, mailbox, value));
+    }
+
+    /// A gate with so many mailboxes may be in this state in cycle `now`, with all arrivals up to cycle `last`.
+    pub(crate) fn fits(&self, mailboxes: usize, now: Cycle, last: Cycle) -> bool {
+        let mut arrivals = self.arrivals.iter();
+        self.next <= now
+            && arrivals.all(|(cycle, mailbox, _)| *cycle <= last && *mailbox < mailboxes)
+            && self.waiting.iter().all(|(mailbox, _)| *mailbox < mailboxes)
     }
 
     /// Next cycle in which a value enters, as far as known; `None` if no arrival is pending.

@@ -6,4 +6,5 @@ mod file;
 mod latency;
 mod links;
 mod replay;
+mod restore;
 mod stale;

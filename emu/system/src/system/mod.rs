@@ -8,10 +8,13 @@
 
 mod host;
 mod links;
+mod restore;
 mod run;
 
 use crate::fifo::{Fifo, FifoCounts};
 use crate::gate::Gate;
+pub use restore::{Transit, WaitingSystem};
+use serde::{Deserialize, Serialize};
 use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
 use takt_emu::{Emulator, Event, Fault, LoadError, PeriodReport};
@@ -176,7 +179,7 @@ struct CoreState {
     last: Option<PeriodReport>,
 }
 
-#[derive(Clone)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 enum LinkState {
     Wire {
         /// Value that the sender's `wait` publishes, if its ports are latched.

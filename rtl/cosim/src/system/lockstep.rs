@@ -10,7 +10,9 @@ use takt_emu::Status;
 use takt_isa::timing::{Cycle, INPUT_DELAY};
 use takt_rtl::system::{Pin, PinKind, SystemPlan};
 use takt_rtl::verilog::Direction;
-use takt_system::{Description, HostAction, HostError, LinkEventKind, LinkKind, System, SystemFault};
+use takt_system::{
+    Description, HostAction, HostError, HostSide, LinkEventKind, LinkKind, System, SystemFault,
+};
 
 /// A system running on the emulator and on the circuit.
 ///
@@ -26,6 +28,18 @@ pub struct SystemLockstep {
     /// deliver, the host's next entry.
     working: Vec<BTreeMap<usize, u32>>,
     free: Vec<[Cycle; 2]>,
+}
+
+impl HostSide for SystemLockstep {
+    type Error = LockstepError;
+
+    fn act(&mut self, action: &HostAction) -> Result<bool, LockstepError> {
+        SystemLockstep::act(self, action)
+    }
+
+    fn system(&self) -> &System {
+        &self.system
+    }
 }
 
 impl SystemLockstep {

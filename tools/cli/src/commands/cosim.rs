@@ -5,7 +5,6 @@ use crate::run::application::Application;
 use crate::run::fault;
 use crate::run::parameters::ParameterArguments;
 use crate::run::ports;
-use crate::run::system::host::Host;
 use crate::run::system::{self, LoadedSystem};
 use crate::terminal::files::{self, Out};
 use crate::terminal::number;
@@ -24,6 +23,7 @@ use takt_emu::{Fault, Row, Status};
 use takt_isa::{MACHINES, Machine, Program};
 use takt_rtl::verilator::VerilatorError;
 use takt_rtl::{Design, Library, SystemDesign, export};
+use takt_system::Host;
 
 /// Run a program on the circuit, in Verilator, and on the emulator, and compare every cycle.
 ///

@@ -4,7 +4,6 @@
 pub(crate) mod analyse;
 pub(crate) mod controller;
 pub(crate) mod debug;
-pub(crate) mod host;
 pub(crate) mod observers;
 pub(crate) mod record;
 pub(crate) mod report;

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Recorded host actions of a system, in the table format that `takt run`, `cosim` and `debug` read.
 
-use super::host::Host;
 use crate::run::ports;
 use crate::terminal::files::Out;
 use anyhow::{Context, Result, bail};
 use std::path::Path;
 use takt_isa::timing::Cycle;
-use takt_system::{HostAction, System};
+use takt_system::{Host, HostAction, System};
 
 /// Maximum number of rows: a hundred seconds at a tick of 100 µs.
 const ROWS: usize = 1_000_000;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Run of a system, with one base tick per row of inputs.
 
-use super::host::Host;
 use super::observers::Observer;
 use crate::run::nan::NanWrites;
 use crate::run::outcome::{CoreOutcome, Execution, RunOutcome, SystemOutcome};
@@ -14,7 +13,7 @@ use takt_debug::trace::SystemTracer;
 use takt_emu::Row;
 use takt_isa::program::Port;
 use takt_isa::timing::Cycle;
-use takt_system::{Description, System};
+use takt_system::{Description, Host, System};
 
 pub(crate) struct SystemRun<'a, 't> {
     description: &'a Description,

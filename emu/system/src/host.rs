@@ -1,24 +1,31 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Host in a run of a system: one row of inputs and one row of outputs per base tick.
+//! Host of a system that works in rows: one row of inputs and one row of outputs in each base tick.
 
-use anyhow::Result;
-use takt_cosim::system::SystemLockstep;
-use takt_debug::system::TickActions;
+use crate::{Description, End, HostAction, HostError, Link, LinkKind, System, SystemPort};
+use takt_emu::Row;
 use takt_isa::program::Port;
 use takt_isa::{Register, Type};
-use takt_system::{Description, End, HostAction, LinkKind, System, SystemPort};
 
-/// A system that accepts host actions, or the two systems of a lockstep.
-pub(crate) trait HostSide {
+/// A system that accepts host actions, or a system and its circuit in lockstep.
+pub trait HostSide {
+    /// Reason why an action fails.
+    type Error;
+
     /// Executes a host action; see [`System::act`].
-    fn act(&mut self, action: &HostAction) -> Result<bool>;
+    ///
+    /// # Errors
+    /// If the system has no such input or link.
+    fn act(&mut self, action: &HostAction) -> Result<bool, Self::Error>;
 
+    /// The emulated system.
     fn system(&self) -> &System;
 }
 
 impl HostSide for System {
-    fn act(&mut self, action: &HostAction) -> Result<bool> {
-        Ok(System::act(self, action)?)
+    type Error = HostError;
+
+    fn act(&mut self, action: &HostAction) -> Result<bool, HostError> {
+        System::act(self, action)
     }
 
     fn system(&self) -> &System {
@@ -26,38 +33,32 @@ impl HostSide for System {
     }
 }
 
-impl HostSide for SystemLockstep {
-    fn act(&mut self, action: &HostAction) -> Result<bool> {
-        Ok(SystemLockstep::act(self, action)?)
-    }
-
-    fn system(&self) -> &System {
-        SystemLockstep::system(self)
-    }
-}
-
 /// Suffix of a column's name that tells whether a row pushes an entry into a FIFO.
 const PUSH: &str = "push";
 
-/// Host of a run: meanings of the table's columns.
-pub(crate) struct Host {
-    pub(crate) inputs: Vec<SystemPort>,
-    /// Snapshots that the host publishes.
-    snapshots: Vec<usize>,
-    /// FIFOs that the host pushes to.
-    pushes: Vec<usize>,
-    /// FIFOs that the host pops from.
-    pub(crate) pops: Vec<usize>,
-    pub(crate) outputs: Vec<SystemPort>,
+/// Host that writes and reads rows: meanings of the columns.
+#[derive(Clone, Debug)]
+pub struct Host {
+    /// Input ports of the system: the first columns of a row of inputs.
+    pub inputs: Vec<SystemPort>,
+    /// Snapshots that each row publishes, as indices of links.
+    pub snapshots: Vec<usize>,
+    /// FIFOs that a row may push to, as indices of links: the further columns of a row of inputs.
+    pub pushes: Vec<usize>,
+    /// FIFOs from which each row takes an entry, as indices of links.
+    pub pops: Vec<usize>,
+    /// Output ports of the system: the columns of a row of outputs.
+    pub outputs: Vec<SystemPort>,
 }
 
 impl Host {
-    pub(crate) fn new(description: &Description) -> Host {
-        let links = |wanted: &dyn Fn(&takt_system::Link) -> bool| -> Vec<usize> {
+    /// Host of a system.
+    pub fn new(description: &Description) -> Host {
+        let links = |wanted: &dyn Fn(&Link) -> bool| -> Vec<usize> {
             let numbered = description.links.iter().enumerate();
             numbered.filter(|(_, link)| wanted(link)).map(|(number, _)| number).collect()
         };
-        let fifo = |link: &takt_system::Link| matches!(link.kind, LinkKind::Fifo { .. });
+        let fifo = |link: &Link| matches!(link.kind, LinkKind::Fifo { .. });
         Host {
             inputs: description.inputs(),
             snapshots: links(&|link| link.is_snapshot() && link.from == End::Host),
@@ -68,8 +69,8 @@ impl Host {
     }
 
     /// Input columns, in the order of their values.
-    pub(crate) fn columns(&self, description: &Description) -> Vec<Port> {
-        // The table needs a register for each column; which one does not matter.
+    pub fn columns(&self, description: &Description) -> Vec<Port> {
+        // A table needs a register for each column; which one does not matter.
         let port = |name, ty| Port { name, register: Register::ZERO, ty };
         let inputs = self.inputs.iter().map(|input| port(input.name.clone(), input.ty));
         let pushes = self.pushes.iter().map(|link| port(Host::push_column(description, *link), Type::I));
@@ -77,12 +78,15 @@ impl Host {
     }
 
     /// Name of the push column of a FIFO.
-    pub(crate) fn push_column(description: &Description, link: usize) -> String {
+    pub fn push_column(description: &Description, link: usize) -> String {
         format!("{}.{PUSH}", description.links[link].name)
     }
 
     /// Executes the actions of a row; returns the number of rejected entries.
-    pub(crate) fn write(&self, system: &mut impl HostSide, row: &takt_emu::Row) -> Result<u64> {
+    ///
+    /// # Errors
+    /// If an action fails, as no action of a row with a value for each column does on a system itself.
+    pub fn write<S: HostSide>(&self, system: &mut S, row: &Row) -> Result<u64, S::Error> {
         let (inputs, pushes) = row.split_at(self.inputs.len());
         for (input, (_, bits)) in self.inputs.iter().zip(inputs) {
             system.act(&HostAction::Input { name: input.name.clone(), bits: *bits })?;
@@ -99,20 +103,11 @@ impl Host {
         Ok(refused)
     }
 
-    /// Actions of a row, for a debugger.
-    pub(crate) fn turn(&self, row: &takt_emu::Row) -> TickActions {
-        let (inputs, pushes) = row.split_at(self.inputs.len());
-        let inputs = self.inputs.iter().zip(inputs);
-        let pushes = self.pushes.iter().zip(pushes).filter(|(_, (_, push))| *push != 0);
-        TickActions {
-            inputs: inputs.map(|(input, (_, bits))| (input.name.clone(), *bits)).collect(),
-            publish: self.snapshots.clone(),
-            push: pushes.map(|(link, _)| *link).collect(),
-        }
-    }
-
     /// Outputs as the host sees them now. Pops one entry from each FIFO; `None` if the FIFO is empty.
-    pub(crate) fn read(&self, system: &mut impl HostSide) -> Result<Vec<Option<u32>>> {
+    ///
+    /// # Errors
+    /// If an action fails, as none does on a system itself.
+    pub fn read<S: HostSide>(&self, system: &mut S) -> Result<Vec<Option<u32>>, S::Error> {
         let value = |output: &SystemPort| system.system().field_bits(output.link, output.field);
         let mut values: Vec<Option<u32>> = self.outputs.iter().map(value).collect();
         for &link in &self.pops {
