@@ -45,6 +45,7 @@ pub mod plain;
 mod resolve;
 pub mod schedule;
 pub mod select;
+pub mod units;
 
 use banks::{copies, webs};
 use emit::{allocate, spill};

@@ -14,7 +14,6 @@ pub mod stale_reads;
 pub mod system;
 mod target;
 pub mod trace;
-pub mod units;
 pub mod value;
 #[cfg(feature = "tui")]
 pub mod view;

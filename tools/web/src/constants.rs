@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 use std::collections::{HashMap, HashSet};
 use takt_asm::AssembledProgram;
 use takt_asm::expr::Value as Number;
-use takt_debug::units;
+use takt_asm::units;
 use takt_diagnostics::diag::Sink;
 use takt_diagnostics::source::Source;
 use takt_syntax::ast::{Ast, DirectiveKind, Expr, Name, NodeKind, StatementKind};

@@ -8,7 +8,7 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use takt_asm::AssembledProgram;
-use takt_debug::units;
+use takt_asm::units;
 use takt_emu::{Emulator, Rows};
 use takt_isa::Program;
 use takt_programs::PLANTS;

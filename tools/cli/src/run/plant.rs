@@ -9,7 +9,7 @@ use crate::terminal::output::Failure;
 use anyhow::{Result, anyhow};
 use clap::Args;
 use std::path::{Path, PathBuf};
-use takt_debug::units;
+use takt_asm::units;
 use takt_diagnostics::Span;
 use takt_programs::plants::file::{Kind, TEXT_BYTES};
 use takt_programs::plants::{ClosedLoop, Interface, Plant, PlantFile};

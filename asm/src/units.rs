@@ -2,13 +2,13 @@
 //! Units of ports and constants. The language has none; by convention, the comment of a declaration begins with them, as in
 //! `.output u ; V`.
 
-use takt_asm::expr::Value as Number;
+use crate::expr::Value as Number;
 
 /// Maximum length of a unit in characters.
 const UNIT: usize = 12;
 
-/// Unit at the beginning of the comment on a port's declaration; `None` if the comment does not begin with one. `directive` is `.input`
-/// or `.output`.
+/// Unit at the beginning of the comment on a port's declaration; `None` if the comment does not begin with one. `directive` is `.input`,
+/// `.output` or `.param`.
 pub fn unit(sources: &[(String, String)], directive: &str, port: &str) -> Option<String> {
     let (at, names, comment) = declaration(sources, directive, port)?;
     let comment = comment?;
@@ -70,23 +70,100 @@ fn names_it(declared: &str, port: &str) -> bool {
     }
     let rest = port.strip_prefix(name);
     rest.is_some_and(|rest| {
-        !rest.is_empty() && rest.chars().all(|one| one.is_ascii_digit() || "[]".contains(one))
+        !rest.is_empty() && rest.chars().all(|one| one.is_ascii_digit() || "[,]".contains(one))
     })
 }
 
+/// SI base units in which [`SiUnit`] states units; the radian counts as one, as FMI has it.
+pub const SI: [&str; 6] = ["kg", "m", "s", "A", "K", "rad"];
+
+/// Unit in SI base units: a value `x` in it is `factor * x + offset` in these.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SiUnit {
+    /// Size of the unit.
+    pub factor: f64,
+    /// Value of its zero, other than 0 for a temperature alone.
+    pub offset: f64,
+    /// Exponents of the units of [`SI`].
+    pub exponents: [i8; SI.len()],
+}
+
+/// Zero of the Celsius scale, in K.
+const CELSIUS: f64 = 273.15;
+
+/// Unit symbols, each with its size and its exponents in [`SI`].
+const BASE: [(&str, f64, [i8; SI.len()]); 22] = [
+    ("m", 1.0, [0, 1, 0, 0, 0, 0]),
+    ("mm", 1e-3, [0, 1, 0, 0, 0, 0]),
+    ("um", 1e-6, [0, 1, 0, 0, 0, 0]),
+    ("µm", 1e-6, [0, 1, 0, 0, 0, 0]),
+    ("s", 1.0, [0, 0, 1, 0, 0, 0]),
+    ("ms", 1e-3, [0, 0, 1, 0, 0, 0]),
+    ("µs", 1e-6, [0, 0, 1, 0, 0, 0]),
+    ("g", 1e-3, [1, 0, 0, 0, 0, 0]),
+    ("kg", 1.0, [1, 0, 0, 0, 0, 0]),
+    ("A", 1.0, [0, 0, 0, 1, 0, 0]),
+    ("mA", 1e-3, [0, 0, 0, 1, 0, 0]),
+    ("V", 1.0, [1, 2, -3, -1, 0, 0]),
+    ("mV", 1e-3, [1, 2, -3, -1, 0, 0]),
+    ("W", 1.0, [1, 2, -3, 0, 0, 0]),
+    ("N", 1.0, [1, 1, -2, 0, 0, 0]),
+    ("J", 1.0, [1, 2, -2, 0, 0, 0]),
+    ("Hz", 1.0, [0, 0, -1, 0, 0, 0]),
+    ("rad", 1.0, [0, 0, 0, 0, 0, 1]),
+    ("°", std::f64::consts::PI / 180.0, [0, 0, 0, 0, 0, 1]),
+    ("°C", 1.0, [0, 0, 0, 0, 1, 0]),
+    ("K", 1.0, [0, 0, 0, 0, 1, 0]),
+    ("Ω", 1.0, [1, 2, -3, -2, 0, 0]),
+];
+
+/// Characters of a factor's power.
+const POWERS: &str = "²³⁴-0123456789^";
+
 /// The word is a product or quotient of powers of known unit symbols, at most [`UNIT`] characters long.
 fn is_unit(word: &str) -> bool {
-    const BASE: [&str; 22] = [
-        "m", "mm", "um", "µm", "s", "ms", "µs", "g", "kg", "A", "mA", "V", "mV", "W", "N", "J", "Hz", "rad",
-        "°", "°C", "K", "Ω",
-    ];
-    let powers = |one: char| "²³⁴-0123456789^".contains(one);
     !word.is_empty()
         && word.chars().count() <= UNIT
         && word.split(['/', '·', '*']).all(|factor| {
-            let factor = factor.trim_end_matches(powers);
-            BASE.contains(&factor)
+            let factor = factor.trim_end_matches(|one| POWERS.contains(one));
+            BASE.iter().any(|(symbol, ..)| *symbol == factor)
         })
+}
+
+/// Power as written behind a symbol: `²`, `2`, `^2`, `-1`, or nothing for 1.
+fn power(text: &str) -> Option<i8> {
+    let digits = text.strip_prefix('^').unwrap_or(text);
+    let plain = digits.replace('²', "2").replace('³', "3").replace('⁴', "4");
+    if plain.is_empty() { Some(1) } else { plain.parse().ok() }
+}
+
+/// A unit, as [`unit`] reads it, in SI base units; `None` if its meaning is not clear, as that of `V/rad·s`.
+pub fn si(unit: &str) -> Option<SiUnit> {
+    if unit == "°C" {
+        return Some(SiUnit { factor: 1.0, offset: CELSIUS, exponents: [0, 0, 0, 0, 1, 0] });
+    }
+    let mut si = SiUnit { factor: 1.0, offset: 0.0, exponents: [0; SI.len()] };
+    let mut is_below = false;
+    let mut rest = unit;
+    loop {
+        let end = rest.find(['/', '·', '*']).unwrap_or(rest.len());
+        let symbol = rest[..end].trim_end_matches(|one| POWERS.contains(one));
+        let (_, factor, exponents) = BASE.iter().find(|(known, ..)| *known == symbol)?;
+        let power = power(&rest[symbol.len()..end])?;
+        let power = if is_below { power.checked_neg()? } else { power };
+        si.factor *= factor.powi(i32::from(power));
+        for (sum, exponent) in si.exponents.iter_mut().zip(exponents) {
+            *sum = sum.checked_add(exponent.checked_mul(power)?)?;
+        }
+        let mut after = rest[end..].chars();
+        match after.next() {
+            None => return Some(si),
+            Some('/') => is_below = true,
+            Some(_) if is_below => return None,
+            Some(_) => {}
+        }
+        rest = after.as_str();
+    }
 }
 
 /// Unit at the beginning of a comment.
@@ -116,6 +193,33 @@ mod tests {
         assert_eq!(
             (of(".output", "tau4").as_deref(), of(".output", "a").as_deref()),
             (Some("N·m"), Some("m/s²"))
+        );
+    }
+    #[test]
+    fn units_in_si_units() {
+        let of = |unit| si(unit).map(|si| (si.factor, si.offset, si.exponents));
+        assert_eq!(of("rad/s"), Some((1.0, 0.0, [0, 0, -1, 0, 0, 1])));
+        assert_eq!(of("N·m"), Some((1.0, 0.0, [1, 2, -2, 0, 0, 0])));
+        assert_eq!(of("m/s²"), of("m*s^-2"));
+        assert_eq!(of("mm2"), Some((1e-3 * 1e-3, 0.0, [0, 2, 0, 0, 0, 0])));
+        assert_eq!(of("V/A"), of("Ω"));
+        assert_eq!((of("°C"), of("W/°C")), (Some((1.0, 273.15, [0, 0, 0, 0, 1, 0])), of("W/K")));
+        for unclear in ["V/rad·s", "m^", "m2-", "m99999", "s-128", "m/", "", "1/s"] {
+            assert_eq!(of(unclear), None, "{unclear}");
+        }
+        // 128 is no exponent, and no sum of exponents either.
+        assert_eq!((of("m64·m64"), of("V64")), (None, None));
+    }
+
+    #[test]
+    fn parameters_have_units() {
+        let source =
+            ".param kp = 2.0 range 0..50 ; V/rad\n.param K[2,2] = 1, 2, 3, 4 ; A: gains\n.param free = 1\n";
+        let sources = [("a.s".to_owned(), source.to_owned())];
+        let of = |name| unit(&sources, ".param", name);
+        assert_eq!(
+            (of("kp").as_deref(), of("K[1,2]").as_deref(), of("free")),
+            (Some("V/rad"), Some("A"), None)
         );
     }
 }
