@@ -20,6 +20,12 @@ const MANYLINUX: [&str; 5] =
 const TARGETS: [&str; 2] = ["x86_64-unknown-linux-musl", "aarch64-unknown-linux-musl"];
 /// Build folder of the static targets.
 const STATIC: &str = "target/static";
+/// Target of FMUs' library for Linux: glibc 2.17 and later, since a master that loads it has that C library.
+const FMU_LINUX: &str = "x86_64-unknown-linux-gnu";
+/// Target of FMUs' library for Windows.
+const FMU_WINDOWS: &str = "x86_64-pc-windows-gnu";
+/// Linker for Windows, from Debian's package `gcc-mingw-w64-x86-64`.
+const MINGW: &str = "x86_64-w64-mingw32-gcc";
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 /// The contents of a release.
@@ -80,8 +86,28 @@ pub(crate) fn release(arguments: &Arguments) -> Result<()> {
     sums(&out)
 }
 
+/// Builds the libraries of FMUs, which `takt fmu` looks for beside `takt`.
+fn fmu_libraries(venv: &Venv) -> Result<Vec<PathBuf>> {
+    const BUILD: [&str; 5] = ["--release", "--package", "takt-fmu", "--target-dir", STATIC];
+    let mut linux = venv.command("cargo-zigbuild")?;
+    linux.current_dir(root()).arg("zigbuild").args(BUILD);
+    run(linux.arg("--target").arg(format!("{FMU_LINUX}.2.17")))?;
+    let mut libraries = vec![root().join(STATIC).join(FMU_LINUX).join("release/libtakt_fmu.so")];
+    if run(Command::new("rustup").args(["target", "add", FMU_WINDOWS])).is_err() {
+        eprintln!("FMUs for Windows are left out: rustup cannot add the standard library of {FMU_WINDOWS}");
+        return Ok(libraries);
+    }
+    if !works(MINGW, "--version") {
+        apt_install(&["gcc-mingw-w64-x86-64"])?;
+    }
+    run(cargo().arg("build").args(BUILD).args(["--target", FMU_WINDOWS]))?;
+    libraries.push(root().join(STATIC).join(FMU_WINDOWS).join("release/takt_fmu.dll"));
+    Ok(libraries)
+}
+
 /// Builds `takt` for each target whose standard library is installed through rustup.
 fn binaries(venv: &Venv, out: &Path) -> Result<()> {
+    let libraries = fmu_libraries(venv)?;
     for target in TARGETS {
         if run(Command::new("rustup").args(["target", "add", target])).is_err() {
             eprintln!("{target} is left out: rustup cannot add its standard library");
@@ -103,6 +129,11 @@ fn binaries(venv: &Venv, out: &Path) -> Result<()> {
         fs::create_dir_all(&folder)?;
         let built = root().join(STATIC).join(target).join("release/takt");
         fs::copy(&built, folder.join("takt")).with_context(|| format!("cannot copy {}", built.display()))?;
+        for library in &libraries {
+            let file = library.file_name().context("a library has no name")?;
+            fs::copy(library, folder.join(file))
+                .with_context(|| format!("cannot copy {}", library.display()))?;
+        }
         for file in ["LICENSE-APACHE", "LICENSE-MIT", "README.md", "CHANGELOG.md"] {
             fs::copy(root().join(file), folder.join(file)).with_context(|| format!("cannot copy {file}"))?;
         }
