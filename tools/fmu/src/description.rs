@@ -3,7 +3,9 @@
 
 use crate::model::Model;
 use crate::variables::{Causality, TIME, Variable, free_name};
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
+use takt_asm::units::{self, SI, SiUnit};
 use takt_isa::Type;
 
 /// Version of the standard.
@@ -53,9 +55,49 @@ fn number(ty: Type, bits: u32, fmi: Fmi) -> String {
     }
 }
 
-/// Attributes of the value: its start, and its range.
+/// Unit of the time.
+const SECOND: &str = "s";
+
+/// Unit of a variable; integers have none in FMI.
+fn unit(variable: &Variable) -> Option<&str> {
+    variable.unit.as_deref().filter(|_| variable.ty == Type::F)
+}
+
+/// Definitions of all units, in SI base units where their meaning is known.
+fn unit_definitions(out: &mut String, model: &Model) {
+    let names: BTreeSet<&str> = model.variables.iter().filter_map(unit).chain([SECOND]).collect();
+    out.push_str("  <UnitDefinitions>\n");
+    for name in names {
+        let _ = match units::si(name) {
+            None => writeln!(out, "    <Unit name=\"{}\"/>", escape(name)),
+            Some(si) => {
+                writeln!(out, "    <Unit name=\"{}\"><BaseUnit{}/></Unit>", escape(name), base_unit(&si))
+            }
+        };
+    }
+    out.push_str("  </UnitDefinitions>\n");
+}
+
+/// Attributes of a unit in SI base units, without those that have their defaults.
+fn base_unit(si: &SiUnit) -> String {
+    let mut text = String::new();
+    for (name, exponent) in SI.iter().zip(si.exponents).filter(|(_, exponent)| *exponent != 0) {
+        let _ = write!(text, " {name}=\"{exponent}\"");
+    }
+    for (name, value, default) in [("factor", si.factor, 1.0), ("offset", si.offset, 0.0)] {
+        if value != default {
+            let _ = write!(text, " {name}=\"{value:?}\"");
+        }
+    }
+    text
+}
+
+/// Attributes of the value: its unit, its start, and its range.
 fn value_attributes(variable: &Variable, fmi: Fmi) -> String {
     let mut text = String::new();
+    if let Some(unit) = unit(variable) {
+        let _ = write!(text, " unit=\"{}\"", escape(unit));
+    }
     if let Some((low, high)) = variable.range {
         let (low, high) = (number(variable.ty, low, fmi), number(variable.ty, high, fmi));
         let _ = write!(text, " min=\"{low}\" max=\"{high}\"");
@@ -92,14 +134,16 @@ fn element(out: &mut String, reference: usize, variable: &Variable, fmi: Fmi) {
 
 /// The variables; the time is the first.
 fn variables(out: &mut String, model: &Model, fmi: Fmi) {
-    let time = free_name(&model.program, "time");
+    let time = free_name(&model.variables, "time");
     let attributes = format!(
-        "name=\"{time}\" valueReference=\"{TIME}\" description=\"Time, in seconds\" causality=\"independent\" variability=\"continuous\""
+        "name=\"{time}\" valueReference=\"{TIME}\" description=\"Time\" causality=\"independent\" variability=\"continuous\""
     );
     out.push_str("  <ModelVariables>\n");
     let _ = match fmi {
-        Fmi::Two => writeln!(out, "    <ScalarVariable {attributes}><Real/></ScalarVariable>"),
-        Fmi::Three => writeln!(out, "    <Float64 {attributes}/>"),
+        Fmi::Two => {
+            writeln!(out, "    <ScalarVariable {attributes}><Real unit=\"{SECOND}\"/></ScalarVariable>")
+        }
+        Fmi::Three => writeln!(out, "    <Float64 {attributes} unit=\"{SECOND}\"/>"),
     };
     for (index, variable) in model.variables.iter().enumerate() {
         element(out, index + 1, variable, fmi);
@@ -154,11 +198,13 @@ pub fn write(model: &Model, name: &str, identifier: &str, fmi: Fmi) -> String {
          <fmiModelDescription fmiVersion=\"{version}\" modelName=\"{}\" {token}=\"{}\" generationTool=\"Takt {}\" \
          variableNamingConvention=\"structured\">\n  \
          <CoSimulation modelIdentifier=\"{identifier}\" canHandleVariableCommunicationStepSize=\"false\"{memory} \
-         canGetAndSet{state}=\"true\" canSerialize{state}=\"true\"{step}/>\n  <LogCategories>\n",
+         canGetAndSet{state}=\"true\" canSerialize{state}=\"true\"{step}/>\n",
         escape(name),
         model.token(),
         env!("CARGO_PKG_VERSION"),
     );
+    unit_definitions(&mut out, model);
+    out.push_str("  <LogCategories>\n");
     for (category, meaning) in CATEGORIES {
         let _ = writeln!(out, "    <Category name=\"{category}\" description=\"{meaning}\"/>");
     }

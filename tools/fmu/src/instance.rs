@@ -2,14 +2,13 @@
 //! Instance of an FMU: an emulator, the values of the variables, and where in its life it stands. Nothing here knows which standard the
 //! master speaks.
 
+use crate::machine::Machine;
 use crate::model::Model;
 use crate::state::SavedState;
 use crate::variables::{Causality, Source, TIME};
 use std::sync::Arc;
-use takt_analysis::period::PERIOD_LIMIT;
-use takt_emu::{Emulator, LoadError, PeriodError, Stop};
-use takt_isa::timing::Cycle;
-use takt_isa::{Register, Type};
+use takt_emu::LoadError;
+use takt_isa::Type;
 
 /// Difference between a step size and a whole number of periods that rounding explains, in periods.
 const STEP_TOLERANCE: f64 = 1e-6;
@@ -111,19 +110,16 @@ impl Phase {
 /// Instance of an FMU.
 pub struct Instance {
     pub(crate) model: Arc<Model>,
-    pub(crate) emulator: Emulator,
+    pub(crate) machine: Machine,
     /// Bits of each variable's value, by index.
     pub(crate) values: Vec<u32>,
-    /// Registers of outputs, each with the index of its variable.
-    outputs: Vec<(usize, Register)>,
-    /// Index of the variable `cycles`; `missed` and `flags` follow.
-    cycles: usize,
+    /// Outputs, each with the index of its variable.
+    outputs: Vec<(usize, Source)>,
     pub(crate) phase: Phase,
     /// Time at which the simulation starts.
     pub(crate) start: f64,
     /// Number of periods so far.
     pub(crate) periods: u64,
-    pub(crate) missed: u64,
     digest: u128,
 }
 
@@ -131,25 +127,17 @@ impl Instance {
     /// Instance of a model.
     ///
     /// # Errors
-    /// If the machine cannot hold the program.
+    /// If a machine cannot hold its program.
     pub fn new(model: Arc<Model>) -> Result<Instance, LoadError> {
-        let emulator = Emulator::new(&model.program)?;
         let variables = model.variables.iter().enumerate();
-        let outputs = variables.filter_map(|(index, variable)| match (variable.causality, variable.source) {
-            (Causality::Output, Source::Port(register)) => Some((index, register)),
-            _ => None,
-        });
-        let outputs = outputs.collect();
-        let cycles = model.variables.iter().position(|variable| variable.source == Source::Cycles);
+        let outputs = variables.filter(|(_, variable)| variable.causality == Causality::Output);
         let mut instance = Instance {
-            emulator,
+            machine: Machine::new(&model)?,
             values: Vec::new(),
-            outputs,
-            cycles: cycles.unwrap_or(0),
+            outputs: outputs.map(|(index, variable)| (index, variable.source)).collect(),
             phase: Phase::Instantiated,
             start: 0.0,
             periods: 0,
-            missed: 0,
             digest: model.digest(),
             model,
         };
@@ -159,26 +147,26 @@ impl Instance {
 
     /// Returns to the state after [`Instance::new`].
     pub fn reset(&mut self) {
-        self.emulator.reset();
+        self.machine.reset();
         self.values = self.model.variables.iter().map(|variable| variable.start).collect();
-        (self.phase, self.start, self.periods, self.missed) = (Phase::Instantiated, 0.0, 0, 0);
+        (self.phase, self.start, self.periods) = (Phase::Instantiated, 0.0, 0);
         self.send_inputs();
     }
 
     /// Writes all inputs and parameters to the machine.
     pub(crate) fn send_inputs(&mut self) {
         for (variable, &bits) in self.model.variables.iter().zip(&self.values) {
-            if let (Causality::Input | Causality::Parameter, Source::Port(register)) =
-                (variable.causality, variable.source)
-            {
-                // The image's reader accepts no other registers as ports.
-                let _ = self.emulator.set_input_bits(register, bits);
+            if variable.causality != Causality::Output {
+                self.machine.set(variable.source, bits);
             }
         }
     }
 
     /// Bytes of a state; other instances of the FMU can read them.
-    pub fn state_to_bytes(&self, saved: &SavedState) -> Vec<u8> {
+    ///
+    /// # Errors
+    /// If a core of a system is within a period: only a core that waits has a state in bytes.
+    pub fn state_to_bytes(&self, saved: &SavedState) -> Result<Vec<u8>, Mistake> {
         saved.to_bytes(self.digest)
     }
 
@@ -187,7 +175,7 @@ impl Instance {
     /// # Errors
     /// If they are damaged, or belong to another FMU.
     pub fn state_from_bytes(&self, bytes: &[u8]) -> Result<SavedState, Mistake> {
-        SavedState::from_bytes(bytes, self.digest)
+        SavedState::from_bytes(bytes, self.digest, &self.model)
     }
 
     /// Time up to which the program has run, in seconds.
@@ -234,11 +222,9 @@ impl Instance {
     pub fn set(&mut self, reference: u32, types: &[Type], bits: u32) -> Result<(), Mistake> {
         let index = self.index(reference, types)?;
         let variable = &self.model.variables[index];
-        let (Causality::Input | Causality::Parameter, Source::Port(register)) =
-            (variable.causality, variable.source)
-        else {
+        if variable.causality == Causality::Output {
             return Err(Mistake::ReadOnly(variable.name.clone()));
-        };
+        }
         let is_parameter = variable.causality == Causality::Parameter;
         let is_finite = variable.ty != Type::F || f32::from_bits(bits).is_finite();
         if !variable.holds(bits) || is_parameter && !is_finite {
@@ -251,8 +237,7 @@ impl Instance {
             return Err(Mistake::Range { name: variable.name.clone(), value: variable.text(bits), range });
         }
         self.values[index] = bits;
-        // The image's reader accepts no other registers as ports.
-        let _ = self.emulator.set_input_bits(register, bits);
+        self.machine.set(variable.source, bits);
         Ok(())
     }
 
@@ -294,47 +279,22 @@ impl Instance {
     pub fn exit_initialisation(&mut self) -> Result<(), Mistake> {
         self.phase.check("the end of the initialisation", &[Phase::Initialising])?;
         self.phase = Phase::Failed;
-        self.emulator.set_cycle_limit(PERIOD_LIMIT);
-        match self.emulator.run_to_wait() {
-            Err(fault) => return Err(self.stopped(&PeriodError::Fault(fault))),
-            Ok(Stop::Halted) => return Err(self.stopped(&PeriodError::Halted)),
-            Ok(_) => {}
-        }
+        self.machine.start().map_err(|reason| self.stopped(reason))?;
+        self.take_outputs();
+        self.machine.settle().map_err(|reason| self.stopped(reason))?;
         self.phase = Phase::Stepping;
-        self.take_outputs(0);
-        self.settle()
+        Ok(())
     }
 
-    fn stopped(&self, error: &PeriodError) -> Mistake {
-        let reason = match error {
-            PeriodError::Fault(fault) => fault.show(&self.model.program).to_string(),
-            other => other.to_string(),
-        };
+    fn stopped(&self, reason: String) -> Mistake {
         Mistake::Program { period: self.periods, reason }
     }
 
     /// Copies the outputs to the values.
     #[inline]
-    fn take_outputs(&mut self, cycles: Cycle) {
-        for &(index, register) in &self.outputs {
-            self.values[index] = self.emulator.output_bits(register).unwrap_or(0);
-        }
-        // A period has 10⁹ cycles at most.
-        self.values[self.cycles] = cycles as u32;
-        self.values[self.cycles + 1] = self.missed.min(i32::MAX as u64) as u32;
-        self.values[self.cycles + 2] = u32::from(self.emulator.flags().bits());
-    }
-
-    /// Waits until nothing is in flight, so that the state can be saved: operations beside the `wait` may complete after it.
-    #[inline]
-    fn settle(&mut self) -> Result<(), Mistake> {
-        let Some(last) = self.emulator.in_flight().map(|retire| retire.cycle).max() else { return Ok(()) };
-        match self.emulator.run_until(last + 1) {
-            Ok(_) => Ok(()),
-            Err(fault) => {
-                self.phase = Phase::Failed;
-                Err(self.stopped(&PeriodError::Fault(fault)))
-            }
+    fn take_outputs(&mut self) {
+        for &(index, source) in &self.outputs {
+            self.values[index] = self.machine.get(source);
         }
     }
 
@@ -357,36 +317,22 @@ impl Instance {
             return Err(Mistake::StepTime { time, expected });
         }
         let mut warnings = Vec::new();
+        let tick = self.model.settings.tick;
         for _ in 0..count as u64 {
-            self.run_period(&mut warnings)?;
+            if let Err(reason) = self.run_period(tick, &mut warnings) {
+                self.phase = Phase::Failed;
+                return Err(self.stopped(reason));
+            }
         }
         Ok(warnings)
     }
 
-    fn run_period(&mut self, warnings: &mut Vec<String>) -> Result<(), Mistake> {
-        self.emulator.set_cycle_limit(self.emulator.now() + PERIOD_LIMIT);
-        let report = match self.emulator.run_period(&[]) {
-            Ok(report) => report,
-            Err(error) => {
-                self.phase = Phase::Failed;
-                return Err(self.stopped(&error));
-            }
-        };
-        let tick = self.model.settings.tick;
-        if report.cycles >= tick {
-            self.missed += 1;
-            warnings.push(format!(
-                "period {}: {} cycles, and the next tick comes after {tick}",
-                self.periods, report.cycles
-            ));
-        }
-        if let Some(first) = report.nan_writes.first() {
-            let name = self.model.program.register_text(first.register);
-            warnings.push(format!("period {}: NaN on the output `{name}`", self.periods));
-        }
+    #[inline]
+    fn run_period(&mut self, tick: u64, warnings: &mut Vec<String>) -> Result<(), String> {
+        self.machine.run(self.periods, tick, warnings)?;
         self.periods += 1;
-        self.take_outputs(report.cycles);
-        self.settle()
+        self.take_outputs();
+        self.machine.settle()
     }
 
     /// Ends the simulation.

@@ -1,23 +1,33 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The program of an FMU with its settings, as the folder `resources` of the FMU holds them.
+//! The program or system of an FMU with its settings, as the folder `resources` of the FMU holds them.
 
 use crate::variables::{self, Variable};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use takt_asm::image::{self, ImageError};
+use takt_asm::units;
 use takt_emu::{Emulator, LoadError};
 use takt_isa::Program;
+use takt_isa::system::Description;
+use takt_system::{MAX_CORES, ProgramError, ReadError, Request, System, TEXT_BYTES};
 
 /// Image of the program, a file of `resources`.
 pub(crate) const IMAGE: &str = "program.takt";
+/// Cores and links of a system, a file of `resources` in place of [`IMAGE`].
+pub(crate) const SYSTEM: &str = "system.toml";
 /// Settings, a file of `resources`.
 pub(crate) const SETTINGS: &str = "takt.json";
+
+/// Image of a core's program, a file of `resources` beside [`SYSTEM`]. A core's name might be none of a file on Windows.
+fn core_image(core: usize) -> String {
+    format!("core{core}.takt")
+}
 
 /// Settings of an FMU.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Settings {
-    /// Time from tick to tick, in seconds: the step.
+    /// Time from tick to tick, of a system from base tick to base tick, in seconds: the step.
     pub period: f64,
     /// Cycles from tick to tick: a period of as many cycles or more has missed the next tick.
     pub tick: u64,
@@ -33,7 +43,7 @@ impl Settings {
     }
 }
 
-/// Reason why a program with its settings is no FMU.
+/// Reason why a program or a system with its settings is no FMU.
 #[derive(Debug, thiserror::Error)]
 pub enum ModelError {
     /// A file of `resources` cannot be read.
@@ -44,9 +54,22 @@ pub enum ModelError {
         /// Reason from the system.
         error: std::io::Error,
     },
-    /// The image is damaged, or cannot be written.
-    #[error("{IMAGE}: {0}")]
-    Image(#[from] ImageError),
+    /// An image is damaged, or cannot be written.
+    #[error("{file}: {error}")]
+    Image {
+        /// Name of the file in `resources`.
+        file: String,
+        /// Reason.
+        error: ImageError,
+    },
+    /// The system's file has mistakes.
+    #[error("{0}")]
+    System(String),
+    /// The receivers of an input of a system state ranges without a common value.
+    #[error(
+        "the cores that receive the system's input `{0}` state ranges (`.range`) that have no value in common"
+    )]
+    Ranges(String),
     /// The settings cannot be parsed.
     #[error("{SETTINGS}: {0}")]
     Json(#[from] serde_json::Error),
@@ -54,21 +77,50 @@ pub enum ModelError {
     #[error("{SETTINGS}: {0}")]
     Setting(&'static str),
     /// The machine cannot hold the program.
-    #[error("{IMAGE}: {0}")]
-    Load(#[from] LoadError),
-    /// The program has no instruction.
-    #[error("{IMAGE} has no instruction")]
-    Empty,
+    #[error("{file}: {error}")]
+    Load {
+        /// Name of the file in `resources`.
+        file: &'static str,
+        /// Reason.
+        error: LoadError,
+    },
+    /// A program has no instruction.
+    #[error("{0} has no instruction")]
+    Empty(String),
 }
 
-/// Program with its settings and variables: what all instances of an FMU share.
+/// Contents of an FMU.
+#[derive(Clone, Debug)]
+pub(crate) enum Application {
+    Program(Box<Program>),
+    System(Box<Description>),
+}
+
+/// Program or system with its settings and variables: what all instances of an FMU share.
 #[derive(Clone, Debug)]
 pub struct Model {
-    pub(crate) program: Program,
+    pub(crate) application: Application,
     pub(crate) settings: Settings,
     pub(crate) variables: Vec<Variable>,
-    pub(crate) image: Vec<u8>,
-    pub(crate) settings_text: String,
+    /// Files of `resources`, each with its name.
+    pub(crate) files: Vec<(String, Vec<u8>)>,
+}
+
+/// File of `resources` with an image.
+fn image_file(file: String, program: &Program) -> Result<(String, Vec<u8>), ModelError> {
+    match image::write(program) {
+        Ok(bytes) => Ok((file, bytes)),
+        Err(error) => Err(ModelError::Image { file, error }),
+    }
+}
+
+/// Program of an image.
+fn program(file: &str, bytes: &[u8]) -> Result<Program, ModelError> {
+    let read = image::read(bytes).map_err(|error| ModelError::Image { file: file.to_owned(), error });
+    read.and_then(|program| match program.bundles() {
+        0 => Err(ModelError::Empty(file.to_owned())),
+        _ => Ok(program),
+    })
 }
 
 impl Model {
@@ -77,7 +129,21 @@ impl Model {
     /// # Errors
     /// If the program cannot run, or a setting has no meaning.
     pub fn new(program: &Program, settings: Settings) -> Result<Model, ModelError> {
-        Model::parse(image::write(program)?, serde_json::to_string(&settings)?)
+        Model::parse(vec![image_file(IMAGE.to_owned(), program)?, settings_file(settings)?])
+    }
+
+    /// Model of a system; the step is a base tick, which `settings` states too.
+    ///
+    /// # Errors
+    /// If the system cannot run, or a setting has no meaning.
+    pub fn of_system(description: &Description, settings: Settings) -> Result<Model, ModelError> {
+        let text = takt_system::write(description, core_image);
+        let mut files = vec![(SYSTEM.to_owned(), text.into_bytes())];
+        for (number, core) in description.cores.iter().enumerate() {
+            files.push(image_file(core_image(number), &core.program)?);
+        }
+        files.push(settings_file(settings)?);
+        Model::parse(files)
     }
 
     /// Reads the folder `resources` of an FMU.
@@ -85,26 +151,71 @@ impl Model {
     /// # Errors
     /// If a file is missing or damaged.
     pub fn read(resources: &Path) -> Result<Model, ModelError> {
-        let read = |name: &str| {
-            let path = resources.join(name);
-            std::fs::read(&path).map_err(|error| ModelError::File { file: path.display().to_string(), error })
+        let read = |name: String| {
+            let path = resources.join(&name);
+            match std::fs::read(&path) {
+                Ok(bytes) => Ok((name, bytes)),
+                Err(error) => Err(ModelError::File { file: path.display().to_string(), error }),
+            }
         };
-        let settings = String::from_utf8_lossy(&read(SETTINGS)?).into_owned();
-        Model::parse(read(IMAGE)?, settings)
+        let settings = read(SETTINGS.to_owned())?;
+        let mut files = Vec::new();
+        if resources.join(SYSTEM).exists() {
+            files.push(read(SYSTEM.to_owned())?);
+            let cores = (0..MAX_CORES).map(core_image).take_while(|name| resources.join(name).exists());
+            for core in cores {
+                files.push(read(core)?);
+            }
+        } else {
+            files.push(read(IMAGE.to_owned())?);
+        }
+        files.push(settings);
+        Model::parse(files)
     }
 
-    fn parse(image: Vec<u8>, settings_text: String) -> Result<Model, ModelError> {
-        let settings: Settings = serde_json::from_str(&settings_text)?;
+    /// Model of the files of `resources`: [`SYSTEM`] with the cores' images, or [`IMAGE`], then [`SETTINGS`].
+    fn parse(files: Vec<(String, Vec<u8>)>) -> Result<Model, ModelError> {
+        let bytes = |name: &str| {
+            let found = files.iter().find(|(known, _)| known == name);
+            found.map(|(_, bytes)| bytes.as_slice())
+        };
+        let settings: Settings = serde_json::from_slice(bytes(SETTINGS).unwrap_or_default())?;
         if let Some(mistake) = settings.mistake() {
             return Err(ModelError::Setting(mistake));
         }
-        let program = image::read(&image)?;
-        if program.bundles() == 0 {
-            return Err(ModelError::Empty);
+        let (application, variables) = match bytes(SYSTEM) {
+            None => {
+                let program = program(IMAGE, bytes(IMAGE).unwrap_or_default())?;
+                Emulator::new(&program).map_err(|error| ModelError::Load { file: IMAGE, error })?;
+                let variables = variables::of_program(&program);
+                (Application::Program(Box::new(program)), variables)
+            }
+            Some(text) if text.len() > TEXT_BYTES => {
+                return Err(ModelError::System(format!("{SYSTEM} has more than {TEXT_BYTES} bytes")));
+            }
+            Some(text) => {
+                let description = description(&String::from_utf8_lossy(text), bytes)?;
+                if description.tick != settings.tick {
+                    return Err(ModelError::Setting("the tick is not that of the system"));
+                }
+                System::new(&description).map_err(|error| ModelError::Load { file: SYSTEM, error })?;
+                let variables = variables::of_system(&description).map_err(ModelError::Ranges)?;
+                (Application::System(Box::new(description)), variables)
+            }
+        };
+        Ok(Model { application, settings, variables, files })
+    }
+
+    /// States the units of ports and parameters, with which the comments of their declarations begin. `sources` has the source files of
+    /// each core's program, each file's name with its text.
+    #[must_use]
+    pub fn with_units(mut self, sources: &[&[(String, String)]]) -> Model {
+        for variable in &mut self.variables {
+            variable.unit = variable.declaration.as_ref().and_then(|declaration| {
+                units::unit(sources.get(declaration.core)?, declaration.directive, &declaration.name)
+            });
         }
-        Emulator::new(&program)?;
-        let variables = variables::of(&program);
-        Ok(Model { program, settings, variables, image, settings_text })
+        self
     }
 
     /// Variables, in the order of their value references: the first has 1.
@@ -117,9 +228,9 @@ impl Model {
         self.settings
     }
 
-    /// Digest of image and settings (FNV-1a of 128 bits): equal for equal FMUs, and no secret.
+    /// Digest of the files of `resources` (FNV-1a of 128 bits): equal for equal FMUs, and no secret.
     pub(crate) fn digest(&self) -> u128 {
-        let bytes = self.image.iter().chain(self.settings_text.as_bytes());
+        let bytes = self.files.iter().flat_map(|(_, bytes)| bytes);
         bytes.fold(0x6c62_272e_07bb_0142_62b8_2175_6295_c58d, |hash, &byte| {
             (hash ^ u128::from(byte)).wrapping_mul(0x0100_0000_0000_0000_0000_013b)
         })
@@ -131,4 +242,23 @@ impl Model {
         let hex = format!("{:032x}", self.digest());
         format!("{{{}-{}-{}-{}-{}}}", &hex[..8], &hex[8..12], &hex[12..16], &hex[16..20], &hex[20..])
     }
+}
+
+fn settings_file(settings: Settings) -> Result<(String, Vec<u8>), ModelError> {
+    Ok((SETTINGS.to_owned(), serde_json::to_vec(&settings)?))
+}
+
+/// System of a file's text and its cores' images.
+fn description<'f>(text: &str, bytes: impl Fn(&str) -> Option<&'f [u8]>) -> Result<Description, ModelError> {
+    let read = takt_system::read(SYSTEM, text, |request: &Request<'_>| match bytes(request.path) {
+        Some(image) => program(request.path, image).map_err(ProgramError::Invalid),
+        None => {
+            let message = format!("{} is no image beside the system", request.path);
+            Err(ProgramError::Missing { message, help: None })
+        }
+    });
+    read.map_err(|error| match error {
+        ReadError::Mistakes(mistakes) => ModelError::System(mistakes.render(false)),
+        ReadError::Program(error) => error,
+    })
 }

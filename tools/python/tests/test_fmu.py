@@ -3,6 +3,7 @@
 
 import csv
 import ctypes
+import json
 import struct
 import subprocess
 import zipfile
@@ -50,7 +51,7 @@ PERIOD = 1e-3
 def write(folder, program, *options, name="p.fmu"):
     file = folder / name
     command = [TOOL, "fmu", program, "-o", file, "--library", LIBRARY, *options]
-    if "--period" not in options:
+    if "--period" not in options and not str(program).endswith(".toml"):
         command += ["--period", "1ms"]
     subprocess.run(command, check=True, capture_output=True, text=True)
     return file
@@ -151,6 +152,193 @@ def test_runs_like_takt_run(tmp_path, program, inputs, fmi):
                 assert struct.pack("<f", got) == struct.pack("<f", np.float32(text)), (name, got, text)
     assert master.get("missed") == 0 and master.messages == []
     master.end()
+
+
+# A FIFO each way, a snapshot, wires, two rates, a parameter in each core.
+SYSTEM = """
+tick = 1000
+[[core]]
+name = "sum"
+program = "sum.s"
+machine = "t1"
+[[core]]
+name = "twice"
+program = "twice.s"
+tick = 2
+offset = 990
+[[wire]]
+from = "host.x"
+to = "sum.x"
+[[wire]]
+from = "sum.total"
+to = "host.total"
+[[snapshot]]
+name = "seen"
+from = "sum"
+to = "twice"
+ports = ["total"]
+[[fifo]]
+name = "in"
+from = "host"
+to = "sum"
+depth = 2
+ports = ["entry"]
+pop = "done"
+receiver = { empty = "empty" }
+[[fifo]]
+name = "out"
+from = "twice"
+to = "host"
+depth = 4
+ports = ["double", "count"]
+push = "count"
+"""
+SUM = """
+.param  gain = 1.0 range 0..10          ; N·m/rad
+.input  x, entry                        ; rad, N·m
+.input  empty:int
+.output total                           ; N·m: so far
+.output done:int
+.state  s
+.range  x = -8, 8
+.once
+        mov     s, gain
+        mov     total, s
+        wait    period
+.period
+period:
+        s = s + gain*x
+        mov     total, s
+        bnz     empty, idle
+        s = s + entry
+        mov     total, s
+        mov     done, zero
+idle:   wait    period
+"""
+TWICE = """
+.param  cycles:int = 5
+.input  total
+.output double
+.output count:int
+.state  n:int
+.once
+        mov     n, zero
+        wait    period
+.period
+period: double = 2*total
+        n = n + cycles
+        count = n
+        wait    period
+"""
+
+
+@pytest.fixture
+def cores(tmp_path):
+    for name, text in [("cores.toml", SYSTEM), ("sum.s", SUM), ("twice.s", TWICE)]:
+        (tmp_path / name).write_text(text)
+    return tmp_path / "cores.toml"
+
+
+def compare_system(folder, system, rows, period, fmi, *parameters):
+    """Every output of every base tick has the bits that `takt run` prints."""
+    file = write(folder, system, "--fmi", fmi, *parameters, name=Path(system).stem + ".fmu")
+    assert validate_fmu(str(file)) == []
+    table = folder / "rows.csv"
+    with table.open("w") as out:
+        lines = csv.DictWriter(out, rows[0])
+        lines.writeheader()
+        lines.writerows(rows)
+    command = [TOOL, "run", system, "--inputs", table, "--outputs", "-", *parameters]
+    said = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    expected = list(csv.DictReader(said.splitlines()))
+    assert len(expected) == len(rows)
+    master, entries = Master(file, folder), 0
+    for row, results in zip(rows, expected):
+        master.set(**row)
+        master.step(period)
+        for name, text in results.items():
+            got, link = master.get(name), name.split(".")[0]
+            if link + ".popped" in master.variables:
+                assert master.get(link + ".popped") == (text != ""), name
+                entries += text != ""
+            if "Int" in master.variables[name].type:
+                assert got == int(text or 0)
+            else:
+                assert struct.pack("<f", got) == struct.pack("<f", np.float32(text or 0)), (name, got, text)
+    return master, entries
+
+
+@pytest.mark.parametrize("fmi", ["2", "3"])
+def test_a_system_runs_like_takt_run(tmp_path, cores, fmi):
+    random = np.random.default_rng(1)
+    value = lambda: float(np.float32(random.uniform(-8, 8)))
+    rows = [{"x": value(), "in.entry": value(), "in.push": int(random.integers(3)) // 2} for _ in range(300)]
+    master, entries = compare_system(tmp_path, cores, rows, 8e-6, fmi, "--param", "twice.cycles=7")
+    # Two fields in every second base tick.
+    assert 290 <= entries <= 300 and master.get("out.count") % 7 == 0
+    assert master.get("sum.missed") == 0 and 5 < master.get("sum.cycles") < 100 and master.get("takt.twice.cycles") > 3
+    assert not master.messages
+    master.end()
+    rows = [{"moves.target": 3.0 * (i % 40), "moves.rate": 2.5, "moves.push": int(i % 40 == 0), "w": 0.3 * (i % 90)} for i in range(400)]
+    master, _ = compare_system(tmp_path, "programs/systems/speed.toml", rows, PERIOD, fmi)
+    assert [master.get(name + ".missed") for name in ("profile", "servo", "watch")] == [0, 0, 0]
+    master.end()
+
+
+def test_missed_ticks_of_a_system(tmp_path, cores):
+    """At a short tick: the counts are those of `takt run`."""
+    cores.write_text(SYSTEM.replace("tick = 1000", "tick = 40").replace("offset = 990", "offset = 30"))
+    rows = [{"x": 1.0, "in.entry": 2.0, "in.push": 1}] * 200
+    master, _ = compare_system(tmp_path, cores, rows, 40 / 125e6, "2")
+    command = [TOOL, "run", cores, "--inputs", tmp_path / "rows.csv", "--json"]
+    said = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+    missed = [said["cores"][name]["deadlines_missed"] for name in ("sum", "twice")]
+    assert missed[0] > 50 and [master.get(name + ".missed") for name in ("sum", "twice")] == missed
+    assert any("core sum missed a tick" in text for text in master.messages)
+    master.end()
+
+
+@pytest.mark.parametrize("fmi", ["2", "3"])
+def test_a_system_in_a_master(tmp_path, cores, fmi):
+    """FMPy's own loop; units, ranges and starts; states in bytes; full FIFOs."""
+    file = write(tmp_path, cores, "--fmi", fmi)
+    result = fmpy.simulate_fmu(str(file), stop_time=80e-6, start_values={"x": 1.0, "sum.gain": 2.0}, output=["total", "out.count"])
+    assert list(result["total"]) == [2.0 + 2.0 * i for i in range(11)]
+    one, two = Master(file, tmp_path), Master(file, tmp_path)
+    real = "Real" if fmi == "2" else "Float32"
+    shown = {v.name: (v.type, v.variability, v.start, v.min, v.max, v.unit) for v in one.description.modelVariables}
+    assert shown["x"] == (real, "discrete", "0.0", "-8.0", "8.0", "rad")
+    assert shown["sum.gain"] == (real, "tunable", "1.0", "0.0", "10.0", "N·m/rad")
+    assert shown["total"][5] == "N·m" and shown["time"][5] == "s" and shown["out.double"][5] is None
+    torque = {unit.name: unit.baseUnit for unit in one.description.unitDefinitions}["N·m"]
+    assert (torque.kg, torque.m, torque.s, torque.A, float(torque.factor)) == (1, 2, -2, 0, 1.0)
+    row = {"x": 0.25, "in.entry": 3.0, "in.push": 1}
+    for _ in range(5):
+        one.set(**row)
+        one.step(8e-6)
+    # The tick of `twice` came in the cycles before.
+    busy = one.fmu.getFMUState()
+    one.fails("the state has no bytes while core `twice` is within a period", lambda: one.fmu.serializeFMUState(busy))
+    one.step(8e-6)
+    state, time = one.fmu.getFMUState(), one.time
+    data = one.fmu.serializeFMUState(state)
+
+    def rest(master):
+        master.time, found = time, []
+        for i in range(20):
+            master.set(**{"x": i / 8, "in.push": i % 2})
+            master.step(8e-6)
+            found.append([master.get(name) for name in master.variables if name != "time"])
+        return found
+
+    first = rest(one)
+    one.fmu.setFMUState(state)
+    assert rest(one) == first
+    two.fmu.setFMUState(two.fmu.deserializeFMUState(data))
+    assert rest(two) == first
+    one.fails("51.0 is no value of `sum.gain`", lambda: one.set(**{"sum.gain": 51.0}))
+    for master in (one, two):
+        master.end()
 
 
 @pytest.mark.parametrize("fmi", ["2", "3"])
@@ -354,18 +542,34 @@ def test_null_pointers(tmp_path, law):
     master.end()
 
 
-def test_the_command_line(tmp_path, law):
+def test_the_command_line(tmp_path, law, cores):
     """Mistakes of the command line, and a library that is none."""
-    def said(*options):
-        done = subprocess.run([TOOL, "fmu", law, "-o", tmp_path / "x.fmu", *options], capture_output=True, text=True)
+    def said(*options, system=law):
+        done = subprocess.run([TOOL, "fmu", system, "-o", tmp_path / "x.fmu", *options], capture_output=True, text=True)
         assert done.returncode in (1, 2) and not (tmp_path / "x.fmu").exists()
         return done.stderr
     assert "--period" in said()
+    assert "`.const T = 100e-6 ; s`" in said()
     assert "a period has 1 to 100000000" in said("--period", "10s")
-    assert "no shared library for Linux" in said("--period", "1ms", "--library", law)
+    assert "no shared library for Linux or Windows" in said("--period", "1ms", "--library", law)
+    twice = said("--period", "1ms", "--library", LIBRARY, "--library", LIBRARY)
+    assert "two libraries are for Linux, and an FMU holds one for each platform" in twice
     (tmp_path / "other.so").write_bytes(LIBRARY.read_bytes().replace(b"fmi3DoStep", b"fmi9DoStep"))
     assert "it does not export fmi3DoStep" in said("--period", "1ms", "--library", tmp_path / "other.so")
     assert "no parameter `kq`" in said("--period", "1ms", "--param", "kq=1", "--library", LIBRARY)
+    # The source states the period, 1 ms.
+    command = [TOOL, "fmu", "programs/examples/pi.s", "-o", tmp_path / "stated.fmu", "--library", LIBRARY]
+    subprocess.run(command, check=True, capture_output=True)
+    assert float(fmpy.read_model_description(str(tmp_path / "stated.fmu")).defaultExperiment.stepSize) == PERIOD
+    # Systems.
+    wrong = lambda *options, system=cores: said(*options, "--library", LIBRARY, system=system)
+    assert "--period cannot be used with a system: a step is its file's `tick`" in wrong("--period", "1ms")
+    assert "--machine cannot be used with a system" in wrong("-m", "t1")
+    assert "in a system it begins with `sum.`, `twice.`" in wrong("--param", "summ.gain=1")
+    assert "no parameter `gian`" in wrong("--param", "sum.gian=1")
+    (tmp_path / "twice.s").unlink()
+    assert "there is no program twice.s" in wrong()
+    assert "cannot" in wrong(system=tmp_path / "none.toml")
     names = zipfile.ZipFile(write(tmp_path, law)).namelist()
     assert names == ["modelDescription.xml", "resources/program.takt", "resources/takt.json", "binaries/linux64/law___order.so"]
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The command `takt fmu`: writes a program as a functional mock-up unit.
 
-use crate::run::load::{Load, is_system};
+use crate::run::application::{Application, refuse};
 use crate::run::parameters::ParameterArguments;
 use crate::terminal::files::{self, Out};
 use crate::terminal::number::{self, Time};
@@ -11,18 +11,20 @@ use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use takt_asm::units;
 use takt_emu::LONGEST_TICK;
 use takt_fmu::description::Fmi;
-use takt_fmu::{Causality, Fmu, Model, Settings};
+use takt_fmu::{Causality, Fmu, Library, Model, Settings};
 
-/// Write a program as an FMU, for simulators that speak FMI (co-simulation, Linux on x86-64).
+/// Write a program or a system as an FMU, for simulators that speak FMI (co-simulation, x86-64).
 ///
-/// A step is a period. Ports are variables with the ranges of the source (`.range`), parameters (`.param`) tunable ones; `cycles`, `missed`
-/// and `flags` say how the period went. The emulator is inside of the FMU; neither Takt nor Python is needed to run it (docs/fmi.md).
+/// A step is a period, of a system (a file whose name ends in `.toml`) a base tick. Ports are variables with the units and ranges of the
+/// source (`.range`), parameters (`.param`) tunable ones; `cycles`, `missed` and `flags` say how the period went. The emulator is inside
+/// of the FMU; neither Takt nor Python is needed to run it (docs/fmi.md).
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct ToFmu {
-    /// Source or image, `-` being standard input.
+    /// Source or image, `-` being standard input, or a system.
     file: PathBuf,
     #[command(flatten)]
     machine: OptionalMachine,
@@ -31,9 +33,10 @@ pub(crate) struct ToFmu {
     /// Write the FMU here.
     #[arg(long, short, value_name = "FILE")]
     output: PathBuf,
-    /// Time from tick to tick, the FMU's step: `100us`, `0.1ms`, or a number of cycles.
+    /// Time from tick to tick, the FMU's step: `100us`, `0.1ms`, or a number of cycles [default: the constant `T` if its comment begins
+    /// with `s`, or `FS` in `Hz`; of a system, the `tick` of its file].
     #[arg(long, value_name = "TIME", value_parser = number::time, allow_hyphen_values = true)]
-    period: Time,
+    period: Option<Time>,
     /// Clock in MHz: a period that has no end before the next tick counts as missed.
     #[arg(long, value_name = "MHZ", default_value_t = options::PAPER_CLOCK, value_parser = number::clock, allow_hyphen_values = true)]
     clock: f64,
@@ -42,9 +45,10 @@ pub(crate) struct ToFmu {
     fmi: Version,
     #[command(flatten)]
     parameters: ParameterArguments,
-    /// Library to put into the FMU [default: `libtakt_fmu.so` beside `takt`, in `deps` there, or in `../lib/takt`].
+    /// Library to put into the FMU, for Linux or for Windows; given twice, the FMU runs on both [default: `libtakt_fmu.so` and, if it is
+    /// there, `takt_fmu.dll`, beside `takt`, in `deps` there, or in `../lib/takt`].
     #[arg(long, value_name = "FILE")]
-    library: Option<PathBuf>,
+    library: Vec<PathBuf>,
 }
 
 const EXAMPLES: &str = "\
@@ -52,6 +56,7 @@ Examples:
   takt fmu pi.s --period 1ms -o pi.fmu           FMI 2.0
   takt fmu foc.s --period 50us --fmi 3 -o foc.fmu
   takt fmu law.s --period 1ms --param kp=3 -o law.fmu   kp starts with 3
+  takt fmu system.toml -o system.fmu             several cores, a step for each base tick
   fmpy validate pi.fmu                           check what was written, with FMPy";
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -64,37 +69,35 @@ enum Version {
     Three,
 }
 
-/// File name of the library, as cargo writes it.
-const LIBRARY: &str = "libtakt_fmu.so";
+/// File names of the libraries, as cargo writes them: for Linux, which is always there, and for Windows.
+const LIBRARIES: [&str; 2] = ["libtakt_fmu.so", "takt_fmu.dll"];
 
 pub(crate) fn run(arguments: &ToFmu, color: bool, out: &mut Out) -> Result<()> {
     let ToFmu { file, output, parameters, library, .. } = arguments;
     let mut reads = vec![("FILE", file.as_path())];
     reads.extend(parameters.file.as_deref().map(|path| ("--params", path)));
-    reads.extend(library.as_deref().map(|path| ("--library", path)));
+    reads.extend(library.iter().map(|path| ("--library", path.as_path())));
     files::check(&reads, &[("--output", output.as_path())])?;
-    if is_system(file) {
-        return Err(Failure::Usage(
-            "an FMU holds one program: write one for each core's program, and let the master connect them"
-                .to_owned(),
-        )
-        .into());
-    }
-    let settings = arguments.settings()?;
-    let mut loaded = Load::new(arguments.machine.machine, color).with(&arguments.source).with_source(file)?;
-    parameters.set(&mut loaded.program)?;
-    let model = Model::new(&loaded.program, settings)?;
+    let mut application = Application::load(file, &arguments.machine, &arguments.source, color)?;
+    let settings = arguments.settings(&application)?;
+    parameters.apply(&mut application)?;
+    let model = match &application {
+        Application::Program(loaded) => Model::new(&loaded.program, settings)?,
+        Application::System(system) => Model::of_system(&system.description, settings)?,
+    };
+    let sources: Vec<_> = application.programs().iter().map(|program| program.sources.as_slice()).collect();
+    let model = model.with_units(&sources);
     let fmi = match arguments.fmi {
         Version::Two => Fmi::Two,
         Version::Three => Fmi::Three,
     };
-    let library = arguments.library()?;
+    let libraries = arguments.libraries()?;
     // A master shows the name; the model is what the file is called.
     let name = match file.file_stem() {
         Some(stem) if !files::is_dash(file) => stem.to_string_lossy().into_owned(),
         _ => "program".to_owned(),
     };
-    let bytes = Fmu { model: &model, name: &name, fmi, library: &library }.to_bytes()?;
+    let bytes = Fmu { model: &model, name: &name, fmi, libraries: &libraries }.to_bytes()?;
     files::write(output, &bytes)?;
     if files::is_dash(output) {
         return Ok(());
@@ -105,10 +108,12 @@ pub(crate) fn run(arguments: &ToFmu, color: bool, out: &mut Out) -> Result<()> {
         Fmi::Two => "2.0",
         Fmi::Three => "3.0",
     };
+    let platforms: Vec<&str> = libraries.iter().map(|library| library.platform().name()).collect();
     writeln!(
         out,
-        "{}: FMI {version} for co-simulation, {} inputs, {} parameters, {} outputs, a step of {} s or {} cycles",
+        "{}: FMI {version} for co-simulation on {}, {} inputs, {} parameters, {} outputs, a step of {} s or {} cycles",
         output.display(),
+        platforms.join(" and "),
         count(Causality::Input),
         count(Causality::Parameter),
         count(Causality::Output),
@@ -120,9 +125,28 @@ pub(crate) fn run(arguments: &ToFmu, color: bool, out: &mut Out) -> Result<()> {
 
 impl ToFmu {
     /// Period in seconds and in cycles.
-    fn settings(&self) -> Result<Settings> {
+    fn settings(&self, application: &Application) -> Result<Settings> {
         let hertz = self.clock * 1e6;
-        let (period, cycles) = match self.period {
+        let time = match (application, self.period) {
+            (Application::System(system), period) => {
+                refuse(&[(
+                    "--period",
+                    period.is_some(),
+                    "a step is its file's `tick`, in cycles at --clock",
+                )])?;
+                Time::Cycles(system.description.tick)
+            }
+            (Application::Program(_), Some(time)) => time,
+            (Application::Program(loaded), None) => {
+                let stated = units::sampling_period(&loaded.sources, &loaded.constants);
+                let missing = || {
+                    let mend = "`--period 100us`, or in the source `.const T = 100e-6 ; s`";
+                    Failure::Usage(format!("--period is missing, and no constant states it: {mend}"))
+                };
+                Time::Seconds(stated.ok_or_else(missing)?)
+            }
+        };
+        let (period, cycles) = match time {
             Time::Cycles(cycles) => (number::shortest(cycles as f64 / hertz), cycles),
             // A tick between two cycles is seen in the second; the product's rounding error is less than a thousandth of a cycle.
             Time::Seconds(seconds) => {
@@ -131,7 +155,7 @@ impl ToFmu {
         };
         if cycles == 0 || cycles > LONGEST_TICK {
             return Err(Failure::Usage(format!(
-                "--period: {cycles} cycles at {} MHz; a period has 1 to {LONGEST_TICK}",
+                "a period of {cycles} cycles at {} MHz; a period has 1 to {LONGEST_TICK}",
                 self.clock
             ))
             .into());
@@ -139,24 +163,35 @@ impl ToFmu {
         Ok(Settings { period, tick: cycles })
     }
 
-    /// Bytes of the library.
-    fn library(&self) -> Result<Vec<u8>> {
-        if let Some(path) = &self.library {
-            return std::fs::read(path).with_context(|| format!("cannot read --library {}", path.display()));
+    /// Libraries to put into the FMU.
+    fn libraries(&self) -> Result<Vec<Library>> {
+        let library =
+            |path: &Path, bytes| Library::new(bytes).with_context(|| format!("--library {}", path.display()));
+        if !self.library.is_empty() {
+            let libraries = self.library.iter().map(|path| {
+                let bytes = std::fs::read(path);
+                library(path, bytes.with_context(|| format!("cannot read --library {}", path.display()))?)
+            });
+            return libraries.collect();
         }
         let program = std::env::current_exe().context("cannot find takt's own folder")?;
         // A link, as package managers make them, leads to the folder.
         let program = program.canonicalize().unwrap_or(program);
         let folder = program.parent().unwrap_or(Path::new("."));
         for place in [folder.to_owned(), folder.join("deps"), folder.join("../lib/takt")] {
-            if let Ok(bytes) = std::fs::read(place.join(LIBRARY)) {
-                return Ok(bytes);
+            let [linux, windows] = LIBRARIES.map(|name| place.join(name));
+            let Ok(bytes) = std::fs::read(&linux) else { continue };
+            let mut libraries = vec![library(&linux, bytes)?];
+            if let Ok(bytes) = std::fs::read(&windows) {
+                libraries.push(library(&windows, bytes)?);
             }
+            return Ok(libraries);
         }
         bail!(
-            "the library of an FMU, {LIBRARY}, is not in {0}, {0}/deps or {0}/../lib/takt: `cargo build --release -p takt-fmu` in Takt's \
-             sources makes target/release/{LIBRARY}; give it with --library",
-            folder.display()
+            "the library of an FMU, {1}, is not in {0}, {0}/deps or {0}/../lib/takt: `cargo build --release -p takt-fmu` in Takt's \
+             sources makes target/release/{1}; give it with --library",
+            folder.display(),
+            LIBRARIES[0]
         )
     }
 }

@@ -22,7 +22,7 @@ fn path(address: &str) -> Result<PathBuf, String> {
     let wrong = || format!("the address of the resources, `{address}`, is no file on this computer");
     // Some masters hand over a plain path.
     let Some(rest) = address.strip_prefix("file:") else {
-        return if address.starts_with('/') { Ok(PathBuf::from(address)) } else { Err(wrong()) };
+        return if Path::new(address).is_absolute() { Ok(PathBuf::from(address)) } else { Err(wrong()) };
     };
     let path = rest.strip_prefix("//localhost").or_else(|| rest.strip_prefix("//")).unwrap_or(rest);
     let mut bytes = Vec::new();
@@ -39,8 +39,16 @@ fn path(address: &str) -> Result<PathBuf, String> {
         bytes.push((16 * high + low) as u8);
     }
     match String::from_utf8(bytes) {
-        Ok(path) if path.starts_with('/') => Ok(PathBuf::from(path)),
+        Ok(path) if path.starts_with('/') => Ok(PathBuf::from(without_root(&path))),
         _ => Err(wrong()),
+    }
+}
+
+/// Path of Windows, `C:/folder`, for `/C:/folder`, as an address has it; any other path as it is.
+fn without_root(path: &str) -> &str {
+    match path.as_bytes() {
+        [b'/', letter, b':', ..] if cfg!(windows) && letter.is_ascii_alphabetic() => &path[1..],
+        _ => path,
     }
 }
 

@@ -173,7 +173,7 @@ fn no_variable(component: &Component, references: &In<u32>, count: usize) -> Sta
 /// Number of bytes of a state.
 fn serialised_size(component: &Component, state: State, size: &Out<usize>) -> Status {
     call(component, |handle| {
-        let bytes = handle.instance.state_to_bytes(state.read()?);
+        let bytes = handle.instance.state_to_bytes(state.read()?)?;
         size.write(1, |_| Ok(bytes.len()))
     })
 }
@@ -181,7 +181,7 @@ fn serialised_size(component: &Component, state: State, size: &Out<usize>) -> St
 /// Bytes of a state, into the master's memory.
 fn serialise(component: &Component, state: State, bytes: &Out<u8>, size: usize) -> Status {
     call(component, |handle| {
-        let state = handle.instance.state_to_bytes(state.read()?);
+        let state = handle.instance.state_to_bytes(state.read()?)?;
         if size < state.len() {
             return Err(Mistake::Call(format!("room for {size} bytes, and the state has {}", state.len())));
         }
