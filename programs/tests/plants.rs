@@ -5,7 +5,7 @@ use takt_isa::program::Port;
 use takt_isa::{Register, Type};
 use takt_programs::PLANTS;
 use takt_programs::plants::models::MODELS;
-use takt_programs::plants::{ClosedLoop, Interface, LoopError, Plant, PlantFile, Quantity, Simulation};
+use takt_programs::plants::{ClosedLoop, Interface, Leg, LoopError, Plant, PlantFile, Quantity, Simulation};
 
 const PERIOD: f64 = 1e-3;
 
@@ -171,6 +171,65 @@ fn dead_time_takes_voltage_from_each_phase() {
     }
 }
 
+#[test]
+fn a_plant_follows_its_switches() {
+    let text = format!("model = \"pmsm_switched\"\n{}", TURNING.replace("p = 4", "p = 4\ndead = 1e-6"));
+    let (mut whole, mut parts) = (plant(&text, 50e-6), plant(&text, 50e-6));
+    let duties = [0.5, 0.3, 0.6];
+    for _ in 0..100 {
+        whole.advance(&[duties[0], duties[1], duties[2], 0.1]).unwrap();
+        // Steps of a tenth of a microsecond, in which no switch changes.
+        for step in 0..500 {
+            let time = (f64::from(step) + 0.5) * 1e-7;
+            let legs = duties.map(|duty| {
+                let (rise, fall) = (25e-6 * (1.0 - duty), 25e-6 * (1.0 + duty));
+                match time {
+                    _ if (rise..rise + 1e-6).contains(&time) || (fall..fall + 1e-6).contains(&time) => {
+                        Leg::OFF
+                    }
+                    _ if (rise..fall).contains(&time) => Leg::HIGH,
+                    _ => Leg::LOW,
+                }
+            });
+            parts.advance_switched(1e-7, &legs, &[9.0, 9.0, 9.0, 0.1]);
+        }
+    }
+    for (a, b) in whole.states().into_iter().zip(parts.states()) {
+        near(b, a, 1e-6);
+    }
+}
+
+#[test]
+fn a_switched_dc_motor_has_the_speed_of_its_mean_voltage() {
+    let (r, k, b, load) = (1.0, 0.08, 1e-4, 0.4);
+    for (da, db) in [(0.9, 0.2), (1.0, 0.0), (0.1, 0.6)] {
+        let expected = (k * 24.0 * (da - db) - r * load) / (k * k + r * b);
+        let text = "model = \"dc_motor_switched\"\n[parameters]\ndead = 0";
+        near(after(text, PERIOD / 10.0, 4.0, &[da, db, load])[0], expected, 1e-3);
+    }
+    // In the dead time a current out of a leg flows through the lower diode, one into it through the upper one.
+    let text = "model = \"dc_motor_switched\"\n[parameters]\ndead = 5e-6\nJ = 1e6\n";
+    near(after(text, PERIOD / 10.0, 0.05, &[0.8, 0.2, 0.0])[1], 24.0 * (0.6 - 0.1), 1e-2);
+    // Without switches a current flows back into the bridge, and ends.
+    let mut motor = plant("model = \"dc_motor_switched\"\n[initial]\ni = 5", PERIOD);
+    motor.advance_switched(1e-4, &[Leg::OFF; 2], &[0.0; 3]);
+    let current = motor.states()[0];
+    near(current, (5.0 + 24.0) * (-0.1_f64).exp() - 24.0, 1e-3);
+    motor.advance_switched(1e-2, &[Leg::OFF; 2], &[0.0; 3]);
+    assert!(motor.states()[0].abs() < 0.01, "{:?}", motor.states());
+}
+
+#[test]
+fn sensors_saturate_at_their_limits() {
+    let text = "model = \"dc_motor\"\n[ports]\nw = { port = \"n\", scale = 10, offset = 5, limits = [-3, 4] }\n[inputs]\nw_ref = 0\nw = 0";
+    let closed = connect(text, &[]).unwrap();
+    let mut row = vec![];
+    closed.set_inputs(&mut row);
+    assert_eq!(row.iter().find(|(register, _)| register.index() == 770).map(|(_, bits)| *bits), Some(4));
+    let wrong = text.replace("w = { port = \"n\"", "u = { port = \"count\"");
+    assert!(connect(&wrong, &[]).is_err_and(|error| error.contains("`limits` is for sensors")));
+}
+
 fn port(name: &str, register: usize, ty: Type) -> Port {
     Port { name: name.to_owned(), register: Register::new(register).unwrap(), ty }
 }
@@ -243,6 +302,16 @@ fn mistakes_in_a_file_are_named_with_their_places() {
         ("model = \"tank\"\n[ports]\nh = 1", "3:5", "a port's name in quotes"),
         ("model = \"tank\"\n[ports]\nh = { scale = 1 }", "3:5", "a port's name in quotes"),
         ("model = \"tank\"\n[ports]\nh = { port = \"w\", scal = 1 }", "3:19", "did you mean `scale`?"),
+        (
+            "model = \"tank\"\n[ports]\nh = { port = \"w\", limits = [2, 1] }",
+            "3:28",
+            "as in `limits = [0, 4095]`",
+        ),
+        ("model = \"tank\"\n[pins]\nstop = 2", "3:8", "expected the level of a pin, 0 or 1"),
+        ("model = \"tank\"\n[pins]\nstop = [1, 0]", "3:9", "as in [[0.1, 0], [0.2, \"sensor\"]]"),
+        ("model = \"tank\"\n[pins]\nstop = [[1, 0], [0, 1]]", "3:18", "increase; 0 s does not"),
+        ("model = \"tank\"\n[pins]\nstop = { above = 1 }", "3:8", "the sensors that a comparator watches"),
+        ("model = \"tank\"\n[pins]\nstop = { signal = \"h\" }", "3:10", "did you mean `signals`?"),
         ("model = \"tank\"\n[ports", "2:", ""),
         ("model = \"tank\"\nmodel = \"tank\"", "2:1", "duplicate key"),
     ] {
@@ -306,7 +375,7 @@ fn connect(text: &str, options: &[(&str, &str)]) -> Result<ClosedLoop<Simulation
     let options: Vec<_> = options.iter().map(|(a, b)| ((*a).to_owned(), (*b).to_owned())).collect();
     let connection = file.connect(&interface, &inputs, &outputs, &options);
     let connection = connection.map_err(|mistakes| mistakes.render(false))?;
-    connection.complete(false)?;
+    connection.complete(|_| false)?;
     Ok(ClosedLoop::new(plant, interface, connection, PERIOD))
 }
 

@@ -4,6 +4,7 @@
 use super::models::MODELS;
 use super::{Interface, MOST_STEPS, Model, Quantity, Simulation, SimulationError};
 use std::ops::Range;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use takt_diagnostics::diag::{Diagnostic, Diagnostics};
 use takt_diagnostics::source::{Sources, Span};
@@ -29,8 +30,17 @@ impl Course {
     /// Value in a period of the given length in s. A step acts from the first period on that does not begin before it.
     pub(super) fn at(&self, period: u64, length: f64) -> f64 {
         // Rounding must not put off a step at a multiple of the period.
-        let begins = (period as f64 + 1e-6) * length;
-        let index = self.steps.partition_point(|(time, _)| *time <= begins);
+        self.value((period as f64 + 1e-6) * length)
+    }
+
+    /// Times of the steps, in s.
+    pub fn times(&self) -> impl Iterator<Item = f64> {
+        self.steps.iter().map(|(time, _)| *time)
+    }
+
+    /// Value at a time in s.
+    pub fn value(&self, time: f64) -> f64 {
+        let index = self.steps.partition_point(|(begin, _)| *begin <= time);
         index.checked_sub(1).map_or(0.0, |last| self.steps[last].1)
     }
 }
@@ -42,11 +52,51 @@ pub(super) struct PortOf {
     /// Of a sensor the port is signal · scale + offset; of an input the signal is port · scale + offset.
     pub(super) scale: f64,
     pub(super) offset: f64,
+    /// Least and greatest value of a sensor's port.
+    pub(super) limits: (f64, f64),
 }
 
 impl PortOf {
     pub(super) fn named(port: &str) -> PortOf {
-        PortOf { port: port.to_owned(), scale: 1.0, offset: 0.0 }
+        PortOf { port: port.to_owned(), scale: 1.0, offset: 0.0, limits: UNLIMITED }
+    }
+}
+
+/// Limits of a sensor without any.
+pub(super) const UNLIMITED: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
+
+/// Driver of an input pin of a board.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum PinDriver {
+    /// A constant level.
+    Level(bool),
+    /// What is connected there: a sensor, or a level of 0.
+    Sensor,
+    /// The same, with one level in 16 inverted.
+    Noise,
+}
+
+/// What a plant's file says of an input pin of a board.
+#[derive(Clone, PartialEq, Debug)]
+pub enum PinCourse {
+    /// Times in s, increasing, and drivers from then on; before them the sensor.
+    Steps(Vec<(f64, PinDriver)>),
+    /// A comparator: 1 while the magnitude of one of the signals is above a value.
+    Comparator {
+        /// Sensors of the plant.
+        signals: Vec<String>,
+        /// Greatest magnitude for 0.
+        above: f64,
+    },
+}
+
+impl PinCourse {
+    /// Driver at a time in s, and the time of the next step.
+    pub fn at(&self, time: f64) -> (PinDriver, Option<f64>) {
+        let PinCourse::Steps(steps) = self else { return (PinDriver::Sensor, None) };
+        let index = steps.partition_point(|(begin, _)| *begin <= time);
+        let driver = index.checked_sub(1).map_or(PinDriver::Sensor, |last| steps[last].1);
+        (driver, steps.get(index).map(|(begin, _)| *begin))
     }
 }
 
@@ -105,6 +155,7 @@ pub struct PlantFile {
     pub(super) ports: Vec<Entry<PortOf>>,
     pub(super) disturbances: Vec<Entry<Course>>,
     pub(super) inputs: Vec<Entry<Course>>,
+    pins: Vec<Entry<PinCourse>>,
 }
 
 impl PlantFile {
@@ -145,7 +196,19 @@ impl PlantFile {
             ports: Vec::new(),
             disturbances: Vec::new(),
             inputs: Vec::new(),
+            pins: Vec::new(),
         }
+    }
+
+    /// Input pins of a board that the file drives, with their places.
+    pub fn pins(&self) -> impl Iterator<Item = (&str, Span, &PinCourse)> {
+        self.pins.iter().map(|Entry { name, place, value }| (name.as_str(), *place, value))
+    }
+
+    /// Path of the plant's FMU, if it is one. `file` is the path of this file, beside which FMUs lie, or of the FMU by itself.
+    pub fn fmu(&self, file: &Path) -> Option<PathBuf> {
+        let Kind::Fmu { path, .. } = &self.kind else { return None };
+        Some(if is_fmu(file) { file.to_owned() } else { file.parent().unwrap_or(Path::new("")).join(path) })
     }
 
     /// A mistake at a place of this file.
@@ -237,6 +300,11 @@ impl PlantFile {
     }
 }
 
+/// The path names an FMU, by its extension.
+pub fn is_fmu(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("fmu"))
+}
+
 /// Mistakes in the order of their places.
 pub(super) fn diagnostics(sources: Arc<Sources>, mut list: Vec<Diagnostic>) -> Diagnostics {
     list.sort_by_key(|one| one.labels.first().map(|label| label.span));
@@ -317,8 +385,18 @@ impl Reader {
     }
 
     fn file(&mut self, table: &DeTable<'_>) -> Option<PlantFile> {
-        const KEYS: [&str; 9] =
-            ["model", "fmu", "steps", "limit", "parameters", "initial", "ports", "disturbance", "inputs"];
+        const KEYS: [&str; 10] = [
+            "model",
+            "fmu",
+            "steps",
+            "limit",
+            "parameters",
+            "initial",
+            "ports",
+            "disturbance",
+            "inputs",
+            "pins",
+        ];
         for (name, place, _) in entries(table) {
             if !KEYS.contains(&name) {
                 self.unknown("a plant's file has no key", name, place, KEYS);
@@ -329,6 +407,7 @@ impl Reader {
         let kind = self.kind(table);
         let ports = self.table(get("ports"), "ports", |reader, _, value| reader.port(value));
         let inputs = self.table(get("inputs"), "inputs", |reader, _, value| reader.course(value, None));
+        let pins = self.table(get("pins"), "pins", |reader, _, value| reader.pin(value));
         let model = match &kind {
             Some(Kind::Model { model, .. }) => Some(*model),
             _ => None,
@@ -341,7 +420,7 @@ impl Reader {
             reader.course(value, unit)
         });
         let sources = Arc::clone(&self.sources);
-        Some(PlantFile { sources, kind: kind?, steps: steps?, ports, disturbances, inputs })
+        Some(PlantFile { sources, kind: kind?, steps: steps?, ports, disturbances, inputs, pins })
     }
 
     fn kind(&mut self, table: &DeTable<'_>) -> Option<Kind> {
@@ -508,12 +587,7 @@ impl Reader {
                 let _ = self.mistake(span(step.span()), text);
                 return None;
             };
-            let at = self.number(time, Some("s"))?;
-            if at < 0.0 || steps.last().is_some_and(|(last, _)| at <= *last) {
-                let text = format!("the times must begin with 0 or more and increase; {at} s does not");
-                let _ = self.mistake(span(time.span()), text);
-                return None;
-            }
+            let at = self.time(time, steps.last().map(|(last, _)| *last))?;
             steps.push((at, self.number(value, unit)?));
         }
         if steps.is_empty() {
@@ -522,6 +596,17 @@ impl Reader {
             return None;
         }
         Some(Course { steps })
+    }
+
+    /// Time of a step, in s, which comes after the last one's.
+    fn time(&mut self, value: &Spanned<DeValue<'_>>, last: Option<f64>) -> Option<f64> {
+        let at = self.number(value, Some("s"))?;
+        if at < 0.0 || last.is_some_and(|last| at <= last) {
+            let text = format!("the times must begin with 0 or more and increase; {at} s does not");
+            let _ = self.mistake(span(value.span()), text);
+            return None;
+        }
+        Some(at)
     }
 
     fn port(&mut self, value: &Spanned<DeValue<'_>>) -> Option<PortOf> {
@@ -533,7 +618,7 @@ impl Reader {
             let _ = self.mistake(span(value.span()), expected);
             return None;
         };
-        const KEYS: [&str; 3] = ["port", "scale", "offset"];
+        const KEYS: [&str; 4] = ["port", "scale", "offset", "limits"];
         for (name, place, _) in entries(table) {
             if !KEYS.contains(&name) {
                 self.unknown("a port of a plant has no key", name, place, KEYS);
@@ -546,6 +631,73 @@ impl Reader {
         let port = self.text("port", port)?.to_owned();
         let scale = table.get("scale").map_or(Some(1.0), |value| self.number(value, None))?;
         let offset = table.get("offset").map_or(Some(0.0), |value| self.number(value, None))?;
-        Some(PortOf { port, scale, offset })
+        let limits = table.get("limits").map_or(Some(UNLIMITED), |value| {
+            let pair = value.get_ref().as_array().filter(|pair| pair.len() == 2);
+            let pair = pair.and_then(|pair| Some((pair.first()?, pair.get(1)?)));
+            let found =
+                pair.and_then(|(low, high)| Some((self.number(low, None)?, self.number(high, None)?)));
+            let found = found.filter(|(low, high)| low <= high);
+            if found.is_none() {
+                let text =
+                    "expected the least and the greatest value of the port, as in `limits = [0, 4095]`";
+                let _ = self.mistake(span(value.span()), text);
+            }
+            found
+        })?;
+        Some(PortOf { port, scale, offset, limits })
+    }
+
+    fn pin(&mut self, value: &Spanned<DeValue<'_>>) -> Option<PinCourse> {
+        if let Some(table) = value.get_ref().as_table() {
+            return self.comparator(table, span(value.span()));
+        }
+        let Some(list) = value.get_ref().as_array() else {
+            return Some(PinCourse::Steps(vec![(0.0, self.pin_driver(value)?)]));
+        };
+        let mut steps: Vec<(f64, PinDriver)> = Vec::new();
+        for step in list.iter() {
+            let pair = step.get_ref().as_array().filter(|pair| pair.len() == 2);
+            let Some((Some(time), Some(driver))) = pair.map(|pair| (pair.first(), pair.get(1))) else {
+                let text = "expected a list of [time in s, level], as in [[0.1, 0], [0.2, \"sensor\"]]";
+                let _ = self.mistake(span(step.span()), text);
+                return None;
+            };
+            let at = self.time(time, steps.last().map(|(last, _)| *last))?;
+            steps.push((at, self.pin_driver(driver)?));
+        }
+        Some(PinCourse::Steps(steps))
+    }
+
+    fn pin_driver(&mut self, value: &Spanned<DeValue<'_>>) -> Option<PinDriver> {
+        let driver = match value.get_ref() {
+            DeValue::Integer(number) if number.as_str() == "0" => Some(PinDriver::Level(false)),
+            DeValue::Integer(number) if number.as_str() == "1" => Some(PinDriver::Level(true)),
+            DeValue::String(text) if text == "sensor" => Some(PinDriver::Sensor),
+            DeValue::String(text) if text == "noise" => Some(PinDriver::Noise),
+            _ => None,
+        };
+        if driver.is_none() {
+            let text = "expected the level of a pin, 0 or 1, or \"sensor\", or \"noise\"";
+            let _ = self.mistake(span(value.span()), text);
+        }
+        driver
+    }
+
+    fn comparator(&mut self, table: &DeTable<'_>, place: Span) -> Option<PinCourse> {
+        const KEYS: [&str; 2] = ["signals", "above"];
+        for (name, place, _) in entries(table) {
+            if !KEYS.contains(&name) {
+                self.unknown("a comparator has no key", name, place, KEYS);
+            }
+        }
+        let signals = table.get("signals").and_then(|value| value.get_ref().as_array());
+        let signals: Option<Vec<String>> = signals
+            .and_then(|list| list.iter().map(|signal| Some(signal.get_ref().as_str()?.to_owned())).collect());
+        let (Some(signals), Some(above)) = (signals, table.get("above")) else {
+            let text = "expected the sensors that a comparator watches, as in { signals = [\"ia\", \"ib\"], above = 15 }";
+            let _ = self.mistake(place, text);
+            return None;
+        };
+        Some(PinCourse::Comparator { signals, above: self.number(above, None)? })
     }
 }

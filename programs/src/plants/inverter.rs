@@ -43,7 +43,7 @@ pub(super) fn averaged(duties: [f64; 3], dead: f64) -> [Leg; 3] {
 
 /// Legs from edge to edge over a period in seconds, which begins in the middle of the lower switches' pulses: durations and states. The
 /// switch that is to go on waits for the dead time, a lower one of the period before, whose duties are taken to be the same, into this one.
-pub(super) fn switched(duties: [f64; 3], dead: f64, period: f64) -> Vec<(f64, [Leg; 3])> {
+pub(super) fn switched<const N: usize>(duties: [f64; N], dead: f64, period: f64) -> Vec<(f64, [Leg; N])> {
     let pulses = duties.map(|duty| {
         let half = 0.5 * period * limited(duty);
         (0.5 * period - half, 0.5 * period + half)

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! A plant between the output and the input ports of a program.
 
-use super::file::{self, CODE, Course, Entry, PlantFile, PortOf, listed};
+use super::file::{self, CODE, Course, Entry, PlantFile, PortOf, UNLIMITED, listed};
 use super::{Interface, Plant};
 use std::sync::Arc;
 use takt_diagnostics::diag::{Diagnostic, Diagnostics};
@@ -40,26 +40,51 @@ pub enum LoopError {
 
 /// Source of one input of a plant.
 #[derive(Clone, Debug)]
-enum Source {
-    Port { register: Register, ty: Type, scale: f64, offset: f64 },
+pub enum Source {
+    /// The program: the input is port · scale + offset.
+    Port {
+        /// Output port.
+        port: Port,
+        /// Factor.
+        scale: f64,
+        /// Summand.
+        offset: f64,
+    },
+    /// The plant's file.
     Course(Course),
 }
 
-/// Sensor behind an input port.
+/// Sensor behind an input port, which is signal · scale + offset.
 #[derive(Clone, Debug)]
-struct Sensor {
-    index: usize,
-    port: Port,
-    scale: f64,
-    offset: f64,
+pub struct Sensor {
+    /// Index among the plant's sensors.
+    pub index: usize,
+    /// Input port.
+    pub port: Port,
+    /// Factor.
+    pub scale: f64,
+    /// Summand.
+    pub offset: f64,
+    /// Least and greatest value.
+    pub limits: (f64, f64),
+}
+
+impl Sensor {
+    /// Value of the port, before it is rounded, from the plant's signals.
+    pub fn value(&self, signals: &[f64]) -> f64 {
+        (signals[self.index] * self.scale + self.offset).clamp(self.limits.0, self.limits.1)
+    }
 }
 
 /// How a plant is connected to a program.
 #[derive(Clone, Debug)]
 pub struct Connection {
-    sources: Vec<Source>,
-    sensors: Vec<Sensor>,
-    courses: Vec<(Port, Course)>,
+    /// Sources of the plant's inputs, in their order.
+    pub sources: Vec<Source>,
+    /// Sensors that drive input ports.
+    pub sensors: Vec<Sensor>,
+    /// Input ports that the plant's file drives.
+    pub courses: Vec<(Port, Course)>,
     /// Input ports that neither the plant nor its file drives: a table must.
     pub rest: Vec<Port>,
 }
@@ -73,8 +98,8 @@ fn value(ty: Type, bits: u32) -> f64 {
     }
 }
 
-/// Bits of a port: a float is rounded to nearest, an integer is the next lower one, as in a counter or converter, within its range.
-fn bits(ty: Type, value: f64) -> u32 {
+/// Bits of a port's value: a float is rounded to nearest, an integer is the next lower one, as in a counter or converter, within its range.
+pub fn bits(ty: Type, value: f64) -> u32 {
     match ty {
         Type::F => (value as f32).to_bits(),
         // Rust's casts saturate.
@@ -135,22 +160,22 @@ impl Connector<'_> {
         &mut self.mistakes[last]
     }
 
-    /// Port of a signal: of the map, or of equal name. Reports a mapped one that does not exist.
-    fn port_of(&mut self, signal: &str, ports: &[Port], kind: &str) -> Option<(Port, f64, f64)> {
+    /// Port of a signal, with its entry: of the map, or of equal name. Reports a mapped one that does not exist.
+    fn port_of(&mut self, signal: &str, ports: &[Port], kind: &str) -> Option<(Port, PortOf)> {
         let find = |name: &str| ports.iter().find(|port| port.name == name).cloned();
         let Some(entry) = self.ports.iter().find(|entry| entry.name == signal).cloned() else {
-            return find(signal).map(|port| (port, 1.0, 0.0));
+            return find(signal).map(|port| (port, PortOf::named(signal)));
         };
-        let PortOf { port, scale, offset } = entry.value;
-        let found = find(&port);
+        let PortOf { port, .. } = &entry.value;
+        let found = find(port);
         if found.is_none() {
-            let near = nearest(&port, ports.iter().map(|port| port.name.as_str()));
+            let near = nearest(port, ports.iter().map(|port| port.name.as_str()));
             let names = listed(ports.iter().map(|port| port.name.as_str()));
             let text = format!("the program has no {kind} port `{port}` for the plant's `{signal}`");
             let mistake = self.mistake(entry.place, text);
             *mistake = mistake.clone().help(format!("{kind} ports: {names}")).did_you_mean(near);
         }
-        found.map(|port| (port, scale, offset))
+        found.map(|port| (port, entry.value))
     }
 
     fn connect(&mut self, inputs: &[Port], outputs: &[Port]) -> Connection {
@@ -183,8 +208,12 @@ impl Connector<'_> {
             if let Some(course) = course {
                 return Source::Course(course.value.clone());
             }
-            if let Some((port, scale, offset)) = self.port_of(signal, outputs, "output") {
-                return Source::Port { register: port.register, ty: port.ty, scale, offset };
+            if let Some((port, PortOf { scale, offset, limits, .. })) = self.port_of(signal, outputs, "output") {
+                if limits != UNLIMITED {
+                    let text = format!("`limits` is for sensors, and `{signal}` is an input of the plant");
+                    let _ = self.mistake(mapped.unwrap_or_default(), text);
+                }
+                return Source::Port { port, scale, offset };
             }
             if !is_disturbance && mapped.is_none() {
                 let text = format!("the plant `{plant}` takes `{signal}`, and the program has no output port of that name");
@@ -201,7 +230,10 @@ impl Connector<'_> {
         let sources = sources.collect::<Vec<_>>();
         let mut sensors: Vec<Sensor> = Vec::new();
         for (index, signal) in gives.iter().enumerate() {
-            let Some((port, scale, offset)) = self.port_of(signal, inputs, "input") else { continue };
+            let Some((port, PortOf { scale, offset, limits, .. })) = self.port_of(signal, inputs, "input")
+            else {
+                continue;
+            };
             if let Some(other) = sensors.iter().find(|other| other.port.register == port.register) {
                 let other = &gives[other.index];
                 let place = self.ports.iter().find(|entry| entry.name == *signal || entry.name == *other);
@@ -210,7 +242,7 @@ impl Connector<'_> {
                     format!("the input port `{}` gets `{other}` and `{signal}`: one must go", port.name);
                 let _ = self.mistake(place, text);
             }
-            sensors.push(Sensor { index, port, scale, offset });
+            sensors.push(Sensor { index, port, scale, offset, limits });
         }
         let mut courses = Vec::new();
         for entry in &self.file.inputs {
@@ -266,13 +298,16 @@ impl Connection {
     }
 
     /// # Errors
-    /// If input ports are left that no table drives; in words.
-    pub fn complete(&self, has_table: bool) -> Result<(), String> {
-        if has_table || self.rest.is_empty() {
-            return Ok(());
-        }
-        let names = listed(self.rest.iter().map(|port| port.name.as_str()));
-        let (ports, have) = if self.rest.len() == 1 { ("port", "has") } else { ("ports", "have") };
+    /// If input ports are left for which `has_values` is false; in words.
+    pub fn complete(&self, has_values: impl Fn(&Port) -> bool) -> Result<(), String> {
+        let missing: Vec<&str> =
+            self.rest.iter().filter(|port| !has_values(port)).map(|port| port.name.as_str()).collect();
+        let (ports, have) = match missing.len() {
+            0 => return Ok(()),
+            1 => ("port", "has"),
+            _ => ("ports", "have"),
+        };
+        let names = listed(missing);
         Err(format!(
             "the input {ports} {names} {have} no source: state a value or steps under [inputs] in the plant's file, map a signal of the plant \
              under [ports], or give columns with --inputs"
@@ -288,12 +323,15 @@ pub struct ClosedLoop<P> {
     /// Length of a period, s.
     length: f64,
     period: u64,
+    begun: bool,
+    /// States at the beginning of the last period.
+    states: Vec<f64>,
 }
 
 impl<P: Plant> ClosedLoop<P> {
     /// A loop whose periods have the given length in s.
     pub fn new(plant: P, interface: Interface, connection: Connection, length: f64) -> ClosedLoop<P> {
-        ClosedLoop { plant, interface, connection, length, period: 0 }
+        ClosedLoop { plant, interface, connection, length, period: 0, begun: false, states: Vec::new() }
     }
 
     /// Length of a period, s.
@@ -321,13 +359,38 @@ impl<P: Plant> ClosedLoop<P> {
         &self.plant
     }
 
+    /// States at the beginning of the last period, in the order of [`Interface::states`]; empty before the first.
+    pub fn states(&self) -> &[f64] {
+        &self.states
+    }
+
+    /// Begins a period: moves the plant under the outputs of the one before, unless it is the first, and sets the inputs in a row of a table
+    /// as [`ClosedLoop::set_inputs`] does. So only a period that is run needs the plant's motion in the one before.
+    ///
+    /// # Errors
+    /// If the plant fails, or is not finite any more.
+    pub fn begin(
+        &mut self,
+        row: &mut Vec<(Register, u32)>,
+        output: impl Fn(Register) -> Option<u32>,
+    ) -> Result<(), LoopError> {
+        if self.begun {
+            self.advance(output)?;
+        }
+        self.begun = true;
+        self.set_inputs(row);
+        self.states = self.plant.states();
+        Ok(())
+    }
+
     /// Sets the inputs of the next period in a row of a table: those of the plant in place of the row's own, those of the file where the
     /// row has none.
     pub fn set_inputs(&self, row: &mut Vec<(Register, u32)>) {
         let signals = self.plant.sensors();
-        for Sensor { index, port, scale, offset } in &self.connection.sensors {
+        for sensor in &self.connection.sensors {
+            let Sensor { port, .. } = sensor;
             row.retain(|(known, _)| *known != port.register);
-            row.push((port.register, bits(port.ty, signals[*index] * scale + offset)));
+            row.push((port.register, bits(port.ty, sensor.value(&signals))));
         }
         for (port, course) in &self.connection.courses {
             if row.iter().all(|(known, _)| *known != port.register) {
@@ -344,8 +407,8 @@ impl<P: Plant> ClosedLoop<P> {
     pub fn advance(&mut self, output: impl Fn(Register) -> Option<u32>) -> Result<(), LoopError> {
         let ClosedLoop { plant, interface, connection, length, period } = self;
         let inputs = connection.sources.iter().map(|source| match source {
-            Source::Port { register, ty, scale, offset } => {
-                value(*ty, output(*register).unwrap_or_default()) * scale + offset
+            Source::Port { port, scale, offset } => {
+                value(port.ty, output(port.register).unwrap_or_default()) * scale + offset
             }
             Source::Course(course) => course.at(*period, *length),
         });

@@ -11,12 +11,13 @@
 //! the same on every host.
 
 pub mod file;
-pub mod inverter;
+mod inverter;
 mod loops;
 pub mod models;
 
-pub use file::PlantFile;
-pub use loops::{ClosedLoop, Connection, LoopError};
+pub use file::{Course, PinCourse, PinDriver, PlantFile};
+pub use inverter::Leg;
+pub use loops::{ClosedLoop, Connection, LoopError, Sensor, Source, bits};
 use models::{ORDER, State};
 
 /// Steps of integration in the time constant of the fastest motion: errors below 10⁻⁶ of the values.
@@ -78,6 +79,9 @@ type Stretch = (f64, Vec<f64>);
 /// Stretches that make up a period, from parameters, inputs and the period in seconds.
 type Stretches = fn(&[f64], &[f64], f64) -> Vec<Stretch>;
 
+/// Inputs of [`Model::derivative`] from the states of the legs and the inputs.
+type Bridge = fn(&[Leg], &[f64]) -> Vec<f64>;
+
 /// A small plant.
 #[derive(Debug)]
 pub struct Model {
@@ -101,12 +105,21 @@ pub struct Model {
     rate: fn(&[f64], f64) -> f64,
     /// Stretches that make up a period; `None`: one, with the inputs as they are.
     stretches: Option<Stretches>,
+    /// Inputs of [`Model::derivative`] while the legs of half bridges are in given states, in place of the duties, which are all inputs but
+    /// disturbances; `None` for a plant without switches.
+    bridge: Option<Bridge>,
 }
 
 impl Model {
     /// The model of a name.
     pub fn named(name: &str) -> Option<&'static Model> {
         models::MODELS.into_iter().find(|model| model.name == name)
+    }
+
+    /// Number of half bridges whose switches the model has; its first inputs are their duties.
+    pub fn legs(&self) -> usize {
+        let is_duty = |input: &&Input| self.bridge.is_some() && !input.is_disturbance;
+        self.inputs.iter().filter(is_duty).count()
     }
 
     /// Signals of the model.
@@ -219,6 +232,15 @@ impl Simulation {
         // A step that is a rounding error longer is no further step.
         let longest = period / asked.ceil() * (1.0 + 1e-9);
         Ok(Simulation { model, parameters, period, longest, state })
+    }
+
+    /// Moves for a time in s under switches in given states, one leg for each of [`Model::legs`], and constant inputs, of which duties have no
+    /// effect.
+    pub fn advance_switched(&mut self, duration: f64, legs: &[Leg], inputs: &[f64]) {
+        match self.model.bridge {
+            Some(bridge) => self.integrate(duration, &bridge(legs, inputs)),
+            None => self.integrate(duration, inputs),
+        }
     }
 
     /// Moves under constant inputs of the equations.

@@ -10,8 +10,8 @@ pub(super) const ORDER: usize = 4;
 pub(super) type State = [f64; ORDER];
 
 /// All models.
-pub static MODELS: [&Model; 7] =
-    [&DC_MOTOR, &PMSM, &PMSM_SWITCHED, &INERTIA, &MASS_SPRING, &CART_PENDULUM, &TANK];
+pub static MODELS: [&Model; 8] =
+    [&DC_MOTOR, &DC_MOTOR_SWITCHED, &PMSM, &PMSM_SWITCHED, &INERTIA, &MASS_SPRING, &CART_PENDULUM, &TANK];
 
 const fn positive(name: &'static str, value: f64, unit: &'static str, text: &'static str) -> Parameter {
     Parameter { name, value, unit, text, least: f64::MIN_POSITIVE }
@@ -37,7 +37,21 @@ const SPEED: Quantity = quantity("w", "rad/s", "speed of the shaft");
 const ANGLE: Quantity = quantity("angle", "rad", "angle of the shaft, which counts turns");
 const LOAD: Input = disturbance("load", "N·m", "torque of the load, against the motor's");
 const INERTIA_OF_SHAFT: Parameter = positive("J", 7e-4, "kg·m²", "moment of inertia, with the load's");
+const RESISTANCE: Parameter = positive("R", 1.0, "Ω", "resistance of the armature");
+const INDUCTANCE: Parameter = positive("L", 1e-3, "H", "inductance of the armature");
+const CONSTANT: Parameter =
+    positive("K", 0.08, "V·s/rad", "back EMF per speed, and torque per current in N·m/A");
+const BRIDGE_VOLTAGE: Parameter = positive("udc", 24.0, "V", "voltage of the bridge");
+const DEAD_TIME: Parameter = natural("dead", 0.5e-6, "s", "dead time of the half bridges");
+const KNEE: Parameter = positive(
+    "knee",
+    0.05,
+    "A",
+    "current below which a leg's capacitance, and no diode, decides its voltage in the dead time",
+);
 const FRICTION: Parameter = natural("B", 1e-4, "N·m·s/rad", "viscous friction");
+
+static DC_MOTOR_PARAMETERS: [Parameter; 5] = [RESISTANCE, INDUCTANCE, CONSTANT, INERTIA_OF_SHAFT, FRICTION];
 
 /// L·di/dt = u - R·i - K·w, J·dw/dt = K·i - B·w - load.
 static DC_MOTOR: Model = Model {
@@ -46,13 +60,7 @@ static DC_MOTOR: Model = Model {
     inputs: &[actuator("u", "V", "voltage of the armature"), LOAD],
     sensors: &[SPEED, quantity("i", "A", "current of the armature"), ANGLE],
     states: &[quantity("i", "A", "current of the armature"), SPEED, ANGLE],
-    parameters: &[
-        positive("R", 1.0, "Ω", "resistance of the armature"),
-        positive("L", 1e-3, "H", "inductance of the armature"),
-        positive("K", 0.08, "V·s/rad", "back EMF per speed, and torque per current in N·m/A"),
-        INERTIA_OF_SHAFT,
-        FRICTION,
-    ],
+    parameters: &DC_MOTOR_PARAMETERS,
     derivative: |p, input, [current, speed, ..]| {
         let (&[r, l, k, j, b], &[u, load]) = (p, input) else { return [0.0; ORDER] };
         [(u - r * current - k * speed) / l, (k * current - b * speed - load) / j, speed, 0.0]
@@ -63,6 +71,43 @@ static DC_MOTOR: Model = Model {
         r / l + b / j + k / (l * j).sqrt()
     },
     stretches: None,
+    bridge: None,
+};
+
+/// The same between two half bridges, each of which has its edges.
+static DC_MOTOR_SWITCHED: Model = Model {
+    name: "dc_motor_switched",
+    text: "DC motor between two half bridges, switch by switch",
+    inputs: &[actuator("da", "", PHASES), actuator("db", "", PHASES), LOAD],
+    parameters: &[
+        RESISTANCE,
+        INDUCTANCE,
+        CONSTANT,
+        INERTIA_OF_SHAFT,
+        FRICTION,
+        BRIDGE_VOLTAGE,
+        DEAD_TIME,
+        KNEE,
+    ],
+    derivative: |p, input, [current, speed, ..]| {
+        let (&[r, l, k, j, b, udc, _, knee], &[a_level, a_loss, b_level, b_loss, load]) = (p, input) else {
+            return [0.0; ORDER];
+        };
+        let [a, behind] = [(a_level, a_loss, current), (b_level, b_loss, -current)]
+            .map(|(level, loss, current)| Leg { level, loss }.voltage(current, knee));
+        let u = (a - behind) * udc;
+        [(u - r * current - k * speed) / l, (k * current - b * speed - load) / j, speed, 0.0]
+    },
+    rate: |p, _| {
+        let [r, l, k, j, b, udc, _, knee] = *p else { return 0.0 };
+        r / l + b / j + k / (l * j).sqrt() + udc / (knee * l)
+    },
+    stretches: Some(|p, input, period| {
+        let edges = inverter::switched::<2>(duties(input), p[6], period);
+        edges.into_iter().map(|(duration, state)| (duration, legs(&state, input))).collect()
+    }),
+    bridge: Some(legs),
+    ..DC_MOTOR
 };
 
 const PHASES: &str = "duty of the half bridge, 0 to 1";
@@ -94,14 +139,9 @@ static PMSM_PARAMETERS: [Parameter; 10] = [
     positive("p", 4.0, "", "pairs of poles"),
     positive("J", 2e-5, "kg·m²", "moment of inertia, with the load's"),
     natural("B", 1e-5, "N·m·s/rad", "viscous friction"),
-    positive("udc", 24.0, "V", "voltage of the bridge"),
-    natural("dead", 0.5e-6, "s", "dead time of the half bridges"),
-    positive(
-        "knee",
-        0.05,
-        "A",
-        "current below which a leg's capacitance, and no diode, decides its voltage in the dead time",
-    ),
+    BRIDGE_VOLTAGE,
+    DEAD_TIME,
+    KNEE,
 ];
 
 /// Permanent-magnet synchronous machine in the rotor's axes, amplitudes invariant, behind an inverter: the mean voltages of a period.
@@ -116,8 +156,9 @@ static PMSM: Model = Model {
     sense: pmsm_sensors,
     rate: |p, period| pmsm_rate(p, p[DEAD] / period),
     stretches: Some(|p, input, period| {
-        vec![(period, legs(inverter::averaged(duties(input), p[DEAD] / period), input))]
+        vec![(period, legs(&inverter::averaged(duties(input), p[DEAD] / period), input))]
     }),
+    bridge: None,
 };
 
 /// The same behind the switches of the inverter, each of which has its edges.
@@ -126,9 +167,10 @@ static PMSM_SWITCHED: Model = Model {
     text: "synchronous motor with an inverter, switch by switch",
     rate: |p, _| pmsm_rate(p, 0.5),
     stretches: Some(|p, input, period| {
-        let edges = inverter::switched(duties(input), p[DEAD], period);
-        edges.into_iter().map(|(duration, state)| (duration, legs(state, input))).collect()
+        let edges = inverter::switched::<3>(duties(input), p[DEAD], period);
+        edges.into_iter().map(|(duration, state)| (duration, legs(&state, input))).collect()
     }),
+    bridge: Some(legs),
     ..PMSM
 };
 
@@ -136,13 +178,13 @@ static PMSM_SWITCHED: Model = Model {
 const UDC: usize = 7;
 const DEAD: usize = 8;
 
-fn duties(input: &[f64]) -> [f64; 3] {
+fn duties<const N: usize>(input: &[f64]) -> [f64; N] {
     std::array::from_fn(|phase| input[phase])
 }
 
-/// Inputs of [`pmsm`]: level and loss of each leg, and the load.
-fn legs(legs: [Leg; 3], input: &[f64]) -> Vec<f64> {
-    let legs = legs.into_iter().flat_map(|leg| [leg.level, leg.loss]);
+/// Inputs of the equations of plants behind half bridges: level and loss of each leg, and the load.
+fn legs(legs: &[Leg], input: &[f64]) -> Vec<f64> {
+    let legs = legs.iter().flat_map(|leg| [leg.level, leg.loss]);
     legs.chain(input.last().copied()).collect()
 }
 
@@ -221,6 +263,7 @@ static INERTIA: Model = Model {
     sense: |_, [speed, angle, ..]| vec![angle, speed],
     rate: |p, _| p[1] / p[0],
     stretches: None,
+    bridge: None,
 };
 
 /// m·dv/dt = force + push - k·x - d·v.
@@ -245,6 +288,7 @@ static MASS_SPRING: Model = Model {
     sense: |_, [x, v, ..]| vec![x, v],
     rate: |p, _| p[2] / p[0] + (p[1] / p[0]).sqrt(),
     stretches: None,
+    bridge: None,
 };
 
 /// Standard gravity, m/s².
@@ -293,6 +337,7 @@ static CART_PENDULUM: Model = Model {
         b / cart + c / (mass * length * length) + (GRAVITY / length * (cart + mass) / cart).sqrt()
     },
     stretches: None,
+    bridge: None,
 };
 
 /// A·dh/dt = q + inflow - a·√(2·g·h), within the tank.
@@ -327,4 +372,5 @@ static TANK: Model = Model {
     // The outlet's time constant at a hundredth of the height.
     rate: |p, _| p[1] / p[0] * (GRAVITY / (0.02 * p[2])).sqrt(),
     stretches: None,
+    bridge: None,
 };

@@ -92,12 +92,12 @@ pub(crate) fn close(
             Some(recorded) => recorded.get(at).cloned().unwrap_or_default(),
             None => rest.clone(),
         };
-        closed.set_inputs(&mut row);
+        if closed.begin(&mut row, |register| emulator.output_bits(register)).is_err() {
+            break;
+        }
         rows.push(row);
         prepare(&mut emulator, Some(&rows), at as u64)?;
-        if emulator.run_period(&[]).is_err()
-            || closed.advance(|register| emulator.output_bits(register)).is_err()
-        {
+        if emulator.run_period(&[]).is_err() {
             break;
         }
     }

@@ -33,7 +33,7 @@ use takt_emu::{Emulator, Row, Stop};
 use takt_isa::program::Port;
 use takt_isa::timing::Cycle;
 use takt_isa::{Program, Type};
-use takt_programs::plants::{Interface, Plant as _};
+use takt_programs::plants::Interface;
 use takt_system::CorePeriods;
 
 /// Run a program, counting cycles.
@@ -228,19 +228,7 @@ impl Run {
         let (program, max_cycles) = (&loaded.program, self.max_cycles);
         let words =
             self.memory.iter().map(|name| memory::words(loaded, name)).collect::<Result<Vec<_>>>()?.concat();
-        Ok(ProgramRun {
-            program,
-            words,
-            emulator,
-            max_cycles,
-            tracer,
-            nans,
-            watch,
-            periods,
-            last: 0,
-            plant,
-            states: Vec::new(),
-        })
+        Ok(ProgramRun { program, words, emulator, max_cycles, tracer, nans, watch, periods, last: 0, plant })
     }
 
     fn of_system<'a, 't>(
@@ -272,8 +260,6 @@ struct ProgramRun<'a, 't> {
     /// Cycles of the last period.
     last: Cycle,
     plant: Option<ProgramLoop>,
-    /// State of the plant at the beginning of the last period.
-    states: Vec<f64>,
 }
 
 impl ProgramRun<'_, '_> {
@@ -322,13 +308,8 @@ impl TableApplication for ProgramRun<'_, '_> {
         match &mut self.plant {
             None => self.set_inputs(row)?,
             Some(plant) => {
-                // Only a period that is run needs the plant's motion in the one before.
-                if self.periods.count > 0 {
-                    plant.advance(|register| self.emulator.output_bits(register))?;
-                }
                 let mut row = row.clone();
-                plant.set_inputs(&mut row);
-                self.states = plant.plant().states();
+                plant.begin(&mut row, |register| self.emulator.output_bits(register))?;
                 self.set_inputs(&row)?;
             }
         }
@@ -352,12 +333,10 @@ impl TableApplication for ProgramRun<'_, '_> {
         let text = |ty: Type, bits: Option<u32>| bits.map_or(String::new(), |bits| ports::format(ty, bits));
         let outputs = self.outputs().map(|(_, ty, bits)| text(ty, bits));
         let cycles = [self.last.to_string()];
-        if self.plant.is_none() {
-            return outputs.chain(cycles).collect();
-        }
+        let Some(plant) = &self.plant else { return outputs.chain(cycles).collect() };
         let inputs = self.program.inputs.iter();
         let inputs = inputs.map(|port| text(port.ty, self.emulator.register(port.register)));
-        inputs.chain(outputs).chain(self.states.iter().map(f64::to_string)).chain(cycles).collect()
+        inputs.chain(outputs).chain(plant.states().iter().map(f64::to_string)).chain(cycles).collect()
     }
 }
 
@@ -389,7 +368,7 @@ impl<'a> Execution<'a> for ProgramRun<'a, '_> {
         let (zeros, nans) = (!self.program.inputs.is_empty(), self.nans);
         let plant = self.plant.map(|plant| {
             let Interface { name, states, .. } = plant.interface().clone();
-            PlantOutcome { name, states: states.into_iter().zip(self.states).collect() }
+            PlantOutcome { name, states: states.into_iter().zip(plant.states().iter().copied()).collect() }
         });
         Ok(RunOutcome { cores: vec![core], outputs, zeros, nans, system: None, plant })
     }

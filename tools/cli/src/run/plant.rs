@@ -10,8 +10,7 @@ use anyhow::{Result, anyhow};
 use clap::Args;
 use std::path::{Path, PathBuf};
 use takt_asm::units;
-use takt_diagnostics::Span;
-use takt_programs::plants::file::{Kind, TEXT_BYTES};
+use takt_programs::plants::file::{TEXT_BYTES, is_fmu};
 use takt_programs::plants::{ClosedLoop, Interface, Plant, PlantFile};
 
 /// Options of a plant.
@@ -48,7 +47,7 @@ impl PlantArguments {
     ) -> Result<Option<ProgramLoop>> {
         let Some(path) = &self.plant else { return Ok(None) };
         let file = read(path, color)?;
-        let options = self.options()?;
+        let options = connections(&self.connect)?;
         let period = self.period.or_else(|| units::sampling_period(&loaded.sources, &loaded.constants));
         let period = period.ok_or_else(|| {
             Failure::Usage(
@@ -61,36 +60,33 @@ impl PlantArguments {
         let program = &loaded.program;
         let connection = file.connect(&interface, &program.inputs, &program.outputs, &options);
         let connection = connection.map_err(|mistakes| Failure::Diagnostics(mistakes.render(color)))?;
-        connection.complete(has_table).map_err(Failure::Usage)?;
+        connection.complete(|_| has_table).map_err(Failure::Usage)?;
         Ok(Some(ClosedLoop::new(plant, interface, connection, period)))
-    }
-
-    /// Signals and ports of --connect.
-    fn options(&self) -> Result<Vec<(String, String)>> {
-        let mut options: Vec<(String, String)> = Vec::new();
-        for text in &self.connect {
-            let Some((signal, port)) = text.split_once('=') else {
-                return Err(Failure::Usage(format!(
-                    "--connect {text}: expected SIGNAL=PORT, as in `w=speed`"
-                ))
-                .into());
-            };
-            let (signal, port) = (signal.trim().to_owned(), port.trim().to_owned());
-            if options.iter().any(|(known, _)| *known == signal) {
-                return Err(Failure::Usage(format!("--connect connects `{signal}` twice")).into());
-            }
-            options.push((signal, port));
-        }
-        Ok(options)
     }
 }
 
+/// Signals and ports of --connect.
+pub(crate) fn connections(texts: &[String]) -> Result<Vec<(String, String)>> {
+    let mut options: Vec<(String, String)> = Vec::new();
+    for text in texts {
+        let Some((signal, port)) = text.split_once('=') else {
+            return Err(
+                Failure::Usage(format!("--connect {text}: expected SIGNAL=PORT, as in `w=speed`")).into()
+            );
+        };
+        let (signal, port) = (signal.trim().to_owned(), port.trim().to_owned());
+        if options.iter().any(|(known, _)| *known == signal) {
+            return Err(Failure::Usage(format!("--connect connects `{signal}` twice")).into());
+        }
+        options.push((signal, port));
+    }
+    Ok(options)
+}
+
 /// Reads a plant's file, or takes an FMU by itself.
-fn read(path: &Path, color: bool) -> Result<PlantFile> {
-    let is = |wanted: &str| path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(wanted));
+pub(crate) fn read(path: &Path, color: bool) -> Result<PlantFile> {
     let name = files::input_name(path);
-    if is("fmu") {
-        // The path is relative to the current folder, as the command line states it.
+    if is_fmu(path) {
         return Ok(PlantFile::of_fmu(&name));
     }
     if !is_system(path) {
@@ -104,58 +100,31 @@ fn read(path: &Path, color: bool) -> Result<PlantFile> {
 
 /// The plant in motion, with its signals.
 fn open(file: &PlantFile, path: &Path, period: f64, color: bool) -> Result<(Box<dyn Plant>, Interface)> {
-    match &file.kind {
-        Kind::Model { .. } => {
-            let (plant, interface) = file.simulation(period)?;
-            Ok((Box::new(plant), interface))
-        }
-        Kind::Fmu { path: fmu, start, limit } => {
-            // An FMU of a file lies beside it.
-            let is_file = is_system(path);
-            let folder = path.parent().filter(|_| is_file).unwrap_or(Path::new(""));
-            open_fmu(file, &folder.join(fmu), start, period, *limit, color)
-        }
+    if file.fmu(path).is_some() {
+        return open_fmu(file, path, period, color);
     }
+    let (plant, interface) = file.simulation(period)?;
+    Ok((Box::new(plant), interface))
 }
 
 /// Starts an FMU in a process of its own, which is this program with the command `fmu-process`.
 #[cfg(all(unix, feature = "fmu"))]
-fn open_fmu(
-    file: &PlantFile,
-    path: &Path,
-    start: &[(String, f64, Span)],
-    period: f64,
-    limit: f64,
-    color: bool,
-) -> Result<(Box<dyn Plant>, Interface)> {
+fn open_fmu(file: &PlantFile, path: &Path, period: f64, color: bool) -> Result<(Box<dyn Plant>, Interface)> {
     use anyhow::Context;
-    use takt_fmu_plant::{Fmu, FmuError, FmuPlant};
+    use takt_fmu_plant::{FmuError, FmuPlant};
     let program = std::env::current_exe().context("cannot find takt's own file")?;
     let mut command = std::process::Command::new(program);
     command.arg("fmu-process");
-    let values: Vec<(String, f64)> = start.iter().map(|(name, value, _)| (name.clone(), *value)).collect();
-    match FmuPlant::new(Fmu::open(path)?, command, &values, period, file.steps, limit) {
-        Ok(plant) => {
-            let interface = plant.interface();
-            Ok((Box::new(plant), interface))
-        }
-        Err(FmuError::Start { index, text }) => {
-            let place = start.get(index).map_or(Span::default(), |(_, _, place)| *place);
-            Err(Failure::Diagnostics(file.mistake(place, text).render(color)).into())
-        }
-        Err(error) => Err(error.into()),
-    }
+    let plant = FmuPlant::of_file(file, path, command, period).map_err(|error| match error {
+        FmuError::Plant(mistakes) => Failure::Diagnostics(mistakes.render(color)).into(),
+        error => anyhow::Error::from(error),
+    })?;
+    let interface = plant.interface();
+    Ok((Box::new(plant), interface))
 }
 
 #[cfg(not(all(unix, feature = "fmu")))]
-fn open_fmu(
-    _: &PlantFile,
-    path: &Path,
-    _: &[(String, f64, Span)],
-    _: f64,
-    _: f64,
-    _: bool,
-) -> Result<(Box<dyn Plant>, Interface)> {
+fn open_fmu(_: &PlantFile, path: &Path, _: f64, _: bool) -> Result<(Box<dyn Plant>, Interface)> {
     anyhow::bail!(
         "{}: this takt was built without FMUs; `cargo install --path tools/cli --all-features` builds it with them, for Linux and macOS",
         path.display()

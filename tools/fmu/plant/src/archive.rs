@@ -2,11 +2,12 @@
 //! The file of an FMU, unpacked into a temporary folder that lives as long as the FMU.
 
 use crate::FmuError;
-use crate::description::{Description, Version};
+use crate::description::{Causality, Description, Version};
 use std::fs::{self, File};
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
+use takt_programs::plants::Interface;
 use zip::ZipArchive;
 
 /// Bytes of all unpacked files, at most.
@@ -73,6 +74,17 @@ impl Fmu {
         let fmu = Fmu { name: name.clone(), description, folder };
         unpack(&mut archive, &library, &fmu.folder).map_err(wrong)?;
         Ok(fmu)
+    }
+
+    /// Signals of the FMU as a plant; its outputs are also its states.
+    pub fn interface(&self) -> Interface {
+        let names = |causality| self.description.of(causality).map(|(_, variable)| variable.name.clone());
+        Interface {
+            name: self.description.name.clone(),
+            inputs: names(Causality::Input).map(|name| (name, false)).collect(),
+            sensors: names(Causality::Output).collect(),
+            states: names(Causality::Output).collect(),
+        }
     }
 }
 

@@ -19,6 +19,7 @@ pub use archive::Fmu;
 pub use description::{Causality, Description, Kind, Variable, Version};
 pub use process::FmuPlant;
 pub use serve::serve;
+use takt_diagnostics::diag::Diagnostics;
 
 /// Reason why an FMU is no plant.
 #[derive(Debug, thiserror::Error)]
@@ -39,6 +40,9 @@ pub enum FmuError {
         /// Reason.
         text: String,
     },
+    /// A mistake in the plant's file, at its place.
+    #[error("{}", .0.render(false))]
+    Plant(Box<Diagnostics>),
     /// The FMU failed while it was started.
     #[error("{name}: {text}")]
     Run {

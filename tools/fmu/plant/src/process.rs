@@ -3,14 +3,16 @@
 
 use crate::FmuError;
 use crate::archive::Fmu;
-use crate::description::{Causality, Variable};
+use crate::description::Causality;
 use crate::message::Message;
 use std::io;
 use std::os::fd::{AsFd, OwnedFd};
 use std::os::unix::net::UnixStream;
+use std::path::Path;
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
-use takt_programs::plants::{Interface, Plant};
+use takt_programs::plants::file::Kind;
+use takt_programs::plants::{Interface, Plant, PlantFile};
 
 /// Time in which an FMU must be loaded and initialised.
 const START: Duration = Duration::from_secs(60);
@@ -67,17 +69,35 @@ impl FmuPlant {
         Ok(plant)
     }
 
+    /// Starts the FMU of a plant's file at a path, as [`FmuPlant::new`] does.
+    ///
+    /// # Errors
+    /// If the plant is no FMU that can run here, or does not start; mistakes of the file at their places.
+    pub fn of_file(
+        file: &PlantFile,
+        path: &Path,
+        command: Command,
+        period: f64,
+    ) -> Result<FmuPlant, FmuError> {
+        let name = || path.display().to_string();
+        let (Kind::Fmu { start, limit, .. }, Some(fmu)) = (&file.kind, file.fmu(path)) else {
+            return Err(FmuError::File { name: name(), text: "its plant is a model, and no FMU".to_owned() });
+        };
+        let values: Vec<(String, f64)> =
+            start.iter().map(|(name, value, _)| (name.clone(), *value)).collect();
+        let plant = FmuPlant::new(Fmu::open(&fmu)?, command, &values, period, file.steps, *limit);
+        plant.map_err(|error| match error {
+            FmuError::Start { index, text } => match start.get(index) {
+                Some((_, _, place)) => FmuError::Plant(Box::new(file.mistake(*place, text))),
+                None => FmuError::Start { index, text },
+            },
+            error => error,
+        })
+    }
+
     /// Signals of the plant; its outputs are also its states.
     pub fn interface(&self) -> Interface {
-        let names = |causality| {
-            self.fmu.description.of(causality).map(|(_, variable): (_, &Variable)| variable.name.clone())
-        };
-        Interface {
-            name: self.fmu.description.name.clone(),
-            inputs: names(Causality::Input).map(|name| (name, false)).collect(),
-            sensors: names(Causality::Output).collect(),
-            states: names(Causality::Output).collect(),
-        }
+        self.fmu.interface()
     }
 
     /// Sends a request, and keeps the outputs of the answer.
