@@ -5,6 +5,7 @@ use pyo3::prelude::*;
 use takt_debug::fault::diagnose;
 use takt_emu::{Fault, FaultKind, PeriodError};
 use takt_isa::Program;
+use takt_programs::plants::LoopError;
 
 /// An event that ended a run.
 #[pyclass(name = "Fault", frozen, get_all, module = "takt")]
@@ -14,7 +15,8 @@ pub(crate) struct Failure {
     pub(crate) run: usize,
     /// Number of the period in which the event occurred, from 0.
     pub(crate) period: usize,
-    /// Kind of the event in a word or two, such as `data address`; `halted` if the program has halted.
+    /// Kind of the event in a word or two, such as `data address`; `halted` if the program has halted, `plant` if the
+    /// plant failed or diverged.
     pub(crate) kind: String,
     /// Description of the event.
     pub(crate) message: String,
@@ -81,6 +83,12 @@ pub(crate) fn of_period(
         PeriodError::Halted => plain("halted", error.to_string(), (run, period)),
         PeriodError::Port(error) => plain("port", error.to_string(), (run, period)),
     }
+}
+
+/// Failure of a plant.
+pub(crate) fn of_loop(error: &LoopError) -> Failure {
+    let (LoopError::Failed { period, .. } | LoopError::Diverged { period, .. }) = error;
+    plain("plant", error.to_string(), (0, *period as usize))
 }
 
 /// Failure without a place in the program.

@@ -12,6 +12,7 @@ mod interrupt;
 mod lanes;
 mod model;
 mod mpc;
+mod plant;
 mod policy;
 mod program;
 mod report;
@@ -38,6 +39,8 @@ mod _takt {
     #[pymodule_export]
     use crate::mpc::{predictive, predictive_weight, predictive_worst};
     #[pymodule_export]
+    use crate::plant::{Plant, serve_fmu};
+    #[pymodule_export]
     use crate::policy::perceptron;
     #[pymodule_export]
     use crate::program::{
@@ -46,7 +49,7 @@ mod _takt {
     #[pymodule_export]
     use crate::report::analyse;
     #[pymodule_export]
-    use crate::run::{run, run_to_halt};
+    use crate::run::{run, run_loop, run_to_halt};
     #[pymodule_export]
     use crate::sim::Sim;
     #[pymodule_export]

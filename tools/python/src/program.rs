@@ -349,10 +349,14 @@ impl Program {
         }
     }
 
+    /// Sources, constants and names; `None` of an image without them.
+    pub(crate) fn debug_info(&self) -> Option<DebugInfo> {
+        self.assembled.as_ref().map(AssembledProgram::debug_info).or_else(|| self.debug.clone())
+    }
+
     /// Arrays that the source places in data memory.
     pub(crate) fn arrays(&self) -> Vec<Array> {
-        let debug = self.assembled.as_ref().map(AssembledProgram::debug_info).or_else(|| self.debug.clone());
-        let arrays = debug.map_or(Vec::new(), |debug| debug.names.arrays);
+        let arrays = self.debug_info().map_or(Vec::new(), |debug| debug.names.arrays);
         arrays
             .into_iter()
             .map(|NamedArray { name, base, sizes, ty }| Array { name, base, sizes, ty })
@@ -473,8 +477,7 @@ impl Program {
 
     /// Image of the program, as `takt asm` writes it.
     pub(crate) fn image(&self) -> PyResult<Vec<u8>> {
-        let debug = self.assembled.as_ref().map(AssembledProgram::debug_info).or_else(|| self.debug.clone());
-        let image = image::write_with(&self.program, debug.as_ref());
+        let image = image::write_with(&self.program, self.debug_info().as_ref());
         image.map_err(|error| PyValueError::new_err(format!("no image: {error}")))
     }
 

@@ -3,14 +3,16 @@
 
 use crate::failure::{self, Failure};
 use crate::interrupt::{Interrupt, SLICE};
+use crate::plant::{Plant, ProgramLoop};
 use crate::program::Program;
 use numpy::{Element, PyReadonlyArray, PyReadwriteArray, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use std::num::NonZeroU64;
-use takt_emu::{Batch, Emulator, PeriodError, PeriodReport, Status, Stop};
+use takt_emu::{Batch, Emulator, PeriodError, PeriodReport, Row, Status, Stop};
 use takt_isa::Type;
 use takt_isa::program::Port;
+use takt_programs::plants::LoopError;
 
 /// Maximum number of lanes that run together; more runs are split into groups. (A lane takes 5 kB plus its data memory.)
 const LANES: usize = 4096;
@@ -46,6 +48,60 @@ struct Arrays<'a> {
     /// Cycles, indexed by period and run.
     cycles: &'a mut [u64],
     missed: &'a mut [u64],
+}
+
+/// Source of a single run's inputs.
+enum Feed<'a> {
+    /// The input words of [`Arrays`].
+    Arrays,
+    /// A plant; the inputs that it does not give are given.
+    Loop {
+        closed: &'a mut ProgramLoop,
+        given: &'a [bool],
+        /// Input words, indexed by port and period; those of the plant are filled in.
+        inputs: &'a mut [u32],
+        /// States at the beginning of each period, indexed by state and period.
+        states: &'a mut [f64],
+    },
+}
+
+impl Feed<'_> {
+    /// Sets the inputs of a period, number `number` of `periods`; `recorded` are the words of [`Arrays`].
+    fn set(
+        &mut self,
+        program: &takt_isa::Program,
+        emulator: &mut Emulator,
+        recorded: &[u32],
+        (number, periods): (usize, usize),
+    ) -> PyResult<Result<(), LoopError>> {
+        let ports = program.inputs.iter().map(|port| port.register);
+        match self {
+            Feed::Arrays => {
+                for (register, series) in ports.zip(recorded.chunks_exact(periods)) {
+                    emulator.set_input_bits(register, series[number]).map_err(port_error)?;
+                }
+            }
+            Feed::Loop { closed, given, inputs, states } => {
+                let series = ports.zip(inputs.chunks_exact(periods)).zip(*given);
+                let own = series.filter(|(_, is_given)| **is_given);
+                let mut row: Row = own.map(|((register, series), _)| (register, series[number])).collect();
+                if let Err(error) = closed.begin(&mut row, |register| emulator.output_bits(register)) {
+                    return Ok(Err(error));
+                }
+                for (register, bits) in row {
+                    let at = program.inputs.iter().position(|port| port.register == register);
+                    if let Some(series) = at.and_then(|at| inputs.chunks_exact_mut(periods).nth(at)) {
+                        series[number] = bits;
+                    }
+                    emulator.set_input_bits(register, bits).map_err(port_error)?;
+                }
+                for (state, series) in closed.states().iter().zip(states.chunks_exact_mut(periods)) {
+                    series[number] = *state;
+                }
+            }
+        }
+        Ok(Ok(()))
+    }
 }
 
 struct Settings<'a> {
@@ -123,7 +179,57 @@ pub(crate) fn run(
         tick,
         max_cycles: max_cycles.get(),
     };
-    py.detach(|| if runs == 1 { alone(&settings, arrays) } else { together(&settings, arrays) })
+    py.detach(|| match runs {
+        1 => alone(&settings, Feed::Arrays, arrays),
+        _ => together(&settings, arrays),
+    })
+}
+
+/// Runs the program in the loop that a plant closes: `inputs` and `outputs` are indexed by port and period, `states` by the plant's state
+/// and period, `cycles` and `missed` by period. `given` says which inputs have values; the others, which the plant or its file gives, are
+/// filled in.
+#[pyfunction]
+#[allow(clippy::too_many_arguments)]
+pub(crate) fn run_loop(
+    py: Python<'_>,
+    program: &Program,
+    plant: &Plant,
+    words: Vec<usize>,
+    given: Vec<bool>,
+    mut inputs: PyReadwriteArray<'_, u32, numpy::Ix2>,
+    mut outputs: PyReadwriteArray<'_, u32, numpy::Ix2>,
+    mut states: PyReadwriteArray<'_, f64, numpy::Ix2>,
+    mut cycles: PyReadwriteArray<'_, u64, numpy::Ix1>,
+    mut missed: PyReadwriteArray<'_, u64, numpy::Ix1>,
+    tick: Option<NonZeroU64>,
+    max_cycles: NonZeroU64,
+) -> PyResult<RunResults> {
+    let ports = program.program.inputs.len();
+    let periods = cycles.shape().first().copied().unwrap_or_default();
+    if given.len() != ports {
+        return Err(PyValueError::new_err(format!("{} inputs; the program has {ports}", given.len())));
+    }
+    let mut closed = py.detach(|| plant.close(program, Some(&given)))?;
+    let states = writable(&mut states, "states", &[closed.interface().states.len(), periods])?;
+    let from = writable(&mut inputs, "inputs", &[ports, periods])?;
+    let arrays = Arrays {
+        ports,
+        periods,
+        runs: 1,
+        inputs: &[],
+        outputs: writable(&mut outputs, "outputs", &[program.program.outputs.len() + words.len(), periods])?,
+        cycles: writable(&mut cycles, "cycles", &[periods])?,
+        missed: writable(&mut missed, "missed", &[periods])?,
+    };
+    let settings = Settings {
+        program: &program.program,
+        words: &words,
+        sources: &program.sources,
+        tick,
+        max_cycles: max_cycles.get(),
+    };
+    let feed = Feed::Loop { closed: &mut closed, given: &given, inputs: from, states };
+    py.detach(|| alone(&settings, feed, arrays))
 }
 
 /// Runs the program to its `halt`, with the given words on the input ports. Returns cycles, outputs (`None` if never written) followed by
@@ -216,7 +322,7 @@ pub(crate) fn port_error(error: takt_emu::PortError) -> PyErr {
     PyValueError::new_err(error.to_string())
 }
 
-fn alone(settings: &Settings<'_>, arrays: Arrays<'_>) -> PyResult<RunResults> {
+fn alone(settings: &Settings<'_>, mut feed: Feed<'_>, arrays: Arrays<'_>) -> PyResult<RunResults> {
     let Settings { program, words, sources, tick, max_cycles } = *settings;
     let Arrays { periods, inputs, outputs, cycles, missed, .. } = arrays;
     let mut emulator = loaded(Emulator::new(program))?;
@@ -225,8 +331,9 @@ fn alone(settings: &Settings<'_>, arrays: Arrays<'_>) -> PyResult<RunResults> {
     let mut ran = RunResults::new(1, program);
     fill(program, outputs, periods);
     for number in 0..periods {
-        for (port, series) in program.inputs.iter().zip(inputs.chunks_exact(periods)) {
-            emulator.set_input_bits(port.register, series[number]).map_err(port_error)?;
+        if let Err(error) = feed.set(program, &mut emulator, inputs, (number, periods))? {
+            ran.failures.push(failure::of_loop(&error));
+            break;
         }
         match period(&mut emulator, max_cycles, &mut interrupt)? {
             Ok(report) => {

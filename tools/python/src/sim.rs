@@ -3,15 +3,17 @@
 
 use crate::failure::{self, Failure};
 use crate::interrupt::Interrupt;
+use crate::plant::{Plant, ProgramLoop};
 use crate::program::{Program, suggest};
 use crate::run::{loaded, misses, period, port_error};
+use pyo3::IntoPyObjectExt;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyString};
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::num::NonZeroU64;
-use std::sync::Arc;
-use takt_emu::{Emulator, Number};
+use std::sync::{Arc, Mutex, PoisonError};
+use takt_emu::{Emulator, Number, Row};
 use takt_isa::program::Port;
 use takt_isa::{Register, Type};
 
@@ -51,11 +53,19 @@ pub(crate) struct Sim {
     tick: Option<NonZeroU64>,
     history: History,
     emulator: Emulator,
+    /// Loop that a plant closes; the lock is never waited for.
+    closed: Option<Mutex<ProgramLoop>>,
+    /// Inputs and parameters that were given, in a loop.
+    kept: Row,
     sources: Arc<Vec<(String, String)>>,
     max_cycles: u64,
     inputs: HashMap<String, usize>,
     /// Whether each input has been set, then each parameter, which always has a value.
     given: Vec<bool>,
+    /// The same before the first period.
+    initially: Vec<bool>,
+    /// Inputs that the plant gives.
+    driven: HashSet<usize>,
     outputs: Vec<(Py<PyString>, Register, Type)>,
     /// Inputs to set at the start of the next period.
     next: Vec<(Register, u32)>,
@@ -67,6 +77,9 @@ pub(crate) struct Sim {
     missed: u64,
     #[pyo3(get)]
     failure: Option<Failure>,
+    /// States of the plant at the beginning of the last period.
+    #[pyo3(get)]
+    states: Vec<f64>,
 }
 
 impl Sim {
@@ -114,6 +127,11 @@ impl Sim {
                 let near = suggest(&name, ports.iter().map(|port| port.name.as_str()));
                 return Err(PyValueError::new_err(format!("the program has no input `{name}`{near}")));
             };
+            if self.driven.contains(&index) {
+                return Err(PyValueError::new_err(format!(
+                    "the plant gives the input `{name}`: leave it out of the inputs"
+                )));
+            }
             let bits = Self::bits(ports[index], &value, self.periods)?;
             if index >= program.inputs.len() {
                 let checked = program.check_parameter(ports[index], bits);
@@ -138,8 +156,28 @@ impl Sim {
         Ok(())
     }
 
+    /// Adds to the inputs in `next` those that the plant gives; returns false if it failed.
+    fn feed(&mut self, py: Python<'_>) -> bool {
+        let Some(closed) = &mut self.closed else { return true };
+        let closed = closed.get_mut().unwrap_or_else(PoisonError::into_inner);
+        for (register, bits) in self.next.drain(..) {
+            self.kept.retain(|(known, _)| *known != register);
+            self.kept.push((register, bits));
+        }
+        self.next.clone_from(&self.kept);
+        let (next, emulator) = (&mut self.next, &self.emulator);
+        match py.detach(|| closed.begin(next, |register| emulator.output_bits(register))) {
+            Ok(()) => self.states = closed.states().to_vec(),
+            Err(error) => self.failure = Some(failure::of_loop(&error)),
+        }
+        self.failure.is_none()
+    }
+
     /// Runs a period with the inputs in `next`; returns false if it failed.
     fn run(&mut self, py: Python<'_>) -> PyResult<bool> {
+        if !self.feed(py) {
+            return Ok(false);
+        }
         for &(register, bits) in &self.next {
             self.emulator.set_input_bits(register, bits).map_err(port_error)?;
         }
@@ -172,11 +210,44 @@ fn not_given(program: &takt_isa::Program) -> Vec<bool> {
     (0..program.host_registers().count()).map(|index| index >= inputs).collect()
 }
 
+/// Python value of a port's bits.
+fn number<'py>(py: Python<'py>, ty: Type, bits: Option<u32>) -> PyResult<Bound<'py, PyAny>> {
+    Ok(match bits.map(|bits| Number::of(ty, bits)) {
+        Some(Number::Float(value)) => f64::from(value).into_bound_py_any(py)?,
+        Some(Number::Integer(value)) => value.into_bound_py_any(py)?,
+        Some(Number::Bits(value)) => value.into_bound_py_any(py)?,
+        None => py.None().into_bound(py),
+    })
+}
+
 #[pymethods]
 impl Sim {
-    /// Creates a machine that runs the program.
+    /// Creates a machine that runs the program, in the loop of a plant if there is one.
     #[new]
-    fn new(program: &Program, tick: Option<NonZeroU64>, max_cycles: NonZeroU64) -> PyResult<Sim> {
+    fn new(
+        py: Python<'_>,
+        program: &Program,
+        tick: Option<NonZeroU64>,
+        max_cycles: NonZeroU64,
+        plant: Option<Py<Plant>>,
+    ) -> PyResult<Sim> {
+        let mut given = not_given(&program.program);
+        let mut driven = HashSet::new();
+        let closed = match &plant {
+            None => None,
+            Some(plant) => {
+                let closed = py.detach(|| plant.get().close(program, None))?;
+                let connection = closed.connection();
+                for (index, port) in program.program.inputs.iter().enumerate() {
+                    given[index] = connection.rest.iter().all(|rest| rest.register != port.register);
+                }
+                let index = |port: &Port| {
+                    program.program.inputs.iter().position(|known| known.register == port.register)
+                };
+                driven.extend(connection.driven().filter_map(index));
+                Some(Mutex::new(closed))
+            }
+        };
         let mut emulator = loaded(Emulator::new(&program.program))?;
         emulator.set_tick_period(tick);
         let (inputs, outputs) = (program.program.host_registers(), &program.program.outputs);
@@ -188,7 +259,12 @@ impl Sim {
             history: History::default(),
             sources: Arc::clone(&program.sources),
             max_cycles: max_cycles.get(),
-            given: not_given(&program.program),
+            closed,
+            kept: Row::new(),
+            states: Vec::new(),
+            initially: given.clone(),
+            given,
+            driven,
             inputs: inputs.enumerate().map(|(index, port)| (port.name.clone(), index)).collect(),
             outputs: outputs.iter().map(named).collect(),
             next: Vec::new(),
@@ -213,12 +289,20 @@ impl Sim {
         if self.run(py)? { self.read(py).map(Some) } else { Ok(None) }
     }
 
-    /// An independent machine in the same state.
-    fn __copy__(&self, py: Python<'_>) -> Sim {
+    /// An independent machine in the same state. (The one of a loop is made from its history.)
+    fn __copy__(&self, py: Python<'_>) -> PyResult<Sim> {
+        if self.closed.is_some() {
+            return Err(PyTypeError::new_err("a loop is copied by its history"));
+        }
         let outputs = self.outputs.iter().map(|(name, register, ty)| (name.clone_ref(py), *register, *ty));
-        Sim {
+        Ok(Sim {
             tick: self.tick,
             history: self.history.clone(),
+            closed: None,
+            kept: Row::new(),
+            states: Vec::new(),
+            initially: self.initially.clone(),
+            driven: HashSet::new(),
             emulator: self.emulator.clone(),
             sources: Arc::clone(&self.sources),
             max_cycles: self.max_cycles,
@@ -230,7 +314,7 @@ impl Sim {
             cycles: self.cycles,
             missed: self.missed,
             failure: self.failure.clone(),
-        }
+        })
     }
 
     /// State for pickling: cycles between ticks, cycle limit of a period, and input history since reset.
@@ -250,7 +334,9 @@ impl Sim {
         if !history.len().is_multiple_of(4) {
             return Err(damaged());
         }
-        self.reset();
+        if self.periods > 0 {
+            self.reset();
+        }
         let mut words =
             history.chunks_exact(4).map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]]));
         while let Some(count) = words.next() {
@@ -276,12 +362,16 @@ impl Sim {
     fn read<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let values = PyDict::new(py);
         for (name, register, ty) in &self.outputs {
-            match self.emulator.output_bits(*register).map(|bits| Number::of(*ty, bits)) {
-                Some(Number::Float(value)) => values.set_item(name, f64::from(value))?,
-                Some(Number::Integer(value)) => values.set_item(name, value)?,
-                Some(Number::Bits(value)) => values.set_item(name, value)?,
-                None => values.set_item(name, py.None())?,
-            }
+            values.set_item(name, number(py, *ty, self.emulator.output_bits(*register))?)?;
+        }
+        Ok(values)
+    }
+
+    /// Values of the input ports; `None` for a port that has never been set.
+    fn read_inputs<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let values = PyDict::new(py);
+        for port in &self.emulator.program().inputs {
+            values.set_item(&port.name, number(py, port.ty, self.emulator.register(port.register))?)?;
         }
         Ok(values)
     }
@@ -291,12 +381,18 @@ impl Sim {
         addresses.into_iter().map(|address| self.emulator.memory().get(address).copied()).collect()
     }
 
-    /// Restores the state after loading.
+    /// Restores the state after loading; a loop is made anew instead, with another plant.
     fn reset(&mut self) {
         self.emulator.reset();
-        self.given = not_given(self.emulator.program());
+        self.given.clone_from(&self.initially);
         self.history = History::default();
         (self.periods, self.cycles, self.missed, self.failure) = (0, 0, 0, None);
+    }
+
+    /// Cycles between ticks, and cycle limit of a period.
+    #[getter]
+    fn limits(&self) -> (Option<u64>, u64) {
+        (self.tick.map(NonZeroU64::get), self.max_cycles)
     }
 
     /// Cycles since reset, including waits.

@@ -9,6 +9,7 @@
     sim = program.sim()                                  # the same, period by period
     y = sim.step({"x": 0.25})["y"]
     batch = program.batch(1000)                          # and a thousand of them at once
+    motor = takt.Plant("dc_motor.toml")                    # a plant in a file, or an FMU: program.run(plant=motor, periods=400)
 
     system = takt.System("axis.toml")                      # several cores with links between them
     board = takt.Board("/dev/ttyUSB0", program)            # and on a board
@@ -30,8 +31,10 @@ from takt._errors import (
     ModelError,
     NoBoundError,
     Place,
+    PlantError,
     TaktError,
 )
+from takt._plant import Plant
 from takt._ports import Array, Parameter, Port
 from takt._program import DEFAULT_MACHINE, Program, assemble, load, machines
 from takt._progress import set_progress
@@ -83,6 +86,8 @@ __all__ = [
     "OutputBound",
     "Parameter",
     "Place",
+    "Plant",
+    "PlantError",
     "Port",
     "Program",
     "Run",

@@ -115,6 +115,13 @@ class ModelError(TaktError, ValueError):
         return type(self), (*self.args, self.line)
 
 
+class PlantError(TaktError, ValueError):
+    """A plant that cannot run, or cannot close a program's loop, and why."""
+
+    def __str__(self) -> str:
+        return in_python(super().__str__())
+
+
 class BoardError(TaktError, OSError):
     """A board does not answer, rejects a request, or the device is not a board."""
 

@@ -16,6 +16,7 @@ from takt import _takt
 from takt._batch import Batch
 from takt._errors import AssemblyWarning, Diagnostic, FaultError, diagnostics
 from takt._ports import AnyPath, Array, Parameter, Port, count_of, limits_of, mapping_of, near, numbers, path_of, word_of, words_of
+from takt._plant import Plant, core_of
 from takt._progress import progress
 from takt._results import Accuracy, Analysis, Bound, Enclosure, Largest, Model, Run, Section, Span, ports_table
 from takt._sim import Sim
@@ -225,6 +226,7 @@ class Program:
         inputs: Mapping[str, ArrayLike] | None = None,
         *,
         periods: int | None = None,
+        plant: Plant | None = None,
         tick: int | None = None,
         max_cycles: int = MAX_CYCLES,
     ) -> Run:
@@ -237,6 +239,8 @@ class Program:
                 dimensions behind these: (periods, 6). Numbers are rounded to binary32 once.
             periods: How many, if no input says so. Without both, the program runs to its `halt`, and outputs and cycles
                 have shape ().
+            plant: Closes the loop of a single run: it gives the inputs that its sensors drive, which are left out of `inputs`, and moves
+                between the periods. Inputs that its file states may be left out, too. `Run.inputs` and `Run.states` have the loop.
             tick: Cycles from tick to tick, 100,000,000 at most; without it, the tick comes when the program is ready.
             max_cycles: A period, or a run to `halt`, that takes more is ended by a fault.
 
@@ -245,16 +249,23 @@ class Program:
 
         Raises:
             ValueError: a name, shape or value that does not fit, with the name nearest to it.
+            PlantError: the plant cannot run, or inputs have no source; AssemblyError: it does not fit the program.
         """
         tick, max_cycles = limits_of(tick, max_cycles, MAX_CYCLES)
         given = self._by_port(mapping_of("inputs", {} if inputs is None else inputs))
-        self._all_given(given)
+        closing = core_of(plant)
+        if closing is None:
+            self._all_given(given)
         lead = self._lead({what: shape for what, shape, _ in given.values()})
         if periods is not None:
             wanted = count_of("periods", periods, least=0) or 0
             if lead and lead[-1] not in (1, wanted):
                 raise ValueError(f"periods is {wanted}, and the inputs have {lead[-1]}")
             lead = (*lead[:-1], wanted)
+        if closing is not None and plant is not None:
+            if len(lead) != 1:
+                raise ValueError("a plant moves from period to period in one run: " + ("give periods" if not lead else f"the inputs have {lead[0]} runs"))
+            return self._run_loop(plant, closing, given, lead[0], tick, max_cycles)
         if not lead:
             return self._run_to_halt({name: words for name, (_, _, words) in given.items()}, max_cycles)
         runs, count = lead if len(lead) == 2 else (1, lead[0])
@@ -271,6 +282,25 @@ class Program:
         ports = {name: shaped(bits.view(port.dtype)) for (name, port), bits in zip(self.outputs.items(), outputs)}
         ports |= {name: shaped(bits.view(np.float32)) for name, bits in zip(self._data, outputs[len(self.outputs) :])}
         return Run(self.output_arrays, ports, shaped(cycles.view(np.int64)), shaped(missed.view(np.int64)), ran)
+
+    def _run_loop(
+        self, plant: Plant, closing: _takt.Plant, given: Mapping[str, Any], count: int, tick: int | None, max_cycles: int
+    ) -> Run:
+        nothing = {"float": np.array(np.nan, np.float32).view(np.uint32)}
+        words = np.zeros((len(self.inputs), count), np.uint32)
+        for series, port in zip(words, self.inputs.values()):
+            series[:] = given[port.name][2] if port.name in given else nothing.get(port.type, np.uint32(0))
+        outputs = np.empty((len(self.outputs) + len(self._data), count), np.uint32)
+        states = np.full((len(plant.states), count), np.nan)
+        cycles, missed = np.zeros(count, np.uint64), np.zeros(count, np.uint64)
+        data, known = list(self._data.values()), [name in given for name in self.inputs]
+        ran = _takt.run_loop(self._core, closing, data, known, words, outputs, states, cycles, missed, tick, max_cycles)
+        ports: dict[str, NDArray[Any]] = {name: bits.view(port.dtype) for (name, port), bits in zip(self.outputs.items(), outputs)}
+        ports |= {name: bits.view(np.float32) for name, bits in zip(self._data, outputs[len(self.outputs) :])}
+        run = Run(self.output_arrays, ports, cycles.view(np.int64), missed.view(np.int64), ran)
+        run.inputs = {name: bits.view(port.dtype) for (name, port), bits in zip(self.inputs.items(), words)}
+        run.states = dict(zip(plant.states, states))
+        return run
 
     def _run_to_halt(self, words: Mapping[str, NDArray[np.uint32]], max_cycles: int) -> Run:
         bits = [int(words[name]) for name in self.inputs]
@@ -291,14 +321,15 @@ class Program:
         }
         return Run(self.output_arrays, ports, np.array(cycles, np.int64), np.array(0, np.int64), ran)
 
-    def sim(self, *, tick: int | None = None, max_cycles: int = MAX_CYCLES) -> Sim:
+    def sim(self, *, plant: Plant | None = None, tick: int | None = None, max_cycles: int = MAX_CYCLES) -> Sim:
         """A machine with the program in it, to be stepped period by period.
 
         Args:
+            plant: Closes the loop: `step` then takes only the inputs that neither its sensors nor its file give.
             tick: Cycles from tick to tick, 100,000,000 at most; without it, the tick comes when the program is ready.
             max_cycles: A period that takes more is ended by a fault.
         """
-        return Sim(self, _takt.Sim(self._core, *limits_of(tick, max_cycles, MAX_CYCLES)))
+        return Sim(self, _takt.Sim(self._core, *limits_of(tick, max_cycles, MAX_CYCLES), core_of(plant)), plant)
 
     def batch(self, runs: int, *, tick: int | None = None, max_cycles: int = MAX_CYCLES) -> Batch:
         """So many machines with the program in them, whose closed loops run together, computed in vectors and on all cores.

@@ -240,6 +240,10 @@ class Run:
     outputs: dict[str, NDArray[Any]]
     #: Outputs by port.
     ports: dict[str, NDArray[Any]]
+    #: Inputs by port, as the program read them, in a loop that a plant closes; empty otherwise.
+    inputs: dict[str, NDArray[Any]]
+    #: States of the plant when the program read its inputs, float64 in SI units; NaN from a fault on. Empty without a plant.
+    states: dict[str, NDArray[np.float64]]
     #: Cycles of each period, from the tick to the `wait`; int64.
     cycles: NDArray[np.int64]
     #: Number of deadlines missed in each period, by ticks that came before the `wait`; int64.
@@ -264,6 +268,7 @@ class Run:
         ran: _takt.Ran,
     ) -> None:
         self.ports = ports
+        self.inputs, self.states = {}, {}
         self.outputs = {array.name: array.stacked(ports, cycles.shape) for array in arrays} or ports
         self.cycles = cycles
         self.missed = missed

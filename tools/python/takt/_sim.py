@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from takt import _takt
 from takt._errors import FaultError
 from takt._exclusive import exclusive
+from takt._plant import Plant, core_of
 from takt._ports import KEPT, mapping_of, near, numbers
 from takt._results import flags_of
 
@@ -29,8 +30,12 @@ class Sim:
             q, qd = plant(q, qd, out["tau"])
     """
 
-    def __init__(self, program: Program, core: _takt.Sim) -> None:
+    #: The plant that closes the loop, if there is one.
+    plant: Plant | None
+
+    def __init__(self, program: Program, core: _takt.Sim, plant: Plant | None = None) -> None:
         self.program = program
+        self.plant = plant
         self._core = core
 
     def step(self, inputs: Mapping[str, ArrayLike] = KEPT) -> dict[str, Any]:
@@ -38,14 +43,14 @@ class Sim:
 
         Args:
             inputs: Values by port or array of ports. The first step needs all; later an input that is not given keeps
-                its value.
+                its value. With a plant, those that it gives are left out, and those that its file states may be.
 
         Returns:
             The outputs: a float or int for each port, None if nothing was ever written there; an array of ports as
             float32 of its shape.
 
         Raises:
-            FaultError: the machine has stopped; it stays where it is until `reset`.
+            FaultError: the machine has stopped, or the plant has failed or diverged; it stays where it is until `reset`.
             ValueError: a name, shape or value that does not fit.
         """
         program = self.program
@@ -94,8 +99,22 @@ class Sim:
         return shaped
 
     def reset(self) -> None:
-        """Back to the state after loading."""
-        self._core.reset()
+        """Back to the state after loading, with the plant at its beginning."""
+        if self.plant is None:
+            self._core.reset()
+        else:
+            tick, max_cycles = self._core.limits
+            self._core = _takt.Sim(self.program._core, tick, max_cycles, self.plant._core)
+
+    @property
+    def inputs(self) -> dict[str, float | int | None]:
+        """Inputs by port, as the last period read them; None if an input was never set."""
+        return self._core.read_inputs()
+
+    @property
+    def states(self) -> dict[str, float]:
+        """States of the plant when the last period read its inputs, in SI units; empty without a plant, and before the first period."""
+        return {} if self.plant is None else dict(zip(self.plant.states, self._core.states))
 
     @property
     def outputs(self) -> dict[str, Any]:
@@ -129,6 +148,10 @@ class Sim:
 
     def __copy__(self) -> Sim:
         """A machine in the same state, which goes on by itself."""
+        if self.plant is not None:
+            # Plants cannot be copied in motion: the loop is run again.
+            restored, arguments = self.__reduce__()
+            return restored(*arguments)  # type: ignore[no-any-return]
         return Sim(self.program, copy.copy(self._core))
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Sim:
@@ -137,14 +160,14 @@ class Sim:
     def __reduce__(self) -> tuple[Any, ...]:
         """For `pickle`. The machine's state is made again by running what it was given since reset; a machine that has run for very
         long, or was interrupted in the middle of a period, is none that can be pickled (TypeError)."""
-        return _restored, (self.program, *self._core.state())
+        return _restored, (self.program, self.plant, *self._core.state())
 
     def __repr__(self) -> str:
         return f"<takt.Sim on {self.program.machine}: {self.periods} periods, the last {self.cycles} cycles>"
 
 
-def _restored(program: Program, tick: int | None, max_cycles: int, history: bytes) -> Sim:
+def _restored(program: Program, plant: Plant | None, tick: int | None, max_cycles: int, history: bytes) -> Sim:
     """A machine that was pickled."""
-    core = _takt.Sim(program._core, tick, max_cycles)
+    core = _takt.Sim(program._core, tick, max_cycles, core_of(plant))
     core.replay(history)
-    return Sim(program, core)
+    return Sim(program, core, plant)

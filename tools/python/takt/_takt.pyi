@@ -18,7 +18,8 @@ class Fault:
         """The period in which it happened, from 0."""
     @property
     def kind(self) -> str:
-        """What happened, in a word or two, as `data address`; `halted` if the program has halted."""
+        """What happened, in a word or two, as `data address`; `halted` if the program has halted, `plant` if the plant failed or
+        diverged."""
     @property
     def message(self) -> str:
         """What happened."""
@@ -109,8 +110,28 @@ class Program:
     def __deepcopy__(self, memo: object) -> Program: ...
 
 @final
+class Plant:
+    def __init__(
+        self,
+        path: str | PathLike[str],
+        connect: list[tuple[str, str]],
+        period: float | None,
+        settings: list[tuple[str, float]],
+        command: list[str],
+    ) -> None: ...
+    @property
+    def signals(self) -> tuple[str, list[str], list[str], list[str]]: ...
+    @property
+    def settings(self) -> list[tuple[str, float, str, str]]: ...
+
+@final
 class Sim:
-    def __init__(self, program: Program, tick: int | None, max_cycles: int) -> None: ...
+    def __init__(self, program: Program, tick: int | None, max_cycles: int, plant: Plant | None) -> None: ...
+    @property
+    def states(self) -> list[float]: ...
+    @property
+    def limits(self) -> tuple[int | None, int]: ...
+    def read_inputs(self) -> dict[str, float | int | None]: ...
     @property
     def periods(self) -> int: ...
     @property
@@ -221,6 +242,20 @@ def run(
     tick: int | None,
     max_cycles: int,
 ) -> Ran: ...
+def run_loop(
+    program: Program,
+    plant: Plant,
+    words: list[int],
+    given: list[bool],
+    inputs: NDArray[np.uint32],
+    outputs: NDArray[np.uint32],
+    states: NDArray[np.float64],
+    cycles: NDArray[np.uint64],
+    missed: NDArray[np.uint64],
+    tick: int | None,
+    max_cycles: int,
+) -> Ran: ...
+def serve_fmu(folder: str | PathLike[str]) -> None: ...
 def run_to_halt(
     program: Program, words: list[int], inputs: list[int], max_cycles: int
 ) -> tuple[int, list[int | None], int, Fault | None]: ...

@@ -16,7 +16,7 @@ _OPTION = re.compile(
 _SOURCE = re.compile(r"\s*\d+ │")
 
 #: Options that correspond to arguments of the same name.
-_ARGUMENTS = {"base", "contract", "effort", "exact", "floating", "include", "output", "range", "schedule", "tip"}
+_ARGUMENTS = {"base", "contract", "effort", "exact", "floating", "include", "inputs", "output", "range", "schedule", "tip"}
 #: Options and commands that have a different form in Python.
 _OTHERS = {"deadline": "`program.bound()`", "status": "`board.status`"}
 
@@ -29,6 +29,9 @@ def _argument(found: re.Match[str]) -> str:
         return _OTHERS[name]
     if found["method"]:
         return f"`board.{name}()`"
+    if name == "connect":
+        signal, _, port = (found["value"] or "SIGNAL=PORT").partition("=")
+        return f'`connect={{"{signal}": "{port}"}}`'
     if name.startswith("no-"):
         return f'`without=["{name[3:]}"]`'
     if name not in _ARGUMENTS:

@@ -42,6 +42,7 @@ def here(tmp_path, monkeypatch):
 def test_every_example_has_its_test():
     assert set(PYTHON) == {
         "Takt from Python",
+        "A plant",
         "Many closed loops",
         "On several computers",
         "A system of several cores",
@@ -54,6 +55,14 @@ def test_the_first_example(here):
     names = {"angles": np.linspace(0, 1, 5), "steps": np.arange(5), "reference": lambda k: 0.5, "plant": lambda q, u: 0.0}
     exec(compile(PYTHON["Takt from Python"].replace("range(1000)", "range(3)"), "python.md", "exec"), names)
     assert names["run"].cycles.shape == (5,) and names["sim"].periods == 3
+
+
+def test_a_plant(here):
+    for file in ("pi.s", "plant/dc_motor.toml"):
+        shutil.copy(ROOT / "programs/examples" / file, here)
+    names = {"takt": takt}
+    exec(compile(PYTHON["A plant"], "python.md", "exec"), names)
+    assert names["run"].states["i"].shape == (400,) and abs(names["sim"].inputs["w"] - 80) < 1
 
 
 def test_many_closed_loops(here):

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""`takt run --plant`: closed loops against SciPy's integrator and motulator's machine and inverter, tables fed back, FMUs of others."""
+"""`takt run --plant` and `takt.Plant`: closed loops against SciPy's integrator and motulator's machine and inverter, tables fed back, FMUs of others."""
 
+import copy
 import csv
 import json
 import os
+import pickle
 import subprocess
 import sysconfig
 import zipfile
@@ -12,6 +14,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+
+import takt as package
 
 TOOL = Path("target/release/takt").absolute()
 EXAMPLES = Path("programs/examples")
@@ -396,3 +400,137 @@ def test_an_fmu_of_pythonfmu_closes_the_loop(tmp_path):
         pytest.skip("this Python has no shared library")
     columns = table(*loop, env=os.environ | {"LD_PRELOAD": str(library), "PYTHONPATH": str(Path(pythonfmu.__file__).parents[1])})
     assert (columns["Motor.w"] == lag(columns)).all() and abs(columns["w"][-1] - 100) < 0.1
+
+
+def in_python(run, columns, plant):
+    """The run of the package has the values of the command's table, bit for bit."""
+    for name, values in {**run.inputs, **run.outputs}.items():
+        assert (values.view(np.uint32) == columns[name].astype(values.dtype).view(np.uint32)).all(), name
+    for name, values in run.states.items():
+        assert (values == columns[f"{plant.name}.{name}"]).all(), name
+    assert (run.cycles == columns["cycles"]).all() and run.completed == len(columns["cycles"]) and not run.faults
+
+
+@pytest.mark.parametrize(("program", "file", "periods"), [
+    ("pi.s", "dc_motor", 400), ("foc.s", "pmsm", 400), ("pi.s", "tank", 300), ("plant/servo.s", "servo", 600), ("plant/pendulum.s", "cart_pendulum", 2100),
+])
+def test_python_s_loops_are_those_of_the_command(program, file, periods):
+    plant, law = package.Plant(PLANTS / f"{file}.toml"), package.load(EXAMPLES / program, effort=20)
+    columns = table(EXAMPLES / program, "--plant", PLANTS / f"{file}.toml", "--periods", periods)
+    run = law.run(plant=plant, periods=periods)
+    in_python(run, columns, plant)
+    sim = law.sim(plant=plant)
+    for at in range(60):
+        outputs = sim.step()
+        assert all(np.float32(value) == np.float32(run.outputs[name][at]) for name, value in outputs.items())
+        assert all(np.float32(value) == np.float32(run.inputs[name][at]) for name, value in sim.inputs.items())
+        assert all(value == run.states[name][at] for name, value in sim.states.items())
+    others = [copy.copy(sim), pickle.loads(pickle.dumps(sim))]
+    for at in range(60, 70):
+        states = [(each.step(), each.states) for each in (sim, *others)]
+        assert states[0] == states[1] == states[2] and states[0][1] == {name: values[at] for name, values in run.states.items()}
+    sim.reset()
+    sim.step()
+    assert sim.periods == 1 and sim.states == {name: values[0] for name, values in run.states.items()}
+
+
+def test_values_in_python_come_before_the_file_s(tmp_path):
+    plant, law = package.Plant(PLANTS / "dc_motor.toml"), package.load(EXAMPLES / "pi.s", effort=20)
+    file = tmp_path / "in.csv"
+    rows = np.linspace(20, 60, 200).astype(np.float32)
+    file.write_text("w_ref\n" + "".join(f"{row}\n" for row in rows))
+    in_python(law.run({"w_ref": rows}, plant=plant), table(EXAMPLES / "pi.s", "--plant", PLANTS / "dc_motor.toml", "--inputs", file), plant)
+    # Numbers of the file, as if they were written there.
+    other = tmp_path / "other.toml"
+    other.write_text((PLANTS / "dc_motor.toml").read_text().replace("7e-4 ", "2e-3 ").replace("[[0.1, 0.4]]", "[[0.05, 0.3]]"))
+    heavy = pickle.loads(pickle.dumps(plant.with_parameters({"J": 2e-3}).with_parameters({"load": 0.3, "load.at": 0.05})))
+    assert (plant.parameters["J"], heavy.parameters["J"], heavy.parameters["load.at"]) == (7e-4, 2e-3, 0.05)
+    in_python(law.run(plant=heavy, periods=200), table(EXAMPLES / "pi.s", "--plant", other, "--periods", 200), heavy)
+    # What was given stays in force, and the file's value before.
+    sim = law.sim(plant=plant)
+    assert (sim.step(), sim.inputs["w_ref"])[1] == 100 and (sim.step({"w_ref": 7}), sim.step(), sim.inputs["w_ref"])[2] == 7
+
+
+def test_fmus_in_python(tmp_path, motor, capfd):
+    law = package.load(EXAMPLES / "pi.s", effort=20)
+    file = plant_file(tmp_path, motor)
+    plant = package.Plant(file)
+    assert (plant.name, plant.inputs, plant.sensors, plant.parameters) == ("motor", ("u",), ("w",), {})
+    in_python(law.run(plant=plant, periods=300), table(EXAMPLES / "pi.s", "--plant", file, "--periods", 300), plant)
+    # By itself, whose other input is given, and step by step: one after the other, and two at a time.
+    alone = package.Plant(motor, period=1e-3)
+    run = law.run({"w_ref": 100.0}, plant=alone, periods=300)
+    sim, other = law.sim(plant=alone), law.sim(plant=alone)
+    for at in range(20):
+        assert np.float32(sim.step({"w_ref": 100.0})["u"]) == run.outputs["u"][at]
+        other.step({"w_ref": 3.0})
+    assert copy.copy(sim).step() == sim.step() != other.step()
+    for mode, message, period in [
+        (1, "its process broke down in a step: signal: 11", 9),
+        (2, "a step took longer than 0.5 s", 9),
+        (3, "fmi2DoStep failed: the winding", 9),
+        (4, "diverged: w is NaN", 9),
+    ]:
+        run = law.run(plant=package.Plant(plant_file(tmp_path, motor, f"limit = 0.5\n[parameters]\nmode = {mode}")), periods=100)
+        (fault,) = run.faults
+        assert (fault.kind, fault.period, run.completed) == ("plant", period, period + 1) and message in str(fault)
+        assert np.isfinite(run.states["w"][:10]).all() and np.isnan(run.states["w"][10:]).all() and np.isnan(run.inputs["w"][10:]).all()
+    sim = law.sim(plant=package.Plant(file))
+    while sim.periods < 10:
+        sim.step()
+    with pytest.raises(package.FaultError, match="diverged"):
+        for _ in range(3):
+            sim.step()
+    assert sim.periods == 10
+    sim.reset()
+    sim.step()
+    assert "the motor talks" in capfd.readouterr().err
+
+
+def test_an_fmu_of_pythonfmu_in_python(tmp_path):
+    """The process of the FMU is Python, which such libraries expect."""
+    pythonfmu = pytest.importorskip("pythonfmu.builder")
+    (tmp_path / "motor.py").write_text(MOTOR_PY)
+    fmu = Path(pythonfmu.FmuBuilder.build_FMU(str(tmp_path / "motor.py"), dest=str(tmp_path)))
+    run = package.load(EXAMPLES / "pi.s").run({"w_ref": 100}, plant=package.Plant(fmu), periods=1000).check()
+    assert (run.states["w"] == lag({"u": run.outputs["u"].astype(float)})).all() and abs(run.inputs["w"][-1] - 100) < 0.1
+
+
+def test_mistakes_in_python(tmp_path, motor):
+    law, plant = package.load(EXAMPLES / "pi.s"), package.Plant(PLANTS / "dc_motor.toml")
+    bare = tmp_path / "bare.toml"
+    bare.write_text('model = "dc_motor"\n')
+    silent = package.assemble(".input w\n.output u\n.period\np: mov u, w\n wait p\n")
+    exchange = pack(tmp_path / "exchange.fmu", DESCRIPTION.replace("CoSimulation", "ModelExchange"), {})
+    wrong = tmp_path / "wrong.toml"
+    wrong.write_text('model = "dc_motor"\n[parameters]\nr = 1\n')
+    for kind, message, act in [
+        (OSError, "cannot read none.toml", lambda: package.Plant("none.toml")),
+        (ValueError, "expected a file `….toml` or `….fmu`", lambda: package.Plant("plant.py")),
+        (TypeError, "path is a path", lambda: package.Plant(3)),
+        (package.AssemblyError, r"wrong.toml:3:1", lambda: package.Plant(wrong)),
+        (package.PlantError, "for ModelExchange only", lambda: package.Plant(exchange)),
+        (ValueError, "period is -1.0 s", lambda: package.Plant(bare, period=-1)),
+        (TypeError, "names of signals to names of ports", lambda: package.Plant(bare, connect={"w": 3})),
+        (ValueError, "no parameter `r`", lambda: plant.with_parameters({"r": 1})),
+        (ValueError, "expected a positive number", lambda: plant.with_parameters({"R": 0})),
+        (TypeError, "plant is a takt.Plant", lambda: law.run(plant="dc_motor.toml", periods=3)),
+        (ValueError, "give periods", lambda: law.run(plant=plant)),
+        (ValueError, "the inputs have 2 runs", lambda: law.run({"w_ref": np.zeros((2, 5))}, plant=plant)),
+        (ValueError, "the plant gives the input `w`", lambda: law.run({"w": 1}, plant=plant, periods=3)),
+        (ValueError, "the plant gives the input `w`", lambda: law.sim(plant=plant).step({"w": 1})),
+        (ValueError, "no input `v`", lambda: law.run({"v": 1}, plant=plant, periods=3)),
+        (package.PlantError, "`w_ref` has no source.*columns with `inputs=`", lambda: law.run(plant=package.Plant(bare), periods=3)),
+        (ValueError, "no value for `w_ref`", lambda: law.sim(plant=package.Plant(bare)).step()),
+        (package.AssemblyError, 'connect={"da": "…"}', lambda: law.run(plant=package.Plant(PLANTS / "pmsm.toml"), periods=3)),
+        (package.AssemblyError, "no input port `speed`", lambda: law.run(plant=package.Plant(bare, connect={"w": "speed"}), periods=3)),
+        (ValueError, r"takt.Plant\(…, period=1e-3\)", lambda: silent.run(plant=package.Plant(bare), periods=3)),
+        (package.PlantError, "moves too fast", lambda: silent.run(plant=package.Plant(bare, period=1e9), periods=3)),
+    ]:
+        with pytest.raises(kind, match=message):
+            act()
+    with pytest.raises(package.AssemblyError):
+        package.Plant(plant_file(tmp_path, motor, "[parameters]\nmass = 1")).name
+        law.run(plant=package.Plant(plant_file(tmp_path, motor, "[parameters]\nmass = 1")), periods=3)
+    broken = silent.run(plant=package.Plant(bare, period=1e-3), periods=0)
+    assert broken.completed == 0 and broken.cycles.shape == (0,)
