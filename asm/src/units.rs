@@ -132,7 +132,10 @@ fn is_unit(word: &str) -> bool {
 
 /// Power as written behind a symbol: `²`, `2`, `^2`, `-1`, or nothing for 1.
 fn power(text: &str) -> Option<i8> {
-    let digits = text.strip_prefix('^').unwrap_or(text);
+    let digits = match text.strip_prefix('^') {
+        Some("") => return None,
+        digits => digits.unwrap_or(text),
+    };
     let plain = digits.replace('²', "2").replace('³', "3").replace('⁴', "4");
     if plain.is_empty() { Some(1) } else { plain.parse().ok() }
 }

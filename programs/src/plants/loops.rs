@@ -405,7 +405,7 @@ impl<P: Plant> ClosedLoop<P> {
     /// # Errors
     /// If the plant fails, or is not finite any more.
     pub fn advance(&mut self, output: impl Fn(Register) -> Option<u32>) -> Result<(), LoopError> {
-        let ClosedLoop { plant, interface, connection, length, period } = self;
+        let ClosedLoop { plant, interface, connection, length, period, .. } = self;
         let inputs = connection.sources.iter().map(|source| match source {
             Source::Port { port, scale, offset } => {
                 value(port.ty, output(port.register).unwrap_or_default()) * scale + offset

@@ -74,7 +74,9 @@ fn each_platform_has_its_folder() {
     let names = |fmi, libraries: &[Library]| -> Result<Vec<String>, ArchiveError> {
         let bytes = Fmu { model: &model, name: "law", fmi, libraries }.to_bytes()?;
         let archive = zip::ZipArchive::new(std::io::Cursor::new(bytes))?;
-        Ok(archive.file_names().filter(|name| name.starts_with("binaries")).map(str::to_owned).collect())
+        let names = archive.file_names().map(|name| name.map(|name| name.into_owned()));
+        let names = names.collect::<Result<Vec<String>, _>>()?;
+        Ok(names.into_iter().filter(|name| name.starts_with("binaries")).collect())
     };
     let both = [windows.clone(), linux.clone()];
     assert_eq!(names(Fmi::Two, &both).unwrap(), ["binaries/linux64/law.so", "binaries/win64/law.dll"]);

@@ -6,7 +6,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::import_exception;
 use pyo3::prelude::*;
 use std::path::{Path, PathBuf};
-use takt_debug::units;
+use takt_asm::units;
 use takt_diagnostics::diag::Diagnostics;
 use takt_isa::program::Port;
 use takt_programs::plants::file::{TEXT_BYTES, is_fmu};
