@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Generated documents of evidence: proofs, measurements and campaigns.
 
+use crate::boards;
 use crate::campaign::record as campaign;
 use crate::formal::results;
 use crate::synth;
@@ -18,6 +19,7 @@ pub(crate) fn run(check: bool) -> Result<()> {
         (SYNTHESIS, synth::markdown(&synth::recorded()?)),
         results::document()?,
         (campaign::DOCUMENT, with_record()?),
+        (boards::DOCUMENT, with_boards()?),
     ];
     let files = files.into_iter().map(|(path, text)| (PathBuf::from(path), text));
     documents::fresh(&documents::update(files, check)?, "cargo evidence docs")
@@ -29,6 +31,14 @@ fn with_record() -> Result<String> {
     let text =
         std::fs::read_to_string(root().join(document)).with_context(|| format!("cannot read {document}"))?;
     between(document, &text, ("campaigns", "docs"), &campaign::table()?)
+}
+
+/// Document about boards with the table of their builds.
+fn with_boards() -> Result<String> {
+    let document = boards::DOCUMENT;
+    let text =
+        std::fs::read_to_string(root().join(document)).with_context(|| format!("cannot read {document}"))?;
+    between(document, &text, ("builds", "docs"), &boards::table()?)
 }
 
 /// Replaces the text between two marker comments of a document, which name the table and the command that writes it.

@@ -3,6 +3,7 @@
 //! documents. `cargo evidence --help` lists the commands.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
+mod boards;
 mod c;
 mod campaign;
 mod check;
@@ -54,6 +55,8 @@ enum Task {
     Mutants(mutants::Arguments),
     /// Synthesise a machine or units, place and route them, and record clock and resources in docs/synthesis.md.
     Synth(synth::Arguments),
+    /// Build a program on the boards, to the bitstream, and record resources and clock in docs/board.md.
+    Boards(boards::Arguments),
     /// Map a core to the cells of an FPGA and run the mapped netlist in lockstep with the emulator.
     Netlist(netlist::Arguments),
     /// Let LinuxCNC, without a screen, cut agh.ngc with the hybrid robot on a simulated board, cut its link, stop it, and report
@@ -96,6 +99,7 @@ fn task(task: Task) -> Result<()> {
         Task::Tables => formal::tables(),
         Task::Mutants(arguments) => mutants::mutants(&arguments),
         Task::Synth(arguments) => synth::synth(&arguments),
+        Task::Boards(arguments) => boards::boards(&arguments),
         Task::Netlist(arguments) => netlist::lockstep(&arguments),
         Task::Linuxcnc(arguments) => linuxcnc::linuxcnc(&arguments),
         Task::C(arguments) => c::count(&arguments),
