@@ -137,7 +137,8 @@ fn power(text: &str) -> Option<i8> {
         digits => digits.unwrap_or(text),
     };
     let plain = digits.replace('²', "2").replace('³', "3").replace('⁴', "4");
-    if plain.is_empty() { Some(1) } else { plain.parse().ok() }
+    // As far below as above 0.
+    if plain.is_empty() { Some(1) } else { plain.parse().ok().filter(|power| *power > i8::MIN) }
 }
 
 /// A unit, as [`unit`] reads it, in SI base units; `None` if its meaning is not clear, as that of `V/rad·s`.

@@ -459,8 +459,11 @@ fn programs_compute_what_gcc_does() {
     );
 }
 
+/// A changed line; `None` if there is nothing to change.
+type Change = fn(&str) -> Option<String>;
+
 /// The text with one line of the period changed, the first for which there is a change.
-fn planted(text: &str, change: fn(&str) -> Option<String>) -> Option<String> {
+fn planted(text: &str, change: Change) -> Option<String> {
     let at = text.find("\nperiod:\n")?;
     let (head, code) = text.split_at(at + 9);
     let mut done = false;
@@ -502,8 +505,7 @@ fn unstored(line: &str) -> Option<String> {
 #[test]
 fn faults_of_the_translation_are_noticed() {
     let folder = folder("planted");
-    let kinds: [(&str, fn(&str) -> Option<String>); 3] =
-        [("exchanged", exchanged), ("uncut", uncut), ("unstored", unstored)];
+    let kinds: [(&str, Change); 3] = [("exchanged", exchanged), ("uncut", uncut), ("unstored", unstored)];
     let mut counts = [(0, 0); 3];
     let mut ready = Vec::new();
     for seed in 0..60 {
