@@ -752,6 +752,22 @@ fn editors_leave_other_assemblers_alone() {
             String::from_utf8_lossy(&output.stderr)
         );
     }
+    // One list of directives in the three, each of them one of Takt's.
+    let listed = |file: &str| -> Vec<String> {
+        let text = std::fs::read_to_string(format!("{editors}/{file}")).unwrap();
+        let line =
+            text.lines().find(|line| line.contains("period") && line.contains("endfor")).expect("the list");
+        let words = line.replace('\\', "").replace(['(', ')', '|'], " ");
+        let names = takt_asm::Directive::ALL.iter().map(|directive| &directive.name()[1..]);
+        let found =
+            names.filter(|name| words.split(|c: char| !c.is_alphanumeric()).any(|word| word == *name));
+        let mut found: Vec<String> = found.map(str::to_owned).collect();
+        found.sort();
+        assert_eq!(found.len(), line.matches('|').count() + 1, "{file}: {line}");
+        found
+    };
+    let lists = ["neovim/takt.lua", "emacs/takt.el", "vscode/src/recognise.ts"].map(listed);
+    assert!(lists.iter().all(|list| *list == lists[0]), "{lists:?}");
     let helix = std::fs::read_to_string(format!("{editors}/helix/languages.toml")).unwrap();
     assert!(helix.contains("file-types = [\"tks\"]"), "{helix}");
     // The path that its first lines name exists in a copy of Takt.
