@@ -229,7 +229,7 @@ fn neovim_colours_a_file() {
     }
     let plugin = format!("{FOLDER}/../neovim/takt.lua");
     std::fs::copy(plugin, folder.join("plugin/takt.lua")).expect("it is there");
-    let source = home.join("a.s");
+    let source = home.join("a.tks");
     std::fs::write(&source, "; a comment\n").expect("there is room");
     let active = "vim.treesitter.highlighter.active[vim.api.nvim_get_current_buf()] ~= nil";
     let output = Command::new("nvim")
