@@ -136,8 +136,8 @@ fn a_later_stage_points_into_the_file() {
     assert_eq!(line(&place(RowPlace::Unit("aux", "divroot"))), "    \"divroot\",");
     assert_eq!(line(&place(RowPlace::Bank("x"))), "bank = \"x\"");
     assert_eq!(line(&place(RowPlace::Field("refill"))), "refill = 6");
-    // A machine of the table has no file. (Other tests read files whose row is called `t3`.)
-    assert!(about("t1", RowPlace::Name, "", "").is_none());
+    // Other tests read files with the rows of the table, so this name is of no machine.
+    assert!(about("nowhere", RowPlace::Name, "", "").is_none());
 }
 
 #[test]
