@@ -137,7 +137,7 @@ fn power(text: &str) -> Option<i8> {
         digits => digits.unwrap_or(text),
     };
     let plain = digits.replace('²', "2").replace('³', "3").replace('⁴', "4");
-    // As far below as above 0.
+    // Exponents are -127 to 127: each has an opposite.
     if plain.is_empty() { Some(1) } else { plain.parse().ok().filter(|power| *power > i8::MIN) }
 }
 

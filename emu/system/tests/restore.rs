@@ -35,7 +35,7 @@ fn seen(system: &System) -> String {
     let mut text = format!("{} {:?} {:?}\n", system.now(), system.start(), system.fault());
     for (number, core) in system.description().cores.iter().enumerate() {
         let emulator = system.core(number);
-        // Of latched inputs, the program's side changes with the next tick only, which nothing can tell.
+        // The next tick alone copies latched inputs to the program, so nothing can tell when their own side changed.
         let inputs = core.program.inputs.iter().filter(|_| core.program.latched);
         let inputs: Vec<Register> = inputs.map(|port| port.register).collect();
         let registers = Register::all().filter(|register| !inputs.contains(register));

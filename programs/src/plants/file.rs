@@ -70,13 +70,13 @@ pub(super) const UNLIMITED: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
 pub enum PinDriver {
     /// A constant level.
     Level(bool),
-    /// What is connected there: a sensor, or a level of 0.
+    /// Source of the signal: a sensor, or a level of 0.
     Sensor,
     /// The same, with one level in 16 inverted.
     Noise,
 }
 
-/// What a plant's file says of an input pin of a board.
+/// An input pin of a board, as a plant's file describes it.
 #[derive(Clone, PartialEq, Debug)]
 pub enum PinCourse {
     /// Times in s, increasing, and drivers from then on; before them the sensor.

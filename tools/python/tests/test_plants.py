@@ -446,7 +446,7 @@ def test_values_in_python_come_before_the_file_s(tmp_path):
     heavy = pickle.loads(pickle.dumps(plant.with_parameters({"J": 2e-3}).with_parameters({"load": 0.3, "load.at": 0.05})))
     assert (plant.parameters["J"], heavy.parameters["J"], heavy.parameters["load.at"]) == (7e-4, 2e-3, 0.05)
     in_python(law.run(plant=heavy, periods=200), table(EXAMPLES / "pi.s", "--plant", other, "--periods", 200), heavy)
-    # What was given stays in force, and the file's value before.
+    # Given values stay in force; before them, the file's value holds.
     sim = law.sim(plant=plant)
     assert (sim.step(), sim.inputs["w_ref"])[1] == 100 and (sim.step({"w_ref": 7}), sim.step(), sim.inputs["w_ref"])[2] == 7
 

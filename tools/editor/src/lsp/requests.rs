@@ -265,7 +265,7 @@ impl Server {
         for program in self.programs.values() {
             let front = &program.front;
             for symbol in &front.index.symbols {
-                // As written, once for all expansions.
+                // The name in the source stands once, whatever the number of expansions.
                 let name = front.files.text(symbol.span);
                 let kind = outline::protocol_kind(symbol.kind).filter(|_| within(query, name));
                 let (Some(kind), Some(location)) = (kind, self.location(front, symbol.span)) else {

@@ -206,7 +206,7 @@ impl Writer<'_, '_> {
         Ok(())
     }
 
-    /// How far an innermost loop is unrolled: so that its iterations overlap, in a text of some hundred operations.
+    /// The `unroll` of an innermost loop, so that its iterations overlap, within [`UNROLLED`] operations.
     fn unrolled(&self, body: &Block, count: i64) -> String {
         let work = body.iter().try_fold(0, |sum, (statement, _)| match statement {
             Statement::Def(id) => match self.speller.nodes.node(*id) {
