@@ -119,13 +119,14 @@ const fn check(name: &'static str, command: &'static str, seconds: Option<f64>) 
 }
 
 /// Checks outside cargo's tests.
-pub const CHECKS: [Check; 9] = [
+pub const CHECKS: [Check; 10] = [
     check("formal", "cargo evidence check formal", Some(158.0)),
     check("units", "cargo evidence check units", Some(100.0)),
     check(OPERANDS, "cargo evidence formal --units", Some(900.0)),
     check("clients", "cargo evidence check clients", None),
     check("litex", "cargo evidence check litex", None),
     check("routed", "cargo evidence check routed", Some(300.0)),
+    check("boards", "cargo evidence check boards", None),
     check(LINUXCNC, "cargo evidence check linuxcnc", None),
     check("book", "cargo xtask book --no-rustdoc --no-playground", Some(5.0)),
     check(EXHAUSTIVE, "cargo xtask test --full", None),
