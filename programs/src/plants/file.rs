@@ -211,6 +211,16 @@ impl PlantFile {
         Some(if is_fmu(file) { file.to_owned() } else { file.parent().unwrap_or(Path::new("")).join(path) })
     }
 
+    /// A mistake about a signal, at its entry under `[ports]` if it has one.
+    pub fn mistake_of(&self, signal: &str, message: String) -> Diagnostics {
+        let entry = self.ports.iter().find(|entry| entry.name == signal);
+        let mistake = match entry {
+            Some(entry) => Diagnostic::error(CODE, entry.place, message),
+            None => Diagnostic::placeless(CODE, message),
+        };
+        diagnostics(Arc::clone(&self.sources), vec![mistake])
+    }
+
     /// A mistake at a place of this file.
     pub fn mistake(&self, place: Span, message: String) -> Diagnostics {
         diagnostics(Arc::clone(&self.sources), vec![Diagnostic::error(CODE, place, message)])

@@ -3,13 +3,16 @@
 // stdin, words of 32 bits, little-endian; one command:
 //   cycles, faults, then for each input pin its level (0, 1), then a count and that many encoders (pin a, pin b, count, difference):
 //   in these cycles the encoder goes that far, evenly; then a count and that many bytes, a word each, which follow those not sent yet
-//   on the UART. faults: 1 in so many bits of the UART, in either direction, is turned; 0: none.
-// stdout: a count and that many bytes that came from the UART, a word each; for each output pin the cycles in which it was 1, and its level;
-// a count and that many moments in which outputs of a core became safe, or trips rose: the cycle, the core, and the words of `look` but
+//   on the UART; then a count and that many output pins, each with its edges (1: rises, 2: falls): the run ends with the first cycle in
+//   which one of these comes. The pin OUTPUTS is the board's tick. faults: 1 in so many bits of the UART, in either direction, is turned;
+//   0: none.
+// stdout: the cycles that were run, whether the last of them has the board's tick, and of the pins watched those with an edge in it, as
+// bits; a count and that many bytes that came from the UART,
+// a word each; for each output pin the cycles in which it was 1, and its level; the SEEN words of `see`; a count and that many moments in which outputs of a core became safe, or trips rose: the cycle, the core, and the words of `look` but
 // the first. The last word has the trips that rose; it is 0 where outputs of the core became safe.
 //
 // pins.h, which is generated, gives DIVIDE, INPUTS, OUTPUTS and the pins; watch.h CORES and look, whose first word is whether a core's
-// outputs drive. Of a circuit that is not watched, CORES is 0.
+// outputs drive, ticks, and see with SEEN, the registers that the program reads. Of a circuit that is not watched, CORES and SEEN are 0.
 
 #include "Vtop.h"
 #include "Vtop___024root.h"
@@ -35,6 +38,8 @@ template <std::size_t N> static uint32_t bits(const VlWide<N> &value, unsigned l
 static const unsigned LOOKED = 9;   // words of `look`
 #if CORES == 0
 static void look(Vtop *, unsigned, uint32_t *) {}
+static bool ticks(Vtop *) { return false; }
+static void see(Vtop *, uint32_t *) {}
 #endif
 
 static uint64_t seed = 88172645463325252ull;
@@ -89,8 +94,21 @@ int main(int argc, char **argv) {
             if (!word(value)) return 1;
             sends.push_back(value);
         }
+        std::vector<std::pair<uint32_t, uint32_t>> watched;
+        uint32_t tick_ends = 0;
+        if (!word(count)) return 1;
+        for (; count > 0; count--) {
+            uint32_t pin, kinds;
+            if (!word(pin) || !word(kinds) || pin > OUTPUTS) return 1;
+            if (pin == OUTPUTS)
+                tick_ends = 1;
+            else
+                watched.push_back({pin, kinds});
+        }
         std::vector<uint32_t> answer, high(OUTPUTS), moments;
-        for (uint32_t cycle = 0; cycle < cycles; cycle++) {
+        std::vector<uint32_t> edges((watched.size() + 31) / 32);
+        uint32_t cycle = 0, has_tick = 0;
+        for (bool ends = false; cycle < cycles && !ends; cycle++) {
             for (const Encoder &e : encoders) {
                 uint32_t at = e.count + uint32_t(int64_t(e.difference) * (int64_t(cycle) + 1) / int64_t(cycles));
                 *inputs[e.a] = (at + 1) >> 1 & 1;
@@ -141,10 +159,24 @@ int main(int argc, char **argv) {
                     answer.push_back(byte);
                 }
             }
+            has_tick = ticks(&top);
+            ends = tick_ends & has_tick;
+            uint8_t before[OUTPUTS + 1];
+            for (const auto &pin : watched) before[pin.first] = *outputs[pin.first];
             top.clk_in = 1;
             top.eval();
+            for (std::size_t i = 0; i < watched.size(); i++) {
+                auto [pin, kinds] = watched[i];
+                uint8_t now = *outputs[pin];
+                if (now == before[pin] || !(kinds >> (now ? 0 : 1) & 1)) continue;
+                edges[i / 32] |= 1u << i % 32;
+                ends = true;
+            }
         }
         uint32_t size = answer.size();
+        fwrite(&cycle, sizeof cycle, 1, stdout);
+        fwrite(&has_tick, sizeof has_tick, 1, stdout);
+        fwrite(edges.data(), sizeof(uint32_t), edges.size(), stdout);
         fwrite(&size, sizeof size, 1, stdout);
         fwrite(answer.data(), sizeof(uint32_t), answer.size(), stdout);
         fwrite(high.data(), sizeof(uint32_t), high.size(), stdout);
@@ -152,6 +184,9 @@ int main(int argc, char **argv) {
             uint32_t level = *outputs[i];
             fwrite(&level, sizeof level, 1, stdout);
         }
+        uint32_t seen[SEEN + 1];
+        see(&top, seen);
+        fwrite(seen, sizeof(uint32_t), SEEN, stdout);
         size = moments.size() / (LOOKED + 1);
         fwrite(&size, sizeof size, 1, stdout);
         fwrite(moments.data(), sizeof(uint32_t), moments.size(), stdout);

@@ -10,6 +10,7 @@ pub mod boards;
 pub mod build;
 pub mod carrier;
 mod consistency;
+pub mod device;
 mod document;
 pub mod emulated;
 pub mod endpoints;

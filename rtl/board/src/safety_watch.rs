@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Detects when the outputs of a simulated board become safe: the nets of the circuit that the driver watches in every cycle, and the
-//! reason that they give, as text.
+//! Nets of a simulated board that the driver watches in every cycle: the reason for which outputs become safe, as text, the board's tick,
+//! and the registers that the program reads.
 
 use crate::application::Application;
 use crate::host::Status;
@@ -21,6 +21,8 @@ pub(crate) struct Watch {
     cores: Vec<Core>,
     /// Trips of the wiring: name and description of each.
     trips: Vec<(String, String)>,
+    /// Input ports that registers drive, each with the register's net.
+    seen: Vec<(String, String)>,
 }
 
 #[derive(Debug)]
@@ -39,7 +41,19 @@ impl Watch {
             outputs: sinks.into_iter().map(|sink| sink.written.port.clone()).collect(),
         });
         let trips = wiring.trips().enumerate().map(|(i, of)| (of.name.clone(), trip(Some(wiring), i)));
-        Watch { clock: wiring.clock, cores: cores.collect(), trips: trips.collect() }
+        let reads = wiring.peripherals.iter().flat_map(|peripheral| {
+            let registers = peripheral.kind.reads.iter().zip(&peripheral.reads);
+            registers.filter_map(move |(register, port)| {
+                Some((port.clone()?, format!("r_{}_{}", peripheral.name, register.name)))
+            })
+        });
+        let (cores, trips, seen) = (cores.collect(), trips.collect(), reads.collect());
+        Watch { clock: wiring.clock, cores, trips, seen }
+    }
+
+    /// Input ports that registers drive, each with the register's net, in the order of the driver's words.
+    pub(crate) fn seen(&self) -> &[(String, String)] {
+        &self.seen
     }
 
     /// Nets that Verilator must keep, each with its module.
@@ -53,6 +67,8 @@ impl Watch {
         let scaling = if self.is_program() { AROUND } else { "takt_output_latch" };
         nets.push((scaling, "which3".to_owned()));
         nets.extend(self.trips.iter().map(|(name, _)| (AROUND, format!("trip_{name}"))));
+        nets.push((AROUND, "ticks".to_owned()));
+        nets.extend(self.seen.iter().map(|(_, net)| (AROUND, net.clone())));
         nets
     }
 
@@ -66,7 +82,7 @@ impl Watch {
         format!("`verilator_config\n{}", self.nets().into_iter().map(keep).collect::<String>())
     }
 
-    /// C++ header with the driver's access to the nets: for each core, `drive` and the words of a moment.
+    /// C++ header with the driver's access to the nets: for each core, `drive` and the words of a moment; the tick; the registers.
     pub(crate) fn header(&self) -> String {
         let net = |name: &str| format!("top->rootp->{TOP}__DOT__around__DOT__{name}");
         let mut text = format!(
@@ -99,7 +115,17 @@ impl Watch {
             }
             let _ = writeln!(text, "        break;");
         }
-        text + "    }\n}\n"
+        text += "    }\n}\n";
+        let _ = writeln!(text, "static bool ticks(Vtop *top) {{ return {}; }}", net("ticks"));
+        let _ = writeln!(
+            text,
+            "#define SEEN {}\nstatic void see(Vtop *top, uint32_t *words) {{\n    (void)top;\n    (void)words;",
+            self.seen.len()
+        );
+        for (i, (_, register)) in self.seen.iter().enumerate() {
+            let _ = writeln!(text, "    words[{i}] = {};", net(register));
+        }
+        text + "}\n"
     }
 
     /// The trips as bits of a word.

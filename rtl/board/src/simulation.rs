@@ -48,6 +48,37 @@ pub struct EncoderMotion {
     pub by: i32,
 }
 
+/// Changes of an output pin that end a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Edge {
+    /// From 0 to 1.
+    Rise,
+    /// From 1 to 0.
+    Fall,
+    /// Either.
+    Both,
+}
+
+/// What ends a run before its time.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Watched {
+    /// Output pins, as numbers of [`Simulation::outputs`], each with its edges.
+    pub pins: Vec<(usize, Edge)>,
+    /// The board's tick, of a board that was made from a program or a system.
+    pub tick: bool,
+}
+
+/// How a run ended.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Stop {
+    /// Cycles that were run. Output pins have their new levels from the cycle after them on.
+    pub cycles: u32,
+    /// The last of these cycles was that of the board's tick.
+    pub tick: bool,
+    /// For each of the watched pins, whether one of its edges has ended the run.
+    pub edges: Vec<bool>,
+}
+
 /// A simulated board.
 #[derive(Debug)]
 pub struct Simulation {
@@ -69,6 +100,7 @@ pub struct Simulation {
     watch: Option<Watch>,
     high: Vec<u32>,
     levels: Vec<u32>,
+    seen: Vec<u32>,
     received: Vec<u8>,
 }
 
@@ -150,6 +182,7 @@ impl Simulation {
             unplugged: false,
             cycles: 0,
             tell: None,
+            seen: vec![0; watch.as_ref().map_or(0, |watch| watch.seen().len())],
             watch,
             received: Vec::new(),
         })
@@ -170,6 +203,26 @@ impl Simulation {
         &self.outputs
     }
 
+    /// Sets an input by its number, from the next cycle on; a number that does not exist has no effect.
+    pub fn set_input(&mut self, input: usize, level: bool) {
+        if let Some((_, own)) = self.inputs.get_mut(input) {
+            *own = level.into();
+        }
+    }
+
+    /// Levels of the outputs at the end of the last run, and the cycles of it in which each was 1, in the order of
+    /// [`Simulation::outputs`].
+    pub fn output_levels(&self) -> impl Iterator<Item = (bool, u32)> {
+        self.levels.iter().zip(&self.high).map(|(level, high)| (*level != 0, *high))
+    }
+
+    /// Input ports that registers of peripherals drive, each with the register's value at the end of the last run: captured at the tick, or
+    /// where the wiring has its `latch`. Empty for a board that was made from files.
+    pub fn seen(&self) -> impl Iterator<Item = (&str, u32)> {
+        let ports = self.watch.iter().flat_map(|watch| watch.seen());
+        ports.map(|(port, _)| port.as_str()).zip(self.seen.iter().copied())
+    }
+
     /// Sets an input by its name, from the next cycle on.
     pub fn set(&mut self, name: &str, level: bool) {
         if let Some(at) = self.input(name) {
@@ -188,6 +241,15 @@ impl Simulation {
     /// # Errors
     /// If the simulation has ended.
     pub fn run(&mut self, cycles: u32, bytes: &[u8]) -> io::Result<()> {
+        self.run_watched(cycles, bytes, &Watched::default()).map(|_| ())
+    }
+
+    /// Runs at most `cycles` cycles, at least one, and starts sending these bytes to the board; ends after the first cycle that gives a
+    /// watched change. [`Simulation::turns`] are of the whole run: an encoder that turns in a run which ends early has not gone all the way.
+    ///
+    /// # Errors
+    /// If the simulation has ended.
+    pub fn run_watched(&mut self, cycles: u32, bytes: &[u8], watched: &Watched) -> io::Result<Stop> {
         let mut words = vec![cycles, self.noise];
         words.extend(self.inputs.iter().map(|(_, level)| *level));
         words.push(self.turns.len() as u32);
@@ -201,25 +263,43 @@ impl Simulation {
         let bytes = if self.unplugged { &[] } else { bytes };
         words.push(bytes.len() as u32);
         words.extend(bytes.iter().map(|&byte| u32::from(byte)));
+        words.push((watched.pins.len() + usize::from(watched.tick)) as u32);
+        for (pin, edge) in &watched.pins {
+            let edges = match edge {
+                Edge::Rise => 1,
+                Edge::Fall => 2,
+                Edge::Both => 3,
+            };
+            words.extend([*pin as u32, edges]);
+        }
+        if watched.tick {
+            words.extend([self.outputs.len() as u32, 1]);
+        }
         let words: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
         self.stdin.write_all(&words)?;
         self.stdin.flush()?;
         let begun = self.cycles;
+        let (pins, many) = (watched.pins.len(), watched.pins.len().div_ceil(32));
+        let head = self.words(3 + many)?;
+        let (cycles, tick, count) = (head[0], head[1], head[2 + many]);
+        let edges = (0..pins).map(|pin| head[2 + pin / 32] >> (pin % 32) & 1 == 1).collect();
         self.cycles += u64::from(cycles);
-        let count = self.words(1)?[0] as usize;
-        let received = self.words(count)?;
+        // The rest has a length that is known, but for its last part.
+        let (count, outputs, seen) = (count as usize, self.outputs.len(), self.seen.len());
+        let mut rest = self.words(count + 2 * outputs + seen + 1)?;
+        let moments = rest.pop().unwrap_or_default() as usize;
         if !self.unplugged {
-            self.received.extend(received.iter().map(|&word| word as u8));
+            self.received.extend(rest[..count].iter().map(|&word| word as u8));
         }
-        self.high = self.words(self.outputs.len())?;
-        self.levels = self.words(self.outputs.len())?;
-        let moments = self.words(1)?[0] as usize;
+        self.seen = rest.split_off(count + 2 * outputs);
+        self.levels = rest.split_off(count + outputs);
+        self.high = rest.split_off(count);
         for moment in self.words(safety_watch::WORDS * moments)?.chunks_exact(safety_watch::WORDS) {
             if let (Some(watch), Some(tell)) = (&self.watch, self.tell) {
                 tell(&watch.text(begun, moment));
             }
         }
-        Ok(())
+        Ok(Stop { cycles, tick: tick != 0, edges })
     }
 
     fn words(&mut self, count: usize) -> io::Result<Vec<u32>> {
@@ -309,7 +389,7 @@ fn build(
         }
         let _ = writeln!(header, "    (void)top; (void)pins;\n}}");
     }
-    let watched = watch.map_or_else(|| "#define CORES 0\n".to_owned(), Watch::header);
+    let watched = watch.map_or_else(|| "#define CORES 0\n#define SEEN 0\n".to_owned(), Watch::header);
     let kept = watch.map_or_else(|| "`verilator_config\n".to_owned(), Watch::configuration);
     let verilog = verilog.into_iter().map(|file| (file.name.as_str(), file.text.as_str()));
     let sources = Sources {

@@ -2,6 +2,8 @@
 //! The command `takt board`: boards and their pins, and builds of a program or a system for a board.
 
 #[cfg(unix)]
+mod closed_loop;
+#[cfg(unix)]
 mod external_host;
 mod hal;
 #[cfg(unix)]

@@ -99,7 +99,12 @@ pub(crate) fn read(path: &Path, color: bool) -> Result<PlantFile> {
 }
 
 /// The plant in motion, with its signals.
-fn open(file: &PlantFile, path: &Path, period: f64, color: bool) -> Result<(Box<dyn Plant>, Interface)> {
+pub(crate) fn open(
+    file: &PlantFile,
+    path: &Path,
+    period: f64,
+    color: bool,
+) -> Result<(Box<dyn Plant>, Interface)> {
     if file.fmu(path).is_some() {
         return open_fmu(file, path, period, color);
     }

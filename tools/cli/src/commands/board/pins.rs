@@ -87,6 +87,24 @@ impl Pins {
         Pins { inputs, outputs, encoders }
     }
 
+    /// Name in the circuit of an input pin.
+    ///
+    /// # Errors
+    /// If there is no such input pin; in words, with the nearest name.
+    pub(super) fn circuit(&self, name: &str) -> Result<&str, String> {
+        self.input(name).map(|pin| pin.circuit.as_str())
+    }
+
+    /// Name for users of an output pin in the circuit.
+    pub(super) fn shown<'p>(&'p self, circuit: &'p str) -> &'p str {
+        self.outputs.iter().find(|pin| pin.circuit == circuit).map_or(circuit, |pin| &pin.name)
+    }
+
+    /// Leaves out input pins of the circuit that are driven elsewhere.
+    pub(super) fn leave_out(&mut self, circuit: &[String]) {
+        self.inputs.retain(|pin| !circuit.contains(&pin.circuit));
+    }
+
     /// Finds an input pin by name. If a signal and a peripheral share the name, the signal's pin is chosen.
     fn input(&self, name: &str) -> Result<&Pin, String> {
         let of = |name: &str, short: bool| {

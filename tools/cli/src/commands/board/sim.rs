@@ -3,7 +3,7 @@
 
 use super::Target;
 #[cfg(unix)]
-use super::{external_host, pins, plant_at_pins, robot};
+use super::{closed_loop, external_host, pins, plant_at_pins, robot};
 use crate::run::application::Application;
 use crate::terminal::files::Out;
 #[cfg(unix)]
@@ -15,12 +15,14 @@ use anyhow::Result;
 #[cfg(unix)]
 use anyhow::anyhow;
 use anyhow::bail;
-use clap::Args;
+use clap::{ArgGroup, Args};
 #[cfg(unix)]
 use std::io::Write;
 use std::path::PathBuf;
 #[cfg(unix)]
 use takt_board::emulated::EmulatedBoard;
+#[cfg(unix)]
+use takt_board::protocol::Line;
 #[cfg(unix)]
 use takt_board::simulation::{EncoderMotion, Simulation};
 #[cfg(unix)]
@@ -28,10 +30,14 @@ use takt_board::{Host, Wiring};
 
 /// Run the complete top level in Verilator, with its UART on a pseudo-terminal that replaces a board's serial port.
 ///
-/// `takt load` and `takt live` talk to the port that is printed. Input pins are low until --set, --script or --inputs drives them; pins
-/// are named PERIPHERAL.PIN, or PERIPHERAL if it has one input. It runs slower than a board: a second of it takes minutes.
+/// `takt load` and `takt live` talk to the port that is printed. Input pins are low until --set, --script, --inputs or --plant drives them;
+/// pins are named PERIPHERAL.PIN, or PERIPHERAL if it has one input. It runs slower than a board: a second of it takes minutes.
 #[derive(Args)]
-#[command(after_help = EXAMPLES)]
+#[command(
+    after_help = EXAMPLES,
+    group = ArgGroup::new("behind").args(["inputs", "plant"]),
+    group = ArgGroup::new("periodic").args(["robot", "plant"])
+)]
 pub(super) struct Sim {
     #[command(flatten)]
     target: Target,
@@ -49,9 +55,20 @@ pub(super) struct Sim {
     /// row for each period of the board; `-` is standard input. The simulation ends with it.
     #[arg(long, value_name = "CSV", conflicts_with_all = ["axis", "robot", "script"])]
     inputs: Option<PathBuf>,
-    /// The board's side: for each of these rows the part of the period in which each output pin was 1; `-` is standard output.
-    #[arg(long, value_name = "CSV", requires = "inputs")]
+    /// The board's side: for each of these rows the part of the period in which each output pin was 1; `-` is standard output. With --plant
+    /// a row for each period: input ports as the board read them, these parts, and the plant's states.
+    #[arg(long, value_name = "CSV", requires = "behind")]
     outputs: Option<PathBuf>,
+    /// Put a plant at the pins: a TOML file with a model and its numbers (docs/plant.md), or an FMU. Half bridges drive it, converters and
+    /// encoders measure it; this command starts the program, and writes the ports of the file's [inputs] over the UART.
+    #[arg(long, value_name = "TOML|FMU", conflicts_with_all = ["axis", "robot"])]
+    plant: Option<PathBuf>,
+    /// With --plant: connect a signal of the plant with a port of another name, in place of the file's map; may be given several times.
+    #[arg(long, value_name = "SIGNAL=PORT", requires = "plant")]
+    connect: Vec<String>,
+    /// With --plant: draw the table of --outputs over time as SVG.
+    #[arg(long, value_name = "SVG", requires = "plant")]
+    plot: Option<PathBuf>,
     /// Put the hybrid robot behind the pins and drive it along a tool path, this command being the host at the UART: the tracking
     /// error through the pins beside that of `takt track`.
     #[arg(long, conflicts_with_all = ["axis", "cycles"])]
@@ -59,8 +76,9 @@ pub(super) struct Sim {
     /// With --robot: tool path in G-code [default: the letters AGH].
     #[arg(long, value_name = "FILE", requires = "robot")]
     gcode: Option<PathBuf>,
-    /// With --robot: periods to drive, from the path's beginning [default: 1000; with --serve until it is interrupted].
-    #[arg(long, value_name = "N", value_parser = number::count, requires = "robot", allow_hyphen_values = true)]
+    /// With --robot: periods to drive, from the path's beginning [default: 1000; with --serve until it is interrupted]. With --plant:
+    /// periods to run [default: until --cycles, or until it is interrupted].
+    #[arg(long, value_name = "N", value_parser = number::count, requires = "periodic", allow_hyphen_values = true)]
     periods: Option<u64>,
     /// With --robot: leave the UART to a host at the pseudo-terminal that is printed, such as LinuxCNC (docs/linuxcnc.md). After each frame
     /// of a stream, time on the board stands still until the host writes.
@@ -90,7 +108,8 @@ const EXAMPLES: &str = "\
 Examples:
   takt board sim --wiring position.toml --program position.s --axis motor,encoder,20000
   takt board sim --wiring limit.toml --program limit.s --script -        then, for example, `set limit=1`
-  takt board sim --wiring limit.toml --program limit.s --inputs - --outputs -   a plant at both pipes";
+  takt board sim --wiring limit.toml --program limit.s --inputs - --outputs -   a plant at both pipes
+  takt board sim --wiring drive.toml --program drive.s --plant plant/drive.toml --periods 400 --outputs loop.csv";
 
 /// Default number of cycles per run of the simulation.
 #[cfg(unix)]
@@ -153,14 +172,31 @@ pub(super) fn run(arguments: &Sim, color: bool, out: &mut Out) -> Result<()> {
     reads.extend(arguments.target.wiring.as_deref().map(|path| ("--wiring", path)));
     reads.extend(arguments.script.as_deref().map(|path| ("--script", path)));
     reads.extend(arguments.inputs.as_deref().map(|path| ("--inputs", path)));
-    let outputs = [("--outputs", &arguments.outputs), ("--record", &arguments.record)];
+    reads.extend(arguments.plant.as_deref().map(|path| ("--plant", path)));
+    let outputs = [
+        ("--outputs", &arguments.outputs),
+        ("--record", &arguments.record),
+        ("--plot", &arguments.plot),
+    ];
     let writes: Vec<OptionPath<'_>> =
         outputs.into_iter().filter_map(|(name, path)| Some((name, path.as_deref()?))).collect();
     files::check(&reads, &writes)?;
     let (board, wiring, carried) = arguments.target.read(color, true)?;
     // Check the drivers of the pins before the circuit is compiled.
     let taken: Vec<&str> = arguments.axis.iter().filter_map(|text| text.split(',').nth(1)).collect();
-    let pins = pins::Pins::new(&board, &wiring, &taken);
+    let mut pins = pins::Pins::new(&board, &wiring, &taken);
+    let plant = match &arguments.plant {
+        Some(path) => {
+            let Application::Program(loaded) = &carried else {
+                bail!("--plant is for a single program; a system's plant is one at the pipes of --inputs and --outputs");
+            };
+            let plant =
+                closed_loop::PlantAtPins::new(path, &arguments.connect, &wiring, loaded, &pins, color)?;
+            pins.leave_out(&plant.driven());
+            Some(plant)
+        }
+        None => None,
+    };
     let levels =
         pins.levels(arguments.set.iter().map(String::as_str)).map_err(|text| anyhow!("--set {text}"))?;
     let script = match &arguments.script {
@@ -194,6 +230,21 @@ pub(super) fn run(arguments: &Sim, color: bool, out: &mut Out) -> Result<()> {
                 arguments.periods.unwrap_or(PERIODS),
             )?;
             return drive.run(&board.name, simulation()?, out);
+        }
+        if let Some(plant) = plant {
+            let sim = simulation()?;
+            let outputs = arguments.outputs.as_deref();
+            let tables = (outputs, arguments.plot.is_some());
+            let rows = closed_loop::Rows::new(&plant, &sim, &pins, tables, arguments.periods)?;
+            let run = closed_loop::Run {
+                cycles: arguments.cycles,
+                script,
+                plot: arguments.plot.as_deref(),
+                title: files::input_name(&arguments.target.program),
+                is_quiet: outputs.is_some_and(files::is_dash),
+            };
+            let report = |host: &mut Host<_>| report_reasons(host, &wiring, &carried);
+            return closed_loop::run(plant, sim, rows, run, report, out);
         }
         if let Some(inputs) = &arguments.inputs {
             let plant =
@@ -252,7 +303,12 @@ fn report_safe_outputs(mut sim: Simulation, wiring: &Wiring, carried: &Applicati
     sim.noise = 0;
     sim.unplugged = false;
     sim.tell = None;
-    let mut host = Host::connect(sim, 1)?;
+    report_reasons(&mut Host::connect(sim, 1)?, wiring, carried)
+}
+
+/// Reports why the outputs are safe, if they are.
+#[cfg(unix)]
+fn report_reasons<L: Line>(host: &mut Host<L>, wiring: &Wiring, carried: &Application) -> Result<()> {
     // Query this first: each request takes simulated time, after which a silent host would appear as a further reason.
     let reasons = host.safe_reasons(Some(&carried.on_board()))?;
     for trip in host.tripped(Some(wiring))? {
