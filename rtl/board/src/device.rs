@@ -129,8 +129,9 @@ pub fn of(peripheral: &Peripheral, register: &str, value: f64) -> Result<Box<dyn
         "digital-in" => Box::new(Switch { invert: parameter("invert") == 1, level: [false] }),
         "spi" => Box::new(Converter {
             bits: parameter("bits"),
-            polarity: parameter("polarity") == 1,
-            second_edge: parameter("phase") == 1,
+            // Data changes at the edge at which it is not sampled; the clock then has this level.
+            gives_at: (parameter("phase") == 1) != (parameter("polarity") == 1),
+            is_early: parameter("phase") == 0,
             range: range(peripheral).unwrap_or_default(),
             left: VecDeque::new(),
             level: [true],
@@ -289,8 +290,9 @@ fn word(value: u64, bits: u32) -> VecDeque<bool> {
 #[derive(Debug)]
 struct Converter {
     bits: u32,
-    polarity: bool,
-    second_edge: bool,
+    gives_at: bool,
+    /// The first bit comes with the fall of the select pin.
+    is_early: bool,
     range: (f64, f64),
     left: VecDeque<bool>,
     level: [bool; 1],
@@ -298,24 +300,19 @@ struct Converter {
 
 impl Device for Converter {
     fn pins(&self) -> DevicePins {
-        DevicePins::new(&[("select", Edge::Both), ("clock", Edge::Both)], &["in"])
+        let clock = if self.gives_at { Edge::Rise } else { Edge::Fall };
+        DevicePins::new(&[("select", Edge::Fall), ("clock", clock)], &["in"])
     }
 
     fn act(&mut self, _: u64, needed: &[NeededPin], value: f64) -> bool {
         let &[select, clock] = needed else { return false };
-        let gives = match () {
-            () if select.level => select.edge,
-            () if select.edge => {
-                let raw = value.floor().clamp(self.range.0, self.range.1) as i64;
-                self.left = word(raw.cast_unsigned(), self.bits);
-                !self.second_edge
-            }
-            // The first edge leaves the level at rest.
-            () => clock.edge && (clock.level != self.polarity) == self.second_edge,
-        };
+        if select.edge {
+            let raw = value.floor().clamp(self.range.0, self.range.1) as i64;
+            self.left = word(raw.cast_unsigned(), self.bits);
+        }
+        let gives = !select.level && if select.edge { self.is_early } else { clock.edge };
         if gives {
-            // An open line is pulled up.
-            self.level = [select.level || self.left.pop_front().unwrap_or(false)];
+            self.level = [self.left.pop_front().unwrap_or(false)];
         }
         gives
     }
@@ -579,12 +576,7 @@ impl Actuator {
         })
     }
 
-    fn at(
-        wiring: &Wiring,
-        peripheral: &Peripheral,
-        register: usize,
-        scale: i32,
-    ) -> Result<Actuator, String> {
+    fn at(wiring: &Wiring, peripheral: &Peripheral, register: usize, scale: i32) -> Result<Actuator, String> {
         let Peripheral { name, kind, .. } = peripheral;
         let of = |name: &str| peripheral.parameter(name);
         let (names, shape): (&[&str], Shape) = match kind.name {

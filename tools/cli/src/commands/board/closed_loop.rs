@@ -358,7 +358,8 @@ pub(super) struct AtPins {
 
 impl AtPins {
     fn new(plant: PlantAtPins<'_>, sim: Simulation, rows: Rows) -> Result<AtPins> {
-        let PlantAtPins { wiring, interface, motion, drives, measurements, pins: file_pins, references } = plant;
+        let PlantAtPins { wiring, interface, motion, drives, measurements, pins: file_pins, references } =
+            plant;
         let output = |name: &String| {
             let at = sim.outputs().iter().position(|output| output == name);
             at.ok_or_else(|| anyhow!("the circuit has no output pin `{name}`"))
@@ -751,7 +752,11 @@ fn steps(references: &[Reference], period: f64) -> Vec<Step> {
         let changed = references.iter().filter(|one| value(at, one) != value(at - 1, one));
         changed.map(|reference| value(at, reference)).collect()
     };
-    periods.into_iter().map(|at| (at, settings(at))).filter(|(_, settings): &Step| !settings.is_empty()).collect()
+    periods
+        .into_iter()
+        .map(|at| (at, settings(at)))
+        .filter(|(_, settings): &Step| !settings.is_empty())
+        .collect()
 }
 
 /// Runs a plant at the pins of a board. `report` reports at the end why outputs are safe.
@@ -768,9 +773,11 @@ pub(super) fn run(
     let mut board = AtPins::new(plant, sim, rows)?;
     // Encoders stand at their places before the reset ends.
     board.act(&Stop { cycles: 0, tick: false, edges: Vec::new() });
+    // Before the program is started, whether outputs drive says nothing.
+    let tell = board.sim.tell.take();
     board.sim.run(RESET, &[])?;
     let mut host = Host::connect(board, 1)?;
-    let ran = drive_board(&mut host, wiring, &mut run, out);
+    let ran = drive_board(&mut host, wiring, &mut run, tell, out);
     let AtPins { rows, failed, sim, .. } = &mut host.line;
     let (written, cycles) = (rows.written, sim.cycles);
     let result = failed.take().map_or(ran, Err);
@@ -792,6 +799,7 @@ fn drive_board(
     host: &mut Host<AtPins>,
     wiring: &Wiring,
     run: &mut Run<'_>,
+    tell: Option<fn(&str)>,
     out: &mut Out,
 ) -> Result<()> {
     // Hold the program first, so that its first period reads the first values.
@@ -810,6 +818,7 @@ fn drive_board(
         out.flush()?;
     }
     host.line.is_armed = true;
+    host.line.sim.tell = tell;
     host.set("control", control)?;
     let period = f64::from(wiring.period) / (wiring.clock * 1e6);
     let mut steps = steps(&host.line.references, period).into_iter().peekable();

@@ -173,11 +173,8 @@ pub(super) fn run(arguments: &Sim, color: bool, out: &mut Out) -> Result<()> {
     reads.extend(arguments.script.as_deref().map(|path| ("--script", path)));
     reads.extend(arguments.inputs.as_deref().map(|path| ("--inputs", path)));
     reads.extend(arguments.plant.as_deref().map(|path| ("--plant", path)));
-    let outputs = [
-        ("--outputs", &arguments.outputs),
-        ("--record", &arguments.record),
-        ("--plot", &arguments.plot),
-    ];
+    let outputs =
+        [("--outputs", &arguments.outputs), ("--record", &arguments.record), ("--plot", &arguments.plot)];
     let writes: Vec<OptionPath<'_>> =
         outputs.into_iter().filter_map(|(name, path)| Some((name, path.as_deref()?))).collect();
     files::check(&reads, &writes)?;
@@ -188,7 +185,9 @@ pub(super) fn run(arguments: &Sim, color: bool, out: &mut Out) -> Result<()> {
     let plant = match &arguments.plant {
         Some(path) => {
             let Application::Program(loaded) = &carried else {
-                bail!("--plant is for a single program; a system's plant is one at the pipes of --inputs and --outputs");
+                bail!(
+                    "--plant is for a single program; a system's plant is one at the pipes of --inputs and --outputs"
+                );
             };
             let plant =
                 closed_loop::PlantAtPins::new(path, &arguments.connect, &wiring, loaded, &pins, color)?;
