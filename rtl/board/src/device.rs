@@ -171,15 +171,26 @@ struct Position {
     /// Cycle and value of the last call, and the value's change in a cycle.
     last: Option<(u64, f64)>,
     rate: f64,
+    /// First cycle of the next count.
+    ready: u64,
 }
 
 impl Position {
+    /// Longest time between two counts of a position that catches up, in cycles.
+    const PACE: f64 = 8.0;
+
     fn new(value: f64) -> Position {
-        Position { count: value.floor() as i64, wanted: value.floor() as i64, last: None, rate: 0.0 }
+        Position {
+            count: value.floor() as i64,
+            wanted: value.floor() as i64,
+            last: None,
+            rate: 0.0,
+            ready: 0,
+        }
     }
 
-    /// Goes a count towards the value, as both tracks of an encoder never change at once; true if it has.
-    fn follow(&mut self, cycle: u64, value: f64) -> bool {
+    /// Goes a count towards the value, as both tracks of an encoder never change at once.
+    fn follow(&mut self, cycle: u64, value: f64) {
         if let Some((before, old)) = self.last
             && cycle > before
         {
@@ -188,15 +199,19 @@ impl Position {
         self.last = Some((cycle, value));
         self.wanted = value.floor() as i64;
         let step = (self.wanted - self.count).signum();
+        if step == 0 || cycle < self.ready {
+            return;
+        }
         self.count += step;
-        step != 0
+        // Twice as fast as the value at most: the peripheral's filter must see each count.
+        self.ready = cycle + (0.5 / self.rate.abs()).floor().clamp(1.0, Position::PACE) as u64;
     }
 
     /// Cycle of the next count, if the value goes on as it did.
     fn next(&self) -> Option<u64> {
         let (cycle, value) = self.last?;
         if self.count != self.wanted {
-            return Some(cycle + 1);
+            return Some(self.ready.max(cycle + 1));
         }
         let way = if self.rate > 0.0 { self.count as f64 + 1.0 - value } else { value - self.count as f64 };
         let cycles = (way / self.rate.abs()).ceil().max(1.0);
@@ -523,17 +538,6 @@ pub enum BridgeState {
     Short,
 }
 
-impl BridgeState {
-    /// Part of the bridge's voltage at the leg, without current.
-    pub fn level(self) -> f64 {
-        match self {
-            BridgeState::High => 1.0,
-            BridgeState::Low => 0.0,
-            BridgeState::Off | BridgeState::Short => 0.5,
-        }
-    }
-}
-
 /// What the pins of a register drive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Shape {
@@ -630,7 +634,19 @@ impl Actuator {
         }
     }
 
-    /// Value of the program's port for which the pins have this mean level; of a half bridge, of its leg.
+    /// Mean level over some cycles, of which each pin was 1 in `high`; of a half bridge, of its leg, for which the time with both switches
+    /// off counts half.
+    pub fn mean(&self, high: &[u64], cycles: u64) -> f64 {
+        let invert = if let Shape::Bridge(invert, _) = self.shape { invert } else { [false; 2] };
+        let on = |pin: usize| {
+            let high = *high.get(pin)?;
+            Some(if invert[pin] { cycles.saturating_sub(high) } else { high } as f64)
+        };
+        let (cycles, up) = (cycles.max(1) as f64, on(0).unwrap_or_default());
+        on(1).map_or(up, |down| 0.5 * (cycles + up - down)) / cycles
+    }
+
+    /// Value of the program's port for which the pins have this mean level.
     pub fn port(&self, mean: f64) -> f64 {
         let mean = if self.is_signed { mean - 0.5 } else { mean };
         let full = match self.shape {

@@ -3,6 +3,7 @@
 
 mod carrier;
 mod consistency;
+mod devices;
 mod drive;
 mod emulated;
 mod families;

@@ -340,8 +340,6 @@ pub(super) struct AtPins {
     levels: Vec<bool>,
     /// Cycles of this period in which each output pin was 1.
     high: Vec<u64>,
-    /// Sum of the levels behind each input of the plant over the cycles of this period.
-    sums: Vec<f64>,
     seed: u32,
     /// The next tick is the plant's time 0.
     is_armed: bool,
@@ -439,7 +437,6 @@ impl AtPins {
             interface,
             references,
             motion,
-            sums: vec![0.0; at.len()],
             drives: at,
             devices,
             pins,
@@ -530,9 +527,6 @@ impl AtPins {
                 self.sim.cycles - u64::from(cycles)
             );
         }
-        for (sum, state) in self.sums.iter_mut().zip(states) {
-            *sum += state.map_or(0.0, BridgeState::level) * f64::from(cycles);
-        }
         if let Motion::Switched(plant) = &mut self.motion {
             let time = (self.sim.cycles - self.begun.unwrap_or_default()) as f64 - f64::from(cycles);
             let time = (time + 1e-3) / self.clock;
@@ -566,11 +560,14 @@ impl AtPins {
             }
             self.begun = Some(now);
         } else {
-            let cycles = (now - self.tick).max(1) as f64;
+            let cycles = (now - self.tick).max(1);
             if let Motion::Averaged(plant) = &mut self.motion {
                 let time = ((self.tick - self.begun.unwrap_or_default()) as f64 + 1e-3) / self.clock;
-                let inputs = self.drives.iter().zip(&self.sums).map(|((drive, _), sum)| match drive {
-                    Drive::Mean { actuator, scale, offset } => actuator.port(sum / cycles) * scale + offset,
+                let inputs = self.drives.iter().map(|(drive, pins)| match drive {
+                    Drive::Mean { actuator, scale, offset } => {
+                        let high: Vec<u64> = pins.iter().map(|pin| self.high[*pin]).collect();
+                        actuator.port(actuator.mean(&high, cycles)) * scale + offset
+                    }
                     Drive::Course(course) => course.value(time),
                     Drive::Leg { .. } => 0.0,
                 });
@@ -578,8 +575,7 @@ impl AtPins {
                 let (period, name) = (self.periods, self.interface.name.clone());
                 plant.advance(&inputs).map_err(|text| LoopError::Failed { period, plant: name, text })?;
             }
-            self.sums.fill(0.0);
-            self.finish_row(cycles)?;
+            self.finish_row(cycles as f64)?;
             self.periods += 1;
         }
         self.high.fill(0);
