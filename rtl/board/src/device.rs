@@ -538,7 +538,7 @@ pub enum BridgeState {
     Short,
 }
 
-/// What the pins of a register drive.
+/// Meaning of the levels at a register's pins.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Shape {
     /// Half bridge with a period of so many cycles; the pins are those of the upper switch and, if there is one, of the lower one, and

@@ -59,7 +59,7 @@ pub enum Edge {
     Both,
 }
 
-/// What ends a run before its time.
+/// Conditions that end a run before its time.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Watched {
     /// Output pins, as numbers of [`Simulation::outputs`], each with its edges.
@@ -68,7 +68,7 @@ pub struct Watched {
     pub tick: bool,
 }
 
-/// How a run ended.
+/// End of a run: its length, and the conditions that were met.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Stop {
     /// Cycles that were run. Output pins have their new levels from the cycle after them on.

@@ -182,7 +182,7 @@ impl<'a> PlantAtPins<'a> {
     }
 }
 
-/// What drives an input of the plant.
+/// Finds the drive of an input of the plant.
 fn drive(
     file: &PlantFile,
     signal: &str,
@@ -230,7 +230,7 @@ fn drive(
     Ok(Drive::Leg { actuator, is_mirrored })
 }
 
-/// The device behind a sensor, and its peripheral's name.
+/// Finds the device behind a sensor, and its peripheral's name.
 fn measurement<'w>(
     file: &PlantFile,
     signal: &str,
@@ -350,7 +350,7 @@ pub(super) struct AtPins {
     open: Option<(Vec<String>, Vec<String>)>,
     rows: Rows,
     periods: u64,
-    /// Why the loop cannot go on.
+    /// Reason why the loop cannot go on.
     failed: Option<anyhow::Error>,
 }
 
@@ -552,7 +552,7 @@ impl AtPins {
         Ok(())
     }
 
-    /// A tick has come, or its time without one: the period before it ends.
+    /// Ends a period, and begins the next one: at a tick, or at its time without one.
     fn ticked(&mut self, now: u64) -> Result<()> {
         if self.begun.is_none() {
             if !self.is_armed {
@@ -615,7 +615,7 @@ impl AtPins {
         Ok(())
     }
 
-    /// All rows are there.
+    /// The table has all of its rows.
     fn is_over(&self) -> bool {
         self.rows.most.is_some_and(|most| self.rows.written >= most)
     }

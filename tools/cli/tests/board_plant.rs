@@ -1,0 +1,259 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Plants at the pins of a simulated board: closed loops beside those of `takt run --plant`, trips and broken cables, mistakes in files.
+#![cfg(unix)]
+
+use crate::common::{Folder, RunOutput};
+use std::process::{Command, Stdio};
+
+fn example(name: &str) -> String {
+    format!("{}/../../programs/examples/board/{name}", env!("CARGO_MANIFEST_DIR"))
+}
+
+fn text(name: &str) -> String {
+    std::fs::read_to_string(example(name)).unwrap()
+}
+
+/// Runs a simulation; Verilator needs more memory than the limit of other tests allows.
+fn sim(folder: &Folder, line: &str) -> RunOutput {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_takt"));
+    command.args(["board", "sim"]).args(line.split_whitespace()).current_dir(folder.path());
+    command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    RunOutput::from(command.spawn().unwrap().wait_with_output().unwrap())
+}
+
+/// Columns of a table, by name.
+struct Table(Vec<String>, Vec<Vec<f64>>);
+
+impl Table {
+    fn of(folder: &Folder, name: &str) -> Table {
+        let text = folder.read_text(name);
+        let mut lines = text.lines();
+        let titles = lines.next().unwrap().split(',').map(str::to_owned).collect();
+        let number = |field: &str| field.parse().unwrap_or(f64::NAN);
+        Table(titles, lines.map(|line| line.split(',').map(number).collect()).collect())
+    }
+
+    fn column(&self, name: &str) -> Vec<f64> {
+        let at =
+            self.0.iter().position(|title| title == name).unwrap_or_else(|| panic!("{name}: {:?}", self.0));
+        self.1.iter().map(|row| row[at]).collect()
+    }
+}
+
+/// Largest difference of a column in two tables.
+fn difference(a: &Table, b: &Table, name: &str) -> f64 {
+    let (a, b) = (a.column(name), b.column(name));
+    assert_eq!(a.len(), b.len());
+    a.iter().zip(&b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+}
+
+/// Motor, inverter, converters, encoder and comparator of the example: steps of the current, a trip.
+#[test]
+fn a_motor_at_pins_moves_as_without_them() {
+    let folder = Folder::new();
+    folder.write("drive.s", text("drive.s"));
+    folder.write("wiring.toml", text("drive.toml"));
+    folder.write("motor.toml", text("plant/drive.toml"));
+    let target = "--wiring wiring.toml --program drive.s";
+    let done = sim(
+        &folder,
+        &format!("{target} --plant motor.toml --periods 160 --outputs pins.csv --plot pins.svg"),
+    );
+    assert_eq!(done.status, Some(0), "{done:?}");
+    assert!(!done.stderr.contains("safe"), "{done:?}");
+    assert!(done.stderr.contains("160 periods of `pmsm_switched` at the pins"), "{done:?}");
+    folder.line("run drive.s --plant motor.toml --periods 160 --outputs alone.csv").ok();
+    let (pins, alone) = (Table::of(&folder, "pins.csv"), Table::of(&folder, "alone.csv"));
+    // Dead time and duties in whole cycles, samples some cycles after the valley: 1 % of the current's steps, a step of a converter or two.
+    for (column, most) in [
+        ("pmsm_switched.iq", 0.1),
+        ("pmsm_switched.id", 0.05),
+        ("pmsm_switched.w", 0.02),
+        ("ca", 12.0),
+        ("cb", 12.0),
+        ("n", 1.0),
+        ("iq_ref", 0.0),
+    ] {
+        let found = difference(&pins, &alone, column);
+        assert!(found <= most, "{column}: {found}");
+    }
+    assert!(pins.column("pmsm_switched.iq").iter().any(|current| *current > 4.9));
+    // Half bridges: what is neither high nor low is twice the dead time of 30 cycles in 3000.
+    let (high, low) = (pins.column("bridge.high_a"), pins.column("bridge.low_a"));
+    assert!(high[50..].iter().zip(&low[50..]).all(|(high, low)| (1.0 - high - low - 0.02).abs() < 1e-3));
+    assert!(folder.read_text("pins.svg").contains("pmsm_switched.iq"));
+
+    // A lower comparator: the trip brakes the motor by its windings, and the program sees it.
+    folder.write("trip.toml", text("plant/drive.toml").replace("above = 15", "above = 3"));
+    let done = sim(&folder, &format!("{target} --plant trip.toml --periods 60 --outputs trip.csv"));
+    assert!(done.status == Some(0) && done.stderr.contains("the trip `overcurrent` is held"), "{done:?}");
+    let trip = Table::of(&folder, "trip.csv");
+    let (state, current) = (trip.column("tripped"), trip.column("pmsm_switched.iq"));
+    let at = state.iter().position(|state| *state != 0.0).expect("a trip");
+    assert!((20..40).contains(&at), "{at}");
+    assert!(current.iter().all(|current| *current < 3.6) && current[59].abs() < 0.2, "{current:?}");
+    assert!(trip.column("bridge.low_b")[at + 2..].iter().all(|part| *part == 1.0));
+}
+
+const WIRING: &str = r#"board = "ulx3s-85f"
+clock = 60
+baud = 1_000_000
+
+[carrier.main]
+half = 1500
+tick = "valley"
+after = 8
+
+[peripheral.bridge]
+kind = "pwm3"
+carrier = "main"
+pins = { high_a = "gp0", low_a = "gn0", high_b = "gp1", low_b = "gn1", high_c = "gp2", low_c = "gn2" }
+dead = 30
+minimum = 30
+ports = { a = "da", b = "db" }
+scale = { a = 2048, b = 2048 }
+
+[peripheral.current]
+kind = "sinc3"
+pins = { data = "gp3", clock = "gn3" }
+rate = 10
+osr = 50
+centre = "main.valley"
+ports = { value = "ci" }
+
+[peripheral.angle]
+kind = "biss-c"
+pins = { ma = "gp7", slo = "gn7" }
+rate = 10
+bits = 18
+wait = 24
+timeout = 600
+starts = "main.valley"
+ports = { position = "n", frames = "seen", errors = "wrong" }
+
+[peripheral.clock]
+kind = "step"
+pins = { step = "gp8", direction = "gn8" }
+ports = { count = "steps" }
+"#;
+
+const PROGRAM: &str = "\
+.schedule on
+.const  T    = 50e-6                    ; s
+.const  FULL = 3000.0/2048
+.input  ci:int, n:int, seen:int, wrong:int, steps:int
+.input  i_ref
+.output da, db, other:int
+.state  s
+.once
+        mov     s, zero
+        mov     da, 0.5*FULL
+        mov     db, 0.5*FULL
+        mov     other, zero
+        wait    period
+.period
+period:
+.reg    e u
+        e = i_ref - itof(ci)*(25.0/125000)
+        u = max(min(e*3 + s, 20), -20)
+        s = max(min(s + e*0.15, 20), -20)
+        da = u*(0.5*FULL/24) + 0.5*FULL
+        db = u*(-0.5*FULL/24) + 0.5*FULL
+        other = n + seen + wrong + steps
+        wait    period
+";
+
+const PLANT: &str = r#"model = "dc_motor_switched"
+
+[ports]
+da = { port = "da", scale = 0.6826666666666666 }
+db = { port = "db", scale = 0.6826666666666666 }
+i = { port = "ci", scale = 5000 }
+angle = { port = "n", scale = 41721.513401802 }
+
+[inputs]
+i_ref = [[0, 2], [0.002, 4]]
+"#;
+
+fn direct() -> Folder {
+    let folder = Folder::new();
+    folder.write("wiring.toml", WIRING);
+    folder.write("loop.s", PROGRAM);
+    folder.write("motor.toml", PLANT);
+    folder
+}
+
+const TARGET: &str = "--wiring wiring.toml --program loop.s --machine t1";
+
+/// A delta-sigma modulator and a BiSS C encoder; then the encoder's line, with noise and without its cable.
+#[test]
+fn modulators_and_encoders_close_a_loop() {
+    let folder = direct();
+    folder.write("noise.toml", format!("{PLANT}\n[pins]\nangle = [[0.001, \"noise\"], [0.003, 0]]\n"));
+    let done = sim(&folder, &format!("{TARGET} --plant noise.toml --periods 100 --outputs pins.csv"));
+    assert_eq!(done.status, Some(0), "{done:?}");
+    folder.write("alone.toml", format!("{PLANT}seen = 0\nwrong = 0\nsteps = 0\n"));
+    folder.line("run loop.s --machine t1 --plant alone.toml --periods 100 --outputs alone.csv").ok();
+    let (pins, alone) = (Table::of(&folder, "pins.csv"), Table::of(&folder, "alone.csv"));
+    // The filter's window sees the ripple that the valley hides, and the first period comes a duty later.
+    let found = difference(&pins, &alone, "dc_motor_switched.i");
+    assert!(found < 0.3, "{found}");
+    let current = pins.column("dc_motor_switched.i");
+    assert!((current[39] - 2.0).abs() < 0.06 && (current[99] - 4.0).abs() < 0.1, "{current:?}");
+    // In 20 periods each frame comes; with noise most have a wrong CRC, without the line none comes.
+    let (frames, wrong) = (pins.column("seen"), pins.column("wrong"));
+    assert_eq!((frames[19] - frames[0], wrong[19]), (19.0, 0.0));
+    assert!(wrong[60] - wrong[20] > 20.0 && frames[60] - frames[20] < 20.0, "{frames:?}, {wrong:?}");
+    assert_eq!((frames[99], wrong[99]), (frames[62], wrong[62]));
+}
+
+#[test]
+fn mistakes_are_found_before_the_circuit_is_compiled() {
+    let folder = direct();
+    let says = |from: &str, to: &str, text: &str| {
+        assert!(PLANT.contains(from), "{from}");
+        folder.write("wrong.toml", PLANT.replace(from, to));
+        let done = sim(&folder, &format!("{TARGET} --plant wrong.toml --periods 3"));
+        assert!(done.status == Some(1) || done.status == Some(2), "{done:?}");
+        // A message is folded to the terminal's width, and has the place on a line of its own.
+        let shown = done.stderr.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(shown.contains(text) && !shown.contains("compiling"), "{text}: {}", done.stderr);
+    };
+    says(
+        "scale = 0.6826666666666666 }\ndb",
+        "scale = 1 }\ndb",
+        "write `da = { port = \"da\", scale = 0.6826667, offset = 0 }`",
+    );
+    says("da = { port = \"da\"", "da = { port = \"other\"", "`other`, which no peripheral of the wiring has");
+    says("port = \"ci\"", "port = \"i_ref\"", "which is no register of a peripheral");
+    says("port = \"n\"", "port = \"steps\"", "of the kind `step`, which has no device");
+    says("port = \"n\"", "port = \"seen\"", "a signal feeds `position`");
+    says("scale = 5000", "scale = 5000, offset = 200000", "its register `value` has -125000 to 125000");
+    says(
+        "scale = 5000",
+        "scale = 5000, limits = [-2e5, 2e5]",
+        "are beyond the register `value` of `current`",
+    );
+    says("i_ref = [[0, 2], [0.002, 4]]", "", "the input port `i_ref` has no source");
+    let pins = |line: &str, text: &str| says("[inputs]", &format!("[pins]\n{line}\n[inputs]"), text);
+    pins("angel = 1", "no input pin `angel`; did you mean `angle`?");
+    pins("\"bridge.high_a\" = 1", "`bridge.high_a` is an output pin");
+    pins("clock = 1", "no input pin `clock`");
+    pins(
+        "\"clock.step\" = { signals = [\"j\"], above = 1 }",
+        "the plant `dc_motor_switched` has no sensor `j`; did you mean `i`?",
+    );
+    for (more, text) in [
+        ("--plant motor.toml --axis a,b,1", "cannot be used with"),
+        ("--plant motor.toml --robot", "cannot be used with"),
+        ("--plant motor.toml --inputs in.csv", "cannot be used with"),
+        ("--periods 3", "--plant"),
+        ("--plant motor.toml --set angle=1", "no input pin `angle`"),
+        ("--plant motor.toml --connect x=n", "has no signal `x`"),
+        ("--plant none.toml", "none.toml"),
+    ] {
+        let done = sim(&folder, &format!("{TARGET} {more}"));
+        assert!(done.status != Some(0) && done.stderr.contains(text), "{more}: {done:?}");
+        assert!(!done.stderr.contains("compiling"), "{more}: {done:?}");
+    }
+}
