@@ -634,7 +634,8 @@ impl AtPins {
             let gives = device.act(now, &needed, sensor.value(&signals));
             let given: Vec<(usize, bool)> =
                 driven.iter().copied().zip(device.levels().iter().copied()).collect();
-            let anew = gives || !*is_serial;
+            // Between frames no edge comes, and noise goes on.
+            let anew = gives || !*is_serial || !stop.edges.contains(&true);
             for (place, level) in given {
                 let flips = if anew { self.is_flip() } else { self.pins[place].is_flipped };
                 (self.pins[place].level, self.pins[place].is_flipped) = (level, flips);
