@@ -778,7 +778,7 @@ pub(super) fn run(
     let AtPins { rows, failed, sim, .. } = &mut host.line;
     let (written, cycles) = (rows.written, sim.cycles);
     let result = failed.take().map_or(ran, Err);
-    let finished = rows.outputs.take().filter(|_| written > 0).map_or(Ok(()), Out::finish);
+    let finished = rows.outputs.take().filter(|_| written > 0 || result.is_ok()).map_or(Ok(()), Out::finish);
     if let (Some(path), Some(curves)) = (run.plot, rows.curves.take().filter(|curves| !curves.is_empty())) {
         crate::terminal::files::write(path, curves.draw(&run.title)?.as_bytes())?;
     }
