@@ -64,13 +64,13 @@ fn a_motor_at_pins_moves_as_without_them() {
     assert!(done.stderr.contains("160 periods of `pmsm_switched` at the pins"), "{done:?}");
     folder.line("run drive.s --plant motor.toml --periods 160 --outputs alone.csv").ok();
     let (pins, alone) = (Table::of(&folder, "pins.csv"), Table::of(&folder, "alone.csv"));
-    // Dead time and duties in whole cycles, samples some cycles after the valley: 1 % of the current's steps, a step of a converter or two.
+    // Dead time and duties in whole cycles, samples a cycle after the valley: 0.4 % of the current, a step of converters or two.
     for (column, most) in [
-        ("pmsm_switched.iq", 0.1),
-        ("pmsm_switched.id", 0.05),
-        ("pmsm_switched.w", 0.02),
-        ("ca", 12.0),
-        ("cb", 12.0),
+        ("pmsm_switched.iq", 0.02),
+        ("pmsm_switched.id", 0.02),
+        ("pmsm_switched.w", 0.01),
+        ("ca", 2.0),
+        ("cb", 2.0),
         ("n", 1.0),
         ("iq_ref", 0.0),
     ] {
