@@ -12,7 +12,10 @@ use takt_front::c::{self, Source, Translation};
 fn controller(lines: usize) -> String {
     let axes = lines.saturating_sub(12) / 24;
     let mut text = String::from("struct axis { float b[3], z[2], sum, limit; };\n");
-    let _ = writeln!(text, "static struct axis axes[{axes}];\nstatic const float gains[4] = {{0.5f, 0.25f, 0.125f, 2.0f}};");
+    let _ = writeln!(
+        text,
+        "static struct axis axes[{axes}];\nstatic const float gains[4] = {{0.5f, 0.25f, 0.125f, 2.0f}};"
+    );
     for axis in 0..axes {
         let _ = write!(
             text,
@@ -58,22 +61,27 @@ fn translated(text: &str) -> Translation {
         loop_bound: None,
         double_is_float: false,
     };
-    c::translate(&[Source { name: "axes.c".to_owned(), text: text.to_owned() }], &options).expect("the C is well formed")
+    c::translate(&[Source { name: "axes.c".to_owned(), text: text.to_owned() }], &options)
+        .expect("the C is well formed")
 }
 
 fn main() {
     let mut criterion = Criterion::default().configure_from_args();
     let mut group = FastestTimes::new(&mut criterion, "translator");
     let mut rows = Vec::new();
-    for lines in [250, 2_000, 16_000] {
+    for lines in [250, 1_000, 2_000] {
         let text = controller(lines);
         let lines = text.lines().count();
-        let seconds = group.seconds(&format!("{lines} lines of C"), lines as u64, || translated(&text).text.len());
+        let seconds =
+            group.seconds(&format!("{lines} lines of C"), lines as u64, || translated(&text).text.len());
         let program = translated(&text).text;
         let loader = MemoryLoader::of("axes.s", program);
         let options = Options { machine: &DEEP, ..Options::default() };
         let start = std::time::Instant::now();
-        let bundles = takt_asm::assemble("axes.s", &loader, &options).expect("the program is well formed").program.bundles();
+        let assembled = takt_asm::assemble("axes.s", &loader, &options);
+        let bundles = assembled
+            .map(|assembled| assembled.program.bundles())
+            .unwrap_or_else(|mistakes| panic!("{}", mistakes.render(false)));
         rows.push((lines, seconds, bundles, start.elapsed().as_secs_f64()));
     }
     let shortest = rows[0].1 / rows[0].0 as f64;
