@@ -205,6 +205,18 @@ impl Scopes {
         self.globals.get(name.0 as usize).copied().unwrap_or(Binding::None)
     }
 
+    /// The name is the index of a `.for` loop of which this scope is an iteration that is written out.
+    pub(crate) fn is_loop_index(&self, mut scope: ScopeId, name: NameId) -> bool {
+        while scope != ScopeId::ROOT {
+            let here = self.scope(scope);
+            if matches!(here.kind, ScopeKind::Rep(variable, _) if variable == name) {
+                return here.labels == scope;
+            }
+            scope = here.parent;
+        }
+        false
+    }
+
     /// The binding of a name by an expansion, or by the enclosing expansions.
     fn expanded(&self, mut scope: ScopeId, name: NameId) -> Option<Binding> {
         while scope != ScopeId::ROOT {

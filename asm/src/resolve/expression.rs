@@ -81,6 +81,11 @@ impl Computation<'_> {
         (self.node(index).span, ExprId { first: self.id.first + first, count: index - first + 1 })
     }
 
+    /// Nodes of the part that ends at a node.
+    fn part(&self, index: u32) -> &[Node] {
+        &self.ast.nodes[self.place(index).1.range()]
+    }
+
     /// A constant as the term of the part that ends at a node.
     fn constant(&self, value: Value, index: u32) -> Term {
         let (span, id) = self.place(index);
@@ -330,7 +335,10 @@ impl Resolver<'_> {
             NodeKind::Infix(operator) => {
                 let terms = run.take(2);
                 match (terms[0].value(), terms[1].value()) {
-                    (Some(a), Some(b)) => expr::infix(operator, a, b),
+                    (Some(a), Some(b)) => {
+                        self.same_at_run_time(at, operator, (a, b), run.part(index), span)?;
+                        expr::infix(operator, a, b)
+                    }
                     _ => return self.operator_term(at, line, operator, &terms, here),
                 }
             }

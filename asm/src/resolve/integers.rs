@@ -12,7 +12,7 @@ use crate::resolve::term::{CurrentEquation, LineExpression, Term, TermForm};
 use takt_diagnostics::diag::Diagnostic;
 use takt_diagnostics::source::Span;
 use takt_isa::Type;
-use takt_syntax::ast::Operator;
+use takt_syntax::ast::{Node, NodeKind, Operator};
 use takt_syntax::expr::{EvalError, Fault, Value};
 
 /// A part of a factor: the exponent of a power of two, and whether it is subtracted.
@@ -171,12 +171,50 @@ impl Resolver<'_> {
         Ok(term(quotient))
     }
 
+    /// Rejects a remainder that the index of a loop decides, in an iteration that is written out, if the machine would find another one: the
+    /// same line must not mean two things.
+    pub(super) fn same_at_run_time(
+        &mut self,
+        at: AstPlace,
+        operator: Operator,
+        operands: (Value, Value),
+        nodes: &[Node],
+        span: Span,
+    ) -> Result<(), ErrorReported> {
+        let (Operator::Rem, (Value::Int(a), Value::Int(b))) = (operator, operands) else { return Ok(()) };
+        if a.checked_rem(b).is_none_or(|rest| rest == 0 || (rest < 0) == (b < 0)) {
+            return Ok(());
+        }
+        let mut names = nodes.iter().filter_map(|node| match node.kind {
+            NodeKind::Name(name) => name.resolve().ok(),
+            _ => None,
+        });
+        let Some(index) = names.find(|name| self.context.scopes.is_loop_index(at.scope, *name)) else {
+            return Ok(());
+        };
+        let index = self.context.scopes.text(index).to_owned();
+        let message = format!(
+            "`%` of a negative number, in an iteration of the loop over `{index}` that is written out"
+        );
+        let truncated = a.wrapping_rem(b);
+        let error = Diagnostic::error("equation", span, message)
+            .note(format!(
+                "{a} % {b} is {truncated} where the program computes it, and {} where the assembler does",
+                truncated + b
+            ))
+            .help(format!("add a multiple of {b} to the dividend, so that it is never negative"));
+        Err(self.context.report(at.scope, error))
+    }
+
     fn no_product(&mut self, at: AstPlace, terms: &[Term], span: Span) -> ErrorReported {
         let text = |term: &Term| self.context.reports.sources.text(term.span).to_owned();
         let (a, b) = (text(&terms[0]), text(&terms[1]));
         let floats = format!("ftoi(itof({a})*itof({b}))");
         let error = Diagnostic::error("equation", span, "a product of two integers: the machine has none")
             .note("of an integer and a constant, `*` is shifts and sums")
+            .note(format!(
+                "`product({a}, {b})` of `<c.s>` computes it modulo 2^32, in parts that are exact as floats"
+            ))
             .mend(format!("compute it in floats, which is exact up to 2^24: `{floats}`"), floats);
         self.context.report(at.scope, error)
     }
@@ -188,6 +226,7 @@ impl Resolver<'_> {
             Some(_) => text.to_owned(),
             None => format!("itof({text})"),
         };
+        let quotient = format!("`quotient({a}, {b})` of `<c.s>`, truncated");
         let (a, b) = (as_float(&terms[0], &a), as_float(&terms[1], &b));
         let message = format!("`{}` of integers needs a constant power of two on its right", operator.text());
         let help = match operator {
@@ -196,7 +235,9 @@ impl Resolver<'_> {
                 "`{a}/{b}` is the quotient as a float; `ftoi` rounds it, and `trunc` of `<math.s>` cuts it off"
             ),
         };
-        self.context.report(at.scope, Diagnostic::error("equation", span, message).help(help))
+        let exact =
+            format!("of any integers: {quotient}; the rest is what its product with the divisor leaves");
+        self.context.report(at.scope, Diagnostic::error("equation", span, message).note(exact).help(help))
     }
 }
 

@@ -60,6 +60,10 @@ period:
         y = sum(i, 1, 4, V[i+1])
         y = period + x                  ; a code label
         fadd    y, P[1,4], x            ; in an instruction, too
+.reg    rest:int
+        .for    i, -3, -1 unroll 2
+        rest = i % 4
+        .endfor
         wait    period
 .macro  later d, of
         d = of

@@ -278,6 +278,15 @@ impl Nodes {
         }
     }
 
+    /// The value depends on counters of loops that remain, and on nothing else that the program computes.
+    pub(super) fn is_counted(&self, id: Id) -> bool {
+        match self.node(id) {
+            Node::Index(_) | Node::Int(_) => true,
+            Node::Op(..) => self.operands(id).into_iter().all(|operand| self.is_counted(operand)),
+            _ => false,
+        }
+    }
+
     /// A mark for [`Nodes::forget`].
     pub(super) fn mark(&self) -> usize {
         self.log.len()

@@ -173,6 +173,31 @@ impl Exec<'_> {
                     _ => self.op(Op::And, &[a, mask]),
                 };
             }
+            (Some(by), _) if by > 1 && self.nodes.range(a).0 >= 0 => {
+                let shift = self.nodes.int(by.trailing_zeros() as i32);
+                let mask = self.nodes.int((by - 1) as i32);
+                return match operator {
+                    B::Divide => self.op(Op::ShiftRight, &[a, shift]),
+                    _ => self.op(Op::And, &[a, mask]),
+                };
+            }
+            // Where a loop's iteration is written out, the language's quotient of counters is a real number, and its remainder is that of
+            // the divisor's sign.
+            (Some(by), _) if by.unsigned_abs() > 1 && self.nodes.is_counted(a) => {
+                let shift = self.nodes.int(by.trailing_zeros() as i32);
+                let mask = self.nodes.int((by.unsigned_abs() - 1) as i32);
+                let end = self.nodes.int(31);
+                let sign = self.op(Op::ShiftRight, &[a, end])?;
+                let bias = self.op(Op::And, &[sign, mask])?;
+                let biased = self.op(Op::IntAdd, &[a, bias])?;
+                if *operator == B::Modulo {
+                    let low = self.op(Op::And, &[biased, mask])?;
+                    return self.op(Op::IntSub, &[low, bias]);
+                }
+                let quotient = self.op(Op::ShiftRight, &[biased, shift])?;
+                let zero = self.nodes.int(0);
+                return if by < 0 { self.op(Op::IntSub, &[zero, quotient]) } else { Ok(quotient) };
+            }
             (Some(by), _) => {
                 let divisor = self.nodes.int(by.unsigned_abs() as i32);
                 return match operator {
