@@ -339,6 +339,7 @@ impl CheckedProgram {
         let allocation = allocate::allocate(&ir, &runs, why.as_deref(), &mut sink);
         let mut emitted = emit::emit(&mut ir, &allocation, &mut sink);
         emitted.program.parts = names::parts(&sources, &emitted);
+        output::origins::add(&sources, &mut emitted.program);
         let names = names::names(&mut context, &ir, &allocation, &mut emitted);
         let report = sink.finish(Arc::clone(&sources));
         if report.has_errors() {

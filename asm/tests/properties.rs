@@ -312,6 +312,7 @@ prop_compose! {
             files: files.clone(),
             lines,
             parts: Vec::new(),
+            origins: Vec::new(),
         }
     }
 }

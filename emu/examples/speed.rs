@@ -136,6 +136,7 @@ fn period() -> Program {
         assumptions: Vec::new(),
         loop_bounds: Vec::new(),
         parts: Vec::new(),
+        origins: Vec::new(),
         parameters: Vec::new(),
         latched: false,
         sections: Vec::new(),

@@ -310,6 +310,7 @@ impl Generator {
             results: Vec::new(),
             assumptions: Vec::new(),
             parts: Vec::new(),
+            origins: Vec::new(),
             parameters: Vec::new(),
             latched: false,
             sections: vec![section("once", 0, period), section("period", period, end)],

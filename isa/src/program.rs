@@ -51,6 +51,8 @@ pub struct Program {
     pub lines: Vec<Option<Location>>,
     /// Words that compute a part of an equation: index into `code`, ascending, and the columns of the part in its line.
     pub parts: Vec<(u32, Columns)>,
+    /// Lines that another language's were translated into, as C's by `takt cc`, by ascending location, each with the place there.
+    pub origins: Vec<(Location, Location)>,
 }
 
 /// Cycle counts of a section, for the host.
@@ -296,7 +298,7 @@ fn mistake(ty: Type, bits: [u32; 2]) -> Option<&'static str> {
 }
 
 /// A place in a source.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Location {
     /// Index of the file in [`Program::files`].
     pub file: u32,
@@ -480,10 +482,22 @@ impl Program {
         self.locations(address).iter().copied().flatten().next()
     }
 
-    /// `file:line` of a location.
+    /// `file:line` of a location; of a line that was translated from another language, both: `speed.c:43 → speed.s:31`.
     pub fn place_text(&self, location: Location) -> String {
-        let file = self.files.get(location.file as usize).map_or("?", String::as_str);
-        format!("{file}:{}", location.line)
+        let text = self.line_text(location);
+        self.origin(location)
+            .map_or_else(|| text.clone(), |from| format!("{} → {text}", self.line_text(from)))
+    }
+
+    fn line_text(&self, Location { file, line }: Location) -> String {
+        let file = self.files.get(file as usize).map_or("?", String::as_str);
+        format!("{file}:{line}")
+    }
+
+    /// Line of another language from which a line was translated.
+    pub fn origin(&self, location: Location) -> Option<Location> {
+        let found = self.origins.binary_search_by_key(&location, |(line, _)| *line);
+        found.ok().map(|index| self.origins[index].1)
     }
 
     /// Columns of the part of an equation that a word computes.

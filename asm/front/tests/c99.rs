@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! C through `takt cc` on t1, t3, t4 against gcc, construct by construct, bit for bit; and the messages about refused programs.
 
-use crate::common::gcc::{Program, emulated, folder, matches_gcc, translated};
+use crate::common::gcc::{Program, assembled, emulated, folder, matches_gcc, translated};
 use rand_pcg::Pcg32;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 use takt_isa::T3;
@@ -549,6 +549,44 @@ float step(const float x[40], int n) {
 }
 
 /// More results than ports: the largest array stays in data memory.
+#[test]
+fn operations_name_their_lines_of_c() {
+    let code = "float step(float x, float y) {\n  float s = x*y;\n  s = s +\n    x/y;\n  return s; }\n";
+    let translation = check("operations_name_their_lines_of_c", code);
+    let program = assembled(&translation, &takt_isa::T3).expect("it is well formed").program;
+    let place = |mnemonic: &str| {
+        let is_it = |word: &usize| {
+            let slots = program.machine.slots.len();
+            let address = takt_isa::BundleAddress::new((word / slots) as u32);
+            let bundle = program.bundle(address).and_then(Result::ok);
+            bundle.is_some_and(|bundle| bundle[word % slots].op.row().mnemonic == mnemonic)
+        };
+        let word = (0..program.code.len()).find(is_it).unwrap_or_else(|| panic!("no {mnemonic}"));
+        program.word_text(word).split(" → ").next().unwrap_or_default().to_owned()
+    };
+    let name = "operations_name_their_lines_of_c.c";
+    assert_eq!([place("fmul"), place("fdiv")], [format!("{name}:2"), format!("{name}:3")]);
+}
+
+/// Iterations that are left over when a loop is unrolled are written out, with numbers in place of the counter.
+#[test]
+fn divides_counters() {
+    let translation = check(
+        "divides_counters",
+        r#"static float t[64];
+static int n[128];
+float step(float x, int k) {
+  t[k & 63] += x;
+  for (int i = 701; i > 0; i--) t[(i / 4) & 63] += x*t[i % 4 + 1];
+  for (int i = -701; i < 700; i++) n[i & 127] += i / 4 + (i % 4)*k + i / -8;
+  float s = 0;
+  for (int i = 0; i < 83; i++) s += n[i]*t[i / 2];
+  return s; }
+"#,
+    );
+    assert!(translation.text.contains("unroll"), "{}", translation.text);
+}
+
 #[test]
 fn keeps_many_results_in_memory() {
     let translation = check(

@@ -87,6 +87,7 @@ pub(crate) fn emit(ir: &mut Ir, allocation: &Allocation, sink: &mut Sink) -> Emi
         lines,
         // Columns of equations are added where the sources are at hand.
         parts: columns,
+        origins: Vec::new(),
     };
     distinguish(&mut program);
     EmittedProgram { program, expanded, origins, parts }

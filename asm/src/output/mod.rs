@@ -6,3 +6,4 @@ pub mod format;
 pub mod image;
 pub mod listing;
 pub mod names;
+pub(crate) mod origins;

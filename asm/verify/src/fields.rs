@@ -74,6 +74,7 @@ pub(crate) fn compare(program: &Program, plain: &PlainProgram) -> Result<Layout,
         files: _,
         lines: _,
         parts: _,
+        origins: _,
     } = program;
     if *machine != plain.machine {
         let (image, source) = (machine.name, plain.machine.name);

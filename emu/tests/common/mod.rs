@@ -34,6 +34,7 @@ pub(crate) fn program(machine: &'static Machine, source: &str) -> Program {
         results: Vec::new(),
         assumptions: Vec::new(),
         parts: Vec::new(),
+        origins: Vec::new(),
         parameters: Vec::new(),
         latched: false,
         sections: Vec::new(),

@@ -92,6 +92,19 @@ pub(crate) fn translated_text(program: &Program, source: Source) -> Result<Trans
     })
 }
 
+/// The program for a machine, or the assembler's messages.
+pub(crate) fn assembled(
+    translation: &Translation,
+    machine: &'static Machine,
+) -> Result<takt_asm::AssembledProgram, String> {
+    let loader = Search::new(MemoryLoader::default()).library(takt_programs::LIBRARY);
+    let machine = machine.holding(16_384, 8_192).expect("memories");
+    let options = Assembling { machine, effort: 0, ..Assembling::default() };
+    let text = translation.text.clone().into_bytes();
+    let assembled = takt_asm::assemble_bytes("c.s", text, &loader, &options);
+    assembled.map_err(|errors| errors.render(false))
+}
+
 /// Words of all outputs in every period.
 pub(crate) fn emulated(
     program: &Program,
@@ -110,12 +123,7 @@ pub(crate) fn run(
     machine: &'static Machine,
     inputs: &[Vec<u32>],
 ) -> Result<Vec<Vec<u32>>, String> {
-    let loader = Search::new(MemoryLoader::default()).library(takt_programs::LIBRARY);
-    let machine = machine.holding(16_384, 8_192).expect("memories");
-    let options = Assembling { machine, effort: 0, ..Assembling::default() };
-    let text = translation.text.clone().into_bytes();
-    let assembled = takt_asm::assemble_bytes("c.s", text, &loader, &options);
-    let assembled = assembled.map_err(|errors| errors.render(false))?;
+    let assembled = assembled(translation, machine)?;
     let mut emulator = Emulator::new(&assembled.program).expect("it fits");
     let mut rows = Vec::new();
     for row in inputs {

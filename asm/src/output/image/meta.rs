@@ -47,6 +47,8 @@ pub(super) struct Meta {
     /// Parts of equations: index of the word that computes it, first and last column. Left out if empty.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     parts: Vec<(u32, u32, u32)>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    origins: Vec<(u32, u32, u32, u32)>,
 }
 
 /// Version, read first: metadata of another version may differ in everything else.
@@ -203,6 +205,11 @@ impl Meta {
                 .map(|line| line.map(|Location { file, line }| (file, line)))
                 .collect(),
             parts: program.parts.iter().map(|(word, part)| (*word, part.first, part.last)).collect(),
+            origins: program
+                .origins
+                .iter()
+                .map(|(at, from)| (at.file, at.line, from.file, from.line))
+                .collect(),
         }
     }
 
@@ -293,6 +300,13 @@ impl Meta {
                 .parts
                 .into_iter()
                 .map(|(word, first, last)| (word, Columns { first, last }))
+                .collect(),
+            origins: self
+                .origins
+                .into_iter()
+                .map(|(file, line, of, number)| {
+                    (Location { file, line }, Location { file: of, line: number })
+                })
                 .collect(),
         })
     }

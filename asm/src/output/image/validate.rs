@@ -295,7 +295,8 @@ fn lines(program: &Program) -> Result<(), ImageError> {
     if program.lines.len() != program.code.len() {
         return wrong(format!("{} for {} words", program.lines.len(), program.code.len()));
     }
-    for location in program.lines.iter().flatten() {
+    let origins = program.origins.iter().flat_map(|(at, from)| [at, from]);
+    for location in program.lines.iter().flatten().chain(origins) {
         if location.file as usize >= program.files.len() {
             return wrong(format!(
                 "a location is in file {}, and there are {}",
@@ -306,6 +307,9 @@ fn lines(program: &Program) -> Result<(), ImageError> {
         if location.line == 0 {
             return wrong("a location has line 0, and lines count from 1".to_owned());
         }
+    }
+    if !program.origins.is_sorted_by(|(one, _), (other, _)| one < other) {
+        return wrong("lines from another language are out of order".to_owned());
     }
     let mut next = 0;
     for (word, columns) in &program.parts {

@@ -148,11 +148,16 @@ fn line_bundles(file: &str, line: u64, program: &Program) -> Result<BreakpointLo
     let Some(file) = file else {
         return Err(format!("no such source (sources: {})", names().collect::<Vec<_>>().join(" ")));
     };
+    // A line of another language is where its translation is.
+    let of_file = |location: &Location| {
+        let both = [Some(*location), program.origin(*location)];
+        both.into_iter().flatten().find(|place| place.file as usize == file)
+    };
     let places = || {
-        let places = program.addresses().flat_map(|address| {
-            program.locations(address).iter().flatten().map(move |location| (address, *location))
-        });
-        places.filter(|(_, location)| location.file as usize == file)
+        program.addresses().flat_map(|address| {
+            let places = program.locations(address).iter().flatten().filter_map(of_file);
+            places.map(move |place| (address, place))
+        })
     };
     let mut of_line = places().filter(|(_, place)| u64::from(place.line) == line).peekable();
     if let Some(&(_, place)) = of_line.peek() {
