@@ -18,7 +18,7 @@ use takt_isa::fp::Bitwise;
 
 /// Limit on the operations that one condition is followed back through.
 const MAX_STEPS: u32 = 400;
-/// Rounds over the constraints in which symbols are confined.
+/// Rounds in which constraints confine symbols, and a value its exact value.
 const ROUNDS: usize = 3;
 
 /// The assumptions contradict each other: no run makes these decisions.
@@ -272,10 +272,12 @@ impl Context {
         match (view, row.result_type(), &meaning) {
             // If the word is used as another type, only its sign bit is followed back.
             (_, Type::B, Meaning::Bitwise(..) | Meaning::Choose(_)) => self.back(&meaning, now, &made, view),
-            (View::Float, Type::F, _) => {
+            // Bits that are compared as an integer narrow the float, too.
+            (_, Type::F, _) => {
+                let Some(now) = self.range(node, View::Float) else { return Ok(()) };
                 let size = now.magnitude();
                 let rounding = row.ulp.filter(|ulps| *ulps > 0.0).map_or(0.0, |ulps| 2.0 * ulps * ulp(size));
-                self.back(&meaning, now.widened(rounding), &made, view)
+                self.back(&meaning, now.widened(rounding), &made, View::Float)
             }
             (View::Integer, Type::I, _) => self.back(&meaning, now, &made, view),
             _ => Ok(()),
@@ -499,8 +501,12 @@ fn restricted(value: &Value, to: Interval, view: View) -> Result<Option<Value>, 
             }
             let grid = number.grid.max(float_grid(both));
             let both = on_grid(both, grid).ok_or(Impossible)?;
-            let exact = number.exact.meet(both - number.error_range());
-            Ok(Some(Value::Float(Rc::new(Number { actual: both, exact, grid, ..Number::clone(number) }))))
+            let mut narrower = Number { actual: both, grid, ..Number::clone(number) };
+            // A smaller value has a smaller relative error, so that the exact value is nearer.
+            for _ in 0..ROUNDS {
+                narrower.exact = narrower.exact.meet(both - narrower.error_range());
+            }
+            Ok(Some(Value::Float(Rc::new(narrower))))
         }
         (Value::Integer(number), View::Integer) => {
             let Some(both) = cut(number.actual)? else { return Ok(None) };

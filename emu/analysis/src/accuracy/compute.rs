@@ -161,7 +161,7 @@ impl Explorer<'_> {
     }
 
     /// Symbol for an error whose terms it replaces: attributed to the operation with the largest of these terms.
-    fn symbol_of(&mut self, error: &Affine, word: u32) -> u32 {
+    pub(super) fn symbol_of(&mut self, error: &Affine, word: u32) -> u32 {
         let largest = error.main_symbol().and_then(|symbol| self.symbols[symbol as usize]);
         self.symbol(Some(largest.unwrap_or(word)))
     }

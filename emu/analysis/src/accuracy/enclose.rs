@@ -11,13 +11,13 @@ use super::enclosure::{Enclosure, Hazard, OutputBound, OutputPlace, Relied};
 use super::interval::Interval;
 use super::memory::array_starts;
 use super::node::{Made, Node};
-use super::number::Problem;
+use super::number::{Number, Problem};
 use super::states::{Place, is_shown, is_word_shown};
 use super::value::Value;
 use super::{fixed, preset};
 use crate::error::{BoundError, Refusal, place};
 use crate::graph::{Edge, Graph};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::rc::Rc;
 use takt_isa::program::{ArrayResult, Assumption, Port};
 use takt_isa::{BundleAddress, Effect, Flow, Instruction, Program, Register, SlotIndex, Type};
@@ -85,6 +85,7 @@ fn explored<'p>(
         bundles: 0,
         quiet: 0,
         parts: MAX_PARTS,
+        divided: HashMap::new(),
         nested: 0,
         stored: stored.clone(),
         initial_words: BTreeSet::new(),
@@ -212,6 +213,8 @@ pub(super) struct Explorer<'p> {
     pub(super) quiet: u32,
     /// Number of parts of ranges that may still be evaluated separately.
     pub(super) parts: u32,
+    /// Values of functions that parts of their arguments' ranges gave, by what [`Explorer::in_parts`] knows of the function.
+    pub(super) divided: HashMap<Vec<u64>, Option<Rc<Number>>>,
     /// Number of nested selections whose conditions are assumed.
     pub(super) nested: u32,
     /// Data words that the program may change.

@@ -73,6 +73,12 @@ impl Number {
         }
     }
 
+    /// Number of which nothing is known but ranges.
+    pub(super) fn without_correlations(&self) -> Number {
+        let error = if self.error.is_zero() { self.error.clone() } else { Affine::free(self.error_range()) };
+        Number { form: Affine::free(self.exact), error, ..self.clone() }
+    }
+
     /// The number with the opposite sign.
     pub(super) fn negative(&self) -> Number {
         Number {

@@ -8,6 +8,7 @@ use super::enclose::Explorer;
 use super::interval::Interval;
 use super::node::{Made, Meaning, Node};
 use super::number::{Number, SIGN};
+use super::relative::Relative;
 use super::value::Value;
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::rc::Rc;
@@ -19,6 +20,8 @@ const MAX_NESTED: u32 = 3;
 const MAX_CASES: u32 = 6;
 /// Limit on the divisions of a range.
 const MAX_DIVISIONS: u32 = 128;
+/// Factor by which parts must narrow a value or an error to replace terms that are correlated with other values.
+const WORTH: f64 = 4.0;
 /// Limit on the operations that are evaluated again for the cases of one result.
 const MAX_AGAIN: usize = 1 << 14;
 
@@ -29,6 +32,65 @@ pub(super) struct Scene {
     replaced: BTreeMap<u32, (f64, f64, u32)>,
     /// Nodes by address, each with its replacement under the assumptions.
     nodes: HashMap<*const Node, (Rc<Node>, Rc<Node>)>,
+}
+
+/// Value that depends on one other value and on constants.
+struct Function {
+    argument: Rc<Node>,
+    result: Rc<Node>,
+}
+
+/// Copies of the operations between a value and a result, being made.
+struct Copies {
+    /// Address of the value, and the node that stands for it.
+    argument: (*const Node, Rc<Node>),
+    /// Copies so far by the address of the original, with their numbers in the key.
+    made: HashMap<*const Node, (Rc<Node>, u64)>,
+    key: Vec<u64>,
+}
+
+impl Copies {
+    /// Copy of a node. Its key lists operations in the order of a walk back to the argument, constants, and ranges of floats.
+    fn of(&mut self, node: &Rc<Node>) -> Rc<Node> {
+        if Rc::as_ptr(node) == self.argument.0 {
+            self.key.push(u64::MAX);
+            return Rc::clone(&self.argument.1);
+        }
+        if let Some((copy, number)) = self.made.get(&Rc::as_ptr(node)) {
+            self.key.push(u64::MAX - 1 - number);
+            return Rc::clone(copy);
+        }
+        let Some(made) = &node.made else {
+            // `waist` leaves constants only.
+            let bits = match &node.value {
+                Value::Patterns(patterns) => patterns.first().copied().unwrap_or(0),
+                _ => 0,
+            };
+            self.key.push(1 << 40 | u64::from(bits));
+            return Rc::clone(node);
+        };
+        self.key.push(2 << 40 | u64::from(made.word));
+        let operands = [0, 1, 2].map(|place: usize| self.of(&made.operands[place]));
+        let value = match &node.value {
+            Value::Float(number) => {
+                self.describe(number);
+                Value::Float(Rc::new(number.without_correlations()))
+            }
+            _ => Value::Any,
+        };
+        let copy = Node::new(value, Made { operands, ..made.clone() });
+        self.made.insert(Rc::as_ptr(node), (Rc::clone(&copy), self.made.len() as u64));
+        copy
+    }
+
+    /// Adds all of a number but its correlations to the key.
+    fn describe(&mut self, number: &Number) {
+        for range in [number.actual, number.exact, number.error_range()] {
+            self.key.extend([range.low.to_bits(), range.high.to_bits()]);
+        }
+        let Relative { share, rest } = number.relative.unwrap_or(Relative { share: -1.0, rest: -1.0 });
+        self.key.extend([share.to_bits(), rest.to_bits(), number.grid.map_or(u64::MAX, |grid| grid as u64)]);
+    }
 }
 
 /// Question whose answers divide the runs into cases.
@@ -134,8 +196,59 @@ impl Explorer<'_> {
     /// most, are divided further.
     pub(super) fn in_parts(&mut self, node: &Rc<Node>) -> Value {
         let Some(waist) = waist(node) else { return node.value.clone() };
-        let Ok(whole) = waist.value.float().map(|number| number.actual) else { return node.value.clone() };
-        let mut parts: Vec<(Interval, Option<Rc<Number>>)> = vec![(whole, node.value.float().ok())];
+        let Some((function, key)) = self.function(node, &waist) else { return node.value.clone() };
+        let known = match self.divided.get(&key) {
+            Some(known) => known.clone(),
+            None => {
+                let value = self.of_parts(&function);
+                self.divided.insert(key, value.clone());
+                value
+            }
+        };
+        let (Some(parts), Some(made)) = (known, &node.made) else { return node.value.clone() };
+        let mut number = Number::clone(&parts);
+        let mut terms = Affine::constant(0.0);
+        if let Value::Float(whole) = &node.value {
+            // What is narrower costs the correlations: a little is not worth it.
+            if whole.form.radius() < WORTH * parts.form.radius() {
+                number.form = whole.form.clone();
+            }
+            terms = whole.error.clone();
+        }
+        if matches!(node.value, Value::Float(_)) && terms.radius() < WORTH * parts.error.radius() {
+            number.error = terms;
+        } else if !parts.error.is_zero() {
+            number.error = Affine::of(parts.error.range(), self.symbol_of(&terms, made.word));
+        }
+        both(&node.value, Value::Float(Rc::new(number)))
+    }
+
+    /// A node as a function of one value: a copy of the operations between them, and a key that is the same for all copies with the same
+    /// operations, constants and ranges. Nothing else is in the copy: no correlation with other values.
+    fn function(&mut self, node: &Rc<Node>, waist: &Rc<Node>) -> Option<(Function, Vec<u64>)> {
+        let number = waist.value.float().ok()?;
+        let error = number.error_range();
+        let symbols = [self.symbol(None), self.symbol(None)];
+        let argument = Node::leaf(Value::Float(Rc::new(Number {
+            form: Affine::of(number.exact, symbols[0]),
+            error: if number.error.is_zero() { number.error.clone() } else { Affine::of(error, symbols[1]) },
+            ..Number::clone(&number)
+        })));
+        let mut copies = Copies {
+            argument: (Rc::as_ptr(waist), Rc::clone(&argument)),
+            made: HashMap::new(),
+            key: Vec::new(),
+        };
+        copies.describe(&number);
+        let result = copies.of(node);
+        Some((Function { argument, result }, copies.key))
+    }
+
+    /// Value of a function, from parts of its argument's range; `None` if some part has none.
+    fn of_parts(&mut self, function: &Function) -> Option<Rc<Number>> {
+        let Function { argument, result } = function;
+        let whole = argument.value.float().ok()?.actual;
+        let mut parts: Vec<(Interval, Option<Rc<Number>>)> = vec![(whole, result.value.float().ok())];
         for turn in 0..MAX_DIVISIONS {
             // A part without a bound comes first.
             let size = |(_, number): &(Interval, Option<Rc<Number>>)| match number {
@@ -148,19 +261,18 @@ impl Explorer<'_> {
             let (range, _) = parts.swap_remove(at);
             let Some(middle) = middle(range) else { break };
             for part in [Interval::new(range.low, middle), Interval::new(middle, range.high)] {
-                let Some(mut scene) = self.scene(|context| context.pin(&waist, part)) else { continue };
+                let Some(mut scene) = self.scene(|context| context.pin(argument, part)) else { continue };
                 self.parts = self.parts.saturating_sub(1);
-                let under = self.quietly(|explorer| explorer.under(node, &mut scene));
+                let under = self.quietly(|explorer| explorer.under(result, &mut scene));
                 parts.push((part, under.value.float().ok()));
             }
             if self.parts == 0 {
                 break;
             }
         }
-        let values =
-            parts.into_iter().map(|(_, number)| number.map(Value::Float)).collect::<Option<Vec<_>>>();
-        let joined = values.and_then(|values| values.into_iter().reduce(|all, value| all.join(&value)));
-        joined.map_or_else(|| node.value.clone(), |value| both(&node.value, value))
+        let numbers = parts.into_iter().map(|(_, number)| number).collect::<Option<Vec<_>>>()?;
+        let joined = numbers.into_iter().reduce(|all, number| Rc::new(all.join(&number)))?;
+        Some(Rc::new(joined.without_correlations()))
     }
 
     /// Joins the values of all cases; `None` if no case is possible.

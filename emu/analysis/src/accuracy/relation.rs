@@ -13,7 +13,7 @@ const LEAST_NORM: f64 = 1.0 / (1u64 << 60) as f64;
 /// Largest norm whose inverse is not a subnormal number.
 const LARGEST_NORM: f64 = (1u128 << 100) as f64;
 /// Ratio of a divisor's magnitudes, or a root's, from which its range is divided into parts.
-const STEEP: f64 = 64.0;
+const STEEP: f64 = 4.0;
 
 /// Operand of an operation.
 fn source<'n>(meaning: &Meaning, operands: &'n [Rc<Node>; 3]) -> Option<&'n Rc<Node>> {
