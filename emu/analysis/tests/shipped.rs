@@ -7,7 +7,9 @@
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
-use takt_analysis::accuracy::{Enclosure, Moment, OutputBound, Problem, Shadow, StateRange, enclose};
+use takt_analysis::accuracy::{
+    Enclosure, Moment, OutputBound, OutputPlace, Problem, Shadow, StateRange, enclose,
+};
 use takt_asm::{FileLoader, Options, Search};
 use takt_emu::Emulator;
 use takt_emu::testing::Random;
@@ -18,6 +20,13 @@ use takt_isa::{Program, Register, Type};
 const QUICK: f64 = 1.0;
 /// Operations of the random runs of one program.
 const OPERATIONS: u64 = 400_000;
+/// Operations of the directed search for large errors of one program.
+const SEARCHED: u64 = 3_000_000;
+/// Outputs that the search takes, one after the other, always the loosest; and the factor from which it does.
+const ROUNDS: usize = 4;
+const LOOSE: f64 = 10.0;
+/// Limit on the values at a period's beginning that are searched.
+const VALUES: usize = 64;
 /// Limits on the periods of these.
 const PERIODS: [u64; 2] = [8, 1000];
 /// Folders of the programs.
@@ -83,6 +92,19 @@ fn draw(ty: Type, (low, high): (f64, f64), random: &mut Random) -> u32 {
 struct Measured<'p> {
     program: &'p Program,
     shadow: Shadow,
+    /// Largest errors that a directed search has found.
+    found: Vec<(OutputPlace, f64)>,
+}
+
+/// Inputs, states and words of arrays at a period's beginning, with their ranges.
+#[derive(Clone)]
+struct Case(Vec<(Cell, Type, (f64, f64), u32)>);
+
+#[derive(Clone, Copy)]
+enum Cell {
+    Input(Register),
+    State(Register),
+    Word(u32),
 }
 
 impl Measured<'_> {
@@ -162,15 +184,86 @@ impl Measured<'_> {
         }
     }
 
+    /// A case with random values; `None` if there are too many.
+    fn case(&self, random: &mut Random) -> Option<Case> {
+        let mut cells = Vec::new();
+        for inputs in [true, false] {
+            for range in self.ranges(inputs) {
+                let cell = if inputs { Cell::Input(range.register) } else { Cell::State(range.register) };
+                cells.push((cell, range.ty, range.ends()));
+            }
+        }
+        for range in &self.program.array_ranges {
+            cells.extend(range.span().map(|word| (Cell::Word(word), range.ty, range.ends())));
+        }
+        let is_short = !cells.is_empty() && cells.len() <= VALUES;
+        let drawn = cells.into_iter().map(|(cell, ty, ends)| (cell, ty, ends, draw(ty, ends, random)));
+        is_short.then(|| Case(drawn.collect()))
+    }
+
+    /// Error of an output at the end of a period that begins so, after `.once` as `begun` holds it.
+    fn error(&self, begun: (&Emulator, &Shadow), case: &Case, place: OutputPlace) -> Option<f64> {
+        let (mut emulator, mut shadow) = (begun.0.clone(), begun.1.clone());
+        for (cell, _, _, bits) in &case.0 {
+            match *cell {
+                Cell::Input(register) => emulator.set_input_bits(register, *bits).ok()?,
+                Cell::State(register) => {
+                    emulator.set_register(register, *bits);
+                }
+                Cell::Word(word) => emulator.memory_mut()[word as usize] = *bits,
+            }
+        }
+        shadow.run_period(&mut emulator).ok()?;
+        let output = shadow.outputs().iter().find(|output| output.place == place)?;
+        Some(output.absolute?.error)
+    }
+
+    /// Looks for a period in which an output errs most: from the worst of random ones, by steps of all sizes in one or two values.
+    fn search(&mut self, place: OutputPlace, periods: u64) {
+        let mut random = Random::new(55);
+        let (mut emulator, shadow) = (self.emulator(), Shadow::new(self.program).each_period_afresh());
+        let Ok(true) = shadow.clone().run_period(&mut emulator) else { return };
+        let begun = (&emulator, &shadow);
+        let Some(mut best) = self.case(&mut random) else { return };
+        let mut most = self.error(begun, &best, place).unwrap_or(0.0);
+        for turn in 0..periods {
+            let mut case = best.clone();
+            if turn < periods / 8 {
+                let Some(drawn) = self.case(&mut random) else { return };
+                case = drawn;
+            } else {
+                for _ in 0..=random.below(2) {
+                    let at = random.below(case.0.len() as u32) as usize;
+                    let (_, ty, ends, bits) = &mut case.0[at];
+                    *bits = match (*ty, random.below(8)) {
+                        (Type::F, 1..) => {
+                            let by = (ends.1 - ends.0) * 0.5f64.powi(random.below(30) as i32);
+                            let by = if random.below(2) == 0 { by } else { -by };
+                            let value = f64::from(f32::from_bits(*bits)) + by;
+                            (value.clamp(ends.0, ends.1) as f32).to_bits()
+                        }
+                        _ => draw(*ty, *ends, &mut random),
+                    };
+                }
+            }
+            if let Some(error) = self.error(begun, &case, place).filter(|error| *error >= most) {
+                (best, most) = (case, error);
+            }
+        }
+        self.found.push((place, most));
+    }
+
     /// Largest error of an output.
     fn of(&self, bound: &OutputBound) -> Option<f64> {
         let output = self.shadow.outputs().iter().find(|output| output.place == bound.place)?;
-        Some(output.absolute?.error)
+        let found = self.found.iter().filter(|(place, _)| *place == bound.place).map(|(_, error)| *error);
+        Some(found.fold(output.absolute?.error, f64::max))
     }
 }
 
 fn measured<'p>(program: &'p Program, path: &str, operations: u64) -> Measured<'p> {
-    let mut measured = Measured { program, shadow: Shadow::new(program).each_period_afresh() };
+    let mut measured =
+        Measured { program, shadow: Shadow::new(program).each_period_afresh(), found: Vec::new() };
     measured.at_random((OPERATIONS / operations.max(1)).clamp(PERIODS[0], PERIODS[1]));
     measured.recorded(path);
     measured
@@ -182,12 +275,12 @@ fn short(value: f64) -> String {
 }
 
 /// Output whose bound lies furthest above what was measured, with both.
-fn loosest(enclosure: &Enclosure, measured: &Measured<'_>) -> Option<(String, f64, f64)> {
+fn loosest<'e>(enclosure: &'e Enclosure, measured: &Measured<'_>) -> Option<(&'e OutputBound, f64, f64)> {
     let all = enclosure.outputs.iter().filter_map(|bound| {
         let error = bound.error?;
-        Some((bound.name.clone(), error, measured.of(bound)?))
+        Some((bound, error, measured.of(bound)?))
     });
-    let factor = |(_, error, run): &(String, f64, f64)| if *run > 0.0 { error / run } else { 0.0 };
+    let factor = |(_, error, run): &(&OutputBound, f64, f64)| if *run > 0.0 { error / run } else { 0.0 };
     all.max_by(|a, b| factor(a).total_cmp(&factor(b)))
 }
 
@@ -245,7 +338,14 @@ fn row(path: &str) -> (String, f64) {
     let cells = match &enclosure {
         Err(error) => format!("| `{path}` | {} | 0 | {error} | | | |", program.outputs.len()),
         Ok(enclosure) => {
-            let measured = measured(&program, path, enclosure.operations);
+            let mut measured = measured(&program, path, enclosure.operations);
+            for _ in 0..ROUNDS {
+                let Some((bound, error, run)) = loosest(enclosure, &measured) else { break };
+                if run == 0.0 || error <= LOOSE * run {
+                    break;
+                }
+                measured.search(bound.place, SEARCHED / enclosure.operations.max(1));
+            }
             holds(path, enclosure, &measured);
             let outputs = &enclosure.outputs;
             let finite = outputs.iter().filter(|output| output.range.is_some()).count();
@@ -253,9 +353,9 @@ fn row(path: &str) -> (String, f64) {
             let reason = if is_whole { String::new() } else { reason(&program, enclosure) };
             let worst = loosest(enclosure, &measured).map_or_else(
                 || "| | |".to_owned(),
-                |(name, error, run)| {
+                |(bound, error, run)| {
                     let factor = if run > 0.0 { rounded(error / run) } else { String::new() };
-                    format!("`{name}` {} | {} | {factor} |", short(error), short(run))
+                    format!("`{}` {} | {} | {factor} |", bound.name, short(error), short(run))
                 },
             );
             format!("| `{path}` | {} | {finite} | {reason} | {worst}", outputs.len())

@@ -1026,6 +1026,45 @@ fn accuracy_shows_literals_by_their_values() {
     assert!(done.stdout.contains("the integer sum may wrap: n in [0, 3], 2147483647"), "{}", done.stdout);
 }
 
+/// A root near zero makes the bound of one output, and nothing makes that of the other much larger than what runs show.
+#[test]
+fn accuracy_puts_bounds_beside_what_it_measures() {
+    let folder = Folder::new();
+    folder.write(
+        "root.s",
+        ".ports latched\n.input x\n.output y, z\n.range x = 0.1, 1\n.period\np: y = sqrt(max(x*x - 0.01, 0))\n z = 3*x\n wait p\n",
+    );
+    folder.write("in.csv", "x\n0.5\n0.7\n1\n");
+    let done = folder.line("accuracy root.s --inputs in.csv --bound");
+    assert_eq!(done.status, Some(0), "{}", done.stderr);
+    let row = |name: &str| {
+        let table = done.stdout.split("beside its bound").nth(1).expect("the table");
+        let row = table.lines().find(|line| line.trim_start().starts_with(name)).expect("a row");
+        row.split_whitespace()
+            .skip(1)
+            .take(3)
+            .map(|cell| cell.parse().expect("a number"))
+            .collect::<Vec<f64>>()
+    };
+    for (name, is_loose) in [("y", true), ("z", false)] {
+        let row = row(name);
+        assert!(
+            (row[1] / row[0] / row[2] - 1.0).abs() < 1e-2 && (row[2] > 100.0) == is_loose,
+            "{name}: {row:?}"
+        );
+    }
+    assert!(
+        done.stdout.contains("root.s:6:8-30: a root, which is infinitely steep at zero"),
+        "{}",
+        done.stdout
+    );
+    let json: serde_json::Value =
+        serde_json::from_str(&folder.line("accuracy root.s --inputs in.csv --bound --json").stdout).unwrap();
+    assert_eq!((&json["bounds"][1]["name"], &json["each_period"]), (&"z".into(), &true.into()));
+    let done = folder.line("accuracy root.s --bound");
+    assert!(done.stderr.contains("--inputs"), "{}", done.stderr);
+}
+
 #[test]
 fn run_shows_words_of_data_memory() {
     let folder = Folder::new();

@@ -2,6 +2,7 @@
 //! The command `takt accuracy`: errors of the outputs against binary64, measured by source line or proved as bounds.
 
 mod bound_report;
+mod comparison;
 mod lines;
 mod measurement;
 
@@ -13,9 +14,10 @@ use crate::terminal::files::{self, Out};
 use crate::terminal::number;
 use crate::terminal::options::{OptionalMachine, SourceArguments};
 use crate::terminal::output::Failure;
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, anyhow, bail};
 use bound_report::BoundReport;
 use clap::Args;
+use comparison::Comparison;
 pub(crate) use measurement::MeasurementReport;
 use serde_json::{Map, Value, json};
 use std::io::Write;
@@ -54,6 +56,10 @@ pub(crate) struct Accuracy {
     /// Let each period begin with exact values: errors that states carry from period to period are left out.
     #[arg(long, requires = "inputs")]
     each_period: bool,
+    /// Put the bound beside each measured error, with the factor between the two, and say what makes bounds that are far larger. Each period
+    /// begins with exact values, as for bounds.
+    #[arg(long, requires = "inputs")]
+    bound: bool,
     /// Print the result as JSON.
     #[arg(long)]
     json: bool,
@@ -64,6 +70,7 @@ Examples:
   takt accuracy prog.s                                bounds that no run exceeds, from the ranges in the source
   takt accuracy prog.s --inputs in.csv                errors against binary64, and the lines that they come from
   takt accuracy prog.s --inputs in.csv --each-period  without what states carry from period to period
+  takt accuracy prog.s --inputs in.csv --bound        both, and the factor between them
   takt accuracy system.toml --inputs in.csv           of each core, in a run of the system";
 
 pub(crate) fn run(arguments: &Accuracy, color: bool, out: &mut Out) -> Result<()> {
@@ -124,16 +131,31 @@ fn measured(
     out: &mut Out,
 ) -> Result<()> {
     let cores = application.programs().iter().zip(shadows);
-    let cores = cores.map(|(loaded, shadow)| MeasurementReport::new(&loaded.program, shadow));
-    if arguments.json {
-        let cores = cores.map(|measured| measured.json()).collect();
-        let mut value = whole_json(arguments, application, cores);
-        value["each_period"] = json!(arguments.each_period);
-        return files::json(&value, out);
-    }
-    for (core, measured) in cores.enumerate() {
+    let each_period = arguments.each_period || arguments.bound;
+    let mut values = Vec::new();
+    for (core, (loaded, shadow)) in cores.enumerate() {
+        let program = &loaded.program;
+        let measured = MeasurementReport::new(program, shadow);
+        let enclosure = match arguments.bound {
+            true => Some(enclose(program).map_err(|error| anyhow!("no bound: {error}"))?),
+            false => None,
+        };
+        let enclosure = enclosure.as_ref();
+        let comparison = enclosure.map(|enclosure| Comparison { program, shadow, enclosure });
+        if arguments.json {
+            let mut value = measured.json();
+            comparison.inspect(|comparison| comparison.add_to(&mut value));
+            values.push(value);
+            continue;
+        }
         title(application, core, out)?;
-        measured.text(arguments.each_period, out)?;
+        measured.text(each_period, out)?;
+        comparison.map_or(Ok(()), |comparison| comparison.text(out))?;
+    }
+    if arguments.json {
+        let mut value = whole_json(arguments, application, values);
+        value["each_period"] = json!(each_period);
+        files::json(&value, out)?;
     }
     Ok(())
 }
@@ -198,7 +220,7 @@ impl TableApplication for Shadowed<'_> {
 
 fn shadow(arguments: &Accuracy, program: &Program) -> Shadow {
     let shadow = Shadow::new(program);
-    if arguments.each_period { shadow.each_period_afresh() } else { shadow }
+    if arguments.each_period || arguments.bound { shadow.each_period_afresh() } else { shadow }
 }
 
 fn measure(arguments: &Accuracy, inputs: &Path, program: &Program) -> Result<Vec<Shadow>> {

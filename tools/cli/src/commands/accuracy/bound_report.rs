@@ -33,14 +33,14 @@ fn interval(interval: Option<Interval>) -> String {
 }
 
 impl BoundReport<'_> {
-    fn parts(&self, output: &OutputBound) -> Vec<(Option<Location>, f64, f64)> {
+    pub(super) fn parts(&self, output: &OutputBound) -> Vec<(Option<Location>, f64, f64)> {
         let parts: Vec<ErrorShare> =
             output.parts.iter().map(|(word, error)| ErrorShare { word: *word, error: *error }).collect();
         by_line(self.program, &parts)
     }
 
     /// Places of the hazards that leave an output's range open.
-    fn open(&self, output: &OutputBound) -> Vec<String> {
+    pub(super) fn open(&self, output: &OutputBound) -> Vec<String> {
         output.open.iter().map(|word| self.program.word_text(*word as usize)).collect()
     }
 
