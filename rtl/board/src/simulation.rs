@@ -79,6 +79,42 @@ pub struct Stop {
     pub edges: Vec<bool>,
 }
 
+/// The program that simulates a board, with all that it needs on a machine without Verilator. The comment of `driver.cpp` describes the
+/// words on its standard input and output.
+#[derive(Clone, Debug)]
+pub struct Packed {
+    /// The program, linked statically.
+    pub program: PathBuf,
+    /// Files that it reads in its working folder.
+    pub files: Vec<DesignFile>,
+    /// Input pins in the order of the words, each with its level at power-up.
+    pub inputs: Vec<(String, bool)>,
+    /// Output pins in the order of the words.
+    pub outputs: Vec<String>,
+}
+
+impl Packed {
+    /// Builds a board with a program, or a system; `folder` takes the files that the program reads.
+    ///
+    /// # Errors
+    /// If there is no circuit for it, or Verilator is missing or fails.
+    pub fn new<'a>(
+        board: &Board,
+        wiring: &Wiring,
+        application: impl Into<Application<'a>>,
+        folder: &Path,
+    ) -> Result<Packed, SimulationError> {
+        let application = application.into();
+        let watch = Watch::new(wiring, &application);
+        let files = top::circuit(board, wiring, application)?.files;
+        let how = Linking { optimise: "-O2", defines: vec!["-static".to_owned()] };
+        let (program, inputs, outputs) = build(&files, board, wiring, folder, Some(&watch), how)?;
+        let files = files.into_iter().filter(|file| !is_verilog(file)).collect();
+        let inputs = inputs.into_iter().map(|(name, level)| (name, level != 0)).collect();
+        Ok(Packed { program, files, inputs, outputs })
+    }
+}
+
 /// A simulated board.
 #[derive(Debug)]
 pub struct Simulation {
@@ -157,7 +193,8 @@ impl Simulation {
         fault: usize,
         watch: Option<Watch>,
     ) -> Result<Simulation, SimulationError> {
-        let (built, inputs, outputs) = build(files, board, wiring, folder, watch.as_ref())?;
+        let (built, inputs, outputs) =
+            build(files, board, wiring, folder, watch.as_ref(), Linking::default())?;
         let start = |error| SimulationError::Start(built.display().to_string(), error);
         let mut process = Command::new(&built)
             .current_dir(folder)
@@ -343,16 +380,32 @@ impl Drop for Simulation {
 
 type Pins = (PathBuf, Vec<(String, u32)>, Vec<String>);
 
+/// How the program is compiled and linked.
+struct Linking {
+    optimise: &'static str,
+    defines: Vec<String>,
+}
+
+impl Default for Linking {
+    fn default() -> Linking {
+        Linking { optimise: "-O1", defines: Vec::new() }
+    }
+}
+
+fn is_verilog(file: &DesignFile) -> bool {
+    [".v", ".vh"].iter().any(|end| file.name.ends_with(end))
+}
+
 fn build(
     files: &[DesignFile],
     board: &Board,
     wiring: &Wiring,
     folder: &Path,
     watch: Option<&Watch>,
+    how: Linking,
 ) -> Result<Pins, SimulationError> {
     // Verilog, which is compiled, and files that a simulation reads when it runs.
-    let (verilog, read): (Vec<_>, Vec<_>) =
-        files.iter().partition(|file| [".v", ".vh"].iter().any(|end| file.name.ends_with(end)));
+    let (verilog, read): (Vec<_>, Vec<_>) = files.iter().partition(|file| is_verilog(file));
     for file in read {
         let path = folder.join(&file.name);
         fs::create_dir_all(path.parent().unwrap_or(folder))
@@ -400,8 +453,8 @@ fn build(
         driver: DRIVER,
         headers: vec![("pins.h", &header), ("watch.h", &watched), ("watch.vlt", &kept)],
         arguments: vec!["-Wno-fatal".to_owned(), "watch.vlt".to_owned()],
-        defines: Vec::new(),
-        optimise: "-O1",
+        defines: how.defines,
+        optimise: how.optimise,
         trace: false,
     };
     Ok((sources.build(&takt_cache::folder().map_err(VerilatorError::Cache)?)?, inputs, outputs))

@@ -2,7 +2,7 @@
 //! The file of an FMU: a zip archive of description, resources and libraries. Equal programs give equal bytes.
 
 use crate::description::{self, Fmi};
-use crate::model::{Model, SETTINGS};
+use crate::model::{Model, SETTINGS, SIMULATION};
 use std::io::{Cursor, Write as _};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
@@ -144,7 +144,8 @@ impl Fmu<'_> {
         let description = description::write(self.model, self.name, &identifier, self.fmi);
         add("modelDescription.xml", description.as_bytes(), 0o644)?;
         for (name, bytes) in &self.model.files {
-            add(&format!("resources/{name}"), bytes, 0o644)?;
+            let mode = if name == SIMULATION { 0o755 } else { 0o644 };
+            add(&format!("resources/{name}"), bytes, mode)?;
         }
         for platform in [Platform::Linux, Platform::Windows] {
             let mut libraries = self.libraries.iter().filter(|library| library.platform == platform);

@@ -103,7 +103,11 @@ fn value_attributes(variable: &Variable, fmi: Fmi) -> String {
         let _ = write!(text, " min=\"{low}\" max=\"{high}\"");
     }
     if variable.causality != Causality::Output {
-        let _ = write!(text, " start=\"{}\"", number(variable.ty, variable.start, fmi));
+        let start = match variable.is_boolean() {
+            true => (variable.start != 0).to_string(),
+            false => number(variable.ty, variable.start, fmi),
+        };
+        let _ = write!(text, " start=\"{start}\"");
     }
     text
 }
@@ -123,9 +127,14 @@ fn element(out: &mut String, reference: usize, variable: &Variable, fmi: Fmi) {
     let values = value_attributes(variable, fmi);
     let _ = match (fmi, variable.ty) {
         (Fmi::Two, ty) => {
-            let tag = if ty == Type::F { "Real" } else { "Integer" };
+            let tag = match ty {
+                _ if variable.is_boolean() => "Boolean",
+                Type::F => "Real",
+                Type::I | Type::B => "Integer",
+            };
             writeln!(out, "    <ScalarVariable {common}><{tag}{values}/></ScalarVariable>")
         }
+        (Fmi::Three, _) if variable.is_boolean() => writeln!(out, "    <Boolean {common}{values}/>"),
         (Fmi::Three, Type::F) => writeln!(out, "    <Float32 {common}{values}/>"),
         (Fmi::Three, Type::I) => writeln!(out, "    <Int32 {common}{values}/>"),
         (Fmi::Three, Type::B) => writeln!(out, "    <UInt32 {common}{values}/>"),
@@ -192,13 +201,14 @@ pub fn write(model: &Model, name: &str, identifier: &str, fmi: Fmi) -> String {
             format!(" fixedInternalStepSize=\"{:?}\"", model.settings.period),
         ),
     };
+    let states = model.has_states();
     let memory = if fmi == Fmi::Two { " canNotUseMemoryManagementFunctions=\"true\"" } else { "" };
     let mut out = format!(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
          <fmiModelDescription fmiVersion=\"{version}\" modelName=\"{}\" {token}=\"{}\" generationTool=\"Takt {}\" \
          variableNamingConvention=\"structured\">\n  \
          <CoSimulation modelIdentifier=\"{identifier}\" canHandleVariableCommunicationStepSize=\"false\"{memory} \
-         canGetAndSet{state}=\"true\" canSerialize{state}=\"true\"{step}/>\n",
+         canGetAndSet{state}=\"{states}\" canSerialize{state}=\"{states}\"{step}/>\n",
         escape(name),
         model.token(),
         env!("CARGO_PKG_VERSION"),

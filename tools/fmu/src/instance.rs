@@ -193,6 +193,33 @@ impl Instance {
         Ok(self.values[index])
     }
 
+    /// Value of a Boolean.
+    ///
+    /// # Errors
+    /// If no Boolean has the value reference.
+    pub fn boolean(&self, reference: u32) -> Result<bool, Mistake> {
+        Ok(self.values[self.boolean_index(reference)?] != 0)
+    }
+
+    /// Sets a Boolean.
+    ///
+    /// # Errors
+    /// If no Boolean has the value reference.
+    pub fn set_boolean(&mut self, reference: u32, value: bool) -> Result<(), Mistake> {
+        let index = self.boolean_index(reference)?;
+        self.values[index] = value.into();
+        self.machine.set(self.model.variables[index].source, value.into());
+        Ok(())
+    }
+
+    fn boolean_index(&self, reference: u32) -> Result<usize, Mistake> {
+        let index = reference.wrapping_sub(TIME + 1) as usize;
+        match self.model.variables.get(index) {
+            Some(variable) if variable.is_boolean() => Ok(index),
+            _ => Err(Mistake::Reference(reference)),
+        }
+    }
+
     /// Value of a variable that carries binary32, or the time.
     ///
     /// # Errors
@@ -209,7 +236,7 @@ impl Instance {
     fn index(&self, reference: u32, types: &[Type]) -> Result<usize, Mistake> {
         let index = reference.wrapping_sub(TIME + 1) as usize;
         match self.model.variables.get(index) {
-            Some(variable) if types.contains(&variable.ty) => Ok(index),
+            Some(variable) if types.contains(&variable.ty) && !variable.is_boolean() => Ok(index),
             _ => Err(Mistake::Reference(reference)),
         }
     }
@@ -348,8 +375,12 @@ impl Instance {
     /// State to return to.
     ///
     /// # Errors
-    /// If the program has stopped.
+    /// If the program has stopped, or the instance is the circuit of a board.
     pub fn save(&self) -> Result<SavedState, Mistake> {
+        if !self.model.has_states() {
+            let reason = "the state of a board's circuit cannot be saved: write the FMU without `--circuit`";
+            return Err(Mistake::Call(reason.to_owned()));
+        }
         SavedState::of(self)
     }
 

@@ -6,6 +6,7 @@
 
 mod abi;
 pub mod archive;
+pub mod circuit;
 pub mod description;
 mod instance;
 mod machine;

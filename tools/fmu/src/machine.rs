@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Emulated machine of an instance: one core with its program, or a system of cores.
+//! Machine of an instance: one emulated core with its program, a system of cores, or the circuit of a board.
 
+use crate::circuit::Board;
 use crate::model::{Application, Model};
 use crate::variables::Source;
 use takt_analysis::period::PERIOD_LIMIT;
@@ -9,10 +10,11 @@ use takt_isa::Program;
 use takt_isa::timing::Cycle;
 use takt_system::{Host, HostError, System, SystemFault};
 
-/// Emulated machine, between two periods.
+/// Machine, between two periods.
 pub(crate) enum Machine {
     Program(Box<Core>),
     System(Box<Cores>),
+    Circuit(Box<Board>),
 }
 
 /// Counts of a core.
@@ -70,6 +72,11 @@ fn system_fault(fault: &SystemFault, system: &System) -> Reason {
 impl Machine {
     pub(crate) fn new(model: &Model) -> Result<Machine, LoadError> {
         match &model.application {
+            Application::Circuit(circuit) => {
+                // The model has checked that it fits.
+                let period = u32::try_from(model.settings.tick).unwrap_or(u32::MAX);
+                Ok(Machine::Circuit(Box::new(Board::new(circuit, period, &model.folder))))
+            }
             Application::Program(program) => {
                 let emulator = Emulator::new(program)?;
                 Ok(Machine::Program(Box::new(Core { emulator, counts: Counts::default() })))
@@ -96,6 +103,7 @@ impl Machine {
                 cores.popped.fill(false);
                 cores.counts.fill(Counts::default());
             }
+            Machine::Circuit(board) => board.reset(),
         }
     }
 
@@ -113,6 +121,10 @@ impl Machine {
             (Machine::System(cores), Source::Column(column)) => {
                 cores.row[column].1 = bits;
                 return;
+            }
+            (Machine::Circuit(board), Source::Level(pin)) => return board.set_level(pin, bits != 0),
+            (Machine::Circuit(board), Source::Count(encoder)) => {
+                return board.set_count(encoder, bits.cast_signed());
             }
             _ => return,
         };
@@ -136,6 +148,7 @@ impl Machine {
             (Machine::System(cores), Source::Flags(core)) => {
                 u32::from(cores.system.core(core).flags().bits())
             }
+            (Machine::Circuit(board), Source::Part(pin)) => board.part(pin).to_bits(),
             _ => 0,
         }
     }
@@ -145,6 +158,7 @@ impl Machine {
         match self {
             Machine::Program(core) => std::slice::from_ref(&core.counts),
             Machine::System(cores) => &cores.counts,
+            Machine::Circuit(_) => &[],
         }
     }
 
@@ -153,6 +167,7 @@ impl Machine {
         match self {
             Machine::Program(core) => core.start(),
             Machine::System(cores) => cores.start(),
+            Machine::Circuit(board) => board.start(),
         }
     }
 
@@ -162,7 +177,7 @@ impl Machine {
     pub(crate) fn settle(&mut self) -> Result<(), Reason> {
         match self {
             Machine::Program(core) => core.settle(),
-            Machine::System(_) => Ok(()),
+            Machine::System(_) | Machine::Circuit(_) => Ok(()),
         }
     }
 
@@ -172,6 +187,7 @@ impl Machine {
         match self {
             Machine::Program(core) => core.run(number, tick, warnings),
             Machine::System(cores) => cores.run(number, warnings),
+            Machine::Circuit(board) => board.run(number, warnings),
         }
     }
 
@@ -182,6 +198,7 @@ impl Machine {
             Machine::System(cores) => {
                 cores.system.start().map(|_| SavedMachine::System(Box::new(cores.system.clone())))
             }
+            Machine::Circuit(_) => None,
         }
     }
 

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The program or system of an FMU with its settings, as the folder `resources` of the FMU holds them.
 
+use crate::circuit::Circuit;
 use crate::variables::{self, Variable};
 use serde::{Deserialize, Serialize};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use takt_asm::image::{self, ImageError};
 use takt_asm::units;
 use takt_emu::{Emulator, LoadError};
@@ -15,6 +16,12 @@ use takt_system::{MAX_CORES, ProgramError, ReadError, Request, System, TEXT_BYTE
 pub(crate) const IMAGE: &str = "program.takt";
 /// Cores and links of a system, a file of `resources` in place of [`IMAGE`].
 pub(crate) const SYSTEM: &str = "system.toml";
+/// Pins and host of a board, a file of `resources` in place of [`IMAGE`].
+pub(crate) const CIRCUIT: &str = "circuit.json";
+/// Program that simulates a board, a file of `resources` beside [`CIRCUIT`].
+pub(crate) const SIMULATION: &str = "simulation";
+/// Folder in `resources` with the files that the simulation reads.
+pub(crate) const CIRCUIT_FOLDER: &str = "circuit";
 /// Settings, a file of `resources`.
 pub(crate) const SETTINGS: &str = "takt.json";
 
@@ -84,6 +91,9 @@ pub enum ModelError {
         /// Reason.
         error: LoadError,
     },
+    /// The description of a board has no meaning.
+    #[error("{CIRCUIT}: {0}")]
+    Circuit(String),
     /// A program has no instruction.
     #[error("{0} has no instruction")]
     Empty(String),
@@ -94,6 +104,7 @@ pub enum ModelError {
 pub(crate) enum Application {
     Program(Box<Program>),
     System(Box<Description>),
+    Circuit(Box<Circuit>),
 }
 
 /// Program or system with its settings and variables: what all instances of an FMU share.
@@ -104,6 +115,8 @@ pub struct Model {
     pub(crate) variables: Vec<Variable>,
     /// Files of `resources`, each with its name.
     pub(crate) files: Vec<(String, Vec<u8>)>,
+    /// Folder of these files, if they were read from one.
+    pub(crate) folder: PathBuf,
 }
 
 /// File of `resources` with an image.
@@ -146,6 +159,36 @@ impl Model {
         Model::parse(files)
     }
 
+    /// Model of a board in simulation. `simulation` is the program that simulates it; `files` are those that it reads, each with its name,
+    /// in the order of `circuit`.
+    ///
+    /// # Errors
+    /// If a setting has no meaning, or the circuit has no such pins.
+    pub fn of_circuit(
+        circuit: &Circuit,
+        simulation: Vec<u8>,
+        files: Vec<(String, Vec<u8>)>,
+        settings: Settings,
+    ) -> Result<Model, ModelError> {
+        let description = serde_json::to_vec(circuit)?;
+        let mut all = vec![(CIRCUIT.to_owned(), description), (SIMULATION.to_owned(), simulation)];
+        all.extend(files.into_iter().map(|(name, bytes)| (format!("{CIRCUIT_FOLDER}/{name}"), bytes)));
+        all.push(settings_file(settings)?);
+        Model::parse(all)
+    }
+
+    /// Writes the folder `resources` of an FMU.
+    ///
+    /// # Errors
+    /// If a file cannot be written.
+    pub fn write(&self, resources: &Path) -> std::io::Result<()> {
+        self.files.iter().try_for_each(|(name, bytes)| {
+            let path = resources.join(name);
+            std::fs::create_dir_all(path.parent().unwrap_or(resources))?;
+            std::fs::write(path, bytes)
+        })
+    }
+
     /// Reads the folder `resources` of an FMU.
     ///
     /// # Errors
@@ -160,7 +203,14 @@ impl Model {
         };
         let settings = read(SETTINGS.to_owned())?;
         let mut files = Vec::new();
-        if resources.join(SYSTEM).exists() {
+        if resources.join(CIRCUIT).exists() {
+            let (name, description) = read(CIRCUIT.to_owned())?;
+            let circuit: Circuit = circuit(&description)?;
+            files.extend([(name, description), read(SIMULATION.to_owned())?]);
+            for name in &circuit.files {
+                files.push(read(format!("{CIRCUIT_FOLDER}/{name}"))?);
+            }
+        } else if resources.join(SYSTEM).exists() {
             files.push(read(SYSTEM.to_owned())?);
             let cores = (0..MAX_CORES).map(core_image).take_while(|name| resources.join(name).exists());
             for core in cores {
@@ -170,10 +220,11 @@ impl Model {
             files.push(read(IMAGE.to_owned())?);
         }
         files.push(settings);
-        Model::parse(files)
+        Ok(Model { folder: resources.to_owned(), ..Model::parse(files)? })
     }
 
-    /// Model of the files of `resources`: [`SYSTEM`] with the cores' images, or [`IMAGE`], then [`SETTINGS`].
+    /// Model of the files of `resources`: [`CIRCUIT`] with the simulation, [`SYSTEM`] with the cores' images, or [`IMAGE`], then
+    /// [`SETTINGS`].
     fn parse(files: Vec<(String, Vec<u8>)>) -> Result<Model, ModelError> {
         let bytes = |name: &str| {
             let found = files.iter().find(|(known, _)| known == name);
@@ -183,17 +234,25 @@ impl Model {
         if let Some(mistake) = settings.mistake() {
             return Err(ModelError::Setting(mistake));
         }
-        let (application, variables) = match bytes(SYSTEM) {
-            None => {
+        let (application, variables) = match (bytes(CIRCUIT), bytes(SYSTEM)) {
+            (Some(description), _) => {
+                let circuit = circuit(description)?;
+                if u32::try_from(settings.tick).is_err() {
+                    return Err(ModelError::Setting("a period of a board has less than 2^32 cycles"));
+                }
+                let variables = circuit.variables();
+                (Application::Circuit(Box::new(circuit)), variables)
+            }
+            (None, None) => {
                 let program = program(IMAGE, bytes(IMAGE).unwrap_or_default())?;
                 Emulator::new(&program).map_err(|error| ModelError::Load { file: IMAGE, error })?;
                 let variables = variables::of_program(&program);
                 (Application::Program(Box::new(program)), variables)
             }
-            Some(text) if text.len() > TEXT_BYTES => {
+            (None, Some(text)) if text.len() > TEXT_BYTES => {
                 return Err(ModelError::System(format!("{SYSTEM} has more than {TEXT_BYTES} bytes")));
             }
-            Some(text) => {
+            (None, Some(text)) => {
                 let description = description(&String::from_utf8_lossy(text), bytes)?;
                 if description.tick != settings.tick {
                     return Err(ModelError::Setting("the tick is not that of the system"));
@@ -203,7 +262,7 @@ impl Model {
                 (Application::System(Box::new(description)), variables)
             }
         };
-        Ok(Model { application, settings, variables, files })
+        Ok(Model { application, settings, variables, files, folder: PathBuf::new() })
     }
 
     /// States the units of ports and parameters, with which the comments of their declarations begin. `sources` has the source files of
@@ -216,6 +275,11 @@ impl Model {
             });
         }
         self
+    }
+
+    /// The states of an instance can be taken and set.
+    pub(crate) fn has_states(&self) -> bool {
+        !matches!(self.application, Application::Circuit(_))
     }
 
     /// Variables, in the order of their value references: the first has 1.
@@ -246,6 +310,16 @@ impl Model {
 
 fn settings_file(settings: Settings) -> Result<(String, Vec<u8>), ModelError> {
     Ok((SETTINGS.to_owned(), serde_json::to_vec(&settings)?))
+}
+
+/// Description of a board.
+fn circuit(bytes: &[u8]) -> Result<Circuit, ModelError> {
+    let circuit: Circuit =
+        serde_json::from_slice(bytes).map_err(|error| ModelError::Circuit(error.to_string()))?;
+    match circuit.mistake() {
+        Some(mistake) => Err(ModelError::Circuit(mistake.to_owned())),
+        None => Ok(circuit),
+    }
 }
 
 /// System of a file's text and its cores' images.

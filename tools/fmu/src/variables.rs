@@ -37,6 +37,12 @@ pub(crate) enum Source {
     Missed(usize),
     /// Sticky exception flags of a core.
     Flags(usize),
+    /// Level of an input pin of a circuit.
+    Level(usize),
+    /// Count of an encoder at a circuit.
+    Count(usize),
+    /// Part of a period in which an output pin of a circuit was 1.
+    Part(usize),
 }
 
 /// Declaration of a port or parameter in a core's source.
@@ -70,7 +76,7 @@ pub struct Variable {
 }
 
 impl Variable {
-    fn new(name: String, ty: Type, causality: Causality, source: Source) -> Variable {
+    pub(crate) fn new(name: String, ty: Type, causality: Causality, source: Source) -> Variable {
         let (range, unit, declaration) = (None, None, None);
         Variable { name, ty, causality, range, start: 0, unit, description: "", declaration, source }
     }
@@ -102,6 +108,11 @@ impl Variable {
             _ => start,
         };
         self.range = range.map(|range| (range.low, range.high));
+    }
+
+    /// The variable is a Boolean: 0 or 1.
+    pub(crate) fn is_boolean(&self) -> bool {
+        matches!(self.source, Source::Level(_))
     }
 
     /// Value in words.

@@ -7,7 +7,7 @@ mod closed_loop;
 mod external_host;
 mod hal;
 #[cfg(unix)]
-mod pins;
+pub(crate) mod pins;
 #[cfg(unix)]
 mod plant_at_pins;
 #[cfg(unix)]

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The command `takt fmu`: writes a program as a functional mock-up unit.
 
+#[cfg(unix)]
+mod circuit;
+
 use crate::run::application::{Application, refuse};
 use crate::run::parameters::ParameterArguments;
 use crate::terminal::files::{self, Out};
@@ -37,9 +40,19 @@ pub(crate) struct ToFmu {
     /// with `s`, or `FS` in `Hz`; of a system, the `tick` of its file].
     #[arg(long, value_name = "TIME", value_parser = number::time, allow_hyphen_values = true)]
     period: Option<Time>,
-    /// Clock in MHz: a period that has no end before the next tick counts as missed.
-    #[arg(long, value_name = "MHZ", default_value_t = options::PAPER_CLOCK, value_parser = number::clock, allow_hyphen_values = true)]
-    clock: f64,
+    /// Put the circuit of a board, simulated by Verilator, in place of the emulator: variables are the pins of the top level, a step is a
+    /// period of the board, and the FMU's own host starts the program (Linux).
+    #[arg(long, requires = "wiring")]
+    circuit: bool,
+    /// With --circuit: which peripherals are at which pins (docs/board.md).
+    #[arg(long, value_name = "TOML", requires = "circuit")]
+    wiring: Option<PathBuf>,
+    /// With --circuit: a name from `takt board list`, or a file of the same form [default: the one that the wiring names].
+    #[arg(long, value_name = "BOARD", requires = "circuit")]
+    board: Option<String>,
+    /// Clock in MHz: a period that has no end before the next tick counts as missed [default: 125; with --circuit that of the wiring].
+    #[arg(long, value_name = "MHZ", value_parser = number::clock, allow_hyphen_values = true)]
+    clock: Option<f64>,
     /// Version of the standard.
     #[arg(long, value_enum, value_name = "VERSION", default_value_t = Version::Two)]
     fmi: Version,
@@ -57,6 +70,7 @@ Examples:
   takt fmu foc.s --period 50us --fmi 3 -o foc.fmu
   takt fmu law.s --period 1ms --param kp=3 -o law.fmu   kp starts with 3
   takt fmu system.toml -o system.fmu             several cores, a step for each base tick
+  takt fmu limit.s --circuit --wiring limit.toml -o board.fmu   the circuit of a board, with its pins
   fmpy validate pi.fmu                           check what was written, with FMPy";
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -69,6 +83,36 @@ enum Version {
     Three,
 }
 
+impl Version {
+    fn number(self) -> &'static str {
+        match self {
+            Version::Two => "2.0",
+            Version::Three => "3.0",
+        }
+    }
+}
+
+impl From<Version> for Fmi {
+    fn from(version: Version) -> Fmi {
+        match version {
+            Version::Two => Fmi::Two,
+            Version::Three => Fmi::Three,
+        }
+    }
+}
+
+/// Number of variables with a role.
+fn count(model: &Model, causality: Causality) -> usize {
+    model.variables().iter().filter(|variable| variable.causality == causality).count()
+}
+
+#[cfg(not(unix))]
+mod circuit {
+    pub(super) fn run(_: &super::ToFmu, _: bool, _: &mut super::Out) -> anyhow::Result<()> {
+        anyhow::bail!("--circuit: an FMU with the circuit of a board is written on Linux, where it runs")
+    }
+}
+
 /// File names of the libraries, as cargo writes them: for Linux, which is always there, and for Windows.
 const LIBRARIES: [&str; 2] = ["libtakt_fmu.so", "takt_fmu.dll"];
 
@@ -77,7 +121,11 @@ pub(crate) fn run(arguments: &ToFmu, color: bool, out: &mut Out) -> Result<()> {
     let mut reads = vec![("FILE", file.as_path())];
     reads.extend(parameters.file.as_deref().map(|path| ("--params", path)));
     reads.extend(library.iter().map(|path| ("--library", path.as_path())));
+    reads.extend(arguments.wiring.as_deref().map(|path| ("--wiring", path)));
     files::check(&reads, &[("--output", output.as_path())])?;
+    if arguments.circuit {
+        return circuit::run(arguments, color, out);
+    }
     let mut application = Application::load(file, &arguments.machine, &arguments.source, color)?;
     let settings = arguments.settings(&application)?;
     parameters.apply(&mut application)?;
@@ -87,36 +135,23 @@ pub(crate) fn run(arguments: &ToFmu, color: bool, out: &mut Out) -> Result<()> {
     };
     let sources: Vec<_> = application.programs().iter().map(|program| program.sources.as_slice()).collect();
     let model = model.with_units(&sources);
-    let fmi = match arguments.fmi {
-        Version::Two => Fmi::Two,
-        Version::Three => Fmi::Three,
-    };
+    let fmi = arguments.fmi.into();
     let libraries = arguments.libraries()?;
-    // A master shows the name; the model is what the file is called.
-    let name = match file.file_stem() {
-        Some(stem) if !files::is_dash(file) => stem.to_string_lossy().into_owned(),
-        _ => "program".to_owned(),
-    };
-    let bytes = Fmu { model: &model, name: &name, fmi, libraries: &libraries }.to_bytes()?;
+    let bytes = Fmu { model: &model, name: &arguments.name(), fmi, libraries: &libraries }.to_bytes()?;
     files::write(output, &bytes)?;
     if files::is_dash(output) {
         return Ok(());
     }
-    let count =
-        |causality| model.variables().iter().filter(|variable| variable.causality == causality).count();
-    let version = match fmi {
-        Fmi::Two => "2.0",
-        Fmi::Three => "3.0",
-    };
     let platforms: Vec<&str> = libraries.iter().map(|library| library.platform().name()).collect();
     writeln!(
         out,
-        "{}: FMI {version} for co-simulation on {}, {} inputs, {} parameters, {} outputs, a step of {} s or {} cycles",
+        "{}: FMI {} for co-simulation on {}, {} inputs, {} parameters, {} outputs, a step of {} s or {} cycles",
         output.display(),
+        arguments.fmi.number(),
         platforms.join(" and "),
-        count(Causality::Input),
-        count(Causality::Parameter),
-        count(Causality::Output),
+        count(&model, Causality::Input),
+        count(&model, Causality::Parameter),
+        count(&model, Causality::Output),
         settings.period,
         settings.tick
     )?;
@@ -126,7 +161,8 @@ pub(crate) fn run(arguments: &ToFmu, color: bool, out: &mut Out) -> Result<()> {
 impl ToFmu {
     /// Period in seconds and in cycles.
     fn settings(&self, application: &Application) -> Result<Settings> {
-        let hertz = self.clock * 1e6;
+        let clock = self.clock.unwrap_or(options::PAPER_CLOCK);
+        let hertz = clock * 1e6;
         let time = match (application, self.period) {
             (Application::System(system), period) => {
                 refuse(&[(
@@ -156,11 +192,19 @@ impl ToFmu {
         if cycles == 0 || cycles > LONGEST_TICK {
             return Err(Failure::Usage(format!(
                 "a period of {cycles} cycles at {} MHz; a period has 1 to {LONGEST_TICK}",
-                self.clock
+                clock
             ))
             .into());
         }
         Ok(Settings { period, tick: cycles })
+    }
+
+    /// Name that a master shows: that of the file without its ending.
+    fn name(&self) -> String {
+        match self.file.file_stem() {
+            Some(stem) if !files::is_dash(&self.file) => stem.to_string_lossy().into_owned(),
+            _ => "program".to_owned(),
+        }
     }
 
     /// Libraries to put into the FMU.

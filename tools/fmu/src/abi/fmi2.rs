@@ -186,6 +186,32 @@ extern "C" fn fmi2SetInteger(
     })
 }
 
+#[unsafe(no_mangle)]
+extern "C" fn fmi2GetBoolean(
+    component: Component,
+    references: In<u32>,
+    count: usize,
+    values: Out<c_int>,
+) -> Status {
+    call(&component, |handle| {
+        let references = references.read(count)?;
+        values.write(count, |index| Ok(handle.instance.boolean(references[index])?.into()))
+    })
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2SetBoolean(
+    component: Component,
+    references: In<u32>,
+    count: usize,
+    values: In<c_int>,
+) -> Status {
+    call(&component, |handle| {
+        let mut pairs = references.read(count)?.iter().zip(values.read(count)?);
+        pairs.try_for_each(|(&reference, &value)| handle.instance.set_boolean(reference, value != 0))
+    })
+}
+
 states!(
     fmi2GetFMUstate fmi2SetFMUstate fmi2FreeFMUstate fmi2SerializedFMUstateSize
     fmi2SerializeFMUstate fmi2DeSerializeFMUstate
@@ -227,7 +253,7 @@ macro_rules! no_status {
 
 no_status!(fmi2GetStatus fmi2GetIntegerStatus fmi2GetStringStatus);
 
-no_variables!(fmi2GetBoolean fmi2SetBoolean fmi2GetString fmi2SetString);
+no_variables!(fmi2GetString fmi2SetString);
 
 refused!(fmi2GetDirectionalDerivative fmi2SetRealInputDerivatives fmi2GetRealOutputDerivatives fmi2CancelStep);
 

@@ -183,9 +183,39 @@ extern "C" fn fmi3GetFloat64(
     })
 }
 
+#[unsafe(no_mangle)]
+extern "C" fn fmi3GetBoolean(
+    component: Component,
+    references: In<u32>,
+    count: usize,
+    values: Out<Boolean>,
+    value_count: usize,
+) -> Status {
+    call(&component, |handle| {
+        same(count, value_count)?;
+        let references = references.read(count)?;
+        values.write(count, |index| Ok(handle.instance.boolean(references[index])?.into()))
+    })
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi3SetBoolean(
+    component: Component,
+    references: In<u32>,
+    count: usize,
+    values: In<Boolean>,
+    value_count: usize,
+) -> Status {
+    call(&component, |handle| {
+        same(count, value_count)?;
+        let mut pairs = references.read(count)?.iter().zip(values.read(count)?);
+        pairs.try_for_each(|(&reference, &value)| handle.instance.set_boolean(reference, value != 0))
+    })
+}
+
 no_variables!(
     fmi3SetFloat64 fmi3GetInt8 fmi3SetInt8 fmi3GetUInt8 fmi3SetUInt8 fmi3GetInt16 fmi3SetInt16 fmi3GetUInt16 fmi3SetUInt16 fmi3GetInt64
-    fmi3SetInt64 fmi3GetUInt64 fmi3SetUInt64 fmi3GetBoolean fmi3SetBoolean fmi3GetString fmi3SetString fmi3GetBinary fmi3SetBinary
+    fmi3SetInt64 fmi3GetUInt64 fmi3SetUInt64 fmi3GetString fmi3SetString fmi3GetBinary fmi3SetBinary
     fmi3GetClock fmi3SetClock
 );
 

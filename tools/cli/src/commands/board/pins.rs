@@ -44,7 +44,7 @@ struct Encoder {
 }
 
 /// Pins of a simulated board.
-pub(super) struct Pins {
+pub(crate) struct Pins {
     inputs: Vec<Pin>,
     outputs: Vec<Pin>,
     encoders: Vec<Encoder>,
@@ -52,7 +52,7 @@ pub(super) struct Pins {
 
 impl Pins {
     /// Pins of a wiring on a board; pins in `taken` are driven elsewhere.
-    pub(super) fn new(board: &Board, wiring: &Wiring, taken: &[&str]) -> Pins {
+    pub(crate) fn new(board: &Board, wiring: &Wiring, taken: &[&str]) -> Pins {
         let (mut inputs, mut outputs, mut encoders) = (Vec::new(), Vec::new(), Vec::new());
         for (signal, _) in SIGNALS.iter().zip(&wiring.signals).filter(|(_, pin)| pin.is_some()) {
             let circuit = format!("signal_{}", signal.name);
@@ -103,6 +103,23 @@ impl Pins {
     /// Leaves out input pins of the circuit that are driven elsewhere.
     pub(super) fn leave_out(&mut self, circuit: &[String]) {
         self.inputs.retain(|pin| !circuit.contains(&pin.circuit));
+    }
+
+    /// Name of an input pin for a user, from its name in the circuit.
+    pub(crate) fn input_name(&self, circuit: &str) -> Option<&str> {
+        self.inputs.iter().find(|pin| pin.circuit == circuit).map(|pin| pin.name.as_str())
+    }
+
+    /// Name of an output pin for a user, from its name in the circuit.
+    pub(crate) fn output_name(&self, circuit: &str) -> Option<&str> {
+        self.outputs.iter().find(|pin| pin.circuit == circuit).map(|pin| pin.name.as_str())
+    }
+
+    /// Encoders: name of each, names of its two pins in the circuit, and its initial count.
+    pub(crate) fn encoders(&self) -> impl Iterator<Item = (&str, [String; 2], i32)> {
+        self.encoders.iter().map(|encoder| {
+            (encoder.name.as_str(), ["a", "b"].map(|pin| format!("{}_{pin}", encoder.name)), encoder.start)
+        })
     }
 
     /// Finds an input pin by name. If a signal and a peripheral share the name, the signal's pin is chosen.

@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! The option `takt fmu --circuit`: the circuit of a board in Verilator behind the interface of an FMU.
+
+use super::{ToFmu, count};
+use crate::commands::board::Target;
+use crate::commands::board::pins::Pins;
+use crate::terminal::files::{self, Out};
+use crate::terminal::number;
+use crate::terminal::output::{self, Failure};
+use anyhow::{Context, Result, anyhow, ensure};
+use std::io::Write;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+use takt_board::host::Status;
+use takt_board::protocol::{self, ENABLE, RUN};
+use takt_board::simulation::Packed;
+use takt_board::top::RESET;
+use takt_board::{Application, Board, Wiring};
+use takt_fmu::circuit::{Circuit, Encoder, InputPin, Requests};
+use takt_fmu::{Causality, Fmu, Instance, Library, Model, Platform, Settings};
+
+/// Wall-clock time of the run that measures the rate, and its limit in periods.
+const RUN_TIME: Duration = Duration::from_secs(1);
+const RUN_PERIODS: u32 = 100_000;
+/// Number of causes for which outputs become safe.
+const CAUSES: u32 = 7;
+
+/// Rejects options whose values come from the wiring.
+fn refuse(arguments: &ToFmu) -> Result<()> {
+    for (option, given, why) in [
+        ("--period", arguments.period.is_some(), "a step is the wiring's `period`"),
+        ("--clock", arguments.clock.is_some(), "the clock is the wiring's `clock`"),
+    ] {
+        if given {
+            return Err(Failure::Usage(format!("{option} cannot be used with --circuit: {why}")).into());
+        }
+    }
+    Ok(())
+}
+
+pub(super) fn run(arguments: &ToFmu, color: bool, out: &mut Out) -> Result<()> {
+    refuse(arguments)?;
+    let libraries = libraries(arguments)?;
+    let target = Target {
+        board: arguments.board.clone(),
+        wiring: arguments.wiring.clone(),
+        program: arguments.file.clone(),
+        machine: arguments.machine.clone(),
+        source: arguments.source.clone(),
+        parameters: arguments.parameters.clone(),
+    };
+    let (board, wiring, carried) = target.read(color, true)?;
+    let folder = takt_cache::folder()?.join(format!("fmu-{}", std::process::id()));
+    let mut write = || -> Result<()> {
+        let model = model(&board, &wiring, &carried.on_board(), &folder)?;
+        let name = arguments.name();
+        let bytes = Fmu { model: &model, name: &name, fmi: arguments.fmi.into(), libraries: &libraries }
+            .to_bytes()?;
+        // Before the file is written, so that no FMU remains that does not run.
+        let resources = folder.join("resources");
+        model.write(&resources).with_context(|| format!("cannot write {}", resources.display()))?;
+        let rate = rate(&resources)?;
+        files::write(&arguments.output, &bytes)?;
+        if files::is_dash(&arguments.output) {
+            return Ok(());
+        }
+        let Settings { period, tick } = model.settings();
+        writeln!(
+            out,
+            "{}: FMI {} for co-simulation on Linux, the circuit of {} in Verilator, {} inputs, {} outputs, a step of {period} s or {tick} \
+             cycles",
+            arguments.output.display(),
+            arguments.fmi.number(),
+            board.name,
+            count(&model, Causality::Input),
+            count(&model, Causality::Output),
+        )?;
+        writeln!(
+            out,
+            "{rate:.0} periods a second on this machine, in a run with inputs at rest: a second takes {:.3} s",
+            1.0 / (rate * period)
+        )?;
+        Ok(())
+    };
+    let written = write();
+    let _ = std::fs::remove_dir_all(&folder);
+    written
+}
+
+/// The library for Linux, where alone a circuit runs.
+fn libraries(arguments: &ToFmu) -> Result<Vec<Library>> {
+    let (linux, others): (Vec<Library>, Vec<Library>) =
+        arguments.libraries()?.into_iter().partition(|library| library.platform() == Platform::Linux);
+    ensure!(
+        arguments.library.is_empty() || others.is_empty(),
+        "--library: with --circuit the FMU runs on Linux only; leave out the library for {}",
+        others[0].platform().name()
+    );
+    Ok(linux)
+}
+
+/// Model of a board; `folder` takes files for the simulation.
+fn model(board: &Board, wiring: &Wiring, application: &Application<'_>, folder: &Path) -> Result<Model> {
+    output::message("compiling the circuit …");
+    let packed = Packed::new(board, wiring, application.clone(), folder)?;
+    let circuit = circuit(board, wiring, application, &packed)?;
+    let simulation = std::fs::read(&packed.program)
+        .with_context(|| format!("cannot read {}", packed.program.display()))?;
+    let files = packed.files.into_iter().map(|file| (file.name, file.text.into_bytes())).collect();
+    let period = number::shortest(f64::from(wiring.period) / (wiring.clock * 1e6));
+    let settings = Settings { period, tick: wiring.period.into() };
+    Ok(Model::of_circuit(&circuit, simulation, files, settings)?)
+}
+
+/// Pins, files and host of a board.
+fn circuit(
+    board: &Board,
+    wiring: &Wiring,
+    application: &Application<'_>,
+    packed: &Packed,
+) -> Result<Circuit> {
+    let pins = Pins::new(board, wiring, &[]);
+    let index = |name: &String| packed.inputs.iter().position(|(input, _)| input == name);
+    let encoders = pins.encoders().map(|(name, [a, b], start)| {
+        let pins = index(&a).zip(index(&b)).with_context(|| format!("`{name}` has no pins"))?;
+        Ok(Encoder { name: name.to_owned(), pins: pins.into(), start })
+    });
+    let mut encoders = encoders.collect::<Result<Vec<Encoder>>>()?;
+    let unknown = |name: &str| anyhow!("the pin `{name}` of the circuit has no name in the wiring");
+    let inputs = packed.inputs.iter().enumerate().map(|(at, (name, level))| {
+        let turns = encoders.iter().any(|encoder| encoder.pins.contains(&at));
+        let shown = pins.input_name(name).ok_or_else(|| unknown(name))?;
+        Ok(InputPin { name: (!turns).then(|| shown.to_owned()), level: *level })
+    });
+    let inputs = inputs.collect::<Result<Vec<InputPin>>>()?;
+    let outputs =
+        packed.outputs.iter().map(|name| Ok(pins.output_name(name).ok_or_else(|| unknown(name))?.to_owned()));
+    let outputs = outputs.collect::<Result<Vec<String>>>()?;
+    // A signal may have the name of an encoder.
+    let is_taken = |name: &str| {
+        outputs.iter().any(|output| output == name)
+            || inputs.iter().any(|input| input.name.as_deref() == Some(name))
+    };
+    for encoder in &mut encoders {
+        if is_taken(&encoder.name) {
+            encoder.name.push_str(".count");
+        }
+    }
+    let cores = &application.description().cores;
+    let core_name = |name: &String| if application.is_program() { String::new() } else { name.clone() };
+    let cause = |bit| Status(1_u32 << (12 + bit)).causes().next().unwrap_or("another cause").to_owned();
+    Ok(Circuit {
+        board: board.name.clone(),
+        reset: RESET,
+        inputs,
+        encoders,
+        outputs,
+        cores: cores.iter().map(|core| core_name(&core.name)).collect(),
+        causes: (0..CAUSES).map(cause).collect(),
+        trips: wiring.trips().map(|trip| trip.name.clone()).collect(),
+        requests: requests(wiring)?,
+        files: packed.files.iter().map(|file| file.name.clone()).collect(),
+    })
+}
+
+/// Requests of the FMU's host.
+fn requests(wiring: &Wiring) -> Result<Requests> {
+    let address = |name: &str| {
+        let register = protocol::REGISTERS.iter().find(|register| register.name == name);
+        register.map(|register| register.address).with_context(|| format!("no register `{name}`"))
+    };
+    let start = match wiring.autostart {
+        true => Vec::new(),
+        false => protocol::write(1, address("control")?, &[RUN | ENABLE]),
+    };
+    let status = address("status")?;
+    let ask = match wiring.host {
+        0 => Vec::new(),
+        _ => (2..=3).map(|number| protocol::read(number, status, 1)).collect(),
+    };
+    Ok(Requests { start, ask, every: (wiring.host / 2).max(1) })
+}
+
+/// Periods a second of an unpacked FMU, with its inputs at rest.
+fn rate(resources: &Path) -> Result<f64> {
+    let model = Model::read(resources)?;
+    let period = model.settings().period;
+    let mut instance = Instance::new(Arc::new(model))?;
+    instance.enter_initialisation(0.0)?;
+    instance.exit_initialisation()?;
+    let begun = Instant::now();
+    let mut periods = 0;
+    while periods < RUN_PERIODS && begun.elapsed() < RUN_TIME {
+        instance.step(instance.time(), period)?;
+        periods += 1;
+    }
+    Ok(f64::from(periods) / begun.elapsed().as_secs_f64())
+}
