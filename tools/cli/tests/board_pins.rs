@@ -300,3 +300,44 @@ fn a_density_has_no_bound_at_its_pin() {
     }
     assert_eq!(totals, 1, "{json}");
 }
+
+/// Options that do not belong together are reported before anything is compiled.
+#[test]
+fn an_fmu_of_a_circuit_takes_its_numbers_from_the_wiring() {
+    let folder = folder();
+    folder.write("none.so", "");
+    let circuit = "fmu limit.s --machine t1 -o limit.fmu --circuit";
+    for (options, status, says) in [
+        ("", 2, "--wiring <TOML>"),
+        (
+            "--wiring limit.toml --period 1ms",
+            2,
+            "--period cannot be used with --circuit: a step is the wiring's `period`",
+        ),
+        (
+            "--wiring limit.toml --clock 60",
+            2,
+            "--clock cannot be used with --circuit: the clock is the wiring's `clock`",
+        ),
+        (
+            "--wiring limit.toml --library none.so",
+            1,
+            "--library none.so: no shared library for Linux or Windows",
+        ),
+        ("--wiring nowhere.toml", 1, "nowhere.toml"),
+        ("--wiring limit.toml --board nowhere", 1, "there is no board `nowhere`"),
+        ("--wiring limit.toml --param kp=1", 1, "kp"),
+    ] {
+        let done = folder.line(&format!("{circuit} {options}"));
+        assert!(done.status == Some(status) && done.stderr.contains(says), "{options}: {done:?}");
+        assert!(!done.stderr.contains("compiling"), "{options}: {done:?}");
+    }
+    for option in ["--wiring limit.toml", "--board ulx3s-85f"] {
+        let done = folder.line(&format!("fmu limit.s --period 1ms -o limit.fmu {option}"));
+        assert!(done.status == Some(2) && done.stderr.contains("--circuit"), "{option}: {done:?}");
+    }
+    folder.write("limit.s", PROGRAM.replace("n > 10", "m > 10").replace("n:int", "m:int"));
+    let done = folder.line(&format!("{circuit} --wiring limit.toml"));
+    assert!(done.status == Some(1) && done.stderr.contains("limit.toml:"), "{done:?}");
+    assert!(!folder.list().contains(&"limit.fmu".to_owned()));
+}
