@@ -3,10 +3,11 @@
 //! its UART, which starts the program and stays in touch.
 
 use crate::machine::Reason;
-use crate::variables::{Causality, Source, Variable};
+use crate::variables::{Causality, Declaration, Source, Variable};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
-use takt_isa::Type;
+use takt_isa::program::Range;
+use takt_isa::{Register, Type};
 
 /// Encoder, which is set by its count.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -30,11 +31,40 @@ pub struct InputPin {
     pub level: bool,
 }
 
+/// Type of a port that the host sets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum PortType {
+    /// binary32.
+    Float,
+    /// Integer of 32 bits with a sign.
+    Integer,
+    /// 32 bits.
+    Bits,
+}
+
+/// Input port of the program that no peripheral drives, and so the host sets.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct HostPort {
+    /// Name of the variable.
+    pub name: String,
+    /// Name of the port in the source.
+    pub port: String,
+    /// Type of the port.
+    pub ty: PortType,
+    /// Address at the UART (docs/protocol.md).
+    pub address: u16,
+    /// Least and largest value that the source states, as bits.
+    pub range: Option<[u32; 2]>,
+}
+
 /// Host's requests, as bytes at the UART.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Requests {
-    /// Starts the program and enables its outputs; empty if the program starts by itself.
+    /// Starts the program without ticks, so that its ports can be set; empty if the program starts by itself.
+    pub hold: Vec<u8>,
+    /// Lets the program run and enables its outputs; empty if the program starts by itself.
     pub start: Vec<u8>,
     /// Requests that change nothing, sent in turn so that the host is not silent; empty if the board allows silence.
     pub ask: Vec<Vec<u8>>,
@@ -62,6 +92,8 @@ pub struct Circuit {
     pub causes: Vec<String>,
     /// Trips of the wiring by name, from the lowest bit on.
     pub trips: Vec<String>,
+    /// Ports that the host sets, in ascending order of their addresses.
+    pub ports: Vec<HostPort>,
     /// Host's requests.
     pub requests: Requests,
     /// Files that the simulation reads, in `resources/circuit`.
@@ -72,16 +104,20 @@ impl Circuit {
     /// Reason why the circuit has no meaning.
     pub(crate) fn mistake(&self) -> Option<&'static str> {
         let pin = |pin: &usize| *pin >= self.inputs.len();
+        let unsorted = |pair: &[HostPort]| pair[0].address >= pair[1].address;
         match () {
             () if self.encoders.iter().flat_map(|encoder| &encoder.pins).any(pin) => {
                 Some("an encoder is at a pin that the circuit does not have")
+            }
+            () if self.ports.windows(2).any(unsorted) => {
+                Some("the ports are not in the order of their addresses")
             }
             () if self.requests.every == 0 => Some("the host's requests must be a period apart at least"),
             () => None,
         }
     }
 
-    /// Variables, in the order of their value references: levels, counts, and for each output the part of the step.
+    /// Variables, in the order of their value references: levels, counts, the host's ports, and for each output the part of the step.
     pub(crate) fn variables(&self) -> Vec<Variable> {
         let levels = self.inputs.iter().enumerate().filter_map(|(pin, input)| {
             let name = input.name.clone()?;
@@ -95,12 +131,27 @@ impl Circuit {
                 (of.start.cast_unsigned(), "Count to which the encoder turns in the step's first period");
             count
         });
+        let ports = self.ports.iter().enumerate().map(|(number, of)| {
+            let ty = match of.ty {
+                PortType::Float => Type::F,
+                PortType::Integer => Type::I,
+                PortType::Bits => Type::B,
+            };
+            let mut port = Variable::new(of.name.clone(), ty, Causality::Input, Source::HostPort(number));
+            // The register plays no part in a variable's range.
+            let range = of.range.zip(Register::new(0));
+            let range = range.map(|([low, high], register)| Range { register, ty, low, high });
+            port.bound(range.as_ref(), 0);
+            port.declaration = Some(Declaration { core: 0, directive: ".input", name: of.port.clone() });
+            port.description = "Port that the host sets";
+            port
+        });
         let parts = self.outputs.iter().enumerate().map(|(pin, name)| {
             let mut part = Variable::new(name.clone(), Type::F, Causality::Output, Source::Part(pin));
             part.description = "Part of the last period in which the pin was 1";
             part
         });
-        levels.chain(counts).chain(parts).collect()
+        levels.chain(counts).chain(ports).chain(parts).collect()
     }
 }
 
@@ -117,18 +168,26 @@ pub(crate) struct Board {
     counts: Vec<[i32; 2]>,
     /// Part of the last period in which each output was 1.
     parts: Vec<f32>,
-    /// Number of requests that change nothing, periods since the last one, and whether it is answered.
-    asked: usize,
+    /// Bits of each of the host's ports as set, and as the board has them or will have when it answers.
+    ports: Vec<[u32; 2]>,
+    /// Number of requests so far, and periods since the last one.
+    requests: u8,
     since: u32,
-    is_answered: bool,
+    /// Bytes of answers, and their number when all requests are answered.
+    answers: Vec<u8>,
+    awaited: usize,
 }
 
 /// Cycles after which the host looks for the answer to its start.
 const SLICE: u32 = 256;
 /// Most cycles that the answer takes: a UART of 115200 baud at 200 MHz needs 300 000 for 16 bytes each way.
-const PATIENCE: u64 = 5_000_000;
-/// First byte of an answer, and its number of bytes without words (docs/protocol.md).
-const ANSWER: (u8, usize) = (0x5a, 6);
+const PATIENCE: u32 = 5_000_000;
+/// First byte of a request, and of an answer, whose bytes without words are so many (docs/protocol.md).
+const REQUEST: u8 = 0xa5;
+const ANSWER: u8 = 0x5a;
+const ANSWER_BYTES: usize = 6;
+/// Most words of a request.
+const REQUEST_WORDS: usize = 16;
 /// Words of a moment in which outputs became safe.
 const MOMENT: usize = 10;
 
@@ -142,9 +201,11 @@ impl Board {
             levels: Vec::new(),
             counts: Vec::new(),
             parts: Vec::new(),
-            asked: 0,
+            ports: Vec::new(),
+            requests: 0,
             since: 0,
-            is_answered: true,
+            answers: Vec::new(),
+            awaited: 0,
         };
         board.reset();
         board
@@ -156,7 +217,10 @@ impl Board {
         self.levels = self.circuit.inputs.iter().map(|input| input.level).collect();
         self.counts = self.circuit.encoders.iter().map(|encoder| [encoder.start; 2]).collect();
         self.parts = vec![0.0; self.circuit.outputs.len()];
-        (self.asked, self.since, self.is_answered) = (0, 0, true);
+        // The variables state the start, which is not always 0.
+        self.ports = vec![[0; 2]; self.circuit.ports.len()];
+        (self.requests, self.since, self.awaited) = (0, 0, 0);
+        self.answers.clear();
     }
 
     pub(crate) fn set_level(&mut self, pin: usize, level: bool) {
@@ -165,6 +229,10 @@ impl Board {
 
     pub(crate) fn set_count(&mut self, encoder: usize, count: i32) {
         self.counts[encoder][0] = count;
+    }
+
+    pub(crate) fn set_port(&mut self, port: usize, bits: u32) {
+        self.ports[port][0] = bits;
     }
 
     pub(crate) fn part(&self, pin: usize) -> f32 {
@@ -178,22 +246,66 @@ impl Board {
             self.stand(encoder);
         }
         self.run_cycles(self.circuit.reset, &[])?;
-        if self.circuit.requests.start.is_empty() {
+        let Requests { hold, start, .. } = self.circuit.requests.clone();
+        let settings = self.settings();
+        if !settings.is_empty() {
+            self.request(hold)?;
+        }
+        for setting in settings {
+            self.request(setting)?;
+        }
+        self.request(start)
+    }
+
+    /// Sends a request, unless it is empty, and waits for its answer.
+    fn request(&mut self, mut bytes: Vec<u8>) -> Result<(), Reason> {
+        if bytes.is_empty() {
             return Ok(());
         }
-        let (mut bytes, mut answer, mut cycles) = (self.circuit.requests.start.clone(), Vec::new(), 0);
-        while answer.len() < ANSWER.1 {
-            if cycles >= PATIENCE {
-                return Err("the board does not answer its host".to_owned());
-            }
-            answer.extend(self.run_cycles(SLICE, &bytes)?.received);
+        self.awaited = ANSWER_BYTES;
+        for _ in 0..PATIENCE / SLICE {
+            let received = self.run_cycles(SLICE, &bytes)?.received;
             bytes.clear();
-            cycles += u64::from(SLICE);
+            if self.hears(&received)? {
+                return Ok(());
+            }
         }
-        match answer[..] {
-            [first, _, 0, 0, ..] if first == ANSWER.0 => Ok(()),
-            _ => Err(format!("the board does not start its program: it answers {answer:02x?}")),
+        Err("the board does not answer its host".to_owned())
+    }
+
+    /// Takes bytes from the board; returns whether all requests are answered.
+    fn hears(&mut self, received: &[u8]) -> Result<bool, Reason> {
+        self.answers.extend(received);
+        if self.answers.len() < self.awaited {
+            return Ok(self.awaited == 0);
         }
+        let mut rest = self.answers.as_slice();
+        while let [first, _, status, words, ..] = *rest {
+            if first != ANSWER || status != 0 {
+                return Err(format!("the board refuses a request of its host: it answers {rest:02x?}"));
+            }
+            rest = rest.get(ANSWER_BYTES + 4 * usize::from(words)..).unwrap_or_default();
+        }
+        self.answers.clear();
+        self.awaited = 0;
+        Ok(true)
+    }
+
+    /// Requests that set the ports whose values have changed. Ports with consecutive addresses change together.
+    fn settings(&mut self) -> Vec<Vec<u8>> {
+        let mut requests = Vec::new();
+        let together = self.circuit.ports.chunk_by(|a, b| a.address + 1 == b.address);
+        let mut from = 0;
+        for ports in together.flat_map(|run| run.chunks(REQUEST_WORDS)) {
+            let values = &mut self.ports[from..from + ports.len()];
+            from += ports.len();
+            if values.iter().any(|[set, sent]| set != sent) {
+                values.iter_mut().for_each(|[set, sent]| *sent = *set);
+                self.requests = self.requests.wrapping_add(1);
+                requests.push(setting(self.requests, ports[0].address, values));
+            }
+        }
+        requests
     }
 
     /// The pins of an encoder are at the count where it stands.
@@ -207,12 +319,7 @@ impl Board {
     /// Runs a period: `number` of those before it. Adds warnings.
     pub(crate) fn run(&mut self, number: u64, warnings: &mut Vec<String>) -> Result<(), Reason> {
         self.since = self.since.saturating_add(1);
-        let mut bytes = Vec::new();
-        let Requests { ask, every, .. } = &self.circuit.requests;
-        if self.is_answered && self.since >= *every && !ask.is_empty() {
-            bytes.clone_from(&ask[self.asked % ask.len()]);
-            (self.asked, self.since, self.is_answered) = (self.asked + 1, 0, false);
-        }
+        let bytes = if self.awaited == 0 { self.next_requests() } else { Vec::new() };
         let mut turns = Vec::new();
         for (encoder, [to, from]) in self.circuit.encoders.iter().zip(&mut self.counts) {
             turns.push((encoder.pins, *from, to.wrapping_sub(*from)));
@@ -223,13 +330,30 @@ impl Board {
         for encoder in 0..self.counts.len() {
             self.stand(encoder);
         }
-        self.is_answered |= !answer.received.is_empty();
+        self.hears(&answer.received)?;
         let period = self.period as f32;
         self.parts = answer.high.iter().map(|&cycles| cycles as f32 / period).collect();
         for moment in answer.moments.chunks_exact(MOMENT) {
             warnings.push(format!("period {number}: {}", self.moment(moment)));
         }
         Ok(())
+    }
+
+    /// Bytes of the requests that are due: changed ports, or else, now and then, a request that changes nothing.
+    fn next_requests(&mut self) -> Vec<u8> {
+        let settings = self.settings();
+        let Requests { ask, every, .. } = &self.circuit.requests;
+        if !settings.is_empty() {
+            (self.since, self.awaited) = (0, ANSWER_BYTES * settings.len());
+            return settings.concat();
+        }
+        if self.since < *every || ask.is_empty() {
+            return Vec::new();
+        }
+        // The answer has a word.
+        (self.since, self.awaited) = (0, ANSWER_BYTES + 4);
+        self.requests = self.requests.wrapping_add(1);
+        ask[usize::from(self.requests) % ask.len()].clone()
     }
 
     /// A moment in words.
@@ -251,6 +375,22 @@ impl Board {
         let simulation = self.simulation.as_mut().ok_or("the simulation has ended")?;
         simulation.run(cycles, &self.levels, &[], bytes)
     }
+}
+
+/// Request that sets ports with consecutive addresses to values, whose first bits are those to set.
+fn setting(number: u8, address: u16, values: &[[u32; 2]]) -> Vec<u8> {
+    let [low, high] = address.to_le_bytes();
+    let mut bytes = vec![REQUEST, number, 2, values.len() as u8, low, high];
+    bytes.extend(values.iter().flat_map(|[set, _]| set.to_le_bytes()));
+    let sum = checksum(&bytes[1..]);
+    bytes.extend(sum.to_le_bytes());
+    bytes
+}
+
+/// CRC-16/CCITT-FALSE, as the board computes it (docs/protocol.md).
+fn checksum(bytes: &[u8]) -> u16 {
+    let shifted = |sum: u16| if sum & 0x8000 == 0 { sum << 1 } else { sum << 1 ^ 0x1021 };
+    bytes.iter().fold(0xffff, |sum, &byte| (0..8).fold(sum ^ u16::from(byte) << 8, |sum, _| shifted(sum)))
 }
 
 /// Answer of the simulation to a command.

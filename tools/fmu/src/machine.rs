@@ -123,6 +123,7 @@ impl Machine {
                 return;
             }
             (Machine::Circuit(board), Source::Level(pin)) => return board.set_level(pin, bits != 0),
+            (Machine::Circuit(board), Source::HostPort(port)) => return board.set_port(port, bits),
             (Machine::Circuit(board), Source::Count(encoder)) => {
                 return board.set_count(encoder, bits.cast_signed());
             }

@@ -41,6 +41,8 @@ pub(crate) enum Source {
     Level(usize),
     /// Count of an encoder at a circuit.
     Count(usize),
+    /// Port of the program at a circuit that the host sets.
+    HostPort(usize),
     /// Part of a period in which an output pin of a circuit was 1.
     Part(usize),
 }
@@ -99,7 +101,7 @@ impl Variable {
     }
 
     /// States a range and a start, or, if that lies outside, the end next to zero.
-    fn bound(&mut self, range: Option<&Range>, start: u32) {
+    pub(crate) fn bound(&mut self, range: Option<&Range>, start: u32) {
         self.start = match range {
             Some(range) if !range.holds(start) => match range.ends().0 > 0.0 {
                 true => range.low,

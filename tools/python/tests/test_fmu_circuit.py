@@ -59,13 +59,15 @@ PROGRAM = """
 .schedule on
 .param  slow = 0.5
 .input  at_end:int, n:int
+.input  flash:int, stop                ; the host's
+.range  stop = -0.25, 0.25
 .output duty, lit:int
 .once
         duty, lit = 0, 0
         wait    period
 .period
-period: duty = at_end ? 0 : n > 10 ? 1 : slow
-        lit = at_end
+period: duty = at_end ? stop : n > 10 ? 1 : slow
+        lit = xor(at_end, flash)
         wait    period
 """
 # Types of segments in a program; one that is linked dynamically has the latter.
@@ -87,7 +89,7 @@ def write(folder, wiring, *options):
     file = folder / f"{Path(wiring).stem}{''.join(options)}.fmu".replace("=", "")
     command = [TOOL.resolve(), "fmu", "limit.s", "--circuit", "--wiring", wiring, "--machine", "t1", "-o", file, "--library", LIBRARY.resolve()]
     said = subprocess.run([*command, *options], check=True, capture_output=True, text=True, cwd=folder).stdout
-    assert "the circuit of ulx3s-85f in Verilator, 4 inputs, 3 outputs, a step of 0.0001 s or 5000 cycles" in said
+    assert "the circuit of ulx3s-85f in Verilator, 6 inputs, 3 outputs, a step of 0.0001 s or 5000 cycles" in said
     assert " periods a second on this machine" in said
     return file
 
@@ -110,6 +112,7 @@ def test_pins_are_those_of_the_simulated_board(board, fmi):
     shown = {v.name: (v.type, v.causality, v.start) for v in description.modelVariables}
     assert shown["limit.in"] == shown["stop"] == shown["button"] == ("Boolean", "input", "false")
     assert shown["drive.count"] == (integer, "input", "5") and shown["drive"] == (real, "output", None)
+    assert shown["flash"] == (integer, "input", "0") and shown["stop.port"] == (real, "input", "0.0")
     assert not description.coSimulation.canGetAndSetFMUstate and not description.coSimulation.canSerializeFMUstate
     names = [("time", float), ("limit.in", bool), ("drive.count", np.int32)]
     inputs = np.array([(i * PERIOD, *row) for i, row in enumerate(rows)], dtype=names)
@@ -131,6 +134,28 @@ def test_the_host_starts_the_program_and_is_not_silent(board, tmp_path):
     master.set(stop=True)
     master.step(2 * PERIOD)
     assert master.get("drive") == 0.0 and "the outputs become safe: stop" in master.messages[0]
+    master.end()
+
+
+@pytest.mark.parametrize("wiring", ["limit.toml", "host.toml"])
+def test_the_host_sets_ports_without_pins(board, tmp_path, wiring):
+    """Before the first tick those that are set before; later ones when the request has come."""
+    master = Master(write(board, wiring), tmp_path, initialise=False)
+    pulse = lambda duty: pytest.approx((1 + duty * 1024 / 1250) / 2, abs=0.001)
+    master.set(**{"flash": 1, "stop.port": -0.125, "limit.in": True})
+    master.initialise()
+    if wiring == "host.toml":
+        master.step(PERIOD)
+    master.step(2 * PERIOD)
+    assert (master.get("lamp.out"), master.get("motor.high")) == (1 - 1, pulse(-0.125))
+    # The ports are neighbours; a request of two words takes 160 bits, 160 µs at this rate. Meanwhile other values come.
+    for value in (0.25, 0.2, 0.125, 0.0625):
+        master.set(**{"flash": 0, "stop.port": value})
+        master.step(PERIOD)
+    master.step(4 * PERIOD)
+    assert (master.get("lamp.out"), master.get("motor.high")) == (1.0, pulse(0.0625))
+    master.fails("0.5 is no value of `stop.port`: the source states the range -0.25 to 0.25", lambda: master.set(**{"stop.port": 0.5}))
+    assert master.get("drive") == 1.0 and master.messages == []
     master.end()
 
 

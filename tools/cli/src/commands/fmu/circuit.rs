@@ -4,21 +4,24 @@
 use super::{ToFmu, count};
 use crate::commands::board::Target;
 use crate::commands::board::pins::Pins;
+use crate::run::application::Application as Carried;
 use crate::terminal::files::{self, Out};
 use crate::terminal::number;
 use crate::terminal::output::{self, Failure};
 use anyhow::{Context, Result, anyhow, ensure};
+use std::collections::BTreeSet;
 use std::io::Write;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use takt_board::host::Status;
-use takt_board::protocol::{self, ENABLE, RUN};
+use takt_board::protocol::{self, ENABLE, HOLD, RUN};
 use takt_board::simulation::Packed;
 use takt_board::top::RESET;
 use takt_board::{Application, Board, Wiring};
-use takt_fmu::circuit::{Circuit, Encoder, InputPin, Requests};
+use takt_fmu::circuit::{Circuit, Encoder, HostPort, InputPin, PortType, Requests};
 use takt_fmu::{Causality, Fmu, Instance, Library, Model, Platform, Settings};
+use takt_isa::{Program, Type};
 
 /// Wall-clock time of the run that measures the rate, and its limit in periods.
 const RUN_TIME: Duration = Duration::from_secs(1);
@@ -53,7 +56,13 @@ pub(super) fn run(arguments: &ToFmu, color: bool, out: &mut Out) -> Result<()> {
     let (board, wiring, carried) = target.read(color, true)?;
     let folder = takt_cache::folder()?.join(format!("fmu-{}", std::process::id()));
     let mut write = || -> Result<()> {
-        let model = model(&board, &wiring, &carried.on_board(), &folder)?;
+        let program = match &carried {
+            Carried::Program(loaded) => Some(&loaded.program),
+            Carried::System(_) => None,
+        };
+        let model = model(&board, &wiring, &carried.on_board(), program, &folder)?;
+        let sources: Vec<_> = carried.programs().iter().map(|program| program.sources.as_slice()).collect();
+        let model = model.with_units(&sources);
         let name = arguments.name();
         let bytes = Fmu { model: &model, name: &name, fmi: arguments.fmi.into(), libraries: &libraries }
             .to_bytes()?;
@@ -101,10 +110,17 @@ fn libraries(arguments: &ToFmu) -> Result<Vec<Library>> {
 }
 
 /// Model of a board; `folder` takes files for the simulation.
-fn model(board: &Board, wiring: &Wiring, application: &Application<'_>, folder: &Path) -> Result<Model> {
+fn model(
+    board: &Board,
+    wiring: &Wiring,
+    application: &Application<'_>,
+    program: Option<&Program>,
+    folder: &Path,
+) -> Result<Model> {
     output::message("compiling the circuit …");
     let packed = Packed::new(board, wiring, application.clone(), folder)?;
-    let circuit = circuit(board, wiring, application, &packed)?;
+    let ports = program.map_or(Vec::new(), |program| ports(wiring, program));
+    let circuit = circuit(board, wiring, application, ports, &packed)?;
     let simulation = std::fs::read(&packed.program)
         .with_context(|| format!("cannot read {}", packed.program.display()))?;
     let files = packed.files.into_iter().map(|file| (file.name, file.text.into_bytes())).collect();
@@ -118,6 +134,7 @@ fn circuit(
     board: &Board,
     wiring: &Wiring,
     application: &Application<'_>,
+    mut ports: Vec<HostPort>,
     packed: &Packed,
 ) -> Result<Circuit> {
     let pins = Pins::new(board, wiring, &[]);
@@ -137,14 +154,17 @@ fn circuit(
     let outputs =
         packed.outputs.iter().map(|name| Ok(pins.output_name(name).ok_or_else(|| unknown(name))?.to_owned()));
     let outputs = outputs.collect::<Result<Vec<String>>>()?;
-    // A signal may have the name of an encoder.
-    let is_taken = |name: &str| {
-        outputs.iter().any(|output| output == name)
-            || inputs.iter().any(|input| input.name.as_deref() == Some(name))
-    };
+    // A signal may have the name of an encoder, and a port that of either.
+    let mut taken: BTreeSet<String> = outputs.iter().cloned().collect();
+    taken.extend(inputs.iter().filter_map(|input| input.name.clone()));
     for encoder in &mut encoders {
-        if is_taken(&encoder.name) {
+        if !taken.insert(encoder.name.clone()) {
             encoder.name.push_str(".count");
+        }
+    }
+    for port in &mut ports {
+        if taken.contains(&port.name) {
+            port.name.push_str(".port");
         }
     }
     let cores = &application.description().cores;
@@ -159,9 +179,30 @@ fn circuit(
         cores: cores.iter().map(|core| core_name(&core.name)).collect(),
         causes: (0..CAUSES).map(cause).collect(),
         trips: wiring.trips().map(|trip| trip.name.clone()).collect(),
+        ports,
         requests: requests(wiring)?,
         files: packed.files.iter().map(|file| file.name.clone()).collect(),
     })
+}
+
+/// Input ports of a program that no peripheral drives.
+fn ports(wiring: &Wiring, program: &Program) -> Vec<HostPort> {
+    let driven: BTreeSet<&String> =
+        wiring.peripherals.iter().flat_map(|peripheral| peripheral.reads.iter().flatten()).collect();
+    let ports = program.inputs.iter().filter(|port| !driven.contains(&port.name));
+    let ports = ports.filter_map(|port| {
+        let address = protocol::INPUTS + program.machine.inputs.index(port.register)?.get();
+        let ty = match port.ty {
+            Type::F => PortType::Float,
+            Type::I => PortType::Integer,
+            Type::B => PortType::Bits,
+        };
+        let range = program.range(port.register).map(|range| [range.low, range.high]);
+        Some(HostPort { name: port.name.clone(), port: port.name.clone(), ty, address, range })
+    });
+    let mut ports: Vec<HostPort> = ports.collect();
+    ports.sort_by_key(|port| port.address);
+    ports
 }
 
 /// Requests of the FMU's host.
@@ -170,16 +211,19 @@ fn requests(wiring: &Wiring) -> Result<Requests> {
         let register = protocol::REGISTERS.iter().find(|register| register.name == name);
         register.map(|register| register.address).with_context(|| format!("no register `{name}`"))
     };
-    let start = match wiring.autostart {
+    let control = address("control")?;
+    let command = |number, bits| match wiring.autostart {
         true => Vec::new(),
-        false => protocol::write(1, address("control")?, &[RUN | ENABLE]),
+        false => protocol::write(number, control, &[bits]),
     };
+    // Numbers that differ from those before and after.
+    let (hold, start) = (command(0x80, RUN | HOLD | ENABLE), command(0x81, RUN | ENABLE));
     let status = address("status")?;
     let ask = match wiring.host {
         0 => Vec::new(),
-        _ => (2..=3).map(|number| protocol::read(number, status, 1)).collect(),
+        _ => (0x82..=0x83).map(|number| protocol::read(number, status, 1)).collect(),
     };
-    Ok(Requests { start, ask, every: (wiring.host / 2).max(1) })
+    Ok(Requests { hold, start, ask, every: (wiring.host / 2).max(1) })
 }
 
 /// Periods a second of an unpacked FMU, with its inputs at rest.
