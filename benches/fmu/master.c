@@ -1,23 +1,46 @@
 /* SPDX-License-Identifier: MIT OR Apache-2.0
  *
- * A master of FMI 2.0 that only measures: in each period all inputs are set, a step is made, all outputs are read.
+ * A master of FMI 2.0 for Linux and Windows: in each period all inputs are set, a step is made, all outputs are read.
  *
- *   master LIBRARY RESOURCES GUID PERIOD PERIODS ROWS NR NI MR MI < numbers
+ *   master LIBRARY RESOURCES GUID PERIOD PERIODS ROWS NR NI MR MI [print] < numbers
  *
  * NR, NI are the numbers of inputs that are Real and Integer, MR, MI those of outputs. The numbers are the value references in this order,
- * then ROWS rows of inputs. Prints periods per second, and a sum of all outputs. */
+ * then ROWS rows of inputs, of which the first is set before the initialisation ends. Prints periods per second, and a sum of all outputs;
+ * with `print` the outputs of each period in place of both: binary32 as its bits, integers in decimal. */
+#ifdef _WIN32
+#include <windows.h>
+#else
 #include <dlfcn.h>
+#endif
+#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 #include <time.h>
 
 typedef void *Component;
 typedef struct { void *logger, *allocate, *release, *finished, *environment; } Callbacks;
 
+#ifdef _WIN32
+static HMODULE library;
+static int load(const char *path) { return (library = LoadLibraryA(path)) != NULL; }
+static void *find(const char *name) { return (void *)(uintptr_t)GetProcAddress(library, name); }
+static const char *reason(void) { return "LoadLibrary fails"; }
+static double seconds(void) { return (double)clock() / CLOCKS_PER_SEC; }
+#else
 static void *library;
+static int load(const char *path) { return (library = dlopen(path, RTLD_NOW)) != NULL; }
+static void *find(const char *name) { return dlsym(library, name); }
+static const char *reason(void) { return dlerror(); }
+static double seconds(void) {
+    struct timespec now;
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+#endif
 
 static void *function(const char *name) {
-    void *found = dlsym(library, name);
+    void *found = find(name);
     if (!found) { fprintf(stderr, "no function %s\n", name); exit(1); }
     return found;
 }
@@ -33,7 +56,9 @@ static double number(void) {
 }
 
 int main(int count, char **argument) {
-    if (count != 11 || !(library = dlopen(argument[1], RTLD_NOW))) { fprintf(stderr, "%s\n", count == 11 ? dlerror() : "usage"); return 1; }
+    int prints = count == 12 && !strcmp(argument[11], "print");
+    if (count != 11 && !prints) { fprintf(stderr, "usage: see the comment in master.c\n"); return 1; }
+    if (!load(argument[1])) { fprintf(stderr, "%s: %s\n", argument[1], reason()); return 1; }
     double period = atof(argument[4]);
     long periods = atol(argument[5]), rows = atol(argument[6]);
     size_t sizes[4];
@@ -62,10 +87,12 @@ int main(int count, char **argument) {
     if (!component) { fprintf(stderr, "no instance\n"); return 1; }
     expect(setup(component, 0, 0, 0, 0, 0), "setup");
     expect(enter(component), "enter");
+    if (rows > 0) {
+        expect(set_real(component, references[0], sizes[0], reals), "set");
+        expect(set_integer(component, references[1], sizes[1], integers), "set");
+    }
     expect(leave(component), "leave");
-    struct timespec begin, end;
-    double sum = 0;
-    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &begin);
+    double sum = 0, begin = seconds();
     for (long i = 0; i < periods; i++) {
         size_t row = (size_t)(i % rows);
         expect(set_real(component, references[0], sizes[0], reals + row * sizes[0]), "set");
@@ -75,9 +102,16 @@ int main(int count, char **argument) {
         expect(get_integer(component, references[3], sizes[3], counts), "get");
         for (size_t k = 0; k < sizes[2]; k++) sum += results[k];
         for (size_t k = 0; k < sizes[3]; k++) sum += counts[k];
+        if (!prints) continue;
+        for (size_t k = 0; k < sizes[2]; k++) {
+            float value = (float)results[k];
+            uint32_t bits;
+            memcpy(&bits, &value, sizeof bits);
+            printf("%08lx ", (unsigned long)bits);
+        }
+        for (size_t k = 0; k < sizes[3]; k++) printf("%d ", counts[k]);
+        printf("\n");
     }
-    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &end);
-    double seconds = (double)(end.tv_sec - begin.tv_sec) + 1e-9 * (double)(end.tv_nsec - begin.tv_nsec);
-    printf("%.0f %.17g\n", (double)periods / seconds, sum);
+    if (!prints) printf("%.0f %.17g\n", (double)periods / (seconds() - begin), sum);
     return 0;
 }

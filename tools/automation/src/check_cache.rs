@@ -119,7 +119,7 @@ const fn check(name: &'static str, command: &'static str, seconds: Option<f64>) 
 }
 
 /// Checks outside cargo's tests.
-pub const CHECKS: [Check; 10] = [
+pub const CHECKS: [Check; 11] = [
     check("formal", "cargo evidence check formal", Some(158.0)),
     check("units", "cargo evidence check units", Some(100.0)),
     check(OPERANDS, "cargo evidence formal --units", Some(900.0)),
@@ -127,6 +127,7 @@ pub const CHECKS: [Check; 10] = [
     check("litex", "cargo evidence check litex", None),
     check("routed", "cargo evidence check routed", Some(300.0)),
     check("boards", "cargo evidence check boards", None),
+    check("fmu-windows", "cargo evidence check fmu-windows", None),
     check(LINUXCNC, "cargo evidence check linuxcnc", None),
     check("book", "cargo xtask book --no-rustdoc --no-playground", Some(5.0)),
     check(EXHAUSTIVE, "cargo xtask test --full", None),

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The command `cargo evidence check`: evidence that CI collects; each check is repeated only when its inputs change.
 
-use crate::{boards, clients, formal, linuxcnc, litex, routed};
+use crate::{boards, clients, fmu_windows, formal, linuxcnc, litex, routed};
 use anyhow::{Result, ensure};
 use takt_automation::check_cache::{self, Inputs, LINUXCNC, OPERANDS};
 use takt_automation::command::install;
@@ -12,7 +12,8 @@ use takt_automation::progress;
 pub(crate) struct Arguments {
     /// The checks by name, which then run even if they have passed with the same files; without names, formal, units, clients and litex.
     names: Vec<String>,
-    /// Run all, those that take longer too: the placed and routed board, a bitstream for each family, LinuxCNC.
+    /// Run all, those that take longer too: the placed and routed board, a bitstream for each family, FMUs in Wine,
+    /// LinuxCNC.
     #[arg(long, conflicts_with = "names")]
     all: bool,
 }
@@ -27,7 +28,7 @@ struct Share {
     run: fn() -> Result<()>,
 }
 
-const SHARES: [Share; 7] = [
+const SHARES: [Share; 8] = [
     Share {
         name: "formal",
         is_short: true,
@@ -40,6 +41,8 @@ const SHARES: [Share; 7] = [
     Share { name: "routed", is_short: false, inputs: Some(routed::inputs), run: routed::test },
     // The tools may change unnoticed, so this check never counts as passed.
     Share { name: "boards", is_short: false, inputs: None, run: boards::one_of_each },
+    // Wine and the compilers may change unnoticed.
+    Share { name: "fmu-windows", is_short: false, inputs: None, run: fmu_windows::test },
     Share {
         name: LINUXCNC,
         is_short: false,

@@ -9,6 +9,7 @@ mod campaign;
 mod check;
 mod clients;
 mod documents;
+mod fmu_windows;
 mod formal;
 mod linuxcnc;
 mod litex;
