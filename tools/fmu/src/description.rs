@@ -103,7 +103,7 @@ fn value_attributes(variable: &Variable, fmi: Fmi) -> String {
         let _ = write!(text, " min=\"{low}\" max=\"{high}\"");
     }
     if variable.causality != Causality::Output {
-        let start = match variable.is_boolean() {
+        let start = match variable.is_boolean {
             true => (variable.start != 0).to_string(),
             false => number(variable.ty, variable.start, fmi),
         };
@@ -128,13 +128,13 @@ fn element(out: &mut String, reference: usize, variable: &Variable, fmi: Fmi) {
     let _ = match (fmi, variable.ty) {
         (Fmi::Two, ty) => {
             let tag = match ty {
-                _ if variable.is_boolean() => "Boolean",
+                _ if variable.is_boolean => "Boolean",
                 Type::F => "Real",
                 Type::I | Type::B => "Integer",
             };
             writeln!(out, "    <ScalarVariable {common}><{tag}{values}/></ScalarVariable>")
         }
-        (Fmi::Three, _) if variable.is_boolean() => writeln!(out, "    <Boolean {common}{values}/>"),
+        (Fmi::Three, _) if variable.is_boolean => writeln!(out, "    <Boolean {common}{values}/>"),
         (Fmi::Three, Type::F) => writeln!(out, "    <Float32 {common}{values}/>"),
         (Fmi::Three, Type::I) => writeln!(out, "    <Int32 {common}{values}/>"),
         (Fmi::Three, Type::B) => writeln!(out, "    <UInt32 {common}{values}/>"),

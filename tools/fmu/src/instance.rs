@@ -215,7 +215,7 @@ impl Instance {
     fn boolean_index(&self, reference: u32) -> Result<usize, Mistake> {
         let index = reference.wrapping_sub(TIME + 1) as usize;
         match self.model.variables.get(index) {
-            Some(variable) if variable.is_boolean() => Ok(index),
+            Some(variable) if variable.is_boolean => Ok(index),
             _ => Err(Mistake::Reference(reference)),
         }
     }
@@ -236,7 +236,7 @@ impl Instance {
     fn index(&self, reference: u32, types: &[Type]) -> Result<usize, Mistake> {
         let index = reference.wrapping_sub(TIME + 1) as usize;
         match self.model.variables.get(index) {
-            Some(variable) if types.contains(&variable.ty) && !variable.is_boolean() => Ok(index),
+            Some(variable) if types.contains(&variable.ty) && !variable.is_boolean => Ok(index),
             _ => Err(Mistake::Reference(reference)),
         }
     }

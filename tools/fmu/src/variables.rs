@@ -75,12 +75,26 @@ pub struct Variable {
     pub description: &'static str,
     pub(crate) declaration: Option<Declaration>,
     pub(crate) source: Source,
+    /// The variable is a Boolean: 0 or 1. A field, since each access of a master asks for it.
+    pub(crate) is_boolean: bool,
 }
 
 impl Variable {
     pub(crate) fn new(name: String, ty: Type, causality: Causality, source: Source) -> Variable {
         let (range, unit, declaration) = (None, None, None);
-        Variable { name, ty, causality, range, start: 0, unit, description: "", declaration, source }
+        let is_boolean = matches!(source, Source::Level(_));
+        Variable {
+            name,
+            ty,
+            causality,
+            range,
+            start: 0,
+            unit,
+            description: "",
+            declaration,
+            source,
+            is_boolean,
+        }
     }
 
     /// Port or parameter of a core's program, under its own name.
@@ -110,11 +124,6 @@ impl Variable {
             _ => start,
         };
         self.range = range.map(|range| (range.low, range.high));
-    }
-
-    /// The variable is a Boolean: 0 or 1.
-    pub(crate) fn is_boolean(&self) -> bool {
-        matches!(self.source, Source::Level(_))
     }
 
     /// Value in words.
