@@ -7,9 +7,9 @@
 //   which one of these comes. The pin OUTPUTS is the board's tick. faults: 1 in so many bits of the UART, in either direction, is turned;
 //   0: none.
 // stdout: the cycles that were run, whether the last of them has the board's tick, and of the pins watched those with an edge in it, as
-// bits; a count and that many bytes that came from the UART,
-// a word each; for each output pin the cycles in which it was 1, and its level; the SEEN words of `see`; a count and that many moments in which outputs of a core became safe, or trips rose: the cycle, the core, and the words of `look` but
-// the first. The last word has the trips that rose; it is 0 where outputs of the core became safe.
+// bits; a count and that many bytes that came from the UART, a word each; for each output pin the cycles in which it was 1, and its level;
+// a count and that many words of `see`; a count and that many moments in which outputs of a core became safe, or trips rose: the cycle, the
+// core, and the words of `look` but the first. The last word has the trips that rose; it is 0 where outputs of the core became safe.
 //
 // pins.h, which is generated, gives DIVIDE, INPUTS, OUTPUTS and the pins; watch.h CORES and look, whose first word is whether a core's
 // outputs drive, ticks, and see with SEEN, the registers that the program reads. Of a circuit that is not watched, CORES and SEEN are 0.
@@ -186,6 +186,8 @@ int main(int argc, char **argv) {
         }
         uint32_t seen[SEEN + 1];
         see(&top, seen);
+        size = SEEN;
+        fwrite(&size, sizeof size, 1, stdout);
         fwrite(seen, sizeof(uint32_t), SEEN, stdout);
         size = moments.size() / (LOOKED + 1);
         fwrite(&size, sizeof size, 1, stdout);

@@ -323,12 +323,13 @@ impl Simulation {
         self.cycles += u64::from(cycles);
         // The rest has a length that is known, but for its last part.
         let (count, outputs, seen) = (count as usize, self.outputs.len(), self.seen.len());
-        let mut rest = self.words(count + 2 * outputs + seen + 1)?;
+        let mut rest = self.words(count + 2 * outputs + 1 + seen + 1)?;
         let moments = rest.pop().unwrap_or_default() as usize;
         if !self.unplugged {
             self.received.extend(rest[..count].iter().map(|&word| word as u8));
         }
-        self.seen = rest.split_off(count + 2 * outputs);
+        self.seen = rest.split_off(count + 2 * outputs + 1);
+        rest.truncate(count + 2 * outputs);
         self.levels = rest.split_off(count + outputs);
         self.high = rest.split_off(count);
         for moment in self.words(safety_watch::WORDS * moments)?.chunks_exact(safety_watch::WORDS) {

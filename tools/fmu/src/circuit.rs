@@ -467,6 +467,8 @@ mod process {
             }
             words.push(bytes.len() as u32);
             words.extend(bytes.iter().map(|&byte| u32::from(byte)));
+            // No pin is watched: the run does not end before its time.
+            words.push(0);
             let words: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
             self.exchange(&words).map_err(|error| {
                 let status = self.process.try_wait().ok().flatten();
@@ -477,10 +479,13 @@ mod process {
 
         fn exchange(&mut self, words: &[u8]) -> std::io::Result<Answer> {
             self.line.write_all(words)?;
+            // The cycles that were run, and whether the last is that of the tick.
+            self.words(2)?;
             let received = self.counted(1)?;
             let high = self.words(self.outputs)?;
-            // The levels at the end.
+            // The levels at the end, and the registers that the program reads.
             self.words(self.outputs)?;
+            self.counted(1)?;
             let moments = self.counted(MOMENT)?;
             Ok(Answer { received: received.into_iter().map(|word| word as u8).collect(), high, moments })
         }

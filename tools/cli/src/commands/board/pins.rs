@@ -97,7 +97,7 @@ impl Pins {
 
     /// Name for users of an output pin in the circuit.
     pub(super) fn shown<'p>(&'p self, circuit: &'p str) -> &'p str {
-        self.outputs.iter().find(|pin| pin.circuit == circuit).map_or(circuit, |pin| &pin.name)
+        self.output_name(circuit).unwrap_or(circuit)
     }
 
     /// Leaves out input pins of the circuit that are driven elsewhere.
