@@ -1054,7 +1054,7 @@ fn accuracy_puts_bounds_beside_what_it_measures() {
         );
     }
     assert!(
-        done.stdout.contains("root.s:6:8-30: a root, which is infinitely steep at zero"),
+        done.stdout.contains("root.s:6:8-31: a root, which is infinitely steep at zero"),
         "{}",
         done.stdout
     );
