@@ -464,7 +464,8 @@ pub(crate) type Axes =
     Cartesian2d<plotters::coord::types::RangedCoordf64, plotters::coord::types::RangedCoordf64>;
 
 pub(crate) fn mesh(chart: &mut ChartContext<'_, SVGBackend<'_>, Axes>, x: &str, y: &str) -> Outcome<()> {
-    let label = |value: &f64| format!("{}", (value * 1e6).round() / 1e6);
+    // A sum with zero has no negative zero.
+    let label = |value: &f64| format!("{}", (value * 1e6).round() / 1e6 + 0.0);
     // In a low chart, as many labels as do not touch.
     let height = chart.plotting_area().dim_in_pixel().1;
     chart

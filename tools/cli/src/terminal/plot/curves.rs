@@ -2,6 +2,7 @@
 //! Columns of a table over time as SVG, a chart for each.
 
 use super::{CUT, Outcome, POINTS, SIZE, chart, font, in_pixels, mesh, px};
+use crate::terminal::number::rounded;
 use anyhow::{Result, anyhow};
 use plotters::prelude::*;
 
@@ -10,6 +11,13 @@ const HEIGHT: u32 = 150;
 const TITLE: u32 = 40;
 /// Most charts; further columns are left out.
 const CHARTS: usize = 40;
+/// Characters beside a chart.
+const NAME: usize = 18;
+/// Characters of a line of constants, and its height in pixels.
+const LINE: usize = 110;
+const LINE_HEIGHT: u32 = 22;
+/// Color of a reference, below the signal that follows it.
+const REFERENCE: RGBColor = RGBColor(0xd5, 0x5e, 0x00);
 
 /// Least and largest value of each column in a stretch of periods.
 #[derive(Clone)]
@@ -68,44 +76,110 @@ impl Curves {
         self.every *= 2;
     }
 
+    /// Least and largest value of a column; `None` if it has no number.
+    fn range(&self, column: usize) -> Option<(f64, f64)> {
+        let all = self.stretches.iter().filter_map(|stretch| stretch.ranges.get(column).copied().flatten());
+        all.reduce(|(low, high), (a, b)| (low.min(a), high.max(b)))
+    }
+
+    /// Columns of each chart: one, or a signal with the reference that it follows (`id`, or a plant's `motor.id`, and `id_ref`).
+    fn charts(&self) -> Vec<Vec<usize>> {
+        let mut charts: Vec<Vec<usize>> = Vec::new();
+        let follows = |name: &str, reference: &str| {
+            let signal = name.rsplit('.').next().unwrap_or(name);
+            reference.rsplit('.').next().and_then(|text| text.strip_suffix("_ref")) == Some(signal)
+        };
+        let signal_of = |reference: &str| self.titles.iter().position(|name| follows(name, reference));
+        for (column, name) in self.titles.iter().enumerate() {
+            if signal_of(name).is_some() {
+                continue;
+            }
+            let reference = self.titles.iter().position(|other| signal_of(other) == Some(column));
+            charts.push([Some(column), reference].into_iter().flatten().collect());
+        }
+        charts
+    }
+
+    /// Columns of the charts in which something changes, and the constant columns in words.
+    fn parted(&self) -> (Vec<Vec<usize>>, Vec<String>) {
+        let changes = |column: &usize| self.range(*column).is_some_and(|(low, high)| low < high);
+        let (moving, still): (Vec<_>, Vec<_>) =
+            self.charts().into_iter().partition(|columns| columns.iter().any(changes));
+        let words = still.into_iter().flatten().map(|column| {
+            let value = self.range(column).map_or_else(|| "no number".to_owned(), |(low, _)| rounded(low, 6));
+            format!("{} = {value}", self.titles[column])
+        });
+        (moving, words.collect())
+    }
+
+    /// Name beside a chart: that of the column, without its plant or peripheral if the chart is too low for it.
+    fn name(&self, columns: &[usize]) -> String {
+        let joined = |short: bool| {
+            let names = columns.iter().map(|column| self.titles[*column].as_str());
+            let last = |name| if short { str::rsplit(name, '.').next().unwrap_or(name) } else { name };
+            names.map(last).collect::<Vec<_>>().join(" over ")
+        };
+        let whole = joined(false);
+        if whole.chars().count() > NAME { joined(true) } else { whole }
+    }
+
     /// The picture.
     pub(crate) fn draw(&self, title: &str) -> Result<String> {
         let mut svg = String::new();
-        let count = self.titles.len().clamp(1, CHARTS) as u32;
-        let height = TITLE + count * HEIGHT;
-        self.draw_into(title, (count, height), &mut svg).map_err(|error| anyhow!("cannot draw: {error}"))?;
+        let (mut charts, constants) = self.parted();
+        charts.truncate(CHARTS);
+        let mut lines: Vec<String> = Vec::new();
+        for text in constants {
+            match lines.last_mut() {
+                Some(line) if line.len() + text.len() < LINE => *line += &format!(",   {text}"),
+                _ => lines.push(text),
+            }
+        }
+        let height = TITLE + charts.len() as u32 * HEIGHT + (lines.len() as u32 + 1) * LINE_HEIGHT;
+        let drawn = self.draw_into(title, &charts, &lines, height, &mut svg);
+        drawn.map_err(|error| anyhow!("cannot draw: {error}"))?;
         Ok(in_pixels(&svg, SIZE, height))
     }
 
-    fn draw_into(&self, title: &str, (count, height): (u32, u32), svg: &mut String) -> Outcome<()> {
+    fn draw_into(
+        &self,
+        title: &str,
+        charts: &[Vec<usize>],
+        lines: &[String],
+        height: u32,
+        svg: &mut String,
+    ) -> Outcome<()> {
         let root = SVGBackend::with_string(svg, (px(SIZE), px(height))).into_drawing_area();
         root.fill(&WHITE)?;
         let (head, rest) = root.split_vertically(px(TITLE));
         head.titled(title, font(20))?;
+        let (rest, foot) = rest.split_vertically(px(charts.len() as u32 * HEIGHT));
+        for (row, line) in lines.iter().enumerate() {
+            let place = (px(LINE_HEIGHT) as i32, px(row as u32 * LINE_HEIGHT) as i32);
+            foot.draw_text(line, &font(13).into_text_style(&foot), place)?;
+        }
         let time = |stretch: f64| stretch * self.every as f64 * self.period.unwrap_or(1.0);
         let end = time(self.stretches.len().max(1) as f64);
         let label = if self.period.is_some() { "time, s" } else { "period" };
-        for (column, area) in rest.split_evenly((count as usize, 1)).iter().enumerate() {
-            let of = |stretch: &Stretch| stretch.ranges.get(column).copied().flatten();
-            let all = self.stretches.iter().filter_map(of);
-            let (low, high) = all.fold((f64::MAX, f64::MIN), |(low, high), (a, b)| (low.min(a), high.max(b)));
-            let (low, high) = if low > high { (0.0, 1.0) } else { (low, high) };
-            // A constant has an axis, too.
-            let margin = match () {
-                () if high > low => 0.06 * (high - low),
-                () if low == 0.0 => 1.0,
-                () => 0.5 * low.abs(),
-            };
-            let mut chart = chart(area).build_cartesian_2d(0.0..end, low - margin..high + margin)?;
-            let name = self.titles.get(column).map_or("", String::as_str);
-            mesh(&mut chart, if column + 1 == count as usize { label } else { "" }, name)?;
-            // Steps, as the values are held; a stretch of many periods has both of its ends.
-            let points = self.stretches.iter().enumerate().filter_map(|(index, stretch)| {
-                let (low, high) = of(stretch)?;
-                let (from, to) = (time(index as f64), time(index as f64 + 1.0));
-                Some([(from, low), (from, high), (to, high)])
-            });
-            chart.draw_series(LineSeries::new(points.flatten(), CUT.stroke_width(px(1))))?;
+        for (number, (columns, area)) in
+            charts.iter().zip(rest.split_evenly((charts.len().max(1), 1))).enumerate()
+        {
+            let ranges = columns.iter().filter_map(|column| self.range(*column));
+            let (low, high) =
+                ranges.reduce(|(low, high), (a, b)| (low.min(a), high.max(b))).unwrap_or((0.0, 1.0));
+            let margin = if high > low { 0.06 * (high - low) } else { 1.0 };
+            let mut chart = chart(&area).build_cartesian_2d(0.0..end, low - margin..high + margin)?;
+            mesh(&mut chart, if number + 1 == charts.len() { label } else { "" }, &self.name(columns))?;
+            // The reference lies below.
+            for (column, color) in columns.iter().zip([CUT, REFERENCE]).rev() {
+                // Steps, as the values are held; a stretch of many periods has both of its ends.
+                let points = self.stretches.iter().enumerate().filter_map(|(index, stretch)| {
+                    let (low, high) = stretch.ranges.get(*column).copied().flatten()?;
+                    let (from, to) = (time(index as f64), time(index as f64 + 1.0));
+                    Some([(from, low), (from, high), (to, high)])
+                });
+                chart.draw_series(LineSeries::new(points.flatten(), color.stroke_width(px(1))))?;
+            }
         }
         root.present()?;
         Ok(())
@@ -134,6 +208,19 @@ mod tests {
         assert!(curves.stretches.iter().all(|stretch| stretch.ranges[1].is_none()));
         let svg = curves.draw("a & b").unwrap();
         assert!(svg.contains("a &amp; b") && svg.contains("time, s"), "{}", &svg[..300]);
+    }
+
+    /// What does not change takes a line of text, and a reference lies below its signal.
+    #[test]
+    fn constants_are_words_and_references_share_a_chart() {
+        let titles = ["id_ref", "motor.id", "tripped", "w_ref", "w"].map(str::to_owned);
+        let mut curves = Curves::new(titles.to_vec(), Some(1e-3));
+        for row in 0..10 {
+            curves.add(&["0", &row.to_string(), "1", &row.to_string(), "2"].map(str::to_owned));
+        }
+        assert_eq!(curves.parted(), (vec![vec![1, 0], vec![4, 3]], vec!["tripped = 1".to_owned()]));
+        let svg = curves.draw("loop").unwrap();
+        assert!(["id over id_ref", "w over w_ref", "tripped = 1"].iter().all(|text| svg.contains(text)));
     }
 
     #[test]
