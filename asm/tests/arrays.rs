@@ -463,6 +463,28 @@ fn elements_are_operands_of_instructions() {
     check(" y[1] = 7\n y[2], y[1] = y[1], x[2]", "y", &[2., 7., 0., 0.]);
 }
 
+/// A read behind the write of an element has the type of the array, whatever was written: a number, or bits.
+#[test]
+fn what_an_element_was_written_from_does_not_change_its_type() {
+    let check = |body: &str, name: &str, expected: &[f32]| left(&format!("{DECLARED}{body}"), name, expected);
+    let over = ".macro over d:int, a:int\n d = 5 < a\n.endm\n";
+    for written in ["7", "n & 15", "xor(n, 16)", "n << 3", "n | 64"] {
+        check(
+            &format!(" n = 7\n k[1] = {written}\n y[1] = itof(5 < k[1])\n y[2] = itof(k[1] > 6)"),
+            "y",
+            &[1., 1.],
+        );
+        check(&format!("{over} n = 7\n k[1] = {written}\n y[1] = itof(over(k[1]))"), "y", &[1.]);
+        check(
+            &format!(" n = 7\n k[1] = {written}\n n = k[1] + 100 & 0xff\n y[1] = itof(n > 99)"),
+            "y",
+            &[1.],
+        );
+    }
+    // In a float array a whole number is a float, and is compared as one.
+    check(" x[1] = 7\n y[1] = itof(5.5 < x[1])\n y[2] = x[1]/2", "y", &[1., 3.5]);
+}
+
 #[test]
 fn subscripts_in_registers() {
     let check = |body: &str, name: &str, expected: &[f32]| left(&format!("{DECLARED}{body}"), name, expected);

@@ -319,11 +319,14 @@ impl Resolver<'_> {
             NodeKind::All | NodeKind::Range => return Err(ErrorReported),
             NodeKind::Element(element) => {
                 let Element { name, indices } = &run.ast.elements[element as usize];
-                let register = match self.element_place(at, *name, indices, span)? {
-                    Place::Register(register) => register,
-                    Place::Word(word) => self.load(at, line, &word, span)?,
+                let (register, kind) = match self.element_place(at, *name, indices, span)? {
+                    Place::Register(register) => (register, self.kind(register)),
+                    // The register may be the one that an element was stored from, such as a constant's, which has no type of its own.
+                    Place::Word(word) => {
+                        (self.load(at, line, &word, span)?, Kind::of(self.element_type(&word)))
+                    }
                 };
-                return Ok(Term { form: TermForm::Register(register, self.kind(register)), span });
+                return Ok(Term { form: TermForm::Register(register, kind), span });
             }
             NodeKind::Prefix(operator) => {
                 let terms = run.take(1);
@@ -434,7 +437,9 @@ impl Resolver<'_> {
                 let asked = self.asked;
                 let loaded = self.load(at, line, &word, span)?;
                 self.asked = asked;
-                Ok(register(self, loaded))
+                let taken = self.cast.or(self.type_of_parameter());
+                let kind = Kind::of(taken.unwrap_or_else(|| self.element_type(&word)));
+                Ok(Term { form: TermForm::Register(loaded, kind), span })
             }
             (_, Some((_, Binding::Index(index)))) => {
                 self.check_argument(Kind::Int)?;
