@@ -568,6 +568,44 @@ fn operations_name_their_lines_of_c() {
     assert_eq!([place("fmul"), place("fdiv")], [format!("{name}:2"), format!("{name}:3")]);
 }
 
+/// Elements in data memory are read right after they are written: from numbers, from bits, and from narrow types.
+#[test]
+fn compares_elements_that_were_just_written() {
+    check(
+        "elements_just_written",
+        r#"struct st { int count; int log[8]; }; static struct st s;
+int step(int n) { s.log[n & 7] = n; s.count = 7; return s.count > 5 && s.log[n & 7] == n; }
+"#,
+    );
+    check(
+        "elements_just_masked",
+        r#"static int x[8]; static int t[4];
+int step(int n) { int i = n & 7; x[i] = (x[i] + n) & 255; t[n & 3] = ~n | 16; int a = x[i] > 99 ? 5 : 6; return a*(t[n & 3] < 0 ? 2 : 3); }
+"#,
+    );
+    check(
+        "elements_just_cut",
+        r#"#include <stdint.h>
+struct st { uint8_t c8; int16_t tab[4]; }; static struct st s;
+int step(int n) { s.c8 += 50; s.c8 += 100; s.tab[n & 3] = (int16_t)n; return s.c8 + s.tab[n & 3] + (s.tab[n & 3] > 77); }
+"#,
+    );
+}
+
+/// Pointers have as many elements as the step uses, however the elements are found out.
+#[test]
+fn pointers_have_as_many_elements_as_are_used() {
+    let sizes = |name: &str, code: &str| {
+        let translation = check(name, code);
+        [translation.inputs.len(), translation.outputs.len()]
+    };
+    let code = "void step(const float *x, float *y) { for (int i = 0; i < 3; i++) y[i] = x[i + 1]; }\n";
+    assert_eq!(sizes("pointers_in_a_loop", code), [3, 3]);
+    assert_eq!(sizes("pointers_by_numbers", "float step(const float *x) { return x[0] + x[1] + x[7]; }\n"), [3, 1]);
+    let code = "struct p { float a, b; }; float step(const struct p *p, int n) { float s = 0; for (int i = 0; i < 5; i++) s += p[i].b; return s + p[n & 7].a; }\n";
+    assert_eq!(sizes("pointers_to_structures", code), [17, 1]);
+}
+
 /// Iterations that are left over when a loop is unrolled are written out, with numbers in place of the counter.
 #[test]
 fn divides_counters() {

@@ -46,7 +46,7 @@ pub struct Options {
     /// Numbers that the step is given in every period, by the scalars as C writes them (`n`, `conf->taps`): they are computed with while
     /// translating.
     pub set: Vec<(String, f64)>,
-    /// Functions without a result whose calls are left out.
+    /// Functions whose calls are left out where no result is used.
     pub ignore: Vec<String>,
     /// Bound of the loops whose end data decide and that have no other; more iterations are a fault.
     pub loop_bound: Option<u64>,

@@ -83,7 +83,11 @@ impl Unit {
                     .take_while(|c| !c.is_whitespace())
                     .take(24)
                     .collect();
-                Err(unit.error(error.offset, format!("`takt cc` cannot read this as C99, at `{found}`")))
+                let text = match found.is_empty() {
+                    true => "the file ends before the C does: a `}` or a `;` is missing".to_owned(),
+                    false => format!("`takt cc` cannot read this as C99, at `{found}`"),
+                };
+                Err(unit.error(error.offset, text))
             }
         }
     }

@@ -16,13 +16,18 @@ use std::rc::Rc;
 const MAX_CALLS: usize = 64;
 
 impl<'a> Exec<'a> {
+    /// The call is one that the user leaves out.
+    pub(super) fn is_ignored(&self, call: &CallExpression) -> bool {
+        matches!(&call.callee.node, Expression::Identifier(name) if self.ignored.contains(&name.node.name))
+    }
+
     pub(super) fn call(&mut self, call: &'a CallExpression) -> Result<Typed, Error> {
         if let Expression::Identifier(name) = &call.callee.node {
             let name = name.node.name.as_str();
-            if self.ignored.iter().any(|ignored| ignored == name) {
+            if self.is_ignored(call) {
                 return match self.looked_up(name) {
                     Some(Named::Function(_, signature)) if signature.result != Type::Void => {
-                        self.fail(format!("--ignore {name}: its result is a value"))
+                        self.fail(format!("--ignore {name}: its result is used here"))
                     }
                     _ => Ok(Typed { ty: Type::Void, value: Value::Unset }),
                 };

@@ -219,6 +219,15 @@ impl<'a> Exec<'a> {
 
     /// Evaluates an expression for its side effects.
     pub(super) fn effect(&mut self, expression: &'a Node<Expression>) -> Result<(), Error> {
+        let inner = match &expression.node {
+            Expression::Cast(cast) => &cast.node.expression,
+            _ => expression,
+        };
+        if let Expression::Call(call) = &inner.node
+            && self.is_ignored(&call.node)
+        {
+            return Ok(());
+        }
         self.value(expression).map(|_| ())
     }
 

@@ -83,7 +83,7 @@ impl<'a> Exec<'a> {
                     .fail(format!("`{name}` rounds once, and only some machines do: write `a*b + c`"));
             }
             ("printf" | "puts" | "fprintf" | "snprintf" | "__assert_fail", _) => {
-                return self.fail(format!("`{name}`: nothing can be printed while running; leave it out with `#ifndef`, or write to an output"));
+                return self.fail(format!("`{name}`: nothing can be printed while running; leave it out by `--ignore {name}`, or write to an output"));
             }
             _ => {}
         }
@@ -94,7 +94,8 @@ impl<'a> Exec<'a> {
             }
             return self.number(short, name, values);
         }
-        let near = "give the file that defines it, or pass its result as a parameter of the step";
+        let near = "give the file that defines it, pass its result as a parameter of the step, or leave out calls whose result is not used \
+                    by --ignore";
         self.fail(format!("`{name}` is defined in none of the files: {near}"))
     }
 

@@ -93,11 +93,13 @@ pub(super) struct Exec<'a> {
     pub(super) units: &'a [Unit],
     /// `double` is binary32.
     pub(super) double_is_float: bool,
-    /// Functions without a result whose calls are left out.
+    /// Functions whose calls are left out where no result is used.
     ignored: &'a [String],
     /// Bound of the loops that have no other.
     loop_bound: Option<u64>,
     pub(super) facts: Facts,
+    /// The extents with which the objects of this translation are made.
+    pub(super) extents: HashMap<Key, usize>,
     /// Facts have grown: this translation is not the last.
     pub(super) again: bool,
     /// The step runs: writes to states are recorded.
@@ -138,6 +140,7 @@ impl<'a> Exec<'a> {
             ignored: &options.ignore,
             loop_bound: options.loop_bound,
             structs: Structs { list: Vec::new(), members: facts.unions.clone() },
+            extents: facts.extents.clone(),
             facts,
             again: false,
             stepping: false,

@@ -160,7 +160,8 @@ impl Exec<'_> {
         }
         let (name, key) = (object.name.clone(), object.key.clone());
         if let (Some(extent), Some(first)) = (self.facts.extents.get(&key), object.leaves.first()) {
-            let element = self.structs.size(&first.ty).unwrap_or(4) * object.leaves.len() / (*extent).max(1);
+            let built = self.extents.get(&key).copied().unwrap_or(1);
+            let element = self.structs.size(&first.ty).unwrap_or(4) * object.leaves.len() / built.max(1);
             let wanted =
                 usize::try_from(pointer.offset).map_or(usize::MAX, |offset| offset / element.max(1) + 1);
             if wanted <= MAX_EXTENT && wanted > *extent {
@@ -249,8 +250,9 @@ impl Exec<'_> {
         let Pointer { object, offset, dynamic: Some(dynamic) } = pointer else { return Ok(()) };
         let found = &self.objects[*object];
         let Some(extent) = self.facts.extents.get(&found.key).copied() else { return Ok(()) };
+        let built = self.extents.get(&found.key).copied().unwrap_or(1);
         let own = match &found.ty {
-            Type::Array(own, _) if extent > 1 => &**own,
+            Type::Array(own, _) if built > 1 => &**own,
             own => own,
         };
         if own != element {
@@ -258,7 +260,7 @@ impl Exec<'_> {
             return Ok(());
         }
         let size = self.structs.size(element).unwrap_or(4).max(1) as i64;
-        let each = (found.leaves.len() / extent.max(1)).max(1) as i64;
+        let each = (found.leaves.len() / built.max(1)).max(1) as i64;
         let most = self.nodes.range(*dynamic).1 / each + offset / size;
         let wanted = usize::try_from(most).unwrap_or(0) + 1;
         if wanted > MAX_EXTENT {
