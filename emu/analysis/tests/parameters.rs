@@ -48,3 +48,29 @@ fn a_preset_input_needs_its_range() {
     assert!(refused.contains('x'), "{refused}");
     assert_eq!(range(&enclose(&source(&format!(".range x = -1, 1\n{text}"), &F3)).unwrap()), (-3.0, 3.0));
 }
+
+/// A state that only the code before the first period writes keeps its value, and needs no range.
+#[test]
+fn a_state_of_the_first_section_keeps_its_value() {
+    let text = |period: &str| {
+        format!(
+            ".input x\n.range x = -1, 1\n.output y\n.state k\n.reg a n:int\n.once\n a = 3.0\n k = 1.0/a\n call scaled\n y = k\n wait p\n\
+             .period\np: {period}\n y = k*x\n wait p\nscaled: k = 2*k\n ret\n"
+        )
+    };
+    let program = source(&text("nop"), &F3);
+    let enclosure = enclose(&program).unwrap();
+    let ((low, high), two_thirds) = (range(&enclosure), f64::from(2.0f32 / 3.0));
+    assert!(high >= two_thirds && high < two_thirds + 1e-6 && low == -high, "{low} to {high}");
+    // The quotient's own rounding is no error of a period.
+    let error = enclosure.outputs[0].error.unwrap();
+    assert!(error <= 3.0e-8 + 1e-12, "{error:e}");
+    for seed in 0..4 {
+        check(&program, &enclosure, 300, &mut Random::new(seed));
+    }
+    // A period that writes it, itself or by a subroutine, has to state a range.
+    for period in ["ilt n, x, 0\n bz n, on\n k = 3.0\non: nop", "call scaled"] {
+        let refused = enclose(&source(&text(period), &F3)).unwrap_err().to_string();
+        assert!(refused.contains("`k`"), "{refused}");
+    }
+}

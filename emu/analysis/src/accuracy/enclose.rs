@@ -14,7 +14,7 @@ use super::node::{Made, Node};
 use super::number::{Number, Problem};
 use super::states::{Place, is_shown, is_word_shown};
 use super::value::Value;
-use super::{fixed, preset};
+use super::{fixed, kept, preset};
 use crate::error::{BoundError, Refusal, place};
 use crate::graph::{Edge, Graph};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
@@ -77,6 +77,8 @@ fn explored<'p>(
         first: BTreeSet::new(),
         needed: BTreeSet::new(),
         fixed: fixed(program),
+        kept: kept(program),
+        left_by_once: BTreeMap::new(),
         float_outputs: numbers(program).filter(|port| port.ty == Type::F).map(|port| port.register).collect(),
         arrays: array_starts(program),
         state_symbols: BTreeMap::new(),
@@ -199,6 +201,9 @@ pub(super) struct Explorer<'p> {
     pub(super) needed: BTreeSet<Register>,
     /// Constant registers of the program: [`fixed`].
     pub(super) fixed: BTreeMap<Register, u32>,
+    /// Registers that no period writes, and the code before the first one does: [`kept`]. The values that it leaves there.
+    kept: BTreeSet<Register>,
+    left_by_once: BTreeMap<Register, Value>,
     /// Output ports that carry binary32.
     float_outputs: BTreeSet<Register>,
     /// First words of arrays, by their labels, and the end of the declared data.
@@ -243,6 +248,17 @@ impl Explorer<'_> {
         let mut registers: BTreeMap<Register, Rc<Node>> =
             constants.into_iter().map(|(register, bits)| (register, constant(bits))).collect();
         registers.insert(Register::ZERO, constant(0));
+        for (register, value) in self.left_by_once.clone() {
+            let value = match value {
+                // Every period begins with the run's value, which counts as exact.
+                Value::Float(number) => {
+                    let symbol = self.symbol(None);
+                    Value::Float(Rc::new(Number::of(number.actual, symbol, number.grid)))
+                }
+                value => value,
+            };
+            registers.insert(register, Node::leaf(value));
+        }
         let mut unshown = BTreeSet::new();
         self.periods += u32::from(!once);
         (self.once, self.found.ended) = (once, false);
@@ -613,6 +629,12 @@ impl Explorer<'_> {
         for word in program.results.iter().flat_map(ArrayResult::span) {
             let node = self.word_of(state, word);
             self.leaves(Place::Word(word), &node);
+        }
+        if self.once {
+            for register in &self.kept {
+                let value = state.registers.get(register).map_or(&Value::Unknown, |node| &node.value);
+                join_into(&mut self.left_by_once, *register, value);
+            }
         }
         // Unread states pass to the next period, which may read them.
         self.needed.extend(&state.unshown);

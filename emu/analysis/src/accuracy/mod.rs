@@ -28,8 +28,8 @@ mod shadow;
 mod states;
 mod value;
 
-use std::collections::BTreeMap;
-use takt_isa::{Instruction, Program, Register};
+use std::collections::{BTreeMap, BTreeSet};
+use takt_isa::{BundleAddress, Flow, Instruction, Program, Register};
 
 pub use enclose::{MAX_BUNDLES, MAX_UNROLLED, enclose, enclose_within};
 pub use enclosure::{
@@ -66,6 +66,48 @@ fn fixed(program: &Program) -> BTreeMap<Register, u32> {
         }
     }
     fixed
+}
+/// Registers that are written, and by no bundle that a period can reach: they keep what the code before the first period leaves in them.
+fn kept(program: &Program) -> BTreeSet<Register> {
+    let slots = program.machine.slots;
+    let bundle = |address: BundleAddress| {
+        let start = address.index() * slots.len();
+        let words = program.code.get(start..start + slots.len()).unwrap_or_default();
+        words.iter().map(|word| Instruction::decode(*word).ok()).collect::<Vec<_>>()
+    };
+    let writes = |address: BundleAddress| {
+        let instructions = bundle(address).into_iter().zip(slots);
+        instructions.filter_map(|(instruction, slot)| instruction?.writes(slot)).collect::<Vec<_>>()
+    };
+    let flow = |address: BundleAddress| Flow::of(bundle(address).iter().flatten());
+    let mut open: Vec<BundleAddress> = program
+        .addresses()
+        .filter_map(|address| match flow(address) {
+            Flow::Wait(target) => Some(target),
+            _ => None,
+        })
+        .collect();
+    let mut in_periods = BTreeSet::new();
+    while let Some(address) = open.pop() {
+        if address.index() >= program.bundles() as usize || !in_periods.insert(address) {
+            continue;
+        }
+        let next = address.next();
+        match flow(address) {
+            Flow::Jump(target) | Flow::Wait(target) => open.push(target),
+            Flow::Branch { target, .. } | Flow::Call(target) => open.extend([target, next]),
+            Flow::Loop { end, .. } => open.extend([end, next]),
+            Flow::Next | Flow::LoopEnd => open.push(next),
+            // A call goes on behind itself.
+            Flow::Return | Flow::Halt => {}
+        }
+    }
+    let of = |in_period: bool| {
+        let addresses = program.addresses().filter(|address| in_periods.contains(address) == in_period);
+        addresses.flat_map(writes).collect::<BTreeSet<_>>()
+    };
+    let ranged = |register: &Register| program.ranges.iter().any(|range| range.register == *register);
+    of(false).difference(&of(true)).filter(|register| !ranged(register)).copied().collect()
 }
 /// Exponent of the smallest normal binary32.
 const LEAST_EXPONENT: i32 = -126;
