@@ -592,6 +592,16 @@ int step(int n) { s.c8 += 50; s.c8 += 100; s.tab[n & 3] = (int16_t)n; return s.c
     );
 }
 
+/// The source says which word of a structure in data memory is which member.
+#[test]
+fn lists_the_members_of_a_structure_in_memory() {
+    let code = "struct st { float gain; int count; float hist[8]; struct { int a, b; } in; };\n\
+                float step(struct st *s, float x, int n) { s->hist[n & 7] = x; s->count++; s->in.a += n;\n\
+                return s->gain*s->hist[(n + 1) & 7] + s->count + s->in.a; }\n";
+    let text = check("members_of_a_structure", code).text;
+    assert!(text.contains("; Words of s: 1 gain, 2 count, 3 to 10 hist, 11 in_a, 12 in_b.\n"), "{text}");
+}
+
 /// Pointers have as many elements as the step uses, however the elements are found out.
 #[test]
 fn pointers_have_as_many_elements_as_are_used() {
@@ -601,7 +611,10 @@ fn pointers_have_as_many_elements_as_are_used() {
     };
     let code = "void step(const float *x, float *y) { for (int i = 0; i < 3; i++) y[i] = x[i + 1]; }\n";
     assert_eq!(sizes("pointers_in_a_loop", code), [3, 3]);
-    assert_eq!(sizes("pointers_by_numbers", "float step(const float *x) { return x[0] + x[1] + x[7]; }\n"), [3, 1]);
+    assert_eq!(
+        sizes("pointers_by_numbers", "float step(const float *x) { return x[0] + x[1] + x[7]; }\n"),
+        [3, 1]
+    );
     let code = "struct p { float a, b; }; float step(const struct p *p, int n) { float s = 0; for (int i = 0; i < 5; i++) s += p[i].b; return s + p[n & 7].a; }\n";
     assert_eq!(sizes("pointers_to_structures", code), [17, 1]);
 }

@@ -19,6 +19,10 @@ use text::{Speller, real};
 const COMMENT: usize = 56;
 /// Limit on the operations of an unrolled loop's iteration.
 const UNROLLED: usize = 200;
+/// Most members of a structure in data memory that a comment lists.
+const MEMBERS: usize = 100;
+/// Longest line of such a comment, in characters.
+const LINE: usize = 120;
 /// Maximum length of a comment, in characters.
 const COMMENT_LENGTH: usize = 72;
 
@@ -80,6 +84,11 @@ pub(super) fn program(exec: &mut Exec<'_>, roles: Roles, options: &Options) -> R
     for (index, (array, used)) in exec.nodes.arrays.iter().zip(arrays).enumerate() {
         if used {
             head.lines(&declared_array(array));
+            if array.kind.is_none()
+                && let Some(words) = members(exec, index, &array.name)
+            {
+                words.iter().for_each(|line| head.comment(line));
+            }
         }
         match kept.get(&index) {
             Some((c, true)) if used => {
@@ -126,6 +135,34 @@ fn ports(head: &mut Head, directive: &str, ports: &[Port]) {
         }
         head.lines(&format!("{}\n", line.trim_end()));
     }
+}
+
+/// Lines that say which words of an array hold which members: `1 gain, 2 to 9 hist`. `None` if it is no object with a word for each scalar, or
+/// has too many.
+fn members(exec: &Exec<'_>, array: usize, name: &str) -> Option<Vec<String>> {
+    let object = exec.objects.iter().find(|object| object.array == Some(array))?;
+    let is_whole = exec.nodes.arrays[array].words.len() == object.leaves.len();
+    let mut runs: Vec<(usize, usize, &str)> = Vec::new();
+    for (leaf, word) in object.leaves.iter().zip(1..) {
+        match runs.last_mut() {
+            Some((_, last, name)) if *name == leaf.name => *last = word,
+            _ => runs.push((word, word, &leaf.name)),
+        }
+    }
+    let mut lines = vec![format!("Words of {name}:")];
+    for &(first, last, member) in &runs {
+        let words = if first == last { first.to_string() } else { format!("{first} to {last}") };
+        let text = format!(" {words} {member},");
+        match lines.last_mut() {
+            Some(line) if line.len() + text.len() <= LINE => line.push_str(&text),
+            _ => lines.push(format!("   {text}")),
+        }
+    }
+    if let Some(line) = lines.last_mut() {
+        line.pop();
+        line.push('.');
+    }
+    (is_whole && (2..=MEMBERS).contains(&runs.len())).then_some(lines)
 }
 
 fn declared_array(array: &super::ir::Array) -> String {
