@@ -629,7 +629,7 @@ static int n[128];
 float step(float x, int k) {
   t[k & 63] += x;
   for (int i = 701; i > 0; i--) t[(i / 4) & 63] += x*t[i % 4 + 1];
-  for (int i = -701; i < 700; i++) n[i & 127] += i / 4 + (i % 4)*k + i / -8;
+  for (int i = -701; i < 700; i++) n[i & 127] += i / 4 + (i % 4)*k + i / -8 + (i << 30) + (int)((unsigned)i << 31);
   float s = 0;
   for (int i = 0; i < 83; i++) s += n[i]*t[i / 2];
   return s; }

@@ -96,6 +96,17 @@ impl Exec<'_> {
         if let Some(simple) = self.simplified(op, operands) {
             return Ok(simple);
         }
+        // A counter that an iteration which is written out knows is shifted by the assembler, in 64 bits.
+        if op == Op::ShiftLeft && self.nodes.is_counted(operands[0]) {
+            let ((least, most), (by, last)) = (self.nodes.range(operands[0]), self.nodes.range(operands[1]));
+            let fits =
+                |value: i64| (i64::from(i32::MIN)..=i64::from(u32::MAX)).contains(&(value << (by & 31)));
+            if by == last && by & 31 > 0 && !(fits(least) && fits(most)) {
+                let mask = self.nodes.int((u32::MAX >> (by & 31)) as i32);
+                let kept = self.op(Op::And, &[operands[0], mask])?;
+                return self.op(Op::ShiftLeft, &[kept, operands[1]]);
+            }
+        }
         if let Some(sum) = self.offset(op, operands) {
             return self.op(Op::IntAdd, &sum);
         }
