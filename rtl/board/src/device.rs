@@ -115,7 +115,7 @@ pub fn of(peripheral: &Peripheral, register: &str, value: f64) -> Result<Box<dyn
                     "the encoder stands at {count} counts at the beginning, and `{name}` starts at {start}: `start = {count}` in the wiring"
                 ));
             }
-            Box::new(Quadrature(Position::new(value), [false; 2]))
+            Box::new(Tracks::new(value, ["a", "b"], quadrature))
         }
         "hall" => {
             if register == "count" && value.floor() != 0.0 {
@@ -124,7 +124,7 @@ pub fn of(peripheral: &Peripheral, register: &str, value: f64) -> Result<Box<dyn
                     value.floor()
                 ));
             }
-            Box::new(Hall(Position::new(value), [false; 3]))
+            Box::new(Tracks::new(value, ["a", "b", "c"], hall))
         }
         "digital-in" => Box::new(Switch { invert: parameter("invert") == 1, level: [false] }),
         "spi" => Box::new(Converter {
@@ -219,55 +219,50 @@ impl Position {
     }
 }
 
-/// Incremental encoder.
+/// Encoder whose tracks show the count of a position.
 #[derive(Debug)]
-struct Quadrature(Position, [bool; 2]);
+struct Tracks<const N: usize> {
+    position: Position,
+    pins: [&'static str; N],
+    /// Levels of the tracks at a count.
+    at: fn(i64) -> [bool; N],
+    levels: [bool; N],
+}
 
-impl Device for Quadrature {
-    fn pins(&self) -> DevicePins {
-        DevicePins::new(&[], &["a", "b"])
-    }
-
-    fn act(&mut self, cycle: u64, _: &[NeededPin], value: f64) -> bool {
-        self.0.follow(cycle, value);
-        let count = self.0.count;
-        self.1 = [(count + 1) >> 1 & 1 == 1, count >> 1 & 1 == 1];
-        true
-    }
-
-    fn levels(&self) -> &[bool] {
-        &self.1
-    }
-
-    fn next(&self) -> Option<u64> {
-        self.0.next()
+impl<const N: usize> Tracks<N> {
+    fn new(value: f64, pins: [&'static str; N], at: fn(i64) -> [bool; N]) -> Tracks<N> {
+        Tracks { position: Position::new(value), pins, at, levels: [false; N] }
     }
 }
 
-/// Three Hall sensors.
-#[derive(Debug)]
-struct Hall(Position, [bool; 3]);
-
-impl Device for Hall {
+impl<const N: usize> Device for Tracks<N> {
     fn pins(&self) -> DevicePins {
-        DevicePins::new(&[], &["a", "b", "c"])
+        DevicePins::new(&[], &self.pins)
     }
 
     fn act(&mut self, cycle: u64, _: &[NeededPin], value: f64) -> bool {
-        self.0.follow(cycle, value);
-        // Each sensor is 1 over half a turn, a third of a turn after the one before.
-        let sector = self.0.count;
-        self.1 = [1, 5, 3].map(|shift| (sector + shift).rem_euclid(6) < 3);
+        self.position.follow(cycle, value);
+        self.levels = (self.at)(self.position.count);
         true
     }
 
     fn levels(&self) -> &[bool] {
-        &self.1
+        &self.levels
     }
 
     fn next(&self) -> Option<u64> {
-        self.0.next()
+        self.position.next()
     }
+}
+
+/// Tracks of an incremental encoder.
+fn quadrature(count: i64) -> [bool; 2] {
+    [(count + 1) >> 1 & 1 == 1, count >> 1 & 1 == 1]
+}
+
+/// Three Hall sensors: each is 1 over half a turn, a third of a turn after the one before.
+fn hall(sector: i64) -> [bool; 3] {
+    [1, 5, 3].map(|shift| (sector + shift).rem_euclid(6) < 3)
 }
 
 /// Switch: closed from 1 on.
