@@ -164,25 +164,18 @@ impl Exec<'_> {
                 let below = self.op(Op::Below, &[a, b])?;
                 self.op(Op::Not, &[below])?
             }
-            // By shift and mask.
-            (Some(by), _) if !signed => {
+            // By shift and mask: of what has no sign, and of what is not negative.
+            (Some(by), _) if !signed || by > 1 && self.nodes.range(a).0 >= 0 => {
+                let right = if signed { Op::ShiftRight } else { Op::ShiftRightLogical };
                 let shift = self.nodes.int(by.trailing_zeros() as i32);
                 let mask = self.nodes.int((by - 1) as i32);
                 return match operator {
-                    B::Divide => self.op(Op::ShiftRightLogical, &[a, shift]),
+                    B::Divide => self.op(right, &[a, shift]),
                     _ => self.op(Op::And, &[a, mask]),
                 };
             }
-            (Some(by), _) if by > 1 && self.nodes.range(a).0 >= 0 => {
-                let shift = self.nodes.int(by.trailing_zeros() as i32);
-                let mask = self.nodes.int((by - 1) as i32);
-                return match operator {
-                    B::Divide => self.op(Op::ShiftRight, &[a, shift]),
-                    _ => self.op(Op::And, &[a, mask]),
-                };
-            }
-            // Where a loop's iteration is written out, the language's quotient of counters is a real number, and its remainder is that of
-            // the divisor's sign.
+            // The assembler computes counters of iterations that are written out: a quotient is then a real number, and a remainder has the
+            // divisor's sign.
             (Some(by), _) if by.unsigned_abs() > 1 && self.nodes.is_counted(a) => {
                 let shift = self.nodes.int(by.trailing_zeros() as i32);
                 let mask = self.nodes.int((by.unsigned_abs() - 1) as i32);
