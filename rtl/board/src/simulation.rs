@@ -381,7 +381,7 @@ impl Drop for Simulation {
 
 type Pins = (PathBuf, Vec<(String, u32)>, Vec<String>);
 
-/// How the program is compiled and linked.
+/// Options of compiler and linker.
 struct Linking {
     optimise: &'static str,
     defines: Vec<String>,

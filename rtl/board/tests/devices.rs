@@ -15,7 +15,7 @@ fn wiring(peripheral: &str) -> Wiring {
     Wiring::read("w.toml", &text, &board).unwrap_or_else(|mistakes| panic!("{}", mistakes[0]))
 }
 
-/// What a fault does to the pins between device and peripheral.
+/// Fault at the pins between device and peripheral.
 type Fault = fn(cycle: u64, levels: &mut [bool]);
 
 /// A device at the pins of a peripheral's model.
@@ -66,7 +66,7 @@ impl Bench {
             NeededPin { level: levels[i], edge: changed && counts }
         };
         let needed: Vec<NeededPin> = pins.needed.iter().enumerate().map(edge).collect();
-        // As in a simulation, it is only called when it must be.
+        // A simulation calls a device only when it must.
         let is_due = self.device.next().is_some_and(|next| next <= self.cycle);
         if is_due || needed.iter().any(|pin| pin.edge) || self.cycle.is_multiple_of(40) {
             self.device.act(self.cycle, &needed, value);
@@ -378,7 +378,7 @@ fn actuators_have_the_facts_of_their_wiring() {
         [[true, false], [false, true], [false, false], [true, true]].map(|levels| pwm.state(&levels));
     assert_eq!(states, [BridgeState::High, BridgeState::Low, BridgeState::Off, BridgeState::Short]);
     assert_eq!(pwm.state(&[false]), BridgeState::Low);
-    // Of 1000 cycles the upper switch is on in 600, the lower one in 344.
+    // The upper switch is on in 600 of 1000 cycles, the lower one in 344.
     assert!((pwm.mean(&[600, 344], 1000) - 0.628).abs() < 1e-12 && pwm.mean(&[250], 1000) == 0.25);
     // A pulse of 628 cycles in 1000 is 128 more than half: 0.5 of the port.
     assert!((pwm.port(0.628) - 0.5).abs() < 1e-12);

@@ -67,6 +67,7 @@ fn fixed(program: &Program) -> BTreeMap<Register, u32> {
     }
     fixed
 }
+
 /// Registers that are written, and by no bundle that a period can reach: they keep what the code before the first period leaves in them.
 fn kept(program: &Program) -> BTreeSet<Register> {
     let slots = program.machine.slots;
@@ -109,6 +110,7 @@ fn kept(program: &Program) -> BTreeSet<Register> {
     let ranged = |register: &Register| program.ranges.iter().any(|range| range.register == *register);
     of(false).difference(&of(true)).filter(|register| !ranged(register)).copied().collect()
 }
+
 /// Exponent of the smallest normal binary32.
 const LEAST_EXPONENT: i32 = -126;
 /// Fraction bits of a binary32.

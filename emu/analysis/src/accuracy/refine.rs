@@ -209,7 +209,7 @@ impl Explorer<'_> {
         let mut number = Number::clone(&parts);
         let mut terms = Affine::constant(0.0);
         if let Value::Float(whole) = &node.value {
-            // What is narrower costs the correlations: a little is not worth it.
+            // Narrower ranges cost the correlations: a small gain is not worth it.
             if whole.form.radius() < WORTH * parts.form.radius() {
                 number.form = whole.form.clone();
             }

@@ -103,7 +103,7 @@ impl Comparison<'_> {
     }
 }
 
-/// What makes errors large at an operation, and what would keep them small.
+/// Cause of large errors at an operation, and the mend.
 fn advice(op: Op) -> Option<&'static str> {
     let arithmetic = [Op::fadd, Op::fsub, Op::fmul, Op::fma, Op::fms, Op::fnma, Op::fnms];
     let grows = "a rounding error that grows on the way to the output, by wide factors, or by a root or a quotient near zero; a narrower \

@@ -32,7 +32,7 @@ use takt_programs::plants::{
 const RESOLUTION: [u64; 2] = [50, 1000];
 /// Cycles in one go between two looks at the pseudo-terminal.
 const SLICE: u64 = 2000;
-/// Of a pin with noise one level in so many is inverted.
+/// A pin with noise has one level in this many inverted.
 const NOISE: u32 = 16;
 /// Largest relative difference between the scale of a duty in the plant's file and the wiring's.
 const SCALE: f64 = 1e-4;

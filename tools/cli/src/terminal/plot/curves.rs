@@ -210,7 +210,7 @@ mod tests {
         assert!(svg.contains("a &amp; b") && svg.contains("time, s"), "{}", &svg[..300]);
     }
 
-    /// What does not change takes a line of text, and a reference lies below its signal.
+    /// Constant columns take a line of text, and a reference lies below its signal.
     #[test]
     fn constants_are_words_and_references_share_a_chart() {
         let titles = ["id_ref", "motor.id", "tripped", "w_ref", "w"].map(str::to_owned);
