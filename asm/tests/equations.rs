@@ -116,6 +116,7 @@ fn int_infix(operator: &str, a: u32, b: u32) -> Result<u32, NoValue> {
     Ok(match operator {
         "+" => a.wrapping_add(b),
         "-" => a.wrapping_sub(b),
+        "*" => a.wrapping_mul(b),
         "&" => a & b,
         "|" => a | b,
         "<<" => a << (b & 31),
@@ -264,7 +265,7 @@ impl Choices<'_> {
         match self.below(9) {
             0 => self.int(0),
             1 => Prefix(self.one(&["-", "!"]), self.boxed(false, d)),
-            2 | 3 => Infix(self.one(&["+", "-", "&", "|"]), self.boxed(false, d), self.boxed(false, d)),
+            2 | 3 => Infix(self.one(&["+", "-", "&", "|", "*"]), self.boxed(false, d), self.boxed(false, d)),
             4 => Infix(self.one(&["<<", ">>"]), self.boxed(false, d), Box::new(Literal("3"))),
             5 => Infix(self.one(COMPARE), self.boxed(true, d), self.boxed(true, d)),
             6 => Infix(self.one(COMPARE), self.boxed(false, d), self.boxed(false, d)),

@@ -164,6 +164,10 @@ fn of_integers(symbol: &str, a: &[i32]) -> Option<Value> {
         ("&", [a, b]) => word(a & b),
         ("|", [a, b]) => word(a | b),
         ("xor", [a, b]) => word(a ^ b),
+        ("mul24", [a, b]) => {
+            let of_24_bits = |n: &i32| n.wrapping_shl(8) >> 8;
+            word(of_24_bits(a).wrapping_mul(of_24_bits(b)))
+        }
         ("<<", [a, b]) => word(a.wrapping_shl(b.cast_unsigned())),
         (">>", [a, b]) => word(a.wrapping_shr(b.cast_unsigned())),
         ("!", [a]) => word((*a == 0).into()),
@@ -212,12 +216,11 @@ fn evaluate(symbol: &str, operands: &[Operand]) -> Option<Value> {
     let singles: Option<Vec<f32>> = values.iter().map(|value| value.single()).collect();
     let words: Option<Vec<i32>> = values.iter().map(|value| value.word()).collect();
     if int {
-        // Products are by a constant, quotients by a power of two.
+        // Quotients are by a power of two.
         if let ("*" | "/" | "%", [a, b]) = (symbol, &words.clone()?[..]) {
-            let is_open = |number: usize| matches!(values[number], Value::Open(_));
             return match symbol {
-                "*" => (is_open(0) || is_open(1)).then(|| Value::Word(a.wrapping_mul(*b))),
-                _ if !is_open(1) || !b.unsigned_abs().is_power_of_two() => None,
+                "*" => Some(Value::Word(a.wrapping_mul(*b))),
+                _ if !matches!(values[1], Value::Open(_)) || !b.unsigned_abs().is_power_of_two() => None,
                 "/" => Some(Value::Word(a.wrapping_div(*b))),
                 _ => Some(Value::Word(a.wrapping_rem(*b))),
             };
@@ -432,10 +435,8 @@ fn integers_are_multiplied_and_divided_as_in_rust() {
 }
 
 #[test]
-fn other_products_and_quotients_of_integers_name_the_mend() {
+fn other_quotients_of_integers_name_the_mend() {
     for (expression, words) in [
-        ("n*n", "`ftoi(itof(n)*itof(n))`"),
-        ("n*k", "`ftoi(itof(n)*itof(k))`"),
         ("n/3", "`itof(n)/3` is the quotient as a float"),
         ("n/k", "`itof(n)/itof(k)`"),
         ("8/n", "`8/itof(n)`"),

@@ -49,38 +49,14 @@
 
 ; ---- Products -----------------------------------------------------------------------------------------------------------------
 
-; a·b of integers from -2^15 to 2^15 - 1. The parts of b have 8 bits, so that both products are exact in binary32.
-.macro  product_short d:int, a:int, b:int
-.reg    x low high
-        x = itof(a)
-        low = x*itof(b & 255)
-        high = x*itof(b >> 8)
-        d = ftoi(low) + (ftoi(high) << 8)
-.endm
-
-; a·b modulo 2^32. Parts of 11 bits, whose products and sums of two are exact in binary32.
-.macro  product d:int, a:int, b:int
-.reg    a0 a1 a2 b0 b1 b2 p0 p1 p2 q1
-        a0, a1, a2 = itof(a & 2047), itof((a >> 11) & 2047), itof(a >> 22)
-        b0, b1, b2 = itof(b & 2047), itof((b >> 11) & 2047), itof(b >> 22)
-        p0 = a0*b0
-        p1 = a0*b1 + a1*b0
-        p2 = a0*b2 + a2*b0
-        q1 = a1*b1
-        d = ftoi(p0) + (ftoi(p1) << 11) + ((ftoi(p2) + ftoi(q1)) << 22)
-.endm
-
-; The high word of a·b, both from 0 to 2^32 - 1: the digits of 11 bits from the second on, with the carry of the first two.
+; The high word of a·b, both from 0 to 2^32 - 1: the product of the upper parts of 16 bits, and the carries from the others.
 .macro  product_high d:int, a:int, b:int
-.reg    a0 a1 a2 b0 b1 b2 p0:int p1:int p2:int p3:int p4:int
-        a0, a1, a2 = itof(a & 2047), itof((a >> 11) & 2047), itof(shift_right(a, 22))
-        b0, b1, b2 = itof(b & 2047), itof((b >> 11) & 2047), itof(shift_right(b, 22))
-        p0 = ftoi(a0*b0)
-        p1 = ftoi(a0*b1 + a1*b0) + (p0 >> 11)
-        p2 = ftoi(a0*b2 + a2*b0) + ftoi(a1*b1) + (p1 >> 11)
-        p3 = ftoi(a1*b2 + a2*b1)
-        p4 = ftoi(a2*b2)
-        d = (p2 >> 10) + (p3 << 1) + (p4 << 12)
+.reg    a0:int a1:int b0:int b1:int low:int high:int
+        a0, a1 = a & 65535, shift_right(a, 16)
+        b0, b1 = b & 65535, shift_right(b, 16)
+        low = mul24(a1, b0) + shift_right(mul24(a0, b0), 16)
+        high = mul24(a0, b1) + (low & 65535)
+        d = mul24(a1, b1) + shift_right(low, 16) + shift_right(high, 16)
 .endm
 
 ; ---- Quotients ----------------------------------------------------------------------------------------------------------------
@@ -104,9 +80,9 @@
 .reg    y near:int rest:int step:int
         y = itof(b)
         near = ftoi(0.9999999*itof(a)/y)
-        rest = a - product(near, b)
+        rest = a - near*b
         step = ftoi(itof(rest)/y)
-        d = truncated(near + step, rest - product(step, b), a, b)
+        d = truncated(near + step, rest - step*b, a, b)
 .endm
 
 ; The same by a number b, neither 0, 1 nor -1, whose inverse is given.
@@ -129,7 +105,7 @@
 .macro  quotient_unsigned d:int, a:int, b:int
 .reg    half:int
         half = quotient(shift_right(a, 1), b) << 1
-        d = b < 0 ? !below(a, b) : half + !below(a - product(half, b), b)
+        d = b < 0 ? !below(a, b) : half + !below(a - half*b, b)
 .endm
 
 ; The same by a number b from 2 to 2^31 - 1, whose inverse is given.

@@ -66,8 +66,17 @@ PROOFS = [
         parameter=("SMALL = 0", "SMALL = 1"), text="the same, as addmul has it",
     ),
     Proof(
-        "multiply", ("multiply",), "multiply.v", 50, MULTIPLICATION, share=True, **MULTIPLIED,
+        "multiply", ("multiply",), "multiply.v", 50, MULTIPLICATION, defines=("OP=1'b0",), share=True, **MULTIPLIED,
         text="fmul, all operands",
+    ),
+    *(
+        Proof(
+            f"{unit}.integers", (unit,), "integers.v", 1, boxed=(PRODUCT,), defines=defines, share=True,
+            text="imul24, all operands, from the significands' product",
+        )
+        for unit, defines in [
+            ("multiply", ("OP=1'b1",)), ("addmul", ("OP=3'b011",)), ("fused", ("OP=4'b0101", "FUSED")),
+        ]
     ),
     Proof(
         "add", ("add",), "add.v", 56, SUM,

@@ -81,6 +81,11 @@ const FAULTS: &[Fault] = &[
     ("multiply", "(a_special & b_zero) | (a_zero & b_special)", "a_special & b_zero"),
     ("multiply", "zero2     <= zero1", "zero2     <= 1'b0"),
     ("multiply", "~top & shifted3[46]", "~top"),
+    ("multiply", "op ? a[23] : ~a_small", "~a_small"),
+    ("multiply", "integer1 ? 6'd0 : ~subnormal", "~subnormal"),
+    ("multiply", "product2[31:24] - excess2", "product2[31:24]"),
+    ("multiply", "({8{b[23]}} & a[7:0])", "({8{b[23]}} & b[7:0])"),
+    ("multiply", "& {3{~integer3}}", ""),
     // Faults in the fused unit: C's sticky bit, the window's ends, the sum's direction, limits of the count, rounding, signs, flags, a
     // product or sum alone.
     ("fused", "(at_48 & (|by4[10:0]))", "(at_48 & (|by4[10:1]))"),
@@ -116,6 +121,13 @@ const FAULTS: &[Fault] = &[
     ("fused", "a[31] ^ y[31] ^ op[1]", "a[31] ^ y[31]"),
     ("fused", "{6'd0, high_low[23:0]}", "{6'd0, high_low[22:0], 1'b0}"),
     ("fused", "valid4    <= valid3", "valid4    <= valid2"),
+    ("fused", "integers ? a[23] : ~a_small", "~a_small"),
+    ("fused", "integers ? 9'd41 : distance[8:0]", "distance[8:0]"),
+    ("fused", "~integers & (distance[9]", "(distance[9]"),
+    ("fused", "minus | integers;", "minus;"),
+    ("fused", "& ~integers2;", ";"),
+    ("fused", "product4  <= sum3[33:2]", "product4  <= sum3[34:3]"),
+    ("fused", "~zero4 & ~integers4 &", "~zero4 &"),
     // Faults in ties, -2^31, values below one half, the direction of saturation.
     ("convert", "half2 & (lost2 | (addend2[0] ^ sign2))", "half2 & (lost2 | addend2[0])"),
     ("convert", "(shift1[0] & by2[0])", "1'b0"),

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-// takt_addmul: adder, multiplier and integer converter for binary32 in one shared pipeline, to save area.
+// takt_addmul: adder, multiplier and integer converter for binary32 in one shared pipeline, to save area; also multiplies integers of
+// 24 bits.
 //
 // Contract
 //   Operands and op on the inputs in one cycle, with in_valid, give result and flags on the outputs LATENCY - 1 cycles later,
@@ -10,6 +11,7 @@
 //@ op 3'b000 fadd
 //@ op 3'b001 fsub
 //@ op 3'b010 fmul
+//@ op 3'b011 imul24
 //@ op 3'b100 itof
 //@ op 3'b101 ftoi
 //
@@ -19,6 +21,8 @@
 //   itof              the sum is the integer's magnitude, 0 - x or 0 + x; the left shift normalises it
 //   ftoi              is shifted right to its place; the sum rounds and negates: with n for the integer part and up (0 or 1)
 //                     for rounding, -(n + up) = ~n + ~up
+//   imul24            the product of the low 24 bits without their signs; the sum takes 2^24 (s_a b + s_b a) from it, with s for a
+//                     sign bit, as (a - 2^24 s_a)·(b - 2^24 s_b) demands modulo 2^32
 //
 // The datapath has places 32 to 0. Bits shifted out below are ORed to a sticky bit. The lower part of a product, `below`, is in
 // places -1 to -15; it is not shifted right with the rest, since a product that is shifted right is never shifted left. S and L
@@ -62,6 +66,7 @@ module takt_addmul #(
     wire        multiplies = op[1];
     wire        converts   = op[2];
     wire        from_integer = op[2] & ~op[0];
+    wire        integers   = op[1] & op[0];   // imul24
 
     wire        b_sign  = b[31] ^ op[0];
     wire        a_small = a[30:23] == 8'd0;  // zero or subnormal: the same exponent as that of a field of 1
@@ -82,8 +87,9 @@ module takt_addmul #(
 
     wire [47:0] product;    // of the next stage
     takt_significand_product #(.SMALL(1)) u_product (
-        .clk(clk), .a({~a_small, a[22:0]}), .b({~b_small, b[22:0]}), .p(product)
+        .clk(clk), .a({integers ? a[23] : ~a_small, a[22:0]}), .b({integers ? b[23] : ~b_small, b[22:0]}), .p(product)
     );
+    wire [7:0]  excess = ({8{a[23]}} & b[7:0]) + ({8{b[23]}} & a[7:0]);  // of an integer product's upper byte
 
     // The carry in is made by an extra place below the others.
     wire [9:0]  other     = converts ? -10'd157 : {2'd0, b_exponent} ^ {10{~multiplies}};
@@ -93,12 +99,13 @@ module takt_addmul #(
     reg [39:32] above1;     // of an integer, which is in places 39 to 8
     reg [7:0]  exponent1;   // of L
     reg [9:0]  distance1;   // exponent of a less that of b; their sum; exponent of a less 157
-    reg        multiplies1, converts1, from_integer1, subtracts1, sign1, nan1, special1, invalid1, empty1, high1;
+    reg        multiplies1, converts1, from_integer1, subtracts1, sign1, nan1, special1, invalid1, empty1, high1, integers1;
 
     always @(posedge clk) begin
         s1            <= b_larger ? {from_integer ? a[23] : ~a_small, a[22:0]} : {~b_small, b[22:0]};
         l1            <= b_larger ? {~b_small, b[22:0]} : {~a_small, a[22:0]};
         if (multiplies | converts) l1 <= 24'd0;
+        if (integers) l1[16:9] <= excess;
         above1        <= a[31:24];
         if (~from_integer) above1 <= 8'd0;
         exponent1     <= b_larger ? b_exponent : a_exponent;
@@ -108,9 +115,10 @@ module takt_addmul #(
         from_integer1 <= from_integer;
         subtracts1    <= ~multiplies & (a[31] ^ (b_sign & ~converts));
         sign1         <= (multiplies ? a[31] ^ b[31] : b_larger & ~converts ? b_sign : a[31]);
-        nan1          <= ~converts & (a_nan | b_nan | improper);
-        special1      <= ~converts & (a_special | b_special);
-        invalid1      <= ~converts & ((a_nan & ~a[22]) | (b_nan & ~b[22]) | (improper & ~a_nan & ~b_nan));
+        integers1     <= integers;
+        nan1          <= ~converts & ~integers & (a_nan | b_nan | improper);
+        special1      <= ~converts & ~integers & (a_special | b_special);
+        invalid1      <= ~converts & ~integers & ((a_nan & ~a[22]) | (b_nan & ~b[22]) | (improper & ~a_nan & ~b_nan));
         empty1        <= a_empty;
         high1         <= ~a[31] | a_nan;
     end
@@ -132,7 +140,7 @@ module takt_addmul #(
     reg         beyond2;    // so far to the right that nothing is left
     reg [9:0]   distance2;
     reg [7:0]   exponent2;
-    reg         multiplies2, to_integer2, too_large2, subtracts2, sign2, nan2, special2, invalid2;
+    reg         multiplies2, to_integer2, too_large2, subtracts2, sign2, nan2, special2, invalid2, integers2;
 
     always @(posedge clk) begin
         s2[32:8]    <= multiplies1 ? product[47:23] : {above1[32], s1};
@@ -141,6 +149,7 @@ module takt_addmul #(
         if (~multiplies1) {s2[7:0], below2} <= 23'd0;
         above2      <= above1[39:33];
         l2          <= l1;
+        if (integers1) l2[16:9] <= -l1[16:9];
         right2      <= distance[4:0] & {5{~distance[9]}};
         beyond2     <= distance[9] ? to_integer1 : |distance[8:5];
         exponent2   <= exponent1;
@@ -149,6 +158,11 @@ module takt_addmul #(
             beyond2   <= 1'b0;
             exponent2 <= 8'd157;
         end
+        if (integers1) begin
+            right2    <= 5'd0;
+            beyond2   <= 1'b0;
+        end
+        integers2   <= integers1;
         distance2   <= distance;
         multiplies2 <= multiplies1;
         to_integer2 <= to_integer1;
@@ -178,7 +192,7 @@ module takt_addmul #(
     reg [31:8]  l3;
     reg         lost3;
     reg [8:0]   exponent3;
-    reg         to_integer3, too_large3, subtracts3, sign3, nan3, special3, invalid3;
+    reg         to_integer3, too_large3, subtracts3, sign3, nan3, special3, invalid3, integers3;
 
     always @(posedge clk) begin
         s3          <= by1 ^ {33{subtracts2}};
@@ -187,6 +201,7 @@ module takt_addmul #(
         lost3       <= lost;
         exponent3   <= multiplies2 ? product_exponent[8:0] & {9{distance2[9]}} : {1'b0, exponent2};
         to_integer3 <= to_integer2;
+        integers3   <= integers2;
         too_large3  <= too_large2;
         subtracts3  <= subtracts2;
         sign3       <= sign2;
@@ -209,7 +224,7 @@ module takt_addmul #(
     reg         lost4;
     reg [8:0]   exponent4;
     reg [3:1]   allowed4;   // as many bytes to the left
-    reg         to_integer4, saturates4, cancels4, sign4, nan4, special4, invalid4;
+    reg         to_integer4, saturates4, cancels4, sign4, nan4, special4, invalid4, integers4;
 
     always @(posedge clk) begin
         sum4        <= sum[33:1];
@@ -221,6 +236,7 @@ module takt_addmul #(
         allowed4[3] <= (|exponent3[8:5]) | (&exponent3[4:3]);
         if (to_integer3) allowed4 <= 3'd0;
         to_integer4 <= to_integer3;
+        integers4   <= integers3;
         saturates4  <= too_large3;
         cancels4    <= subtracts3;
         sign4       <= sign3;
@@ -229,7 +245,7 @@ module takt_addmul #(
         invalid4    <= invalid3;
     end
 
-    // =============================================================== 5: to the left by bytes; an integer by one
+    // =============================================================== 5: to the left by bytes; an integer by one, a product of two by three
 
     wire        none3  = ~|sum4[32:25];
     wire        none2  = ~|sum4[24:17];
@@ -237,7 +253,7 @@ module takt_addmul #(
     wire        bytes1 = (none3 & allowed4[1]) | to_integer4;
     wire        bytes2 = none3 & none2 & allowed4[2];
     wire        bytes3 = none3 & none2 & none1 & allowed4[3];
-    wire [1:0]  bytes  = {bytes2, bytes3 | (bytes1 & ~bytes2)};
+    wire [1:0]  bytes  = {bytes2, bytes3 | (bytes1 & ~bytes2)} | {2{integers4}};
     wire [5:0]  exponent_bytes = exponent4[8:3] - {4'd0, bytes};
 
     reg [32:0]  moved5;
@@ -254,10 +270,10 @@ module takt_addmul #(
         endcase
         lost5       <= lost4 | (~bytes2 & (|below4[6:0])) | (~bytes1 & (|below4[14:7]));
         zero5       <= none3 & none2 & none1 & ~|sum4[8:0];
-        exponent5   <= to_integer4 ? {1'b0, sum4[31:24]} : {exponent_bytes, exponent4[2:0]};
-        to_integer5 <= to_integer4;
+        exponent5   <= to_integer4 ? {1'b0, sum4[31:24]} : integers4 ? {1'b0, sum4[15:8]} : {exponent_bytes, exponent4[2:0]};
+        to_integer5 <= to_integer4 | integers4;
         cancels5    <= cancels4;
-        sign5       <= to_integer4 ? sum4[32] ^ saturates4 : sign4;
+        sign5       <= to_integer4 ? sum4[32] ^ saturates4 : integers4 ? sum4[16] : sign4;
         nan5        <= nan4;
         special5    <= special4;
         invalid5    <= invalid4;

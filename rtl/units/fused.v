@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-// takt_fused: fused multiply-add for binary32, with one rounding, to nearest even, subnormals included; also product or sum alone.
+// takt_fused: fused multiply-add for binary32, with one rounding, to nearest even, subnormals included; also product or sum alone, and
+// the product of integers of 24 bits.
 //
 // Contract
 //   Operands and op on the inputs in one cycle, with in_valid, give result and flags on the outputs LATENCY - 1 cycles later,
@@ -13,11 +14,13 @@
 //@ op 4'b0010 fnma
 //@ op 4'b0011 fnms
 //@ op 4'b0100 fmul
+//@ op 4'b0101 imul24
 //@ op 4'b1000 fadd
 //@ op 4'b1001 fsub
 //
 // op[0] negates the addend, op[1] the product; op[2]: the addend is a zero of the product's sign, which changes no product;
-// op[3]: a + b is computed as a · 1 + b.
+// op[3]: a + b is computed as a · 1 + b. op[2] and op[0]: the low 24 bits of a and b, without their signs, are multiplied; the addend
+// is 2^24 (s_a b + s_b a), with s for a sign bit, which is subtracted, as (a - 2^24 s_a)·(b - 2^24 s_b) demands modulo 2^32.
 //
 // Notation: P is the product of the significands, 48 bits; C the addend's significand, 24 bits, leading one included. Both are in
 // a window of 76 places: C at the top, two guard places, P, and two places after P:
@@ -82,6 +85,7 @@ module takt_fused #(
     wire        p_sign = a[31] ^ y[31] ^ op[1];
     wire        z_sign = op[2] ? p_sign : (op[3] ? b[31] : c[31]) ^ op[0];
     wire        minus  = p_sign ^ z_sign;
+    wire        integers = op[2] & op[0];  // imul24
 
     wire        a_small = a[30:23] == 8'd0;  // zero or subnormal
     wire        y_small = y[30:23] == 8'd0;
@@ -89,8 +93,9 @@ module takt_fused #(
 
     wire [47:0] product;  // of the next stage
     takt_significand_product u_product (
-        .clk(clk), .a({~a_small, a[22:0]}), .b({~y_small, y[22:0]}), .p(product)
+        .clk(clk), .a({integers ? a[23] : ~a_small, a[22:0]}), .b({integers ? y[23] : ~y_small, y[22:0]}), .p(product)
     );
+    wire [7:0]  excess = ({8{a[23]}} & b[7:0]) + ({8{b[23]}} & a[7:0]);  // of an integer product's upper byte
 
     wire        a_empty   = ~|a[22:0];
     wire        y_empty   = ~|y[22:0];
@@ -120,24 +125,26 @@ module takt_fused #(
     reg  [8:0]  above_p1;    // exponent of a number with its leading one in place 75, less 1: by that of the product
     reg  [7:0]  above_z1;    // by that of an addend that stays at the top
     reg  [23:0] c1;
-    reg         minus1, p_sign1, z_sign1, nan1, infinite1, p_infinite1, invalid1;
+    reg         minus1, p_sign1, z_sign1, nan1, infinite1, p_infinite1, invalid1, integers1;
 
     wire [9:0]  above_p = exponents - 10'd101;  // not used if negative: then C stays at the top
     wire        unused_above = above_p[9];
 
     always @(posedge clk) begin
-        distance1   <= distance[8:0];
-        at_top1     <= distance[9] | a_zero | y_zero;
+        distance1   <= integers ? 9'd41 : distance[8:0];
+        at_top1     <= ~integers & (distance[9] | a_zero | y_zero);
         above_p1    <= above_p[8:0];
         above_z1    <= z_exponent - 8'd1;
         c1          <= {~z_small, z[22:0]};
-        minus1      <= minus;
+        if (integers) c1[22:15] <= excess;  // places 33 to 26
+        integers1   <= integers;
+        minus1      <= minus | integers;
         p_sign1     <= p_sign;
         z_sign1     <= z_sign;
-        nan1        <= any_nan | improper | opposed;
-        infinite1   <= a_special | y_special | z_special;
+        nan1        <= ~integers & (any_nan | improper | opposed);
+        infinite1   <= ~integers & (a_special | y_special | z_special);
         p_infinite1 <= a_special | y_special;
-        invalid1    <= signaling | improper | (opposed & ~any_nan);
+        invalid1    <= ~integers & (signaling | improper | (opposed & ~any_nan));
     end
 
     // =============================================================== 2: product; aligned addend
@@ -161,9 +168,10 @@ module takt_fused #(
     reg  [75:0] addend2;  // inverted, if it is to be subtracted
     reg         lost2;
     reg  [8:0]  above2;
-    reg         minus2, p_sign2, z_sign2, nan2, infinite2, invalid2;
+    reg         minus2, p_sign2, z_sign2, nan2, infinite2, invalid2, integers2;
 
     always @(posedge clk) begin
+        integers2 <= integers1;
         product2  <= product;
         addend2   <= aligned ^ {76{minus1}};
         lost2     <= lost;
@@ -183,12 +191,12 @@ module takt_fused #(
     // larger, as it always is if C has lost bits.
     wire [76:0] plain = {27'd0, product2, 2'd0} + {1'b0, addend2};
     wire [75:0] sum   = {26'd0, product2, 2'd0} + addend2 + {75'd0, minus2 & ~lost2};
-    wire        swap  = minus2 & ~plain[76];
+    wire        swap  = minus2 & ~plain[76] & ~integers2;
 
     reg  [75:0] sum3;
     reg  [18:0] stop3;  // the nibble, from the top, at which the exponent is 1 to 4
     reg  [8:0]  above3;
-    reg         lost3, minus3, sign3, nan3, infinite3, invalid3;
+    reg         lost3, minus3, sign3, nan3, infinite3, invalid3, integers3;
 
     genvar i;
     generate
@@ -200,6 +208,7 @@ module takt_fused #(
     endgenerate
 
     always @(posedge clk) begin
+        integers3 <= integers2;
         sum3      <= swap ? ~plain[75:0] : sum;
         above3    <= above2;
         lost3     <= lost2;
@@ -258,9 +267,12 @@ module takt_fused #(
     reg  [4:0]  nibbles4;  // zeros before it, in fours
     reg         limited4;  // the exponent may become 1 within the first nibble
     reg  [8:0]  above4;
-    reg         lost4, zero4, sign4, nan4, infinite4, invalid4;
+    reg         lost4, zero4, sign4, nan4, infinite4, invalid4, integers4;
+    reg  [31:0] product4;  // of integers
 
     always @(posedge clk) begin
+        integers4 <= integers3;
+        product4  <= sum3[33:2];
         case (nibble)
             2'd0: shifted4 <= grouped[43:12];
             2'd1: shifted4 <= grouped[39:8];
@@ -307,14 +319,16 @@ module takt_fused #(
 
     always @(posedge clk) begin
         result[31] <= sign4 & ~nan4;
-        if (special | (too_large & ~zero4)) begin
+        if (integers4) begin
+            result <= product4;
+        end else if (special | (too_large & ~zero4)) begin
             result[30:0] <= {8'hff, nan4, 22'd0};
         end else if (zero4) begin
             result[30:0] <= 31'd0;
         end else begin
             result[30:0] <= rounded;
         end
-        flags <= {invalid4, 1'b0, ~special & ~zero4 & (too_large | rounds_to_infinity)};
+        flags <= {invalid4, 1'b0, ~special & ~zero4 & ~integers4 & (too_large | rounds_to_infinity)};
     end
 
 endmodule

@@ -1,16 +1,19 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-// takt_multiply: multiplier for binary32, rounded to nearest even, subnormals included.
+// takt_multiply: multiplier for binary32, rounded to nearest even, subnormals included; also for integers of 24 bits.
 //
 // Contract
-//   Operands on the inputs in one cycle, with in_valid, give result and flags on the outputs LATENCY - 1 cycles later, with
-//   out_valid. One operation per cycle. No reset is needed: LATENCY cycles without in_valid empty the pipeline.
+//   Operands and op on the inputs in one cycle, with in_valid, give result and flags on the outputs LATENCY - 1 cycles later,
+//   with out_valid. One operation per cycle. No reset is needed: LATENCY cycles without in_valid empty the pipeline.
 //   flags = {invalid, divide by zero, overflow}. Every NaN result is 7fc00000.
 //
-//@ op - fmul
+//@ op 1'b0 fmul
+//@ op 1'b1 imul24
 //
 // Method: the significands are multiplied without normalisation, leading zeros of a subnormal included. A single shift then serves
 // two purposes: to the left, it normalises such a product, as far as its exponent allows; to the right, it denormalises a product
 // below the normal numbers.
+// Integers: the multiplier's operands are the low 24 bits without a sign. With s for a sign bit, a·b = (a - 2^24 s_a)·(b - 2^24 s_b)
+// is their product less 2^24 (s_a b + s_b a), modulo 2^32, which concerns the upper byte only.
 //
 // Pipeline
 //   1  partial products         three 18 x 18 multipliers and 6 x 6 bits in logic; sum of the exponents; leading zeros
@@ -23,6 +26,7 @@ module takt_multiply #(
 ) (
     input  wire        clk,
     input  wire        in_valid,
+    input  wire        op,
     input  wire [31:0] a,
     input  wire [31:0] b,
     output reg         out_valid,
@@ -48,8 +52,8 @@ module takt_multiply #(
 
     wire        a_small = a[30:23] == 8'd0;  // zero or subnormal
     wire        b_small = b[30:23] == 8'd0;
-    wire [23:0] a_significand = {~a_small, a[22:0]};
-    wire [23:0] b_significand = {~b_small, b[22:0]};
+    wire [23:0] a_significand = {op ? a[23] : ~a_small, a[22:0]};
+    wire [23:0] b_significand = {op ? b[23] : ~b_small, b[22:0]};
 
     wire [47:0] product;  // of the next stage
     takt_significand_product u_product (.clk(clk), .a(a_significand), .b(b_significand), .p(product));
@@ -74,9 +78,12 @@ module takt_multiply #(
 
     reg  [8:0]  exponents1;  // sum of the biased exponents; that of a subnormal is 1
     reg  [4:0]  zeros1;
-    reg         sign1, nan1, infinite1, zero1, invalid1;
+    reg         sign1, nan1, infinite1, zero1, invalid1, integer1;
+    reg  [7:0]  excess1;     // of an integer product's upper byte
 
     always @(posedge clk) begin
+        integer1   <= op;
+        excess1    <= ({8{a[23]}} & b[7:0]) + ({8{b[23]}} & a[7:0]);
         exponents1 <= {1'b0, a[30:24], a[23] | a_small} + {1'b0, b[30:24], b[23] | b_small};
         zeros1     <= a_small ? a_zeros : b_small ? b_zeros : 5'd0;
         sign1      <= a[31] ^ b[31];
@@ -99,11 +106,14 @@ module takt_multiply #(
     reg  [47:0] product2;
     reg  [5:0]  shift2;  // 63 leaves nothing
     reg  [8:0]  field2;
-    reg         sign2, nan2, infinite2, zero2, invalid2;
+    reg         sign2, nan2, infinite2, zero2, invalid2, integer2;
+    reg  [7:0]  excess2;
 
     always @(posedge clk) begin
+        integer2  <= integer1;
+        excess2   <= excess1;
         product2  <= product;
-        shift2    <= ~subnormal ? {1'b0, 5'd23 - zeros1} : |deep[9:6] ? 6'd63 : deep[5:0];
+        shift2    <= integer1 ? 6'd0 : ~subnormal ? {1'b0, 5'd23 - zeros1} : |deep[9:6] ? 6'd63 : deep[5:0];
         field2    <= field[8:0] & {9{~subnormal}};
         sign2     <= sign1;
         nan2      <= nan1;
@@ -130,9 +140,12 @@ module takt_multiply #(
     reg          lost3;
     reg  [7:0]   field3;
     reg          field_253, field_252;
-    reg          sign3, nan3, infinite3, zero3, invalid3, overflow3;
+    reg          sign3, nan3, infinite3, zero3, invalid3, overflow3, integer3;
+    reg  [31:24] upper3;    // of an integer product, whose other places are 46 to 23 of the shifted one
 
     always @(posedge clk) begin
+        integer3  <= integer2;
+        upper3    <= product2[31:24] - excess2;
         shifted3  <= by1;
         lost3     <= lost;
         field3    <= field2[7:0];
@@ -162,14 +175,16 @@ module takt_multiply #(
 
     always @(posedge clk) begin
         result[31] <= sign3 & ~nan3;
-        if (nan3 | infinite) begin
+        if (integer3) begin
+            result <= {upper3, shifted3[46:23]};
+        end else if (nan3 | infinite) begin
             result[30:0] <= {8'hff, nan3, 22'd0};
         end else if (zero3) begin
             result[30:0] <= 31'd0;
         end else begin
             result[30:0] <= rounded;
         end
-        flags <= {invalid3, 1'b0, ~nan3 & (overflow3 | (~infinite3 & (top_overflows | rounds_to_infinity)))};
+        flags <= {invalid3, 1'b0, ~nan3 & (overflow3 | (~infinite3 & (top_overflows | rounds_to_infinity)))} & {3{~integer3}};
     end
 
 endmodule

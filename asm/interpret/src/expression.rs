@@ -301,6 +301,7 @@ fn infix(operator: Operator, a: Value, b: Value) -> Result<Value, Fault> {
         (Type::F, Ge) => float(Op::fle, y, x),
         (Type::I, Add) => int(x.wrapping_add(y)),
         (Type::I, Sub) => int(x.wrapping_sub(y)),
+        (Type::I, Mul) => int(x.wrapping_mul(y)),
         (Type::I, And) => int(x & y),
         (Type::I, Or) => int(x | y),
         (Type::I, Shl) => int(x << (y & 31)),
@@ -360,6 +361,11 @@ fn function(name: &str, values: &[Value]) -> Result<Value, Fault> {
         ("min", [_, _]) => Ok(apply(Op::fmin, float(0)?, float(1)?)),
         ("max", [_, _]) => Ok(apply(Op::fmax, float(0)?, float(1)?)),
         ("sat", [_, _]) => Ok(apply(Op::fsat, float(0)?, float(1)?)),
+        ("mul24", [a, b]) => {
+            let of_24_bits = |bits: u32| (bits << 8).cast_signed() >> 8;
+            let (a, b) = (of_24_bits(a.bits(Type::I)?), of_24_bits(b.bits(Type::I)?));
+            Ok(Value::Bits(a.wrapping_mul(b).cast_unsigned(), Type::I))
+        }
         _ => Err(format!("the function `{name}` of this is not known")),
     }
 }

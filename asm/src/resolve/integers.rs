@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Integer products by constants as shifts and sums, and quotients and remainders by powers of two: the machine does not multiply
-//! or divide integers. A part of [`expression`](crate::resolve::expression).
+//! Products of integers, from parts of 16 bits or, by a constant, as shifts and sums; quotients and remainders by powers of two. The
+//! machine multiplies 24 bits and does not divide integers. A part of [`expression`](crate::resolve::expression).
 //!
 //! Quotients are truncated, as in C: -7/4 is -1, and -7 % 4 is -3.
 
@@ -12,8 +12,15 @@ use crate::resolve::term::{CurrentEquation, LineExpression, Term, TermForm};
 use takt_diagnostics::diag::Diagnostic;
 use takt_diagnostics::source::Span;
 use takt_isa::Type;
-use takt_syntax::ast::{Node, NodeKind, Operator};
+use takt_syntax::ast::{ExprId, Node, NodeKind, Operator};
 use takt_syntax::expr::{EvalError, Fault, Value};
+
+/// The product of integers of 24 bits, as equations write it.
+const PRODUCT: &str = "mul24";
+/// Bits of a part of a product's factor, and a mask of them.
+const PART: (u32, u32) = (16, 0xffff);
+/// Factors that [`PRODUCT`] takes whole.
+const WHOLE: std::ops::Range<i32> = -(1 << 23)..1 << 23;
 
 /// A part of a factor: the exponent of a power of two, and whether it is subtracted.
 type Digit = (u32, bool);
@@ -36,12 +43,15 @@ fn digits(factor: i64) -> Vec<Digit> {
         }
         rest >>= 1;
     }
-    // Operations: a shift for each digit but the units, a sum for each but the first, and a negation if all digits are negative.
-    let cost = |digits: &[Digit]| {
-        let shifts = digits.iter().filter(|(bit, _)| *bit > 0).count();
-        shifts + digits.len() + usize::from(digits.iter().all(|(_, negative)| *negative))
-    };
-    if cost(&signed) < cost(&plain) { signed } else { plain }
+    if operations(&signed) < operations(&plain) { signed } else { plain }
+}
+
+/// Operations that a factor's digits take: a shift for each digit but the units, a sum for each but the first, and a negation if all
+/// digits are negative.
+fn operations(digits: &[Digit]) -> usize {
+    let shifts = digits.iter().filter(|(bit, _)| *bit > 0).count();
+    let negation = usize::from(digits.iter().all(|(_, negative)| *negative));
+    (shifts + digits.len() + negation).saturating_sub(1)
 }
 
 impl Resolver<'_> {
@@ -75,8 +85,17 @@ impl Resolver<'_> {
                 if factor == 0 {
                     return Ok(Some(Term { form: TermForm::Constant(Value::Int(0), here.1), span: here.0 }));
                 }
-                let form =
-                    TermForm::Register(self.scaled(at, line, register, factor.into(), here.0)?, Kind::Int);
+                // In parts, a factor of 24 bits takes six operations, another eight.
+                let in_parts = if WHOLE.contains(&factor) { 6 } else { 8 };
+                let is_long = operations(&digits(factor.into())) > in_parts;
+                let product = match is_long && self.multiplies_integers() {
+                    true => self.product(at, line, [a, b], here.0)?,
+                    false => self.scaled(at, line, register, factor.into(), here.0)?,
+                };
+                Ok(Some(Term { form: TermForm::Register(product, Kind::Int), span: here.0 }))
+            }
+            (Operator::Mul, ..) => {
+                let form = TermForm::Register(self.product(at, line, [a, b], here.0)?, Kind::Int);
                 Ok(Some(Term { form, span: here.0 }))
             }
             (_, TermForm::Register(register, _), TermForm::Constant(divisor, _)) => {
@@ -90,7 +109,6 @@ impl Resolver<'_> {
                 }
                 self.by_power(at, line, operator, register, number, here).map(Some)
             }
-            (Operator::Mul, ..) => Err(self.no_product(at, terms, here.0)),
             _ => Err(self.no_quotient(at, operator, terms, here.0)),
         }
     }
@@ -100,6 +118,68 @@ impl Resolver<'_> {
         let bits =
             value.bits(Type::I).map_err(|fault| self.context.fault(at.scope, EvalError { span, fault }))?;
         Ok(bits.cast_signed())
+    }
+
+    /// The machine has the product of integers of 24 bits.
+    fn multiplies_integers(&self) -> bool {
+        self.forms
+            .get(PRODUCT, 2)
+            .iter()
+            .any(|meaning| !self.context.machine.hosts(meaning.op.row().function).is_empty())
+    }
+
+    /// Multiplies modulo 2³², from parts of 16 bits; of the product of the upper parts nothing is left. A constant of 24 bits stays whole.
+    fn product(
+        &mut self,
+        at: AstPlace,
+        line: &mut CurrentEquation,
+        factors: [&Term; 2],
+        span: Span,
+    ) -> Result<RegisterId, ErrorReported> {
+        let int = |register| Term { form: TermForm::Register(register, Kind::Int), span };
+        let multiply = |resolver: &mut Self, line: &mut CurrentEquation, a, b| {
+            let here = (span, ExprId { first: 0, count: 0 });
+            match resolver.operate(at, line, PRODUCT, &[int(a), int(b)], here, Kind::Int)?.form {
+                TermForm::Register(register, _) => Ok(register),
+                _ => Err(ErrorReported),
+            }
+        };
+        let mut parts = [[RegisterId::ZERO; 2]; 2];
+        let shift = self.pooled(PART.0, span);
+        for (parts, factor) in parts.iter_mut().zip(factors) {
+            *parts = match factor.form {
+                TermForm::Register(register, _) => {
+                    let mask = self.pooled(PART.1, span);
+                    let low = self.integer_operation(at, line, Operator::And, [register, mask], span)?;
+                    [low, self.integer_operation(at, line, Operator::Shr, [register, shift], span)?]
+                }
+                TermForm::Constant(value, _) => {
+                    let word = self.word_of(at, value, factor.span)?;
+                    let (low, high) = match WHOLE.contains(&word) {
+                        true => (word, 0),
+                        false => (word & PART.1 as i32, word >> PART.0),
+                    };
+                    [low, high].map(|part| self.pooled(part.cast_unsigned(), span))
+                }
+                TermForm::Chain(..) | TermForm::Counted(_) => return Err(ErrorReported),
+            };
+        }
+        let [[a_low, a_high], [b_low, b_high]] = parts;
+        let low = multiply(self, line, a_low, b_low)?;
+        let mut upper: Option<RegisterId> = None;
+        for (a, b) in [(a_high, b_low), (a_low, b_high)] {
+            if a == RegisterId::ZERO || b == RegisterId::ZERO {
+                continue;
+            }
+            let part = multiply(self, line, a, b)?;
+            upper = Some(match upper {
+                Some(upper) => self.integer_operation(at, line, Operator::Add, [upper, part], span)?,
+                None => part,
+            });
+        }
+        let Some(upper) = upper else { return Ok(low) };
+        let upper = self.integer_operation(at, line, Operator::Shl, [upper, shift], span)?;
+        self.integer_operation(at, line, Operator::Add, [low, upper], span)
     }
 
     /// Multiplies a register by a constant.
@@ -204,19 +284,6 @@ impl Resolver<'_> {
             ))
             .help(format!("add a multiple of {b} to the dividend, so that it is never negative"));
         Err(self.context.report(at.scope, error))
-    }
-
-    fn no_product(&mut self, at: AstPlace, terms: &[Term], span: Span) -> ErrorReported {
-        let text = |term: &Term| self.context.reports.sources.text(term.span).to_owned();
-        let (a, b) = (text(&terms[0]), text(&terms[1]));
-        let floats = format!("ftoi(itof({a})*itof({b}))");
-        let error = Diagnostic::error("equation", span, "a product of two integers: the machine has none")
-            .note("of an integer and a constant, `*` is shifts and sums")
-            .note(format!(
-                "`product({a}, {b})` of `<c.s>` computes it modulo 2^32, in parts that are exact as floats"
-            ))
-            .mend(format!("compute it in floats, which is exact up to 2^24: `{floats}`"), floats);
-        self.context.report(at.scope, error)
     }
 
     fn no_quotient(&mut self, at: AstPlace, operator: Operator, terms: &[Term], span: Span) -> ErrorReported {

@@ -20,7 +20,7 @@ period:
         y = x + n                       ; an integer and a float
         y = n                           ; an integer where a float goes
         k = x                           ; the other way
-        y = n*m                         ; integers are not multiplied
+        q = n/m                         ; integers are not divided
         y = n*2.5                       ; nor with reals
         q = n + 0.5                     ; a real number with an integer
         y = x ? 1 : 2                   ; a float is no condition

@@ -272,13 +272,14 @@ impl Writer<'_> {
         writeln!(self.text, " li k, {turns}\n.loop_bound {turns}\nl{label}:").unwrap();
         for _ in 0..1 + self.random.below(4) {
             let value = self.operand(Type::F);
-            let line = match self.random.below(8) {
+            let line = match self.random.below(9) {
                 0 => format!(" fadd u, u, {value}\n"),
                 1 => format!(" fadd u, u, {value}\n fsat u, u, 3.0\n"),
                 2 => format!(" fmul u, u, 0.75\n fadd u, u, {value}\n"),
                 3 => " iand j, k, 3\n ld w, A[j]\n fadd u, u, w\n".to_owned(),
                 4 => " iadd j, j, 1\n iand j, j, 3\n fsat w, u, 1.0\n st A[j], w\n".to_owned(),
                 5 => " isub j, j, 2\n".to_owned(),
+                6 => " iadd j, j, 1\n ld w, A[j]\n fadd u, u, w\n".to_owned(),
                 _ => {
                     self.again();
                     String::new()

@@ -27,6 +27,8 @@ pub enum Bitwise {
     Less,
     /// Less than, as unsigned integers.
     LessUnsigned,
+    /// Product of the low 24 bits of both, read as signed integers.
+    Product24,
 }
 
 /// A domain in which rows are evaluated without binary32's rounding, such as numbers or intervals (abstract interpretation).

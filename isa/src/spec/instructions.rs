@@ -55,7 +55,7 @@ functions! {
     Add,
     /// Conversion between integer and binary32.
     Convert,
-    /// Product of binary32 numbers.
+    /// Product of binary32 numbers, and of integers of 24 bits.
     Multiply,
     /// binary32 product and sum with one rounding.
     Fused,
@@ -442,10 +442,12 @@ instructions! { [a b c]
     itof     0x52 Convert  Da    [F I]     { = A::itof(a); a.integer(), ROUNDED }                                      "d = float(a)" "From a signed integer, rounded to nearest even. No flags." "itof(a)";
     ftoi     0x53 Convert  Da    [I F]     { = A::ftoi(a); a.nearest(), EXACT }                                      "d = integer(a)" "Rounded to nearest even, saturating at -2^31 and 2^31 - 1; NaN gives 2^31 - 1. Invalid where the value does not fit." "ftoi(a)";
 
-    // ---- 0x6_ binary32 multiplication, division, root, and product and sum in one, rounded to nearest even.
+    // ---- 0x6_ binary32 multiplication, division, root, and product and sum in one, rounded to nearest even; the multiplier's product
+    // of integers.
     fmul     0x60 Multiply Dab   [F F F]   { = A::mul(a, b); a * b, ROUNDED }                                    "d = a · b"   "Invalid on 0 · ∞ and on a signaling NaN; overflow." "a * b";
     fdiv     0x61 Divide   Dab   [F F F]   { = A::div(a, b); a / b, ROUNDED }                                    "d = a / b"   "Invalid on 0/0, ∞/∞ and a signaling NaN; divide by zero on finite/0; overflow." "a / b";
     fsqrt    0x62 Root     Da    [F F]     { = A::sqrt(a); a.sqrt(), ROUNDED }                                      "d = √a"      "√-0.0 = -0.0. Invalid on a negative operand and on a signaling NaN." "sqrt(a)";
+    imul24   0x63 Multiply Dab   [I I I]   { = bits(((a << 8) as i32 >> 8).wrapping_mul((b << 8) as i32 >> 8) as u32); a.bitwise(Bitwise::Product24, b) } "d = a · b, of 24 bits" "Of the low 24 bits of both, read as signed integers: the low 32 bits of the product. No flags. Three of them, two shifts and two sums make a product modulo 2^32." "mul24(a, b)";
     fma      0x64 Fused    Dabc  [F F F F] { = A::mul_add(a, b, c); a * b + c, ROUNDED }                             "d = a · b + c"    "Rounded once, as fms, fnma and fnms are: the product is exact. The letter n negates the product, s subtracts c (as in x86's names; RISC-V's fnmsub is fnma, its fnmadd fnms). Invalid on 0 · ∞ whatever c is, on ∞ - ∞ and on a signaling NaN; overflow." "fma(a, b, c)";
     fms      0x65 Fused    Dabc  [F F F F] { = A::mul_add(a, b, fp::neg(c).bits); a * b - c, ROUNDED }               "d = a · b - c"    "As fma with -c." "fms(a, b, c)";
     fnma     0x66 Fused    Dabc  [F F F F] { = A::mul_add(fp::neg(a).bits, b, c); c - a * b, ROUNDED }               "d = -(a · b) + c" "As fma with -a. What cancels exactly gives +0." "fnma(a, b, c)";

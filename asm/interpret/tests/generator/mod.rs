@@ -402,13 +402,14 @@ impl Generator {
     fn integers(&mut self, place: &Place) {
         let (target, value) = (self.below(INTEGERS), self.integer(place));
         let a = self.integer(place);
-        let operator = self.pick(&["+", "-", "&", "|", "<<"]);
-        match self.below(4) {
+        let operator = self.pick(&["+", "-", "&", "|", "<<", "*"]);
+        match self.below(5) {
             0 => {
                 let subscript = self.subscript(place, 9);
                 self.line(&format!("K[{subscript}] = {value} + k{target}"));
             }
             1 => self.line(&format!("z0 = k{target} + {value}")),
+            2 => self.line(&format!("k{target} = mul24({a}, k{target})")),
             _ => self.line(&format!("k{target} = {a} {operator} k{target}")),
         }
     }

@@ -237,6 +237,20 @@ pub(super) fn bitwise(op: Bitwise, a: &Value, b: &Value) -> Value {
             let number = a.whole();
             joined(amounts.iter().map(|amount| Value::Integer(Rc::new(shifted(op, &number, *amount)))))
         }
+        Bitwise::Product24 => {
+            let of_24_bits = |value: &Value| {
+                let number = value.whole();
+                let ends = Interval::new(-power(23), power(23) - 1.0);
+                if number.actual.within(ends) {
+                    number
+                } else {
+                    Rc::new(integer(ends, Affine::free(ends), 0))
+                }
+            };
+            let (a, b) = (of_24_bits(a), of_24_bits(b));
+            let grid = a.grid.unwrap_or(0) + b.grid.unwrap_or(0);
+            Value::Integer(Rc::new(integer(a.actual * b.actual, a.form.mul(&b.form), grid)))
+        }
         Bitwise::Equal | Bitwise::Less | Bitwise::LessUnsigned => {
             let (a, b) = (a.whole().actual, b.whole().actual);
             decided(match op {
@@ -521,7 +535,7 @@ mod tests {
         let (mut known, mut all) = (0, 0);
         for round in 0..60_000 {
             let ((a, some_a), (b, some_b)) = (value(&mut random, 0), value(&mut random, 1));
-            let (name, result, of): (_, _, fn(u32, u32) -> u32) = match round % 11 {
+            let (name, result, of): (_, _, fn(u32, u32) -> u32) = match round % 12 {
                 0 => ("and", bitwise(Bitwise::And, &a, &b), |a, b| a & b),
                 1 => ("or", bitwise(Bitwise::Or, &a, &b), |a, b| a | b),
                 2 => ("xor", bitwise(Bitwise::Xor, &a, &b), |a, b| a ^ b),
@@ -535,7 +549,11 @@ mod tests {
                     u32::from(a.cast_signed() < b.cast_signed())
                 }),
                 8 => ("below", bitwise(Bitwise::LessUnsigned, &a, &b), |a, b| u32::from(a < b)),
-                9 => ("sum", sum(&a, &b), u32::wrapping_add),
+                9 => ("product", bitwise(Bitwise::Product24, &a, &b), |a, b| {
+                    let of_24_bits = |bits: u32| (bits << 8).cast_signed() >> 8;
+                    of_24_bits(a).wrapping_mul(of_24_bits(b)).cast_unsigned()
+                }),
+                10 => ("sum", sum(&a, &b), u32::wrapping_add),
                 _ => ("difference", difference(&a, &b), u32::wrapping_sub),
             };
             all += 1;

@@ -162,11 +162,8 @@ impl Speller<'_> {
                 let (yes, no) = (self.of(*yes).at_least(Binding::Or), self.of(*no).at_least(Binding::Or));
                 Text { text: format!("{condition} ? {yes} : {no}"), binding: Binding::Choice }
             }
-            (Form::Infix(..), [a, b]) if op == Op::IntMul && !self.is_known(*b) => {
-                self.library.borrow_mut().insert("c.s");
-                let small = |id: Id| self.nodes.range(id).0 >= -(1 << 15) && self.nodes.range(id).1 < 1 << 15;
-                let name = if small(*a) && small(*b) { "product_short" } else { "product" };
-                Text::atom(format!("{name}({}, {})", self.operand(*a), self.operand(*b)))
+            (Form::Infix(..), [a, b]) if op == Op::IntMul && self.is_short(*a, *b) => {
+                Text::atom(format!("mul24({}, {})", self.operand(*a), self.operand(*b)))
             }
             (_, [a, b]) if matches!(op, Op::IntDiv | Op::UnsignedDiv) && !self.is_power_of_two(*b) => {
                 self.library.borrow_mut().insert("c.s");
@@ -185,6 +182,15 @@ impl Speller<'_> {
             }
             _ => Text::atom("zero".to_owned()),
         }
+    }
+
+    /// A product of integers of 24 bits that the machine's instruction computes at once. Factors with two binary digits are left to the
+    /// assembler, which shifts and adds.
+    fn is_short(&self, a: Id, b: Id) -> bool {
+        let fits = |id: Id| self.nodes.range(id).0 >= -(1 << 23) && self.nodes.range(id).1 < 1 << 23;
+        let is_plain =
+            matches!(self.nodes.node(b), Node::Int(value) if value.unsigned_abs().count_ones() <= 2);
+        fits(a) && fits(b) && !is_plain
     }
 
     /// A quotient by the cheapest macro of `<c.s>` that takes operands of these ranges.
