@@ -592,14 +592,75 @@ int step(int n) { s.c8 += 50; s.c8 += 100; s.tab[n & 3] = (int16_t)n; return s.c
     );
 }
 
-/// The source says which word of a structure in data memory is which member.
+/// A member that data index lies in data memory with its own name and type; the others are registers.
 #[test]
-fn lists_the_members_of_a_structure_in_memory() {
+fn only_members_that_data_index_lie_in_memory() {
     let code = "struct st { float gain; int count; float hist[8]; struct { int a, b; } in; };\n\
                 float step(struct st *s, float x, int n) { s->hist[n & 7] = x; s->count++; s->in.a += n;\n\
                 return s->gain*s->hist[(n + 1) & 7] + s->count + s->in.a; }\n";
     let text = check("members_of_a_structure", code).text;
-    assert!(text.contains("; Words of s: 1 gain, 2 count, 3 to 10 hist, 11 in_a, 12 in_b.\n"), "{text}");
+    for line in [".array  s_hist[8]\n", ".state  s_count:int\n", ".state  s_in_a:int\n", ".input  s_gain"] {
+        assert!(text.contains(line), "no {line:?} in\n{text}");
+    }
+    check(
+        "members_beside_narrow_ones",
+        r#"#include <stdint.h>
+struct in { int16_t lead; float taps[4]; int8_t tail; };
+struct st { int8_t a; int16_t b, c; struct in in; float last; int grid[2][3]; struct { float x; int8_t n; } pair[3]; };
+static struct st s;
+float step(int n, float x)
+{
+    int i = n & 3, j = n & 1, k = (n & 7) % 3;
+    s.a += 3; s.b += s.a; s.c -= n; s.in.lead += 2; s.in.tail++;
+    s.in.taps[i] = x; s.grid[j][k] += n; s.pair[k].x += x; s.pair[2 - k].n += 5; s.last = x;
+    const float *q = s.in.taps + 4;
+    return s.in.taps[3 - i] + q[-1 - i] + s.grid[1][k] + s.pair[k].x + s.pair[j].n + s.a + s.b + s.c + s.in.lead + s.in.tail + s.last;
+}
+"#,
+    );
+    check(
+        "pointers_into_a_member",
+        r#"struct st { int n; float a[6]; int m; float b[6]; };
+static struct st s;
+float step(int n, float x)
+{
+    float *p = n & 1 ? s.a : s.a + 2, *end = s.b + 6, sum = 0;
+    p[n & 3] = x; s.n++; s.m += s.n;
+    for (float *q = s.b; q < end; q++) *q += x*s.n;
+    if (n & 2) p = &s.a[1];
+    for (int i = 0; i < (n & 3); i++) sum += *p++;
+    return sum + s.b[n & 3] + s.m;
+}
+"#,
+    );
+    check(
+        "copies_of_members",
+        r#"#include <string.h>
+struct f { float z[4]; int at; }; struct st { struct f f; float gain; };
+static struct st s; static struct f saved;
+static float filter(struct f *f, float x) { f->z[f->at] = x; f->at = (f->at + 1) & 3; float y = 0; for (int i = 0; i < 4; i++) y += f->z[(f->at + i) & 3]*(i + 1); return y; }
+float step(int n, float x)
+{
+    struct f t = s.f;
+    if (n == 3) memcpy(&saved, &s.f, sizeof saved);
+    if (n == 5) s.f = saved;
+    s.gain = filter(&t, x);
+    return s.gain + filter(&s.f, -x) + saved.z[n & 3];
+}
+"#,
+    );
+}
+
+/// A pointer that may lead to two members takes the whole structure into data memory; the source says which word is which member.
+#[test]
+fn lists_the_members_of_a_structure_in_memory() {
+    let code = "struct st { float gain; int count; float a[4], b[4]; }; static struct st s;\n\
+                float step(float x, int n) { float *p = n > 3 ? s.a : s.b; p[n & 3] = x; s.count++; s.gain += x;\n\
+                return s.gain + s.count + s.a[(n + 1) & 3] + s.b[n & 1]; }\n";
+    let text = check("members_of_a_whole_structure", code).text;
+    assert!(text.contains("; Words of s: 1 gain, 2 count, 3 to 6 a, 7 to 10 b.\n"), "{text}");
+    let code = "struct v { float x, y, z; int n; }; float step(struct v *v, float a, int i) { ((float *)v)[i & 1] = a; v->n++; return v->x - v->y + v->n; }\n";
+    check("members_through_the_first", code);
 }
 
 /// Pointers have as many elements as the step uses, however the elements are found out.

@@ -12,7 +12,7 @@ use super::exec::{Exec, Key};
 use super::ir::{Block, FULL, Id, Kind, Node, Op, Statement};
 use super::live::Live;
 use super::types::{Signature, Type};
-use super::value::{Origin, Pointer, Typed, Value};
+use super::value::{Origin, Part, Pointer, Typed, Value};
 use crate::Error;
 use crate::sink::Names;
 use std::collections::{BTreeMap, HashMap, HashSet};
@@ -188,7 +188,7 @@ impl Exec<'_> {
                 let key = (format!("{}->{leaf}", found.key.0), found.key.1, found.key.2);
                 let Some(pointee) = self.pointed_to(&found.leaf_name(leaf), to, key)? else { continue };
                 self.objects[pointee].spelling = self.spelled(object, scalar);
-                let value = Value::Pointer(Pointer { object: pointee, offset: 0, dynamic: None });
+                let value = Value::Pointer(Pointer { object: pointee, offset: 0, dynamic: None, part: None });
                 self.memory.set(object, leaf, value);
             }
             object += 1;
@@ -261,7 +261,7 @@ impl Exec<'_> {
             let ty = adjusted(ty);
             let variable =
                 self.object(name, &ty, Origin::Local, false, (key.to_owned(), *object, usize::MAX - 1))?;
-            let pointer = Pointer { object: *object, offset: 0, dynamic: None };
+            let pointer = Pointer { object: *object, offset: 0, dynamic: None, part: None };
             let place = self.place_of(variable);
             self.store(&place, Typed { ty, value: Value::Pointer(pointer) })?;
             self.bind(name, variable);
@@ -280,23 +280,30 @@ impl Exec<'_> {
                 continue;
             }
             let is_struct = matches!(found.ty, Type::Struct(_));
-            let array = found.origin != Origin::Parameter && self.facts.arrays.contains(&found.key);
+            self.settle(object)?;
+            let arrays = self.objects[object].arrays.clone();
             let written = |leaf| self.facts.written.contains(&(found.key.clone(), leaf));
-            let any = (0..found.leaves.len()).any(written);
             let kept = self.facts.kept.contains(&found.key);
-            if kept || array && (any || found.origin == Origin::Static) {
-                let own = matches!(found.origin, Origin::Static | Origin::Global)
-                    || kept
-                    || is_struct
-                    || self.has_struct(&found.ty);
-                let set = self.memory.0[object].iter().all(|value| *value != Value::Unset);
-                if own || set {
-                    // The array itself is the state.
-                    self.table(object)?;
-                    continue;
-                }
+            let own = matches!(found.origin, Origin::Static | Origin::Global)
+                || kept
+                || is_struct
+                || self.has_struct(&found.ty);
+            // An array that is the state itself; others are filled from inputs.
+            let is_state = |part: Part| {
+                let changes = found.origin != Origin::Parameter
+                    && (part.range().any(written) || found.origin == Origin::Static);
+                let values = &self.memory.0[object][part.range()];
+                (kept || changes) && (own || values.iter().all(|value| *value != Value::Unset))
+            };
+            let (states, filled): (Vec<_>, Vec<_>) =
+                arrays.into_iter().partition(|(part, _)| is_state(*part));
+            for (part, array) in &states {
+                self.loaded(object, *part, *array);
             }
             for leaf in 0..found.leaves.len() {
+                if states.iter().any(|(part, _)| part.range().contains(&leaf)) {
+                    continue;
+                }
                 let value = self.memory.get(object, leaf).clone();
                 let changes = found.origin != Origin::Parameter
                     && self.facts.written.contains(&(found.key.clone(), leaf));
@@ -305,9 +312,8 @@ impl Exec<'_> {
                 }
                 self.start(object, leaf, &value, &mut starts)?;
             }
-            self.settle(object)?;
-            if let Some(array) = self.objects[object].array {
-                self.fill(object, array)?;
+            for (part, array) in filled {
+                self.fill(object, part, array)?;
             }
         }
         Ok(Begun { starts })
@@ -324,24 +330,29 @@ impl Exec<'_> {
     /// An object in memory whose words the loader sets.
     pub(super) fn table(&mut self, object: usize) -> Result<(), Error> {
         self.settle(object)?;
-        let Some(array) = self.objects[object].array else { return Ok(()) };
-        for leaf in 0..self.objects[object].leaves.len() {
-            let word = bits(self.memory.get(object, leaf)).unwrap_or(0);
-            self.nodes.arrays[array].words[leaf] = word;
+        for (part, array) in self.objects[object].arrays.clone() {
+            self.loaded(object, part, array);
         }
         Ok(())
     }
 
+    /// Sets the words of an array in memory to the scalars' known values.
+    fn loaded(&mut self, object: usize, part: Part, array: usize) {
+        for (word, leaf) in part.range().enumerate() {
+            self.nodes.arrays[array].words[word] = bits(self.memory.get(object, leaf)).unwrap_or(0);
+        }
+    }
+
     /// Stores inputs into an array in memory.
-    fn fill(&mut self, object: usize, array: usize) -> Result<(), Error> {
-        for leaf in 0..self.objects[object].leaves.len() {
+    fn fill(&mut self, object: usize, part: Part, array: usize) -> Result<(), Error> {
+        for (word, leaf) in part.range().enumerate() {
             let (value, ty) =
                 (self.memory.get(object, leaf).clone(), self.objects[object].leaves[leaf].ty.clone());
             match bits(&value) {
-                Some(word) => self.nodes.arrays[array].words[leaf] = word,
+                Some(known) => self.nodes.arrays[array].words[word] = known,
                 None => {
                     let Some(value) = self.register(&value, &ty) else { continue };
-                    let index = self.nodes.int(leaf as i32);
+                    let index = self.nodes.int(word as i32);
                     self.emit(Statement::Store { array, index, value });
                 }
             }
@@ -462,7 +473,7 @@ impl Exec<'_> {
             return false;
         };
         let key = self.objects[object].key.clone();
-        let new = self.facts.arrays.insert(key.clone()) | self.facts.kept.insert(key);
+        let new = self.facts.arrays.insert((key.clone(), None)) | self.facts.kept.insert(key);
         self.again |= new;
         new
     }
@@ -470,12 +481,12 @@ impl Exec<'_> {
     /// A scalar after the step; `None` if it has no register then.
     fn after(&mut self, object: usize, leaf: usize) -> Result<Option<Id>, Error> {
         let ty = self.objects[object].leaves[leaf].ty.clone();
-        if let Some(array) = self.objects[object].array {
+        if let Some((part, array)) = self.objects[object].held(leaf) {
             let written = self.facts.written.contains(&(self.objects[object].key.clone(), leaf));
             if !written {
                 return Ok(None);
             }
-            let (index, serial) = (self.nodes.int(leaf as i32), self.nodes.serial());
+            let (index, serial) = (self.nodes.int((leaf - part.first) as i32), self.nodes.serial());
             return self.put(Node::Load(array, index, serial), kind_of(&ty), FULL).map(Some);
         }
         let value = self.memory.get(object, leaf).clone();
@@ -723,7 +734,7 @@ impl Exec<'_> {
         let kept = self.objects.iter().filter(|object| self.facts.kept.contains(&object.key));
         kept.filter_map(|object| {
             let written = self.facts.written.iter().any(|(key, _)| *key == object.key);
-            Some((object.array?, (object.spelling.as_str(), written)))
+            Some((object.arrays.first()?.1, (object.spelling.as_str(), written)))
         })
         .collect()
     }

@@ -176,6 +176,23 @@ impl Structs {
         })
     }
 
+    /// The array that is a member of a structure, at a place in it, or a member of such a member: its name on the path, place and type.
+    pub(super) fn member_array(&self, ty: &Type, at: usize) -> Option<(String, usize, Type)> {
+        let Type::Struct(index) = ty else { return None };
+        let found = &self.list[*index];
+        let field = match found.union {
+            true => found.fields.get(self.laid_out(*index)),
+            false => found.fields.iter().rev().find(|field| field.offset <= at),
+        }?;
+        let (inner, offset, ty) = match &field.ty {
+            Type::Array(..) => (String::new(), 0, field.ty.clone()),
+            ty => self.member_array(ty, at - field.offset)?,
+        };
+        let names =
+            field.name.iter().map(String::as_str).chain((!inner.is_empty()).then_some(inner.as_str()));
+        Some((names.collect::<Vec<_>>().join("_"), field.offset + offset, ty))
+    }
+
     /// Scalars of a type in the order of their places, two of an integer of 64 bits; `None` if there are more than [`MAX_LEAVES`] or its size is unknown. A union has
     /// the scalars of its largest member.
     pub(super) fn leaves(&self, ty: &Type) -> Option<Vec<Leaf>> {

@@ -5,6 +5,19 @@ use super::ir::Id;
 use super::types::{Leaf, Type};
 use std::rc::Rc;
 
+/// Scalars of an object that follow one another: an array, with all that its elements have.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Debug)]
+pub(super) struct Part {
+    pub(super) first: usize,
+    pub(super) count: usize,
+}
+
+impl Part {
+    pub(super) fn range(self) -> std::ops::Range<usize> {
+        self.first..self.first + self.count
+    }
+}
+
 /// A pointer to a place in an object.
 #[derive(Clone, PartialEq, Debug)]
 pub(super) struct Pointer {
@@ -13,6 +26,8 @@ pub(super) struct Pointer {
     pub(super) offset: i64,
     /// Number of scalars to add, if the place depends on inputs.
     pub(super) dynamic: Option<Id>,
+    /// The member in which the pointer moves, if it began as an array that is one; otherwise the whole object.
+    pub(super) part: Option<Part>,
 }
 
 #[derive(Clone, Debug)]
@@ -99,8 +114,8 @@ pub(super) struct Object {
     pub(super) constant: bool,
     /// Name and place of the declaration, by which a later translation recognises the object.
     pub(super) key: (String, usize, usize),
-    /// The array in data memory that holds the object, if any.
-    pub(super) array: Option<usize>,
+    /// Arrays in data memory, with the scalars that each holds.
+    pub(super) arrays: Vec<(Part, usize)>,
 }
 
 impl Object {
@@ -108,6 +123,25 @@ impl Object {
     pub(super) fn leaf(&self, offset: i64) -> Option<usize> {
         let offset = usize::try_from(offset).ok()?;
         self.leaves.binary_search_by_key(&offset, |leaf| leaf.offset).ok()
+    }
+
+    /// All scalars.
+    pub(super) fn whole(&self) -> Part {
+        Part { first: 0, count: self.leaves.len() }
+    }
+
+    /// The array in data memory that holds a scalar.
+    pub(super) fn held(&self, leaf: usize) -> Option<(Part, usize)> {
+        self.arrays.iter().copied().find(|(part, _)| part.range().contains(&leaf))
+    }
+
+    /// The array in data memory that holds all scalars of a member, or of the object.
+    pub(super) fn array(&self, part: Option<Part>) -> Option<(Part, usize)> {
+        let Part { first, count } = part.unwrap_or(self.whole());
+        self.arrays
+            .iter()
+            .copied()
+            .find(|(held, _)| held.first <= first && first + count <= held.first + held.count)
     }
 
     /// Name of a scalar: `q_2`, `state_angle`.

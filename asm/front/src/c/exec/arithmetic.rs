@@ -379,8 +379,9 @@ impl Exec<'_> {
         let object = &self.objects[pointer.object];
         let end = object.leaves.last().map_or(0, |leaf| leaf.offset as i64 + 1);
         let leaf = match object.leaf(pointer.offset) {
-            Some(leaf) => leaf,
-            None if pointer.offset >= end => object.leaves.len(),
+            _ if pointer.part.is_some() => self.known_scalar(pointer)?.0,
+            Some(leaf) => leaf as i64,
+            None if pointer.offset >= end => object.leaves.len() as i64,
             None => return self.fail(format!("this points between the members of `{}`", object.name)),
         };
         let known = self.nodes.int(leaf as i32);

@@ -21,7 +21,7 @@ use super::Options;
 use super::ir::{Block, Id, Kind, Nodes, Place, Range, Statement};
 use super::types::{Signature, Structs, Type};
 use super::unit::Unit;
-use super::value::{Memory, Object, Value};
+use super::value::{Memory, Object, Part, Value};
 use crate::Error;
 use lang_c::ast::FunctionDefinition;
 use lang_c::span::{Node, Span};
@@ -41,8 +41,8 @@ pub(super) type Key = (String, usize, usize);
 /// Findings of one translation that the next one starts from.
 #[derive(Clone, Default, PartialEq)]
 pub(super) struct Facts {
-    /// Objects with indices that depend on data: they lie in memory.
-    pub(super) arrays: HashSet<Key>,
+    /// Objects, or members of them, with indices that depend on data: they lie in memory.
+    pub(super) arrays: HashSet<(Key, Option<Part>)>,
     /// Arrays of these whose elements would be ports if there were enough.
     pub(super) kept: HashSet<Key>,
     /// Scalars of states that the step writes.
@@ -125,7 +125,7 @@ pub(super) struct Exec<'a> {
     /// Operations to emit before an unrolled loop is given up, innermost last.
     budgets: Vec<usize>,
     /// Indices of arrays in memory, by their objects' keys.
-    arrays: HashMap<Key, usize>,
+    arrays: HashMap<(Key, Part), usize>,
     /// Functions whose `static` variables exist.
     prepared: HashSet<String>,
     /// The outermost budget that is used up.

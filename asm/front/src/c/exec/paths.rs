@@ -6,7 +6,7 @@ use super::Exec;
 use crate::Error;
 use crate::c::ir::{Block, Id, Kind, Node, Op, Statement};
 use crate::c::types::Type;
-use crate::c::value::{Condition, Exit, Memory, Origin, Outcome, Pointer, Value};
+use crate::c::value::{Condition, Exit, Memory, Origin, Outcome, Part, Pointer, Value};
 use std::collections::HashMap;
 use std::rc::Rc;
 
@@ -216,8 +216,12 @@ impl<'a> Exec<'a> {
             (a @ Value::Mixed(_), _) | (_, a @ Value::Mixed(_)) => Ok(a),
             (Value::Pointer(a), Value::Pointer(b)) => match (self.words(&a), self.words(&b)) {
                 (Some(x), Some(y)) if a.object == b.object => {
-                    let dynamic = Some(self.select(condition, x, y)?);
-                    Ok(Value::Pointer(Pointer { object: a.object, offset: 0, dynamic }))
+                    let part = a.part.filter(|_| a.part == b.part);
+                    if a.offset == b.offset && a.dynamic == b.dynamic {
+                        return Ok(Value::Pointer(Pointer { part, ..a }));
+                    }
+                    let scalar = self.select(condition, x, y)?;
+                    Ok(Value::Pointer(self.placed(a.object, part, scalar)?))
                 }
                 _ => Ok(MIXED_POINTER),
             },
@@ -248,12 +252,23 @@ impl<'a> Exec<'a> {
 
     /// Index of the scalar that a pointer refers to, as a node; `None` between members.
     fn words(&mut self, pointer: &Pointer) -> Option<Id> {
-        let leaf = self.objects[pointer.object].leaf(pointer.offset)?;
-        let known = self.nodes.int(i32::try_from(leaf).ok()?);
+        let (scalar, _) = self.known_scalar(pointer).ok()?;
+        let known = self.nodes.int(i32::try_from(scalar).ok()?);
         match pointer.dynamic {
             None => Some(known),
             Some(dynamic) => self.op(Op::IntAdd, &[dynamic, known]).ok(),
         }
+    }
+
+    /// A pointer to a scalar whose index in the object is a node, in a member of it or the whole.
+    pub(super) fn placed(&mut self, object: usize, part: Option<Part>, scalar: Id) -> Result<Pointer, Error> {
+        let Some(Part { first, .. }) = part else {
+            return Ok(Pointer { object, offset: 0, dynamic: Some(scalar), part });
+        };
+        let offset = self.objects[object].leaves[first].offset as i64;
+        let first = self.nodes.int(first as i32);
+        let dynamic = Some(self.op(Op::IntSub, &[scalar, first])?);
+        Ok(Pointer { object, offset, dynamic, part })
     }
 
     /// Emits a branch in which each side assigns variables for all values needed after it.
@@ -368,13 +383,13 @@ impl<'a> Exec<'a> {
                         let name = self.objects[object].leaf_name(leaf);
                         Value::Node(self.exported(exported, ids, &name)?)
                     }
-                    Value::Pointer(Pointer { object: to, offset, dynamic: Some(id) })
+                    Value::Pointer(pointer @ Pointer { dynamic: Some(id), .. })
                         if self.is_inside(exported.first, *id) =>
                     {
                         ids[side] = Some(*id);
-                        let (object, offset) = (*to, *offset);
+                        let pointer = pointer.clone();
                         let dynamic = Some(self.exported(exported, ids, "at")?);
-                        Value::Pointer(Pointer { object, offset, dynamic })
+                        Value::Pointer(Pointer { dynamic, ..pointer })
                     }
                     _ => continue,
                 };
@@ -444,10 +459,14 @@ impl<'a> Exec<'a> {
                 if a.object != b.object || a.offset != b.offset {
                     return Ok(MIXED_POINTER);
                 }
+                let part = a.part.filter(|_| a.part == b.part);
+                if a.dynamic == b.dynamic && !in_a {
+                    return Ok(Value::Pointer(Pointer { part, ..a }));
+                }
                 let zero = self.nodes.int(0);
                 let ids = [Some(a.dynamic.unwrap_or(zero)), Some(b.dynamic.unwrap_or(zero))];
                 let dynamic = Some(self.exported(exported, ids, "at")?);
-                Ok(Value::Pointer(Pointer { dynamic, ..a }))
+                Ok(Value::Pointer(Pointer { dynamic, part, ..a }))
             }
             (a, b) => {
                 let ty = self.objects[object].leaves[leaf].ty.clone();

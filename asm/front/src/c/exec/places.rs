@@ -5,7 +5,7 @@ use super::{Exec, Key};
 use crate::Error;
 use crate::c::ir::{Array, FULL, Id, Kind, Node, Op, Statement};
 use crate::c::types::{Integer, Leaf, Type};
-use crate::c::value::{Lvalue, Object, Origin, Pointer, Typed, Value};
+use crate::c::value::{Lvalue, Object, Origin, Part, Pointer, Typed, Value};
 use std::rc::Rc;
 
 /// Maximum number of elements behind a pointer of unknown extent.
@@ -43,7 +43,7 @@ impl Exec<'_> {
             origin,
             constant,
             key,
-            array: None,
+            arrays: Vec::new(),
         });
         self.memory.0.resize(index, Rc::new(Vec::new()));
         self.memory.0.push(Rc::new(vec![Value::Unset; count]));
@@ -68,38 +68,67 @@ impl Exec<'_> {
         }
     }
 
-    /// Puts an object into data memory if an index into it depends on data.
+    /// Puts an object, or members of it, into data memory if an index into it depends on data.
     pub(in crate::c) fn settle(&mut self, index: usize) -> Result<(), Error> {
         let object = &self.objects[index];
-        if !self.facts.arrays.contains(&object.key) {
-            return Ok(());
+        let demanded = self.facts.arrays.iter().filter(|(key, _)| *key == object.key);
+        let mut parts: Vec<Option<Part>> = demanded.map(|(_, part)| *part).collect();
+        // The whole object comes first: it holds its members.
+        parts.sort_unstable();
+        if parts.first() == Some(&None) {
+            parts.truncate(1);
         }
-        if let Some(array) = self.arrays.get(&object.key) {
-            self.objects[index].array = Some(*array);
-            return Ok(());
+        let mut arrays = Vec::with_capacity(parts.len());
+        for part in parts {
+            let found = part.unwrap_or(self.objects[index].whole());
+            arrays.push((found, self.in_memory(index, found)?));
         }
-        let mut kinds = object.leaves.iter().map(|leaf| kind_of(&leaf.ty));
+        self.objects[index].arrays = arrays;
+        Ok(())
+    }
+
+    /// The array in data memory for some scalars of an object.
+    fn in_memory(&mut self, index: usize, part: Part) -> Result<usize, Error> {
+        let object = &self.objects[index];
+        let key = (object.key.clone(), part);
+        if let Some(array) = self.arrays.get(&key) {
+            return Ok(*array);
+        }
+        let leaves = &object.leaves[part.range()];
+        let mut name = object.name.clone();
+        if let Some(leaf) = leaves.first().filter(|_| part != object.whole())
+            && let Some((member, ..)) = self.structs.member_array(&object.ty, leaf.offset)
+        {
+            name = format!("{name}_{member}");
+        }
+        let mut kinds = leaves.iter().map(|leaf| kind_of(&leaf.ty));
         let first = kinds.next().unwrap_or(Kind::Int);
         let kind = kinds.all(|kind| kind == first).then_some(first);
         let unfit = |leaf: &&Leaf| !matches!(leaf.ty, Type::Int(_) | Type::Float);
-        if let Some(leaf) = object.leaves.iter().find(unfit) {
+        if let Some(leaf) = leaves.iter().find(unfit) {
             return self.fail(format!(
-                "`{}` is indexed by data, but its scalars {} cannot lie in data memory: index only arrays of 32-bit numbers by data",
-                object.name,
+                "`{name}` is indexed by data, but its scalars {} cannot lie in data memory: index only arrays of 32-bit numbers by data",
                 self.structs.shown(&leaf.ty)
             ));
         }
-        let (name, count, key) = (object.name.clone(), object.leaves.len(), object.key.clone());
-        self.nodes.arrays.push(Array { name, kind, words: vec![0; count] });
+        self.nodes.arrays.push(Array { name, kind, words: vec![0; part.count] });
         let array = self.nodes.arrays.len() - 1;
         self.arrays.insert(key, array);
-        self.objects[index].array = Some(array);
-        Ok(())
+        Ok(array)
+    }
+
+    /// The array that is a member of an object of a structure and has a scalar at this place.
+    fn member_part(&self, object: usize, offset: i64) -> Option<Part> {
+        let found = &self.objects[object];
+        let (_, offset, ty) = self.structs.member_array(&found.ty, usize::try_from(offset).ok()?)?;
+        let first = found.leaf(offset as i64)?;
+        let count = self.structs.leaves(&ty)?.len();
+        (count > 0 && first + count <= found.leaves.len()).then_some(Part { first, count })
     }
 
     /// A whole object as an lvalue.
     pub(in crate::c) fn place_of(&self, object: usize) -> Lvalue {
-        let pointer = Pointer { object, offset: 0, dynamic: None };
+        let pointer = Pointer { object, offset: 0, dynamic: None, part: None };
         Lvalue { pointer, ty: self.objects[object].ty.clone() }
     }
 
@@ -108,7 +137,11 @@ impl Exec<'_> {
         let Lvalue { pointer, ty } = place;
         match ty {
             Type::Array(element, _) => {
-                Ok(Typed { ty: Type::Pointer(element.clone()), value: Value::Pointer(pointer.clone()) })
+                let mut pointer = pointer.clone();
+                if pointer.dynamic.is_none() && pointer.part.is_none() {
+                    pointer.part = self.member_part(pointer.object, pointer.offset);
+                }
+                Ok(Typed { ty: Type::Pointer(element.clone()), value: Value::Pointer(pointer) })
             }
             Type::Struct(_) => {
                 let Some(leaves) = self.structs.leaves(ty) else {
@@ -181,17 +214,21 @@ impl Exec<'_> {
         self.fail(format!("this is outside of `{name}`"))
     }
 
-    /// Demands that an object lies in memory, in the next translation.
-    fn demand(&mut self, object: usize) {
+    /// Demands that an object, or a member of it, lies in memory, in the next translation.
+    fn demand(&mut self, object: usize, part: Option<Part>) {
         let key = self.objects[object].key.clone();
-        self.facts.arrays.insert(key);
+        self.facts.arrays.insert((key, part));
         self.again = true;
     }
 
     /// The index of a word of an array. One that only loops count, and that is outside in some iterations, stands in a register: a
     /// condition may guard it, where the assembler refuses such a subscript.
-    fn subscript(&mut self, array: usize, pointer: &Pointer) -> Result<Id, Error> {
-        let index = self.word(pointer)?;
+    fn subscript(&mut self, (part, array): (Part, usize), pointer: &Pointer) -> Result<Id, Error> {
+        let known = self.nodes.int((self.known_scalar(pointer)?.0 - part.first as i64) as i32);
+        let index = match pointer.dynamic {
+            Some(dynamic) => self.op(Op::IntAdd, &[dynamic, known])?,
+            None => known,
+        };
         if self.stays_within(array, index) || !self.is_counted(index) {
             return Ok(index);
         }
@@ -208,46 +245,46 @@ impl Exec<'_> {
         }
     }
 
-    /// The word of an array at a place.
-    fn word(&mut self, pointer: &Pointer) -> Result<Id, Error> {
-        // The known part may lie outside, as in a[i - 1]: in whole elements of the object's last array.
+    /// Index of the scalar at the known part of a place, and a scalar of its type. The place may lie outside of the array in which the
+    /// pointer moves, as in a[i - 1]: in whole elements of it.
+    pub(super) fn known_scalar(&self, pointer: &Pointer) -> Result<(i64, usize), Error> {
         let object = &self.objects[pointer.object];
-        let found = object.leaf(pointer.offset).map(|leaf| leaf as i64);
-        let stride = object.leaves.get(1).map_or(4, |leaf| leaf.offset as i64);
-        let uniform =
-            object.leaves.iter().enumerate().all(|(index, leaf)| leaf.offset as i64 == index as i64 * stride);
-        let leaf = match found {
-            Some(leaf) => leaf,
-            None if uniform && pointer.offset % stride == 0 => pointer.offset / stride,
-            None => {
-                let (size, count) =
-                    (self.structs.size(&object.ty).unwrap_or(0) as i64, object.leaves.len() as i64);
-                let outer = match &object.ty {
-                    Type::Array(element, Some(_)) => self.structs.size(element).map(|size| size as i64),
-                    _ => None,
-                };
-                let outer = outer.filter(|outer| *outer > 0 && size > 0);
-                let Some(outer) = outer else {
-                    return self.fail(format!("this is outside of `{}`", object.name));
-                };
-                let rows = pointer.offset.div_euclid(outer);
-                let within = object.leaf(pointer.offset.rem_euclid(outer));
-                let Some(within) = within else {
-                    return self.fail(format!("this is outside of `{}`", object.name));
-                };
-                rows * (count * outer / size) + within as i64
-            }
+        let part = pointer.part.unwrap_or(object.whole());
+        let leaves = &object.leaves[part.range()];
+        let outside = || self.fail(format!("this is outside of `{}`", object.name));
+        let Some(base) = leaves.first().map(|leaf| leaf.offset as i64) else { return outside() };
+        let (first, count) = (part.first as i64, part.count as i64);
+        let from_base = pointer.offset - base;
+        let size = |ty| self.structs.size(ty).filter(|size| *size > 0).map(|size| size as i64);
+        let stride = match leaves.get(1) {
+            Some(leaf) => leaf.offset as i64 - base,
+            None => size(&leaves[0].ty).unwrap_or(4),
         };
-        let known = self.nodes.int(leaf as i32);
-        match pointer.dynamic {
-            Some(dynamic) => self.op(Op::IntAdd, &[dynamic, known]),
-            None => Ok(known),
+        let mut places = leaves.iter().zip(0..);
+        if from_base % stride == 0 && places.all(|(leaf, index)| leaf.offset as i64 == base + index * stride)
+        {
+            let word = from_base / stride;
+            return Ok((first + word, (first + word.rem_euclid(count)) as usize));
+        }
+        if let Some(leaf) = object.leaf(pointer.offset).filter(|leaf| part.range().contains(leaf)) {
+            return Ok((leaf as i64, leaf));
+        }
+        let ty = match pointer.part {
+            Some(_) => self.structs.member_array(&object.ty, base as usize).map(|(.., ty)| ty),
+            None => Some(object.ty.clone()),
+        };
+        let Some(Type::Array(element, Some(_))) = ty else { return outside() };
+        let Some(element) = size(&element) else { return outside() };
+        let each = leaves.iter().filter(|leaf| (leaf.offset as i64) < base + element).count() as i64;
+        match object.leaf(base + from_base.rem_euclid(element)) {
+            Some(within) => Ok((from_base.div_euclid(element) * each + within as i64, within)),
+            None => outside(),
         }
     }
 
     /// Extends an object of unknown length to the greatest place of a pointer to its elements, in the next translation.
     pub(super) fn extend(&mut self, pointer: &Pointer, element: &Type) -> Result<(), Error> {
-        let Pointer { object, offset, dynamic: Some(dynamic) } = pointer else { return Ok(()) };
+        let Pointer { object, offset, dynamic: Some(dynamic), .. } = pointer else { return Ok(()) };
         let found = &self.objects[*object];
         let Some(extent) = self.facts.extents.get(&found.key).copied() else { return Ok(()) };
         let built = self.extents.get(&found.key).copied().unwrap_or(1);
@@ -286,10 +323,14 @@ impl Exec<'_> {
         }
         let object = pointer.object;
         let is_known = self.objects[object].constant || !self.stepping;
-        if pointer.dynamic.is_none() && (self.objects[object].array.is_none() || is_known) {
-            let Some(leaf) = self.leaf(pointer)? else {
-                return Ok(Value::Node(self.placeholder(kind_of(ty), FULL)));
-            };
+        let leaf = match pointer.dynamic {
+            None => match self.leaf(pointer)? {
+                None => return Ok(Value::Node(self.placeholder(kind_of(ty), FULL))),
+                leaf => leaf,
+            },
+            Some(_) => None,
+        };
+        if let Some(leaf) = leaf.filter(|leaf| is_known || self.objects[object].held(*leaf).is_none()) {
             let own = self.objects[object].leaves[leaf].ty.clone();
             self.restored(object);
             let mut value = self.memory.get(object, leaf).clone();
@@ -309,15 +350,12 @@ impl Exec<'_> {
             };
             return self.punned(value, &own, ty);
         }
-        let Some(array) = self.objects[object].array else {
-            self.demand(object);
+        let Some(held) = self.holding(pointer, leaf) else {
+            self.demand(object, pointer.part);
             return Ok(Value::Node(self.placeholder(kind_of(ty), FULL)));
         };
-        if pointer.dynamic.is_none() && self.leaf(pointer)?.is_none() {
-            return Ok(Value::Node(self.placeholder(kind_of(ty), FULL)));
-        }
-        let index = self.subscript(array, pointer)?;
-        let own = self.word_type(pointer);
+        let (index, array) = (self.subscript(held, pointer)?, held.1);
+        let own = self.word_type(pointer)?;
         let range = match &own {
             Type::Int(integer) if integer.bits < 32 => integer.limits(),
             _ => FULL,
@@ -325,6 +363,12 @@ impl Exec<'_> {
         let serial = self.nodes.serial();
         let id = self.put(Node::Load(array, index, serial), kind_of(&own), range)?;
         self.punned(Value::Node(id), &own, ty)
+    }
+
+    /// The array in data memory with a place, whose scalar is known or not.
+    fn holding(&self, pointer: &Pointer, leaf: Option<usize>) -> Option<(Part, usize)> {
+        let object = &self.objects[pointer.object];
+        leaf.map_or_else(|| object.array(pointer.part), |leaf| object.held(leaf))
     }
 
     /// Demands that something lies behind a pointer of the caller's, in the next translation.
@@ -342,15 +386,9 @@ impl Exec<'_> {
     }
 
     /// The type of the scalar at a place in an array.
-    fn word_type(&self, pointer: &Pointer) -> Type {
-        let object = &self.objects[pointer.object];
-        let size = self.structs.size(&object.ty).unwrap_or(4).max(1) as i64;
-        let outer = match &object.ty {
-            Type::Array(element, _) => self.structs.size(element).map_or(size, |size| size.max(1) as i64),
-            _ => size,
-        };
-        let leaf = object.leaf(pointer.offset).or_else(|| object.leaf(pointer.offset.rem_euclid(outer)));
-        object.leaves[leaf.unwrap_or(0)].ty.clone()
+    fn word_type(&self, pointer: &Pointer) -> Result<Type, Error> {
+        let leaf = self.known_scalar(pointer)?.1;
+        Ok(self.objects[pointer.object].leaves[leaf].ty.clone())
     }
 
     /// The same bits read as another type, as a union's members are.
@@ -405,8 +443,16 @@ impl Exec<'_> {
         if self.objects[object].constant && self.stepping {
             return self.fail(format!("`{}` is const", self.objects[object].name));
         }
-        if pointer.dynamic.is_none() && (self.objects[object].array.is_none() || !self.stepping) {
-            let Some(leaf) = self.leaf(pointer)? else { return Ok(()) };
+        let leaf = match pointer.dynamic {
+            None => match self.leaf(pointer)? {
+                None => return Ok(()),
+                leaf => leaf,
+            },
+            Some(_) => None,
+        };
+        let in_register =
+            |exec: &Self, leaf: &usize| !exec.stepping || exec.objects[object].held(*leaf).is_none();
+        if let Some(leaf) = leaf.filter(|leaf| in_register(self, leaf)) {
             let own = self.objects[object].leaves[leaf].ty.clone();
             let value = self.punned(value, ty, &own)?;
             self.changes(object, leaf);
@@ -418,18 +464,15 @@ impl Exec<'_> {
             self.memory.set(object, leaf, value);
             return Ok(());
         }
-        let Some(array) = self.objects[object].array else {
-            self.demand(object);
-            self.changes_all(object);
+        let Some(held) = self.holding(pointer, leaf) else {
+            self.demand(object, pointer.part);
+            self.changes_all(object, pointer.part);
             return Ok(());
         };
-        if pointer.dynamic.is_none() && self.leaf(pointer)?.is_none() {
-            return Ok(());
-        }
-        let index = self.subscript(array, pointer)?;
-        let own = self.word_type(pointer);
+        let (index, array) = (self.subscript(held, pointer)?, held.1);
+        let own = self.word_type(pointer)?;
         let value = self.punned(value, ty, &own)?;
-        self.changes_all(object);
+        self.changes_all(object, Some(held.0));
         let Some(value) = self.register(&value, &own) else {
             return self.fail("no register holds this value");
         };
@@ -448,8 +491,8 @@ impl Exec<'_> {
         }
     }
 
-    fn changes_all(&mut self, object: usize) {
-        for leaf in 0..self.objects[object].leaves.len() {
+    fn changes_all(&mut self, object: usize, part: Option<Part>) {
+        for leaf in part.unwrap_or(self.objects[object].whole()).range() {
             self.changes(object, leaf);
         }
     }

@@ -6,7 +6,7 @@ use super::loops::{NO_BOUND, Repetition};
 use crate::Error;
 use crate::c::ir::{FULL, Id, Kind, Node, Op, Statement};
 use crate::c::types::{INT, Type};
-use crate::c::value::{Condition, Exit, Memory, Origin, Outcome, Pointer, Typed, Value};
+use crate::c::value::{Condition, Exit, Memory, Origin, Outcome, Part, Typed, Value};
 use lang_c::ast::{BinaryOperator, Expression, UnaryOperator};
 use lang_c::span::Node as Spanned;
 use std::collections::BTreeMap;
@@ -36,7 +36,7 @@ enum Carried {
     /// A variable holds it.
     Value(usize),
     /// A pointer into an object; the variable holds its place.
-    Place { var: usize, object: usize },
+    Place { var: usize, object: usize, part: Option<Part> },
     /// No variable can hold it: the text gives the reason where it is used.
     Lost(&'static str),
 }
@@ -265,7 +265,7 @@ impl<'a> Exec<'a> {
             let mark = self.nodes.mark();
             let saved = self.saved();
             self.blocks.push(Vec::new());
-            self.enter_cells(&cells);
+            self.enter_cells(&cells)?;
             self.nodes.indices.push(name.clone());
             let number = self.nodes.indices.len() - 1;
             let (index, _) = self.nodes.add(Node::Index(number), Kind::Int, range);
@@ -296,7 +296,7 @@ impl<'a> Exec<'a> {
             self.set_cells(&cells, &before)?;
             let (first, step) = (counter.first, counter.step);
             self.emit(Statement::For { index: number, first, last, step, body });
-            self.leave_cells(&cells, before);
+            self.leave_cells(&cells, before)?;
             let end = counter.first + counter.count * counter.step;
             self.set_counter(counter.object, end)?;
             return Ok(true);
@@ -337,7 +337,7 @@ impl<'a> Exec<'a> {
             let mark = self.nodes.mark();
             let saved = self.saved();
             self.blocks.push(Vec::new());
-            self.enter_cells(&cells);
+            self.enter_cells(&cells)?;
             let mut outcomes = Vec::new();
             let normal = self.statement(parts.body, &mut outcomes)?;
             let mut leaves = Vec::new();
@@ -396,7 +396,7 @@ impl<'a> Exec<'a> {
                 _ => body.push((Statement::Set(vec![(var, goes_on)]), at)),
             }
             self.emit(Statement::Loop { bound, body, again: kept });
-            self.leave_cells(&cells, before);
+            self.leave_cells(&cells, before)?;
             let Some(exit) = exit else { return Ok(Condition::Known(true)) };
             let flag = self.memory.get(left, 0).clone();
             let when = match flag {
@@ -416,26 +416,27 @@ impl<'a> Exec<'a> {
     }
 
     /// Puts the variables into memory, as a body finds them.
-    fn enter_cells(&mut self, cells: &Cells) {
+    fn enter_cells(&mut self, cells: &Cells) -> Result<(), Error> {
         for ((object, leaf), carried) in cells {
-            let value = self.carried(*object, *leaf, *carried);
+            let value = self.carried(*object, *leaf, *carried)?;
             self.memory.set(*object, *leaf, value);
         }
+        Ok(())
     }
 
-    fn carried(&mut self, object: usize, leaf: usize, carried: Carried) -> Value {
+    fn carried(&mut self, object: usize, leaf: usize, carried: Carried) -> Result<Value, Error> {
         let range = match &self.objects[object].leaves[leaf].ty {
             Type::Int(integer) if integer.bits < 32 => integer.limits(),
             _ => FULL,
         };
-        match carried {
+        Ok(match carried {
             Carried::Value(var) => Value::Node(self.nodes.read(var, range)),
-            Carried::Place { var, object } => {
-                let dynamic = Some(self.nodes.read(var, FULL));
-                Value::Pointer(Pointer { object, offset: 0, dynamic })
+            Carried::Place { var, object, part } => {
+                let scalar = self.nodes.read(var, FULL);
+                Value::Pointer(self.placed(object, part, scalar)?)
             }
             Carried::Lost(reason) => Value::Mixed(reason),
-        }
+        })
     }
 
     /// Adds the body's changes beyond the cells; returns false if there are none.
@@ -450,8 +451,13 @@ impl<'a> Exec<'a> {
                 let carried = match (cells.get(&(object, leaf)), &new) {
                     (None, _) if old == new => continue,
                     (None, _) => self.new_cell(object, leaf, &old, &new),
-                    (Some(Carried::Place { object, .. }), Value::Pointer(new)) if new.object == *object => {
-                        continue;
+                    (Some(Carried::Place { var, object, part }), Value::Pointer(new))
+                        if new.object == *object =>
+                    {
+                        if part.is_none() || new.part == *part {
+                            continue;
+                        }
+                        Carried::Place { var: *var, object: *object, part: None }
                     }
                     (Some(Carried::Value(_)), Value::Int(_) | Value::Real(_) | Value::Node(_)) => continue,
                     (Some(Carried::Lost(_)), _) => continue,
@@ -470,7 +476,8 @@ impl<'a> Exec<'a> {
         let name = self.objects[object].leaf_name(leaf);
         match (old, new) {
             (Value::Pointer(old), Value::Pointer(new)) if old.object == new.object => {
-                Carried::Place { var: self.nodes.var(&name, Kind::Int), object: old.object }
+                let part = old.part.filter(|_| old.part == new.part);
+                Carried::Place { var: self.nodes.var(&name, Kind::Int), object: old.object, part }
             }
             (Value::Pointer(_), _) | (_, Value::Pointer(_)) => Carried::Lost(MANY),
             (Value::Mixed(reason), _) | (_, Value::Mixed(reason)) => Carried::Lost(reason),
@@ -491,7 +498,7 @@ impl<'a> Exec<'a> {
         let value = memory.get(object, leaf);
         Ok(match (carried, value) {
             (Carried::Lost(_), _) => None,
-            (Carried::Place { var, object }, Value::Pointer(pointer)) if pointer.object == object => {
+            (Carried::Place { var, object, .. }, Value::Pointer(pointer)) if pointer.object == object => {
                 Some((var, self.scalars(pointer)?))
             }
             (Carried::Place { .. }, _) => {
@@ -533,11 +540,12 @@ impl<'a> Exec<'a> {
     }
 
     /// Memory after the loop.
-    fn leave_cells(&mut self, cells: &Cells, before: Memory) {
+    fn leave_cells(&mut self, cells: &Cells, before: Memory) -> Result<(), Error> {
         self.memory = before;
         for ((object, leaf), carried) in cells {
-            let value = self.carried(*object, *leaf, *carried);
+            let value = self.carried(*object, *leaf, *carried)?;
             self.memory.set(*object, *leaf, value);
         }
+        Ok(())
     }
 }

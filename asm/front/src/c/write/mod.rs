@@ -8,6 +8,7 @@ use super::exec::Exec;
 use super::ir::{Block, Id, Kind, Node, Place, Statement};
 use super::live::Live;
 use super::ports::{Port, Roles};
+use super::value::Object;
 use super::{Options, Translation};
 use crate::Error;
 use crate::sink::Head;
@@ -140,10 +141,11 @@ fn ports(head: &mut Head, directive: &str, ports: &[Port]) {
 /// Lines that say which words of an array hold which members: `1 gain, 2 to 9 hist`. `None` if it is no object with a word for each scalar, or
 /// has too many.
 fn members(exec: &Exec<'_>, array: usize, name: &str) -> Option<Vec<String>> {
-    let object = exec.objects.iter().find(|object| object.array == Some(array))?;
-    let is_whole = exec.nodes.arrays[array].words.len() == object.leaves.len();
+    let held = |object: &Object| object.arrays.iter().find(|(_, held)| *held == array).map(|(part, _)| *part);
+    let (object, part) = exec.objects.iter().find_map(|object| Some((object, held(object)?)))?;
+    let is_whole = exec.nodes.arrays[array].words.len() == part.count;
     let mut runs: Vec<(usize, usize, &str)> = Vec::new();
-    for (leaf, word) in object.leaves.iter().zip(1..) {
+    for (leaf, word) in object.leaves[part.range()].iter().zip(1..) {
         match runs.last_mut() {
             Some((_, last, name)) if *name == leaf.name => *last = word,
             _ => runs.push((word, word, &leaf.name)),
