@@ -5,6 +5,9 @@ use crate::export::Design;
 use crate::template::fill;
 use crate::wishbone;
 
+/// Bytes of addresses that the slave decodes.
+pub const BYTES: u32 = 1 << 18;
+
 /// Name of the slave's module.
 pub fn name(design: &Design) -> String {
     format!("{}_axi", design.top)

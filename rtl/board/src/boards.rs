@@ -23,6 +23,12 @@ const FILES: &[(&str, &str)] = &[
     ("gatemate-evb", include_str!("../boards/gatemate-evb.toml")),
     ("olimex-gatemate", include_str!("../boards/olimex-gatemate.toml")),
     ("crosslink-nx-evn", include_str!("../boards/crosslink-nx-evn.toml")),
+    ("arty-a7-35", include_str!("../boards/arty-a7-35.toml")),
+    ("arty-a7-100", include_str!("../boards/arty-a7-100.toml")),
+    ("zybo-z7-10", include_str!("../boards/zybo-z7-10.toml")),
+    ("zybo-z7-20", include_str!("../boards/zybo-z7-20.toml")),
+    ("pynq-z1", include_str!("../boards/pynq-z1.toml")),
+    ("de10-nano", include_str!("../boards/de10-nano.toml")),
 ];
 
 /// FPGA board, as described by its file.
@@ -146,10 +152,14 @@ fn one_of<'a>(
 /// A device that a board may have, its family, and the family's pins.
 type Device = (&'static Part, &'static Family, &'static Pinout);
 
-/// The devices of the families that a board may have.
+/// The devices of the families that a board may have; a name that stands for a family is none.
 fn devices(families: &'static [&'static Family]) -> Vec<Device> {
     let pinouts = families.iter().filter_map(|family| Some((*family, family.board.as_ref()?)));
-    pinouts.flat_map(|(family, pinout)| family.parts.iter().map(move |part| (part, family, pinout))).collect()
+    pinouts
+        .flat_map(|(family, pinout)| {
+            family.parts.iter().filter(|part| part.room.is_some()).map(move |part| (part, family, pinout))
+        })
+        .collect()
 }
 
 fn board(document: &Document<'_>, top: &Table<'_>, families: &'static [&'static Family]) -> Option<Board> {

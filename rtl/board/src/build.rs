@@ -33,10 +33,8 @@ pub enum BuildError {
     #[error(transparent)]
     Top(#[from] TopError),
     /// No open tools make a bitstream of the family.
-    #[error(
-        "Takt knows no open-source tools for {0}: write the Verilog for the vendor's tools with `--sources`, or simulate the board with `takt board sim`"
-    )]
-    NoTools(&'static str),
+    #[error("Takt knows no open-source tools for {}: {}, or simulate the board with `takt board sim`", .0.text, mend(.0))]
+    NoTools(&'static Family),
     /// A tool failed; nextpnr fails, too, if the clock is not met.
     #[error(transparent)]
     Tool(#[from] ToolError),
@@ -82,6 +80,14 @@ pub enum BuildError {
         /// Highest clock of the board that the placement meets, in MHz; `None` if the clock is not the core's.
         lower: Option<f64>,
     },
+}
+
+/// Way to a bitstream of a family without open tools.
+fn mend(family: &Family) -> String {
+    family.flow.map_or_else(
+        || "write the Verilog for the vendor's tools with `--sources`".to_owned(),
+        |flow| format!("write a project for {} with `--flow {}`", flow.tools, flow.name),
+    )
 }
 
 /// Options of a build.
@@ -131,7 +137,7 @@ impl Tools {
     fn of(family: &'static Family) -> Result<Tools, BuildError> {
         match (&family.synthesis, &family.place, &family.pack) {
             (Some(synthesis), Some(place), Some(pack)) => Ok(Tools { synthesis, place, pack }),
-            _ => Err(BuildError::NoTools(family.text)),
+            _ => Err(BuildError::NoTools(family)),
         }
     }
 }
@@ -163,7 +169,7 @@ pub fn write<'a>(
     Ok(circuit)
 }
 
-fn put(folder: &Path, name: &str, text: &str) -> Result<(), BuildError> {
+pub(crate) fn put(folder: &Path, name: &str, text: &str) -> Result<(), BuildError> {
     let path = folder.join(name);
     let made = fs::create_dir_all(path.parent().unwrap_or(folder)).and_then(|()| fs::write(&path, text));
     made.map_err(|error| BuildError::File(path.display().to_string(), error))
@@ -435,7 +441,7 @@ fn manifest(
         "cores": cores, "system": !application.is_program(), "clock_mhz": wiring.clock, "period_cycles": wiring.period, "baud": wiring.baud,
         "seed": report.seed, "margin": report.margin, "records": report.records, "room": report.room, "bytes": report.bytes,
         "clocks": report.clocks.iter().map(|(net, reached, wanted)| json!({ "net": net, "reached_mhz": reached, "needed_mhz": wanted })).collect::<Vec<_>>(),
-        "pins": top::own_pins(wiring).into_iter().map(|(name, _, pin)| json!({ "signal": name, "site": board.site(&pin), "pin": pin })).collect::<Vec<_>>(),
+        "pins": top::own_pins(wiring).into_iter().map(|own| json!({ "signal": own.name, "site": board.site(&own.pin), "pin": own.pin })).collect::<Vec<_>>(),
         "tools": [YOSYS, placer],
     })
 }

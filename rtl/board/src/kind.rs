@@ -20,6 +20,8 @@ pub struct Pin {
     pub direction: Direction,
     /// The pin may stay unconnected; an input is then 0.
     pub optional: bool,
+    /// Output of a register that the module does not read: the register may lie at the device's pin.
+    pub is_register: bool,
 }
 
 /// Register of 32 bits: port `r_<name>` of the module if the program reads it, `w_<name>` if the program writes it.
@@ -99,11 +101,15 @@ pub struct Kind {
 }
 
 const fn input(name: &'static str) -> Pin {
-    Pin { name, direction: Direction::Input, optional: false }
+    Pin { name, direction: Direction::Input, optional: false, is_register: false }
 }
 
 const fn output(name: &'static str) -> Pin {
-    Pin { name, direction: Direction::Output, optional: false }
+    Pin { name, direction: Direction::Output, optional: false, is_register: false }
+}
+
+const fn register_output(name: &'static str) -> Pin {
+    Pin { is_register: true, ..output(name) }
 }
 
 const fn optional(pin: Pin) -> Pin {
@@ -210,7 +216,7 @@ pub const KINDS: &[Kind] = &[
         name: "pwm",
         module: "takt_pwm",
         text: "half bridge: centred pulses, complementary pin, dead time",
-        pins: &[output("high"), optional(output("low"))],
+        pins: &[register_output("high"), optional(register_output("low"))],
         reads: &[],
         writes: &[scaled("duty", "cycles of the pulse, 0 to 2·half; signed: -half to half, 0 is 50 % duty")],
         parameters: &[
@@ -294,7 +300,7 @@ pub const KINDS: &[Kind] = &[
         name: "sigma-delta",
         module: "takt_sigma_delta",
         text: "analogue output: a stream of pulses on one pin",
-        pins: &[output("out")],
+        pins: &[register_output("out")],
         reads: &[],
         writes: &[scaled("value", "ones in 65536 cycles; signed: -32768 to 32768")],
         parameters: &[SIGNED],
@@ -304,7 +310,12 @@ pub const KINDS: &[Kind] = &[
         name: "spi",
         module: "takt_spi",
         text: "SPI master for a converter: one frame each period",
-        pins: &[output("clock"), output("select"), optional(output("out")), optional(input("in"))],
+        pins: &[
+            register_output("clock"),
+            register_output("select"),
+            optional(register_output("out")),
+            optional(input("in")),
+        ],
         reads: &[
             at("in", register("received", "value received in the last frame")),
             register("frames", "frames so far"),
@@ -374,7 +385,7 @@ pub const KINDS: &[Kind] = &[
         name: "sinc3",
         module: "takt_sinc3",
         text: "bits of a delta-sigma modulator: a sinc3 filter, and a faster one whose overcurrent is a trip",
-        pins: &[input("data"), optional(output("clock")), optional(input("clock_in"))],
+        pins: &[input("data"), optional(register_output("clock")), optional(input("clock_in"))],
         reads: &[
             register("value", "the filtered value, -osr³ to osr³"),
             register("values", "values so far; wraps at 32 bits"),
@@ -438,7 +449,7 @@ pub const KINDS: &[Kind] = &[
         name: "digital-out",
         module: "takt_digital_out",
         text: "one pin, on or off",
-        pins: &[output("out")],
+        pins: &[register_output("out")],
         reads: &[],
         writes: &[register("level", "0: off, else on")],
         parameters: &[parameter("safe", 0, 1, 0, "the pin while the drive is not enabled")],

@@ -21,6 +21,7 @@ pub mod latency;
 pub mod model;
 pub mod netlist;
 pub mod place;
+pub mod project;
 pub mod protocol;
 mod safety_watch;
 pub mod serial;

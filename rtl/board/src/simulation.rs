@@ -419,7 +419,7 @@ fn build(
     if let Some(reset) = &board.reset {
         inputs.push(("button".to_owned(), u32::from(!reset.level)));
     }
-    for (name, direction, _) in top::own_pins(wiring) {
+    for top::OwnPin { name, direction, .. } in top::own_pins(wiring) {
         match direction {
             // `stop` is 1 when open, but here it is wired.
             Direction::Input => inputs.push((name, 0)),

@@ -92,6 +92,7 @@ const MADE_UP: Family = Family {
         file: "pins.txt",
         constraints,
     }),
+    flow: None,
 };
 
 static FAMILY: Family = MADE_UP;
@@ -167,7 +168,7 @@ fn the_export_has_the_familys_modules_and_pins() {
 #[test]
 fn a_family_without_tools_makes_no_bitstream() {
     let error = build::packages(&board(BOARD)).expect_err("no tools");
-    assert!(matches!(error, BuildError::NoTools("Made-up fabric")), "{error}");
+    assert!(matches!(error, BuildError::NoTools(family) if family.text == "Made-up fabric"), "{error}");
     assert!(
         error.to_string().contains("Takt knows no open-source tools for Made-up fabric: write the Verilog"),
         "{error}"

@@ -13,6 +13,7 @@ mod harness;
 mod observe;
 mod peripherals;
 mod pins;
+mod project;
 mod sensors;
 mod system;
 mod top;

@@ -53,6 +53,7 @@ module takt_biss_c #(
     localparam [19:0] QUIET = TIMEOUT;
 
     reg  [1:0]  state;
+    (* ASYNC_REG = "TRUE", altera_attribute = "-name SYNCHRONIZER_IDENTIFICATION FORCED_IF_ASYNCHRONOUS" *)
     reg         s0, s1;
     reg  [19:0] quiet;       // cycles of pin_ma at 1 at rest
     reg  [15:0] in_half;

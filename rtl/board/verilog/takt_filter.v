@@ -16,6 +16,8 @@ module takt_filter #(
     output reg  level
 );
 
+    // Vendors' tools place the synchroniser's registers side by side, and do not retime or merge them.
+    (* ASYNC_REG = "TRUE", altera_attribute = "-name SYNCHRONIZER_IDENTIFICATION FORCED_IF_ASYNCHRONOUS" *)
     reg            s0, s1;
     reg [BITS-1:0] held;
     localparam     LAST = HOLD - 1;

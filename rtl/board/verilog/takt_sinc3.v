@@ -52,7 +52,9 @@ module takt_sinc3 #(
     // ---- the clock, and the bits
 
     reg  [8:0]  place;  // of the clock's period; at 0 it rises
-    reg         c0, c1, c2, d0, d1, d2;
+    (* ASYNC_REG = "TRUE", altera_attribute = "-name SYNCHRONIZER_IDENTIFICATION FORCED_IF_ASYNCHRONOUS" *)
+    reg         c0, c1, d0, d1;
+    reg         c2, d2;
     wire [8:0]  next  = start | place == WHOLE ? 9'd0 : place + 9'd1;
     wire        rises = CLOCK != 0 ? c1 & ~c2 : place == 9'd0;
     wire        one   = CLOCK != 0 ? d2 : d1;

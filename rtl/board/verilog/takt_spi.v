@@ -39,7 +39,9 @@ module takt_spi #(
     reg  [31:0] send, shift, received, frames, lost;
     reg  [15:0] wait_for;
     reg  [6:0]  half;      // 0: before the first bit
-    reg         busy, s0, s1;
+    reg         busy;
+    (* ASYNC_REG = "TRUE", altera_attribute = "-name SYNCHRONIZER_IDENTIFICATION FORCED_IF_ASYNCHRONOUS" *)
+    reg         s0, s1;
 
     wire        step    = busy & wait_for == LAST;
     // At the end of a half the clock goes to its active level (even ones) or back (odd ones); it stays at the end of the last.

@@ -43,7 +43,9 @@ module takt_ssi #(
     reg  [BITS-1:0] word;
     reg  [19:0]     since;
     reg  [6:0]      number;  // of the bit
-    reg             busy, rests, bad, above, s0, s1;
+    reg             busy, rests, bad, above;
+    (* ASYNC_REG = "TRUE", altera_attribute = "-name SYNCHRONIZER_IDENTIFICATION FORCED_IF_ASYNCHRONOUS" *)
+    reg             s0, s1;
     reg  [31:0]     position, turns, frames, lost, errors;
 
     wire        ends    = rests & since == REST;

@@ -30,6 +30,7 @@ module takt_trip #(
     wire asks;
     generate
         if (FILTER == 0) begin : g_direct
+            (* ASYNC_REG = "TRUE", altera_attribute = "-name SYNCHRONIZER_IDENTIFICATION FORCED_IF_ASYNCHRONOUS" *)
             reg s0, s1;
             always @(posedge clk) {s1, s0} <= {s0, pin};
             assign asks = s1;

@@ -22,6 +22,7 @@ module takt_uart_receive #(
 
     reg  [15:0] left;
     reg  [3:0]  bits;  // 0: none; 10 start, 9 to 2 data, 1 stop
+    (* ASYNC_REG = "TRUE", altera_attribute = "-name SYNCHRONIZER_IDENTIFICATION FORCED_IF_ASYNCHRONOUS" *)
     reg         s0, s1;
 
     always @(posedge clk) begin

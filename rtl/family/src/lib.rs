@@ -4,13 +4,14 @@
 //!
 //! A new family is a new value of [`Family`], of which the compiler requires every field. Parts that a family may lack are options:
 //! without [`Family::board`] no board can have the family, without [`Family::place`] its cores are only counted, without [`Family::pack`]
-//! there is no bitstream.
+//! there is no bitstream, unless the tools of the maker make it from the project that [`Family::flow`] writes.
 
 #[cfg(test)]
 mod confinement;
 mod count;
 pub mod cyclone_v;
 pub mod ecp5;
+mod flow;
 pub mod gatemate;
 pub mod gowin;
 pub mod ice40;
@@ -22,7 +23,8 @@ pub mod series_7;
 mod synthesis;
 
 pub use count::{Cells, Resources};
-pub use pins::{Constraints, Pin, Pinout, Pull, Sites};
+pub use flow::{Attachment, Flow, Processor, Project};
+pub use pins::{Constraints, Pin, PinRole, Pinout, Pull, Sites};
 pub use place::{MeasurementDevice, Models, Pack, Place, Proof, ROUTED, YosysFile};
 pub use pll::{Pll, PllError};
 pub use synthesis::{Mapping, Synthesis};
@@ -74,6 +76,8 @@ pub struct Family {
     pub bank: Option<Proof>,
     /// Packages, pins and their constraints; `None` if no board may have the family.
     pub board: Option<Pinout>,
+    /// Projects for the maker's tools; `None` if Takt writes none.
+    pub flow: Option<Flow>,
 }
 
 /// Device of a family.
@@ -205,6 +209,30 @@ mod tests {
             FAMILIES.iter().map(|family| (family, family.pack.is_some() || family.models.is_some()))
         {
             assert!(!options || family.place.is_some(), "{}: a bitstream of no placement", family.name);
+        }
+    }
+
+    #[test]
+    fn flows_have_pins_and_devices_for_them() {
+        for family in FAMILIES {
+            let Some(flow) = &family.flow else { continue };
+            assert!(family.board.is_some(), "{}: a project without pins", family.name);
+            let boards = family.parts.iter().filter(|part| part.room.is_some());
+            assert!(boards.clone().count() > 0 && boards.clone().all(|part| !part.tool.is_empty()));
+            assert_eq!(
+                FAMILIES
+                    .iter()
+                    .filter_map(|other| other.flow)
+                    .filter(|other| other.name == flow.name)
+                    .count(),
+                1
+            );
+            let Some(processor) = flow.processor else { continue };
+            assert!(
+                boards.clone().any(processor.is_on) && !boards.clone().all(processor.is_on),
+                "{}",
+                family.name
+            );
         }
     }
 

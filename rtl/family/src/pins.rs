@@ -45,6 +45,29 @@ pub struct Pin<'a> {
     pub site: &'a str,
     /// Resistor within the device.
     pub pull: Pull,
+    /// Circuit at the port.
+    pub role: PinRole,
+}
+
+/// Circuit at a port of the top module.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PinRole {
+    /// Clock of the board.
+    Clock,
+    /// Input at any time, which a synchroniser follows.
+    Input,
+    /// Output of logic, or of a register that the circuit reads.
+    Output,
+    /// Output of a register that nothing else reads, which may lie at the pin.
+    Register,
+}
+
+impl Constraints<'_> {
+    /// Ports with these roles, in order, separated by blanks.
+    pub fn ports(&self, roles: &[PinRole]) -> String {
+        let ports = self.pins.iter().filter(|pin| roles.contains(&pin.role)).map(|pin| pin.port.as_str());
+        ports.collect::<Vec<_>>().join(" ")
+    }
 }
 
 /// Pull resistor of a pin, within the device.

@@ -59,7 +59,7 @@ pub fn works(program: &str, argument: &str) -> bool {
 }
 
 /// Programs that the tests call: name, an argument with which the program exits successfully, Debian package.
-const TOOLS: [(&str, &str, &str); 10] = [
+const TOOLS: [(&str, &str, &str); 11] = [
     // C compiler for Berkeley SoftFloat, the reference arithmetic.
     ("cc", "--version", "gcc"),
     // Verilator needs make and a C++ compiler; Icarus Verilog is the second simulator.
@@ -68,6 +68,8 @@ const TOOLS: [(&str, &str, &str); 10] = [
     ("verilator", "--version", "verilator"),
     ("llvm-mca", "--version", "llvm"),
     ("iverilog", "-V", "iverilog"),
+    // Scripts and constraints for the tools of FPGA makers.
+    ("tclsh", "/dev/null", "tcl"),
     // Client of the language server.
     ("nvim", "--version", "neovim"),
     // JavaScript client of the debug adapter.

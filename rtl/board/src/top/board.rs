@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The board's top level: clock, reset, pins; and the constraints that place them.
 
-use super::peripherals::{direction, own_pins};
+use super::peripherals::{OwnPin, direction, own_pins};
 use super::wrapper::AROUND;
 use crate::boards::Board;
 use crate::kind::Direction;
 use crate::wiring::Wiring;
 use std::fmt::Write as _;
-use takt_family::{Constraints, Pin, PllError, Pull};
+use takt_family::{Constraints, Pin, PinRole, PllError, Pull};
 
 /// Name of the board's top module.
 pub const TOP: &str = "takt_board";
@@ -24,7 +24,7 @@ const LAMPS: usize = 4;
 /// If the clock cannot be made.
 pub(super) fn top(board: &Board, wiring: &Wiring) -> Result<String, PllError> {
     let (mut ports, mut connections, mut constants) = (String::new(), String::new(), String::new());
-    for (name, way, _) in own_pins(wiring) {
+    for OwnPin { name, direction: way, .. } in own_pins(wiring) {
         let _ = write!(ports, ",\n    {} {name}", direction(way));
         let _ = write!(connections, ", .{name}({name})");
     }
@@ -64,6 +64,7 @@ module {TOP} (
 {pll}
     // Reset lasts until the clock has been steady, and the button released, for {} cycles.
     reg  [{RESET_BITS}:0] steady;
+    (* ASYNC_REG = \"TRUE\", altera_attribute = \"-name SYNCHRONIZER_IDENTIFICATION FORCED_IF_ASYNCHRONOUS\" *)
     reg  [1:0] pressed, lock;
     initial {{steady, pressed, lock}} = {}'d0;
     wire rst = ~steady[{RESET_BITS}];
@@ -92,27 +93,30 @@ endmodule
     ))
 }
 
-/// Constraints for place and route.
-pub(super) fn pins(board: &Board, wiring: &Wiring) -> String {
+/// Constraints for place and route, and for projects of the makers' tools.
+pub(crate) fn constraints<'a>(board: &'a Board, wiring: &Wiring) -> Constraints<'a> {
     let mut pins = Vec::new();
-    let mut put = |port: String, site, pull| pins.push(Pin { port, site, pull });
-    put("clk_in".to_owned(), board.clock.0.as_str(), Pull::None);
-    put("uart_send".to_owned(), &board.send, Pull::None);
-    put("uart_receive".to_owned(), &board.receive, Pull::Up);
+    let mut put = |port: String, site, pull, role| pins.push(Pin { port, site, pull, role });
+    put("clk_in".to_owned(), board.clock.0.as_str(), Pull::None, PinRole::Clock);
+    put("uart_send".to_owned(), board.send.as_str(), Pull::None, PinRole::Register);
+    put("uart_receive".to_owned(), board.receive.as_str(), Pull::Up, PinRole::Input);
     if let Some(reset) = &board.reset {
-        put("button".to_owned(), &reset.site, reset.pull);
+        put("button".to_owned(), reset.site.as_str(), reset.pull, PinRole::Input);
     }
     for (i, site) in board.high.iter().enumerate() {
-        put(format!("high{i}"), site, Pull::None);
+        put(format!("high{i}"), site.as_str(), Pull::None, PinRole::Output);
     }
     for (i, site) in board.leds.iter().take(LAMPS).enumerate() {
-        put(format!("led{i}"), site, Pull::None);
+        put(format!("led{i}"), site.as_str(), Pull::None, PinRole::Output);
     }
-    for (name, way, pin) in own_pins(wiring) {
+    for OwnPin { name, direction, pin, is_register } in own_pins(wiring) {
         // An open input is at rest: 1, which for `stop` means stop.
-        let pull = if way == Direction::Input { Pull::Up } else { Pull::None };
-        put(name, board.site(&pin).unwrap_or_default(), pull);
+        let (pull, role) = match (direction, is_register) {
+            (Direction::Input, _) => (Pull::Up, PinRole::Input),
+            (Direction::Output, true) => (Pull::None, PinRole::Register),
+            (Direction::Output, false) => (Pull::None, PinRole::Output),
+        };
+        put(name, board.site(&pin).unwrap_or_default(), pull, role);
     }
-    let constraints = Constraints { pins, standard: &board.standard, clock: ("clk_in", board.clock.1) };
-    (board.pinout.constraints)(&constraints)
+    Constraints { pins, standard: &board.standard, clock: ("clk_in", board.clock.1) }
 }

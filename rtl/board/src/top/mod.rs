@@ -14,11 +14,12 @@ mod shadow_memory;
 mod template;
 mod wrapper;
 
+pub(crate) use board::constraints;
 pub use board::{RESET, TOP};
 pub use design::circuit_number;
 pub use error::TopError;
 pub use image::{Contents, RECORDS, image};
-pub(crate) use peripherals::own_pins;
+pub(crate) use peripherals::{OwnPin, own_pins};
 pub use wrapper::AROUND;
 
 use crate::VERILOG;
@@ -84,7 +85,7 @@ pub fn circuit<'a>(
     put("image.hex", contents.file(application.description().cores.len()));
     Ok(Circuit {
         files,
-        pins: (board.pinout.file, board::pins(board, wiring)),
+        pins: (board.pinout.file, (board.pinout.constraints)(&board::constraints(board, wiring))),
         clock: wiring.clock,
         records: contents.records.len(),
         room: contents.room,

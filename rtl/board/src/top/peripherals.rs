@@ -11,16 +11,29 @@ use crate::wiring::{Peripheral, SIGNALS, Starts, Wiring, Write};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-/// The pins of peripherals and signals: name, direction, pin of the board.
-pub(crate) fn own_pins(wiring: &Wiring) -> Vec<(String, Direction, String)> {
+/// Pin of a peripheral or of a signal.
+pub(crate) struct OwnPin {
+    /// Port of the top.
+    pub(crate) name: String,
+    pub(crate) direction: Direction,
+    /// Pin of the board.
+    pub(crate) pin: String,
+    /// See [`Pin::is_register`](crate::kind::Pin::is_register).
+    pub(crate) is_register: bool,
+}
+
+/// The pins of signals and peripherals.
+pub(crate) fn own_pins(wiring: &Wiring) -> Vec<OwnPin> {
     let mut pins = Vec::new();
     for (signal, pin) in SIGNALS.iter().zip(&wiring.signals) {
-        pins.extend(pin.clone().map(|pin| (format!("signal_{}", signal.name), signal.direction, pin)));
+        let (name, direction) = (format!("signal_{}", signal.name), signal.direction);
+        pins.extend(pin.clone().map(|pin| OwnPin { name, direction, pin, is_register: false }));
     }
     for peripheral in &wiring.peripherals {
         for (pin, at) in peripheral.kind.pins.iter().zip(&peripheral.pins) {
-            let name = format!("{}_{}", peripheral.name, pin.name);
-            pins.extend(at.clone().map(|at| (name, pin.direction, at)));
+            let (name, direction) = (format!("{}_{}", peripheral.name, pin.name), pin.direction);
+            let is_register = pin.is_register;
+            pins.extend(at.clone().map(|pin| OwnPin { name, direction, pin, is_register }));
         }
     }
     pins

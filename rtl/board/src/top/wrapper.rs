@@ -48,8 +48,10 @@ pub(super) fn wrapper(
 
 /// The values for pins, parameters of the wiring, and addresses of the protocol.
 fn pins(wiring: &Wiring) -> Values {
-    let pins: String =
-        own_pins(wiring).iter().map(|(name, way, _)| format!(",\n    {} {name}", direction(*way))).collect();
+    let pins: String = own_pins(wiring)
+        .iter()
+        .map(|pin| format!(",\n    {} {}", direction(pin.direction), pin.name))
+        .collect();
     let mut signals = String::new();
     for (name, value) in
         [("drive", "drive"), ("fault", "|fault"), ("deadline", "|{@ALL_MISSES@}"), ("tick", "ticks")]

@@ -94,6 +94,7 @@ endmodule
         file: "pins.lpf",
         constraints,
     }),
+    flow: None,
 };
 
 /// The LFE5U-85F of grade 8, with the pins of the ULX3S board.

@@ -77,6 +77,7 @@ pub static FAMILY: Family = Family {
         file: "pins.ccf",
         constraints,
     }),
+    flow: None,
 };
 
 /// The CCGM1A1, with pins of the maker's evaluation board.

@@ -59,6 +59,7 @@ pub static FAMILY: Family = Family {
     models: None,
     bank: None,
     board: Some(Pinout { packages: &["MG121N", "MG196S", "PG256", "PG256S", "UG324"], ..PINOUT }),
+    flow: None,
 };
 
 /// The GW5A-25 of grade C1/I0, with pins of the Tang Primer 25K.

@@ -82,6 +82,7 @@ pub static FAMILY: Family = Family {
     models: None,
     bank: None,
     board: Some(Pinout { packages: &["MG196", "PG256", "PG484", "EQ144", "QN88"], ..PINOUT }),
+    flow: None,
 };
 
 const ROOM: Option<crate::Resources> = room(20_736, 15_552, 48, 46);

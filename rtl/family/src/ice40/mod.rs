@@ -80,6 +80,7 @@ pub static FAMILY: Family = Family {
         file: "pins.pcf",
         constraints,
     }),
+    flow: None,
 };
 
 /// The iCE40UP5K in its package of 48 pins, with pins of the iCEBreaker.

@@ -65,6 +65,7 @@ pub static FAMILY: Family = Family {
         file: "pins.pdc",
         constraints,
     }),
+    flow: None,
 };
 
 /// The LIFCL-40 of grade 9, with pins of the maker's evaluation board.

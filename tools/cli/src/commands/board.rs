@@ -26,7 +26,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use takt_board::tools::Venv;
-use takt_board::{Application, Board, Findings, Mistake, Wiring};
+use takt_board::{Application, Board, Findings, Mistake, Wiring, project};
 
 /// List boards and their pins; check, build and simulate a program, or a system of several cores, on a board.
 #[derive(Args)]
@@ -97,6 +97,22 @@ struct Build {
     /// Write the circuit and the pins only, without calling the tools.
     #[arg(long)]
     sources: bool,
+    /// Write a project for the tools of the device's maker, and call nothing; nobody has run one yet (docs/board.md).
+    #[arg(long, value_name = "FLOW", value_parser = flow(), conflicts_with_all = ["sources", "seed", "seeds", "time"])]
+    flow: Option<String>,
+    /// The core of a program on the AXI bus of the device's processors, in place of a board with pins, with programs that drive it from
+    /// Linux.
+    #[arg(long, requires = "flow", conflicts_with = "wiring")]
+    axi: bool,
+    /// Clock of bus and core with --axi, in MHz.
+    #[arg(long, value_name = "MHZ", default_value_t = 50.0, requires = "axi")]
+    clock: f64,
+}
+
+/// Value parser for the name of a flow, for clap.
+fn flow() -> clap::builder::PossibleValuesParser {
+    let flows = takt_family::FAMILIES.iter().filter_map(|family| family.flow);
+    clap::builder::PossibleValuesParser::new(flows.map(|flow| flow.name).collect::<Vec<_>>())
 }
 
 const BUILD: &str = "\
@@ -104,7 +120,9 @@ Example:
   takt board build --wiring robot.toml --program robot.s -o out     on the board that robot.toml names
   takt board build --wiring robot.toml --program robot.s --seeds 8 -o out   up to eight placements, until one meets the clock
   takt board build --board ulx3s-85f --wiring axis.toml --program system.toml -o out   several cores
-  openFPGALoader --board ulx3s out/takt.bit";
+  openFPGALoader --board ulx3s out/takt.bit
+  takt board build --wiring robot.toml --board arty-a7-35 --program robot.s --flow vivado -o out   a project for Vivado
+  takt board build --board zybo-z7-20 --program robot.s --flow vivado --axi -o out   the core on the bus of the Zynq's processors";
 
 /// Folder of the Python environment with the tools: `TAKT_VENV`, or a folder in the user's cache.
 pub(crate) fn tools_folder() -> Result<PathBuf> {
@@ -169,6 +187,13 @@ pub(crate) fn find(name: &str, color: bool) -> Result<Board> {
 }
 
 impl Target {
+    /// Loads the program, or the system, with its parameters.
+    fn application(&self, color: bool) -> Result<application::Application> {
+        let mut carried = application::Application::load(&self.program, &self.machine, &self.source, color)?;
+        self.parameters.apply(&mut carried)?;
+        Ok(carried)
+    }
+
     /// Reads board, wiring and application, and checks that they match. In a simulation, a program that misses every tick is not an error.
     pub(crate) fn read(
         &self,
@@ -178,12 +203,7 @@ impl Target {
         let mut reads: Vec<(&str, &Path)> = vec![("--program", &self.program)];
         reads.extend(self.wiring.as_deref().map(|path| ("--wiring", path)));
         files::check(&reads, &[])?;
-        let load = || {
-            let mut carried =
-                application::Application::load(&self.program, &self.machine, &self.source, color)?;
-            self.parameters.apply(&mut carried)?;
-            anyhow::Ok(carried)
-        };
+        let load = || self.application(color);
         let Some(path) = &self.wiring else {
             let board = find(self.board.as_deref().context("a board: --board NAME")?, color)?;
             let carried = load()?;
@@ -349,7 +369,45 @@ fn pins(arguments: &Pins, color: bool, out: &mut Out) -> Result<()> {
     Ok(())
 }
 
+/// Writes a project for the tools of the device's maker.
+fn project(arguments: &Build, name: &str, color: bool, out: &mut Out) -> Result<()> {
+    let folder = &arguments.output;
+    let written = if arguments.axi {
+        let board = find(arguments.target.board.as_deref().context("a board: --board NAME")?, color)?;
+        let flow = project::flow(&board, name)?;
+        let (lowest, highest) = project::CLOCK;
+        ensure!(
+            (lowest..=highest).contains(&arguments.clock),
+            "--clock: expected {lowest} to {highest} MHz, found {}",
+            arguments.clock
+        );
+        let carried = arguments.target.application(color)?;
+        let application::Application::Program(loaded) = &carried else {
+            return Err(project::ProjectError::System.into());
+        };
+        project::write_attached(&board, &loaded.program, flow, arguments.clock, folder)?
+    } else {
+        let (board, wiring, carried) = arguments.target.read(color, false)?;
+        let flow = project::flow(&board, name)?;
+        project::write(&board, &wiring, carried.on_board(), flow, folder)?
+    };
+    writeln!(
+        out,
+        "{} files in {} for {}: README.md there; nobody has run such a project yet",
+        written.files.len(),
+        folder.display(),
+        written.tools
+    )?;
+    for command in written.commands {
+        writeln!(out, "  {command}")?;
+    }
+    Ok(())
+}
+
 fn build(arguments: &Build, color: bool, out: &mut Out) -> Result<()> {
+    if let Some(name) = &arguments.flow {
+        return project(arguments, name, color, out);
+    }
     let (board, wiring, carried) = arguments.target.read(color, false)?;
     let (application, folder) = (carried.on_board(), &arguments.output);
     if arguments.sources {
