@@ -310,12 +310,7 @@ pub const KINDS: &[Kind] = &[
         name: "spi",
         module: "takt_spi",
         text: "SPI master for a converter: one frame each period",
-        pins: &[
-            register_output("clock"),
-            register_output("select"),
-            optional(register_output("out")),
-            optional(input("in")),
-        ],
+        pins: &[register_output("clock"), output("select"), optional(output("out")), optional(input("in"))],
         reads: &[
             at("in", register("received", "value received in the last frame")),
             register("frames", "frames so far"),

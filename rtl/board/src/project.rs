@@ -233,9 +233,9 @@ fn readme(flow: &Flow, device: &str, about: &str, bitstream: &str, more: &str) -
         text,
         "```\n\nThe bitstream is `{bitstream}`; a design that misses its clock ends in an error.
 
-**Nobody has run this project.** Takt's developers have neither {} nor the board: the scripts ran against stand-ins for the tool's
-commands, the Verilog was read by Verilator and yosys, and the circuit was simulated without its clock generator. Placement, timing, and
-everything electrical are untested. Report what you find.
+**Nobody has run this project.** Takt's developers have neither {} nor the board: projects like it ran with stand-ins for the
+tool's commands, and their Verilog in a simulator, without clock generator and processors. Placement, timing, and everything electrical
+are untested. Report what you find.
 {more}",
         flow.tools
     );

