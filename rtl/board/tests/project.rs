@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Projects for the tools of devices' makers. The tools are not available: scripts and constraints run in `tclsh` with stand-ins for their
-//! commands, pins are compared with the top's ports, Verilator reads the circuit with the stand-in for the PLL, and the host's programs
-//! drive the AXI slave in Verilator.
+//! Projects for makers' tools: scripts run with stand-ins for the tools' commands, pins and constraints are those of the top's ports, and hosts
+//! in C and Python drive the AXI slave in Verilator. The tools themselves are not available.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
