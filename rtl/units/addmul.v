@@ -67,6 +67,7 @@ module takt_addmul #(
     wire        converts   = op[2];
     wire        from_integer = op[2] & ~op[0];
     wire        integers   = op[1] & op[0];   // imul24
+    wire        of_floats  = ~op[2] & ~integers;
 
     wire        b_sign  = b[31] ^ op[0];
     wire        a_small = a[30:23] == 8'd0;  // zero or subnormal: the same exponent as that of a field of 1
@@ -89,7 +90,8 @@ module takt_addmul #(
     takt_significand_product #(.SMALL(1)) u_product (
         .clk(clk), .a({integers ? a[23] : ~a_small, a[22:0]}), .b({integers ? b[23] : ~b_small, b[22:0]}), .p(product)
     );
-    wire [7:0]  excess = ({8{a[23]}} & b[7:0]) + ({8{b[23]}} & a[7:0]);  // of an integer product's upper byte
+    // What the signs of integers add to the upper byte of their product; otherwise 0.
+    wire [7:0]  excess = ({8{integers & a[23]}} & b[7:0]) + ({8{integers & b[23]}} & a[7:0]);
 
     // The carry in is made by an extra place below the others.
     wire [9:0]  other     = converts ? -10'd157 : {2'd0, b_exponent} ^ {10{~multiplies}};
@@ -98,6 +100,7 @@ module takt_addmul #(
     reg [31:8] s1, l1;
     reg [39:32] above1;     // of an integer, which is in places 39 to 8
     reg [7:0]  exponent1;   // of L
+    reg [7:0]  excess1;
     reg [9:0]  distance1;   // exponent of a less that of b; their sum; exponent of a less 157
     reg        multiplies1, converts1, from_integer1, subtracts1, sign1, nan1, special1, invalid1, empty1, high1, integers1;
 
@@ -105,7 +108,7 @@ module takt_addmul #(
         s1            <= b_larger ? {from_integer ? a[23] : ~a_small, a[22:0]} : {~b_small, b[22:0]};
         l1            <= b_larger ? {~b_small, b[22:0]} : {~a_small, a[22:0]};
         if (multiplies | converts) l1 <= 24'd0;
-        if (integers) l1[16:9] <= excess;
+        excess1       <= excess;
         above1        <= a[31:24];
         if (~from_integer) above1 <= 8'd0;
         exponent1     <= b_larger ? b_exponent : a_exponent;
@@ -116,9 +119,9 @@ module takt_addmul #(
         subtracts1    <= ~multiplies & (a[31] ^ (b_sign & ~converts));
         sign1         <= (multiplies ? a[31] ^ b[31] : b_larger & ~converts ? b_sign : a[31]);
         integers1     <= integers;
-        nan1          <= ~converts & ~integers & (a_nan | b_nan | improper);
-        special1      <= ~converts & ~integers & (a_special | b_special);
-        invalid1      <= ~converts & ~integers & ((a_nan & ~a[22]) | (b_nan & ~b[22]) | (improper & ~a_nan & ~b_nan));
+        nan1          <= of_floats & (a_nan | b_nan | improper);
+        special1      <= of_floats & (a_special | b_special);
+        invalid1      <= of_floats & ((a_nan & ~a[22]) | (b_nan & ~b[22]) | (improper & ~a_nan & ~b_nan));
         empty1        <= a_empty;
         high1         <= ~a[31] | a_nan;
     end
@@ -131,6 +134,7 @@ module takt_addmul #(
     wire [9:0]  distance = to_right[10:1];
     wire        to_integer1 = converts1 & ~from_integer1;
     wire        too_large   = to_integer1 & distance[9];
+    wire        shifts      = ~distance[9] & ~integers1;
 
     reg [32:0]  s2;
     reg [14:0]  below2;
@@ -149,18 +153,14 @@ module takt_addmul #(
         if (~multiplies1) {s2[7:0], below2} <= 23'd0;
         above2      <= above1[39:33];
         l2          <= l1;
-        if (integers1) l2[16:9] <= -l1[16:9];
-        right2      <= distance[4:0] & {5{~distance[9]}};
-        beyond2     <= distance[9] ? to_integer1 : |distance[8:5];
+        l2[16:9]    <= l1[16:9] - excess1;  // of a product, l1 is 0
+        right2      <= distance[4:0] & {5{shifts}};
+        beyond2     <= distance[9] ? to_integer1 : ~integers1 & (|distance[8:5]);
         exponent2   <= exponent1;
         if (from_integer1) begin
             right2    <= 5'd7;
             beyond2   <= 1'b0;
             exponent2 <= 8'd157;
-        end
-        if (integers1) begin
-            right2    <= 5'd0;
-            beyond2   <= 1'b0;
         end
         integers2   <= integers1;
         distance2   <= distance;
