@@ -5,7 +5,7 @@ use crate::application::Application;
 use crate::boards::Board;
 use crate::place::reports::resources;
 use crate::tools::{ToolError, Venv, YOSYS};
-use crate::top::{self, TOP, TopError};
+use crate::top::{self, ScopeSize, TOP, TopError};
 use crate::wiring::Wiring;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -124,6 +124,8 @@ pub struct Report {
     pub records: usize,
     /// Number of records that the image has room for.
     pub room: usize,
+    /// The scope.
+    pub scope: Option<ScopeSize>,
 }
 
 /// The tools of a family.
@@ -231,6 +233,7 @@ pub fn build<'a>(
         bytes,
         records: circuit.records,
         room: circuit.room,
+        scope: circuit.scope,
     };
     let manifest = manifest(board, wiring, &application, &report, tools.place.package);
     put(folder, "manifest.json", &format!("{manifest:#}\n"))?;
@@ -440,6 +443,7 @@ fn manifest(
         "board": board.name, "device": board.device.name, "grade": board.grade, "package": board.package,
         "cores": cores, "system": !application.is_program(), "clock_mhz": wiring.clock, "period_cycles": wiring.period, "baud": wiring.baud,
         "seed": report.seed, "margin": report.margin, "records": report.records, "room": report.room, "bytes": report.bytes,
+        "scope": report.scope.map(|scope| json!({ "channels": scope.channels, "depth": scope.depth })),
         "clocks": report.clocks.iter().map(|(net, reached, wanted)| json!({ "net": net, "reached_mhz": reached, "needed_mhz": wanted })).collect::<Vec<_>>(),
         "pins": top::own_pins(wiring).into_iter().map(|own| json!({ "signal": own.name, "site": board.site(&own.pin), "pin": own.pin })).collect::<Vec<_>>(),
         "tools": [YOSYS, placer],

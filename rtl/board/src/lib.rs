@@ -24,6 +24,7 @@ pub mod place;
 pub mod project;
 pub mod protocol;
 mod safety_watch;
+pub mod scope;
 pub mod serial;
 pub mod simulation;
 mod sinks;
@@ -41,6 +42,7 @@ pub use document::Mistake;
 pub use host::Host;
 pub use kind::Kind;
 pub use protocol::Place;
+pub use scope::Scope;
 pub use stream::{STREAMED, Stream};
 pub use wiring::Wiring;
 
@@ -63,6 +65,7 @@ pub const VERILOG: &[(&str, &str)] = &[
     ("takt_pwm_phase.v", include_str!("../verilog/takt_pwm_phase.v")),
     ("takt_quadrature.v", include_str!("../verilog/takt_quadrature.v")),
     ("takt_scale.v", include_str!("../verilog/takt_scale.v")),
+    ("takt_scope.v", include_str!("../verilog/takt_scope.v")),
     ("takt_shadow_memory.v", include_str!("../verilog/takt_shadow_memory.v")),
     ("takt_sigma_delta.v", include_str!("../verilog/takt_sigma_delta.v")),
     ("takt_sinc3.v", include_str!("../verilog/takt_sinc3.v")),

@@ -111,7 +111,7 @@ const fn register(address: u16, name: &'static str, access: &'static str, text: 
 }
 
 /// The board's registers. Generator, host and docs/protocol.md take the registers from this table.
-pub const REGISTERS: [Register; 21] = [
+pub const REGISTERS: [Register; 31] = [
     register(
         0,
         "id",
@@ -151,11 +151,57 @@ pub const REGISTERS: [Register; 21] = [
     register(14, "lost", "r", "frames of the stream that were not sent, since power-up"),
     register(15, "room", "r", "records that the image has room for"),
     register(16, "circuit", "r", "a number for cores, links and ports, without the programs"),
-    register(17, "page", "rw", "the 4096 records of the image that have addresses: 0 for the first"),
+    register(
+        17,
+        "page",
+        "rw",
+        "the 4096 records of the image that have addresses: 0 for the first; from 8 on, the 16,384 words of the scope's ring in their place",
+    ),
     register(18, "observed", "r", "1: registers and data memory can be read; 0: the wiring leaves that out"),
     register(19, "issued", "r", "15:0 the bundle that issued last, if `observed` is 1"),
     register(20, "trips", "r", "the trips that are held, the wiring's first in bit 0"),
+    register(
+        64,
+        "scope",
+        "r",
+        "15:0 samples of the scope's ring, 19:16 channels, 27:24 the core that it records, 28 channels can be restricted to a bundle; 0: no \
+         scope",
+    ),
+    register(
+        65,
+        "scope_state",
+        "rw",
+        "1:0 0 at rest, 1 armed, 2 triggered, 3 done; 2 the last sample is that of a stop; 9:4 the trigger: fault or halt, missed deadline, \
+         trip, outputs become safe, host, comparison; 27:16 periods until the next sample. Written: bit 0 arms, 1 triggers, 2 ends",
+    ),
+    register(66, "scope_every", "rw", "11:0 N: a sample every N periods"),
+    register(67, "scope_length", "rw", "15:0 samples before the trigger's for which a comparison waits, 31:16 samples after it"),
+    register(
+        68,
+        "scope_trigger",
+        "rw",
+        "2:0 comparison: 0 none, 1 at or above the level, 2 below, 3 rises to it, 4 falls below it, 5 equals it, 6 the value changes; 6:4 \
+         channel, 9:8 type: 0 binary32, 1 integer, 2 bits; 19:16 events, as in `scope_state`: fault or halt, missed deadline, trip, outputs \
+         become safe",
+    ),
+    register(69, "scope_level", "rw", "the level, as a key: below"),
+    register(70, "scope_at", "r", "15:0 place in the ring after the last sample, 31:16 place of the trigger's sample"),
+    register(71, "scope_samples", "r", "samples since the scope was armed, ffff at most"),
+    register(72, "scope_period", "r", "the period in which it was triggered"),
+    register(73, "scope_last", "r", "the period of the last sample"),
 ];
+
+/// Address of the scope's first register; it has 64 addresses.
+pub const SCOPE: u16 = 64;
+/// The page from which on the ring of the scope is at [`IMAGE`], with this number of words each.
+pub(crate) const SCOPE_PAGE: u32 = 8;
+/// Words of the ring in a page.
+pub(crate) const PAGE_WORDS: usize = 0x4000;
+
+/// Address of the register that names a channel's register; at the next two are its value, and the last samples in which it has one.
+pub(crate) const fn channel(number: usize) -> u16 {
+    SCOPE + 32 + 4 * number as u16
+}
 
 /// The registers as rows of the table in docs/protocol.md.
 pub fn markdown() -> String {

@@ -10,6 +10,7 @@ use crate::boards::Board;
 use crate::carrier::{self, Carrier, CarrierTick, Carriers, Instant};
 use crate::document::{Document, Located, Mistake, Table};
 use crate::kind::{Direction, KINDS, Kind};
+use crate::scope::{LEAST_DEPTH, MOST_CHANNELS, MOST_DEPTH, MOST_WORDS};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use takt_isa::Type;
@@ -51,8 +52,22 @@ pub struct Wiring {
     pub carriers: Vec<Carrier>,
     /// The ticks that a carrier gives; `None` if they come every `period` cycles of no carrier.
     pub tick: Option<CarrierTick>,
+    /// The scope, if the board has one.
+    pub scope: Option<ScopeRequest>,
     /// The peripherals, in the order of the file.
     pub peripherals: Vec<Peripheral>,
+}
+
+/// A scope as the wiring asks for it.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct ScopeRequest {
+    /// Channels, a power of two up to 8; `None`: by the device.
+    pub channels: Option<u32>,
+    /// Samples, a power of two; `None`: by the block RAM that is left.
+    pub depth: Option<u32>,
+    /// The core of a system that is recorded; `None` for a program.
+    pub core: Option<String>,
+    place: Range<usize>,
 }
 
 /// The start of conversions.
@@ -172,6 +187,7 @@ impl Wiring {
             signals: [const { None }; SIGNALS.len()],
             carriers: Vec::new(),
             tick: None,
+            scope: None,
             peripherals: Vec::new(),
         }
     }
@@ -255,6 +271,24 @@ impl Wiring {
                 }
                 self.check_type(&document, peripheral, (port.as_str(), found.ty), *direction, place);
             }
+        }
+        if let Some(scope) = &self.scope {
+            let cores = &application.description().cores;
+            let names = || cores.iter().map(|core| core.name.as_str()).collect::<Vec<_>>().join(", ");
+            let text = match &scope.core {
+                Some(_) if application.is_program() => {
+                    Some("`core` is for a system of several cores; this is a single program".to_owned())
+                }
+                Some(core) if application.description().core_named(core).is_none() => {
+                    Some(format!("the system has no core `{core}`; there are {}", names()))
+                }
+                None if !application.is_program() => Some(format!(
+                    "a scope records one core of a system: `core = \"NAME\"`, one of {}",
+                    names()
+                )),
+                _ => None,
+            };
+            text.into_iter().for_each(|text| document.mistake(&scope.place, text));
         }
         let place = document.top().and_then(|top| top.place_of("period")).unwrap_or(0..0);
         for text in self.unfit(&application) {
@@ -428,6 +462,7 @@ impl<'a> Reader<'a> {
             }
             table.reject_unknown_keys(&[]);
         }
+        let scope = top.table("scope").map(|table| self.scope(&table));
         let mut peripherals = Vec::new();
         for (name, table) in top.table("peripheral").iter().flat_map(Table::tables) {
             if peripherals.len() == PERIPHERALS {
@@ -450,8 +485,39 @@ impl<'a> Reader<'a> {
             signals,
             tick: self.carriers.tick.map(|(tick, _)| tick),
             carriers: self.carriers.all,
+            scope,
             peripherals,
         })
+    }
+
+    /// The table `[scope]`: channels and samples are powers of two.
+    fn scope(&self, table: &Table<'a>) -> ScopeRequest {
+        let power = |key, least, most| {
+            let at = table.integer(key, least, most)?;
+            if !at.value.is_power_of_two() {
+                let text = format!(
+                    "`{key}` must be a power of two from {least} to {most}: {} is not, {} is",
+                    at.value,
+                    at.value.next_power_of_two().min(most)
+                );
+                self.document.mistake(&at.place, text);
+            }
+            Some(at.value)
+        };
+        let channels = power("channels", 1, MOST_CHANNELS);
+        let depth = power("depth", LEAST_DEPTH, MOST_DEPTH);
+        let core = table.string("core").map(|at| at.value);
+        table.reject_unknown_keys(&[]);
+        if let (Some(channels), Some(depth)) = (channels, depth)
+            && channels * depth > MOST_WORDS
+        {
+            let text = format!(
+                "{channels} channels of {depth} samples are {} words; a host has addresses for {MOST_WORDS}",
+                channels * depth
+            );
+            self.document.mistake(&table.place, text);
+        }
+        ScopeRequest { channels, depth, core, place: table.place.clone() }
     }
 
     /// Reads the baud rate, which a divider of the clock must approximate.

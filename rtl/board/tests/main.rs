@@ -14,6 +14,7 @@ mod observe;
 mod peripherals;
 mod pins;
 mod project;
+mod scope;
 mod sensors;
 mod system;
 mod top;

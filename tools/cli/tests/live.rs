@@ -165,3 +165,124 @@ fn a_stream_is_printed_as_it_comes() {
     assert_eq!(child.wait().unwrap().code(), Some(1), "the board has gone");
     assert!(rest < 600, "{rest} lines were kept back");
 }
+
+/// Program whose state rises by `gain` in each period, and that loads from beyond its memory once `bad` is set.
+const RAMP: &str = "\
+.input  gain, bad:int
+.output duty, k:int
+.array  M[2]
+.reg    P[1,2]
+.state  sum, count:int
+.data
+table:  .float 1, 2
+.once
+        sum, count = 0, 0
+        duty, k = 0, 0
+        M[1] = 0
+        P[1,1], P[1,2] = 0, 0
+        wait    period
+.period
+period: count = count + 1
+        k = iand(count, 7)
+        sum = sum + gain
+        P[1,2] = sum
+        duty = sum * 0.5
+        M[1] = sum
+        ld      P[1,1], table[bad]
+        wait    period
+";
+
+/// A recording as table, waveform and picture; triggers; mistakes before and after the port is opened.
+#[test]
+fn a_scope_records_around_a_trigger() {
+    let folder = Folder::new();
+    folder.write("ramp.s", RAMP);
+    let head = "board = \"ulx3s-85f\"\nclock = 50\nperiod = 40\nbaud = 10_000_000\nautostart = true\n";
+    folder.write("scoped.toml", &format!("{head}[scope]\nchannels = 2\ndepth = 64\n"));
+    let check = folder.line("board check --wiring scoped.toml --program ramp.s --machine t1").ok();
+    assert!(check.contains("scope: 2 channels of 64 samples, in 1 block RAM\n"), "{check}");
+    let line = "board sim --wiring scoped.toml --program ramp.s --machine t1";
+    let board = SimulatedBoard::start(line, folder.path());
+    let open = format!("live {} --baud {} --program ramp.s --machine t1", board.port, board.baud);
+    let live = |what: &[&str]| {
+        let arguments: Vec<&str> = open.split_whitespace().chain(what.iter().copied()).collect();
+        folder.takt(&arguments)
+    };
+    live(&["set", "gain=0.5"]).ok();
+
+    // From now on, to a table.
+    let done = live(&["scope", "P[1,2]", "k", "--csv", "-", "--samples", "10"]);
+    assert!(done.stderr.starts_with("10 samples of 2 channels, period ") && done.stderr.ends_with(" by the host\n"), "{done:?}");
+    let table = done.stdout;
+    let rows: Vec<Vec<f64>> = table
+        .lines()
+        .skip(1)
+        .map(|row| row.split(',').map(|cell| cell.parse().expect("a number")).collect())
+        .collect();
+    assert!(table.starts_with("period,\"P[1,2]\",k\n") && rows.len() == 10, "{table}");
+    for pair in rows.windows(2) {
+        assert!(pair[1][0] == pair[0][0] + 1.0 && pair[1][1] == pair[0][1] + 0.5, "{table}");
+        assert_eq!(pair[1][2], pair[1][0] % 8.0, "{table}");
+    }
+
+    // An edge, with samples before it, as waveform and as pictures.
+    let edge = ["scope", "k", "duty", "-t", "k falls 1", "--samples", "20", "--before", "5", "--wait", "100s"];
+    let files = ["--csv", "edge.csv", "--vcd", "edge.vcd", "--plot", "edge.svg"];
+    let done = live(&[&edge[..], &files].concat()).ok();
+    assert!(done.starts_with("20 samples of 2 channels, period ") && done.ends_with(" by `k falls 1`\n"), "{done}");
+    let table = folder.read_text("edge.csv");
+    let k: Vec<&str> = table.lines().skip(1).map(|row| row.split(',').nth(1).expect("a cell")).collect();
+    assert_eq!(k[..9], ["3", "4", "5", "6", "7", "0", "1", "2", "3"], "{table}");
+    let wave = folder.read_text("edge.vcd");
+    assert!(wave.contains("#5\n1#\n") && wave.contains("#6\n0#\n"), "{wave}");
+    let picture = folder.read_text("edge.svg");
+    assert!(picture.contains("by `k falls 1`") && picture.contains("duty"), "{picture}");
+    let drawn = live(&["scope", "k", "duty", "-t", "k falls 1", "--samples", "20"]).ok();
+    assert!(drawn.contains("periods from the trigger") && drawn.contains("⠤") || drawn.contains("⣀"), "{drawn}");
+
+    // A level that does not come; it is read after the trigger by the host's other command.
+    let never = live(&["scope", "duty", "-t", "duty < -1", "--wait", "200ms"]);
+    assert!(never.status == Some(1) && never.stderr.contains("no trigger within 0.2 s (duty < -1)"), "{never:?}");
+    let unread = live(&["scope", "duty", "--read"]);
+    assert!(unread.stderr.contains("the board's scope waits for its trigger"), "{unread:?}");
+
+    // Mistakes before the port is opened, and such that only the board knows.
+    for (arguments, says) in [
+        (&["gian"][..], "no port, register or data word `gian`"),
+        (&["M[1]"], "`M[1]` lies in data memory"),
+        (&["k", "-t", "k > 1.5"], "`1.5` is not a level for a channel of type int"),
+        (&["k", "-t", "sum > 1"], "the trigger compares `sum`, which is not a channel"),
+        (&["k", "-t", "often"], "`often` is not a trigger"),
+        (&["k", "duty", "sum"], "3 channels are asked for; the board's scope has 2"),
+        (&["k", "--samples", "65"], "65 samples are asked for; the board's scope has 64"),
+        (&["k", "--samples", "4", "--before", "4"], "4 samples before the trigger leave none for it"),
+    ] {
+        let done = live(&[&["scope"], arguments].concat());
+        assert!(done.status == Some(1) && done.stderr.contains(says) && done.stdout.is_empty(), "{arguments:?}: {done:?}");
+    }
+
+    // What leads to a fault, armed by one command and read by another.
+    live(&["scope", "count", "sum", "-t", "fault", "--before", "9", "--arm"]).ok();
+    live(&["set", "bad=1000000"]).ok();
+    let read = ["scope", "count", "sum", "-t", "fault", "--read", "--csv", "-"];
+    let done = (0..100).map(|_| live(&read)).find(|done| done.status == Some(0)).expect("it stops");
+    assert!(done.stderr.contains("by the program stopped; the last sample is what the program left"), "{done:?}");
+    let table = done.stdout;
+    let rows: Vec<&str> = table.lines().skip(1).collect();
+    let first = |row: &str| row.split(',').take(2).map(|cell| cell.parse::<i64>().expect("whole")).collect::<Vec<_>>();
+    assert!(rows.len() == 10 && rows.iter().all(|row| first(row)[0] == first(row)[1]), "{table}");
+    let stopped = live(&["scope", "count", "-t", "count > 0", "--wait", "30s"]);
+    assert!(stopped.stderr.contains("the program stopped with a fault before count > 0"), "{stopped:?}");
+    live(&["stop"]).ok();
+    assert!(live(&["scope", "count"]).stderr.contains("the program is stopped, and has no periods to record"));
+}
+
+/// A board whose wiring has no scope says so.
+#[test]
+fn a_board_without_a_scope_says_so() {
+    let folder = folder();
+    let board = board(&folder);
+    let line = format!("live {} --baud {} --program arrays.s --machine t1 scope count", board.port, board.baud);
+    let done = folder.line(&line);
+    assert!(done.status == Some(1) && done.stderr.contains("the board has no scope: a table `[scope]` in its wiring"), "{done:?}");
+}

@@ -10,6 +10,7 @@ use std::path::PathBuf;
 use std::time::{SystemTime, UNIX_EPOCH};
 use takt_board::host::{COUNTERS, fault_kind};
 use takt_board::protocol::{self, ENABLE, HOLD, LinkError, RESTART, RUN};
+use takt_board::scope::{Recording, ScopeError, ScopeState, Setup};
 use takt_board::serial::Serial;
 use takt_board::{Application, Host, Stream, top};
 
@@ -20,16 +21,31 @@ type Status = (&'static str, bool, Vec<&'static str>, Option<(u32, String)>, Vec
 /// Port names, each with `float`, `int` or `bits`.
 type Ports = Vec<(String, &'static str)>;
 
+/// Recording of a scope: periods, index and period of the trigger, causes, whether the program stopped, and type and bits of each channel.
+type Recorded =
+    (Vec<u32>, Option<(usize, u32)>, Vec<String>, bool, Vec<(String, &'static str, Vec<Option<u32>>)>);
+
 /// A board at a serial port.
 #[pyclass(module = "takt._takt")]
 pub(crate) struct Board {
     host: Host<Serial>,
     application: Application<'static>,
     stream: Option<Stream>,
+    /// Channels and trigger with which the scope was armed.
+    setup: Option<Setup>,
 }
 
 fn failed(error: LinkError) -> PyErr {
     BoardError::new_err(error.to_string())
+}
+
+fn unrecorded(error: ScopeError) -> PyErr {
+    match error {
+        ScopeError::Channels { .. } | ScopeError::Samples { .. } | ScopeError::Before { .. } => {
+            PyValueError::new_err(error.to_string())
+        }
+        error => BoardError::new_err(error.to_string()),
+    }
 }
 
 fn wrong(text: String) -> PyErr {
@@ -64,7 +80,7 @@ impl Board {
             host.fits(application.clone()).map_err(failed)?;
             Ok::<_, PyErr>(host)
         })?;
-        Ok(Board { host, application, stream: None })
+        Ok(Board { host, application, stream: None, setup: None })
     }
 
     /// Inputs that the host sets, and output ports of the cores.
@@ -216,6 +232,57 @@ impl Board {
         let frame = py.detach(|| host.streamed()).map_err(failed)?;
         let (Some(stream), Some(frame)) = (&self.stream, frame) else { return Ok(None) };
         Ok(stream.values(&frame).map(|(period, values)| (period, values.map(|(bits, _)| bits).collect())))
+    }
+
+    /// Size of the board's scope: samples and channels.
+    fn scope(&mut self, py: Python<'_>) -> PyResult<(u32, u32)> {
+        let host = &mut self.host;
+        let scope = py.detach(|| host.scope()).map_err(unrecorded)?;
+        Ok((scope.depth, scope.channels))
+    }
+
+    /// Arms the scope.
+    fn arm(
+        &mut self,
+        py: Python<'_>,
+        names: Vec<String>,
+        triggers: Vec<String>,
+        every: u32,
+        samples: Option<u32>,
+        before: Option<u32>,
+    ) -> PyResult<()> {
+        let mut setup = Setup::new(&self.application, &names, &triggers).map_err(wrong)?;
+        (setup.every, setup.samples, setup.before) = (every, samples, before);
+        let Board { host, application, .. } = self;
+        py.detach(|| {
+            let scope = host.scope()?;
+            host.arm(application, &scope, &setup)
+        })
+        .map_err(unrecorded)?;
+        self.setup = Some(setup);
+        Ok(())
+    }
+
+    /// The recording can be read.
+    fn is_recorded(&mut self, py: Python<'_>) -> PyResult<bool> {
+        let host = &mut self.host;
+        Ok(py.detach(|| host.scope_state()).map_err(failed)? == ScopeState::Done)
+    }
+
+    /// Reads the recording of the scope that was armed last.
+    fn recording(&mut self, py: Python<'_>) -> PyResult<Recorded> {
+        let Some(setup) = &self.setup else {
+            return Err(BoardError::new_err("the scope is not armed: `board.arm(...)` first"));
+        };
+        let host = &mut self.host;
+        let recording = py.detach(|| {
+            let scope = host.scope()?;
+            host.recording(&scope, setup, |_, _| ())
+        });
+        let Recording { channels, periods, values, trigger, causes, is_stopped } =
+            recording.map_err(unrecorded)?;
+        let channels = channels.into_iter().zip(values).map(|((name, ty), values)| (name, ty.name(), values));
+        Ok((periods, trigger, causes, is_stopped, channels.collect()))
     }
 
     /// Ends the stream.

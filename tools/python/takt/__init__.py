@@ -20,7 +20,7 @@ programs from robots' descriptions, from expressions and from learned policies; 
 
 from takt import _takt
 from takt._batch import Batch, Loops
-from takt._board import Board, BoardStatus
+from takt._board import Board, BoardStatus, Recording
 from takt._distribute import distribute
 from takt._errors import (
     AssemblyError,
@@ -90,6 +90,7 @@ __all__ = [
     "PlantError",
     "Port",
     "Program",
+    "Recording",
     "Run",
     "Section",
     "Sim",

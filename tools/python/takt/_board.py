@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,8 +21,28 @@ from takt._program import Program
 _EVERY = 4095
 #: Maximum baud rate, in bits per second.
 _BAUD = 12_000_000
+#: Pause between two questions whether a recording is done, in seconds.
+_PAUSE = 0.05
 #: Time without a frame after which a stream has ended, in tenths of a second.
 _SILENCE = 50
+
+
+def _words(what: str, value: int | None, least: int) -> int | None:
+    """A count for the board, whose own limits are lower than a word's."""
+    count = count_of(what, value, least)
+    return None if count is None else min(count, 0xFFFF_FFFF)
+
+
+def _samples(kind: str, bits: list[int | None]) -> np.ndarray:
+    """Samples of a channel as an array of its type."""
+    words = np.array([word or 0 for word in bits], dtype=np.uint32)
+    missing = np.array([word is None for word in bits])
+    if kind == "float":
+        values = words.view(np.float32)
+        values[missing] = np.nan
+        return values
+    values = words.view(np.int32) if kind == "int" else words
+    return np.ma.masked_array(values, missing) if missing.any() else values
 
 
 @dataclass(frozen=True)
@@ -44,6 +65,24 @@ class BoardStatus:
     most_cycles: int
     errors: int
     lost: int
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Samples that a board's scope has recorded, of every `every`-th period, around the trigger."""
+
+    #: The period of each sample, counted from the program's start.
+    periods: np.ndarray
+    #: The samples of each channel, by name: float32 or int32 (uint32 for bits). Where a float has no value yet, NaN stands; other types
+    #: are masked there.
+    values: dict[str, np.ndarray]
+    #: Index of the trigger's sample, and the period in which it was triggered; None if the recording was ended without.
+    trigger: int | None
+    trigger_period: int | None
+    #: What triggered, in words.
+    causes: tuple[str, ...]
+    #: The last sample has the values that the program left when it stopped, in mid-period.
+    stopped: bool
 
 
 @exclusive("a lock around its calls lets threads take turns")
@@ -195,6 +234,80 @@ class Board:
                 raise ValueError(f"there is no input `{name}`{near(name, list(self.inputs))}")
             words.append((name, word_of(name, value, port)))
         self._core.set(words)
+
+    def arm(
+        self,
+        names: list[str],
+        *,
+        trigger: str | list[str] = (),
+        every: int = 1,
+        samples: int | None = None,
+        before: int | None = None,
+    ) -> None:
+        """Arms the board's scope, which records registers and ports in every period without a cycle of the program. `recording` reads it.
+
+        Args:
+            names: Channels: registers and ports of one core by name; `x:57` is what line 57 of the source writes.
+            trigger: `x >= 1.5` (or >, <, <=, ==), `x rises 1.5`, `x falls 1.5`, `x changes`, `fault`, `miss`, `trip`, `safe`; one
+                comparison at most. Without any, the recording begins at once.
+            every: Periods from one sample to the next, up to 4095.
+            samples: How many; without it, as many as the board's scope has.
+            before: Samples before the trigger's; without it, a quarter, or none without a trigger.
+
+        Raises:
+            BoardError: the board has no scope.
+            ValueError: a name or trigger that does not fit, or more than the board's scope has.
+        """
+        periods = count_of("every", every) or 1
+        if periods > _EVERY:
+            raise ValueError(f"every is {periods}: it is {_EVERY} at most")
+        triggers = [trigger] if isinstance(trigger, str) else list(trigger)
+        self._core.arm(list(names), triggers, periods, _words("samples", samples, 1), _words("before", before, 0))
+
+    @property
+    def recorded(self) -> bool:
+        """Whether the scope's recording is complete."""
+        return self._core.is_recorded()
+
+    def recording(self) -> Recording:
+        """Reads what the scope has recorded since `arm`.
+
+        Raises:
+            BoardError: it is not armed, or not done.
+        """
+        periods, trigger, causes, stopped, channels = self._core.recording()
+        values = {name: _samples(kind, bits) for name, kind, bits in channels}
+        index, period = trigger or (None, None)
+        return Recording(np.array(periods, dtype=np.uint32), values, index, period, tuple(causes), stopped)
+
+    def scope(
+        self,
+        names: list[str],
+        *,
+        trigger: str | list[str] = (),
+        every: int = 1,
+        samples: int | None = None,
+        before: int | None = None,
+        timeout: float | None = None,
+    ) -> Recording:
+        """Records with the board's scope: arms it, waits, and reads. Arguments are those of `arm`.
+
+        Args:
+            timeout: Seconds to wait; without it, until the recording is done. The scope stays armed.
+
+        Raises:
+            BoardError: the board has no scope, the program has no periods, or the time is over.
+            ValueError: as of `arm`.
+        """
+        self.arm(names, trigger=trigger, every=every, samples=samples, before=before)
+        end = None if timeout is None else time.monotonic() + timeout
+        while not self.recorded:
+            if self.status.state in ("stopped", "halted", "stopped with a fault") and not self.recorded:
+                raise BoardError("the program has stopped before the trigger: trigger='fault' records what leads to it")
+            if end is not None and time.monotonic() > end:
+                raise BoardError(f"no recording within {timeout} s: the scope stays armed, and `recording` reads it later")
+            time.sleep(_PAUSE)
+        return self.recording()
 
     def stream(
         self, names: list[str], *, every: int = 1, count: int | None = None

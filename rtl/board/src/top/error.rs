@@ -35,6 +35,23 @@ pub enum TopError {
         /// Flip-flops of the device.
         has: u64,
     },
+    /// The scope takes more block RAMs than are left.
+    #[error(
+        "the scope's {channels} channels of {depth} samples take {needed} block RAMs; {left} of the {device} are left: choose a smaller \
+         `depth`, or leave it out in `[scope]`, which takes what fits"
+    )]
+    Scope {
+        /// Channels.
+        channels: u32,
+        /// Samples.
+        depth: u32,
+        /// Block RAMs of the ring.
+        needed: u64,
+        /// Block RAMs that the circuit leaves.
+        left: u64,
+        /// Device.
+        device: &'static str,
+    },
     /// Block RAM starts without contents.
     #[error("block RAM of {0} starts without contents: program and tables cannot be in the bitstream")]
     NoContents(&'static str),

@@ -6,6 +6,7 @@ use super::shadow_memory::Shadow;
 use super::template::Values;
 use crate::endpoints::Endpoints;
 use crate::sinks::{Sink, transit};
+use crate::wiring::Wiring;
 use std::fmt::Write as _;
 use takt_rtl::system::{Pin, PinKind, SystemPlan};
 use takt_rtl::verilog;
@@ -16,23 +17,24 @@ struct Section<'a> {
     plan: &'a SystemPlan,
     connected: &'a PeripheralConnections<'a>,
     endpoints: &'a Endpoints,
+    wiring: &'a Wiring,
 }
 
 /// The placeholders of the section; `to_integer` is the converter's code for float to integer.
 pub(super) fn section(
     plan: &SystemPlan,
     connected: &PeripheralConnections<'_>,
-    observe: bool,
+    wiring: &Wiring,
     to_integer: &str,
 ) -> Values {
-    let section = Section { plan, connected, endpoints: connected.application.endpoints() };
+    let section = Section { plan, connected, endpoints: connected.application.endpoints(), wiring };
     let cores = (0..plan.description.cores.len()).map(|core| section.core(core, to_integer));
     let mut values = vec![
         ("CONNECTIONS", include_str!("links.v.in").to_owned()),
         ("CORE", plan.top.clone()),
         ("PORT_WRITABLE", "1'b0".to_owned()),
         ("CORES_TICKS", cores.collect()),
-        ("SYSTEM", section.system(observe)),
+        ("SYSTEM", section.system()),
     ];
     values.extend(section.endpoints());
     values
@@ -141,7 +143,7 @@ impl Section<'_> {
     }
 
     /// The connections of the system's top.
-    fn system(&self, observe: bool) -> String {
+    fn system(&self) -> String {
         let mut text = String::new();
         for pin in self.plan.pins() {
             let value = self.pin(&pin).unwrap_or_default();
@@ -162,7 +164,7 @@ impl Section<'_> {
             for (port, net) in own {
                 let _ = writeln!(text, "        .board{k}_{port}({net}),");
             }
-            text += &Shadow::of(self.connected.application, k).pins(&format!("board{k}_"), observe);
+            text += &Shadow::of(self.connected.application, k, self.wiring).pins(&format!("board{k}_"));
         }
         text.trim_end().to_owned()
     }

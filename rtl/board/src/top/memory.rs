@@ -24,13 +24,14 @@ fn copies(machine: &Machine, cores: usize, block: &BlockRam) -> u64 {
     banks.sum::<u64>() + words(copied_words(machine, cores))
 }
 
+/// Checks that memories fit, and returns the block RAMs that are left; `None` if the device's are not known.
 pub(super) fn check(
     board: &Board,
     wiring: &Wiring,
     application: &Application<'_>,
     contents: &Contents,
     library: &Library,
-) -> Result<(), TopError> {
+) -> Result<Option<u64>, TopError> {
     let (memories, block) = (&board.family.memories, board.family.block_ram());
     if !block.is_initial {
         return Err(TopError::NoContents(board.family.text));
@@ -38,12 +39,12 @@ pub(super) fn check(
     if !board.family.initial_registers && board.reset.is_none() {
         return Err(TopError::NoReset(board.family.text));
     }
-    let Some(room) = board.device.room else { return Ok(()) };
+    let Some(room) = board.device.room else { return Ok(None) };
     let machines = || application.description().cores.iter().map(|core| core.program.machine);
     let mut cores = 0;
     for machine in machines() {
         // The export reports machines without a circuit.
-        let Ok(plan) = Plan::new(machine, library) else { return Ok(()) };
+        let Ok(plan) = Plan::new(machine, library) else { return Ok(None) };
         cores += memories::block_rams(&plan, library, block);
     }
     let count = application.description().cores.len();
@@ -52,6 +53,7 @@ pub(super) fn check(
     let image = block.blocks(Shape { words: contents.room as u64, bits: record_bits(count) });
     let (needed, has) = (cores + image + observers, room.block_rams);
     let device = board.device.name;
+    let left = has.saturating_sub(needed);
     if needed > has {
         let records = contents.records.len();
         let copies = match observers {
@@ -79,5 +81,5 @@ pub(super) fn check(
         let (kind, family) = (application.kind(), board.family.text);
         return Err(TopError::FlipFlops { kind, needed, family, device, has });
     }
-    Ok(())
+    Ok(Some(left))
 }

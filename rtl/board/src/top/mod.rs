@@ -10,6 +10,7 @@ mod links;
 mod memory;
 mod peripherals;
 mod ports;
+mod scope;
 mod shadow_memory;
 mod template;
 mod wrapper;
@@ -20,6 +21,7 @@ pub use design::circuit_number;
 pub use error::TopError;
 pub use image::{Contents, RECORDS, image};
 pub(crate) use peripherals::{OwnPin, own_pins};
+pub use scope::ScopeSize;
 pub use wrapper::AROUND;
 
 use crate::VERILOG;
@@ -44,6 +46,8 @@ pub struct Circuit {
     pub records: usize,
     /// Records that the image has room for.
     pub room: usize,
+    /// The scope.
+    pub scope: Option<ScopeSize>,
 }
 
 /// The complete circuit of a program, or a system, on a board.
@@ -57,9 +61,10 @@ pub fn circuit<'a>(
 ) -> Result<Circuit, TopError> {
     let (application, library) = (application.into(), Library::builtin());
     let contents = image(application.clone())?;
-    memory::check(board, wiring, &application, &contents, &library)?;
+    let left = memory::check(board, wiring, &application, &contents, &library)?;
+    let scope = ScopeSize::of(board, wiring, &application, left)?;
     let mut design = Design::of(&application, &library)?;
-    let around = wrapper::wrapper(wiring, &application, &design, &contents, &library);
+    let around = wrapper::wrapper(wiring, &application, &design, (&contents, scope), &library);
     let mut files = std::mem::take(&mut design.files);
     let mut put = |name: &str, text: String| {
         if !files.iter().any(|file| file.name.rsplit('/').next() == name.rsplit('/').next()) {
@@ -89,7 +94,22 @@ pub fn circuit<'a>(
         clock: wiring.clock,
         records: contents.records.len(),
         room: contents.room,
+        scope,
     })
+}
+
+/// The scope of a program, or a system, on a board; `None` without one.
+///
+/// # Errors
+/// As [`circuit`].
+pub fn scope<'a>(
+    board: &Board,
+    wiring: &Wiring,
+    application: impl Into<Application<'a>>,
+) -> Result<Option<ScopeSize>, TopError> {
+    let (application, library) = (application.into(), Library::builtin());
+    let left = memory::check(board, wiring, &application, &image(application.clone())?, &library)?;
+    ScopeSize::of(board, wiring, &application, left)
 }
 
 /// The files of carriers, filters and trips that a wiring does not need.
@@ -103,6 +123,7 @@ fn unused(wiring: &Wiring) -> Vec<&'static str> {
         ("takt_pwm3.v", has(|strobes| strobes.carrier)),
         ("takt_pwm_phase.v", has(|strobes| strobes.carrier)),
         ("takt_sinc3.v", has(|strobes| strobes.window)),
+        ("takt_scope.v", wiring.scope.is_some()),
         ("takt_trip.v", has(|strobes| strobes.trips)),
     ];
     needed.into_iter().filter(|(_, is_needed)| !is_needed).map(|(name, _)| name).collect()

@@ -5,6 +5,7 @@ use super::peripherals::{PeripheralConnections, net, scale};
 use super::shadow_memory::Shadow;
 use super::template::Values;
 use crate::protocol;
+use crate::wiring::Wiring;
 use std::fmt::Write as _;
 use takt_rtl::Library;
 use takt_rtl::wishbone::open_streams;
@@ -13,7 +14,7 @@ use takt_rtl::wishbone::open_streams;
 pub(super) fn section(
     connected: &PeripheralConnections<'_>,
     core: &str,
-    observe: bool,
+    wiring: &Wiring,
     library: &Library,
 ) -> Values {
     let machine = connected.application.description().cores[0].program.machine;
@@ -59,7 +60,7 @@ pub(super) fn section(
         ("SINKS", taken),
         ("FTOI", to_integer(library)),
         ("STREAMS", open_streams(machine)),
-        ("WATCHED", Shadow::of(connected.application, 0).pins("", observe)),
+        ("WATCHED", Shadow::of(connected.application, 0, wiring).pins("")),
     ]
 }
 

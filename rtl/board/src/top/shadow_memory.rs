@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Shadow memories: copies of each core's registers and data memory for the host, `takt_shadow_memory.v` beside the core.
 
+use super::scope::recorded;
 use crate::application::Application;
 use crate::protocol::{core_bits, core_words};
+use crate::wiring::Wiring;
 use std::fmt::Write as _;
 use takt_isa::{Bank, Machine};
 
@@ -19,7 +21,7 @@ const WATCHED: [(&str, u32, bool); 8] = [
 ];
 
 /// Cycles from the last issue, besides the longest latency, until the copies have every result: results pass two registers on the way.
-const COPIED: u32 = 6;
+pub(super) const COPIED: u32 = 6;
 /// Bits of an address at `takt_shadow_memory`: no core has more addresses of data words.
 const ADDRESS: u32 = 14;
 
@@ -35,37 +37,45 @@ pub(super) struct Shadow {
     machine: &'static Machine,
     /// The address that the host asks for, without the number of the core.
     at: String,
+    /// The board has copies.
+    observe: bool,
+    /// The scope watches this core.
+    is_recorded: bool,
 }
 
 impl Shadow {
-    /// The shadow memory of core `core`.
-    pub(super) fn of(application: &Application<'_>, core: usize) -> Shadow {
+    /// The shadow memory of core `core`, as the wiring has it.
+    pub(super) fn of(application: &Application<'_>, core: usize, wiring: &Wiring) -> Shadow {
         let cores = &application.description().cores;
         let bits = 14 - core_bits(cores.len());
         let at = match ADDRESS.saturating_sub(bits) {
             0 => format!("address[{}:0]", ADDRESS - 1),
             above => format!("{{{above}'d0, address[{}:0]}}", bits - 1),
         };
-        Shadow { core, cores: cores.len(), machine: cores[core].program.machine, at }
+        let is_recorded = recorded(wiring, application) == Some(core);
+        let machine = cores[core].program.machine;
+        Shadow { core, cores: cores.len(), machine, at, observe: wiring.observe, is_recorded }
     }
 
     /// The Verilog of an instance, or of zeros in its place.
-    pub(super) fn instance(&self, observe: bool) -> String {
-        let Shadow { core, machine, at, .. } = self;
+    pub(super) fn instance(&self) -> String {
+        let Shadow { core, machine, at, observe, is_recorded, .. } = self;
         let mut text = format!(
             "    wire [15:0] last_issued{core};\n    wire [31:0] core_register{core}, core_data{core};\n"
         );
+        let slots = machine.slots.len() as u32;
+        if *observe || *is_recorded {
+            for (name, bits, of_slot) in WATCHED {
+                let bits = if of_slot { bits * slots } else { bits };
+                let _ = writeln!(text, "    wire [{}:0] {name}{core};", bits - 1);
+            }
+        }
         if !observe {
             let _ = writeln!(
                 text,
                 "    assign {{settled[{core}], last_issued{core}, core_register{core}, core_data{core}}} = {{1'b1, 80'd0}};\n"
             );
             return text;
-        }
-        let slots = machine.slots.len() as u32;
-        for (name, bits, of_slot) in WATCHED {
-            let bits = if of_slot { bits * slots } else { bits };
-            let _ = writeln!(text, "    wire [{}:0] {name}{core};", bits - 1);
         }
         let of_slots = |of: &dyn Fn(&Bank) -> String| {
             let each: Vec<String> = machine.slots.iter().rev().map(|slot| of(&slot.bank)).collect();
@@ -92,10 +102,11 @@ impl Shadow {
         text
     }
 
-    /// The ports of the core that the shadow memory watches, with `prefix` before their names; the ports are left open if the board has no
-    /// copies.
-    pub(super) fn pins(&self, prefix: &str, observe: bool) -> String {
-        let net = |name: &str| if observe { format!("{name}{}", self.core) } else { String::new() };
+    /// The ports of the core that shadow memory and scope watch, with `prefix` before their names; the ports are left open if the board has
+    /// neither.
+    pub(super) fn pins(&self, prefix: &str) -> String {
+        let is_watched = self.observe || self.is_recorded;
+        let net = |name: &str| if is_watched { format!("{name}{}", self.core) } else { String::new() };
         WATCHED.iter().map(|(name, ..)| format!("        .{prefix}{name}({}),\n", net(name))).collect()
     }
 }

@@ -6,6 +6,7 @@ use super::image::Contents;
 use super::peripherals::{PeripheralConnections, carriers, direction, own_pins, trip_net};
 use super::shadow_memory::Shadow;
 use super::template::{Values, fill};
+use super::scope::{self, ScopeSize};
 use super::{links, ports};
 use crate::application::Application;
 use crate::protocol::{self, CORE, core_bits};
@@ -25,19 +26,20 @@ pub(super) fn wrapper(
     wiring: &Wiring,
     application: &Application<'_>,
     design: &Design,
-    contents: &Contents,
+    (contents, scope): (&Contents, Option<ScopeSize>),
     library: &Library,
 ) -> String {
     let connected = PeripheralConnections::new(application, wiring);
     let mut all = match &design.plan {
-        None => ports::section(&connected, &design.top, wiring.observe, library),
-        Some(plan) => links::section(plan, &connected, wiring.observe, &ports::to_integer(library)),
+        None => ports::section(&connected, &design.top, wiring, library),
+        Some(plan) => links::section(plan, &connected, wiring, &ports::to_integer(library)),
     };
     all.extend(connected.instances(wiring));
     all.extend(carriers(wiring));
     all.extend(pins(wiring));
     all.extend(cores(wiring, application));
     all.extend(memories(application, contents));
+    all.extend(scope::section(scope, wiring, application));
     all.push(("CIRCUIT", format!("{:08x}", design.number)));
     let text = fill(include_str!("board.v.in"), &all);
     // The sections have addresses of registers, too.
@@ -94,7 +96,7 @@ fn pins(wiring: &Wiring) -> Values {
 }
 
 /// The trips as a vector, the wiring's first in bit 0; `None` without any.
-fn trips(wiring: &Wiring) -> Option<String> {
+pub(super) fn trips(wiring: &Wiring) -> Option<String> {
     let nets: Vec<String> = wiring.trips().rev().map(|trip| trip_net(&trip.name)).collect();
     (!nets.is_empty()).then(|| format!("{{{}}}", nets.join(", ")))
 }
@@ -201,6 +203,6 @@ fn part(wiring: &Wiring, application: &Application<'_>, k: usize) -> String {
         (2_u32 << last) - 1,
         wiring.deadlines,
         wiring.host,
-        Shadow::of(application, k).instance(wiring.observe)
+        Shadow::of(application, k, wiring).instance()
     )
 }

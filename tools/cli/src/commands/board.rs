@@ -26,6 +26,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use takt_board::tools::Venv;
+use takt_board::top::ScopeSize;
 use takt_board::{Application, Board, Findings, Mistake, Wiring, project};
 
 /// List boards and their pins; check, build and simulate a program, or a system of several cores, on a board.
@@ -307,9 +308,19 @@ pub(crate) fn run(arguments: &Boards, color: bool, out: &mut Out) -> Result<()> 
                     sampling.text
                 )?;
             }
+            if let Some(scope) = takt_board::top::scope(&board, &wiring, carried.on_board())? {
+                writeln!(out, "{}", scope_text(scope))?;
+            }
             Ok(())
         }
     }
+}
+
+/// The scope of a board in a line.
+fn scope_text(scope: ScopeSize) -> String {
+    let ScopeSize { channels, depth, block_rams, .. } = scope;
+    let [s, rams] = [channels, block_rams as u32].map(|count| if count == 1 { "" } else { "s" });
+    format!("scope: {channels} channel{s} of {depth} samples, in {block_rams} block RAM{rams}")
 }
 
 fn list(arguments: &List, color: bool, out: &mut Out) -> Result<()> {
@@ -419,6 +430,9 @@ fn build(arguments: &Build, color: bool, out: &mut Out) -> Result<()> {
             folder.display(),
             takt_board::top::TOP
         )?;
+        if let Some(scope) = circuit.scope {
+            writeln!(out, "{}", scope_text(scope))?;
+        }
         return Ok(());
     }
     let step = |what: &str| output::message(&format!("{what} …"));
@@ -448,5 +462,8 @@ fn build(arguments: &Build, color: bool, out: &mut Out) -> Result<()> {
         writeln!(out, "{name:<16} {used:>7} of {there}")?;
     }
     writeln!(out, "programs: {} records of {} in block RAM", report.records, report.room)?;
+    if let Some(scope) = report.scope {
+        writeln!(out, "{}", scope_text(scope))?;
+    }
     Ok(())
 }

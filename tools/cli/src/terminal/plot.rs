@@ -2,7 +2,7 @@
 //! SVG plots: tool path and tracking error over time; an arm's tool path in space, and joint angles over time.
 
 pub(crate) mod curves;
-mod terminal;
+pub(crate) mod terminal;
 
 use anyhow::{Result, anyhow};
 use plotters::coord::Shift;

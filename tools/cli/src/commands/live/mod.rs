@@ -4,6 +4,7 @@
 mod comparison;
 mod fifo;
 mod parameters;
+mod scope;
 mod status;
 mod value;
 
@@ -22,6 +23,7 @@ use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 use takt_board::endpoints::Fifo;
 use takt_board::protocol::{ENABLE, HOLD, LinkError, RESTART, RUN};
+use takt_board::scope::Setup;
 use takt_board::serial::Serial;
 use takt_board::top::image;
 use takt_board::{Application, Host, Stream, Wiring};
@@ -173,6 +175,8 @@ enum Command {
         /// The FIFO.
         name: String,
     },
+    /// Record registers and ports on the board itself, in every period, around a trigger: no cycle of the program, no period left out.
+    Scope(scope::ScopeArguments),
     /// Print ports, registers or data words every N periods, with the period's number: a head line with the names, then a line each.
     Stream {
         /// Ports, registers or data words, as for `read`: all of one kind, of one core, and within 15 consecutive numbers.
@@ -199,6 +203,8 @@ enum PreparedCommand {
     Stream(Stream),
     /// Parameters to set.
     Parameters(parameters::Changes),
+    /// Channels and trigger of the scope.
+    Scope(Setup),
 }
 
 fn prepare(
@@ -242,6 +248,7 @@ fn prepare(
             let given = ParameterArguments { settings: values.clone(), file: load.clone() };
             PreparedCommand::Parameters(parameters::prepare(named()?, &given)?)
         }
+        Command::Scope(arguments) => PreparedCommand::Scope(scope::prepare(named()?, arguments)?),
         _ => PreparedCommand::Nothing,
     })
 }
@@ -296,6 +303,11 @@ pub(crate) fn live(arguments: &Live, color: bool, out: &mut Out) -> Result<()> {
         Command::Param { save, .. } => {
             if let PreparedCommand::Parameters(changes) = &prepared {
                 parameters::run(&mut host, changes, save.as_deref(), out)?;
+            }
+        }
+        Command::Scope(arguments) => {
+            if let PreparedCommand::Scope(setup) = &prepared {
+                scope::run(&mut host, named()?, (arguments, setup), wiring.as_ref(), out)?;
             }
         }
         Command::Shadow { periods, drive, .. } => {

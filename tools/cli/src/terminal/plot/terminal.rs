@@ -2,6 +2,7 @@
 //! Plot of a drive on the terminal: panels, texts and colours of the SVG, with lines of Braille dots, two by four per character.
 
 use super::{DEVIATES, Plot, REQUIRED, WRITES_NAN, error_title, path_title, required_text};
+use crate::terminal::number::rounded;
 use crate::terminal::page::Page;
 use std::fmt::Write as _;
 use std::ops::Range;
@@ -184,6 +185,44 @@ fn head(title: &str, lines: &[(&str, Ink)], page: Page, out: &mut String) {
     let lines: Vec<String> =
         lines.iter().map(|(text, ink)| format!("{} {text}", inked("──", Some(*ink), page))).collect();
     let _ = writeln!(out, "{:LABELS$}{}", "", lines.join("  "));
+}
+
+/// Rows of a trace's panel.
+const TRACE_ROWS: usize = 6;
+
+/// Curve of a panel of its own.
+pub(crate) struct Trace {
+    /// Title of the panel.
+    pub(crate) name: String,
+    /// Places and values, ascending; all finite.
+    pub(crate) points: Vec<(f64, f64)>,
+}
+
+/// Traces as text, one below the other over the same axis, with a vertical line at `mark`. A trace without change is a line of words.
+pub(crate) fn traces(all: &[Trace], unit: &str, mark: Option<f64>, page: Page) -> String {
+    let columns = page.width.unwrap_or(WIDTH).clamp(LABELS + 2 * TICK, 2 * WIDTH) - LABELS - 1;
+    let places = || all.iter().flat_map(|trace| &trace.points).map(|(x, _)| *x).chain(mark);
+    let (first, last) = (places().fold(f64::INFINITY, f64::min), places().fold(f64::NEG_INFINITY, f64::max));
+    let mut out = String::new();
+    for Trace { name, points } in all {
+        let values = || points.iter().map(|(_, value)| *value);
+        let (low, high) = (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
+        if points.is_empty() || low == high || first >= last {
+            let value = points.first().map_or_else(|| "no value".to_owned(), |(_, value)| rounded(*value, 7));
+            let _ = writeln!(out, "{} = {value}", page.strong(&visible(name)));
+            continue;
+        }
+        let margin = 0.05 * (high - low);
+        let mut canvas = Canvas::new(columns, TRACE_ROWS, first..last, low - margin..high + margin);
+        for row in 0..mark.map_or(0, |_| 2 * TRACE_ROWS) {
+            let (across, _) = canvas.dots((mark.unwrap_or(first), low));
+            canvas.dot(across, 2.0 * row as f64, Ink::Rapid);
+        }
+        canvas.line(points, Ink::Cut);
+        let _ = writeln!(out, "{}", page.strong(&visible(name)));
+        canvas.write((unit, ""), page, &mut out);
+    }
+    out
 }
 
 impl Plot {
