@@ -175,7 +175,12 @@ pub const REGISTERS: [Register; 31] = [
          trip, outputs become safe, host, comparison; 27:16 periods until the next sample. Written: bit 0 arms, 1 triggers, 2 ends",
     ),
     register(66, "scope_every", "rw", "11:0 N: a sample every N periods"),
-    register(67, "scope_length", "rw", "15:0 samples before the trigger's for which a comparison waits, 31:16 samples after it"),
+    register(
+        67,
+        "scope_length",
+        "rw",
+        "15:0 samples before the trigger's for which a comparison waits, 31:16 samples after it",
+    ),
     register(
         68,
         "scope_trigger",
@@ -185,7 +190,12 @@ pub const REGISTERS: [Register; 31] = [
          become safe",
     ),
     register(69, "scope_level", "rw", "the level, as a key: below"),
-    register(70, "scope_at", "r", "15:0 place in the ring after the last sample, 31:16 place of the trigger's sample"),
+    register(
+        70,
+        "scope_at",
+        "r",
+        "15:0 place in the ring after the last sample, 31:16 place of the trigger's sample",
+    ),
     register(71, "scope_samples", "r", "samples since the scope was armed, ffff at most"),
     register(72, "scope_period", "r", "the period in which it was triggered"),
     register(73, "scope_last", "r", "the period of the last sample"),

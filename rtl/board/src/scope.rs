@@ -163,10 +163,14 @@ pub enum ScopeError {
     #[error(transparent)]
     Link(#[from] LinkError),
     /// The circuit has no scope.
-    #[error("the board has no scope: a table `[scope]` in its wiring, and `takt board build`, give it one (docs/board.md)")]
+    #[error(
+        "the board has no scope: a table `[scope]` in its wiring, and `takt board build`, give it one (docs/board.md)"
+    )]
     None,
     /// The circuit records another core.
-    #[error("the board's scope records core {there} of the system, counted from 0; the channels are of core {wanted}")]
+    #[error(
+        "the board's scope records core {there} of the system, counted from 0; the channels are of core {wanted}"
+    )]
     OtherCore {
         /// The core that is recorded.
         there: usize,
@@ -174,7 +178,9 @@ pub enum ScopeError {
         wanted: usize,
     },
     /// More channels than the circuit has.
-    #[error("{wanted} channels are asked for; the board's scope has {there} (`channels` in the wiring's `[scope]`)")]
+    #[error(
+        "{wanted} channels are asked for; the board's scope has {there} (`channels` in the wiring's `[scope]`)"
+    )]
     Channels {
         /// Channels that the host wanted.
         wanted: usize,
@@ -182,7 +188,9 @@ pub enum ScopeError {
         there: u32,
     },
     /// More samples than the ring has.
-    #[error("{wanted} samples are asked for; the board's scope has {there} (`depth` in the wiring's `[scope]`)")]
+    #[error(
+        "{wanted} samples are asked for; the board's scope has {there} (`depth` in the wiring's `[scope]`)"
+    )]
     Samples {
         /// Samples that the host wanted.
         wanted: u32,
@@ -198,13 +206,17 @@ pub enum ScopeError {
         samples: u32,
     },
     /// A channel is restricted to a line, which the circuit of a system cannot do.
-    #[error("`{0}`: the scope of a system records registers, not the operations of a line: leave out the line")]
+    #[error(
+        "`{0}`: the scope of a system records registers, not the operations of a line: leave out the line"
+    )]
     Bundle(String),
     /// Nothing was recorded.
     #[error("the board's scope {0}")]
     NotDone(&'static str),
     /// The board has recorded other channels.
-    #[error("the board's scope has recorded another register in the place of `{0}`: name the channels with which it was armed")]
+    #[error(
+        "the board's scope has recorded another register in the place of `{0}`: name the channels with which it was armed"
+    )]
     OtherChannels(String),
 }
 
@@ -222,7 +234,8 @@ fn key(ty: Type, bits: u32) -> u32 {
 
 /// Bits of a level in text.
 fn level(text: &str, ty: Type) -> Result<u32, String> {
-    let wrong = |is: &str| format!("`{text}` is not a level for a channel of type {}: expected {is}", ty.name());
+    let wrong =
+        |is: &str| format!("`{text}` is not a level for a channel of type {}: expected {is}", ty.name());
     match ty {
         Type::F => match text.parse::<f32>() {
             Ok(value) if value.is_nan() => Err(wrong("a number, which NaN is not")),
@@ -418,7 +431,9 @@ impl Setup {
         }
         let (name, value) = (word[..at].trim(), word[at + operator.len()..].trim());
         let Some(channel) = self.channels.iter().position(|channel| channel.name == name) else {
-            return Err(format!("the trigger compares `{name}`, which is not a channel: name it among the channels"));
+            return Err(format!(
+                "the trigger compares `{name}`, which is not a channel: name it among the channels"
+            ));
         };
         let ty = self.channels[channel].ty;
         let level = match (test, value) {

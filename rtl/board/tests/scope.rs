@@ -3,6 +3,8 @@
 
 use crate::harness::board::refuses;
 use crate::harness::{Part, RESET, compare};
+use rand_pcg::Pcg64;
+use rand_pcg::rand_core::{Rng as _, SeedableRng as _};
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -14,8 +16,6 @@ use takt_board::simulation::Simulation;
 use takt_board::{Application, Board, Host, VERILOG, Wiring};
 use takt_emu::Emulator;
 use takt_isa::{Program, T3};
-use rand_pcg::Pcg64;
-use rand_pcg::rand_core::{Rng as _, SeedableRng as _};
 
 const CYCLES: u32 = 60_000;
 /// Registers of the slots' banks, and of the input ports.
@@ -88,15 +88,10 @@ impl Pins {
         let retire = u32::from(self.writes[0].is_some()) | u32::from(self.writes[1].is_some()) << 1;
         let (load, input) = (self.load.unwrap_or_default(), self.input.unwrap_or_default());
         let (address, value) = self.host.unwrap_or((self.address, 0));
-        let bits = [self.core_tick, self.ended, self.waiting, self.stopped, self.missed, self.tripped, self.drive];
-        let mut words = vec![
-            self.core_rst.into(),
-            self.restart.into(),
-            self.load.is_some().into(),
-            2,
-            load.0,
-            load.1,
-        ];
+        let bits =
+            [self.core_tick, self.ended, self.waiting, self.stopped, self.missed, self.tripped, self.drive];
+        let mut words =
+            vec![self.core_rst.into(), self.restart.into(), self.load.is_some().into(), 2, load.0, load.1];
         words.extend(bits.map(u32::from));
         words.extend([retire, a.0, b.0, a.1, b.1, a.2, b.2]);
         words.extend([self.input.is_some().into(), input.0, input.1]);
@@ -106,7 +101,9 @@ impl Pins {
 
     fn read(words: &[u32]) -> Pins {
         let bit = |at: usize| words[at] != 0;
-        let write = |slot: usize| (words[13] >> slot & 1 != 0).then(|| (words[14 + slot], words[16 + slot], words[18 + slot]));
+        let write = |slot: usize| {
+            (words[13] >> slot & 1 != 0).then(|| (words[14 + slot], words[16 + slot], words[18 + slot]))
+        };
         Pins {
             core_rst: bit(0),
             restart: bit(1),
@@ -397,7 +394,8 @@ impl Scope {
         let acts = write(1).unwrap_or(0);
         let arms = acts & 1 != 0;
         // Registers as they were before this cycle.
-        let shows = self.state == 2 || self.state == 1 && (self.trigger >> 16 & 1 == 1 || self.events != 0 || self.forced);
+        let shows = self.state == 2
+            || self.state == 1 && (self.trigger >> 16 & 1 == 1 || self.events != 0 || self.forced);
         let is_busy = self.walk.is_some();
 
         // The walk that is under way.
@@ -447,7 +445,8 @@ impl Scope {
             }
             let words = self.watched.iter().map(|channel| channel.taken).collect();
             // A decision in this cycle cannot be: the walk before has ended.
-            self.walk = Some(Walk { began: self.now, words, kept: records && (stop || self.until == 0), stop });
+            self.walk =
+                Some(Walk { began: self.now, words, kept: records && (stop || self.until == 0), stop });
         }
 
         // What the core writes reaches a channel a cycle later.
@@ -468,7 +467,12 @@ impl Scope {
             }
             channel.valid &= !pins.restart && !rst;
         }
-        self.late = pins.writes.iter().flatten().map(|(register, bundle, value)| (*register, Some(*bundle), *value)).collect();
+        self.late = pins
+            .writes
+            .iter()
+            .flatten()
+            .map(|(register, bundle, value)| (*register, Some(*bundle), *value))
+            .collect();
         self.late.extend(pins.load.map(|(register, value)| (register, None, value)));
         self.late.extend(pins.input.map(|(index, value)| (INPUTS + index, None, value)));
 
@@ -490,7 +494,9 @@ impl Scope {
         self.begun |= pins.core_tick;
 
         // The host.
-        for (at, register) in [(2, &mut self.every), (3, &mut self.length), (4, &mut self.trigger), (5, &mut self.level)] {
+        for (at, register) in
+            [(2, &mut self.every), (3, &mut self.length), (4, &mut self.trigger), (5, &mut self.level)]
+        {
             if let Some(value) = write(at) {
                 *register = if at == 2 { value & 0xfff } else { value };
             }
@@ -564,8 +570,20 @@ struct Stimulus {
 
 /// Values at which comparisons differ, and some between.
 const VALUES: [u32; 14] = [
-    0, 0x8000_0000, 1, 0x8000_0001, 0x3f80_0000, 0xbf80_0000, 0x7f80_0000, 0xff80_0000, 0x7fc0_0000, 0xffc0_0001, 7, 0xffff_fff9,
-    0x7fff_ffff, 0xffff_ffff,
+    0,
+    0x8000_0000,
+    1,
+    0x8000_0001,
+    0x3f80_0000,
+    0xbf80_0000,
+    0x7f80_0000,
+    0xff80_0000,
+    0x7fc0_0000,
+    0xffc0_0001,
+    7,
+    0xffff_fff9,
+    0x7fff_ffff,
+    0xffff_ffff,
 ];
 
 impl Stimulus {
@@ -612,7 +630,9 @@ impl Stimulus {
         let ty = random(self, 3);
         let mode = random(self, 7);
         let mask = if random(self, 2) == 0 { 0 } else { random(self, 16) };
-        let level = self.value();
+        // A host sends no key of a NaN, and that of +0 for both zeros.
+        let is_key = |key: u32| ty != 0 || (0x007f_ffff..=0xff80_0000).contains(&key) && key != 0x7fff_ffff;
+        let level = std::iter::repeat_with(|| self.value()).find(|key| is_key(*key)).unwrap_or(0);
         let every = if random(self, 2) == 0 { 1 } else { random(self, 4) };
         self.host.extend([(2, every), (3, after << 16 | before)]);
         let tested = random(self, self.channels);
@@ -630,7 +650,9 @@ impl Stimulus {
         };
         if cycle < RESET {
             // Every register that no reset clears has a known value.
-            let all: Vec<u32> = (1..6).chain((0..self.channels).flat_map(|channel| [32 + 4 * channel, 33 + 4 * channel])).collect();
+            let all: Vec<u32> = (1..6)
+                .chain((0..self.channels).flat_map(|channel| [32 + 4 * channel, 33 + 4 * channel]))
+                .collect();
             let at = all[cycle as usize % all.len()];
             pins.host = Some((at, u32::from(at == 1)));
             pins.core_rst = true;
@@ -739,7 +761,6 @@ fn the_circuit_is_its_model() {
     assert!(found.is_empty(), "{}", found.join("\n"));
 }
 
-
 /// Faults: text that occurs once in the circuit, and its replacement.
 const FAULTS: [(&str, &str); 14] = [
     ("(~restricts | wrote_address", "(wrote_address"),
@@ -785,7 +806,7 @@ table:  .float 1.0, 2.0
         sum = 0
         count = 0
         e = 0
-        y = 0
+        mov     y, zero
         k = 0
         wait    period
 .period
@@ -863,10 +884,11 @@ fn record(host: &mut Host<Simulation>, program: &Program, setup: &Setup) -> Reco
 fn emulated(program: &Program, inputs: &[(&str, u32)], periods: usize) -> Vec<BTreeMap<&'static str, u32>> {
     let mut emulator = Emulator::new(program).expect("it can be emulated");
     emulator.run_to_wait().expect("no fault");
-    let register = |name: &str| program.named_registers().find(|port| port.name == name).expect("a register").register;
+    let register =
+        |name: &str| program.named_registers().find(|port| port.name == name).expect("a register").register;
     let mut all = vec![BTreeMap::new()];
     for _ in 0..periods {
-        for (name, bits) in inputs {
+        for (name, bits) in inputs.iter().chain(&[("bad", 0), ("work", 0)]) {
             emulator.set_input_bits(register(name), *bits).expect("a port");
         }
         emulator.run_period(&[]).expect("no fault");
@@ -1019,8 +1041,14 @@ fn events_trigger_and_mistakes_are_refused() {
     host.end_scope().expect("a board");
     let recording = host.recording(&scope, &never, |_, _| ()).expect("a recording");
     assert_eq!((recording.trigger, recording.causes.len()), (None, 0));
-    assert!(recording.periods.len() >= 15 && recording.values[1].iter().all(Option::is_some), "{recording:?}");
-    assert!(recording.values[0].iter().all(Option::is_none), "what runs once does not run again: {recording:?}");
+    assert!(
+        recording.periods.len() >= 15 && recording.values[1].iter().all(Option::is_some),
+        "{recording:?}"
+    );
+    assert!(
+        recording.values[0].iter().all(Option::is_none),
+        "what runs once does not run again: {recording:?}"
+    );
 
     // The board refuses writes to what only reads.
     refuses(&mut host, 64, &[1]);
@@ -1053,7 +1081,11 @@ fn mistakes_in_names_and_triggers() {
         (&["table"], &[], "`table` lies in data memory"),
         (&["count:x"], &[], "expected a line of the source after the colon"),
         (&["count:14"], &[], "no operation of line 14 writes a register"),
-        (&["n", "x", "y", "k", "sum", "count", "a", "e", "s"], &[], "9 channels are asked for; a scope has 1 to 8"),
+        (
+            &["n", "x", "y", "k", "sum", "count", "a", "e", "s"],
+            &[],
+            "9 channels are asked for; a scope has 1 to 8",
+        ),
         (&one, &["sum > 1"], "the trigger compares `sum`, which is not a channel"),
         (&one, &["count > 2.5"], "`2.5` is not a level for a channel of type int: expected a whole number"),
         (&one, &["count > 1", "count < 2"], "there is one comparison"),

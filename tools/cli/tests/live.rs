@@ -212,7 +212,11 @@ fn a_scope_records_around_a_trigger() {
 
     // From now on, to a table.
     let done = live(&["scope", "P[1,2]", "k", "--csv", "-", "--samples", "10"]);
-    assert!(done.stderr.starts_with("10 samples of 2 channels, period ") && done.stderr.ends_with(" by the host\n"), "{done:?}");
+    assert!(
+        done.stderr.starts_with("10 samples of 2 channels, period ")
+            && done.stderr.ends_with(" by the host\n"),
+        "{done:?}"
+    );
     let table = done.stdout;
     let rows: Vec<Vec<f64>> = table
         .lines()
@@ -226,10 +230,14 @@ fn a_scope_records_around_a_trigger() {
     }
 
     // An edge, with samples before it, as waveform and as pictures.
-    let edge = ["scope", "k", "duty", "-t", "k falls 1", "--samples", "20", "--before", "5", "--wait", "100s"];
+    let edge =
+        ["scope", "k", "duty", "-t", "k falls 1", "--samples", "20", "--before", "5", "--wait", "100s"];
     let files = ["--csv", "edge.csv", "--vcd", "edge.vcd", "--plot", "edge.svg"];
     let done = live(&[&edge[..], &files].concat()).ok();
-    assert!(done.starts_with("20 samples of 2 channels, period ") && done.ends_with(" by `k falls 1`\n"), "{done}");
+    assert!(
+        done.starts_with("20 samples of 2 channels, period ") && done.ends_with(" by `k falls 1`\n"),
+        "{done}"
+    );
     let table = folder.read_text("edge.csv");
     let k: Vec<&str> = table.lines().skip(1).map(|row| row.split(',').nth(1).expect("a cell")).collect();
     assert_eq!(k[..9], ["3", "4", "5", "6", "7", "0", "1", "2", "3"], "{table}");
@@ -238,11 +246,17 @@ fn a_scope_records_around_a_trigger() {
     let picture = folder.read_text("edge.svg");
     assert!(picture.contains("by `k falls 1`") && picture.contains("duty"), "{picture}");
     let drawn = live(&["scope", "k", "duty", "-t", "k falls 1", "--samples", "20"]).ok();
-    assert!(drawn.contains("periods from the trigger") && drawn.contains("⠤") || drawn.contains("⣀"), "{drawn}");
+    assert!(
+        drawn.contains("periods from the trigger") && drawn.contains("⠤") || drawn.contains("⣀"),
+        "{drawn}"
+    );
 
     // A level that does not come; it is read after the trigger by the host's other command.
     let never = live(&["scope", "duty", "-t", "duty < -1", "--wait", "200ms"]);
-    assert!(never.status == Some(1) && never.stderr.contains("no trigger within 0.2 s (duty < -1)"), "{never:?}");
+    assert!(
+        never.status == Some(1) && never.stderr.contains("no trigger within 0.2 s (duty < -1)"),
+        "{never:?}"
+    );
     let unread = live(&["scope", "duty", "--read"]);
     assert!(unread.stderr.contains("the board's scope waits for its trigger"), "{unread:?}");
 
@@ -258,7 +272,10 @@ fn a_scope_records_around_a_trigger() {
         (&["k", "--samples", "4", "--before", "4"], "4 samples before the trigger leave none for it"),
     ] {
         let done = live(&[&["scope"], arguments].concat());
-        assert!(done.status == Some(1) && done.stderr.contains(says) && done.stdout.is_empty(), "{arguments:?}: {done:?}");
+        assert!(
+            done.status == Some(1) && done.stderr.contains(says) && done.stdout.is_empty(),
+            "{arguments:?}: {done:?}"
+        );
     }
 
     // What leads to a fault, armed by one command and read by another.
@@ -266,15 +283,22 @@ fn a_scope_records_around_a_trigger() {
     live(&["set", "bad=1000000"]).ok();
     let read = ["scope", "count", "sum", "-t", "fault", "--read", "--csv", "-"];
     let done = (0..100).map(|_| live(&read)).find(|done| done.status == Some(0)).expect("it stops");
-    assert!(done.stderr.contains("by the program stopped; the last sample is what the program left"), "{done:?}");
+    assert!(
+        done.stderr.contains("by the program stopped; the last sample is what the program left"),
+        "{done:?}"
+    );
     let table = done.stdout;
     let rows: Vec<&str> = table.lines().skip(1).collect();
-    let first = |row: &str| row.split(',').take(2).map(|cell| cell.parse::<i64>().expect("whole")).collect::<Vec<_>>();
+    let first = |row: &str| {
+        row.split(',').take(2).map(|cell| cell.parse::<i64>().expect("whole")).collect::<Vec<_>>()
+    };
     assert!(rows.len() == 10 && rows.iter().all(|row| first(row)[0] == first(row)[1]), "{table}");
     let stopped = live(&["scope", "count", "-t", "count > 0", "--wait", "30s"]);
     assert!(stopped.stderr.contains("the program stopped with a fault before count > 0"), "{stopped:?}");
     live(&["stop"]).ok();
-    assert!(live(&["scope", "count"]).stderr.contains("the program is stopped, and has no periods to record"));
+    assert!(
+        live(&["scope", "count"]).stderr.contains("the program is stopped, and has no periods to record")
+    );
 }
 
 /// A board whose wiring has no scope says so.
@@ -282,7 +306,12 @@ fn a_scope_records_around_a_trigger() {
 fn a_board_without_a_scope_says_so() {
     let folder = folder();
     let board = board(&folder);
-    let line = format!("live {} --baud {} --program arrays.s --machine t1 scope count", board.port, board.baud);
+    let line =
+        format!("live {} --baud {} --program arrays.s --machine t1 scope count", board.port, board.baud);
     let done = folder.line(&line);
-    assert!(done.status == Some(1) && done.stderr.contains("the board has no scope: a table `[scope]` in its wiring"), "{done:?}");
+    assert!(
+        done.status == Some(1)
+            && done.stderr.contains("the board has no scope: a table `[scope]` in its wiring"),
+        "{done:?}"
+    );
 }

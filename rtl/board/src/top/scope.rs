@@ -98,7 +98,8 @@ pub(super) fn section(scope: Option<ScopeSize>, wiring: &Wiring, application: &A
         true => ("core_tick".to_owned(), "scope_ended".to_owned(), "scope_bundles".to_owned()),
         false => (format!("core_ticks[{k}]"), format!("ended[{k}]"), format!("{}'d0", 16 * slots)),
     };
-    let tripped = super::wrapper::trips(wiring).map_or_else(|| "1'b0".to_owned(), |trips| format!("|{trips}"));
+    let tripped =
+        super::wrapper::trips(wiring).map_or_else(|| "1'b0".to_owned(), |trips| format!("|{trips}"));
     let [first, last] = [SCOPE, SCOPE + 0x3f].map(|at| format!("16'd{at}"));
     let text = format!(
         "    // ---- the scope
@@ -124,10 +125,7 @@ pub(super) fn section(scope: Option<ScopeSize>, wiring: &Wiring, application: &A
     );
     vec![
         ("SCOPE", text),
-        (
-            "SCOPE_WRITABLE",
-            writable(channels),
-        ),
+        ("SCOPE_WRITABLE", writable(channels)),
         ("SCOPE_READ", format!("address[15:6] == 10'd{} ? scope_read : 32'd0", SCOPE >> 6)),
         ("SCOPE_SAMPLE", "page[3] ? scope_sample : ".to_owned()),
         ("ENDED", "scope_ended".to_owned()),
@@ -135,7 +133,9 @@ pub(super) fn section(scope: Option<ScopeSize>, wiring: &Wiring, application: &A
         (
             "SCOPE_NETS",
             match is_program {
-                true => format!("    wire        scope_ended;\n    wire [{}:0] scope_bundles;\n", 16 * slots - 1),
+                true => {
+                    format!("    wire        scope_ended;\n    wire [{}:0] scope_bundles;\n", 16 * slots - 1)
+                }
                 false => String::new(),
             },
         ),

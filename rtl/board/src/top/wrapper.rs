@@ -4,9 +4,9 @@
 use super::design::Design;
 use super::image::Contents;
 use super::peripherals::{PeripheralConnections, carriers, direction, own_pins, trip_net};
+use super::scope::{self, ScopeSize};
 use super::shadow_memory::Shadow;
 use super::template::{Values, fill};
-use super::scope::{self, ScopeSize};
 use super::{links, ports};
 use crate::application::Application;
 use crate::protocol::{self, CORE, core_bits};

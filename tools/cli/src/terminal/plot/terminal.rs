@@ -206,7 +206,8 @@ pub(crate) fn traces(all: &[Trace], unit: &str, mark: Option<f64>, page: Page) -
     let mut out = String::new();
     for Trace { name, points } in all {
         let values = || points.iter().map(|(_, value)| *value);
-        let (low, high) = (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
+        let (low, high) =
+            (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
         if points.is_empty() || low == high || first >= last {
             let value = points.first().map_or_else(|| "no value".to_owned(), |(_, value)| rounded(*value, 7));
             let _ = writeln!(out, "{} = {value}", page.strong(&visible(name)));
