@@ -219,7 +219,7 @@ def test_the_circuit_in_verilator(tmp_path):
         pytest.skip("neither target/release/takt nor Verilator is there")
     source = tmp_path / "gain.s"
     source.write_text(GAIN)
-    (tmp_path / "w.toml").write_text("clock = 50\nperiod = 100\nbaud = 5_000_000\n")
+    (tmp_path / "w.toml").write_text("clock = 50\nperiod = 100\nbaud = 5_000_000\n[scope]\nchannels = 2\ndepth = 32\n")
     command = [tool, "board", "sim", "--board", "ulx3s-85f", "--wiring", tmp_path / "w.toml", "--program", source, "--machine", "t1"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as sim:
         try:
@@ -236,6 +236,24 @@ def test_the_circuit_in_verilator(tmp_path):
             board.go()
             frames = list(board.stream(["y", "m"], every=2, count=4))
             assert [period - frames[0][0] for period, _ in frames] == [0, 2, 4, 6]
+            recording = board.scope(["y", "m"], samples=10)
+            assert list(recording.periods - recording.periods[0]) == list(range(10)) and recording.causes == ("the host",)
+            assert recording.values["y"].dtype == np.float32 and (recording.values["m"] == -(2**31)).all()
+            board.arm(["m", "x"], trigger="m rises 7", every=2, samples=8, before=3)
+            with pytest.raises(takt.BoardError, match="waits for its trigger"):
+                board.recording()
+            board.set({"n": 41})
+            while not board.recorded:
+                pass
+            recording = board.recording()
+            assert recording.trigger == 3 and list(np.diff(recording.periods)) == [2] * 7
+            assert list(recording.values["m"]) == [-(2**31)] * 3 + [42] * 5 and recording.causes == ("`m rises 7`",)
+            with pytest.raises(ValueError, match="3 channels are asked for; the board's scope has 2"):
+                board.arm(["x", "y", "m"])
+            with pytest.raises(ValueError, match="`often` is not a trigger"):
+                board.arm(["x"], trigger="often")
+            with pytest.raises(takt.BoardError, match="no recording within 0.2 s"):
+                board.scope(["x"], trigger="x > 1e30", timeout=0.2)
             board.stop()
             assert board.status.state == "stopped"
         finally:
