@@ -183,10 +183,10 @@ table:  .float 1, 2
         wait    period
 .period
 period: count = count + 1
-        k = iand(count, 7)
+        iand    k, count, 7
         sum = sum + gain
         P[1,2] = sum
-        duty = sum * 0.5
+        duty = P[1,2] * 0.5
         M[1] = sum
         ld      P[1,1], table[bad]
         wait    period
@@ -214,7 +214,7 @@ fn a_scope_records_around_a_trigger() {
     let done = live(&["scope", "P[1,2]", "k", "--csv", "-", "--samples", "10"]);
     assert!(
         done.stderr.starts_with("10 samples of 2 channels, period ")
-            && done.stderr.ends_with(" by the host\n"),
+            && done.stderr.ends_with(": the host\n"),
         "{done:?}"
     );
     let table = done.stdout;
@@ -235,7 +235,7 @@ fn a_scope_records_around_a_trigger() {
     let files = ["--csv", "edge.csv", "--vcd", "edge.vcd", "--plot", "edge.svg"];
     let done = live(&[&edge[..], &files].concat()).ok();
     assert!(
-        done.starts_with("20 samples of 2 channels, period ") && done.ends_with(" by `k falls 1`\n"),
+        done.starts_with("20 samples of 2 channels, period ") && done.ends_with(": `k falls 1`\n"),
         "{done}"
     );
     let table = folder.read_text("edge.csv");
@@ -244,7 +244,7 @@ fn a_scope_records_around_a_trigger() {
     let wave = folder.read_text("edge.vcd");
     assert!(wave.contains("#5\n1#\n") && wave.contains("#6\n0#\n"), "{wave}");
     let picture = folder.read_text("edge.svg");
-    assert!(picture.contains("by `k falls 1`") && picture.contains("duty"), "{picture}");
+    assert!(picture.contains(": `k falls 1`") && picture.contains("duty"), "{picture}");
     let drawn = live(&["scope", "k", "duty", "-t", "k falls 1", "--samples", "20"]).ok();
     assert!(
         drawn.contains("periods from the trigger") && drawn.contains("⠤") || drawn.contains("⣀"),
@@ -284,7 +284,7 @@ fn a_scope_records_around_a_trigger() {
     let read = ["scope", "count", "sum", "-t", "fault", "--read", "--csv", "-"];
     let done = (0..100).map(|_| live(&read)).find(|done| done.status == Some(0)).expect("it stops");
     assert!(
-        done.stderr.contains("by the program stopped; the last sample is what the program left"),
+        done.stderr.contains(": the program stopped; the last sample is what the program left"),
         "{done:?}"
     );
     let table = done.stdout;

@@ -183,7 +183,7 @@ fn summary(recording: &Recording) -> String {
         recording.channels.len()
     );
     if let Some((_, period)) = recording.trigger {
-        let _ = write!(text, "; triggered in period {period} by {}", recording.causes.join(" and "));
+        let _ = write!(text, "; triggered in period {period}: {}", recording.causes.join(" and "));
     }
     if recording.is_stopped {
         text.push_str("; the last sample is what the program left when it stopped");
