@@ -213,8 +213,7 @@ fn a_scope_records_around_a_trigger() {
     // From now on, to a table.
     let done = live(&["scope", "P[1,2]", "k", "--csv", "-", "--samples", "10"]);
     assert!(
-        done.stderr.starts_with("10 samples of 2 channels, period ")
-            && done.stderr.ends_with(": the host\n"),
+        done.stderr.starts_with("10 samples of 2 channels, period ") && done.stderr.ends_with(": the host\n"),
         "{done:?}"
     );
     let table = done.stdout;
