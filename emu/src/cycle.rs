@@ -180,6 +180,11 @@ impl Emulator {
                     None => self.continue_at(address.next(), next, address),
                 }
             }
+            Flow::Publish => {
+                emit(sink, || Event::Publish { cycle, address });
+                self.publish_issued(cycle);
+                self.continue_at(address.next(), timing::after_sequential(cycle), address);
+            }
             Flow::Wait(target) => {
                 emit(sink, || Event::Wait { cycle, address });
                 self.wait_issued(cycle, address, target);

@@ -21,7 +21,8 @@ pub enum Event {
     },
     /// An operation completed, at its writeback or issue.
     Retire(Retire),
-    /// An output port took a value. If ports are latched, the outside sees it from the next [`Event::Wait`] on.
+    /// An output port took a value. If ports are latched, the outside sees it from the next [`Event::Publish`] or
+    /// [`Event::Wait`] on.
     PortWrite(PortWrite),
     /// The machine saw the tick.
     Tick {
@@ -37,6 +38,13 @@ pub enum Event {
     TickLost {
         /// Cycle of the tick.
         cycle: Cycle,
+    },
+    /// The outputs were published, and the period goes on.
+    Publish {
+        /// Cycle in which `publish` issued.
+        cycle: Cycle,
+        /// Bundle with the `publish`.
+        address: BundleAddress,
     },
     /// The period ended; latched outputs are published.
     Wait {

@@ -55,6 +55,7 @@ fn check_operation(
         | Effect::Jump
         | Effect::BranchZero
         | Effect::BranchNonzero
+        | Effect::Publish
         | Effect::Wait
         | Effect::Halt => flow_fault(decoded.flow, decoded.ends_loop, state, machine, address),
         Effect::Compute | Effect::Immediate | Effect::ReadFlags | Effect::ClearFlags => None,
@@ -92,7 +93,13 @@ pub(crate) fn flow_fault(
             let cut = around.filter(|around| around.end > address && around.end <= end)?;
             Some(FaultKind::LoopNesting { last: cut.end.previous() })
         }
-        Flow::Next | Flow::LoopEnd | Flow::Jump(_) | Flow::Branch { .. } | Flow::Wait(_) | Flow::Halt => None,
+        Flow::Next
+        | Flow::LoopEnd
+        | Flow::Jump(_)
+        | Flow::Branch { .. }
+        | Flow::Publish
+        | Flow::Wait(_)
+        | Flow::Halt => None,
     }
 }
 
@@ -135,7 +142,7 @@ pub(crate) fn issue(
             // Control flow is handled for the whole bundle.
             Effect::Jump | Effect::BranchZero | Effect::BranchNonzero => Value::exact(0),
             Effect::Call | Effect::Return | Effect::Loop => Value::exact(0),
-            Effect::Wait | Effect::Halt | Effect::Nothing => Value::exact(0),
+            Effect::Publish | Effect::Wait | Effect::Halt | Effect::Nothing => Value::exact(0),
         };
         let latency = if operation.dest.is_some() { operation.latency } else { 0 };
         let retire = Retire {

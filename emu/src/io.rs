@@ -113,6 +113,8 @@ impl Ticks {
 pub(crate) struct Period {
     tick: Cycle,
     start: Cycle,
+    /// Cycle in which the period's first `publish` issued.
+    published: Option<Cycle>,
     missed: u64,
     lost: u64,
 }
@@ -121,7 +123,8 @@ impl Period {
     /// Period shifted by `by` cycles; negative is earlier.
     pub(crate) fn shifted(self, by: i64) -> Period {
         let shift = |cycle: Cycle| cycle.wrapping_add_signed(by);
-        Period { tick: shift(self.tick), start: shift(self.start), ..self }
+        let published = self.published.map(shift);
+        Period { tick: shift(self.tick), start: shift(self.start), published, ..self }
     }
 }
 
@@ -132,6 +135,8 @@ pub struct PeriodReport {
     pub tick: Cycle,
     /// Cycle from which the period is counted: its tick or, if the tick came before the previous `wait` (a missed deadline), that `wait`.
     pub start: Cycle,
+    /// Cycle in which the period's outputs were published: that of its first `publish`, else that of its `wait`.
+    pub published: Cycle,
     /// Cycle in which the period's `wait` issued.
     pub wait: Cycle,
     /// Cycles of the period: `wait - start`. In each, a bundle issued or a stall was charged.
@@ -149,8 +154,9 @@ impl PeriodReport {
     pub(crate) fn shifted(&self, by: i64, nan_writes: &[PortWrite]) -> PeriodReport {
         let shift = |cycle: Cycle| cycle.wrapping_add_signed(by);
         let (tick, start, wait) = (shift(self.tick), shift(self.start), shift(self.wait));
+        let published = shift(self.published);
         let PeriodReport { cycles, missed, lost, .. } = *self;
-        PeriodReport { tick, start, wait, cycles, missed, lost, nan_writes: nan_writes.to_vec() }
+        PeriodReport { tick, start, published, wait, cycles, missed, lost, nan_writes: nan_writes.to_vec() }
     }
 }
 
@@ -411,7 +417,7 @@ impl Emulator {
             self.state.take_inputs();
             let delivered = timing::after_tick(self.code.machine, since, cycle);
             self.continue_at(self.front.next, delivered, address);
-            self.period = Some(Period { tick: cycle, start: cycle, missed: 0, lost: 0 });
+            self.period = Some(Period { tick: cycle, start: cycle, published: None, missed: 0, lost: 0 });
         } else if self.ticks.remembered.is_none() {
             self.ticks.remembered = Some(cycle);
             self.ticks.missed += 1;
@@ -428,6 +434,14 @@ impl Emulator {
         }
     }
 
+    /// Publishes the outputs: a `publish` has issued in `cycle`.
+    pub(crate) fn publish_issued(&mut self, cycle: Cycle) {
+        self.state.publish_outputs(self.code.machine);
+        if let Some(period) = &mut self.period {
+            period.published.get_or_insert(cycle);
+        }
+    }
+
     /// Ends the period: a `wait` has issued in `cycle`, after a tick in that cycle was handled.
     pub(crate) fn wait_issued(&mut self, cycle: Cycle, address: BundleAddress, target: BundleAddress) {
         if self.ticks.waited.is_none() {
@@ -436,16 +450,23 @@ impl Emulator {
         self.ticks.waited = Some(cycle);
         self.turns.iter_mut().for_each(|turns| turns.section = 0);
         self.state.publish_outputs(self.code.machine);
-        if let Some(Period { tick, start, missed, lost }) = self.period.take() {
-            let (missed, cycles) = (missed > 0, cycle - start);
-            self.report =
-                Some(PeriodReport { tick, start, wait: cycle, cycles, missed, lost, nan_writes: Vec::new() });
+        if let Some(Period { tick, start, published, missed, lost }) = self.period.take() {
+            self.report = Some(PeriodReport {
+                tick,
+                start,
+                published: published.unwrap_or(cycle),
+                wait: cycle,
+                cycles: cycle - start,
+                missed: missed > 0,
+                lost,
+                nan_writes: Vec::new(),
+            });
         }
         match self.ticks.remembered.take() {
             Some(tick) => {
                 self.state.take_inputs_next();
                 self.continue_at(target, timing::after_redirect(self.code.machine, cycle), address);
-                self.period = Some(Period { tick, start: cycle, missed: 0, lost: 0 });
+                self.period = Some(Period { tick, start: cycle, published: None, missed: 0, lost: 0 });
             }
             None => {
                 self.status = Status::Waiting { since: cycle, address };

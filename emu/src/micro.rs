@@ -175,7 +175,7 @@ impl Emitter {
                 // Control flow ends the block, and is handled by its caller.
                 Effect::Jump | Effect::BranchZero | Effect::BranchNonzero => continue,
                 Effect::Call | Effect::Return | Effect::Loop => continue,
-                Effect::Wait | Effect::Halt | Effect::Nothing => continue,
+                Effect::Publish | Effect::Wait | Effect::Halt | Effect::Nothing => continue,
             };
             if matches!(kind, Kind::Load | Kind::Store) {
                 let fixed = operation.sources[0] == Register::ZERO && operation.constant < self.depth;

@@ -323,14 +323,22 @@ impl Generator {
     fn body(&mut self, bundles: u32) {
         let end = self.bundles.len() + bundles as usize;
         while self.bundles.len() < end {
-            match self.random.below(if self.options.control { 14 } else { 8 }) {
+            match self.random.below(if self.options.control { 15 } else { 8 }) {
                 0..8 => self.plain(),
                 8 | 9 => self.skip(),
                 10 => self.repeat(),
                 11 => self.call(),
+                12 => self.publish(),
                 _ => self.counted(),
             }
         }
+    }
+
+    /// Generates a bundle that publishes the outputs, beside other operations.
+    fn publish(&mut self) {
+        let at = self.bundles.len();
+        self.plain();
+        self.control(at, Effect::Publish, 0, None);
     }
 
     /// Generates a call of a subroutine that does not exist yet.
@@ -506,6 +514,7 @@ impl Generator {
                 3 => self.repeat(),
                 // Subroutines use the counters themselves.
                 4 if self.around.repeats == 0 => self.call(),
+                5 => self.publish(),
                 _ => self.plain(),
             }
         }
@@ -664,6 +673,7 @@ impl Generator {
                     Effect::Call,
                     Effect::Return,
                     Effect::Loop,
+                    Effect::Publish,
                     Effect::Wait,
                     Effect::Halt,
                 ]);

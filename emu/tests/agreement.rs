@@ -335,6 +335,7 @@ fn cycle(event: &Event) -> u64 {
         | Event::Tick { cycle }
         | Event::DeadlineMissed { cycle }
         | Event::TickLost { cycle }
+        | Event::Publish { cycle, .. }
         | Event::Wait { cycle, .. }
         | Event::Halt { cycle, .. } => *cycle,
         Event::Retire(retire) => retire.cycle,

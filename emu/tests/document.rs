@@ -76,6 +76,18 @@ const EXAMPLES: &[Example] = &[
         cycles: 28,
     },
     Example {
+        name: "publish",
+        machine: &T3,
+        source: "
+            wait period
+    period: fadd a224, i0, i1
+            publish
+            fsin m1, i0
+            wait period",
+        ticks: &[14],
+        cycles: 44,
+    },
+    Example {
         name: "missed",
         machine: &T3,
         source: "

@@ -158,3 +158,52 @@ fn reset_gives_the_start_again() {
         assert_eq!(run(&mut emulator), first);
     }
 }
+
+/// Program that publishes a sum, then computes on, and waits.
+fn published_early() -> Program {
+    let program = program(
+        &F3,
+        ".input x i0 int
+         .output out x224 int
+         mov x224, i0
+         wait 2
+         period: iadd x224, i0, i0
+         publish
+         nop
+         nop
+         mov x1, i0
+         wait 2",
+    );
+    Program { latched: true, ..program }
+}
+
+/// A `publish` shows the outputs while the period goes on; a tick before the `wait` is a missed deadline all the same.
+#[test]
+fn outputs_are_published_before_the_wait() {
+    for blocks in [true, false] {
+        let mut emulator = Emulator::new(&published_early()).unwrap();
+        emulator.set_blocks(blocks);
+        let out = |emulator: &Emulator| emulator.output("out").unwrap();
+        emulator.set_input("x", 3.into()).unwrap();
+        emulator.run_to_wait().unwrap();
+        assert_eq!(out(&emulator), Some(Number::Integer(3)));
+        let tick = emulator.now() + 20;
+        assert!(emulator.tick_at(tick));
+        let alu = latency(&F3, Function::Alu);
+        // The sum issues in the cycle after the tick; the `publish` issues in that of its writeback.
+        let publish = tick + 1 + alu;
+        emulator.run_until(publish).unwrap();
+        assert_eq!(out(&emulator), Some(Number::Integer(3)));
+        emulator.run_until(publish + 1).unwrap();
+        assert_eq!(out(&emulator), Some(Number::Integer(6)));
+        assert!(emulator.tick_at(publish + 2));
+        let report = emulator.run_period(&[]).unwrap();
+        let wait = publish + 3 + alu;
+        assert_eq!((report.tick, report.published, report.wait), (tick, publish, wait));
+        assert!(report.missed && emulator.deadline_missed());
+        // The next period begins with the `wait` that takes the tick.
+        let report = emulator.run_period(&[]).unwrap();
+        assert_eq!((report.start, report.missed), (wait, false));
+        assert_eq!(report.published, wait + u64::from(F3.refill) + 1 + alu);
+    }
+}

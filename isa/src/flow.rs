@@ -36,6 +36,8 @@ pub enum Flow {
     },
     /// At the first bundle of the innermost loop if this is its last bundle and iterations are left; else at the next bundle.
     LoopEnd,
+    /// At the next bundle; the outputs are published.
+    Publish,
     /// At the target, on the tick.
     Wait(BundleAddress),
     /// Nowhere: execution ends here.
@@ -61,7 +63,9 @@ impl Flow {
             Flow::Jump(target) | Flow::Branch { target, .. } | Flow::Call(target) | Flow::Wait(target) => {
                 Some(target)
             }
-            Flow::Next | Flow::Return | Flow::Loop { .. } | Flow::LoopEnd | Flow::Halt => None,
+            Flow::Next | Flow::Return | Flow::Loop { .. } | Flow::LoopEnd | Flow::Publish | Flow::Halt => {
+                None
+            }
         }
     }
 }
@@ -78,6 +82,7 @@ impl Instruction {
             Effect::Call => Flow::Call(target),
             Effect::Return => Flow::Return,
             Effect::Loop => Flow::Loop { count: self.sources[0], end: target },
+            Effect::Publish => Flow::Publish,
             Effect::Wait => Flow::Wait(target),
             Effect::Halt => Flow::Halt,
             Effect::Compute

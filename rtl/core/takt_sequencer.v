@@ -12,7 +12,7 @@
 //   block: nothing issues in the next cycle.
 //   Reset acts as a jump to 0 in the cycle before cycle 0.
 //   open: the program waits, and there is no tick in this cycle. ends: a `wait` issued in the last cycle. ended: a `wait` issued
-//   two cycles ago, and no fault cancelled it.
+//   two cycles ago, and no fault cancelled it. published: the same of a `publish` or a `wait`.
 //   tick acts in the cycle in which it is high; in the same cycle, missed reports a missed deadline, lost a lost tick.
 //   fault and fault_* are valid from the second cycle after that of the fault on. Without a fault, fault_* mean nothing.
 //   fault_kind: 1 illegal word, 2 data address, 3 return stack full, 4 return stack empty, 5 loops too deep, 6 loop count, 7 loop
@@ -40,6 +40,7 @@ module takt_sequencer #(
     input  wire             i_call,
     input  wire             i_return,
     input  wire             i_loop,
+    input  wire             i_publish,
     input  wire             i_wait,
     input  wire             i_halt,
     input  wire [15:0]      r_target,
@@ -58,6 +59,7 @@ module takt_sequencer #(
     output wire             open,
     output wire             ends,
     output wire             ended,
+    output wire             published,
     output wire             missed,
     output wire             lost,
     output reg              deadline_missed,
@@ -86,7 +88,7 @@ module takt_sequencer #(
     // ---- execute
 
     reg        x_if_zero, x_if_nonzero;  // it redirects if its operand is 0, if it is not
-    reg        x_call, x_return, x_loop, x_wait, x_halt, x_refused;
+    reg        x_call, x_return, x_loop, x_publish, x_wait, x_halt, x_refused;
     reg        x_nested;  // an operation that redirects ends a loop
     reg [15:0] x_target;
     reg [2:0]  x_illegal_slot;
@@ -132,9 +134,10 @@ module takt_sequencer #(
         x_call       <= take & i_call;
         x_return     <= take & i_return;
         x_loop       <= take & i_loop;
+        x_publish    <= take & i_publish & ~i_ends;
         x_wait       <= take & i_wait & ~i_ends;
         x_halt       <= take & i_halt & ~i_ends;
-        x_nested     <= take & i_ends & (redirects | i_loop);
+        x_nested     <= take & i_ends & (redirects | i_loop | i_publish);
         x_refused    <= refused;
         for (s = SLOTS - 1; s >= 0; s = s - 1) if (i_illegal[s]) x_illegal_slot <= s[2:0];
         if (x_call) begin
@@ -147,7 +150,7 @@ module takt_sequencer #(
             top     <= top - BELOW;
         end
         if (rst) begin
-            {x_call, x_return, x_loop, x_wait, x_halt, x_nested, x_refused, x_issued} <= 8'd0;
+            {x_call, x_return, x_loop, x_publish, x_wait, x_halt, x_nested, x_refused, x_issued} <= 9'd0;
             {flush, x_if_zero, x_if_nonzero} <= 3'b011;
             x_target <= 16'd0;
             entries  <= 0;
@@ -219,9 +222,13 @@ module takt_sequencer #(
     wire wait_next = waits & ~tick;
     assign open = wait_next;
     assign ends = x_wait & ~fault;
-    reg was_wait;
-    always @(posedge clk) was_wait <= ends & ~rst;
-    assign ended = was_wait & ~fault;
+    reg was_wait, was_publish;
+    always @(posedge clk) begin
+        was_wait    <= ends & ~rst;
+        was_publish <= x_publish & ~fault & ~rst;
+    end
+    assign ended     = was_wait & ~fault;
+    assign published = (was_wait | was_publish) & ~fault;
 
     always @(posedge clk) begin
         waiting    <= wait_next;

@@ -10,7 +10,8 @@
     reg           f_call, f_return, f_returned, f_full, f_empty, f_besides, f_stopped;
     reg           f_begun = 1'b0;
     wire          f_runs = f_begun & ~f_stopped & ~fault & ~rst;
-    wire [6:0]    f_others = {i_jump, i_branch_zero, i_branch_nonzero, i_loop, i_wait, i_halt, i_call & i_return};
+    wire [7:0]    f_others =
+        {i_jump, i_branch_zero, i_branch_nonzero, i_loop, i_publish, i_wait, i_halt, i_call & i_return};
     always @(posedge clk) begin
         f_begun    <= 1'b1;
         f_address  <= i_address;

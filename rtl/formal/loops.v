@@ -45,9 +45,9 @@ module takt_loops_meaning #(
     takt_sequencer #(.PROGRAM(PROGRAM), .STACK(2)) sequencer (
         .clk(clk), .rst(rst), .advance(advance), .issue(issue), .refused(1'b0), .i_illegal(3'd0),
         .i_jump(i_kind == 2'd1), .i_branch_zero(i_kind == 2'd2), .i_branch_nonzero(1'b0), .i_call(1'b0), .i_return(1'b0),
-        .i_loop(i_kind == 2'd3), .i_wait(1'b0), .i_halt(1'b0), .r_target(r_target), .i_target(i_target), .x_operand(x_operand),
+        .i_loop(i_kind == 2'd3), .i_publish(1'b0), .i_wait(1'b0), .i_halt(1'b0), .r_target(r_target), .i_target(i_target), .x_operand(x_operand),
         .x_address_fault(3'd0), .tick(1'b0), .flush(flush), .fetch(fetch), .f_outside(f_outside), .block(block),
-        .i_address(i_address), .x_issued(), .x_address(), .waiting(), .open(), .ends(), .ended(), .missed(), .lost(),
+        .i_address(i_address), .x_issued(), .x_address(), .waiting(), .open(), .ends(), .ended(), .published(), .missed(), .lost(),
         .deadline_missed(), .halted(), .fault(fault), .fault_kind(), .fault_slot(), .fault_address()
     );
 

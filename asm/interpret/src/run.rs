@@ -208,7 +208,8 @@ impl Interpreter {
                     writes.extend(dest.map(|dest| (dest, Value::Bits(a, kind))));
                 }
                 Effect::Store => writes.extend(dest.map(|dest| (dest, Value::Bits(b, Type::B)))),
-                Effect::Nothing => {}
+                // The outputs keep their values to the `wait`: nothing may write them in between.
+                Effect::Nothing | Effect::Publish => {}
                 Effect::Jump => self.at = to,
                 Effect::BranchZero | Effect::BranchNonzero => {
                     if (a == 0) == (row.effect == Effect::BranchZero) {

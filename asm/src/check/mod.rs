@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Checks of the whole program: registers that are read and never written, written by several slots, or never read.
 
+mod publish;
 pub(crate) mod types;
 mod unreachable;
 
@@ -93,6 +94,7 @@ pub(crate) fn check(context: &mut Context, ir: &Ir, assignment: &BankAssignment)
     }
     if !opaque {
         no_wait(context, ir);
+        publish::check(context, ir);
         unreachable::check(context, ir);
         unused_arrays(context, ir, &uses);
         let single = |(register, _, id): &(&VirtualRegister, &Use, RegisterId)| {

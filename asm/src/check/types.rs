@@ -310,6 +310,7 @@ impl<'i, V: AbstractValue> Types<'i, V> {
             | Effect::Call
             | Effect::Return
             | Effect::Loop
+            | Effect::Publish
             | Effect::Wait
             | Effect::Halt
             | Effect::ReadFlags

@@ -37,6 +37,9 @@ pub(crate) fn whole_source(seed: u64) -> String {
         source.statement(0);
     }
     source.outputs();
+    if seed % 8 == 3 {
+        source.line(" publish\n s1 = s0*0.5 + x1");
+    }
     source.line(" call sub0\n call sub1\n wait p");
     source.subroutine = true;
     for name in ["sub0", "sub1"] {

@@ -142,6 +142,10 @@ fn source_with(seed: u64, has_loops: bool) -> String {
     if let Some((name, _)) = open {
         let _ = writeln!(text, "skip{name}:");
     }
-    text.push_str(" fmul om, m0, m1\n fadd oa, a0, a1\n mov ox, x0\n rdflags u\n mov of, u\n wait period\n");
+    text.push_str(" fmul om, m0, m1\n fadd oa, a0, a1\n mov ox, x0\n rdflags u\n mov of, u\n");
+    if seed % 8 == 5 {
+        text.push_str(" publish\n fmul m0, m1, 0.5\n fadd a0, m0, a1\n st buf[zero], a0\n");
+    }
+    text.push_str(" wait period\n");
     text
 }

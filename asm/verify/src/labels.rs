@@ -88,6 +88,7 @@ fn is_passed_over(plain: &PlainProgram, position: u32) -> bool {
         effect.redirects()
             && effect != Effect::Return
             && effect != Effect::Halt
+            && effect != Effect::Publish
             && operation.constant == position
     });
     let mut any = false;

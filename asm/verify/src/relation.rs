@@ -2,7 +2,7 @@
 //! Simulation relation between source and image, inferred at cuts: Kildall's algorithm on partitions (value numbering over both programs at
 //! once).
 //!
-//! A cut is a pair of positions, after a decision on a value or at a tick. There the registers of both programs, memory and flags are
+//! A cut is a pair of positions, after a decision on a value or a publication, or at a tick. There the registers of both programs, memory and flags are
 //! cells; the relation knows which cells are equal, differ by a constant, or are constant. From a cut, both programs run independently to the next decision, which
 //! must be the same, and their effects must agree. The partition at a cut is the meet over all paths to it.
 
@@ -291,6 +291,7 @@ impl<'a> Relation<'a> {
             Event::Branch { condition, .. } | Event::LoopEnd { condition } => {
                 format!("a decision on {}", self.text(condition))
             }
+            Event::Publish => "publish".to_owned(),
             Event::Wait(_) => "wait".to_owned(),
             Event::Halt => "halt".to_owned(),
         };
@@ -319,6 +320,11 @@ impl<'a> Relation<'a> {
                     self.compare_place(&source, &image)?;
                     self.arrive(&mut source, &mut image, true);
                 }
+            }
+            Event::Publish => {
+                source.resume(ways.0, true, &mut self.world);
+                image.resume(ways.1, true, &mut self.world);
+                self.arrive(&mut source, &mut image, false);
             }
             Event::Branch { .. } | Event::LoopEnd { .. } => {
                 for truth in [true, false] {
@@ -545,10 +551,12 @@ struct Mismatch {
     at_decision: bool,
 }
 
-/// The programs agree: both wait, both halt, or both decide on the same condition.
+/// The programs agree: both publish, both wait, both halt, or both decide on the same condition.
 fn agree(ways: (Event, Event)) -> bool {
     match ways {
-        (Event::Wait(_), Event::Wait(_)) | (Event::Halt, Event::Halt) => true,
+        (Event::Publish, Event::Publish) | (Event::Wait(_), Event::Wait(_)) | (Event::Halt, Event::Halt) => {
+            true
+        }
         (
             Event::Branch { condition: a, .. } | Event::LoopEnd { condition: a },
             Event::Branch { condition: b, .. } | Event::LoopEnd { condition: b },

@@ -69,6 +69,8 @@ pub(crate) enum Event {
     Branch { condition: Term, target: u32, zero: bool },
     /// End of an iteration: the loop continues if `condition` is not zero.
     LoopEnd { condition: Term },
+    /// Publication of the outputs; execution continues at the next bundle.
+    Publish,
     /// Wait for the tick, which continues at a bundle.
     Wait(u32),
     /// End of the program.
@@ -146,7 +148,7 @@ impl<'a> Side<'a> {
                             None => return Ok(event),
                         }
                     }
-                    Event::Wait(_) | Event::Halt => return Ok(event),
+                    Event::Publish | Event::Wait(_) | Event::Halt => return Ok(event),
                 }
             }
         }
@@ -207,6 +209,7 @@ impl<'a> Side<'a> {
                 | Effect::Call
                 | Effect::Return
                 | Effect::Loop
+                | Effect::Publish
                 | Effect::Wait
                 | Effect::Halt => {
                     flow = Some((operation, sources[0]));
@@ -387,6 +390,7 @@ impl<'a> Side<'a> {
                 }
                 self.at = next;
             }
+            Effect::Publish => return Ok(Some(Event::Publish)),
             Effect::Wait => return Ok(Some(Event::Wait(target))),
             Effect::Halt => return Ok(Some(Event::Halt)),
             // These do not redirect: the next bundle follows.
@@ -483,6 +487,7 @@ impl<'a> Side<'a> {
                 self.left.pop();
                 self.at += 1;
             }
+            Event::Publish => self.at += 1,
             Event::Wait(target) => self.at = target,
             Event::Halt => {}
         }

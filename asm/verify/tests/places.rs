@@ -192,6 +192,48 @@ fn verified_unless_changed(source: &str, changes: &[[&str; 2]]) {
     }
 }
 
+/// What a `publish` hands over is compared at it: neither a write moved behind it, nor another value, nor its absence is accepted.
+#[test]
+fn published_outputs_are_compared() {
+    let source = "\
+.schedule on\n.ports latched\n.input x\n.output y z\n.state s\n.reg t\n.once\n s = 0.0\n wait p\n.period\n\
+p: y = x * s\n z = y + s\n publish\n t = sqrt(x)\n s = t + x\n wait p\n";
+    let changes = [
+        ["publish\n", "\n"],
+        ["z = y + s\n publish", "publish\n z = y + s"],
+        ["y + s", "y - s"],
+        ["t + x", "t - x"],
+    ];
+    verified_unless_changed(source, &changes[..1]);
+    verified_unless_changed(source, &changes[2..]);
+    // The assembler refuses the second; an image can have it.
+    for machine in [&T1, &T3, &T4] {
+        let options = Options { machine, effort: 0, ..Options::default() };
+        let loader = MemoryLoader::of("a.s", source.to_owned());
+        let (assembled, plain) = build("a.s", &loader, &options).expect("it assembles");
+        let mut program = assembled.program.clone();
+        let slots = machine.slots.len();
+        let writes = |bundle: &[u64], name: &str| {
+            let port = assembled.program.outputs.iter().find(|port| port.name == name).expect("a port");
+            let words = bundle.iter().zip(machine.slots);
+            words
+                .filter_map(|(word, slot)| Instruction::decode(*word).ok()?.writes(slot))
+                .any(|to| to == port.register)
+        };
+        let at = |found: &dyn Fn(&[u64]) -> bool| {
+            program.code.chunks(slots).position(found).expect("a bundle") * slots
+        };
+        let publish = at(&|bundle| {
+            bundle.iter().any(|word| Instruction::decode(*word).is_ok_and(|found| found.op == Op::publish))
+        });
+        let last = at(&|bundle| writes(bundle, "z"));
+        for place in 0..slots {
+            program.code.swap(last + place, publish + place);
+        }
+        assert!(verify(&program, &plain, &assembled.contractions).is_err(), "{}", machine.name);
+    }
+}
+
 /// The check follows the copies of the body further than the count allows, to a word of the array before: the image's order of accesses
 /// to both arrays is another.
 #[test]

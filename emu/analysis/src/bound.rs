@@ -48,6 +48,27 @@ pub struct SectionBounds {
     pub in_time: Span,
     /// Cycles of a period whose tick came before the previous `wait` (a missed deadline), from the cycle after that `wait`.
     pub missed: Span,
+    /// Cycles to the publication of the outputs; `None` without a `publish`: the `wait` publishes them.
+    pub published: Option<Publication>,
+}
+
+/// Best and worst case from the beginning of a section to the issue of its first `publish`, or of its `wait` on a path without one; counted
+/// as the cycles of [`SectionBounds`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Publication {
+    /// As [`SectionBounds::cycles`].
+    pub cycles: Span,
+    /// As [`SectionBounds::in_time`].
+    pub in_time: Span,
+    /// As [`SectionBounds::missed`].
+    pub missed: Span,
+}
+
+impl SectionBounds {
+    /// Cycles to the publication of the outputs, by a `publish` or by the `wait`.
+    pub fn to_outputs(&self) -> Span {
+        self.published.map_or(self.cycles, |published| published.cycles)
+    }
 }
 
 /// Best and worst case of each section of a program.
@@ -104,6 +125,14 @@ pub fn bound(program: &Program) -> Result<Bounds, BoundError> {
         ];
         // Take the smaller of two valid bounds.
         spans.into_iter().for_each(|(span, other)| span.worst = span.worst.min(other.worst));
+        if let (Some(published), Some(other)) = (&mut section.published, other.published) {
+            let spans = [
+                (&mut published.cycles, other.cycles),
+                (&mut published.in_time, other.in_time),
+                (&mut published.missed, other.missed),
+            ];
+            spans.into_iter().for_each(|(span, other)| span.worst = span.worst.min(other.worst));
+        }
     }
     Ok(bounds)
 }
@@ -149,6 +178,7 @@ fn bound_with(program: &Program, slice: Slice, prices: &Prices) -> Result<(Bound
     // still be pending or not when its first bundle is delivered: each such state, up to the empty one, is analysed (`delivered`). The
     // first of these states also arises after a missed deadline.
     let mut sections: BTreeMap<(bool, BundleAddress), SectionBounds> = BTreeMap::new();
+    let mut publications: BTreeMap<(bool, BundleAddress), Publication> = BTreeMap::new();
     let mut seen = BTreeSet::new();
     let mut left = vec![(true, BundleAddress::RESET, Residue::default())];
     while let Some((once, address, residue)) = left.pop() {
@@ -163,7 +193,7 @@ fn bound_with(program: &Program, slice: Slice, prices: &Prices) -> Result<(Bound
             let region = Region::Subroutine(address);
             // A period may begin with any register values that another period has left.
             let values = if once { at_reset.clone() } else { Values::default() };
-            let summary = explorer.explore(region, &State { residue, values })?;
+            let summary = explorer.explore(region, &State { residue, values, published: false })?;
             if summary.calls > machine.stack_depth {
                 let refusal = Refusal::StackOverflow { needed: summary.calls, depth: machine.stack_depth };
                 return Err(BoundError::new(program, address, refusal));
@@ -173,14 +203,16 @@ fn bound_with(program: &Program, slice: Slice, prices: &Prices) -> Result<(Bound
                 return Err(BoundError::new(program, address, refusal));
             }
             let totals = explorer.totals(&summary);
+            let publishes = summary.outcomes.keys().any(|outcome| matches!(outcome, Outcome::Publish { .. }));
             for (outcome, cost) in &summary.outcomes {
                 let span = cost.span(totals);
-                let end = match *outcome {
-                    Outcome::Wait { at, target, ref residue } => {
+                let (end, is_publication) = match *outcome {
+                    Outcome::Wait { at, target, ref residue, published } => {
                         left.push((false, target, residue.clone()));
-                        at
+                        (Some(at), publishes && !published)
                     }
-                    Outcome::Halt { at } => at,
+                    Outcome::Publish { .. } => (None, true),
+                    Outcome::Halt { at } => (Some(at), false),
                     Outcome::Return { at, .. } => {
                         return Err(BoundError::new(program, at, Refusal::StackUnderflow));
                     }
@@ -204,6 +236,19 @@ fn bound_with(program: &Program, slice: Slice, prices: &Prices) -> Result<(Bound
                         Refusal::Limit { limit: MAX_CYCLES, what },
                     ));
                 }
+                if is_publication {
+                    let known = publications.entry((!once, address)).or_insert(Publication {
+                        cycles: plain,
+                        in_time,
+                        missed,
+                    });
+                    known.cycles = known.cycles.or(plain);
+                    known.in_time = known.in_time.or(in_time);
+                    if later == 0 {
+                        known.missed = known.missed.or(missed);
+                    }
+                }
+                let Some(end) = end else { continue };
                 let section = sections.entry((!once, address)).or_insert_with(|| SectionBounds {
                     name: name(program, once, address),
                     address,
@@ -213,6 +258,7 @@ fn bound_with(program: &Program, slice: Slice, prices: &Prices) -> Result<(Bound
                     cycles: plain,
                     in_time,
                     missed,
+                    published: None,
                 });
                 section.cycles = section.cycles.or(plain);
                 section.in_time = section.in_time.or(in_time);
@@ -224,6 +270,9 @@ fn bound_with(program: &Program, slice: Slice, prices: &Prices) -> Result<(Bound
                 }
             }
         }
+    }
+    for (key, section) in &mut sections {
+        section.published = publications.get(key).copied();
     }
     let Explorer { steps, found, .. } = explorer;
     Ok((Bounds { sections: sections.into_values().collect(), steps }, found))
@@ -266,11 +315,12 @@ impl Cost {
     }
 }
 
-/// State of a path: its timing state, and the known values of the registers that loop counts depend on.
+/// State of a path: its timing state, the known values of the registers that loop counts depend on, and whether a `publish` has issued.
 #[derive(Clone, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 struct State {
     residue: Residue,
     values: Values,
+    published: bool,
 }
 
 /// Part of the program that is analysed as a unit, entered at one bundle.
@@ -297,11 +347,16 @@ enum Outcome {
         at: BundleAddress,
         state: State,
     },
-    /// Residue: timing state at the earliest possible delivery of the target.
+    /// Residue: timing state at the earliest possible delivery of the target. Published: a `publish` has issued on the way.
     Wait {
         at: BundleAddress,
         target: BundleAddress,
         residue: Residue,
+        published: bool,
+    },
+    /// Issue of the first `publish`; the path goes on by another outcome.
+    Publish {
+        at: BundleAddress,
     },
     Halt {
         at: BundleAddress,
@@ -343,8 +398,8 @@ fn widened(states: BTreeMap<State, Cost>) -> BTreeMap<State, Cost> {
         return states;
     }
     let mut forgotten = BTreeMap::new();
-    for (State { residue, .. }, cost) in states {
-        add(&mut forgotten, State { residue, values: Values::default() }, cost);
+    for (State { residue, published, .. }, cost) in states {
+        add(&mut forgotten, State { residue, values: Values::default(), published }, cost);
     }
     forgotten
 }
@@ -521,7 +576,7 @@ impl Explorer<'_> {
             .unwrap_or_else(|| Rc::new(self.slice.used(&self.graph, &self.graph.loops[&head].body)));
         self.used.insert(region, Rc::clone(&used));
         let values = Values { count: state.values.count, ..state.values.of(&used) };
-        let inside = self.explore(region, &State { residue: state.residue.clone(), values })?;
+        let inside = self.explore(region, &State { values, ..state.clone() })?;
         let mut summary = Summary::default();
         summary.contain(&inside);
         for (outcome, cost) in &inside.outcomes {
@@ -570,13 +625,20 @@ impl Explorer<'_> {
             }
             (address, delivered) = (address.next(), timing::after_sequential(cycle));
         };
+        let published = state.published || flow == Flow::Publish;
         let mut go = |to, back, delivered| {
-            let state = State { residue: scoreboard.residue(delivered), values: values.clone() };
+            let state = State { residue: scoreboard.residue(delivered), values: values.clone(), published };
             summary.add(Outcome::Go { edge: Edge { to, back }, state }, Cost::exactly(delivered));
         };
         let redirected = timing::after_redirect(machine, cycle);
         match flow {
             Flow::Next => go(at.next(), false, timing::after_sequential(cycle)),
+            Flow::Publish => {
+                go(at.next(), false, timing::after_sequential(cycle));
+                if !state.published {
+                    summary.add(Outcome::Publish { at }, Cost::exactly(cycle));
+                }
+            }
             Flow::Loop { end, .. } => go(at.next(), false, timing::after_loop(machine, at, end, cycle)),
             Flow::LoopEnd => {
                 if let Some(head) = closes {
@@ -598,7 +660,7 @@ impl Explorer<'_> {
                     let callee = place(self.graph.program, target);
                     return Err(self.error(at, Refusal::Recursion { callee }));
                 }
-                let state = State { residue: scoreboard.residue(redirected), values };
+                let state = State { residue: scoreboard.residue(redirected), values, published };
                 let callee = self.explore(Region::Subroutine(target), &state)?;
                 summary.contain(&callee);
                 summary.calls = callee.calls + 1;
@@ -608,18 +670,20 @@ impl Explorer<'_> {
                             Outcome::Go { edge: Edge { to: at.next(), back: false }, state: state.clone() }
                         }
                         Outcome::Wait { at, .. } => return Err(self.error(*at, Refusal::WaitInSubroutine)),
-                        Outcome::Halt { .. } | Outcome::Go { .. } => outcome.clone(),
+                        Outcome::Publish { .. } | Outcome::Halt { .. } | Outcome::Go { .. } => {
+                            outcome.clone()
+                        }
                     };
                     summary.add(outcome, cost.and(Cost::exactly(redirected)));
                 }
             }
             Flow::Return => {
-                let state = State { residue: scoreboard.residue(redirected), values };
+                let state = State { residue: scoreboard.residue(redirected), values, published };
                 summary.add(Outcome::Return { at, state }, Cost::exactly(redirected));
             }
             Flow::Wait(target) => {
                 let residue = scoreboard.residue(redirected);
-                summary.add(Outcome::Wait { at, target, residue }, Cost::exactly(cycle));
+                summary.add(Outcome::Wait { at, target, residue, published }, Cost::exactly(cycle));
             }
             Flow::Halt => summary.add(Outcome::Halt { at }, Cost::exactly(cycle)),
         }

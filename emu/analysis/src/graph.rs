@@ -171,7 +171,7 @@ impl<'p> Graph<'p> {
         let next = (false, Edge { to: from.next(), back: false });
         let jump = |to| (true, Edge { to, back: to <= from });
         let (next, jump) = match flow {
-            Flow::Next | Flow::Call(_) | Flow::Loop { .. } => (Some(next), None),
+            Flow::Next | Flow::Publish | Flow::Call(_) | Flow::Loop { .. } => (Some(next), None),
             Flow::LoopEnd => (Some(next), closes.map(jump)),
             Flow::Jump(target) => (None, Some(jump(target))),
             Flow::Branch { target, .. } => (

@@ -25,7 +25,7 @@ mod trace;
 mod values;
 pub mod what_if;
 
-pub use bound::{Bounds, SectionBounds, bound, section_cycles};
+pub use bound::{Bounds, Publication, SectionBounds, bound, section_cycles};
 pub use chain::{EdgeSlots, Loop};
 pub use error::{BoundError, Refusal};
 pub use static_issue::{StaticIssue, static_issue};

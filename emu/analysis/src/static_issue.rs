@@ -55,7 +55,7 @@ pub fn static_issue(program: &Program) -> Vec<StaticIssue> {
         issues.push(StaticIssue { address, from, cycle: issue.cycle, stalls, awaits });
         match Flow::of(instructions) {
             Flow::Loop { end, .. } => earliest = timing::after_loop(machine, address, end, issue.cycle),
-            Flow::Next | Flow::LoopEnd => earliest = timing::after_sequential(issue.cycle),
+            Flow::Next | Flow::LoopEnd | Flow::Publish => earliest = timing::after_sequential(issue.cycle),
             Flow::Branch { .. } => earliest = timing::after_not_taken(machine, issue.cycle),
             _ => (scoreboard, from, earliest) = (Scoreboard::new(machine), address.next(), 1),
         }

@@ -7,7 +7,7 @@ use takt_analysis::{Bounds, Refusal, SectionBounds, bound, section_cycles};
 use takt_asm::{MemoryLoader, Options, assemble};
 use takt_emu::testing::{self, Random, input_ports, random_program};
 use takt_emu::{Emulator, FaultKind, PeriodError, PeriodReport, Stop};
-use takt_isa::timing::Cycle;
+use takt_isa::timing::{Cycle, Span};
 use takt_isa::{BundleAddress, F3, MACHINES, Machine, Program, T3};
 
 fn shipped(name: &str, machine: &'static Machine) -> Program {
@@ -35,6 +35,8 @@ struct SectionCycles {
     address: BundleAddress,
     entered: SectionEntry,
     cycles: Cycle,
+    /// Cycles to the publication of a period's outputs.
+    published: Option<Cycle>,
 }
 
 /// Runs a program: the section `.once`, then up to `periods` periods. Ends early where the program halts.
@@ -56,19 +58,20 @@ fn measure(
         address: BundleAddress::RESET,
         entered: SectionEntry::Reset,
         cycles: waited + 1,
+        published: None,
     });
     for _ in 0..periods {
         inputs(emulator);
         // Target of the `wait`, whether its tick has come or not.
         let address = emulator.next_address();
         match emulator.run_period(&[]) {
-            Ok(PeriodReport { tick, start, wait, cycles, .. }) => {
+            Ok(PeriodReport { tick, start, published, wait, cycles, .. }) => {
                 let entered = if start == tick && tick > waited {
                     SectionEntry::Tick(tick - waited)
                 } else {
                     SectionEntry::Missed
                 };
-                all.push(SectionCycles { address, entered, cycles });
+                all.push(SectionCycles { address, entered, cycles, published: Some(published - start) });
                 waited = wait;
             }
             Err(PeriodError::Halted) => break,
@@ -99,7 +102,70 @@ fn check(bounds: &Bounds, measured: SectionCycles, refill: u32) -> bool {
         span.best <= measured.cycles && measured.cycles <= span.worst,
         "{measured:?} is not in {section:?}"
     );
+    if let Some(cycles) = measured.published {
+        let published = section.published.map(|published| match measured.entered {
+            SectionEntry::Missed => published.missed,
+            SectionEntry::Tick(after) if after < refill.into() => published.in_time,
+            SectionEntry::Tick(_) | SectionEntry::Reset => published.cycles,
+        });
+        // Without a `publish`, the `wait` publishes.
+        let to_outputs = published.unwrap_or(Span { best: measured.cycles, worst: measured.cycles });
+        assert!(
+            to_outputs.best <= cycles && cycles <= to_outputs.worst,
+            "the publication of {measured:?} is not in {section:?}"
+        );
+    }
     span.best == span.worst
+}
+
+/// The cycles to a `publish`, on two paths of which one has none, and behind a loop.
+#[test]
+fn a_publication_has_bounds_of_its_own() {
+    let text = "
+.ports latched
+.input n:int x
+.output o
+.reg k:int t
+.once
+        wait    period
+.period
+period: mov     o, x
+        bz      n, without
+        mov     k, 3
+again:  .loop_bound 3
+        isub    k, k, 1
+        bnz     k, again
+        publish
+        fsqrt   t, x
+        fadd    _e, t, x
+        wait    period
+without: wait   period
+.reg _e
+";
+    for machine in MACHINES {
+        let program = source(text, machine);
+        let bounds = bound(&program).unwrap();
+        let [_, period] = &bounds.sections[..] else { panic!("{bounds:?}") };
+        let published = period.published.expect("it publishes");
+        assert_eq!(published.cycles.best, period.cycles.best, "the short path has no `publish`");
+        assert!(published.cycles.worst + 10 < period.cycles.worst, "{period:?}");
+        assert_eq!(period.to_outputs(), published.cycles);
+        let mut emulator = Emulator::new(&program).unwrap();
+        let mut found = BTreeSet::new();
+        for (n, blocks) in [(0, true), (1, true), (1, false)] {
+            emulator.set_blocks(blocks);
+            let set = |emulator: &mut Emulator| {
+                emulator.set_input("x", 2.0.into()).unwrap();
+                emulator.set_input("n", n.into()).unwrap();
+            };
+            for one in measure(&mut emulator, 3, set).into_iter().skip(1) {
+                check(&bounds, one, machine.refill);
+                found.extend(one.published);
+            }
+            emulator.reset();
+        }
+        assert_eq!(found, BTreeSet::from([published.cycles.best, published.cycles.worst]));
+    }
 }
 
 #[test]

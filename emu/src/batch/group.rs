@@ -402,7 +402,7 @@ impl Group {
             self.lead.state.registers[register.index()] = u32::from(!most);
         }
         self.lead.follow(flow, address, last, &mut None);
-        if !matches!(flow, Flow::Wait(_)) {
+        if !matches!(flow, Flow::Publish | Flow::Wait(_)) {
             return GroupContinuation::More;
         }
         let Emulator { state, code, .. } = &self.lead;

@@ -121,6 +121,8 @@ pub enum Effect {
     Return,
     /// Repeats the bundles from the next one to the bundle before the target, `a` times.
     Loop,
+    /// Publishes the outputs: all earlier results are written; the period goes on at the next bundle.
+    Publish,
     /// Ends the period: all earlier results are written; continues at the target on the next tick.
     Wait,
     /// Stops the machine for good.
@@ -132,8 +134,8 @@ pub enum Effect {
 }
 
 impl Effect {
-    /// Execution may continue elsewhere than at the next bundle, or the front end refills first (a short loop): the operation
-    /// ends a basic block.
+    /// Execution may continue elsewhere than at the next bundle, or the front end refills first (a short loop), or the outputs are
+    /// published: the operation ends a basic block.
     pub const fn redirects(self) -> bool {
         matches!(
             self,
@@ -143,6 +145,7 @@ impl Effect {
                 | Effect::Call
                 | Effect::Return
                 | Effect::Loop
+                | Effect::Publish
                 | Effect::Wait
                 | Effect::Halt
         )
@@ -150,7 +153,7 @@ impl Effect {
 
     /// Execution may continue at the next bundle.
     pub const fn falls_through(self) -> bool {
-        !self.redirects() || self.is_conditional() || matches!(self, Effect::Loop)
+        !self.redirects() || self.is_conditional() || matches!(self, Effect::Loop | Effect::Publish)
     }
 
     /// The redirection depends on an operand.
@@ -160,7 +163,7 @@ impl Effect {
 
     /// Issue waits until every earlier result is written (see `timing`).
     pub const fn drains(self) -> bool {
-        matches!(self, Effect::Wait | Effect::Halt | Effect::ReadFlags | Effect::ClearFlags)
+        matches!(self, Effect::Publish | Effect::Wait | Effect::Halt | Effect::ReadFlags | Effect::ClearFlags)
     }
 }
 
@@ -400,6 +403,7 @@ instructions! { [a b c]
     wait     0x07 Control  T     []        { do Wait }          "end of period; at the tick, continue at target" "Issues when every earlier result is written, so that all outputs of the period are written. If the next tick has come already, the deadline was missed: the event is recorded and execution continues at once.";
     halt     0x08 Control  None  []        { do Halt }          "stop"                                    "Issues when every earlier result is written. Only a reset restarts the machine.";
     r#loop   0x09 Loop     At    [I]       { do Loop }          "repeat the bundles up to target a times"  "From the next bundle to the one before target, at no cost of time per iteration. The count is 1 to 65,535: any other is a fault. Loops nest as deep as the machine's row says. The last bundle of a body holds no operation that redirects, and no loop around it ends within the body: otherwise a fault.";
+    publish  0x0a Control  None  []        { do Publish }       "publish the outputs; the period goes on" "Issues when every earlier result is written, so that the outputs that the host sees, and those that a board takes, are complete. What follows in the period costs them no time. As an operation that redirects, it cannot be in the last bundle of a loop.";
 
     // ---- 0x1_ data memory: words of 32 bits, addressed by word.
     ld       0x10 Load     Load  [B I]     { do Load }          "d = memory[offset + a]"                  "The address is the sum of the 16-bit unsigned offset and the signed integer a. An address outside the data memory is a fault.";

@@ -7,7 +7,7 @@ mod windows;
 
 use crate::application::Application;
 use crate::document::{Document, Mistake, Table};
-use crate::latency;
+use crate::latency::{self, ProgramCycles};
 use crate::wiring::{Peripheral, Wiring};
 use std::ops::Range;
 use takt_analysis::Bounds;
@@ -114,16 +114,17 @@ impl Fit<'_> {
 
     /// Compares a program's periods with the tick.
     fn program(&self, bounds: &[Option<Bounds>]) -> Option<PeriodCycles> {
-        let sections = bounds.first()?.as_ref()?.sections.iter().filter(|section| !section.once);
-        let span = sections.map(|section| section.cycles).reduce(takt_isa::timing::Span::or)?;
+        let cycles = ProgramCycles::new(bounds.first()?.as_ref()?)?;
         let peripherals = &self.wiring.peripherals;
-        let reads = peripherals.iter().map(|peripheral| peripheral.reads.iter().flatten().count()).sum();
-        let writes = peripherals.iter().map(|peripheral| peripheral.writes.iter().flatten().count()).sum();
-        let copies = latency::copies(reads, writes);
-        let busy = PeriodCycles { best: span.best + copies, worst: span.worst + copies };
+        let reads =
+            peripherals.iter().map(|peripheral| peripheral.reads.iter().flatten().count() as u64).sum();
+        let writes =
+            peripherals.iter().map(|peripheral| peripheral.writes.iter().flatten().count() as u64).sum();
+        let busy = cycles.to_idle(reads, writes);
         let period = u64::from(self.wiring.period);
         let place = self.tick_place();
-        let figures = |cycles: u64| {
+        let figures = |cycles: u64, program: u64| {
+            let copies = cycles - program;
             format!(
                 "{cycles} cycles, {copies} of them for {reads} ports read and {writes} written at pins, and a tick comes every {period} cycles"
             )
@@ -135,19 +136,20 @@ impl Fit<'_> {
         if busy.best >= period {
             let text = format!(
                 "every tick is missed, and the outputs stay safe: a period of the program takes {}: {mend}",
-                figures(busy.best)
+                figures(busy.best, cycles.period.best)
             );
             self.late.mistake(&place, text);
         } else if busy.worst >= period {
             let text = format!(
                 "a tick can be missed: a period of the program takes up to {}: {mend}",
-                figures(busy.worst)
+                figures(busy.worst, cycles.period.worst)
             );
             // On a carrier, the program must meet its deadline: report a mistake instead of a warning.
             let list = if self.wiring.tick.is_some() { &self.mistakes } else { &self.warnings };
             list.mistake(&place, text);
         }
-        Some(busy)
+        let put = cycles.to_put(reads, writes);
+        Some(PeriodCycles { best: put.best, worst: put.worst })
     }
 
     /// Compares the periods of a system's cores with their ticks.

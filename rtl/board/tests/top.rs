@@ -135,6 +135,56 @@ fn board_runs_talks_and_fails_safe() {
     runs_talks_and_fails_safe(sim, &wiring, &first);
 }
 
+/// The period's end in `PROGRAM`, after `lit` is written.
+const WAIT: &str = "        iand    lit, n, 1\n        wait    period\n";
+
+/// `PROGRAM` with its outputs published before some work.
+fn published(work: &str) -> String {
+    assert!(PROGRAM.contains(WAIT));
+    let early = format!("        iand    lit, n, 1\n        publish\n{work}        wait    period\n");
+    PROGRAM.replace(WAIT, &early)
+}
+
+/// The board does the same with outputs published some hundred cycles before the `wait`, and is as much earlier.
+#[test]
+fn outputs_published_early_reach_the_pins_early() {
+    let (board, wiring, plain, folder) = target("board-published");
+    let work = ".rep i, 1, 20\n        fdiv    f, f, 3.0\n.endr\n        st      [17], f\n";
+    let early = program(&published(work));
+    let late = program(
+        &PROGRAM.replace(WAIT, &format!("        iand    lit, n, 1\n{work}        wait    period\n")),
+    );
+    let worst = |program: &Program| {
+        let bounds = takt_analysis::bound(program).expect("it can be bounded");
+        let ways = latency::ways(&wiring, &Application::from(program), &[bounds]).expect("it has a period");
+        ways.ways[0].total().expect("an edge").worst
+    };
+    assert!(worst(&early) <= worst(&plain) && worst(&early) + 400 < worst(&late), "{}", worst(&early));
+    let sim = Simulation::new(&board, &wiring, &early, &folder).unwrap_or_else(|error| panic!("{error}"));
+    runs_talks_and_fails_safe(sim, &wiring, &early);
+}
+
+/// A period whose `wait` comes after the next tick misses its deadline, although its outputs were published long before.
+#[test]
+fn a_published_period_can_miss_its_deadline() {
+    let (board, wiring, _, folder) = target("board-published-late");
+    let program = program(&published(SLOW));
+    let mut sim =
+        Simulation::new(&board, &wiring, &program, &folder).unwrap_or_else(|error| panic!("{error}"));
+    let mut driven = 0;
+    for _ in 0..12 {
+        periods(&mut sim, 1);
+        driven += u32::from(sim.output("signal_drive").expect("a pin").0);
+    }
+    // It drives from the first outputs on, and until the second tick that comes too early.
+    assert!((1..=3).contains(&driven), "{driven}");
+    assert!(safe(&mut sim));
+    let mut host = Host::connect(sim, 3).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(host.status().expect("status").causes().collect::<Vec<_>>(), ["missed deadline"]);
+    assert!(host.register("periods").expect("a register") >= 1);
+    assert!(host.register("misses").expect("a register") >= 2);
+}
+
 static TOLD: Mutex<Vec<String>> = Mutex::new(Vec::new());
 
 /// Each reason for safe outputs is reported when it occurs: a pin, the host, a value in the program.

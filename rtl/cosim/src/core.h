@@ -7,7 +7,7 @@
 enum Space { TO_PROGRAM, TO_DATA, TO_REGISTER, TO_INPUT };
 
 static Was was;
-// For each output port: written since the last `wait`; written at all before it; value shown at that time.
+// For each output port: written since the last publication; written at all before it; value shown at that time.
 static bool written[OUTPUTS], known[OUTPUTS];
 static uint32_t shown[OUTPUTS];
 
@@ -37,9 +37,9 @@ static uint32_t read_output(unsigned number) {
     return top->read_value;
 }
 
-// After a `wait`, all written values are visible outside; with latched ports, outputs change at no other time.
+// After a `publish` or a `wait`, all written values are visible outside; with latched ports, outputs change at no other time.
 static void observe_outputs() {
-    if (top->ended) {
+    if (top->published) {
         for (unsigned n = 0; n < OUTPUTS; n++) {
             if (!written[n] && !known[n]) continue;
             uint32_t value = read_output(n);

@@ -244,7 +244,7 @@ fn stray_accesses(base: &Program) -> Vec<Corner> {
             corners
                 .push(writer.corner(name(&format!("results of unit {unit} from bundle {from} on")), address));
         }
-        for next in [Effect::Halt, Effect::Wait, Effect::ReadFlags, Effect::ClearFlags] {
+        for next in [Effect::Halt, Effect::Publish, Effect::Wait, Effect::ReadFlags, Effect::ClearFlags] {
             for first in [0, 1] {
                 let mut writer = Writer::new(base);
                 stray(&mut writer, first);
@@ -262,7 +262,7 @@ fn stray_accesses(base: &Program) -> Vec<Corner> {
         }
         let Some(control) = sequencer(machine).filter(|control| *control != slot) else { continue };
         // Beside operations without a fault that would publish the written outputs, or stop.
-        for own in [Effect::Wait, Effect::Halt] {
+        for own in [Effect::Publish, Effect::Wait, Effect::Halt] {
             let mut writer = Writer::new(base);
             writer.results(0, 0);
             stray(&mut writer, 1);
@@ -417,7 +417,7 @@ fn faults_of_loops(base: &Program) -> Vec<Corner> {
         );
     }
     // An operation that redirects, as a loop's last bundle, with a fault of its own.
-    for effect in [Effect::Return, Effect::Loop, Effect::Call, Effect::Halt, Effect::Wait] {
+    for effect in [Effect::Return, Effect::Loop, Effect::Call, Effect::Publish, Effect::Halt, Effect::Wait] {
         let mut writer = Writer::new(base);
         writer.counted(0, 2, 9);
         writer.put(8, effect, 20, Register::ZERO);

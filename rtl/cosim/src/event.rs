@@ -117,7 +117,7 @@ pub enum EventKind {
     Halt,
     /// Fault of a bundle.
     Fault,
-    /// Publication: a `wait` issues, and the last value written to an output port since the last `wait` becomes visible.
+    /// Publication: a `publish` or a `wait` issues, and the last value written to an output port since the last one becomes visible.
     Publish,
     /// Value on the input pins; only in a system, whose driver reports it.
     Input,
@@ -266,6 +266,6 @@ pub(crate) fn expect(event: &Event) -> Option<CoreEvent> {
             register: fault_code(&fault.kind)?,
             ..bare(EventKind::Fault, fault.cycle)
         },
-        Event::Tick { .. } | Event::Wait { .. } => return None,
+        Event::Tick { .. } | Event::Publish { .. } | Event::Wait { .. } => return None,
     })
 }

@@ -62,7 +62,7 @@ pub struct Lockstep {
     free_pin: Cycle,
     simulated: Cycle,
     stopped: Option<Fault>,
-    /// Values written to output ports since the last `wait`, by number.
+    /// Values written to output ports since they were last published, by number.
     written: BTreeMap<u16, u32>,
     /// Cycles from an input on its pins to the cycle in which the emulator gets it.
     input_delay: Cycle,
@@ -179,7 +179,7 @@ impl Lockstep {
                 Event::PortWrite(write) => {
                     written.extend(machine.output_number(write.register).map(|number| (number, write.value)));
                 }
-                Event::Wait { cycle, .. } => {
+                Event::Publish { cycle, .. } | Event::Wait { cycle, .. } => {
                     let published = std::mem::take(written).into_iter().map(|(register, value)| CoreEvent {
                         register,
                         value,

@@ -61,6 +61,7 @@ fn sequencer(plan: &Plan, m: &mut Module) {
         Effect::Call,
         Effect::Return,
         Effect::Loop,
+        Effect::Publish,
         Effect::Wait,
         Effect::Halt,
     ] {
@@ -78,7 +79,7 @@ fn sequencer(plan: &Plan, m: &mut Module) {
             .same([net::X_ISSUED, net::X_ADDRESS, net::WAITING])
             .port("open", net::INPUTS_OPEN)
             .port("ends", net::INPUTS_TAKEN)
-            .same([net::ENDED])
+            .same([net::ENDED, net::PUBLISHED])
             .port("missed", net::TICK_MISSED)
             .port("lost", net::TICK_LOST)
             .same([net::DEADLINE_MISSED, net::HALTED, net::FAULT, net::FAULT_KIND, net::FAULT_SLOT])

@@ -47,6 +47,8 @@ pub(super) fn ports(plan: &Plan) -> Vec<Port> {
         output(net::READ_VALUE),
         output(net::ENDED)
             .remark("a `wait` issued two cycles ago: read_value belongs to the period that it ended"),
+        output(net::PUBLISHED)
+            .remark("a `publish` or a `wait` issued two cycles ago: read_value is what it published"),
     ];
     let rest = [
         input(net::TICK).heading("The tick: high for one cycle, seen in the next one."),

@@ -29,7 +29,7 @@ pub(super) fn write(plan: &Plan, m: &mut Module) {
             .parameter("INDEX", plan.port_bits)
             .parameter_as("READ_DELAY", &net::READ_DELAY)
             .same([net::CLK, net::RST])
-            .port("publish", net::ENDED)
+            .port("publish", net::PUBLISHED)
             .port("write", of_banks(&Plan::output_write))
             .port("index", of_banks(&Plan::output_index))
             .port("value", of_banks(&Plan::output_value))

@@ -42,6 +42,7 @@ impl fmt::Display for ControlBit {
                 Effect::Call => "call",
                 Effect::Loop => "loop",
                 Effect::Return => "return",
+                Effect::Publish => "publish",
                 Effect::Wait => "wait",
                 Effect::Halt => "halt",
                 Effect::ReadFlags => "read_flags",

@@ -344,7 +344,7 @@ impl Explorer<'_> {
         }
         let next = address.next();
         match flow {
-            Flow::Next | Flow::Loop { .. } => self.go(walk, address, next, false, state)?,
+            Flow::Next | Flow::Publish | Flow::Loop { .. } => self.go(walk, address, next, false, state)?,
             Flow::LoopEnd => {
                 let Some(head) = self.graph.node(address)?.closes else { return Ok(()) };
                 let turn = state.turns.get(&(state.calls.len(), head)).copied().unwrap_or(1);
@@ -612,7 +612,7 @@ impl Explorer<'_> {
             }
             Effect::ReadFlags => Some(Node::leaf(Value::Any)),
             // Control and flag operations write no register.
-            Effect::ClearFlags | Effect::Nothing | Effect::Wait | Effect::Halt => None,
+            Effect::ClearFlags | Effect::Nothing | Effect::Publish | Effect::Wait | Effect::Halt => None,
             Effect::Jump | Effect::BranchZero | Effect::BranchNonzero => None,
             Effect::Call | Effect::Return | Effect::Loop => None,
         })

@@ -98,7 +98,7 @@ fn kept(program: &Program) -> BTreeSet<Register> {
             Flow::Jump(target) | Flow::Wait(target) => open.push(target),
             Flow::Branch { target, .. } | Flow::Call(target) => open.extend([target, next]),
             Flow::Loop { end, .. } => open.extend([end, next]),
-            Flow::Next | Flow::LoopEnd => open.push(next),
+            Flow::Next | Flow::LoopEnd | Flow::Publish => open.push(next),
             // A call goes on behind itself.
             Flow::Return | Flow::Halt => {}
         }

@@ -298,7 +298,7 @@ impl Shadow {
             // Flags are an integer, and so exact.
             Effect::ReadFlags => None,
             // Control and flag operations write no register.
-            Effect::ClearFlags | Effect::Nothing | Effect::Wait | Effect::Halt => None,
+            Effect::ClearFlags | Effect::Nothing | Effect::Publish | Effect::Wait | Effect::Halt => None,
             Effect::Jump | Effect::BranchZero | Effect::BranchNonzero => None,
             Effect::Call | Effect::Return | Effect::Loop => None,
         }

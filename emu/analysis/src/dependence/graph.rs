@@ -333,7 +333,7 @@ impl Places {
                     (ValueSource::Places(Vec::new()), self.flags.map(ValueDestination::Place))
                 }
                 // Control operations write no place.
-                Effect::Nothing | Effect::Wait | Effect::Halt => continue,
+                Effect::Nothing | Effect::Publish | Effect::Wait | Effect::Halt => continue,
                 Effect::Jump | Effect::BranchZero | Effect::BranchNonzero => continue,
                 Effect::Call | Effect::Return | Effect::Loop => continue,
             };

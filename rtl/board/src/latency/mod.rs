@@ -11,14 +11,12 @@ mod samples;
 
 pub(crate) use peripherals::{Frame, Window, frame, update, window, window_start};
 pub use pin_path::{Answer, End, Part, PinPath, PinPaths, Sample, Until};
-pub(crate) use ports::copies;
-pub use ports::undivided;
+pub use ports::{ProgramCycles, undivided};
 pub use samples::{Sampling, samples};
 
 use crate::application::Application;
 use crate::wiring::Wiring;
 use takt_analysis::Bounds;
-use takt_isa::timing::Span;
 use takt_system::latency::{LatencyError, Passages};
 use thiserror::Error;
 
@@ -46,8 +44,7 @@ pub fn ways(
     if !application.is_program() {
         return Ok(links::ways(wiring, application, &Passages::new(description, bounds))?);
     }
-    // The board ticks only after it has read the outputs, so the program always waits by then.
-    let sections = bounds.iter().flat_map(|bounds| &bounds.sections).filter(|section| !section.once);
-    let span = sections.map(|section| section.cycles).reduce(Span::or).ok_or(PinPathsError::NoPeriod)?;
-    Ok(ports::ways(wiring, &description.cores[0].program, span))
+    // The board ticks only while the program waits and its outputs have been read.
+    let cycles = bounds.first().and_then(ProgramCycles::new).ok_or(PinPathsError::NoPeriod)?;
+    Ok(ports::ways(wiring, &description.cores[0].program, cycles))
 }

@@ -6,25 +6,73 @@ use super::pin_path::{End, Part, PinPath, PinPaths, states_text};
 use crate::wiring::Wiring;
 use std::collections::{BTreeMap, BTreeSet};
 use takt_analysis::dependence::{Dependence, OutputEvent};
+use takt_analysis::{Bounds, SectionBounds};
 use takt_isa::Program;
 use takt_isa::program::Port;
 use takt_isa::timing::Span;
 
 /// Cycles that `takt_exchange` takes, without any input, from the board's tick to the core's tick.
-const BEGIN: u64 = 5;
+const BEGIN: u64 = 2;
 /// Cycles, without any output, from the issue of `wait` to the cycle in which `put` is high: the core's `waiting`, `takt_exchange` and
 /// the rounding of the last output.
-const END: u64 = 14;
+const END: u64 = 9;
 
-/// Cycles of a period that the program does not take: `reads` registers become input ports, and output ports become `writes` registers.
-pub(crate) fn copies(reads: usize, writes: usize) -> u64 {
-    reads as u64 + BEGIN + writes as u64 + END
+/// Cycles from the issue of `wait`, and the core's delay of the tick, to the first cycle in which the board's tick begins a period, if the
+/// outputs have been copied before.
+const WAITS: u64 = 3;
+
+/// Cycles of a program's periods, from the tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ProgramCycles {
+    /// To the `wait`.
+    pub period: Span,
+    /// To the publication of the outputs, if a `publish` comes before the `wait`.
+    pub published: Option<Span>,
+}
+
+impl From<Span> for ProgramCycles {
+    fn from(period: Span) -> ProgramCycles {
+        ProgramCycles { period, published: None }
+    }
+}
+
+impl ProgramCycles {
+    /// Cycles of the periods that start with a tick after the `wait`; `None` without periods.
+    pub fn new(bounds: &Bounds) -> Option<ProgramCycles> {
+        let sections = || bounds.sections.iter().filter(|section| !section.once);
+        let period = sections().map(|section| section.cycles).reduce(Span::or)?;
+        let publishes = sections().any(|section| section.published.is_some());
+        let published = sections().map(SectionBounds::to_outputs).reduce(Span::or).filter(|_| publishes);
+        Some(ProgramCycles { period, published })
+    }
+
+    /// Cycles to the publication of the outputs, by a `publish` or by the `wait`.
+    pub fn to_outputs(&self) -> Span {
+        self.published.unwrap_or(self.period)
+    }
+
+    /// Cycles from the board's tick to the cycle in which the peripherals take the outputs on: `reads` registers become input ports, and
+    /// output ports become `writes` registers.
+    pub(crate) fn to_put(&self, reads: u64, writes: u64) -> Span {
+        self.to_outputs().after(reads + BEGIN + writes + END)
+    }
+
+    /// Cycles from the board's tick to the first cycle in which the next one begins a period.
+    pub(crate) fn to_idle(&self, reads: u64, writes: u64) -> Span {
+        let (put, waits) = (self.to_put(reads, writes), self.period.after(reads + BEGIN + WAITS));
+        Span { best: put.best.max(waits.best), worst: put.worst.max(waits.worst) }
+    }
+
+    /// Name of the operation that publishes the outputs.
+    fn publisher(&self) -> &'static str {
+        if self.published.is_some() { "`publish`" } else { "`wait`" }
+    }
 }
 
 /// Paths of a program, with the periods that states add: inputs and outputs with equal states share a path. Outputs that follow no input
 /// are left out.
-pub(super) fn ways(wiring: &Wiring, program: &Program, span: Span) -> PinPaths {
-    let ways = undivided(wiring, span);
+pub(super) fn ways(wiring: &Wiring, program: &Program, cycles: ProgramCycles) -> PinPaths {
+    let ways = undivided(wiring, cycles);
     let dependence = Dependence::new(program, &BTreeSet::new()).unwrap_or_else(|_| Dependence::unknown());
     let sent = if program.latched { OutputEvent::AtWait } else { OutputEvent::Written };
     let register =
@@ -64,7 +112,7 @@ pub(super) fn ways(wiring: &Wiring, program: &Program, span: Span) -> PinPaths {
         };
         inputs.into_iter().map(each).collect::<Vec<_>>()
     };
-    let busy = ways.first().map_or(0, |way| Part::sum("", &way.between[1..]).worst);
+    let busy = if ways.is_empty() { 0 } else { cycles.to_idle(reads(wiring), writes(wiring)).worst };
     let late = (busy >= u64::from(wiring.period))
         .then(|| format!("{busy} cycles from the tick, of {}", wiring.period));
     PinPaths {
@@ -76,15 +124,16 @@ pub(super) fn ways(wiring: &Wiring, program: &Program, span: Span) -> PinPaths {
 }
 
 /// Paths from all inputs of a wiring to all its outputs, regardless of dependences, through a core without links: one for the inputs that
-/// wait for a tick, and one for each time from a carrier's sample to the tick. The periods of the core take the cycles of `span` from
-/// tick to `wait`, and the next tick comes after the `wait`. Empty if the wiring has no such input, or no such output.
-pub fn undivided(wiring: &Wiring, span: Span) -> Vec<PinPath> {
+/// wait for a tick, and one for each time from a carrier's sample to the tick. The periods of the core take `cycles`, and the next tick
+/// comes after the `wait`. Empty if the wiring has no such input, or no such output.
+pub fn undivided(wiring: &Wiring, cycles: impl Into<ProgramCycles>) -> Vec<PinPath> {
+    let cycles = cycles.into();
+    let span = cycles.to_outputs();
     let inputs: Vec<_> = wiring.peripherals.iter().flat_map(|of| inputs(wiring, of)).collect();
-    let writes = wiring.peripherals.iter().map(|of| of.writes.iter().flatten().count() as u64).sum::<u64>();
-    let reads = inputs.len() as u64;
+    let (reads, writes) = (reads(wiring), writes(wiring));
     let after = [
         Part::new(format!("registers to input ports ({reads})"), reads + BEGIN, reads + BEGIN),
-        Part::new("the program, from tick to `wait`", span.best, span.worst),
+        Part::new(format!("the program, from tick to {}", cycles.publisher()), span.best, span.worst),
         Part::new(format!("output ports to registers ({writes})"), writes + END, writes + END),
     ];
     let busy = Part::sum("", &after);
@@ -114,4 +163,14 @@ pub fn undivided(wiring: &Wiring, span: Span) -> Vec<PinPath> {
         });
     }
     ways
+}
+
+/// Number of registers that become input ports at the tick.
+fn reads(wiring: &Wiring) -> u64 {
+    wiring.peripherals.iter().map(|of| of.reads.iter().flatten().count() as u64).sum()
+}
+
+/// Number of output ports that become registers.
+fn writes(wiring: &Wiring) -> u64 {
+    wiring.peripherals.iter().map(|of| of.writes.iter().flatten().count() as u64).sum()
 }

@@ -41,6 +41,8 @@ nets! {
     READ_VALUE "read_value" 32;
     /// A `wait` issued two cycles ago.
     ENDED "ended";
+    /// A `publish` or a `wait` issued two cycles ago.
+    PUBLISHED "published";
     /// Tick, high for one cycle.
     TICK "tick";
     /// The program waits for the tick.

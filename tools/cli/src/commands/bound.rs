@@ -177,6 +177,16 @@ pub(crate) fn sections_json(program: &Program, bounds: &Bounds) -> Value {
             value["in_time"] = span(section.in_time);
             value["missed"] = span(section.missed);
         }
+        if let Some(published) = section.published {
+            value["published"] = match section.once {
+                true => json!({ "cycles": span(published.cycles) }),
+                false => json!({
+                    "cycles": span(published.cycles),
+                    "in_time": span(published.in_time),
+                    "missed": span(published.missed),
+                }),
+            };
+        }
         value
     };
     bounds.sections.iter().map(section).collect()
@@ -251,6 +261,11 @@ pub(crate) fn write_sections(program: &Program, bounds: &Bounds, clock: f64, out
             text(section.in_time),
             text(section.missed)
         )?;
+    }
+    for section in &bounds.sections {
+        let Some(published) = section.published else { continue };
+        let time = microseconds(published.cycles.worst, clock);
+        writeln!(out, "{}: outputs published after {} ({time})", section.name, text(published.cycles))?;
     }
     Ok(())
 }

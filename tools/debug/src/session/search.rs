@@ -104,8 +104,10 @@ impl Search {
                 Event::Retire(retire) if self.interest.is_of(retire.address) => {
                     positions.extend([retire.cycle, retire.cycle + 1]);
                 }
-                // A period ends, and latched output ports change.
-                Event::Wait { cycle, .. } => positions.extend(cycle + 1..=cycle + 3),
+                // Latched output ports change, and a period ends.
+                Event::Publish { cycle, .. } | Event::Wait { cycle, .. } => {
+                    positions.extend(cycle + 1..=cycle + 3)
+                }
                 // Latched input ports change.
                 Event::Tick { cycle } => positions.extend(*cycle..=cycle + 2),
                 _ => {}

@@ -108,6 +108,9 @@ impl Writer for JsonLines<'_> {
                 Event::Tick { cycle } => Some(LogLine::of(*cycle, "tick")),
                 Event::DeadlineMissed { cycle } => Some(LogLine::of(*cycle, "missed")),
                 Event::TickLost { cycle } => Some(LogLine::of(*cycle, "lost")),
+                Event::Publish { cycle, address } => {
+                    Some(LogLine { bundle: Some(*address), ..LogLine::of(*cycle, "publish") })
+                }
                 Event::Wait { cycle, address } => {
                     Some(LogLine { bundle: Some(*address), ..LogLine::of(*cycle, "wait") })
                 }
