@@ -80,7 +80,7 @@ impl Batch {
             let bundle = program.bundle(address).expect("it is there").expect("it is legal");
             for (slot, instruction) in program.machine.slots.iter().zip(&bundle) {
                 match instruction.effect() {
-                    Effect::Nothing | Effect::ClearFlags | Effect::Wait => {}
+                    Effect::Nothing | Effect::ClearFlags | Effect::Publish | Effect::Wait => {}
                     Effect::Compute => {
                         let mut sources = [0; 3];
                         for (source, &register) in sources.iter_mut().zip(instruction.reads()) {
