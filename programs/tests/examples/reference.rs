@@ -40,6 +40,28 @@ pub(crate) struct Foc {
     integral: [f64; 2],
 }
 
+/// The same law with the angle that the last period predicted, and that period's speed and voltage.
+pub(crate) struct FocEarly {
+    law: Foc,
+    /// Angle, speed and voltage.
+    known: [f64; 3],
+}
+
+impl Default for FocEarly {
+    fn default() -> FocEarly {
+        FocEarly { law: Foc::default(), known: [0.0, 0.0, 24.0] }
+    }
+}
+
+impl Reference for FocEarly {
+    fn period(&mut self, inputs: &[f64]) -> Vec<f64> {
+        let &[ia, ib, theta, speed, udc, id_ref, iq_ref] = inputs else { panic!("seven inputs") };
+        let [angle, last_speed, last_udc] = self.known;
+        self.known = [theta + speed * 50e-6, speed, udc];
+        self.law.period(&[ia, ib, angle, last_speed, last_udc, id_ref, iq_ref])
+    }
+}
+
 impl Reference for Foc {
     fn period(&mut self, inputs: &[f64]) -> Vec<f64> {
         let &[ia, ib, theta, speed, udc, id_ref, iq_ref] = inputs else { panic!("seven inputs") };
