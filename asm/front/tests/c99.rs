@@ -651,6 +651,35 @@ float step(int n, float x)
     );
 }
 
+/// Copies reach as far as they say: of elements that data choose, and behind pointers of unknown length.
+#[test]
+fn copies_what_data_choose_and_all_of_it() {
+    check(
+        "copies_of_chosen_elements",
+        r#"#include <stdint.h>
+#include <string.h>
+struct e { uint8_t k[4]; float v[2]; };
+static struct { int16_t win[5]; int8_t pos; } m[3];
+static struct { float x; struct e t[8]; } g;
+float step(int n, float x)
+{
+    int16_t t[5];
+    m[(n & 7) % 3].win[2] = n; m[1].pos++;
+    memcpy(t, m[(n & 7) % 3].win, sizeof t);
+    g.t[n & 7].v[1] += x; g.t[(n + 1) & 7].k[2] = 3;
+    if (n & 8) memset(&g.t[n & 3], 0, sizeof(struct e));
+    return t[2] + t[3] + g.t[n & 3].v[1] + g.t[n & 7].k[2] + m[1].pos;
+}
+"#,
+    );
+    let code = "#include <string.h>\nvoid step(const float *x, float *y) { float t[4]; memcpy(t, x, sizeof t); memset(y, 0, 3*sizeof *y); y[0] = t[0] + t[3]; }\n";
+    let translation = check("copies_behind_pointers", code);
+    assert_eq!([translation.inputs.len(), translation.outputs.len()], [2, 3], "{}", translation.text);
+    let code = "#include <string.h>\nfloat step(float x) { float t[4] = { x }, u[2]; memcpy(u, t + 3, sizeof u); return u[0]; }\n";
+    let text = refused("copies_beyond_an_end", code);
+    assert!(text.contains("beyond the end of `t`, at byte 16"), "{text}");
+}
+
 /// A pointer that may lead to two members takes the whole structure into data memory; the source says which word is which member.
 #[test]
 fn lists_the_members_of_a_structure_in_memory() {

@@ -268,14 +268,16 @@ impl<'a> Exec<'a> {
     }
 
     /// Scalars within the first `bytes` bytes of a pointer's target: offset and type of each.
-    fn covered(&self, pointer: &Pointer, bytes: i64) -> Result<Vec<(i64, Type)>, Error> {
+    fn covered(&mut self, pointer: &Pointer, bytes: i64) -> Result<Vec<(i64, Type)>, Error> {
+        self.reach(pointer.object, pointer.offset.saturating_add(bytes))?;
         let object = &self.objects[pointer.object];
         let inside = |offset: i64| (pointer.offset..pointer.offset + bytes).contains(&offset);
         let leaves = object.leaves.iter().filter(|leaf| inside(leaf.offset as i64));
         let found: Vec<(i64, Type)> =
             leaves.map(|leaf| (leaf.offset as i64 - pointer.offset, leaf.ty.clone())).collect();
         let end = found.last().map_or(0, |(offset, ty)| offset + self.structs.size(ty).unwrap_or(0) as i64);
-        if end > bytes || pointer.dynamic.is_some() {
+        let begins = pointer.dynamic.is_none() || object.leaf(pointer.offset).is_some();
+        if end > bytes || !begins {
             return self.fail(format!(
                 "this copies or sets only a part of a scalar of `{}`: assign members instead",
                 object.name

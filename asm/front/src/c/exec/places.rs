@@ -282,6 +282,26 @@ impl Exec<'_> {
         }
     }
 
+    /// Extends an object of unknown length up to a place, in bytes, in the next translation; others must have it.
+    pub(super) fn reach(&mut self, object: usize, end: i64) -> Result<(), Error> {
+        let found = &self.objects[object];
+        let size = self.structs.size(&found.ty).unwrap_or(0) as i64;
+        if end <= size {
+            return Ok(());
+        }
+        let built = self.extents.get(&found.key).copied().unwrap_or(1).max(1) as i64;
+        let element = (size / built).max(1);
+        let wanted = end.saturating_add(element - 1) / element;
+        match self.facts.extents.get_mut(&found.key) {
+            Some(extent) if wanted <= MAX_EXTENT as i64 => {
+                *extent = (*extent).max(wanted as usize);
+                self.again = true;
+                Ok(())
+            }
+            _ => self.fail(format!("this copies or sets beyond the end of `{}`, at byte {size}", found.name)),
+        }
+    }
+
     /// Extends an object of unknown length to the greatest place of a pointer to its elements, in the next translation.
     pub(super) fn extend(&mut self, pointer: &Pointer, element: &Type) -> Result<(), Error> {
         let Pointer { object, offset, dynamic: Some(dynamic), .. } = pointer else { return Ok(()) };
