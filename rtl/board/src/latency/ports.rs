@@ -47,24 +47,24 @@ impl ProgramCycles {
     }
 
     /// Cycles to the publication of the outputs, by a `publish` or by the `wait`.
-    pub fn to_outputs(&self) -> Span {
+    pub fn to_outputs(self) -> Span {
         self.published.unwrap_or(self.period)
     }
 
     /// Cycles from the board's tick to the cycle in which the peripherals take the outputs on: `reads` registers become input ports, and
     /// output ports become `writes` registers.
-    pub(crate) fn to_put(&self, reads: u64, writes: u64) -> Span {
+    pub(crate) fn to_put(self, reads: u64, writes: u64) -> Span {
         self.to_outputs().after(reads + BEGIN + writes + END)
     }
 
     /// Cycles from the board's tick to the first cycle in which the next one begins a period.
-    pub(crate) fn to_idle(&self, reads: u64, writes: u64) -> Span {
+    pub(crate) fn to_idle(self, reads: u64, writes: u64) -> Span {
         let (put, waits) = (self.to_put(reads, writes), self.period.after(reads + BEGIN + WAITS));
         Span { best: put.best.max(waits.best), worst: put.worst.max(waits.worst) }
     }
 
     /// Name of the operation that publishes the outputs.
-    fn publisher(&self) -> &'static str {
+    fn publisher(self) -> &'static str {
         if self.published.is_some() { "`publish`" } else { "`wait`" }
     }
 }
