@@ -680,6 +680,38 @@ float step(int n, float x)
     assert!(text.contains("beyond the end of `t`, at byte 16"), "{text}");
 }
 
+/// What a stranger's programs found: an unsigned quotient by a number that is 1 by computation, pointers chosen among structures of
+/// several types, and structures that change places.
+#[test]
+fn chosen_pointers_quotients_by_one_and_exchanges() {
+    check(
+        "quotient_by_a_computed_one",
+        "int step(short a, unsigned n) { unsigned t = (unsigned)a/((n & 0) + 1u); return (128 < t) + (t >> 5 > 7)*2 + (t/7u > 99)*4; }\n",
+    );
+    check(
+        "chosen_elements_of_several_types",
+        r#"#include <stdint.h>
+typedef struct { float z[2]; int16_t x[8]; } E; static E t[4];
+int step(int c, int h) { int16_t *px = c & 1 ? t[1].x : t[c & 3].x; px[h & 7] += c; return px[(h >> 2) & 7]; }
+"#,
+    );
+    check(
+        "chosen_members_of_several_types",
+        r#"#include <stdint.h>
+typedef struct { uint8_t k; float x[4]; } E; static struct { uint16_t n; E one; E t[2]; } g;
+float step(int a, int b, float f) { E *p = a > b ? &g.one : &g.t[b & 1]; p->x[a & 3] += f; p->k++; return g.one.x[b & 3] + g.one.k; }
+"#,
+    );
+    let code = "typedef struct { float v[40]; } O; static O g, h;\n\
+                float step(int i, float f) { { O t = g; g = h; h = t; } g.v[3] += f; g.v[7] -= i; float o = 0;\n\
+                for (int k = 0; k < 40; k++) o += g.v[k]; return o; }\n";
+    check("large_structures_exchanged", code);
+    let code = "static unsigned char bytes[12], len; static int sum(const unsigned char *p, unsigned char n) { int a = 0; while (n--) a += *p++; return a; }\n\
+                int step(unsigned char x) { if (len < 12) bytes[len++] = x; return sum(bytes, len); }\n";
+    let text = refused("a_walk_without_bound", code);
+    assert!(text.contains("loop_bound(N)"), "{text}");
+}
+
 /// A pointer that may lead to two members takes the whole structure into data memory; the source says which word is which member.
 #[test]
 fn lists_the_members_of_a_structure_in_memory() {

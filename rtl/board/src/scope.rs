@@ -251,8 +251,11 @@ fn level(text: &str, ty: Type) -> Result<u32, String> {
     }
 }
 
+/// A line, perhaps with its file.
+type At<'a> = (Option<&'a str>, u32);
+
 /// Splits a channel's name from the line whose operations count: `x`, `x:57`, `x:pi.s:57`.
-fn named(text: &str) -> Result<(&str, Option<(Option<&str>, u32)>), String> {
+fn named(text: &str) -> Result<(&str, Option<At<'_>>), String> {
     let Some((name, place)) = text.split_once(':') else { return Ok((text, None)) };
     let (file, line) = match place.rsplit_once(':') {
         Some((file, line)) => (Some(file), line),
@@ -677,10 +680,10 @@ impl<L: Line> Host<L> {
         let mut words = Vec::with_capacity(total);
         let (mut at, mut page) = ((first * scope.channels) as usize, None);
         while words.len() < total {
-            let wanted = Some(SCOPE_PAGE + (at / PAGE_WORDS) as u32);
-            if page != wanted {
-                self.set("page", wanted.unwrap_or(SCOPE_PAGE))?;
-                page = wanted;
+            let wanted = SCOPE_PAGE + (at / PAGE_WORDS) as u32;
+            if page != Some(wanted) {
+                self.set("page", wanted)?;
+                page = Some(wanted);
             }
             let inside = at % PAGE_WORDS;
             let some = (total - words.len()).min(size - at).min(PAGE_WORDS - inside).min(STRETCH);

@@ -52,7 +52,7 @@ fn range_of(op: Op, ranges: &[Range]) -> Range {
             fits((if ranges[0].0 >= 0 && ranges[1].0 >= 0 { 0 } else { -most }, most))
         }
         Op::UnsignedDiv if ranges[1].0 == ranges[1].1 && ranges[1].0 > 0 => {
-            (0, i64::from(u32::MAX) / ranges[1].0)
+            fits((0, i128::from(u32::MAX) / wide(1).0))
         }
         Op::IntRem if ranges[1].0 == ranges[1].1 && ranges[1].0 > 0 => {
             let most = ranges[1].0 - 1;

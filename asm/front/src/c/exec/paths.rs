@@ -6,7 +6,7 @@ use super::Exec;
 use crate::Error;
 use crate::c::ir::{Block, Id, Kind, Node, Op, Statement};
 use crate::c::types::Type;
-use crate::c::value::{Condition, Exit, Memory, Origin, Outcome, Part, Pointer, Value};
+use crate::c::value::{Condition, Exit, Memory, Origin, Outcome, Pointer, Value};
 use std::collections::HashMap;
 use std::rc::Rc;
 
@@ -221,7 +221,10 @@ impl<'a> Exec<'a> {
                         return Ok(Value::Pointer(Pointer { part, ..a }));
                     }
                     let scalar = self.select(condition, x, y)?;
-                    Ok(Value::Pointer(self.placed(a.object, part, scalar)?))
+                    // The known part gives the scalars' type; where these differ, the object's beginning does.
+                    let ty = |exec: &Self, pointer| exec.word_type(pointer).ok();
+                    let offset = if ty(self, &a) == ty(self, &b) { a.offset } else { 0 };
+                    Ok(Value::Pointer(self.placed(Pointer { part, offset, ..a }, scalar)?))
                 }
                 _ => Ok(MIXED_POINTER),
             },
@@ -260,15 +263,12 @@ impl<'a> Exec<'a> {
         }
     }
 
-    /// A pointer to a scalar whose index in the object is a node, in a member of it or the whole.
-    pub(super) fn placed(&mut self, object: usize, part: Option<Part>, scalar: Id) -> Result<Pointer, Error> {
-        let Some(Part { first, .. }) = part else {
-            return Ok(Pointer { object, offset: 0, dynamic: Some(scalar), part });
-        };
-        let offset = self.objects[object].leaves[first].offset as i64;
-        let first = self.nodes.int(first as i32);
-        let dynamic = Some(self.op(Op::IntSub, &[scalar, first])?);
-        Ok(Pointer { object, offset, dynamic, part })
+    /// A pointer to a scalar whose index in the object is a node; the known part is that of another pointer to a scalar of this type.
+    pub(super) fn placed(&mut self, like: Pointer, scalar: Id) -> Result<Pointer, Error> {
+        let (known, _) = self.known_scalar(&like)?;
+        let known = self.nodes.int(known as i32);
+        let dynamic = Some(self.op(Op::IntSub, &[scalar, known])?);
+        Ok(Pointer { dynamic, ..like })
     }
 
     /// Emits a branch in which each side assigns variables for all values needed after it.

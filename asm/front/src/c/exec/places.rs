@@ -11,6 +11,10 @@ use std::rc::Rc;
 /// Maximum number of elements behind a pointer of unknown extent.
 const MAX_EXTENT: usize = 4096;
 
+/// The remedy where a loop that is written out goes further than the data let it.
+const BOUND: &str =
+    ": if data end a loop before it comes so far, write `#pragma takt loop_bound(N)` before the loop";
+
 /// Register that holds a scalar.
 pub(in crate::c) fn kind_of(ty: &Type) -> Kind {
     if matches!(ty, Type::Float | Type::Double) { Kind::Float } else { Kind::Int }
@@ -94,13 +98,8 @@ impl Exec<'_> {
         if let Some(array) = self.arrays.get(&key) {
             return Ok(*array);
         }
+        let name = self.part_name(index, Some(part));
         let leaves = &object.leaves[part.range()];
-        let mut name = object.name.clone();
-        if let Some(leaf) = leaves.first().filter(|_| part != object.whole())
-            && let Some((member, ..)) = self.structs.member_array(&object.ty, leaf.offset)
-        {
-            name = format!("{name}_{member}");
-        }
         let mut kinds = leaves.iter().map(|leaf| kind_of(&leaf.ty));
         let first = kinds.next().unwrap_or(Kind::Int);
         let kind = kinds.all(|kind| kind == first).then_some(first);
@@ -115,6 +114,16 @@ impl Exec<'_> {
         let array = self.nodes.arrays.len() - 1;
         self.arrays.insert(key, array);
         Ok(array)
+    }
+
+    /// Name of an object, or of a member of it.
+    fn part_name(&self, object: usize, part: Option<Part>) -> String {
+        let found = &self.objects[object];
+        let first = part.filter(|part| *part != found.whole()).and_then(|part| found.leaves.get(part.first));
+        match first.and_then(|leaf| self.structs.member_array(&found.ty, leaf.offset)) {
+            Some((member, ..)) => format!("{}_{member}", found.name),
+            None => found.name.clone(),
+        }
     }
 
     /// The array that is a member of an object of a structure and has a scalar at this place.
@@ -189,7 +198,14 @@ impl Exec<'_> {
     fn leaf(&mut self, pointer: &Pointer) -> Result<Option<usize>, Error> {
         let object = &self.objects[pointer.object];
         if let Some(leaf) = object.leaf(pointer.offset) {
-            return Ok(Some(leaf));
+            let of_type = |part: Part| object.leaves[part.first].ty == object.leaves[leaf].ty;
+            if pointer.part.is_none_or(|part| part.range().contains(&leaf) || of_type(part)) {
+                return Ok(Some(leaf));
+            }
+            return self.fail(format!(
+                "this is outside of `{}`{BOUND}",
+                self.part_name(pointer.object, pointer.part)
+            ));
         }
         let (name, key) = (object.name.clone(), object.key.clone());
         if let (Some(extent), Some(first)) = (self.facts.extents.get(&key), object.leaves.first()) {
@@ -211,7 +227,7 @@ impl Exec<'_> {
             return self
                 .fail(format!("this reads or writes a part of a scalar of `{name}`: use shifts and masks"));
         }
-        self.fail(format!("this is outside of `{name}`"))
+        self.fail(format!("this is outside of `{name}`{BOUND}"))
     }
 
     /// Demands that an object, or a member of it, lies in memory, in the next translation.
@@ -406,7 +422,7 @@ impl Exec<'_> {
     }
 
     /// The type of the scalar at a place in an array.
-    fn word_type(&self, pointer: &Pointer) -> Result<Type, Error> {
+    pub(super) fn word_type(&self, pointer: &Pointer) -> Result<Type, Error> {
         let leaf = self.known_scalar(pointer)?.1;
         Ok(self.objects[pointer.object].leaves[leaf].ty.clone())
     }

@@ -6,7 +6,7 @@ use super::loops::{NO_BOUND, Repetition};
 use crate::Error;
 use crate::c::ir::{FULL, Id, Kind, Node, Op, Statement};
 use crate::c::types::{INT, Type};
-use crate::c::value::{Condition, Exit, Memory, Origin, Outcome, Part, Typed, Value};
+use crate::c::value::{Condition, Exit, Memory, Origin, Outcome, Part, Pointer, Typed, Value};
 use lang_c::ast::{BinaryOperator, Expression, UnaryOperator};
 use lang_c::span::Node as Spanned;
 use std::collections::BTreeMap;
@@ -36,7 +36,7 @@ enum Carried {
     /// A variable holds it.
     Value(usize),
     /// A pointer into an object; the variable holds its place.
-    Place { var: usize, object: usize, part: Option<Part> },
+    Place { var: usize, object: usize, offset: i64, part: Option<Part> },
     /// No variable can hold it: the text gives the reason where it is used.
     Lost(&'static str),
 }
@@ -431,9 +431,9 @@ impl<'a> Exec<'a> {
         };
         Ok(match carried {
             Carried::Value(var) => Value::Node(self.nodes.read(var, range)),
-            Carried::Place { var, object, part } => {
+            Carried::Place { var, object, offset, part } => {
                 let scalar = self.nodes.read(var, FULL);
-                Value::Pointer(self.placed(object, part, scalar)?)
+                Value::Pointer(self.placed(Pointer { object, offset, dynamic: None, part }, scalar)?)
             }
             Carried::Lost(reason) => Value::Mixed(reason),
         })
@@ -451,13 +451,13 @@ impl<'a> Exec<'a> {
                 let carried = match (cells.get(&(object, leaf)), &new) {
                     (None, _) if old == new => continue,
                     (None, _) => self.new_cell(object, leaf, &old, &new),
-                    (Some(Carried::Place { var, object, part }), Value::Pointer(new))
+                    (Some(Carried::Place { var, object, offset, part }), Value::Pointer(new))
                         if new.object == *object =>
                     {
                         if part.is_none() || new.part == *part {
                             continue;
                         }
-                        Carried::Place { var: *var, object: *object, part: None }
+                        Carried::Place { var: *var, object: *object, offset: *offset, part: None }
                     }
                     (Some(Carried::Value(_)), Value::Int(_) | Value::Real(_) | Value::Node(_)) => continue,
                     (Some(Carried::Lost(_)), _) => continue,
@@ -477,7 +477,8 @@ impl<'a> Exec<'a> {
         match (old, new) {
             (Value::Pointer(old), Value::Pointer(new)) if old.object == new.object => {
                 let part = old.part.filter(|_| old.part == new.part);
-                Carried::Place { var: self.nodes.var(&name, Kind::Int), object: old.object, part }
+                let (object, offset) = (old.object, old.offset);
+                Carried::Place { var: self.nodes.var(&name, Kind::Int), object, offset, part }
             }
             (Value::Pointer(_), _) | (_, Value::Pointer(_)) => Carried::Lost(MANY),
             (Value::Mixed(reason), _) | (_, Value::Mixed(reason)) => Carried::Lost(reason),

@@ -311,11 +311,20 @@ impl Writer<'_, '_> {
                     self.line(&format!("{name} = {text}"), place);
                 }
                 None => {
-                    let names: Vec<&str> = left.iter().map(|(name, ..)| name.as_str()).collect();
-                    let texts: Vec<&str> = left.iter().map(|(_, text, _)| text.as_str()).collect();
+                    // What reads one another's old values stands in one equation, no more: its registers are limited.
+                    let mut together = vec![left.remove(0)];
+                    let reads = |a: &(String, String, Vec<String>), b: &(String, String, Vec<String>)| {
+                        a.2.contains(&b.0) || b.2.contains(&a.0)
+                    };
+                    while let Some(index) =
+                        left.iter().position(|pair| together.iter().any(|other| reads(pair, other)))
+                    {
+                        together.push(left.remove(index));
+                    }
+                    let names: Vec<&str> = together.iter().map(|(name, ..)| name.as_str()).collect();
+                    let texts: Vec<&str> = together.iter().map(|(_, text, _)| text.as_str()).collect();
                     let line = format!("{} = {}", names.join(", "), texts.join(", "));
                     self.line(&line, place);
-                    left.clear();
                 }
             }
         }

@@ -188,9 +188,11 @@ fn head(title: &str, lines: &[(&str, Ink)], page: Page, out: &mut String) {
 }
 
 /// Rows of a trace's panel.
+#[cfg(feature = "board")]
 const TRACE_ROWS: usize = 6;
 
 /// Curve of a panel of its own.
+#[cfg(feature = "board")]
 pub(crate) struct Trace {
     /// Title of the panel.
     pub(crate) name: String,
@@ -199,6 +201,7 @@ pub(crate) struct Trace {
 }
 
 /// Traces as text, one below the other over the same axis, with a vertical line at `mark`. A trace without change is a line of words.
+#[cfg(feature = "board")]
 pub(crate) fn traces(all: &[Trace], unit: &str, mark: Option<f64>, page: Page) -> String {
     let columns = page.width.unwrap_or(WIDTH).clamp(LABELS + 2 * TICK, 2 * WIDTH) - LABELS - 1;
     let places = || all.iter().flat_map(|trace| &trace.points).map(|(x, _)| *x).chain(mark);
