@@ -672,7 +672,7 @@ impl Stimulus {
                 }
                 _ => (0, 3 + self.bits() % 8),
             };
-            if self.bits() % 200 == 0 {
+            if self.bits().is_multiple_of(200) {
                 (self.phase, self.left) = (0, 4);
             }
             pins.core_tick = self.phase == 2;
@@ -905,6 +905,9 @@ fn emulated(program: &Program, inputs: &[(&str, u32)], periods: usize) -> Vec<BT
 
 const STEPS: [(&str, u32); 2] = [("n", 3), ("x", 0x3fa0_0000)];
 
+/// Triggers, periods between two samples, samples, samples before the trigger, period in which it comes.
+type Case = (&'static [&'static str], u32, Option<u32>, Option<u32>, Option<u32>);
+
 /// Recordings of a running program have the emulator's values, in the periods that triggers and settings ask for.
 #[test]
 fn recordings_are_what_the_emulator_computes() {
@@ -917,7 +920,7 @@ fn recordings_are_what_the_emulator_computes() {
     let names = ["n", "x", "y", "k", "sum", "count", "a:18", "e"];
     // With a trigger: the period, counted from the start at which the scope is armed.
     let sum = |at: f32| (1..).find(|period| 1.25 * *period as f32 >= at).expect("it comes");
-    let cases: [(&[&str], u32, Option<u32>, Option<u32>, Option<u32>); 9] = [
+    let cases: [Case; 9] = [
         (&[], 1, None, None, Some(1)),
         (&["sum >= 100"], 1, None, Some(20), Some(sum(100.0))),
         // The comparison holds at once: it waits for the samples before.

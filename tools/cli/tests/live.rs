@@ -198,7 +198,7 @@ fn a_scope_records_around_a_trigger() {
     let folder = Folder::new();
     folder.write("ramp.s", RAMP);
     let head = "board = \"ulx3s-85f\"\nclock = 50\nperiod = 40\nbaud = 10_000_000\nautostart = true\n";
-    folder.write("scoped.toml", &format!("{head}[scope]\nchannels = 2\ndepth = 64\n"));
+    folder.write("scoped.toml", format!("{head}[scope]\nchannels = 2\ndepth = 64\n"));
     let check = folder.line("board check --wiring scoped.toml --program ramp.s --machine t1").ok();
     assert!(check.contains("scope: 2 channels of 64 samples, in 1 block RAM\n"), "{check}");
     let line = "board sim --wiring scoped.toml --program ramp.s --machine t1";

@@ -2,7 +2,6 @@
 //! Plot of a drive on the terminal: panels, texts and colours of the SVG, with lines of Braille dots, two by four per character.
 
 use super::{DEVIATES, Plot, REQUIRED, WRITES_NAN, error_title, path_title, required_text};
-use crate::terminal::number::rounded;
 use crate::terminal::page::Page;
 use std::fmt::Write as _;
 use std::ops::Range;
@@ -212,7 +211,10 @@ pub(crate) fn traces(all: &[Trace], unit: &str, mark: Option<f64>, page: Page) -
         let (low, high) =
             (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
         if points.is_empty() || low == high || first >= last {
-            let value = points.first().map_or_else(|| "no value".to_owned(), |(_, value)| rounded(*value, 7));
+            let value = points.first().map_or_else(
+                || "no value".to_owned(),
+                |(_, value)| crate::terminal::number::rounded(*value, 7),
+            );
             let _ = writeln!(out, "{} = {value}", page.strong(&visible(name)));
             continue;
         }
