@@ -180,3 +180,4 @@ period:
 .range  we_psi = -51, 51
 .range  vmax = 6.9, 34.7
 .range  v2 = 47, 1205
+; SPDX-License-Identifier: MIT OR Apache-2.0
