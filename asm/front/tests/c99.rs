@@ -710,6 +710,16 @@ float step(int a, int b, float f) { E *p = a > b ? &g.one : &g.t[b & 1]; p->x[a 
                 int step(unsigned char x) { if (len < 12) bytes[len++] = x; return sum(bytes, len); }\n";
     let text = refused("a_walk_without_bound", code);
     assert!(text.contains("loop_bound(N)"), "{text}");
+    check(
+        "a_walk_with_a_loose_bound",
+        &code.replace("int a = 0;", "int a = 0;\n#pragma takt loop_bound(20)\n"),
+    );
+    let code = "static struct { unsigned char pre; short hist[32]; int c; } d; int step(unsigned char k, short h) { d.hist[k & 31] = h; d.c++; int s = 0;\n\
+                short *p = d.hist, *e = d.hist + (k & 31);\n#pragma takt loop_bound(31)\nwhile (p < e) s += *p++; return s + d.c; }\n";
+    check("a_walk_to_an_end_that_data_choose", code);
+    let code = "static int v[4]; int step(int n) { int s = 0; for (int i = 0; i < 6; i++) s += v[i]; v[n & 3] = n; return s; }\n";
+    let text = refused("a_walk_beyond_an_end", code);
+    assert!(text.contains("this is outside of `v`") && text.contains("loop_bound(N)"), "{text}");
 }
 
 /// A pointer that may lead to two members takes the whole structure into data memory; the source says which word is which member.

@@ -54,7 +54,7 @@ impl Writer {
     /// Writes a core with a random program.
     fn core(&mut self, core: usize, machine: &'static Machine, path: &str) -> Program {
         let Writer { random, text, .. } = self;
-        let options = Options { bundles: 20 + random.below(30), ..Options::TAME };
+        let options = Options { bundles: 20 + random.below(30), publish: false, ..Options::TAME };
         let program = random_program(random.bits(), machine, options);
         let program = Program { latched: random.once_in(3), ..program };
         self.inputs.push(program.inputs.iter().map(|port| port.name.clone()).collect());

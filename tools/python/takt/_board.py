@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -38,10 +38,10 @@ def _samples(kind: str, bits: list[int | None]) -> np.ndarray:
     words = np.array([word or 0 for word in bits], dtype=np.uint32)
     missing = np.array([word is None for word in bits])
     if kind == "float":
-        values = words.view(np.float32)
-        values[missing] = np.nan
-        return values
-    values = words.view(np.int32) if kind == "int" else words
+        floats = words.view(np.float32)
+        floats[missing] = np.nan
+        return floats
+    values: np.ndarray = words.view(np.int32) if kind == "int" else words
     return np.ma.masked_array(values, missing) if missing.any() else values
 
 
@@ -239,7 +239,7 @@ class Board:
         self,
         names: list[str],
         *,
-        trigger: str | list[str] = (),
+        trigger: str | Sequence[str] = (),
         every: int = 1,
         samples: int | None = None,
         before: int | None = None,
@@ -284,7 +284,7 @@ class Board:
         self,
         names: list[str],
         *,
-        trigger: str | list[str] = (),
+        trigger: str | Sequence[str] = (),
         every: int = 1,
         samples: int | None = None,
         before: int | None = None,

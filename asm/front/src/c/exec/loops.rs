@@ -2,6 +2,7 @@
 //! Loops: executed iteration by iteration, and so written out, while the result stays short; otherwise kept as loops (`rolled.rs`).
 
 use super::Exec;
+use super::places::OUTSIDE;
 use crate::Error;
 use crate::c::ir::Block;
 use crate::c::value::{Condition, Exit, Memory, Outcome};
@@ -167,13 +168,15 @@ impl<'a> Exec<'a> {
 
     fn looped(&mut self, parts: Repetition<'a>, out: &mut Vec<Outcome>) -> Result<Condition, Error> {
         let limit = self.nodes.len() + SHORT;
-        match self.written_out(parts, Some(limit)) {
+        // Iterations that data never enter may leave an object: the loop itself ends before them.
+        let outside = match self.written_out(parts, Some(limit)) {
             Ok((normal, outcomes)) => {
                 return self.absorbed(normal, outcomes, &|exit| *exit == Exit::Break, out);
             }
+            Err(Some(error)) if error.text.contains(OUTSIDE) => Some(error),
             Err(Some(error)) => return Err(error),
-            Err(None) => {}
-        }
+            Err(None) => None,
+        };
         let saved = self.saved();
         self.blocks.push(Block::new());
         let mut inner = Vec::new();
@@ -187,6 +190,9 @@ impl<'a> Exec<'a> {
             Err(error) if self.exhausted.is_some() => Err(error),
             Err(reason) => {
                 self.restore(saved);
+                if let Some(error) = outside {
+                    return Err(error);
+                }
                 if parts.bound.is_some() {
                     return Err(reason);
                 }
@@ -227,7 +233,12 @@ impl<'a> Exec<'a> {
                 self.restore(saved);
                 Err(None)
             }
-            Err(error) => Err(Some(error)),
+            Err(error) => {
+                if error.text.contains(OUTSIDE) {
+                    self.restore(saved);
+                }
+                Err(Some(error))
+            }
         }
     }
 

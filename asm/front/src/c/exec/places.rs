@@ -12,7 +12,7 @@ use std::rc::Rc;
 const MAX_EXTENT: usize = 4096;
 
 /// The remedy where a loop that is written out goes further than the data let it.
-const BOUND: &str =
+pub(super) const OUTSIDE: &str =
     ": if data end a loop before it comes so far, write `#pragma takt loop_bound(N)` before the loop";
 
 /// Register that holds a scalar.
@@ -203,7 +203,7 @@ impl Exec<'_> {
                 return Ok(Some(leaf));
             }
             return self.fail(format!(
-                "this is outside of `{}`{BOUND}",
+                "this is outside of `{}`{OUTSIDE}",
                 self.part_name(pointer.object, pointer.part)
             ));
         }
@@ -227,7 +227,7 @@ impl Exec<'_> {
             return self
                 .fail(format!("this reads or writes a part of a scalar of `{name}`: use shifts and masks"));
         }
-        self.fail(format!("this is outside of `{name}`{BOUND}"))
+        self.fail(format!("this is outside of `{name}`{OUTSIDE}"))
     }
 
     /// Demands that an object, or a member of it, lies in memory, in the next translation.
