@@ -242,6 +242,10 @@ def test_the_circuit_in_verilator(tmp_path):
             board.arm(["m", "x"], trigger="m rises 7", every=2, samples=8, before=3)
             with pytest.raises(takt.BoardError, match="waits for its trigger"):
                 board.recording()
+            # A comparison waits for the samples before it.
+            armed = board.status.periods
+            while board.status.periods < armed + 8:
+                pass
             board.set({"n": 41})
             while not board.recorded:
                 pass
