@@ -16,6 +16,8 @@ const PERIODS_OF: [(&str, usize); 1] = [("blink.s", 2000)];
 const SECONDS_OF: [(&str, u32); 2] = [("tracking.s", 3), ("statespace.s", 2)];
 /// Plants that close the loops of examples: files of [`takt_programs::PLANTS`], without the extension.
 const PLANT_OF: [(&str, &str); 2] = [("foc.s", "pmsm"), ("pi.s", "dc_motor")];
+/// Tables of inputs that do not have their example's name.
+const INPUTS_OF: [(&str, &str); 1] = [("foc_early.s", "foc.csv")];
 /// Program that controls the robot.
 pub(crate) const TRACKING: &str = "hybrid/tracking.s";
 
@@ -61,7 +63,8 @@ pub(crate) fn about() -> Value {
     };
     let example = |name: &str| {
         let source = text(name)?;
-        let inputs = text(&name.replace(".s", ".csv"));
+        let table = INPUTS_OF.iter().find(|(known, _)| *known == name).map(|(_, table)| *table);
+        let inputs = text(table.unwrap_or(&name.replace(".s", ".csv")));
         let periods = PERIODS_OF.iter().find(|(known, _)| *known == name).map(|(_, periods)| periods);
         Some(
             json!({ "name": name, "title": title(source), "source": source, "inputs": inputs, "periods": periods, "seconds": seconds(name), "plant": plant(name), "track": false }),
