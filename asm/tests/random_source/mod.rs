@@ -64,6 +64,9 @@ fn counted_loop(random: &mut Random, number: u64, operand: &dyn Fn(&mut Random) 
     text
 }
 
+/// End of a period that publishes its outputs before.
+pub(crate) const PUBLISHED: &str = " publish\n fmul m0, m1, 0.5\n fadd a0, m0, a1\n st buf[zero], a0\n";
+
 /// A source of a few hundred operations: arithmetic with reuse of names, loads and stores, ports, flags, bundles, branches.
 pub(crate) fn source(seed: u64) -> String {
     source_with(seed, false)
@@ -144,7 +147,7 @@ fn source_with(seed: u64, has_loops: bool) -> String {
     }
     text.push_str(" fmul om, m0, m1\n fadd oa, a0, a1\n mov ox, x0\n rdflags u\n mov of, u\n");
     if seed % 8 == 5 {
-        text.push_str(" publish\n fmul m0, m1, 0.5\n fadd a0, m0, a1\n st buf[zero], a0\n");
+        text.push_str(PUBLISHED);
     }
     text.push_str(" wait period\n");
     text
