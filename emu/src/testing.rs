@@ -331,7 +331,7 @@ impl Generator {
                 8 | 9 => self.skip(),
                 10 => self.repeat(),
                 11 => self.call(),
-                14 => self.publish(),
+                12 if self.options.publish => self.publish(),
                 _ => self.counted(),
             }
         }

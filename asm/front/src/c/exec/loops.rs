@@ -168,12 +168,12 @@ impl<'a> Exec<'a> {
 
     fn looped(&mut self, parts: Repetition<'a>, out: &mut Vec<Outcome>) -> Result<Condition, Error> {
         let limit = self.nodes.len() + SHORT;
-        // Iterations that data never enter may leave an object: the loop itself ends before them.
+        // Iterations that data never enter may leave an object: a loop with a bound of its own ends before them.
         let outside = match self.written_out(parts, Some(limit)) {
             Ok((normal, outcomes)) => {
                 return self.absorbed(normal, outcomes, &|exit| *exit == Exit::Break, out);
             }
-            Err(Some(error)) if error.text.contains(OUTSIDE) => Some(error),
+            Err(Some(error)) if parts.bound.is_some() && error.text.contains(OUTSIDE) => Some(error),
             Err(Some(error)) => return Err(error),
             Err(None) => None,
         };
@@ -234,7 +234,7 @@ impl<'a> Exec<'a> {
                 Err(None)
             }
             Err(error) => {
-                if error.text.contains(OUTSIDE) {
+                if parts.bound.is_some() && error.text.contains(OUTSIDE) {
                     self.restore(saved);
                 }
                 Err(Some(error))
