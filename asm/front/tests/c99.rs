@@ -680,7 +680,7 @@ float step(int n, float x)
     assert!(text.contains("beyond the end of `t`, at byte 16"), "{text}");
 }
 
-/// What a stranger's programs found: an unsigned quotient by a number that is 1 by computation, pointers chosen among structures of
+/// Faults that a stranger's programs found: an unsigned quotient by a number that is 1 by computation, pointers chosen among structures of
 /// several types, and structures that change places.
 #[test]
 fn chosen_pointers_quotients_by_one_and_exchanges() {

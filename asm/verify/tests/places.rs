@@ -192,7 +192,7 @@ fn verified_unless_changed(source: &str, changes: &[[&str; 2]]) {
     }
 }
 
-/// What a `publish` hands over is compared at it: neither a write moved behind it, nor another value, nor its absence is accepted.
+/// Outputs are compared at the `publish` that hands them over: neither a write moved behind it, nor another value, nor its absence is accepted.
 #[test]
 fn published_outputs_are_compared() {
     let source = "\

@@ -56,11 +56,11 @@ pub struct SectionBounds {
 /// as the cycles of [`SectionBounds`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Publication {
-    /// As [`SectionBounds::cycles`].
+    /// Cycles up to the publication, in the cases of [`SectionBounds::cycles`].
     pub cycles: Span,
-    /// As [`SectionBounds::in_time`].
+    /// Cycles up to the publication, in the cases of [`SectionBounds::in_time`].
     pub in_time: Span,
-    /// As [`SectionBounds::missed`].
+    /// Cycles up to the publication, in the cases of [`SectionBounds::missed`].
     pub missed: Span,
 }
 

@@ -111,7 +111,7 @@ struct Comparison {
     text: String,
 }
 
-/// What a scope records, and when.
+/// Channels of a recording, its triggers and its length.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Setup {
     /// The channels.
@@ -150,7 +150,7 @@ pub struct Recording {
     pub values: Vec<Vec<Option<u32>>>,
     /// Index of the trigger's sample, and the period in which it was triggered; `None` if the host ended the recording before.
     pub trigger: Option<(usize, u32)>,
-    /// What triggered, in words.
+    /// Causes of the trigger, in words.
     pub causes: Vec<String>,
     /// The last sample has the values that the program left when it stopped, in mid-period.
     pub is_stopped: bool,

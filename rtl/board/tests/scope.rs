@@ -74,7 +74,7 @@ struct Pins {
     missed: bool,
     tripped: bool,
     drive: bool,
-    /// Of each slot: register, bundle, value.
+    /// Register, bundle and value that each slot writes.
     writes: [Option<(u32, u32, u32)>; 2],
     input: Option<(u32, u32)>,
     host: Option<(u32, u32)>,

@@ -79,7 +79,7 @@ class Recording:
     #: Index of the trigger's sample, and the period in which it was triggered; None if the recording was ended without.
     trigger: int | None
     trigger_period: int | None
-    #: What triggered, in words.
+    #: Causes of the trigger, in words.
     causes: tuple[str, ...]
     #: The last sample has the values that the program left when it stopped, in mid-period.
     stopped: bool

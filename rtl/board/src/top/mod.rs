@@ -101,7 +101,7 @@ pub fn circuit<'a>(
 /// The scope of a program, or a system, on a board; `None` without one.
 ///
 /// # Errors
-/// As [`circuit`].
+/// The mistakes of [`circuit`].
 pub fn scope<'a>(
     board: &Board,
     wiring: &Wiring,

@@ -311,7 +311,7 @@ impl Writer<'_, '_> {
                     self.line(&format!("{name} = {text}"), place);
                 }
                 None => {
-                    // What reads one another's old values stands in one equation, no more: its registers are limited.
+                    // Variables that read one another's old values stand in one equation, and no others: an equation's registers are limited.
                     let mut together = vec![left.remove(0)];
                     let reads = |a: &(String, String, Vec<String>), b: &(String, String, Vec<String>)| {
                         a.2.contains(&b.0) || b.2.contains(&a.0)
