@@ -28,7 +28,7 @@ pub(crate) fn word(random: &mut Pcg32, float: bool) -> u32 {
     value.to_bits()
 }
 
-fn check(name: &str, code: &str) -> takt_front::c::Translation {
+pub(crate) fn check(name: &str, code: &str) -> takt_front::c::Translation {
     matches_gcc(&Program::new(name, code), |translation| {
         let mut random = Pcg32::seed_from_u64(name.bytes().fold(7, |sum, byte| sum * 31 + u64::from(byte)));
         let row = |_| translation.inputs.iter().map(|port| word(&mut random, port.float)).collect();
@@ -37,7 +37,7 @@ fn check(name: &str, code: &str) -> takt_front::c::Translation {
 }
 
 /// The message about a refused program.
-fn refused(name: &str, code: &str) -> String {
+pub(crate) fn refused(name: &str, code: &str) -> String {
     let folder = folder(name);
     let mut program = Program::new(name, code);
     program.double_is_float = false;
@@ -401,12 +401,56 @@ float step(const struct fir *f, const float *x, int n) { float s = 0.0f; for (in
         Ok::<_, String>(ports.into_iter().map(|port| port.c).collect::<Vec<_>>().join(" "))
     };
     assert!(names(&program).is_err());
-    program.set = vec![("f->taps".to_owned(), 2.0), ("n".to_owned(), 1.0)];
+    program.set = vec![("f->taps".to_owned(), vec![2.0]), ("n".to_owned(), vec![1.0])];
     assert_eq!(names(&program).expect("it is translated"), "x[1] x[2] f->c[0] f->c[1]");
     for (name, number, part) in [("m", 1.0, "no such scalar"), ("n", 0.5, "int does not hold it")] {
-        program.set = vec![(name.to_owned(), number)];
+        program.set = vec![(name.to_owned(), vec![number])];
         let message = names(&program).expect_err("it is refused");
         assert!(message.contains(part), "{message}");
+    }
+    let _ = std::fs::remove_dir_all(folder);
+}
+
+/// The structure of a sparse matrix, as OSQP keeps it: arrays behind pointers of a structure and of the step.
+#[test]
+fn arrays_that_are_the_same_in_every_period() {
+    let code = r#"
+typedef struct { int m, n; int *p, *i; float *x; } csc;
+void step(const csc *A, const float *x, float *y)
+{
+    for (int k = 0; k < A->m; k++) y[k] = 0;
+    for (int j = 0; j < A->n; j++)
+        for (int k = A->p[j]; k < A->p[j + 1]; k++) y[A->i[k]] += A->x[k]*x[j];
+}
+"#;
+    let mut program = Program::new("arrays_that_are_the_same", code);
+    program.set = [
+        ("A->m", vec![2.0]),
+        ("A->n", vec![3.0]),
+        ("A->p", vec![0.0, 2.0, 3.0, 4.0]),
+        ("A->i", vec![0.0, 1.0, 1.0, 0.0]),
+    ]
+    .map(|(name, numbers)| (name.to_owned(), numbers))
+    .to_vec();
+    let folder = folder("arrays_that_are_the_same");
+    let translation = translated(&program, &folder).expect("it is translated");
+    let names: Vec<&str> = translation.inputs.iter().map(|port| port.name.as_str()).collect();
+    assert_eq!(
+        names,
+        ["x[1]", "x[2]", "x[3]", "A_x[1]", "A_x[2]", "A_x[3]", "A_x[4]"],
+        "{}",
+        translation.text
+    );
+    assert!(translation.text.contains("A_x[1]*x[1]"), "{}", translation.text);
+    for (name, numbers, reason) in [
+        ("A->q", vec![0.0, 1.0], "the step reads no such scalar"),
+        ("A->i", vec![0.0, 0.5, 1.0, 1.0], "does not hold it"),
+        ("x", vec![1.0; 5000], "at most 4096 elements"),
+    ] {
+        let mut wrong = program.clone();
+        wrong.set.push((name.to_owned(), numbers));
+        let message = translated(&wrong, &folder).expect_err("it is refused");
+        assert!(message.contains(reason), "{name}: {message}");
     }
     let _ = std::fs::remove_dir_all(folder);
 }
@@ -1231,18 +1275,17 @@ fn refuses_jumps_back() {
     assert!(message.contains("goto again"), "{message}");
 }
 
+/// Translation takes a time in the length of such chains, not in the number of paths through them.
 #[test]
-fn refuses_chosen_functions() {
-    let message = refused(
-        "refuses_chosen_functions",
-        r#"static int f(int x) { return x; }
-static int g(int x) { return -x; }
-int step(int a) {
-  int (*h)(int) = a > 0 ? f : g;
-  return h(a); }
-"#,
+fn long_chains_of_a_counter() {
+    let chain = "j = j ^ (j << 1); ".repeat(40);
+    check(
+        "long_chains_of_a_counter",
+        &format!(
+            "static float t[8]; float step(float x) {{ float a = x; {}\nfor (int i = 0; i < 500; i++) {{ int j = i; {chain} t[j & 7] += a; }} return t[3] + a; }}\n",
+            "a = 0.5f*a; a = 1.5f*a; ".repeat(20)
+        ),
     );
-    assert!(message.contains("data"), "{message}");
 }
 
 #[test]

@@ -234,7 +234,35 @@ impl Generator {
         }
     }
 
+    /// A pointer that data choose, to one of two objects or to one or none.
+    fn pointer(&mut self, names: &mut Names, depth: usize) {
+        let (name, p, condition) = (self.fresh(), self.prefix.clone(), self.condition(names, 2));
+        if self.chance(3) {
+            let (index, value) = (self.integer(names, 1), self.float(names, 2));
+            self.line(depth, &format!("float *{name} = {condition} ? &{p}m[({index}) & 7] : 0;"));
+            self.line(depth, &format!("if ({name}) *{name} = {value}; else {p}k++;"));
+            return;
+        }
+        if self.chance(2) {
+            self.line(depth, &format!("struct {p}s *{name} = {condition} ? &{p}st : &{p}su;"));
+        } else {
+            self.line(depth, &format!("struct {p}s *{name} = &{p}su;"));
+            self.line(depth, &format!("if ({condition}) {name} = &{p}st;"));
+        }
+        for (places, all, member) in [
+            (&mut names.float_places, &mut names.floats, "f"),
+            (&mut names.integer_places, &mut names.integers, "n"),
+        ] {
+            let place = format!("{name}->{member}");
+            places.push(place.clone());
+            all.push(place);
+        }
+    }
+
     fn declaration(&mut self, names: &mut Names, depth: usize) {
+        if self.chance(6) {
+            return self.pointer(names, depth);
+        }
         let name = self.fresh();
         if self.chance(2) {
             let value = self.float(names, 3);

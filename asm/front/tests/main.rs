@@ -2,6 +2,7 @@
 //! Tests of the crate from outside, one program: a module for each subject.
 
 mod c99;
+mod c99_pointers;
 mod c99_random;
 mod c99_style;
 mod common;

@@ -55,7 +55,24 @@ struct Project {
     headers: BTreeMap<String, String>,
     /// Lengths and orders that callers give.
     #[serde(default)]
-    set: BTreeMap<String, f64>,
+    set: BTreeMap<String, Numbers>,
+}
+
+/// The number of a scalar, or the numbers of an array.
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum Numbers {
+    One(f64),
+    Many(Vec<f64>),
+}
+
+impl Numbers {
+    fn list(&self) -> Vec<f64> {
+        match self {
+            Numbers::One(number) => vec![*number],
+            Numbers::Many(numbers) => numbers.clone(),
+        }
+    }
 }
 
 /// Counts, prints both tables and writes them to the document.
@@ -146,7 +163,7 @@ fn tried(project: &Project, folder: &Path) -> Result<Vec<Candidate>> {
     let options = Options {
         step: String::new(),
         init: None,
-        set: project.set.iter().map(|(name, number)| (name.clone(), *number)).collect(),
+        set: project.set.iter().map(|(name, numbers)| (name.clone(), numbers.list())).collect(),
         ignore: Vec::new(),
         loop_bound: None,
         double_is_float: true,

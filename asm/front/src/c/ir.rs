@@ -142,6 +142,8 @@ pub(super) struct Data {
     pub(super) range: Range,
     /// Name in C that the value was first given.
     pub(super) label: Option<String>,
+    /// The value depends on counters of loops that remain, and on nothing else that the program computes.
+    counted: bool,
 }
 
 /// A variable: a register that is written more than once.
@@ -244,7 +246,14 @@ impl Nodes {
             return (*id, false);
         }
         let id = Id(u32::try_from(self.list.len()).expect("the number of nodes is limited"));
-        self.list.push(Data { node, kind, range, label: None });
+        let counted = match node {
+            Node::Index(_) | Node::Int(_) => true,
+            Node::Op(_, operands, count) => {
+                operands[..usize::from(count)].iter().all(|id| self.is_counted(*id))
+            }
+            _ => false,
+        };
+        self.list.push(Data { node, kind, range, label: None, counted });
         self.known.insert(node, id);
         self.log.push(node);
         (id, true)
@@ -278,13 +287,8 @@ impl Nodes {
         }
     }
 
-    /// The value depends on counters of loops that remain, and on nothing else that the program computes.
     pub(super) fn is_counted(&self, id: Id) -> bool {
-        match self.node(id) {
-            Node::Index(_) | Node::Int(_) => true,
-            Node::Op(..) => self.operands(id).into_iter().all(|operand| self.is_counted(operand)),
-            _ => false,
-        }
+        self.get(id).counted
     }
 
     /// A mark for [`Nodes::forget`].

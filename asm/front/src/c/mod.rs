@@ -43,9 +43,9 @@ pub struct Options {
     pub step: String,
     /// Name of the function that runs once, before the first period.
     pub init: Option<String>,
-    /// Numbers that the step is given in every period, by the scalars as C writes them (`n`, `conf->taps`): they are computed with while
-    /// translating.
-    pub set: Vec<(String, f64)>,
+    /// Numbers that the step is given in every period, by the scalars and arrays as C writes them (`n`, `conf->taps`): they are computed
+    /// with while translating. An array gets as many as are given, from its first element on.
+    pub set: Vec<(String, Vec<f64>)>,
     /// Functions whose calls are left out where no result is used.
     pub ignore: Vec<String>,
     /// Bound of the loops whose end data decide and that have no other; more iterations are a fault.
@@ -125,10 +125,20 @@ fn translated(units: &[Unit], options: &Options, strict: bool) -> Result<Transla
     let mut facts = Facts::default();
     for _ in 0..MAX_ROUNDS {
         let mut exec = Exec::new(units, options, facts);
-        match round(&mut exec, options, strict) {
-            Err(error) if !exec.again => return Err(error),
-            Ok(Some(translation)) if !exec.again => return Ok(translation),
-            _ => facts = exec.facts,
+        match round(&mut exec, options) {
+            _ if exec.again => facts = exec.facts,
+            // A name that is wrong says more than its consequences.
+            result => {
+                if let (Some(name), true) = (exec.missing, strict) {
+                    return Err(Error::plain(format!(
+                        "--set {name}: the step reads no such scalar; write it as C does: `n`, `conf->taps`, `x[0]`"
+                    )));
+                }
+                match result? {
+                    Some(translation) => return Ok(translation),
+                    None => facts = exec.facts,
+                }
+            }
         }
     }
     Err(Error::plain(format!(
@@ -137,7 +147,7 @@ fn translated(units: &[Unit], options: &Options, strict: bool) -> Result<Transla
 }
 
 /// One translation, with the facts of the earlier ones.
-fn round(exec: &mut Exec<'_>, options: &Options, strict: bool) -> Result<Option<Translation>, Error> {
+fn round(exec: &mut Exec<'_>, options: &Options) -> Result<Option<Translation>, Error> {
     let before = exec.facts.clone();
     for unit in 0..exec.units.len() {
         exec.file(unit)?;
@@ -152,7 +162,7 @@ fn round(exec: &mut Exec<'_>, options: &Options, strict: bool) -> Result<Option<
         exec.run(&init)?;
     }
     exec.behind()?;
-    exec.set(&options.set, strict)?;
+    exec.missing = exec.set(&options.set)?;
     exec.bound(&step, &signature, &objects)?;
     exec.here(&step);
     let begun = exec.begin()?;

@@ -196,39 +196,84 @@ impl Exec<'_> {
         Ok(())
     }
 
-    /// Sets scalars of the step's parameters, and of objects behind them, to numbers that hold in every period.
-    pub(super) fn set(&mut self, numbers: &[(String, f64)], strict: bool) -> Result<(), Error> {
-        for (name, number) in numbers {
-            let mut found = None;
-            for (object, of) in self.objects.iter().enumerate() {
-                if matches!(of.origin, Origin::Parameter | Origin::Pointee | Origin::Global) {
-                    let leaf = of.leaves.iter().position(|leaf| self.spelled(object, leaf) == *name);
-                    found = found.or(leaf.map(|leaf| (object, leaf)));
+    /// Sets scalars and arrays among the step's parameters, and in objects behind them, to numbers that hold in every period. Returns the
+    /// first name that no object has: a later translation may have it.
+    pub(super) fn set(&mut self, numbers: &[(String, Vec<f64>)]) -> Result<Option<String>, Error> {
+        let mut missing = None;
+        for (name, numbers) in numbers {
+            let (base, first) = match name.strip_suffix(']').and_then(|name| name.rsplit_once('[')) {
+                Some((base, index)) if numbers.len() == 1 => (base, index.trim().parse().ok()),
+                _ => (name.as_str(), None),
+            };
+            for (number, index) in numbers.iter().zip(first.unwrap_or(0)..) {
+                let alone = first.is_none() && numbers.len() == 1;
+                match self.named(base, (!alone).then_some(index)) {
+                    Some((object, leaf)) => self.set_scalar(name, (object, leaf), *number)?,
+                    None if !alone && self.lengthened(name, base, index + 1)? => {}
+                    None => {
+                        missing.get_or_insert(name.clone());
+                    }
                 }
             }
-            let Some((object, leaf)) = found else {
-                if strict && !self.again {
-                    return Err(Error::plain(format!(
-                        "--set {name}: the step reads no such scalar; write it as C does: `n`, `conf->taps`, `x[0]`"
-                    )));
-                }
-                continue;
-            };
-            let value = match &self.objects[object].leaves[leaf].ty {
-                Type::Int(integer)
-                    if number.fract() == 0.0 && integer.wrap(*number as i64) == *number as i64 =>
-                {
-                    Value::Int(*number as i64)
-                }
-                Type::Float => Value::Real(f64::from(*number as f32)),
-                Type::Double => Value::Real(*number),
-                ty => {
-                    let ty = self.structs.shown(ty);
-                    return Err(Error::plain(format!("--set {name}={number}: {ty} does not hold it")));
-                }
-            };
-            self.memory.set(object, leaf, value);
         }
+        Ok(missing)
+    }
+
+    fn settable(&self) -> impl Iterator<Item = (usize, &super::value::Object)> {
+        let given = |of: &super::value::Object| {
+            matches!(of.origin, Origin::Parameter | Origin::Pointee | Origin::Global)
+        };
+        self.objects.iter().enumerate().filter(move |(_, of)| given(of))
+    }
+
+    /// The scalar that C writes as this name, or as this element of it.
+    fn named(&self, name: &str, index: Option<usize>) -> Option<(usize, usize)> {
+        let full = index.map_or(name.to_owned(), |index| format!("{name}[{index}]"));
+        let only = format!("*{name}");
+        self.settable().find_map(|(object, of)| {
+            let is_it = |leaf| {
+                let spelled = self.spelled(object, leaf);
+                !matches!(leaf.ty, Type::Pointer(_))
+                    && (spelled == full || index == Some(0) && spelled == only)
+            };
+            of.leaves.iter().position(is_it).map(|leaf| (object, leaf))
+        })
+    }
+
+    /// Lengthens the object behind a pointer of unknown length, in the next translation; false if there is none of this name.
+    fn lengthened(&mut self, name: &str, base: &str, length: usize) -> Result<bool, Error> {
+        let (only, first) = (format!("*{base}"), format!("{base}[0]"));
+        let found = self.settable().find_map(|(object, of)| {
+            let spelled = self.spelled(object, of.leaves.first()?);
+            (self.facts.extents.contains_key(&of.key) && (spelled == only || spelled == first))
+                .then_some(of.key.clone())
+        });
+        let Some(key) = found else { return Ok(false) };
+        if length > super::exec::places::MAX_EXTENT {
+            let most = super::exec::places::MAX_EXTENT;
+            return Err(Error::plain(format!("--set {name}: an array has at most {most} elements")));
+        }
+        let extent = self.facts.extents.entry(key).or_insert(1);
+        if length > *extent {
+            *extent = length;
+            self.again = true;
+        }
+        Ok(true)
+    }
+
+    fn set_scalar(&mut self, name: &str, (object, leaf): (usize, usize), number: f64) -> Result<(), Error> {
+        let value = match &self.objects[object].leaves[leaf].ty {
+            Type::Int(integer) if number.fract() == 0.0 && integer.wrap(number as i64) == number as i64 => {
+                Value::Int(number as i64)
+            }
+            Type::Float => Value::Real(f64::from(number as f32)),
+            Type::Double => Value::Real(number),
+            ty => {
+                let ty = self.structs.shown(ty);
+                return Err(Error::plain(format!("--set {name}={number}: {ty} does not hold it")));
+            }
+        };
+        self.memory.set(object, leaf, value);
         Ok(())
     }
 

@@ -30,6 +30,15 @@ pub(super) struct Pointer {
     pub(super) part: Option<Part>,
 }
 
+/// Pointers of which data choose one; the null pointer and functions are pointers too.
+#[derive(Clone, PartialEq, Debug)]
+pub(super) struct Choice {
+    /// A node that is 1 for the first, 0 for the second.
+    pub(super) when: Id,
+    pub(super) yes: Value,
+    pub(super) no: Value,
+}
+
 #[derive(Clone, Debug)]
 pub(super) enum Value {
     /// Not written yet.
@@ -43,6 +52,8 @@ pub(super) enum Value {
     Pointer(Pointer),
     /// A function, by its key.
     Function(String),
+    /// One of two pointers, as data choose.
+    Choice(Rc<Choice>),
     /// Scalars of a structure.
     Struct(Rc<Vec<Value>>),
     /// A value that depends on data and for which the language has no register; the text gives the reason.
@@ -60,6 +71,7 @@ impl PartialEq for Value {
             (Value::Wide(a, c), Value::Wide(b, d)) => a == b && c == d,
             (Value::Pointer(a), Value::Pointer(b)) => a == b,
             (Value::Function(a), Value::Function(b)) => a == b,
+            (Value::Choice(a), Value::Choice(b)) => a == b,
             (Value::Struct(a), Value::Struct(b)) => a == b,
             (Value::Mixed(a), Value::Mixed(b)) => a == b,
             _ => false,

@@ -18,7 +18,7 @@ pub(crate) struct Program {
     pub(crate) code: String,
     pub(crate) step: String,
     pub(crate) init: Option<String>,
-    pub(crate) set: Vec<(String, f64)>,
+    pub(crate) set: Vec<(String, Vec<f64>)>,
     pub(crate) ignore: Vec<String>,
     pub(crate) loop_bound: Option<u64>,
     pub(crate) double_is_float: bool,

@@ -32,9 +32,10 @@ pub(crate) struct Cc {
     /// The function that sets the states before the first period; it takes pointers to the same structures.
     #[arg(long, value_name = "NAME")]
     init: Option<String>,
-    /// Give a scalar of the step's parameters a number that holds in every period, as C writes it: `n=8`, `conf->taps=16`.
-    #[arg(long, value_name = "SCALAR=NUMBER", value_parser = scalar)]
-    set: Vec<(String, f64)>,
+    /// Give a scalar or an array of the step's parameters numbers that hold in every period, as C writes it: `n=8`, `conf->taps=16`,
+    /// `A->p=0,2,3`.
+    #[arg(long, value_name = "NAME=NUMBER,…", value_parser = numbers)]
+    set: Vec<(String, Vec<f64>)>,
     /// Leave out calls of a function that has no result, as one that prints, logs or toggles a pin.
     #[arg(long, value_name = "NAME")]
     ignore: Vec<String>,
@@ -63,10 +64,10 @@ Examples:
   takt cc pid.c --list                              which functions can be the step
   takt cc foc.c math.c --step foc --double=float -I inc -DNDEBUG -o foc.s";
 
-fn scalar(text: &str) -> Result<(String, f64), String> {
-    let (name, number) = text.split_once('=').ok_or("expected SCALAR=NUMBER")?;
-    let number = number.trim().parse().map_err(|_| format!("`{number}` is not a number"))?;
-    Ok((name.trim().to_owned(), number))
+fn numbers(text: &str) -> Result<(String, Vec<f64>), String> {
+    let (name, numbers) = text.split_once('=').ok_or("expected NAME=NUMBER")?;
+    let number = |text: &str| text.trim().parse().map_err(|_| format!("`{}` is not a number", text.trim()));
+    Ok((name.trim().to_owned(), numbers.split(',').map(number).collect::<Result<_, _>>()?))
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]

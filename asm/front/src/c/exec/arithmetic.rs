@@ -2,6 +2,7 @@
 //! Operators on numbers and pointers.
 
 use super::Exec;
+use super::chosen::known;
 use crate::Error;
 use crate::c::ir::{Id, Node, Op};
 use crate::c::types::{INT, Integer, Type};
@@ -337,6 +338,13 @@ impl Exec<'_> {
 
     fn pointers_compared(&mut self, op: Op, a: &Value, b: &Value) -> Result<Condition, Error> {
         Ok(match (a, b) {
+            (Value::Choice(choice), _) | (_, Value::Choice(choice)) => {
+                let [yes, no] = [true, false].map(|holds| {
+                    let decided = vec![(choice.when, holds)];
+                    self.pointers_compared(op, &known(a, &decided), &known(b, &decided))
+                });
+                self.condition_by(choice.when, yes?, no?)?
+            }
             (Value::Int(0), Value::Int(0)) => Condition::Known(op != Op::IntLess),
             (Value::Int(0), Value::Pointer(_) | Value::Function(_))
             | (Value::Pointer(_) | Value::Function(_), Value::Int(0)) => {
@@ -393,7 +401,8 @@ impl Exec<'_> {
 
     fn pointer_sum(&mut self, operator: &B, a: Typed, b: Typed) -> Result<Typed, Error> {
         if let (Type::Pointer(to), Type::Pointer(_)) = (&a.ty, &b.ty) {
-            let (Value::Pointer(x), Value::Pointer(y)) = (&a.value, &b.value) else {
+            let (x, y) = (self.followed(a.value)?, self.followed(b.value)?);
+            let (Value::Pointer(x), Value::Pointer(y)) = (&x, &y) else {
                 return self.fail("these pointers cannot be subtracted");
             };
             if x.object != y.object || *operator == B::Plus {
@@ -419,8 +428,9 @@ impl Exec<'_> {
     pub(super) fn moved(&mut self, pointer: Typed, index: Typed, back: bool) -> Result<Typed, Error> {
         let Type::Pointer(to) = pointer.ty.clone() else { return self.fail("expected a pointer") };
         let size = self.size_of(&to)? as i64;
-        let Value::Pointer(place) = pointer.value else {
-            return match pointer.value {
+        let value = self.followed(pointer.value)?;
+        let Value::Pointer(place) = value else {
+            return match value {
                 Value::Int(0) => self.fail("this is the null pointer"),
                 Value::Mixed(reason) => self.fail(format!("this is {reason}")),
                 _ => self.fail("the object that this pointer points to is not known"),

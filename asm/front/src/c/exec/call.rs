@@ -4,7 +4,7 @@
 use super::{Exec, Frame, Named, Scope, plain};
 use crate::Error;
 use crate::c::types::{Signature, Type};
-use crate::c::value::{Condition, Exit, Memory, Origin, Typed, Value};
+use crate::c::value::{Choice, Condition, Exit, Memory, Origin, Typed, Value};
 use lang_c::ast::{
     BlockItem, CallExpression, Declaration, DeclarationSpecifier, Expression, ForInitializer, Statement,
     StorageClassSpecifier,
@@ -44,7 +44,8 @@ impl<'a> Exec<'a> {
                 return self.builtin(name, &call.arguments);
             }
         }
-        let callee = self.value(&call.callee)?;
+        let mut callee = self.value(&call.callee)?;
+        callee.value = self.followed(callee.value)?;
         let signature = match &callee.ty {
             Type::Function(signature) => signature.clone(),
             Type::Pointer(to) => match &**to {
@@ -55,7 +56,7 @@ impl<'a> Exec<'a> {
         };
         let key = match callee.value {
             Value::Function(key) => key,
-            Value::Mixed(_) | Value::Node(_) => {
+            Value::Node(_) => {
                 return self.fail("the function that this pointer calls depends on data: write `if` or `switch` with a call in each case");
             }
             Value::Int(0) => return self.fail("this calls the null pointer"),
@@ -150,18 +151,31 @@ impl<'a> Exec<'a> {
     /// Pointers to local variables of a function that has returned are known to point nowhere.
     fn left_behind(&mut self, before: &Memory, result: &mut Value) {
         let kept = self.objects.len();
-        let dangles = |value: &Value| matches!(value, Value::Pointer(pointer) if pointer.object >= kept);
-        const NOWHERE: Value = Value::Mixed("a pointer to a variable of a function that has returned");
-        if dangles(result) {
-            *result = NOWHERE;
+        fn dangles(value: &Value, kept: usize) -> Option<Value> {
+            const NOWHERE: Value = Value::Mixed("a pointer to a variable of a function that has returned");
+            match value {
+                Value::Pointer(pointer) if pointer.object >= kept => Some(NOWHERE),
+                Value::Choice(choice) => {
+                    let (yes, no) = (dangles(&choice.yes, kept), dangles(&choice.no, kept));
+                    (yes.is_some() || no.is_some()).then(|| {
+                        let yes = yes.unwrap_or(choice.yes.clone());
+                        let no = no.unwrap_or(choice.no.clone());
+                        Value::Choice(Choice { when: choice.when, yes, no }.into())
+                    })
+                }
+                _ => None,
+            }
+        }
+        if let Some(nowhere) = dangles(result, kept) {
+            *result = nowhere;
         }
         for object in 0..self.memory.0.len() {
             if before.0.get(object).is_some_and(|old| Rc::ptr_eq(old, &self.memory.0[object])) {
                 continue;
             }
             for leaf in 0..self.memory.0[object].len() {
-                if dangles(self.memory.get(object, leaf)) {
-                    self.memory.set(object, leaf, NOWHERE);
+                if let Some(nowhere) = dangles(self.memory.get(object, leaf), kept) {
+                    self.memory.set(object, leaf, nowhere);
                 }
             }
         }

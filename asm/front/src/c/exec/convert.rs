@@ -36,7 +36,8 @@ impl Exec<'_> {
                 _ => self.fail("a number as an address is a register of hardware: pass its value as a parameter of the step"),
             },
             (Type::Pointer(_), Type::Int(to)) if to.boolean => {
-                Ok(Value::Int(i64::from(!matches!(value, Value::Int(0)))))
+                let condition = self.truth(&Typed { ty, value })?;
+                Ok(self.value_of(condition))
             }
             (from, to) => {
                 let (from, to) = (self.structs.shown(from), self.structs.shown(to));
@@ -177,6 +178,11 @@ impl Exec<'_> {
             Value::Int(value) => Condition::Known(*value != 0),
             Value::Real(value) => Condition::Known(*value != 0.0),
             Value::Pointer(_) | Value::Function(_) => Condition::Known(true),
+            Value::Choice(choice) => {
+                let side = |value: &Value| Typed { ty: from.ty.clone(), value: value.clone() };
+                let (yes, no) = (self.truth(&side(&choice.yes))?, self.truth(&side(&choice.no))?);
+                self.condition_by(choice.when, yes, no)?
+            }
             Value::Node(id) => match from.ty {
                 Type::Float => {
                     let zero = self.nodes.float(0.0);

@@ -393,8 +393,8 @@ impl<'a> Exec<'a> {
     }
 
     /// The place that a pointer refers to, as an lvalue.
-    pub(super) fn pointee(&self, pointer: Typed) -> Result<Lvalue, Error> {
-        match (pointer.ty, pointer.value) {
+    pub(super) fn pointee(&mut self, pointer: Typed) -> Result<Lvalue, Error> {
+        match (pointer.ty, self.followed(pointer.value)?) {
             (Type::Pointer(to), Value::Pointer(pointer)) => Ok(Lvalue { pointer, ty: (*to).clone() }),
             (Type::Pointer(_), Value::Int(_)) => self.fail("this is the null pointer"),
             (Type::Pointer(_), Value::Mixed(reason)) => self.fail(format!("this is {reason}")),
@@ -425,7 +425,9 @@ impl<'a> Exec<'a> {
                 if matches!(pointer.ty, Type::Function(_)) {
                     return Ok(pointer);
                 }
-                if let (Type::Pointer(to), Value::Function(_)) = (&pointer.ty, &pointer.value) {
+                if let Type::Pointer(to) = &pointer.ty
+                    && matches!(**to, Type::Function(_))
+                {
                     return Ok(Typed { ty: (**to).clone(), value: pointer.value });
                 }
                 self.go(expression.span);

@@ -289,8 +289,9 @@ impl<'a> Exec<'a> {
     fn copied(&mut self, values: Vec<Typed>) -> Result<Typed, Error> {
         let [to, from, bytes] =
             <[Typed; 3]>::try_from(values).unwrap_or_else(|_| unreachable!("three arguments"));
+        let (target, source) = (self.followed(to.value.clone())?, self.followed(from.value)?);
         let (Value::Pointer(target), Value::Pointer(source), Value::Int(bytes)) =
-            (&to.value, &from.value, &bytes.value)
+            (&target, &source, &bytes.value)
         else {
             return self
                 .fail("`memcpy` and `memmove` require pointers and a size that are known at compile time");
@@ -311,8 +312,8 @@ impl<'a> Exec<'a> {
     fn filled(&mut self, values: Vec<Typed>) -> Result<Typed, Error> {
         let [to, byte, bytes] =
             <[Typed; 3]>::try_from(values).unwrap_or_else(|_| unreachable!("three arguments"));
-        let (Value::Pointer(target), Value::Int(0), Value::Int(bytes)) =
-            (&to.value, &byte.value, &bytes.value)
+        let target = self.followed(to.value.clone())?;
+        let (Value::Pointer(target), Value::Int(0), Value::Int(bytes)) = (&target, &byte.value, &bytes.value)
         else {
             return self.fail("`memset` requires a pointer and a size that are known at compile time, and the value 0: assign other values in a loop");
         };

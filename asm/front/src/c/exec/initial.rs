@@ -4,7 +4,7 @@
 use super::Exec;
 use crate::Error;
 use crate::c::types::Type;
-use crate::c::value::{Lvalue, Pointer, Typed, Value};
+use crate::c::value::{Condition, Lvalue, Outcome, Pointer, Typed, Value};
 use lang_c::ast::{Designator, Expression, Initializer, InitializerListItem};
 use lang_c::span::Node;
 use std::rc::Rc;
@@ -24,9 +24,13 @@ impl<'a> Exec<'a> {
                 {
                     return self.text(place, element, *count, expression);
                 }
-                let value = self.value(expression)?;
-                let value = self.converted(value, &place.ty)?;
-                self.store(place, Typed { ty: place.ty.clone(), value })
+                let mut run = |exec: &mut Exec<'a>, _: &mut Vec<Outcome>| {
+                    let value = exec.value(expression)?;
+                    let value = exec.converted(value, &place.ty)?;
+                    exec.store(place, Typed { ty: place.ty.clone(), value })?;
+                    Ok(Condition::Known(true))
+                };
+                self.decisive(&mut run, &mut Vec::new()).map(|_| ())
             }
             Initializer::List(items) => {
                 if !matches!(place.ty, Type::Array(..) | Type::Struct(_)) {

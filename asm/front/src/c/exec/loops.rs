@@ -33,7 +33,7 @@ pub(super) struct Repetition<'a> {
 
 /// State that a trial may change, saved before it.
 pub(super) struct Saved {
-    memory: Memory,
+    pub(super) memory: Memory,
     blocks: usize,
     frames: Vec<usize>,
     mark: usize,

@@ -3,6 +3,7 @@
 
 mod arithmetic;
 pub(super) mod call;
+mod chosen;
 mod convert;
 mod declare;
 mod expression;
@@ -102,6 +103,8 @@ pub(super) struct Exec<'a> {
     pub(super) extents: HashMap<Key, usize>,
     /// Facts have grown: this translation is not the last.
     pub(super) again: bool,
+    /// A name of `--set` that no object has.
+    pub(super) missing: Option<String>,
     /// The step runs: writes to states are recorded.
     pub(super) stepping: bool,
     pub(super) nodes: Nodes,
@@ -130,6 +133,10 @@ pub(super) struct Exec<'a> {
     prepared: HashSet<String>,
     /// The outermost budget that is used up.
     exhausted: Option<usize>,
+    /// Memory may hold pointers that data choose.
+    chosen: bool,
+    /// The condition of such a pointer, which the failed statement needs to know.
+    undecided: Option<Id>,
 }
 
 impl<'a> Exec<'a> {
@@ -143,6 +150,7 @@ impl<'a> Exec<'a> {
             extents: facts.extents.clone(),
             facts,
             again: false,
+            missing: None,
             stepping: false,
             nodes: Nodes::default(),
             objects: Vec::new(),
@@ -161,6 +169,8 @@ impl<'a> Exec<'a> {
             arrays: HashMap::new(),
             prepared: HashSet::new(),
             exhausted: None,
+            chosen: false,
+            undecided: None,
         }
     }
 

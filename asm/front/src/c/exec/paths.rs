@@ -6,7 +6,7 @@ use super::Exec;
 use crate::Error;
 use crate::c::ir::{Block, Id, Kind, Node, Op, Statement};
 use crate::c::types::Type;
-use crate::c::value::{Condition, Exit, Memory, Origin, Outcome, Pointer, Value};
+use crate::c::value::{Choice, Condition, Exit, Memory, Origin, Outcome, Pointer, Value};
 use std::collections::HashMap;
 use std::rc::Rc;
 
@@ -18,11 +18,11 @@ pub(super) type Side<'s, 'a> =
     &'s mut dyn FnMut(&mut Exec<'a>, &mut Vec<Outcome>) -> Result<Condition, Error>;
 
 /// A side after its execution.
-struct Ran {
+pub(super) struct Ran {
     block: Block,
     normal: Condition,
-    memory: Memory,
-    outcomes: Vec<Outcome>,
+    pub(super) memory: Memory,
+    pub(super) outcomes: Vec<Outcome>,
 }
 
 /// Variables that take values out of the sides of a branch.
@@ -34,7 +34,7 @@ struct Exported {
 }
 
 impl<'a> Exec<'a> {
-    fn side(&mut self, run: Side<'_, 'a>) -> Result<Ran, Error> {
+    pub(super) fn side(&mut self, run: Side<'_, 'a>) -> Result<Ran, Error> {
         self.blocks.push(Block::new());
         let mut outcomes = Vec::new();
         let at = self.at;
@@ -54,10 +54,10 @@ impl<'a> Exec<'a> {
     ) -> Result<Condition, Error> {
         let (before, mark, first) = (self.memory.clone(), self.nodes.mark(), self.nodes.len());
         self.depth += 1;
-        let yes = self.side(then)?;
+        let yes = self.assuming(condition, true, then)?;
         self.nodes.forget(mark);
         self.memory = before.clone();
-        let no = self.side(other)?;
+        let no = self.assuming(condition, false, other)?;
         self.depth -= 1;
         let short = |ran: &Ran| self.work(&ran.block);
         match (short(&yes), short(&no)) {
@@ -214,22 +214,11 @@ impl<'a> Exec<'a> {
         match (a, b) {
             (Value::Unset, other) | (other, Value::Unset) => Ok(other),
             (a @ Value::Mixed(_), _) | (_, a @ Value::Mixed(_)) => Ok(a),
-            (Value::Pointer(a), Value::Pointer(b)) => match (self.words(&a), self.words(&b)) {
-                (Some(x), Some(y)) if a.object == b.object => {
-                    let part = a.part.filter(|_| a.part == b.part);
-                    if a.offset == b.offset && a.dynamic == b.dynamic {
-                        return Ok(Value::Pointer(Pointer { part, ..a }));
-                    }
-                    let scalar = self.select(condition, x, y)?;
-                    // The known part gives the scalars' type; where these differ, the object's beginning does.
-                    let ty = |exec: &Self, pointer| exec.word_type(pointer).ok();
-                    let offset = if ty(self, &a) == ty(self, &b) { a.offset } else { 0 };
-                    Ok(Value::Pointer(self.placed(Pointer { part, offset, ..a }, scalar)?))
-                }
-                _ => Ok(MIXED_POINTER),
-            },
             (a, b) => {
                 let ty = self.objects[object].leaves[leaf].ty.clone();
+                if matches!(ty, Type::Pointer(_)) {
+                    return self.pointer_of(condition, a, b);
+                }
                 let (Some(a), Some(b)) = (self.register(&a, &ty), self.register(&b, &ty)) else {
                     return Ok(mixed(&ty));
                 };
@@ -254,7 +243,7 @@ impl<'a> Exec<'a> {
     }
 
     /// Index of the scalar that a pointer refers to, as a node; `None` between members.
-    fn words(&mut self, pointer: &Pointer) -> Option<Id> {
+    pub(super) fn words(&mut self, pointer: &Pointer) -> Option<Id> {
         let (scalar, _) = self.known_scalar(pointer).ok()?;
         let known = self.nodes.int(i32::try_from(scalar).ok()?);
         match pointer.dynamic {
@@ -299,7 +288,7 @@ impl<'a> Exec<'a> {
         } else if yes.normal == never {
             self.memory_of(&mut exported, 1, before, no.memory)?
         } else {
-            self.joint_memory(&mut exported, &yes.memory, &no.memory)?
+            self.joint_memory(&mut exported, condition, &yes.memory, &no.memory)?
         };
         let mut leaving = Vec::new();
         for (side, outcomes) in [yes.outcomes, no.outcomes].into_iter().enumerate() {
@@ -376,31 +365,57 @@ impl<'a> Exec<'a> {
                 continue;
             }
             for leaf in 0..memory.0[object].len() {
-                let mut ids = [None, None];
-                let new = match memory.get(object, leaf) {
-                    Value::Node(id) if self.is_inside(exported.first, *id) => {
-                        ids[side] = Some(*id);
-                        let name = self.objects[object].leaf_name(leaf);
-                        Value::Node(self.exported(exported, ids, &name)?)
-                    }
-                    Value::Pointer(pointer @ Pointer { dynamic: Some(id), .. })
-                        if self.is_inside(exported.first, *id) =>
-                    {
-                        ids[side] = Some(*id);
-                        let pointer = pointer.clone();
-                        let dynamic = Some(self.exported(exported, ids, "at")?);
-                        Value::Pointer(Pointer { dynamic, ..pointer })
-                    }
-                    _ => continue,
-                };
-                memory.set(object, leaf, new);
+                let name = self.objects[object].leaf_name(leaf);
+                let old = memory.get(object, leaf).clone();
+                let new = self.taken_out(exported, side, old.clone(), &name)?;
+                if new != old {
+                    memory.set(object, leaf, new);
+                }
             }
         }
         Ok(memory)
     }
 
+    /// A value of one side, with variables for the nodes that the side computes.
+    fn taken_out(
+        &mut self,
+        exported: &mut Exported,
+        side: usize,
+        value: Value,
+        name: &str,
+    ) -> Result<Value, Error> {
+        let mut out = |exec: &mut Self, id: Id, name: &str| {
+            if !exec.is_inside(exported.first, id) {
+                return Ok(id);
+            }
+            let mut ids = [None, None];
+            ids[side] = Some(id);
+            exec.exported(exported, ids, name)
+        };
+        Ok(match value {
+            Value::Node(id) => Value::Node(out(self, id, name)?),
+            Value::Pointer(Pointer { dynamic: Some(id), object, offset, part }) => {
+                let dynamic = Some(out(self, id, "at")?);
+                Value::Pointer(Pointer { dynamic, object, offset, part })
+            }
+            Value::Choice(choice) => {
+                let when = out(self, choice.when, "chosen")?;
+                let yes = self.taken_out(exported, side, choice.yes.clone(), name)?;
+                let no = self.taken_out(exported, side, choice.no.clone(), name)?;
+                Value::Choice(Rc::new(Choice { when, yes, no }))
+            }
+            other => other,
+        })
+    }
+
     /// Memory after both sides.
-    fn joint_memory(&mut self, exported: &mut Exported, yes: &Memory, no: &Memory) -> Result<Memory, Error> {
+    fn joint_memory(
+        &mut self,
+        exported: &mut Exported,
+        condition: Id,
+        yes: &Memory,
+        no: &Memory,
+    ) -> Result<Memory, Error> {
         let shared = yes.0.len().min(no.0.len());
         let longer = if yes.0.len() > no.0.len() { yes.clone() } else { no.clone() };
         let mut memory = self.without_locals(longer, shared);
@@ -410,7 +425,7 @@ impl<'a> Exec<'a> {
             }
             for leaf in 0..yes.0[object].len().min(no.0[object].len()) {
                 let (a, b) = (yes.get(object, leaf).clone(), no.get(object, leaf).clone());
-                let value = self.joint(exported, object, leaf, a, b)?;
+                let value = self.joint(exported, condition, (object, leaf), a, b)?;
                 memory.set(object, leaf, value);
             }
         }
@@ -430,46 +445,34 @@ impl<'a> Exec<'a> {
     fn joint(
         &mut self,
         exported: &mut Exported,
-        object: usize,
-        leaf: usize,
+        condition: Id,
+        (object, leaf): (usize, usize),
         a: Value,
         b: Value,
     ) -> Result<Value, Error> {
-        let inside = |exec: &Self, value: &Value| match value {
-            Value::Node(id) | Value::Pointer(Pointer { dynamic: Some(id), .. }) => {
-                exec.is_inside(exported.first, *id)
-            }
-            _ => false,
-        };
         let name = self.objects[object].leaf_name(leaf);
-        let (in_a, in_b) = (inside(self, &a), inside(self, &b));
         match (a, b) {
-            (a, b) if a == b && !in_a => Ok(a),
-            (Value::Unset, Value::Node(id)) if in_b => {
-                Ok(Value::Node(self.exported(exported, [None, Some(id)], &name)?))
-            }
-            (Value::Node(id), Value::Unset) if in_a => {
-                Ok(Value::Node(self.exported(exported, [Some(id), None], &name)?))
-            }
-            (Value::Unset, Value::Pointer(_)) if in_b => Ok(MIXED_POINTER),
-            (Value::Pointer(_), Value::Unset) if in_a => Ok(MIXED_POINTER),
-            (Value::Unset, other) | (other, Value::Unset) => Ok(other),
+            (a, b) if a == b && self.taken_out(exported, 0, a.clone(), &name)? == a => Ok(a),
+            (Value::Unset, other) => self.taken_out(exported, 1, other, &name),
+            (other, Value::Unset) => self.taken_out(exported, 0, other, &name),
             (a @ Value::Mixed(_), _) | (_, a @ Value::Mixed(_)) => Ok(a),
-            (Value::Pointer(a), Value::Pointer(b)) => {
-                if a.object != b.object || a.offset != b.offset {
-                    return Ok(MIXED_POINTER);
-                }
+            (Value::Pointer(a), Value::Pointer(b)) if a.object == b.object && a.offset == b.offset => {
                 let part = a.part.filter(|_| a.part == b.part);
-                if a.dynamic == b.dynamic && !in_a {
-                    return Ok(Value::Pointer(Pointer { part, ..a }));
-                }
                 let zero = self.nodes.int(0);
                 let ids = [Some(a.dynamic.unwrap_or(zero)), Some(b.dynamic.unwrap_or(zero))];
-                let dynamic = Some(self.exported(exported, ids, "at")?);
+                let dynamic = match a.dynamic == b.dynamic && a.dynamic.is_none() {
+                    true => None,
+                    false => Some(self.exported(exported, ids, "at")?),
+                };
                 Ok(Value::Pointer(Pointer { dynamic, part, ..a }))
             }
             (a, b) => {
                 let ty = self.objects[object].leaves[leaf].ty.clone();
+                if matches!(ty, Type::Pointer(_)) {
+                    let yes = self.taken_out(exported, 0, a, &name)?;
+                    let no = self.taken_out(exported, 1, b, &name)?;
+                    return Ok(self.chosen_by(condition, yes, no));
+                }
                 let (Some(a), Some(b)) = (self.register(&a, &ty), self.register(&b, &ty)) else {
                     return Ok(mixed(&ty));
                 };
@@ -523,15 +526,9 @@ impl<'a> Exec<'a> {
     }
 }
 
-const MIXED_POINTER: Value =
-    Value::Mixed("a pointer whose object depends on data: use an index into one array");
-
 fn mixed(ty: &Type) -> Value {
     match ty {
         Type::Double => Value::Mixed("a double that depends on data: give --double=float"),
-        Type::Function(_) | Type::Pointer(_) => {
-            Value::Mixed("a pointer that data choose: use `if` or `switch`")
-        }
         _ => Value::Mixed("a value that no register holds"),
     }
 }

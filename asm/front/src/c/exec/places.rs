@@ -9,7 +9,7 @@ use crate::c::value::{Lvalue, Object, Origin, Part, Pointer, Typed, Value};
 use std::rc::Rc;
 
 /// Maximum number of elements behind a pointer of unknown extent.
-const MAX_EXTENT: usize = 4096;
+pub(in crate::c) const MAX_EXTENT: usize = 4096;
 
 /// The remedy where a loop that is written out goes further than the data let it.
 pub(super) const OUTSIDE: &str =
@@ -245,20 +245,10 @@ impl Exec<'_> {
             Some(dynamic) => self.op(Op::IntAdd, &[dynamic, known])?,
             None => known,
         };
-        if self.stays_within(array, index) || !self.is_counted(index) {
+        if self.stays_within(array, index) || !self.nodes.is_counted(index) {
             return Ok(index);
         }
         self.op(Op::Copy, &[index])
-    }
-
-    fn is_counted(&self, id: Id) -> bool {
-        match self.nodes.node(id) {
-            Node::Int(_) | Node::Index(_) => true,
-            Node::Op(Op::IntAdd | Op::IntSub | Op::IntMul, [a, b, _], _) => {
-                self.is_counted(a) && self.is_counted(b)
-            }
-            _ => false,
-        }
     }
 
     /// Index of the scalar at the known part of a place, and a scalar of its type. The place may lie outside of the array in which the
@@ -385,6 +375,9 @@ impl Exec<'_> {
                 }
             };
             return self.punned(value, &own, ty);
+        }
+        if let (Type::Pointer(_), Some(dynamic)) = (ty, pointer.dynamic) {
+            return self.entry_of(pointer, dynamic);
         }
         let Some(held) = self.holding(pointer, leaf) else {
             self.demand(object, pointer.part);

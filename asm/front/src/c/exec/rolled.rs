@@ -100,6 +100,7 @@ impl<'a> Exec<'a> {
         let saved = self.saved();
         self.blocks.push(Vec::new());
         let found = self.wraps(parts).unwrap_or(false);
+        self.undecided = None;
         self.restore(saved);
         found
     }
@@ -461,7 +462,7 @@ impl<'a> Exec<'a> {
                     }
                     (Some(Carried::Value(_)), Value::Int(_) | Value::Real(_) | Value::Node(_)) => continue,
                     (Some(Carried::Lost(_)), _) => continue,
-                    (Some(Carried::Place { .. }), _) | (_, Value::Pointer(_)) => Carried::Lost(MANY),
+                    (Some(Carried::Place { .. }), _) => Carried::Lost(MANY),
                     (Some(Carried::Value(_)), _) => Carried::Lost(NONE),
                 };
                 cells.insert((object, leaf), carried);
@@ -480,8 +481,8 @@ impl<'a> Exec<'a> {
                 let (object, offset) = (old.object, old.offset);
                 Carried::Place { var: self.nodes.var(&name, Kind::Int), object, offset, part }
             }
-            (Value::Pointer(_), _) | (_, Value::Pointer(_)) => Carried::Lost(MANY),
             (Value::Mixed(reason), _) | (_, Value::Mixed(reason)) => Carried::Lost(reason),
+            _ if matches!(ty, Type::Pointer(_)) => Carried::Lost(MANY),
             _ if matches!(ty, Type::Float) || matches!(ty, Type::Int(integer) if integer.bits <= 32) => {
                 Carried::Value(self.nodes.var(&name, super::places::kind_of(&ty)))
             }

@@ -99,7 +99,7 @@ impl<'a> Exec<'a> {
     ) -> Result<Condition, Error> {
         self.enter(statement)?;
         self.depth += 1;
-        let reached = self.executed(statement, out);
+        let reached = self.decisive(&mut |exec, out| exec.executed(statement, out), out);
         self.depth -= 1;
         reached
     }

@@ -234,6 +234,11 @@ impl Speller<'_> {
         };
         let chain = matches!(binding, Binding::Sum | Binding::Or | Binding::And)
             || binding == Binding::Product && self.nodes.kind(a) == Kind::Float;
+        // A constant comes first in a product.
+        if operator == "*" && self.nodes.kind(a) == Kind::Float && self.is_known(b) {
+            let (first, second) = (self.of(b).at_least(Binding::Sign), self.of(a).at_least(above));
+            return Text { text: format!("{first}*{second}"), binding };
+        }
         let first = self.of(a);
         let first = if chain && first.binding == binding { first.text } else { first.at_least(above) };
         let second = self.of(b).at_least(above);
@@ -242,11 +247,6 @@ impl Speller<'_> {
                 ("-", by.unsigned_abs().to_string())
             }
             _ => (operator, second),
-        };
-        // A constant comes first in a product.
-        let (first, second) = match operator == "*" && self.nodes.kind(a) == Kind::Float && self.is_known(b) {
-            true => (self.of(b).at_least(Binding::Sign), self.of(a).at_least(above)),
-            false => (first, second),
         };
         let text = match operator {
             "*" | "/" => format!("{first}{operator}{second}"),
