@@ -138,6 +138,19 @@
         speed = speed + T*ki*e
 .endm
 
+; Speed of an incremental encoder in counts/s by the times of its edges, as fine at low speed as at high: count and since are the registers
+; of a board's `quadrature`, last and before those of the period before (`.state`s, as is v), T and f a period in cycles and the clock in
+; Hz. In periods without an edge, v falls as far as the next edge is late.
+.macro edge_speed v:float, last:int, before:int, count:int, since:int, T:float, f:float
+.reg    turned:int apart most
+        turned = count - last
+        apart = T + (itof(before) - itof(since))        ; cycles from the last edge of then to that of now
+        most = f/itof(since)
+        v = turned == 0 ? sat(v, most) : f*itof(turned)/apart
+        last = count
+        before = since
+.endm
+
 ; ---- Profiles ---------------------------------------------------------------------------------------------------------------
 
 ; Trapezoidal profile: moves p with speed v, both `.state`s, one period T towards goal, within speed vmax and acceleration amax. The speed from

@@ -5,6 +5,7 @@
 //! A device gives its levels in the cycle in which an output pin has changed: lines have no length, and devices no delay.
 
 use crate::kind::Kind;
+use crate::latency::RECEIVED;
 use crate::simulation::Edge;
 use crate::wiring::{Peripheral, Wiring};
 use std::collections::VecDeque;
@@ -12,13 +13,16 @@ use std::collections::VecDeque;
 /// Kinds of peripherals with a device, and the registers that a value can feed.
 const FED: [(&str, &[&str]); 7] = [
     ("quadrature", &["count"]),
-    ("spi", &["received"]),
+    ("spi", RECEIVED),
     ("sinc3", &["value"]),
     ("ssi", &["position"]),
     ("biss-c", &["position"]),
     ("hall", &["count", "sector"]),
     ("digital-in", &["level"]),
 ];
+
+/// Pins of the data lines of `spi`, in the order of [`RECEIVED`].
+const LINES: [&str; 8] = ["in", "in2", "in3", "in4", "in5", "in6", "in7", "in8"];
 
 /// A device at pins of a peripheral. Pins have their names in the kind's table.
 pub trait Device: std::fmt::Debug + Send {
@@ -135,6 +139,7 @@ pub fn of(peripheral: &Peripheral, register: &str, value: f64) -> Result<Box<dyn
             range: range(peripheral).unwrap_or_default(),
             left: VecDeque::new(),
             level: [true],
+            pin: RECEIVED.iter().zip(LINES).find(|(own, _)| **own == register).map_or("in", |(_, pin)| pin),
         }),
         "sinc3" => Box::new(Modulator {
             full: f64::from(parameter("osr")).powi(3),
@@ -306,12 +311,14 @@ struct Converter {
     range: (f64, f64),
     left: VecDeque<bool>,
     level: [bool; 1],
+    /// The line that it drives.
+    pin: &'static str,
 }
 
 impl Device for Converter {
     fn pins(&self) -> DevicePins {
         let clock = if self.gives_at { Edge::Rise } else { Edge::Fall };
-        DevicePins::new(&[("select", Edge::Fall), ("clock", clock)], &["in"])
+        DevicePins::new(&[("select", Edge::Fall), ("clock", clock)], &[self.pin])
     }
 
     fn act(&mut self, _: u64, needed: &[NeededPin], value: f64) -> bool {

@@ -188,6 +188,7 @@ pub const KINDS: &[Kind] = &[
             at("index", register("at_index", "the count at the last pulse of the index")),
             at("index", register("indices", "pulses of the index so far")),
             register("errors", "times that both pins changed at once"),
+            register("since", "cycles since the last edge of a or b, at most 2^31 - 1"),
         ],
         writes: &[],
         parameters: &[
@@ -309,12 +310,37 @@ pub const KINDS: &[Kind] = &[
     Kind {
         name: "spi",
         module: "takt_spi",
-        text: "SPI master for a converter: one frame each period",
-        pins: &[register_output("clock"), output("select"), optional(output("out")), optional(input("in"))],
+        text: "SPI master for a converter: one frame each period, of one line or up to eight",
+        pins: &[
+            register_output("clock"),
+            output("select"),
+            optional(output("out")),
+            optional(input("in")),
+            optional(input("in2")),
+            optional(input("in3")),
+            optional(input("in4")),
+            optional(input("in5")),
+            optional(input("in6")),
+            optional(input("in7")),
+            optional(input("in8")),
+        ],
         reads: &[
             at("in", register("received", "value received in the last frame")),
             register("frames", "frames so far"),
             register("lost", "starts that came during a frame and were dropped"),
+            at(
+                "in2",
+                register(
+                    "received2",
+                    "value received at `in2` in the same frame; likewise up to `received8`",
+                ),
+            ),
+            at("in3", register("received3", "the same of `in3`")),
+            at("in4", register("received4", "the same of `in4`")),
+            at("in5", register("received5", "the same of `in5`")),
+            at("in6", register("received6", "the same of `in6`")),
+            at("in7", register("received7", "the same of `in7`")),
+            at("in8", register("received8", "the same of `in8`")),
         ],
         writes: &[at("out", scaled("send", "value to send in the next frames"))],
         parameters: &[

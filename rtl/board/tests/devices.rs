@@ -165,6 +165,24 @@ fn a_converter_samples_at_the_fall_of_its_select_pin() {
     assert_ne!(Bench::with_fault(&text, "received", 100.0, spoiled).frame(100.0, 400)("received"), 100);
 }
 
+/// Converters with a line each, which share clock and select.
+#[test]
+fn lines_of_a_converter_are_read_at_once() {
+    let pins = "pins = { clock = \"gp0\", select = \"gn0\", in = \"gp1\", in2 = \"gn1\", in8 = \"gp2\" }";
+    let ports = "ports = { received = \"x\", received2 = \"y\", received8 = \"z\" }";
+    let text = format!("kind = \"spi\"\n{pins}\nbits = 14\nsigned = 1\n{ports}");
+    for register in ["received", "received2", "received8"] {
+        let mut bench = Bench::new(&text, register, 0.0);
+        for value in [-8192.0, 8191.0, -1.0, 3.0] {
+            let read = bench.frame(value, 400);
+            for other in ["received", "received2", "received3", "received8"] {
+                let wanted = if other == register { value as i32 } else { 0 };
+                assert_eq!(read(other), wanted, "{register} of {value}: {other}");
+            }
+        }
+    }
+}
+
 const CLOCKED: &str = "pins = { clock = \"gp0\", data = \"gp1\" }";
 
 #[test]

@@ -393,7 +393,7 @@ const FAULTS: &[&[(&str, &str, &str)]] = &[
         ("takt_uart_send.v", "bits  <= 4'd10;", "bits  <= 4'd9;"),
     ],
     &[
-        ("takt_quadrature.v", "wire both = (a ^ was_a) & (b ^ was_b)", "wire both = 1'b0"),
+        ("takt_quadrature.v", "one | both ? 31'd1", "one ? 31'd1"),
         ("takt_step.v", "direction ? count", "pin_direction ? count"),
         ("takt_pwm.v", "pulse & since_rise == LATE", "pulse"),
         ("takt_sigma_delta.v", "{1'b0, sum} + value", "{1'b0, sum} + (value | 17'd1)"),
@@ -415,8 +415,8 @@ const FAULTS: &[&[(&str, &str, &str)]] = &[
     &[
         (
             "takt_quadrature.v",
-            "{count, at_index, indices, errors} <= {START",
-            "{count, at_index, indices, errors} <= {32'd0",
+            "{count, at_index, indices, errors, since} <= {START",
+            "{count, at_index, indices, errors, since} <= {32'd0",
         ),
         ("takt_pwm.v", "wanted[33] ? 17'd0 :", ""),
         ("takt_pwm_phase.v", "is_all ? MOST : ", ""),
@@ -424,7 +424,7 @@ const FAULTS: &[&[(&str, &str, &str)]] = &[
         // A bit of more than 256 cycles.
         ("takt_uart_receive.v", "left <= LAST;", "left <= {8'd0, LAST[7:0]};"),
         ("takt_uart_send.v", "left  <= LAST;", "left  <= {8'd0, LAST[7:0]};"),
-        ("takt_spi.v", "(shift & mask) | extend", "shift & mask"),
+        ("takt_spi.v", "(bits & mask) | sign", "bits & mask"),
         ("takt_ssi.v", "bad       <= ~s1;", "bad       <= 1'b0;"),
         ("takt_biss_c.v", "{31'd0, ~word[1]}", "{31'd0, word[1]}"),
         ("takt_sinc3.v", "anew[2] ? 3'b001 : ", ""),

@@ -6,7 +6,8 @@
 //   at its first edge (PHASE 0) or its second. pin_select falls HALF cycles before the first bit and rises HALF cycles after the
 //   last edge; a frame lasts HALF * (2 * BITS + 1) cycles. A start during a frame is not one, and lost goes up by one.
 //   put: w_send is taken; start sends what was taken last, bits BITS - 1 to 0.
-//   received is what the last whole frame brought (SIGNED: with its highest bit as sign), frames how many there were.
+//   received is what the last whole frame brought (SIGNED: with its highest bit as sign), frames how many there were. received2 to
+//   received8 are the same of the lines pin_in2 to pin_in8: converters that share clock and select.
 //   take: registers r_… hold from the next cycle on what they are in this one.
 //   rst: pins at rest, registers 0. A converter is not switched off by enable: its safe state is a value that is sent.
 
@@ -24,13 +25,27 @@ module takt_spi #(
     input  wire        take,
     input  wire        put,
     input  wire        pin_in,
+    input  wire        pin_in2,
+    input  wire        pin_in3,
+    input  wire        pin_in4,
+    input  wire        pin_in5,
+    input  wire        pin_in6,
+    input  wire        pin_in7,
+    input  wire        pin_in8,
     input  wire [31:0] w_send,
     output reg         pin_clock,
     output reg         pin_out,
     output reg         pin_select,
     output reg  [31:0] r_received,
     output reg  [31:0] r_frames,
-    output reg  [31:0] r_lost
+    output reg  [31:0] r_lost,
+    output wire [31:0] r_received2,
+    output wire [31:0] r_received3,
+    output wire [31:0] r_received4,
+    output wire [31:0] r_received5,
+    output wire [31:0] r_received6,
+    output wire [31:0] r_received7,
+    output wire [31:0] r_received8
 );
 
     localparam [15:0] LAST  = HALF - 1;
@@ -85,5 +100,27 @@ module takt_spi #(
             {received, frames, lost, r_received, r_frames, r_lost} <= 192'd0;
         end
     end
+
+    // The other lines only receive.
+    wire [6:0]   others = {pin_in8, pin_in7, pin_in6, pin_in5, pin_in4, pin_in3, pin_in2};
+    wire [223:0] taken;
+    assign {r_received8, r_received7, r_received6, r_received5, r_received4, r_received3, r_received2} = taken;
+    genvar line;
+    generate
+        for (line = 0; line < 7; line = line + 1) begin : g_line
+            (* ASYNC_REG = "TRUE", altera_attribute = "-name SYNCHRONIZER_IDENTIFICATION FORCED_IF_ASYNCHRONOUS" *)
+            reg         t0, t1;
+            reg  [31:0] bits, value, held;
+            wire [31:0] sign = {32{SIGNED != 0 & bits[BITS-1]}} << (BITS - 1) << 1;
+            assign taken[32*line +: 32] = held;
+            always @(posedge clk) begin
+                {t1, t0} <= {t0, others[line]};
+                if (samples) bits <= {bits[30:0], t1};
+                if (step & half == END) value <= (bits & mask) | sign;
+                if (take) held <= value;
+                if (rst) {value, held} <= 64'd0;
+            end
+        end
+    endgenerate
 
 endmodule

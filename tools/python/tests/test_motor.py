@@ -185,6 +185,42 @@ def test_pll_follows_position_and_speed(machine):
     assert abs(out["speed"][1990] - 30) < 0.05
 
 
+def test_edge_speed_is_as_fine_at_low_speed_as_at_high(machine):
+    period, clock = 1000, 60e6
+    edges = []  # cycles of the edges, and their directions
+    for speed, duration in ((0, 5), (300, 2_000), (40_000, 100), (900_000, 60), (-7_000, 300), (0, 400)):  # counts/s, periods
+        start = (edges[-1][2] if edges else 0) * period
+        end = (edges[-1][2] if edges else 0) + duration
+        step = clock / abs(speed) if speed else np.inf
+        times = np.arange(start + step, end * period, step) if speed else []
+        edges.append((np.floor(times).astype(np.int64), np.sign(speed), end))
+    count, since = [], []
+    position, last, ticks = 0, None, edges[-1][2]
+    flat = [(int(time), sign) for times, sign, _ in edges for time in times]
+    for tick in range(1, ticks + 1):
+        while flat and flat[0][0] < tick * period:
+            last, sign = flat.pop(0)
+            position += sign
+        count.append(position)
+        since.append(2**31 - 1 if last is None else tick * period - last)
+    out = run(
+        machine,
+        ".output w\n.state v n:int s:int\n.preset v = 0\n.preset n = 0\n.preset s = 2147483647",
+        f" edge_speed v, n, s, count, since, {period}.0, {clock:.1f}\n mov w, v",
+        count=np.array(count, dtype=np.int32),
+        since=np.array(since, dtype=np.int32),
+    )
+    w = out["w"]
+    assert (w[:5] == 0).all()
+    # An edge is known to a cycle. By counts alone, a period at 300 counts/s has 0 or 60,000.
+    for speed, (_, _, end) in zip((300, 40_000, 900_000, -7_000), edges[1:]):
+        error = np.abs(w[end - 20 : end] / speed - 1).max()
+        assert error < 2 * abs(speed) / clock + 1e-6 or error < 2 / period, f"{speed}: {error}"
+    # The axis stands still: at most a count in the time since the last edge.
+    late = np.array(since[-390:], dtype=float)
+    assert (np.abs(w[-390:]) <= clock / late * (1 + 1e-6)).all() and abs(w[-1]) < 200
+
+
 def test_trapezoid_arrives_exactly_within_its_limits(machine):
     goal = np.repeat(np.array([1.0, -0.7, -0.7, 2.0, 0.3, 0.3], dtype=np.float32), 900)
     goal[5000:] = 0.301

@@ -9,7 +9,7 @@ mod pin_path;
 mod ports;
 mod samples;
 
-pub(crate) use peripherals::{Frame, Window, frame, update, window, window_start};
+pub(crate) use peripherals::{Frame, RECEIVED, Window, frame, update, window, window_start};
 pub use pin_path::{Answer, End, Part, PinPath, PinPaths, Sample, Until};
 pub use ports::{ProgramCycles, undivided};
 pub use samples::{Sampling, samples};

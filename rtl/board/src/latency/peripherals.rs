@@ -6,6 +6,10 @@ use super::samples::significant;
 use crate::carrier::Instant;
 use crate::wiring::{Peripheral, Starts, Wiring};
 
+/// Registers of `spi` with what the data lines bring.
+pub(crate) const RECEIVED: &[&str] =
+    &["received", "received2", "received3", "received4", "received5", "received6", "received7", "received8"];
+
 /// Cycles from the put of a duty to the first cycle in which it can act.
 const ACTS: u64 = 2;
 
@@ -40,7 +44,7 @@ pub(crate) fn frame(peripheral: &Peripheral) -> Option<Frame> {
             cycles: [half * (2 * bits + 1); 2],
             rest: 0,
             formulas: ["half · (2 · bits + 1)", ""],
-            registers: &["received"],
+            registers: RECEIVED,
         },
         "ssi" => {
             let is_double = parameter(peripheral, "double") == 1;

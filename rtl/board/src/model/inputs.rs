@@ -4,21 +4,24 @@
 use super::clocked::{Model, high};
 use super::filter::Filter;
 
+/// Cycles since the last edge, at most, as at standstill.
+const STANDSTILL: u32 = i32::MAX as u32;
+
 /// Model of the circuit `takt_quadrature`.
 #[derive(Clone, Debug)]
 pub struct Quadrature {
     pins: [Filter; 3],
     was: [bool; 3],
     start: u32,
-    now: [u32; 4],
-    taken: [u32; 4],
+    now: [u32; 5],
+    taken: [u32; 5],
 }
 
 impl Quadrature {
     /// Counter with filters that pass levels of `filter` cycles, and with the count `start` after a reset.
     pub fn new(filter: u32, start: u32) -> Quadrature {
         let pins = [(); 3].map(|()| Filter::new(filter));
-        let now = [start, 0, 0, 0];
+        let now = [start, 0, 0, 0, STANDSTILL];
         Quadrature { pins, was: [false; 3], start, now, taken: now }
     }
 }
@@ -35,7 +38,7 @@ impl Model for Quadrature {
         if high(inputs, 1) {
             self.taken = self.now;
         }
-        let [count, at_index, indices, errors] = &mut self.now;
+        let [count, at_index, indices, errors, since] = &mut self.now;
         if index && !was_index {
             *at_index = *count;
             *indices = indices.wrapping_add(1);
@@ -47,9 +50,10 @@ impl Model for Quadrature {
             (false, true) => *count = count.wrapping_add(if a == b { 1 } else { u32::MAX }),
             (false, false) => {}
         }
+        *since = if (a, b) == (was_a, was_b) { (*since + 1).min(STANDSTILL) } else { 1 };
         self.was = [a, b, index];
         if rst {
-            self.now = [self.start, 0, 0, 0];
+            self.now = [self.start, 0, 0, 0, STANDSTILL];
             self.taken = self.now;
         }
         for (i, pin) in self.pins.iter_mut().enumerate() {
@@ -135,9 +139,6 @@ impl Model for DigitalIn {
         self.pin.clock(rst, high(inputs, 2) != self.invert);
     }
 }
-
-/// Time of a [`Hall`] at standstill.
-const STANDSTILL: u32 = i32::MAX as u32;
 
 /// Model of the circuit `takt_hall`.
 #[derive(Clone, Debug)]
