@@ -330,6 +330,17 @@ impl<L: Line> Host<L> {
         Ok(self.read(at, 1)?.first().copied().unwrap_or(0))
     }
 
+    /// Reads registers of a core, by name, in one request if their addresses lie within 16.
+    ///
+    /// # Errors
+    /// If the board does not answer.
+    pub fn registers_of(&mut self, core: usize, names: &[&str]) -> Result<Vec<u32>, LinkError> {
+        let addresses = || names.iter().map(|name| address(name));
+        let (first, last) = (addresses().min().unwrap_or(0), addresses().max().unwrap_or(0));
+        let words = self.read(first + CORE * core as u16, usize::from(last - first) + 1)?;
+        Ok(addresses().map(|at| words[usize::from(at - first)]).collect())
+    }
+
     /// Writes a register, by name.
     ///
     /// # Errors

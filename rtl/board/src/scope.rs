@@ -6,6 +6,7 @@ use crate::host::Host;
 use crate::protocol::{
     CORE_DATA, CORE_REGISTERS, DRIVEN, IMAGE, Line, LinkError, PAGE_WORDS, SCOPE_PAGE, address, channel,
 };
+use std::ops::ControlFlow;
 use takt_isa::program::Location;
 use takt_isa::{Instruction, Program, Register, Type};
 use thiserror::Error;
@@ -213,6 +214,9 @@ pub enum ScopeError {
     /// Nothing was recorded.
     #[error("the board's scope {0}")]
     NotDone(&'static str),
+    /// The host gave up reading a recording, which the board keeps.
+    #[error("the recording was not read to its end")]
+    Interrupted,
     /// The board has recorded other channels.
     #[error(
         "the board's scope has recorded another register in the place of `{0}`: name the channels with which it was armed"
@@ -582,15 +586,16 @@ impl<L: Line> Host<L> {
         self.set("scope_state", END)
     }
 
-    /// Reads the recording of the channels with which the scope was armed; `passed` gets the number of words that have come, and of all.
+    /// Reads the recording of the channels with which the scope was armed; `passed` gets the number of words that have come, and of all, and
+    /// says whether to go on.
     ///
     /// # Errors
-    /// If there is no recording, or one of other channels, or the board does not answer.
+    /// If there is no recording, or one of other channels, or the board does not answer, or `passed` breaks off.
     pub fn recording(
         &mut self,
         scope: &Scope,
         setup: &Setup,
-        mut passed: impl FnMut(usize, usize),
+        mut passed: impl FnMut(usize, usize) -> ControlFlow<()>,
     ) -> Result<Recording, ScopeError> {
         setup.fits(scope)?;
         match self.scope_state()? {
@@ -673,8 +678,8 @@ impl<L: Line> Host<L> {
         scope: &Scope,
         first: u32,
         count: u32,
-        passed: &mut impl FnMut(usize, usize),
-    ) -> Result<Vec<u32>, LinkError> {
+        passed: &mut impl FnMut(usize, usize) -> ControlFlow<()>,
+    ) -> Result<Vec<u32>, ScopeError> {
         let size = (scope.depth * scope.channels) as usize;
         let total = (count * scope.channels) as usize;
         let mut words = Vec::with_capacity(total);
@@ -689,10 +694,12 @@ impl<L: Line> Host<L> {
             let some = (total - words.len()).min(size - at).min(PAGE_WORDS - inside).min(STRETCH);
             words.extend(self.read(IMAGE + inside as u16, some)?);
             at = (at + some) % size;
-            passed(words.len(), total);
+            if passed(words.len(), total).is_break() {
+                break;
+            }
         }
         self.set("page", 0)?;
-        Ok(words)
+        if words.len() < total { Err(ScopeError::Interrupted) } else { Ok(words) }
     }
 }
 

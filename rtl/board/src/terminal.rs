@@ -2,6 +2,7 @@
 //! Pseudo-terminal through which any host reaches the UART of a simulated board.
 
 use rustix::fs::{OFlags, fcntl_setfl};
+use rustix::io::{FdFlags, fcntl_setfd};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{self, OptionalActions};
 use std::ffi::OsStr;
@@ -26,6 +27,8 @@ impl Terminal {
     /// Fails if the system has no pseudo-terminal left.
     pub fn new() -> io::Result<Terminal> {
         let own = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY)?;
+        // In a process that this one starts, it would keep the line alive.
+        fcntl_setfd(&own, FdFlags::CLOEXEC)?;
         grantpt(&own)?;
         unlockpt(&own)?;
         let name = ptsname(&own, Vec::new())?;

@@ -7,6 +7,7 @@ use rand_pcg::Pcg64;
 use rand_pcg::rand_core::{Rng as _, SeedableRng as _};
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
+use std::ops::ControlFlow;
 use std::path::Path;
 use takt_asm::{MemoryLoader, Options, assemble};
 use takt_board::model::Model;
@@ -877,7 +878,7 @@ fn record(host: &mut Host<Simulation>, program: &Program, setup: &Setup) -> Reco
     host.arm(&Application::from(program), &scope, setup).expect("it is armed");
     host.set("control", RUN | ENABLE).expect("control");
     wait(host);
-    host.recording(&scope, setup, |_, _| ()).expect("a recording")
+    host.recording(&scope, setup, |_, _| ControlFlow::Continue(())).expect("a recording")
 }
 
 /// Values of registers after each period, the first at 1; of `a`, what the line [`DOUBLE`] writes.
@@ -988,7 +989,7 @@ fn events_trigger_and_mistakes_are_refused() {
     set(&mut host, "bad", 1 << 20);
     wait(&mut host);
     assert!(host.status().expect("a board").fault());
-    let recording = host.recording(&scope, &before, |_, _| ()).expect("a recording");
+    let recording = host.recording(&scope, &before, |_, _| ControlFlow::Continue(())).expect("a recording");
     let periods = host.register("periods").expect("a board");
     assert!(recording.is_stopped && recording.causes == ["the program stopped"], "{recording:?}");
     assert_eq!(recording.periods, (periods - 9..=periods + 1).collect::<Vec<_>>());
@@ -1008,7 +1009,7 @@ fn events_trigger_and_mistakes_are_refused() {
     assert_eq!(host.scope_state().expect("a board"), ScopeState::Armed);
     set(&mut host, "work", 1);
     wait(&mut host);
-    let recording = host.recording(&scope, &missed, |_, _| ()).expect("a recording");
+    let recording = host.recording(&scope, &missed, |_, _| ControlFlow::Continue(())).expect("a recording");
     assert_eq!(recording.causes, ["a missed deadline"]);
     assert_eq!(recording.values[1], [[Some(0); 4].as_slice(), &[Some(1); 8]].concat(), "{recording:?}");
     assert_eq!(recording.periods.len(), 12);
@@ -1022,7 +1023,7 @@ fn events_trigger_and_mistakes_are_refused() {
     host.line.run(20 * 800, &[]).expect("it runs");
     host.set("control", RUN).expect("control");
     wait(&mut host);
-    let recording = host.recording(&scope, &safe, |_, _| ()).expect("a recording");
+    let recording = host.recording(&scope, &safe, |_, _| ControlFlow::Continue(())).expect("a recording");
     assert_eq!(recording.causes, ["the outputs became safe"]);
 
     // A recording of the start, for which the scope is armed while the program is stopped.
@@ -1032,7 +1033,7 @@ fn events_trigger_and_mistakes_are_refused() {
     host.arm(&application, &scope, &start).expect("it is armed");
     host.set("control", RUN | ENABLE | RESTART).expect("control");
     wait(&mut host);
-    let recording = host.recording(&scope, &start, |_, _| ()).expect("a recording");
+    let recording = host.recording(&scope, &start, |_, _| ControlFlow::Continue(())).expect("a recording");
     assert_eq!(recording.periods, [1, 2, 3, 4, 5]);
     assert_eq!(recording.values, [[Some(0); 5]; 2], "the host has not set `n`");
     assert_eq!(recording.causes, ["the host"]);
@@ -1042,7 +1043,7 @@ fn events_trigger_and_mistakes_are_refused() {
     host.arm(&application, &scope, &never).expect("it is armed");
     host.line.run(20 * 800, &[]).expect("it runs");
     host.end_scope().expect("a board");
-    let recording = host.recording(&scope, &never, |_, _| ()).expect("a recording");
+    let recording = host.recording(&scope, &never, |_, _| ControlFlow::Continue(())).expect("a recording");
     assert_eq!((recording.trigger, recording.causes.len()), (None, 0));
     assert!(
         recording.periods.len() >= 15 && recording.values[1].iter().all(Option::is_some),
@@ -1057,7 +1058,8 @@ fn events_trigger_and_mistakes_are_refused() {
     refuses(&mut host, 64, &[1]);
     refuses(&mut host, 70, &[1]);
     let other = setup(&program, &["sum", "count"], &[]);
-    let error = host.recording(&scope, &other, |_, _| ()).expect_err("another channel");
+    let error =
+        host.recording(&scope, &other, |_, _| ControlFlow::Continue(())).expect_err("another channel");
     assert!(error.to_string().contains("another register in the place of `sum`"), "{error}");
     let mut deep = other.clone();
     deep.samples = Some(DEPTH + 1);

@@ -18,6 +18,7 @@ mod explore;
 mod header;
 mod linuxcnc;
 mod live;
+mod live_page;
 mod lsp;
 mod machine_file;
 mod mistakes;

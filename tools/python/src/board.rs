@@ -6,6 +6,7 @@ use crate::system;
 use pyo3::exceptions::PyValueError;
 use pyo3::import_exception;
 use pyo3::prelude::*;
+use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::time::{SystemTime, UNIX_EPOCH};
 use takt_board::host::{COUNTERS, fault_kind};
@@ -277,7 +278,7 @@ impl Board {
         let host = &mut self.host;
         let recording = py.detach(|| {
             let scope = host.scope()?;
-            host.recording(&scope, setup, |_, _| ())
+            host.recording(&scope, setup, |_, _| ControlFlow::Continue(()))
         });
         let Recording { channels, periods, values, trigger, causes, is_stopped } =
             recording.map_err(unrecorded)?;

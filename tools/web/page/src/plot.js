@@ -1,9 +1,9 @@
 // Plots of port values over periods, one chart below another, with synchronised cursors.
 import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
+import { COLOURS } from "./parts.js";
 import { Pen, drawing } from "./svg.js";
 
-const COLOURS = ["#2f6fbf", "#d9534f", "#5aa469", "#b07cd8", "#d98a1f", "#26a0a8", "#a3156b", "#8d6e63"];
 /** Dashes of the curves in a chart, so that many differ in more than colour, and those of a reference. */
 const DASHES = [[], [], [7, 4], [9, 3, 2, 3]], REFERENCE = [2, 3];
 /** Maximum number of curves over one axis. */

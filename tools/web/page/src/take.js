@@ -1,14 +1,6 @@
 // Downloads: source, image, listing, circuit, headers.
 import { zipSync, strToU8 } from "fflate";
-
-/** Offers a file for download. */
-export function save(name, content, type) {
-  const link = document.createElement("a");
-  link.href = URL.createObjectURL(new Blob([content], { type }));
-  link.download = name;
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
-}
+import { save } from "./parts.js";
 
 /** Creates the function that saves a download by name; main.js describes the arguments. */
 export function taker({ machine, work, current, state, editor }) {

@@ -1,31 +1,10 @@
 // Sliders for the constants of the text, and for the parameters of a plant. A constant's slider writes its value into the text, so that
 // text, plots, links and exports agree.
 
+import { initial, isNumber, node, short } from "./parts.js";
+
 /** Significant digits of a slider's steps: a hundredth of the power of ten below its range. */
 const DIGITS = 2;
-/** Digits that a value keeps: those of a binary32 that people read. */
-const PRECISION = 6;
-
-const node = (name, set = {}, ...children) => {
-  const made = Object.assign(document.createElement(name), set);
-  made.append(...children);
-  return made;
-};
-
-const isNumber = (text) => text.trim() !== "" && Number.isFinite(Number(text));
-
-/** Range of a slider before the user gives another: from 0 to twice the value. */
-function initial(value) {
-  if (value === 0) return [-1, 1];
-  const end = Number((2 * value).toPrecision(3));
-  return value > 0 ? [0, end] : [end, 0];
-}
-
-/** Shortest text of a number. */
-function short(value) {
-  const plain = String(Number(value.toPrecision(PRECISION))), power = Number(value.toPrecision(PRECISION)).toExponential().replace("e+", "e");
-  return power.length < plain.length ? power : plain;
-}
 
 /** Text of a value in the source; a real number stays one. */
 function written(constant, value) {

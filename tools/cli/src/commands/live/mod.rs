@@ -5,6 +5,7 @@ mod comparison;
 mod fifo;
 mod parameters;
 mod scope;
+mod serve;
 mod status;
 mod value;
 
@@ -18,6 +19,9 @@ use crate::terminal::options::{OptionalMachine, SourceArguments};
 use crate::terminal::progress::progress;
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use clap::{Args, Subcommand};
+use serde::Deserialize;
+use serve::Target;
+use status::Report;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -177,6 +181,13 @@ enum Command {
     },
     /// Record registers and ports on the board itself, in every period, around a trigger: no cycle of the program, no period left out.
     Scope(scope::ScopeArguments),
+    /// Serve a page to a browser on this computer: parameters and inputs with sliders, the scope, status and faults, start and stop.
+    ///
+    /// The address that is printed is for the browser: it holds a token, and nobody else can open it. One page sets values and starts and
+    /// stops; others show what it does. The page follows the board until this command is interrupted, also when the port goes and comes
+    /// back.
+    #[command(long_flag = "serve")]
+    Serve(serve::ServeArguments),
     /// Print ports, registers or data words every N periods, with the period's number: a head line with the names, then a line each.
     Stream {
         /// Ports, registers or data words, as for `read`: all of one kind, of one core, and within 15 consecutive numbers.
@@ -205,6 +216,8 @@ enum PreparedCommand {
     Parameters(parameters::Changes),
     /// Channels and trigger of the scope.
     Scope(Setup),
+    /// Address of the page.
+    Serve(serve::Address),
 }
 
 fn prepare(
@@ -222,13 +235,7 @@ fn prepare(
             for value in values {
                 let (name, text) =
                     value.split_once('=').with_context(|| format!("`{value}` is not `name=value`"))?;
-                let settable = named()?.settable(name);
-                let (address, ty) = settable.map_err(|text| anyhow!("{text}"))?;
-                let bits = bits(text, ty).with_context(|| format!("`{text}` is not a value of `{name}`"))?;
-                named()?.check_parameter(name, bits)?;
-                if let Some(driver) = wiring.and_then(|wiring| wiring.driver(application?, address)) {
-                    bail!("`{name}` cannot be set: the wiring connects it to {driver}, which drives it");
-                }
+                let (address, bits) = setting(named()?, wiring, name, text)?;
                 settings.push((address, bits));
                 names.push((address, name.to_owned()));
             }
@@ -249,8 +256,28 @@ fn prepare(
             PreparedCommand::Parameters(parameters::prepare(named()?, &given)?)
         }
         Command::Scope(arguments) => PreparedCommand::Scope(scope::prepare(named()?, arguments)?),
+        Command::Serve(arguments) => {
+            named()?;
+            PreparedCommand::Serve(serve::Address::listen(arguments)?)
+        }
         _ => PreparedCommand::Nothing,
     })
+}
+
+/// Address and bits of a value that the host is to set.
+fn setting(
+    application: &Application<'_>,
+    wiring: Option<&Wiring>,
+    name: &str,
+    text: &str,
+) -> Result<(u16, u32)> {
+    let (address, ty) = application.settable(name).map_err(|text| anyhow!("{text}"))?;
+    let bits = bits(text, ty).with_context(|| format!("`{text}` is not a value of `{name}`"))?;
+    application.check_parameter(name, bits)?;
+    if let Some(driver) = wiring.and_then(|wiring| wiring.driver(application, address)) {
+        bail!("`{name}` cannot be set: the wiring connects it to {driver}, which drives it");
+    }
+    Ok((address, bits))
 }
 
 pub(crate) fn live(arguments: &Live, color: bool, out: &mut Out) -> Result<()> {
@@ -273,17 +300,15 @@ pub(crate) fn live(arguments: &Live, color: bool, out: &mut Out) -> Result<()> {
     if let Some(application) = &application {
         host.fits(application.clone())?;
     }
-    let control = host.register("control")?;
     match &arguments.command {
-        Command::Status => status::print(&mut host, application.as_ref(), wiring.as_ref(), out)?,
-        Command::Start => host.set("control", RUN | ENABLE | RESTART)?,
-        Command::Stop => host.set("control", 0)?,
-        Command::Hold => host.set("control", control | HOLD)?,
-        Command::Go => host.set("control", control & !HOLD)?,
-        Command::Step => {
-            ensure!(control & HOLD != 0, "the program is not held: `takt live PORT hold` first");
-            host.set("step", 1)?;
+        Command::Status => {
+            Report::read(&mut host, application.as_ref(), wiring.as_ref())?.print(out)?;
         }
+        Command::Start => Control::Start.send(&mut host)?,
+        Command::Stop => Control::Stop.send(&mut host)?,
+        Command::Hold => Control::Hold.send(&mut host)?,
+        Command::Go => Control::Go.send(&mut host)?,
+        Command::Step => Control::Step.send(&mut host)?,
         Command::Read { names } => {
             let application = named()?;
             let each = |name: &String| application.elements(name).unwrap_or_else(|| vec![name.clone()]);
@@ -329,6 +354,15 @@ pub(crate) fn live(arguments: &Live, color: bool, out: &mut Out) -> Result<()> {
                 fifo::pop(&mut host, fifo, out)?;
             }
         }
+        Command::Serve(_) => {
+            if let (PreparedCommand::Serve(address), Some(file), Some(loaded), Some(application)) =
+                (prepared, &arguments.program, &carried, &application)
+            {
+                let target =
+                    Target { port: &arguments.port, file, loaded, application, wiring: wiring.as_ref() };
+                serve::run(host, &target, address, out)?;
+            }
+        }
         Command::Stream { names, every, count } => {
             if let PreparedCommand::Stream(stream) = &prepared {
                 streamed(&mut host, (stream, names), *every, *count, color, out)?;
@@ -336,6 +370,34 @@ pub(crate) fn live(arguments: &Live, color: bool, out: &mut Out) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// Command that starts, stops or holds the program.
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum Control {
+    Start,
+    Stop,
+    Hold,
+    Step,
+    Go,
+}
+
+impl Control {
+    fn send(self, host: &mut Host<Serial>) -> Result<()> {
+        let control = match self {
+            Control::Start => RUN | ENABLE | RESTART,
+            Control::Stop => 0,
+            Control::Hold => host.register("control")? | HOLD,
+            Control::Go => host.register("control")? & !HOLD,
+            Control::Step => {
+                let held = host.register("control")? & HOLD != 0;
+                ensure!(held, "the program is not held: `takt live PORT hold` first");
+                return Ok(host.set("step", 1)?);
+            }
+        };
+        Ok(host.set("control", control)?)
+    }
 }
 
 /// Sets ports; the error names ports that the board does not let the host set.

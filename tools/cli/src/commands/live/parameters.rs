@@ -22,54 +22,104 @@ struct Parameter {
     range: String,
 }
 
-/// Parameters, and the values to set.
-pub(super) struct Changes {
-    all: Vec<Parameter>,
-    /// Addresses and bits, ascending.
-    settings: Vec<(u16, u32)>,
+/// Parameters of the program, or the system's cores, on a board.
+pub(super) struct Parameters(Vec<Parameter>);
+
+/// Values to set: addresses and bits, ascending.
+pub(super) type Settings = Vec<(u16, u32)>;
+
+impl Parameters {
+    pub(super) fn of(application: &Application<'_>) -> Result<Parameters> {
+        let mut all = Vec::new();
+        for (core, known) in application.description().cores.iter().enumerate() {
+            for port in &known.program.parameters {
+                let name = application.name(core, &port.name);
+                let place = application.find(&name).map_err(|text| anyhow!("{text}"))?;
+                let range = known.program.range(port.register).map_or(String::new(), |range| {
+                    let (low, high) = range.ends();
+                    format!("   {low} to {high}")
+                });
+                all.push(Parameter { name, address: place.read, ty: port.ty, range });
+            }
+        }
+        Ok(Parameters(all))
+    }
+
+    /// Checks values before anything is sent: names, types, ranges, and that one request holds them.
+    pub(super) fn check(
+        &self,
+        application: &Application<'_>,
+        given: Vec<(String, String)>,
+    ) -> Result<Settings> {
+        let mut settings = Settings::new();
+        for (name, text) in given {
+            let (program, port) = application.parameter(&name)?;
+            let bits = bits(port, &text)?;
+            program.check_parameter(port, bits)?;
+            let (address, _) = application.settable(&name).map_err(|text| anyhow!("{text}"))?;
+            // A value on the command line replaces that of the file.
+            settings.retain(|(known, _)| *known != address);
+            settings.push((address, bits));
+        }
+        settings.sort_unstable();
+        if let [(first, _), .., (last, _)] = settings[..]
+            && usize::from(last - first) >= WORDS
+        {
+            let known = |address| self.0.iter().find(|known| known.address == address);
+            let name = |address| known(address).map_or("", |known| &known.name);
+            bail!(
+                "`{}` and `{}` cannot change at once: the board sets {WORDS} consecutive ports between two periods, and their \
+                 numbers are {} apart; set them by two commands",
+                name(first),
+                name(last),
+                last - first
+            );
+        }
+        Ok(settings)
+    }
+
+    /// Values on the board, in the order of the parameters.
+    fn read(&self, host: &mut Host<Serial>) -> Result<Vec<u32>> {
+        let addresses: Vec<u16> = self.0.iter().map(|parameter| parameter.address).collect();
+        Ok(host.read_each(&addresses)?)
+    }
+
+    /// A file of all parameters with their values on the board.
+    pub(super) fn file(&self, host: &mut Host<Serial>) -> Result<String> {
+        let values = self.read(host)?;
+        Ok(self.0.iter().zip(values).map(|(known, bits)| line(&known.name, known.ty, bits)).collect())
+    }
 }
 
-/// Checks values before the serial port is opened: names, types, ranges, and that one request holds them.
-pub(super) fn prepare(application: &Application<'_>, given: &ParameterArguments) -> Result<Changes> {
-    let mut all = Vec::new();
-    for (core, known) in application.description().cores.iter().enumerate() {
-        for port in &known.program.parameters {
-            let name = application.name(core, &port.name);
-            let place = application.find(&name).map_err(|text| anyhow!("{text}"))?;
-            let range = known.program.range(port.register).map_or(String::new(), |range| {
-                let (low, high) = range.ends();
-                format!("   {low} to {high}")
-            });
-            all.push(Parameter { name, address: place.read, ty: port.ty, range });
-        }
+/// Sets parameters by one request: those in between keep their values.
+pub(super) fn set(host: &mut Host<Serial>, settings: &Settings) -> Result<()> {
+    let ([(first, _), ..], Some((last, _))) = (&settings[..], settings.last()) else { return Ok(()) };
+    let mut words = host.read(*first, usize::from(last - first) + 1)?;
+    for (address, bits) in settings {
+        words[usize::from(address - first)] = *bits;
     }
-    if all.is_empty() {
+    let settings: Vec<(u16, u32)> = (*first..).zip(words).collect();
+    host.set_ports(&settings).map_err(|error| match error {
+        LinkError::ReadOnly { .. } => {
+            anyhow!("the board sets none of them: a port between them is a peripheral's; set them by several commands")
+        }
+        error => error.into(),
+    })
+}
+
+/// Parameters, and the values to set.
+pub(super) struct Changes {
+    all: Parameters,
+    settings: Settings,
+}
+
+/// Checks values before the serial port is opened.
+pub(super) fn prepare(application: &Application<'_>, given: &ParameterArguments) -> Result<Changes> {
+    let all = Parameters::of(application)?;
+    if all.0.is_empty() {
         bail!("the {} has no parameters: `.param kp = 2.0 range 0..50` declares one", application.kind());
     }
-    let mut settings: Vec<(u16, u32)> = Vec::new();
-    for (name, text) in given.settings()? {
-        let (program, port) = application.parameter(&name)?;
-        let bits = bits(port, &text)?;
-        program.check_parameter(port, bits)?;
-        let (address, _) = application.settable(&name).map_err(|text| anyhow!("{text}"))?;
-        // A value on the command line replaces that of the file.
-        settings.retain(|(known, _)| *known != address);
-        settings.push((address, bits));
-    }
-    settings.sort_unstable();
-    if let [(first, _), .., (last, _)] = settings[..]
-        && usize::from(last - first) >= WORDS
-    {
-        let name =
-            |address| all.iter().find(|known| known.address == address).map_or("", |known| &known.name);
-        bail!(
-            "`{}` and `{}` cannot change at once: the board sets {WORDS} consecutive ports between two periods, and their \
-             numbers are {} apart; set them by two commands",
-            name(first),
-            name(last),
-            last - first
-        );
-    }
+    let settings = all.check(application, given.settings()?)?;
     Ok(Changes { all, settings })
 }
 
@@ -81,33 +131,15 @@ pub(super) fn run(
     out: &mut Out,
 ) -> Result<()> {
     let Changes { all, settings } = changes;
-    if let [(first, _), ..] = settings[..]
-        && let Some((last, _)) = settings.last()
-    {
-        // One request: ports in between keep what they hold.
-        let mut words = host.read(first, usize::from(last - first) + 1)?;
-        for (address, bits) in settings {
-            words[usize::from(address - first)] = *bits;
-        }
-        let settings: Vec<(u16, u32)> = (first..).zip(words).collect();
-        host.set_ports(&settings).map_err(|error| match error {
-            LinkError::ReadOnly { .. } => {
-                anyhow!("the board sets none of them: a port between them is a peripheral's; set them by several commands")
-            }
-            error => error.into(),
-        })?;
-    }
-    let addresses: Vec<u16> = all.iter().map(|parameter| parameter.address).collect();
-    let values = host.read_each(&addresses)?;
+    set(host, settings)?;
     if let Some(path) = save {
+        let text = all.file(host)?;
         let mut file = Out::create(path)?;
-        for (Parameter { name, ty, .. }, bits) in all.iter().zip(&values) {
-            file.write_all(line(name, *ty, *bits).as_bytes())?;
-        }
+        file.write_all(text.as_bytes())?;
         return file.finish();
     }
     let is_set = |address: u16| settings.iter().any(|(known, _)| *known == address);
-    for (Parameter { name, address, ty, range }, bits) in all.iter().zip(values) {
+    for (Parameter { name, address, ty, range }, bits) in all.0.iter().zip(all.read(host)?) {
         if settings.is_empty() || is_set(*address) {
             writeln!(out, "{name} = {}{range}", value::text(*ty, bits))?;
         }

@@ -11,6 +11,7 @@ use anyhow::{Result, anyhow, bail};
 use clap::Args;
 use std::fmt::Write as _;
 use std::io::Write;
+use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 use takt_board::protocol::{HOLD, Line, RUN};
@@ -113,6 +114,7 @@ pub(super) fn run<L: Line>(
     let bar = std::cell::OnceCell::new();
     let recording = host.recording(&scope, setup, |passed, all| {
         bar.get_or_init(|| progress(all as u64, "words", false)).set_position(passed as u64);
+        ControlFlow::Continue(())
     });
     if let Some(bar) = bar.get() {
         bar.finish_and_clear();
@@ -173,7 +175,7 @@ fn wait<L: Line>(host: &mut Host<L>, scope: &Scope, setup: &Setup, limit: Option
 }
 
 /// The recording in a line.
-fn summary(recording: &Recording) -> String {
+pub(super) fn summary(recording: &Recording) -> String {
     let [first, .., last] = recording.periods[..] else {
         return "1 sample".to_owned();
     };
@@ -234,7 +236,7 @@ fn cells(recording: &Recording, row: usize) -> impl Iterator<Item = String> {
 }
 
 /// A table with a row for each sample.
-fn table(recording: &Recording) -> String {
+pub(super) fn table(recording: &Recording) -> String {
     let mut text = "period".to_owned();
     for (name, _) in &recording.channels {
         let quote = if name.contains(',') { "\"" } else { "" };

@@ -1,69 +1,140 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Subcommand `status` of `takt live`: state of each core, FIFOs, and counters.
+//! State of the cores, FIFOs and counters of a board: the subcommand `status` of `takt live`, and part of what its page shows.
 
 use super::fifo::depth;
 use crate::terminal::files::Out;
 use anyhow::Result;
+use serde::Serialize;
 use std::io::Write;
-use takt_board::protocol::{HOLD, Line, RUN};
+use takt_board::host::Status;
+use takt_board::protocol::{HOLD, Line, LinkError, RUN};
 use takt_board::{Application, Host, Wiring};
 
-/// Prints the state of the cores and the counters, with names if the application is known.
-pub(super) fn print<L: Line>(
-    host: &mut Host<L>,
-    application: Option<&Application<'_>>,
-    wiring: Option<&Wiring>,
-    out: &mut Out,
-) -> Result<()> {
-    let control = host.register("control")?;
-    let cores = (0..host.cores).map(|core| host.status_of(core)).collect::<Result<Vec<_>, _>>()?;
-    let is_single = application.map_or(host.cores == 1, Application::is_program);
-    let name = |core: usize| match application {
-        Some(known) => known.description().cores[core].name.clone(),
-        None => format!("core {core}"),
-    };
-    let state = match cores.iter().position(|core| core.fault()) {
-        Some(_) if is_single => "stopped with a fault".to_owned(),
-        Some(core) => format!("stopped with a fault of {}", name(core)),
-        None if control & RUN == 0 => "stopped".to_owned(),
-        None if cores.iter().all(|core| core.halted()) => "halted".to_owned(),
-        None if control & HOLD != 0 => "held".to_owned(),
-        None => "runs".to_owned(),
-    };
-    let kind = if is_single { "program" } else { "system" };
-    let reasons = host.safe_reasons(application)?;
-    let drive =
-        if reasons.is_empty() { "drive".to_owned() } else { format!("are safe: {}", reasons.join("; ")) };
-    writeln!(out, "the {kind} {state}; outputs {drive}")?;
-    for trip in host.tripped(wiring)? {
-        writeln!(out, "  {trip}")?;
-    }
-    for (core, status) in cores.iter().enumerate() {
-        let mut parts = Vec::new();
-        for register in ["periods", "misses", "cycles", "most_cycles"] {
-            parts.push(format!("{register} {}", host.register_of(core, register)?));
-        }
-        if status.halted() {
-            parts.push("halted".to_owned());
-        }
-        if status.fault() {
-            parts.push(format!("fault at bundle {}", host.register_of(core, "fault")? & 0xffff));
-        }
-        let title = if is_single { String::new() } else { format!("{}: ", name(core)) };
-        writeln!(out, "  {title}{}", parts.join(", "))?;
-    }
-    for fifo in application.iter().flat_map(|known| &known.endpoints().fifos) {
-        let status = host.fifo(fifo)?;
-        let refused = match (fifo.to_host, status.overflow(), status.underflow()) {
-            (_, true, _) => ", entries were refused",
-            (false, _, true) => ", entries were asked for while it was empty",
-            _ => "",
+/// Registers that one request reads.
+const REGISTERS: [&str; 9] =
+    ["control", "status", "fault", "misses", "errors", "periods", "cycles", "most_cycles", "lost"];
+
+/// State of a board.
+#[derive(Serialize)]
+pub(super) struct Report {
+    /// The program or system, in a few words: `the program runs`.
+    state: String,
+    runs: bool,
+    held: bool,
+    /// Reasons why the outputs are safe; empty if they drive.
+    safe: Vec<String>,
+    /// Trips that are held.
+    trips: Vec<String>,
+    cores: Vec<CoreReport>,
+    fifos: Vec<String>,
+    /// Frames that were dropped, and frames of the stream that were not sent, since power-up.
+    errors: u32,
+    lost: u32,
+}
+
+/// State and counters of a core.
+#[derive(Serialize)]
+struct CoreReport {
+    /// Name in messages; empty for a single program.
+    name: String,
+    periods: u32,
+    misses: u32,
+    cycles: u32,
+    most_cycles: u32,
+    halted: bool,
+    /// Bundle of the operation that faulted.
+    fault: Option<u32>,
+}
+
+impl Report {
+    /// Reads the state from a board, with names if the application is known.
+    pub(super) fn read<L: Line>(
+        host: &mut Host<L>,
+        application: Option<&Application<'_>>,
+        wiring: Option<&Wiring>,
+    ) -> Result<Report, LinkError> {
+        let is_single = application.map_or(host.cores == 1, Application::is_program);
+        let name = |core: usize| match application {
+            Some(known) => known.description().cores[core].name.clone(),
+            None => format!("core {core}"),
         };
-        let depth = application.map_or(0, |known| depth(known, fifo));
-        writeln!(out, "  {}: {} of {depth} entries{refused}", fifo.name, status.count())?;
+        let (mut cores, mut statuses, mut first) = (Vec::new(), Vec::new(), [0; REGISTERS.len()]);
+        for core in 0..host.cores {
+            let words = host.registers_of(core, &REGISTERS)?;
+            let [_, status, fault, misses, _, periods, cycles, most_cycles, _] = words[..] else { continue };
+            if core == 0 {
+                first.copy_from_slice(&words);
+            }
+            let status = Status(status);
+            statuses.push(status);
+            cores.push(CoreReport {
+                name: if is_single { String::new() } else { name(core) },
+                periods,
+                misses,
+                cycles,
+                most_cycles,
+                halted: status.halted(),
+                fault: status.fault().then_some(fault & 0xffff),
+            });
+        }
+        let [control, .., lost] = first;
+        let state = match statuses.iter().position(|core| core.fault()) {
+            Some(_) if is_single => "stopped with a fault".to_owned(),
+            Some(core) => format!("stopped with a fault of {}", name(core)),
+            None if control & RUN == 0 => "stopped".to_owned(),
+            None if statuses.iter().all(|core| core.halted()) => "halted".to_owned(),
+            None if control & HOLD != 0 => "held".to_owned(),
+            None => "runs".to_owned(),
+        };
+        let kind = if is_single { "program" } else { "system" };
+        let drives = statuses.iter().all(|core| core.drives());
+        let mut fifos = Vec::new();
+        for fifo in application.iter().flat_map(|known| &known.endpoints().fifos) {
+            let status = host.fifo(fifo)?;
+            let refused = match (fifo.to_host, status.overflow(), status.underflow()) {
+                (_, true, _) => ", entries were refused",
+                (false, _, true) => ", entries were asked for while it was empty",
+                _ => "",
+            };
+            let depth = application.map_or(0, |known| depth(known, fifo));
+            fifos.push(format!("{}: {} of {depth} entries{refused}", fifo.name, status.count()));
+        }
+        Ok(Report {
+            state: format!("the {kind} {state}"),
+            runs: control & RUN != 0,
+            held: control & HOLD != 0,
+            safe: if drives { Vec::new() } else { host.safe_reasons(application)? },
+            trips: host.tripped(wiring)?,
+            cores,
+            fifos,
+            errors: first[4],
+            lost,
+        })
     }
-    for name in ["errors", "lost"] {
-        writeln!(out, "{name:<12} {}", host.register(name)?)?;
+
+    /// Prints the state.
+    pub(super) fn print(&self, out: &mut Out) -> Result<()> {
+        let drive = match self.safe[..] {
+            [] => "drive".to_owned(),
+            _ => format!("are safe: {}", self.safe.join("; ")),
+        };
+        writeln!(out, "{}; outputs {drive}", self.state)?;
+        for trip in &self.trips {
+            writeln!(out, "  {trip}")?;
+        }
+        for CoreReport { name, periods, misses, cycles, most_cycles, halted, fault } in &self.cores {
+            let title = if name.is_empty() { String::new() } else { format!("{name}: ") };
+            let halted = if *halted { ", halted" } else { "" };
+            let fault = fault.map_or(String::new(), |bundle| format!(", fault at bundle {bundle}"));
+            writeln!(
+                out,
+                "  {title}periods {periods}, misses {misses}, cycles {cycles}, most_cycles {most_cycles}{halted}{fault}"
+            )?;
+        }
+        for fifo in &self.fifos {
+            writeln!(out, "  {fifo}")?;
+        }
+        writeln!(out, "{:<12} {}", "errors", self.errors)?;
+        Ok(writeln!(out, "{:<12} {}", "lost", self.lost)?)
     }
-    Ok(())
 }

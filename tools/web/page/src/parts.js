@@ -1,0 +1,38 @@
+// Parts that the playground and the page of `takt live serve` share: elements, numbers, downloads, colours of curves.
+
+export const COLOURS = ["#2f6fbf", "#d9534f", "#5aa469", "#b07cd8", "#d98a1f", "#26a0a8", "#a3156b", "#8d6e63"];
+
+/** Digits that a value keeps: those of a binary32 that people read. */
+const PRECISION = 6;
+
+/** Creates an element with properties and children. */
+export const node = (name, set = {}, ...children) => {
+  const made = Object.assign(document.createElement(name), set);
+  made.append(...children);
+  return made;
+};
+
+/** The text is a finite number. */
+export const isNumber = (text) => text.trim() !== "" && Number.isFinite(Number(text));
+
+/** Range of a slider if none is stated: from 0 to twice the value. */
+export function initial(value) {
+  if (value === 0) return [-1, 1];
+  const end = Number((2 * value).toPrecision(3));
+  return value > 0 ? [0, end] : [end, 0];
+}
+
+/** Shortest text of a number. */
+export function short(value) {
+  const plain = String(Number(value.toPrecision(PRECISION))), power = Number(value.toPrecision(PRECISION)).toExponential().replace("e+", "e");
+  return power.length < plain.length ? power : plain;
+}
+
+/** Offers a file for download. */
+export function save(name, content, type) {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(new Blob([content], { type }));
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+}
