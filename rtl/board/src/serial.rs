@@ -31,6 +31,24 @@ impl Serial {
         Serial { patience: PATIENT, ..self }
     }
 
+    /// Reserves the port, where the system has such locks: a second host would take answers of the first one.
+    ///
+    /// # Errors
+    /// [`io::ErrorKind::ResourceBusy`] if another host has reserved it.
+    pub fn reserved(self) -> io::Result<Serial> {
+        #[cfg(unix)]
+        {
+            use rustix::fs::{FlockOperation, flock};
+            // A port without locks is used without.
+            if let Err(rustix::io::Errno::WOULDBLOCK) =
+                flock(&self.port, FlockOperation::NonBlockingLockExclusive)
+            {
+                return Err(io::ErrorKind::ResourceBusy.into());
+            }
+        }
+        Ok(self)
+    }
+
     /// Opens a port with this baud rate, 8 data bits, no parity and 1 stop bit.
     ///
     /// # Errors

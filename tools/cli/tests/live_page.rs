@@ -349,6 +349,7 @@ fn one_page_has_control() {
     );
     // It hands control over.
     assert_eq!(first.ask(json!({ "do": "release" })), "");
+    assert_eq!(first.ask(json!({ "do": "end" })), "no page has control: this one only shows");
     second.wait(|message| message["type"] == "role" && message["free"] == true);
     assert_eq!(second.ask(json!({ "do": "claim" })), "");
     assert_eq!(first.wait(|message| message["type"] == "role" && message["free"] == false)["writer"], false);
@@ -498,7 +499,7 @@ fn parameters_and_recordings() {
         page.ask(json!({ "do": "arm", "request": request }))
     };
     assert_eq!(arm(&mut page, &["y", "k"], &["y rises 3", "fault"], false), "");
-    let armed = page.wait(|message| message["phase"] == "armed");
+    let armed = watcher.wait(|message| message["phase"] == "armed");
     assert_eq!(armed["text"], "y rises 3 or fault");
     assert_eq!(page.ask(json!({ "do": "input", "name": "on", "value": "1" })), "");
     for page in [&mut page, &mut watcher] {
@@ -536,7 +537,12 @@ fn parameters_and_recordings() {
         assert!(error.contains(says), "{channels:?} {triggers:?}: {error}");
     }
 
-    // Another command at the port meanwhile, and the board that ends.
+    // Another command at the port would take answers of the server; then the board ends.
+    let done = folder.line(&format!("{live} status"));
+    assert!(
+        done.status == Some(1) && done.stderr.contains("is in use by another command of takt"),
+        "{done:?}"
+    );
     drop(board);
     let lost = page.wait(|message| message["type"] == "link");
     assert!(

@@ -6,7 +6,7 @@ use anyhow::{Context, Result};
 use clap::Args;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use takt_automation::command::{apt_install, root, run, works};
+use takt_automation::command::{apt_install, cargo, root, run, works};
 
 /// The steps beyond building the page.
 #[derive(Args)]
@@ -93,7 +93,12 @@ fn test(arguments: &Arguments) -> Result<()> {
         std::fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
         environment.push(("TAKT_SCREENSHOTS", folder));
     }
-    in_browser("test/page.test.mjs", &environment)
+    in_browser("test/page.test.mjs", &environment)?;
+    // The page of `takt live serve`, which shares its style and parts.
+    run(cargo().args(["build", "--release", "-p", "takt", "--features", "full"]))?;
+    let takt = root().join("target/release/takt");
+    environment.push(("TAKT", &takt));
+    in_browser("test/live.test.mjs", &environment)
 }
 
 /// Runs a test of the page's folder in a headless browser.

@@ -93,7 +93,13 @@ const take = {
     showState();
   },
   scope(message) {
+    // The form is that of the last recording, of whichever page; what the writer is typing stays.
+    const isNew = message.request && (!scope.request || !role.writer) && JSON.stringify(message.request) !== JSON.stringify(scope.request);
     scope = message;
+    if (isNew && fitted !== null) {
+      fill(message.request);
+      showChannels();
+    }
     showScope();
   },
   recording(message) {
@@ -143,13 +149,15 @@ el("claim").addEventListener("click", () => {
 function showLink() {
   el("link").hidden = link.connected;
   el("link").textContent = link.gone
-    ? "The server does not answer: is takt live … serve still running? Looking for it…"
+    ? "The server does not answer. Looking for it… If it is started again, it prints a new address."
     : `The board does not answer: ${link.text}. Looking for it…`;
   document.body.classList.toggle("lost", !link.connected);
   if (!link.connected) {
     el("runs").textContent = link.gone ? "no server" : "no board";
     el("drives").textContent = el("load").textContent = "";
     el("state").className = "lost";
+    before = "";
+    el("reasons").replaceChildren(node("li", { className: "warn", textContent: "Whether the outputs drive is not known." }));
     document.title = `no board · ${hello?.program ?? "Takt live"}`;
   }
   permit();
@@ -281,6 +289,7 @@ for (const button of document.querySelectorAll("[data-control]")) {
 
 // ---- State ------------------------------------------------------------------------------------------------------------------
 
+/** Reasons that are shown. */
 let before = "";
 
 function showState() {
@@ -304,7 +313,7 @@ function showState() {
     ...(report.errors ? [["warn", `${plural(report.errors, "frame")} with errors on the line.`]] : []),
   ];
   if (!safe.length && !trips.length) reasons.unshift(["good", "The outputs drive."]);
-  if (safe.length || trips.length) reasons.push(["told", `${report.runs && !faulty ? "Restart" : "Start"} runs the program from its beginning, and clears the cause${trips.length ? "; the program may clear a trip itself" : ""}.`]);
+  if (safe.length || trips.length) reasons.push(["told", `${report.runs && !faulty ? "Restart" : "Start"} runs the program from its beginning, with the parameters that it was loaded with, and clears the cause${trips.length ? "; the program may clear a trip itself" : ""}.`]);
   const lines = reasons.map(([kind, textContent]) => `${kind} ${textContent}`).join("\n");
   if (lines !== before) {
     before = lines;
@@ -335,13 +344,13 @@ function note(line) {
 
 const stored = (key, otherwise) => {
   try {
-    const value = JSON.parse(localStorage.getItem(`takt-live-${key}`));
+    const value = JSON.parse(localStorage.getItem(`${hello.program} ${key}`));
     return Array.isArray(value) ? value : otherwise;
   } catch {
     return otherwise;
   }
 };
-const store = (key, value) => localStorage.setItem(`takt-live-${key}`, JSON.stringify(value));
+const store = (key, value) => localStorage.setItem(`${hello.program} ${key}`, JSON.stringify(value));
 
 const colours = new Colours(), trendChart = new Chart(el("trend"));
 let trend = { times: [], values: new Map(), begin: 0 }, paused = false, picked = null;
@@ -418,25 +427,24 @@ function showScope() {
   showPhase();
 }
 
-/** Fills the form with what was asked for last. */
+/** Fills the form with a recording that was asked for. */
 function fill({ channels, triggers, every, samples, before: earlier }) {
   scopeNames = channels;
   el("every").value = every;
   if (samples) el("samples").value = samples;
   el("before").value = earlier ?? "";
-  let comparison = false;
+  el("trigger").value = triggers.length ? "events" : "";
+  for (const box of document.querySelectorAll("#events input")) box.checked = false;
   for (const trigger of triggers) {
     const box = document.querySelector(`#events [value="${trigger}"]`), parts = trigger.match(/^(\S+) (\S+)(?: (\S+))?$/);
     if (box) box.checked = true;
     else if (parts) {
-      comparison = true;
       el("trigger").value = parts[2];
       showChannels();
       el("trigger-channel").value = parts[1];
       if (parts[3]) el("level").value = parts[3];
     }
   }
-  if (!comparison && triggers.length) el("trigger").value = "events";
 }
 
 function showChannels() {

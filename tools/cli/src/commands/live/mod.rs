@@ -53,6 +53,9 @@ pub(crate) fn open(port: &Path, baud: u32) -> Result<Host<Serial>> {
     let name = port.display();
     let line = Serial::open(port, baud)
         .with_context(|| format!("cannot open {name}: is the board plugged in, and may you use the port?"))?;
+    let line = line
+        .reserved()
+        .map_err(|_| anyhow!("{name} is in use by another command of takt, which must end first"))?;
     // Number of the first request; it should differ from the last request of an earlier command.
     let now = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.subsec_micros());
     Host::connect(line, now as u8).with_context(|| format!("{name} at {baud} baud"))

@@ -199,7 +199,8 @@ impl<'a> Server<'a> {
     fn fulfil(&mut self, number: u64, wish: Wish) -> Result<Option<String>> {
         let Target { application, wiring, .. } = *self.target;
         if self.writer != Some(number) && !wish.is_harmless() {
-            bail!("another page has control: this one only shows");
+            let other = if self.writer.is_some() { "another page" } else { "no page" };
+            bail!("{other} has control: this one only shows");
         }
         match wish {
             Wish::Claim | Wish::Release => {
