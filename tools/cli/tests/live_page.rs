@@ -108,9 +108,16 @@ impl Server {
     fn ask(&self, head: &str) -> String {
         let mut stream = TcpStream::connect(("127.0.0.1", self.port)).unwrap();
         stream.write_all(head.as_bytes()).unwrap();
-        let mut answer = String::new();
-        stream.read_to_string(&mut answer).unwrap();
-        answer
+        let mut answer = Vec::new();
+        // Who is let in by mistake would be told the board's state for ever.
+        while !answer.starts_with(b"HTTP/1.1 101") {
+            let mut bytes = [0; 4096];
+            match stream.read(&mut bytes).unwrap() {
+                0 => break,
+                count => answer.extend(&bytes[..count]),
+            }
+        }
+        String::from_utf8(answer).unwrap()
     }
 
     fn get(&self, path: &str) -> String {
