@@ -116,7 +116,7 @@ impl Entry {
     }
 
     /// Latency and interval on a machine, as `slot 5/1` for each slot that hosts the unit; `-` if none does.
-    fn cost(&self, machine: &str) -> String {
+    pub fn cost(&self, machine: &str) -> String {
         let cost = |timing: &Timing| match timing.latency {
             0 => format!("{} -/{}", timing.slot, timing.interval),
             latency => format!("{} {latency}/{}", timing.slot, timing.interval),
@@ -153,31 +153,6 @@ pub fn entry_text(entry: &Entry) -> String {
             timing.machine, timing.slot, timing.interval
         );
     }
-    out
-}
-
-/// The manual as text: one line for each instruction.
-pub fn text() -> String {
-    let manual = manual();
-    let mut out = String::new();
-    let _ = write!(out, "{:<10} {:<14} {:<6}", "mnemonic", "operands", "opcode");
-    for machine in manual.machines {
-        let _ = write!(out, " {:<10}", machine.name);
-    }
-    out.push_str(" meaning\n");
-    for entry in &manual.instructions {
-        let _ = write!(out, "{:<10} {:<14} 0x{:02x}  ", entry.mnemonic, entry.syntax, entry.opcode);
-        for machine in manual.machines {
-            let _ = write!(out, " {:<10}", entry.cost(machine.name));
-        }
-        let _ = writeln!(out, " {}", entry.summary);
-    }
-    let machines: Vec<&str> = manual.machines.iter().map(|machine| machine.name).collect();
-    let _ = writeln!(
-        out,
-        "\nColumns {}: slot, latency/interval in cycles. `takt isa MNEMONIC` tells more.",
-        machines.join(", ")
-    );
     out
 }
 

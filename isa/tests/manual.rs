@@ -2,11 +2,6 @@
 //! The manual, as text: a change of the specification shows here as a change of the manual.
 
 #[test]
-fn instructions_as_text() {
-    insta::assert_snapshot!(takt_isa::manual::text());
-}
-
-#[test]
 fn machines_as_text() {
     insta::assert_snapshot!(takt_isa::manual::machines_text());
 }

@@ -82,8 +82,12 @@ enum Command {
 impl Command {
     /// The results are tables and sentences, which are folded to the terminal's width. Other commands print sources, or are interactive.
     fn is_for_people(&self) -> bool {
+        if let Command::Board(board) = self {
+            return commands::board::is_for_people(board);
+        }
         use Command::{
-            Accuracy, Analyse, Arm, Asm, Bound, Cosim, Explore, Fmu, Isa, Machines, Robot, Run, Track, Verify,
+            Accuracy, Analyse, Arm, Asm, Bound, Cc, Cosim, Debug, Explore, Fmu, Isa, Machines, Model, Robot,
+            Run, Track, Verify,
         };
         matches!(
             self,
@@ -92,11 +96,14 @@ impl Command {
                 | Arm(_)
                 | Asm(_)
                 | Bound(_)
+                | Cc(_)
                 | Cosim(_)
+                | Debug(_)
                 | Isa(_)
                 | Explore(_)
                 | Fmu(_)
                 | Machines(_)
+                | Model(_)
                 | Robot(_)
                 | Run(_)
                 | Track(_)
@@ -156,7 +163,7 @@ fn parse(out: &mut Out) -> Result<Arguments, ExitCode> {
         if answer.use_stderr() {
             let text = answer.render();
             let color = Color::Auto.on_stderr();
-            output::message(&if color { text.ansi().to_string() } else { text.to_string() });
+            output::message(&output::folded(&if color { text.ansi().to_string() } else { text.to_string() }));
             return ExitCode::from(2);
         }
         // Print help in the same way as results, so that a full disk or a closed pipe has the same effect.

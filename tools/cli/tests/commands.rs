@@ -643,6 +643,7 @@ fn references() {
     let folder = Folder::new();
     let manual = folder.line("isa --format markdown").ok();
     assert!(manual.starts_with("# Takt's instruction set\n") && manual.contains("### fadd\n"));
+    insta::assert_snapshot!("isa", folder.line("isa").ok());
     let isa: serde_json::Value = serde_json::from_str(&folder.line("isa --json").ok()).unwrap();
     assert_eq!(
         isa["instructions"].as_array().unwrap().iter().filter(|row| row["mnemonic"] == "fadd").count(),

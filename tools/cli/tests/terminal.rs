@@ -2,7 +2,7 @@
 //! The command `takt debug` on a pseudo-terminal, with an emulated screen.
 
 use crate::common;
-use crate::common::{Folder, SUM};
+use crate::common::{Folder, SUM, source};
 use portable_pty::{Child, CommandBuilder, MasterPty, PtySize, native_pty_system};
 use std::io::{Read, Write};
 use std::num::NonZeroU16;
@@ -177,6 +177,40 @@ fn results_fit_the_terminal() {
         text.contains("FPGA\n") && !text.contains("paper PC") && text.contains("A wider terminal"),
         "{text}"
     );
+}
+
+/// Lists, tables, mistakes in the command line and the debugger's answers fit 80 columns, without a line that the terminal breaks.
+#[test]
+fn eighty_columns_are_enough() {
+    let folder = Folder::new();
+    folder.write("sum.s", SUM);
+    let [foc, pi, csv] = ["foc.s", "pi.s", "pi.csv"].map(|name| source(&format!("../examples/{name}")));
+    let track = source("tracking.s");
+    let policy = concat!(env!("CARGO_MANIFEST_DIR"), "/../python/examples/pendulum.onnx");
+    let lines = [
+        "isa".to_owned(),
+        "isa zzz".to_owned(),
+        "asm sum.s -m t9".to_owned(),
+        "bound sum.s --clock fast".to_owned(),
+        format!("accuracy {foc}"),
+        format!("accuracy {track}"),
+        format!("accuracy {pi} --inputs {csv} --bound"),
+        format!("model {policy} -o policy.s"),
+        "debug sum.s --script commands.txt".to_owned(),
+    ];
+    folder.write("commands.txt", "step 3\nstep line\nhelp\nlist\n");
+    for line in lines {
+        let mut terminal = Terminal::new(&folder, &format!("takt {line}; echo all printed"), 200, 80);
+        terminal.shows("all printed");
+        let screen = terminal.parser.screen();
+        let wrapped = (0..200).find(|row| screen.row_wrapped(*row));
+        assert_eq!(wrapped, None, "{line}:\n{}", terminal.text());
+        if line == "isa" {
+            let text = terminal.text();
+            assert!(text.contains("A wider terminal has room for the other machines"), "{text}");
+            assert!(text.contains("fma      d, a, b, c   -         d = a · b + c\n"), "{text}");
+        }
+    }
 }
 
 /// Comments beside examples in the help continue under their own start.

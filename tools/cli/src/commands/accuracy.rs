@@ -14,6 +14,7 @@ use crate::terminal::files::{self, Out};
 use crate::terminal::number;
 use crate::terminal::options::{OptionalMachine, SourceArguments};
 use crate::terminal::output::Failure;
+use crate::terminal::progress::DelayedActivity;
 use anyhow::{Context, Result, anyhow, bail};
 use bound_report::BoundReport;
 use clap::Args;
@@ -91,13 +92,23 @@ pub(crate) fn run(arguments: &Accuracy, color: bool, out: &mut Out) -> Result<()
     }
 }
 
+/// Progress of an enclosure, which takes half a minute for a program of many branches.
+fn bounding(program: &Program) -> DelayedActivity {
+    let file = program.files.first().map_or("the program", String::as_str);
+    DelayedActivity::new(format!("bounding the errors of {file}"))
+}
+
 /// Prints proved error bounds of each core, from the ranges in its source.
 fn bounded(arguments: &Accuracy, application: &Application, out: &mut Out) -> Result<()> {
     let mut safe = true;
     let mut cores = Vec::new();
     for (core, loaded) in application.programs().iter().enumerate() {
         let program = &loaded.program;
-        let enclosure = match (enclose(program), application.system()) {
+        let found = {
+            let _waiting = bounding(program);
+            enclose(program)
+        };
+        let enclosure = match (found, application.system()) {
             (Ok(enclosure), _) => Ok(enclosure),
             (Err(error), None) if !arguments.json => bail!("no bound: {error}"),
             (Err(error), _) => Err(format!("no bound: {error}")),
@@ -137,7 +148,10 @@ fn measured(
         let program = &loaded.program;
         let measured = MeasurementReport::new(program, shadow);
         let enclosure = match arguments.bound {
-            true => Some(enclose(program).map_err(|error| anyhow!("no bound: {error}"))?),
+            true => {
+                let _waiting = bounding(program);
+                Some(enclose(program).map_err(|error| anyhow!("no bound: {error}"))?)
+            }
             false => None,
         };
         let enclosure = enclosure.as_ref();

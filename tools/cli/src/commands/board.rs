@@ -19,9 +19,11 @@ use crate::run::parameters::ParameterArguments;
 use crate::terminal::files::{self, Out};
 use crate::terminal::options::{OptionalMachine, SourceArguments};
 use crate::terminal::output::{self, Failure};
+use crate::terminal::progress::DelayedActivity;
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use clap::{Args, Subcommand};
 use serde_json::json;
+use std::cell::RefCell;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -275,6 +277,11 @@ pub(crate) fn wired(
     Ok((board, wiring))
 }
 
+/// The results are sentences; those of other commands are tables that fit, or files and commands to copy.
+pub(crate) fn is_for_people(arguments: &Boards) -> bool {
+    matches!(arguments.command, Command::Check(_) | Command::Sim(_))
+}
+
 pub(crate) fn run(arguments: &Boards, color: bool, out: &mut Out) -> Result<()> {
     match &arguments.command {
         Command::List(list) => self::list(list, color, out),
@@ -435,7 +442,13 @@ fn build(arguments: &Build, color: bool, out: &mut Out) -> Result<()> {
         }
         return Ok(());
     }
-    let step = |what: &str| output::message(&format!("{what} …"));
+    // A step ends where the next begins.
+    let under_way = RefCell::new(None);
+    let step = |what: &str| {
+        under_way.take();
+        output::message(&format!("{what} …"));
+        under_way.replace(Some(DelayedActivity::new(format!("{what} for {}", board.name))));
+    };
     let packages = takt_board::build::packages(&board)?;
     // A design that cannot be built is refused before tools are installed.
     takt_board::top::circuit(&board, &wiring, application.clone())?;
@@ -445,6 +458,7 @@ fn build(arguments: &Build, color: bool, out: &mut Out) -> Result<()> {
     let Build { seed, seeds, .. } = *arguments;
     let options = takt_board::build::Options { seed, seeds, time, netlist: false };
     let report = takt_board::build::build(&venv, &board, &wiring, application, options, folder, &step)?;
+    drop(under_way);
     writeln!(out, "{}: {} bytes, for {}", folder.join(report.bitstream).display(), report.bytes, board.text)?;
     for (net, reached, needed) in &report.clocks {
         writeln!(

@@ -10,6 +10,7 @@ use crate::terminal::files::{self, Out};
 use crate::terminal::number;
 use crate::terminal::options::{OptionalMachine, SourceArguments};
 use crate::terminal::output::Failure;
+use crate::terminal::progress::{DelayedActivity, DelayedProgress};
 use anyhow::{Result, bail};
 use clap::Args;
 use serde_json::{Value, json};
@@ -129,6 +130,10 @@ impl<'a> Pair<'a> {
 
     fn simulation(&self, waveform: Option<&Path>) -> Result<Simulation> {
         let trace = waveform.is_some();
+        let _waiting = compiling(match self {
+            Pair::Program { program, .. } => program.machine.name,
+            Pair::System { .. } => "the system",
+        });
         Ok(match self {
             Pair::Program { design, .. } => core_simulation(design, waveform)?,
             Pair::System { design, .. } => {
@@ -154,14 +159,25 @@ impl<'a> Pair<'a> {
 
     fn run(&self, rows: &[Row], simulation: Simulation) -> Result<EqualRun> {
         match self {
-            Pair::Program { program, .. } => Ok(run_program(program, rows, simulation)?),
-            Pair::System { system, design, host } => run_system(system, design, host, rows, simulation),
+            Pair::Program { program, .. } => {
+                let bar = DelayedProgress::new(Some(rows.len() as u64), "periods");
+                Ok(run_program(program, rows, simulation, &bar)?)
+            }
+            Pair::System { system, design, host } => {
+                let bar = DelayedProgress::new(Some(rows.len() as u64), "base ticks");
+                run_system(system, design, host, rows, simulation, &bar)
+            }
         }
     }
 }
 
 fn design(machine: &'static Machine, latched: u16) -> Result<Design> {
     Ok(Design { latched, ..export(machine, &Library::builtin())? })
+}
+
+/// Progress of a circuit's compilation, which takes half a minute where the cache has no model.
+fn compiling(of: &str) -> DelayedActivity {
+    DelayedActivity::new(format!("compiling the circuit of {of}"))
 }
 
 fn core_simulation(design: &Design, waveform: Option<&Path>) -> Result<Simulation, ModelError> {
@@ -171,7 +187,12 @@ fn core_simulation(design: &Design, waveform: Option<&Path>) -> Result<Simulatio
     model.start(&arguments)
 }
 
-fn run_program(program: &Program, rows: &[Row], simulation: Simulation) -> Result<EqualRun, LockstepError> {
+fn run_program(
+    program: &Program,
+    rows: &[Row],
+    simulation: Simulation,
+    bar: &DelayedProgress,
+) -> Result<EqualRun, LockstepError> {
     let first = rows.first().map(Vec::as_slice).unwrap_or_default();
     let mut lockstep = Lockstep::new(program, simulation, first)?;
     let mut periods = 0;
@@ -182,6 +203,7 @@ fn run_program(program: &Program, rows: &[Row], simulation: Simulation) -> Resul
             break;
         }
         periods += 1;
+        bar.add(1);
     }
     lockstep.finish()?;
     let halted = matches!(lockstep.emulator().status(), Status::Halted { .. });
@@ -196,6 +218,7 @@ fn run_system(
     host: &Host,
     rows: &[Row],
     simulation: Simulation,
+    bar: &DelayedProgress,
 ) -> Result<EqualRun> {
     let description = &system.description;
     let mut lockstep = SystemLockstep::new(description, &design.plan, simulation)?;
@@ -213,6 +236,7 @@ fn run_system(
             if running {
                 host.read(&mut lockstep)?;
                 ticks += 1;
+                bar.add(1);
             }
         }
     } else if lockstep.fault().is_none() && !lockstep.system().halted() {
@@ -313,12 +337,19 @@ fn many(arguments: &Cosim, out: &mut Out) -> Result<()> {
     let count = arguments.programs.unwrap_or(1);
     let Some(end) = first.checked_add(count) else { bail!("seeds end at {}", u64::MAX) };
     let design = design(machine, if arguments.latched { machine.inputs.depth } else { 0 })?;
-    let mut simulation = core_simulation(&design, None)?;
+    let mut simulation = {
+        let _waiting = compiling(machine.name);
+        core_simulation(&design, None)?
+    };
+    let bar = DelayedProgress::new(Some(count), "programs");
     let mut coverage = random::Coverage::default();
     let start = Instant::now();
     for seed in first..end {
         simulation = match random::run(seed, machine, simulation, &mut coverage) {
-            Ok(simulation) => simulation,
+            Ok(simulation) => {
+                bar.add(1);
+                simulation
+            }
             Err(error) => {
                 let of = ("machine", machine.name.into());
                 let difference = DifferingRun { arguments, of, seed: Some(seed) };
@@ -332,6 +363,7 @@ fn many(arguments: &Cosim, out: &mut Out) -> Result<()> {
         };
     }
     let rate = rate(coverage.cycles, start.elapsed());
+    drop(bar);
     if arguments.json {
         return files::json(
             &json!({

@@ -40,6 +40,15 @@ pub(crate) fn takes_away(bar: &ProgressBar) {
     }
 }
 
+/// Prints to the terminal while no progress bar is on its line.
+pub(crate) fn beside_bars<T>(print: impl FnOnce() -> T) -> T {
+    let bar = held(&BARS).iter().rfind(|bar| !bar.is_finished()).cloned();
+    match bar {
+        Some(bar) => bar.suspend(print),
+        None => print(),
+    }
+}
+
 fn end() {
     held(&BARS).iter().for_each(ProgressBar::finish_and_clear);
     // End by the signal, as without a handler, so that a loop in a shell also ends.

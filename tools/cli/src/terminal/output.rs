@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Messages on standard error, and errors that are presented in special ways.
 
+use crate::terminal::interrupt;
 use crate::terminal::page::Page;
 use anyhow::Result;
 use std::io::{self, IsTerminal, Write};
@@ -10,7 +11,7 @@ use takt_isa::text::visible;
 pub(crate) fn message(text: &str) {
     let text = text.trim_end();
     if !text.is_empty() {
-        let _ = writeln!(io::stderr(), "{}", coloured(text));
+        let _ = interrupt::beside_bars(|| writeln!(io::stderr(), "{}", coloured(text)));
     }
 }
 
@@ -33,7 +34,7 @@ pub(crate) fn coloured(text: &str) -> String {
 }
 
 /// Folds a text to the width of the terminal on standard error.
-fn folded(text: &str) -> String {
+pub(crate) fn folded(text: &str) -> String {
     let page = Page::of_stderr();
     text.lines().map(|line| page.folded(line)).collect::<Vec<_>>().join("\n")
 }

@@ -75,8 +75,17 @@ impl Page {
 /// Placeholder for a space at which lines must not break.
 const TIED: char = '\u{a0}';
 
-/// Protects code in backticks from line breaks.
+/// Protects code in backticks, and percentages with the name before them, from line breaks.
 fn together(line: &str) -> String {
+    let line = line.replace(" %", &format!("{TIED}%"));
+    let mut parts = line.split(" (");
+    let mut line = parts.next().unwrap_or("").to_owned();
+    for part in parts {
+        let is_percentage = part.trim_start_matches(|c: char| c.is_ascii_digit()).starts_with(TIED);
+        line.push(if is_percentage { TIED } else { ' ' });
+        line.push('(');
+        line.push_str(part);
+    }
     let pieces = line.split('`').enumerate();
     let pieces = pieces.map(|(number, piece)| match number % 2 {
         1 => piece.replace(' ', &TIED.to_string()),
@@ -143,6 +152,11 @@ impl<'c> Columns<'c> {
         Columns { all, page, most }
     }
 
+    /// Highest rank of the columns that are shown.
+    pub(crate) fn most(&self) -> u8 {
+        self.most
+    }
+
     /// Some columns are omitted.
     pub(crate) fn leave_out_some(&self) -> bool {
         self.all.iter().any(|column| column.rank > self.most)
@@ -190,6 +204,7 @@ mod tests {
         // Bold sequences have no width, and a word longer than the line is not broken.
         assert_eq!(page(8).folded("a \x1b[1mbold\x1b[0m b"), "a \x1b[1mbold\x1b[0m b");
         assert_eq!(page(10).folded("to https://example.org/path it"), "to\n  https://example.org/path\n  it");
+        assert_eq!(page(20).folded("  u  1e-4  pi.s:26 (100 %)"), "  u  1e-4\n    pi.s:26 (100 %)");
         for width in 1..60 {
             let folded = page(width).folded(line);
             let words = |text: &str| text.split_whitespace().map(str::to_owned).collect::<Vec<_>>();

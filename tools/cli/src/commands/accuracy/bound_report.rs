@@ -135,16 +135,20 @@ impl BoundReport<'_> {
         let outputs = &enclosure.outputs;
         let width = outputs.iter().map(|output| output.name.len()).max().unwrap_or(0).max(6);
         let wide = outputs.iter().map(|output| interval(output.range).len()).max().unwrap_or(0).max(5);
+        let ulps = |output: &OutputBound| output.ulps().map_or_else(|| "-".to_owned(), ulps_text);
+        let ulp_width = outputs.iter().map(|output| ulps(output).len()).max().unwrap_or(0).max(3);
         writeln!(
             out,
-            "\n  {:<width$}  {:>wide$}  {:>11}  {:>9}  most of it from",
+            "\n  {:<width$}  {:>wide$}  {:>11}  {:>ulp_width$}  most of it from",
             "output", "range", "error up to", "ulp"
         )?;
         for output in outputs {
             let error = output.error.map_or_else(|| "-".to_owned(), |error| rounded(error, 4));
-            let ulps = output.ulps().map_or_else(|| "-".to_owned(), ulps_text);
+            let ulps = ulps(output);
             let lines = self.parts(output);
             let lines = lines.iter().take(SHOWN_PARTS);
+            // A part below half a percent would read "0 %".
+            let lines = lines.filter(|(_, _, share)| *share >= 0.005 || *share == 0.0);
             let lines =
                 lines.map(|(at, _, share)| format!("{} ({:.0} %)", line_text(program, *at), 100.0 * share));
             let open = self.open(output);
@@ -156,7 +160,7 @@ impl BoundReport<'_> {
             let range = interval(output.range);
             writeln!(
                 out,
-                "  {:<width$}  {range:>wide$}  {error:>11}  {ulps:>9}  {}",
+                "  {:<width$}  {range:>wide$}  {error:>11}  {ulps:>ulp_width$}  {}",
                 output.name,
                 lines.join(", ")
             )?;

@@ -140,16 +140,16 @@ impl<'a> MeasurementReport<'a> {
         writeln!(out, "\nlargest error of each output, and its period")?;
         writeln!(
             out,
-            "  {:<width$}  {:>12} {:>8}  {:>12} {:>8}  {:>12} {:>8}",
+            "  {:<width$}  {:>10} {:>7}  {:>10} {:>7}  {:>10} {:>7}",
             "output", "absolute", "period", "ulp", "period", "relative", "period"
         )?;
         for output in outputs {
             let cell = |worst: Option<LargestError>, ulps: bool| match worst {
                 Some(LargestError { error, period, .. }) if ulps => {
-                    format!("{:>12} {period:>8}", ulps_text(error))
+                    format!("{:>10} {period:>7}", ulps_text(error))
                 }
-                Some(LargestError { error, period, .. }) => format!("{:>12} {period:>8}", rounded(error, 4)),
-                None => format!("{:>12} {:>8}", "-", "-"),
+                Some(LargestError { error, period, .. }) => format!("{:>10} {period:>7}", rounded(error, 4)),
+                None => format!("{:>10} {:>7}", "-", "-"),
             };
             let [absolute, ulp, relative] =
                 [(output.absolute, false), (output.ulp, true), (output.relative, false)]
@@ -179,7 +179,7 @@ impl<'a> MeasurementReport<'a> {
         writeln!(out, "\nerrors by source line, the largest contribution to an output's error first")?;
         writeln!(
             out,
-            "  {:<wide$}  {:>14} {:>12}  {:>16} {:>9}  share of",
+            "  {:<wide$}  {:>14}  {:>11}  {:>9}  {:>7}  share of",
             "line", "rounding (ulp)", "cancels", "in period", "absorbs"
         )?;
         for ((_, line), place) in lines.iter().zip(&places) {
@@ -188,10 +188,10 @@ impl<'a> MeasurementReport<'a> {
             let period = if cancelled > 0.0 { cancelled_in.to_string() } else { "-".to_owned() };
             let share = line.output.as_ref();
             let share = share.map_or(String::new(), |name| format!("{:.0} % of {name}", 100.0 * line.share));
-            writeln!(
-                out,
-                "  {place:<wide$}  {rounding:>14.3} {cancels:>12}  {period:>16} {absorbed:>9}  {share}"
-            )?;
+            let row = format!(
+                "  {place:<wide$}  {rounding:>14.3}  {cancels:>11}  {period:>9}  {absorbed:>7}  {share}"
+            );
+            writeln!(out, "{}", row.trim_end())?;
         }
         if lines.len() > SHOWN {
             writeln!(out, "  and {} more (--json has all)", lines.len() - SHOWN)?;

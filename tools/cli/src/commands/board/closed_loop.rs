@@ -3,12 +3,14 @@
 //! pins measure it. This command is also the host at the UART, which starts the program and writes the ports that no peripheral drives.
 
 use super::pins::{Pins, Script};
+use super::sim::next_commands;
 use crate::run::loaded_program::LoadedProgram;
 use crate::run::plant;
 use crate::run::ports;
 use crate::terminal::files::Out;
 use crate::terminal::output::{self, Failure};
 use crate::terminal::plot::curves::Curves;
+use crate::terminal::progress::DelayedProgress;
 use anyhow::{Result, anyhow, bail};
 use std::io;
 use std::io::Write;
@@ -821,8 +823,17 @@ fn drive_board(
     let mut steps = steps(&host.line.references, period).into_iter().peekable();
     let bit = (wiring.clock * 1e6 / f64::from(wiring.baud)).round() as u64;
     let mut asked = 0;
+    let periods = host.line.rows.most;
+    if periods.or(run.cycles).is_none() {
+        next_commands(None, terminal.path(), wiring.baud);
+    }
+    let unit = if periods.is_some() { "periods" } else { "cycles" };
+    let (bar, mut shown) = (DelayedProgress::new(periods.or(run.cycles), unit), 0);
     loop {
         let now = host.line.sim.cycles;
+        let done = periods.map_or(now, |_| host.line.rows.written);
+        bar.add(done - shown);
+        shown = done;
         if host.line.is_over() || run.cycles.is_some_and(|most| now >= most) {
             return Ok(());
         }

@@ -7,6 +7,7 @@ use crate::run::ports;
 use crate::terminal::files::{self, Out};
 use crate::terminal::number;
 use crate::terminal::output;
+use crate::terminal::progress::{self, DelayedProgress};
 use anyhow::{Context, Result, anyhow, bail};
 use std::collections::VecDeque;
 use std::io::{BufRead, BufReader, IsTerminal, Read, Write};
@@ -394,6 +395,7 @@ impl Plant<'_> {
         // During reset, pins are undefined.
         sim.run(RESET, &[])?;
         let period = self.wiring.period;
+        let bar = DelayedProgress::new(progress::rows(Some(self.inputs)), "periods");
         while cycles.is_none_or(|most| sim.cycles < most)
             && let Some(row) = table.next().map_err(|error| anyhow!(error))?.cloned()
         {
@@ -421,6 +423,7 @@ impl Plant<'_> {
                 }
             }
             sim.run(period, &terminal.receive()?)?;
+            bar.add(1);
             let received = sim.take_received();
             if !received.is_empty() {
                 terminal.send(&received)?;

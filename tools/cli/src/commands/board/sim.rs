@@ -11,13 +11,17 @@ use crate::terminal::files::{self, OptionPath};
 use crate::terminal::number;
 #[cfg(unix)]
 use crate::terminal::output;
+#[cfg(unix)]
+use crate::terminal::progress::DelayedActivity;
 use anyhow::Result;
 #[cfg(unix)]
 use anyhow::anyhow;
 use anyhow::bail;
 use clap::{ArgGroup, Args};
 #[cfg(unix)]
-use std::io::Write;
+use std::io::{IsTerminal, Write};
+#[cfg(unix)]
+use std::path::Path;
 use std::path::PathBuf;
 #[cfg(unix)]
 use takt_board::emulated::EmulatedBoard;
@@ -204,7 +208,7 @@ pub(super) fn run(arguments: &Sim, color: bool, out: &mut Out) -> Result<()> {
     };
     let folder = takt_cache::folder()?.join(format!("board-{}", std::process::id()));
     let simulation = || -> Result<Simulation> {
-        output::message("compiling the circuit …");
+        let _waiting = DelayedActivity::new(format!("compiling the circuit for {}", board.name));
         let mut sim = Simulation::new(&board, &wiring, carried.on_board(), &folder)?;
         sim.noise = arguments.noise;
         // With --robot alone, this command is the host, and reports itself how its drive ended.
@@ -319,6 +323,21 @@ fn report_reasons<L: Line>(host: &mut Host<L>, wiring: &Wiring, carried: &Applic
     Ok(())
 }
 
+/// Says on a terminal how to use the port that was printed. `program`: the program, if the host has to load it.
+#[cfg(unix)]
+pub(super) fn next_commands(program: Option<&Path>, port: &Path, baud: u32) {
+    if !std::io::stderr().is_terminal() {
+        return;
+    }
+    let port = port.display();
+    let baud = if baud == number::BAUD { String::new() } else { format!(" --baud {baud}") };
+    output::message("Ctrl-C ends the simulation; type in another terminal:");
+    if let Some(program) = program {
+        output::message(&format!("  takt load {port} {}{baud}", program.display()));
+    }
+    output::message(&format!("  takt live {port}{baud} status"));
+}
+
 #[cfg(unix)]
 fn serve(
     arguments: &Sim,
@@ -334,6 +353,7 @@ fn serve(
     let mut terminal = takt_board::terminal::Terminal::new()?;
     writeln!(out, "{} {}", terminal.path().display(), wiring.baud)?;
     out.flush()?;
+    next_commands(Some(&arguments.target.program), terminal.path(), wiring.baud);
     while arguments.cycles.is_none_or(|most| sim.cycles < most) {
         let mut slice = whole.unwrap_or(SLICE);
         if let Some(script) = &mut script {

@@ -7,7 +7,8 @@ use crate::commands::board::pins::Pins;
 use crate::run::application::Application as Carried;
 use crate::terminal::files::{self, Out};
 use crate::terminal::number;
-use crate::terminal::output::{self, Failure};
+use crate::terminal::output::Failure;
+use crate::terminal::progress::DelayedActivity;
 use anyhow::{Context, Result, anyhow, ensure};
 use std::collections::BTreeSet;
 use std::io::Write;
@@ -117,7 +118,7 @@ fn model(
     program: Option<&Program>,
     folder: &Path,
 ) -> Result<Model> {
-    output::message("compiling the circuit …");
+    let _waiting = DelayedActivity::new(format!("compiling the circuit for {}", board.name));
     let packed = Packed::new(board, wiring, application.clone(), folder)?;
     let ports = program.map_or(Vec::new(), |program| ports(wiring, program));
     let circuit = circuit(board, wiring, application, ports, &packed)?;
