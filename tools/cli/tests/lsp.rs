@@ -6,7 +6,7 @@ use crate::common::{Folder, source};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::process::Command;
-use takt_isa::{Function, T3, Unit};
+use takt_isa::{Function, T3, Type, Unit};
 
 /// A session with documents in a folder.
 struct Session {
@@ -25,7 +25,7 @@ impl Session {
         let root = format!("file://{}", folder.path().display());
         let capabilities = json!({
             "workspace": { "inlayHint": { "refreshSupport": true } },
-            "experimental": { "takt/counted": true },
+            "experimental": { "takt/counted": true, "takt/runs": true },
         });
         let answer = client.ask(
             "initialize",
@@ -388,6 +388,66 @@ fn each_suggestion_is_a_code_action() {
     session.end();
 }
 
+/// An instruction becomes an equation that assembles to it, and back, for every operation with a form in equations.
+#[test]
+fn instructions_and_equations_are_rewritten() {
+    let mut session = Session::new(&[]);
+    let of = |ty: Type| match ty {
+        Type::F => "float",
+        Type::I => "int",
+        Type::B => "bits",
+    };
+    let actions = |session: &mut Session, name: &str, text: &str| -> Vec<Value> {
+        let at = position(text, "y ", 0);
+        let params = json!({
+            "textDocument": { "uri": session.uri(name) }, "range": { "start": at, "end": at },
+            "context": { "diagnostics": [], "only": ["refactor"] },
+        });
+        session.ask("textDocument/codeAction", params).as_array().unwrap().clone()
+    };
+    // Of an equation, places have columns; of an instruction, they have none.
+    let code = |session: &Session, name: &str, text: &str| -> String {
+        session.folder.write(name, text);
+        session.folder.line(&format!("asm {name} -o image")).ok();
+        let whole = session.folder.line("disasm image").ok();
+        whole
+            .lines()
+            .skip_while(|line| !line.starts_with(".period"))
+            .filter(|line| !line.contains(".loc "))
+            .collect()
+    };
+    for row in takt_isa::ROWS.iter().filter(|row| !row.forms.is_empty()) {
+        let name = format!("{}.s", row.mnemonic);
+        let sources = ["a", "b", "c"].into_iter().zip(&row.types[1..]);
+        let ports: String =
+            sources.clone().map(|(name, ty)| format!(".input {name}:{}\n", of(*ty))).collect();
+        let names: Vec<&str> = sources.map(|(name, _)| name).collect();
+        let operation = format!("{:<7} y , {}", row.mnemonic, names.join(", "));
+        let text = format!(
+            ".machine t4\n{ports}.output y:{}\n.period\np: {operation} ; it\n wait p\n",
+            of(row.types[0])
+        );
+        session.open(&name, &text);
+        let found = actions(&mut session, &name, &text);
+        let [action] = &found[..] else { panic!("{operation}: {found:?}") };
+        assert_eq!(action["title"], format!("write `y = {}`", row.forms[0]));
+        let equation = session.applied(&json!({ "result": action["edit"] }), &[(&name, &text)]).remove(0);
+        assert_eq!(code(&session, &name, &equation), code(&session, &name, &text), "{equation}");
+
+        let name = format!("{}_equation.s", row.mnemonic);
+        session.open(&name, &equation);
+        let back = actions(&mut session, &name, &equation);
+        let back: Vec<String> = back
+            .iter()
+            .map(|action| {
+                session.applied(&json!({ "result": action["edit"] }), &[(&name, &equation)]).remove(0)
+            })
+            .collect();
+        assert!(back.contains(&text.replace("y ,", "y,")), "{equation}\n{back:?}");
+    }
+    session.end();
+}
+
 /// Cycles are shown beside lines and above the section, and keep their places when lines are added.
 #[test]
 fn cycles_stand_beside_the_lines() {
@@ -419,6 +479,11 @@ fn cycles_stand_beside_the_lines() {
     let title = lenses[0]["command"]["title"].as_str().unwrap();
     assert!(title.starts_with(&format!("period: {} cycles, bound ", cycles["worst"])), "{title}");
     assert_eq!(lenses[0]["range"]["start"]["line"], 5);
+    for (lens, command) in lenses.as_array().unwrap().iter().rev().zip(["debug", "run"]) {
+        assert_eq!(lens["range"], lenses[0]["range"]);
+        let wanted = json!({ "title": command, "command": format!("takt.{command}"), "arguments": [uri] });
+        assert_eq!(lens["command"], wanted);
+    }
 
     // Insert two lines above; old hints move with their lines until the new counts arrive.
     session.edit("main.s", MAIN, ".schedule on\n", "\n\n.schedule on\n");

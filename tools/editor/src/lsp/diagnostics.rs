@@ -91,21 +91,26 @@ fn convert(files: &Files, diagnostic: &diag::Diagnostic, encoding: Encoding) -> 
     }
 }
 
+/// An action that edits a document.
+pub(crate) fn action(uri: &Uri, title: String, kind: CodeActionKind, edit: TextEdit) -> CodeAction {
+    // `Uri` caches its parsed form through interior mutability; the protocol's types require it as a key.
+    #[allow(clippy::mutable_key_type)]
+    let changes = HashMap::from([(uri.clone(), vec![edit])]);
+    CodeAction {
+        title,
+        kind: Some(kind),
+        edit: Some(WorkspaceEdit { changes: Some(changes), ..WorkspaceEdit::default() }),
+        ..CodeAction::default()
+    }
+}
+
 /// Quick fixes of diagnostics: the assembler's replacements and missing lines.
 pub(crate) fn fixes(uri: &Uri, text: &Text, range: Range, diagnostics: &[Diagnostic]) -> Vec<CodeAction> {
     let touches = |other: &Range| other.start <= range.end && range.start <= other.end;
-    let fix = |diagnostic: &Diagnostic, title: String, preferred: bool, edit: TextEdit| {
-        // `Uri` caches its parsed form through interior mutability; the protocol's types require it as a key.
-        #[allow(clippy::mutable_key_type)]
-        let changes = HashMap::from([(uri.clone(), vec![edit])]);
-        CodeAction {
-            title,
-            kind: Some(CodeActionKind::QUICKFIX),
-            diagnostics: Some(vec![diagnostic.clone()]),
-            edit: Some(WorkspaceEdit { changes: Some(changes), ..WorkspaceEdit::default() }),
-            is_preferred: Some(preferred),
-            ..CodeAction::default()
-        }
+    let fix = |diagnostic: &Diagnostic, title: String, preferred: bool, edit: TextEdit| CodeAction {
+        diagnostics: Some(vec![diagnostic.clone()]),
+        is_preferred: Some(preferred),
+        ..action(uri, title, CodeActionKind::QUICKFIX, edit)
     };
     let mut found = Vec::new();
     for diagnostic in diagnostics.iter().filter(|diagnostic| touches(&diagnostic.range)) {

@@ -65,6 +65,7 @@ impl Server {
         self.client = Client {
             encoding,
             wants_counted: experimental["takt/counted"] == true,
+            runs: experimental["takt/runs"] == true,
             snippets: item.and_then(|item| item.snippet_support).unwrap_or(false),
             refreshes_hints: workspace.inlay_hint.and_then(|hint| hint.refresh_support).unwrap_or(false),
             refreshes_lenses: workspace.code_lens.and_then(|lens| lens.refresh_support).unwrap_or(false),
@@ -173,7 +174,7 @@ fn capabilities(encoding: Encoding) -> ServerCapabilities {
         }),
         selection_range_provider: Some(SelectionRangeProviderCapability::Simple(true)),
         code_action_provider: Some(CodeActionProviderCapability::Options(CodeActionOptions {
-            code_action_kinds: Some(vec![CodeActionKind::QUICKFIX]),
+            code_action_kinds: Some(vec![CodeActionKind::QUICKFIX, CodeActionKind::REFACTOR_REWRITE]),
             ..CodeActionOptions::default()
         })),
         code_lens_provider: Some(CodeLensOptions { resolve_provider: Some(false) }),

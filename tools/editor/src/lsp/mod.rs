@@ -17,6 +17,7 @@ mod outline;
 mod pipeline;
 mod program;
 mod requests;
+mod rewrite;
 mod signature;
 mod text;
 mod timing;
@@ -100,6 +101,8 @@ struct Client {
     refreshes_lenses: bool,
     /// The client draws the pipeline itself, and is notified when a program's cycles have been counted.
     wants_counted: bool,
+    /// The client has the commands `takt.run` and `takt.debug`.
+    runs: bool,
 }
 
 /// Phase of the session.

@@ -4,15 +4,16 @@
 use crate::lsp::pipeline::{self, Pipeline, ProgramFacts};
 use crate::lsp::program::{AssemblyResult, CountedProgram, File, Front};
 use crate::lsp::text::Text;
-use crate::lsp::{Server, complete, diagnostics, hover, names, outline, signature, timing, uri};
+use crate::lsp::{Server, complete, diagnostics, hover, names, outline, rewrite, signature, timing, uri};
 use lsp_server::ErrorCode;
 use lsp_types::{
-    CodeActionParams, CodeLens, Command, CompletionList, CompletionParams, DocumentFormattingParams,
-    DocumentHighlight, DocumentLink, DocumentOnTypeFormattingParams, DocumentRangeFormattingParams,
-    FoldingRangeParams, Hover, HoverContents, InlayHint, InlayHintLabel, InlayHintParams, InlayHintTooltip,
-    Location, MarkupContent, MarkupKind, Position, Range, ReferenceParams, RenameParams,
-    SelectionRangeParams, SemanticTokens, SemanticTokensParams, SemanticTokensRangeParams, SymbolInformation,
-    TextDocumentIdentifier, TextDocumentPositionParams, TextEdit, Uri, WorkspaceEdit, WorkspaceSymbolParams,
+    CodeActionKind, CodeActionParams, CodeLens, Command, CompletionList, CompletionParams,
+    DocumentFormattingParams, DocumentHighlight, DocumentLink, DocumentOnTypeFormattingParams,
+    DocumentRangeFormattingParams, FoldingRangeParams, Hover, HoverContents, InlayHint, InlayHintLabel,
+    InlayHintParams, InlayHintTooltip, Location, MarkupContent, MarkupKind, Position, Range, ReferenceParams,
+    RenameParams, SelectionRangeParams, SemanticTokens, SemanticTokensParams, SemanticTokensRangeParams,
+    SymbolInformation, TextDocumentIdentifier, TextDocumentPositionParams, TextEdit, Uri, WorkspaceEdit,
+    WorkspaceSymbolParams,
 };
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -27,10 +28,19 @@ pub(crate) struct Failed(pub(crate) ErrorCode, pub(crate) String);
 /// Limit on the names of an answer to `workspace/symbol`.
 const SYMBOLS: usize = 500;
 
+/// Lenses that run a program: title, and the command of a client that has `takt/runs` among its experimental capabilities. The argument is
+/// the document's URI.
+const RUNS: [(&str, &str); 2] = [("run", "takt.run"), ("debug", "takt.debug")];
+
 /// A name contains the letters of a query in their order, whatever their case.
 fn within(query: &str, name: &str) -> bool {
     let mut letters = name.chars().flat_map(char::to_lowercase);
     query.chars().flat_map(char::to_lowercase).all(|wanted| letters.any(|letter| letter == wanted))
+}
+
+/// A kind of code actions is another, or one of its parts: `refactor.rewrite` of `refactor`.
+fn is_of_kind(kind: &str, wanted: &str) -> bool {
+    kind.strip_prefix(wanted).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
 }
 
 /// Deserialises the parameters of a message.
@@ -415,7 +425,19 @@ impl Server {
         let old = here.full.and_then(|full| full.files.named(&here.file.name));
         let head = |name: &str| old.and_then(|file| outline::head_line(file, name));
         let lenses = timing::lenses(counted, &self.settings, &here.file.name, &head);
-        Ok(lenses.into_iter().filter_map(lens).collect())
+        let mut lenses: Vec<CodeLens> = lenses.into_iter().filter_map(lens).collect();
+        let is_program = self.workspace.roots(&here.path).contains(&here.path);
+        if self.client.runs
+            && is_program
+            && let Some(first) = lenses.iter().map(|lens| lens.range).min_by_key(|range| range.start)
+        {
+            lenses.extend(RUNS.map(|(title, command)| {
+                let (title, command) = (title.to_owned(), command.to_owned());
+                let command = Command { title, command, arguments: Some(vec![json!(uri.as_str())]) };
+                CodeLens { range: first, command: Some(command), data: None }
+            }));
+        }
+        Ok(lenses)
     }
 
     fn fixes(&self, params: &CodeActionParams) -> Vec<lsp_types::CodeAction> {
@@ -423,7 +445,25 @@ impl Server {
         let sent: Vec<_> =
             self.published.get(&path).into_iter().flat_map(|by| by.values().flatten().cloned()).collect();
         let Some(text) = self.workspace.open.get(&path) else { return Vec::new() };
-        diagnostics::fixes(&params.text_document.uri, text, params.range, &sent)
+        let uri = &params.text_document.uri;
+        let mut actions = diagnostics::fixes(uri, text, params.range, &sent);
+        if let Ok(here) = self.request_context(uri) {
+            let byte = here.file.text.byte(params.range.start, self.client.encoding);
+            let rewrites = rewrite::rewrites(here.front, here.file, byte).into_iter();
+            actions.extend(rewrites.map(|rewrite| {
+                let range = here.file.text.range(rewrite.bytes, self.client.encoding);
+                let title =
+                    format!("write `{}`", rewrite.text.split_whitespace().collect::<Vec<_>>().join(" "));
+                let edit = TextEdit { range, new_text: rewrite.text };
+                diagnostics::action(uri, title, CodeActionKind::REFACTOR_REWRITE, edit)
+            }));
+        }
+        let only = params.context.only.as_deref();
+        let is_wanted = |kind: &CodeActionKind| {
+            only.is_none_or(|only| only.iter().any(|wanted| is_of_kind(kind.as_str(), wanted.as_str())))
+        };
+        actions.retain(|action| action.kind.as_ref().is_none_or(is_wanted));
+        actions
     }
 
     /// Edits that format the document.

@@ -33,7 +33,7 @@ async function start() {
   client.registerFeature({
     getState: () => ({ kind: 'static' }),
     fillClientCapabilities: (capabilities) => {
-      capabilities.experimental = { ...capabilities.experimental, 'takt/counted': true };
+      capabilities.experimental = { ...capabilities.experimental, 'takt/counted': true, 'takt/runs': true };
     },
     initialize: () => undefined,
     clear: () => undefined,
@@ -114,6 +114,40 @@ const configurations: vscode.DebugConfigurationProvider = {
   },
 };
 
+/** Runs a program on the emulator, in a task. */
+async function run(uri: vscode.Uri) {
+  const file = vscode.workspace.asRelativePath(uri, false);
+  const inputs = await table(uri);
+  const definition: Definition = { type: 'takt', command: 'run', file, ...(inputs && { arguments: ['--inputs', inputs] }) };
+  const one = task(definition, vscode.workspace.getWorkspaceFolder(uri) ?? vscode.TaskScope.Workspace);
+  if (one) await vscode.tasks.executeTask(one);
+}
+
+/** Debugs a program. */
+async function debug(uri: vscode.Uri) {
+  const inputs = await table(uri);
+  const configuration = { type: 'takt', request: 'launch', name: 'Takt', program: uri.fsPath, ...(inputs && { inputs }) };
+  await vscode.debug.startDebugging(vscode.workspace.getWorkspaceFolder(uri), configuration);
+}
+
+/** Command of a code lens, which gives the program's URI, or of the palette, which gives none: then the active editor's program. */
+function runs(command: (uri: vscode.Uri) => Promise<void>) {
+  return async (uri?: string) => {
+    const document = vscode.window.activeTextEditor?.document;
+    const file = uri === undefined ? document?.uri : vscode.Uri.parse(uri);
+    if (file?.scheme !== 'file') return void vscode.window.showInformationMessage('Takt: only a program in a file runs: save it first.');
+    await vscode.workspace.textDocuments.find((open) => open.uri.toString() === file.toString())?.save();
+    await command(file);
+  };
+}
+
+/** Table of inputs of the program's name, as `pi.csv` of `pi.s`, if there is one. */
+async function table(uri: vscode.Uri): Promise<string | undefined> {
+  const csv = uri.with({ path: uri.path.replace(/\.[^./]*$/, '.csv') });
+  const isThere = await vscode.workspace.fs.stat(csv).then(() => true, () => false);
+  return isThere ? csv.fsPath : undefined;
+}
+
 /** A document called *.s with a directive that GNU's assembler does not know is a source of Takt; others stay as they are. */
 async function recognise(document: vscode.TextDocument) {
   if (document.languageId !== 'takt' && document.fileName.endsWith('.s') && isSource(document.getText())) {
@@ -146,6 +180,8 @@ export async function activate(context: vscode.ExtensionContext) {
       if (editor?.document.languageId === 'takt') await beside?.open(editor);
       else void vscode.window.showInformationMessage('Takt: the pipeline is that of a Takt source: open one.');
     }),
+    vscode.commands.registerCommand('takt.run', runs(run)),
+    vscode.commands.registerCommand('takt.debug', runs(debug)),
     vscode.commands.registerCommand('takt.gotoCycle', goTo('cycle')),
     vscode.commands.registerCommand('takt.gotoPeriod', goTo('period')),
     vscode.workspace.onDidChangeConfiguration((change) => {
