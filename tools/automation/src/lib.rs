@@ -15,5 +15,5 @@ pub mod venv;
 pub const SPDX: &str = "SPDX-License-Identifier: MIT OR Apache-2.0";
 
 /// Commands of `cargo xtask`; a test in `xtask` compares this list with the command-line parser.
-pub const XTASK: [&str; 10] =
-    ["test", "lint", "docs", "book", "web", "wheel", "extension", "release", "reach", "fuzz"];
+pub const XTASK: [&str; 11] =
+    ["test", "lint", "docs", "book", "web", "pages", "wheel", "extension", "release", "reach", "fuzz"];

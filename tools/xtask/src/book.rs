@@ -14,6 +14,7 @@ use std::path::{Component, Path, PathBuf};
 use std::process::Command;
 use takt_automation::check_cache::Inputs;
 use takt_automation::command::{cargo, root, run};
+use takt_automation::progress;
 use takt_programs::listings::listings;
 
 /// The parts of the site.
@@ -40,6 +41,11 @@ impl Arguments {
     /// Documents alone, with a check of links.
     pub(crate) const DOCUMENTS: Arguments =
         Arguments { no_rustdoc: true, no_web: false, no_playground: true, test: false };
+
+    /// Documents and playground, as a static host serves them; `no_web`: with the playground as it was built last.
+    pub(crate) const fn pages(no_web: bool) -> Arguments {
+        Arguments { no_rustdoc: true, no_web, no_playground: false, test: false }
+    }
 }
 
 /// mdbook version that the site supports.
@@ -82,7 +88,9 @@ pub(crate) fn book(arguments: &Arguments) -> Result<()> {
         }
     }
     write_source(&root().join("docs"), &source)?;
-    run(Command::new(mdbook).arg("build").arg(&source).arg("--dest-dir").arg(&site))?;
+    progress::step("the book's pages", || {
+        run(Command::new(mdbook).arg("build").arg(&source).arg("--dest-dir").arg(&site))
+    })?;
     if !arguments.no_playground {
         copy(&root().join(web::PAGE), &site.join("playground"))?;
     }
@@ -90,14 +98,21 @@ pub(crate) fn book(arguments: &Arguments) -> Result<()> {
         // Document the libraries only; packages for work on the project itself have no external users.
         let excluded = ["xtask", "unify", "takt-benches", "takt"];
         let excluded = excluded.iter().flat_map(|package| ["--exclude", package]);
-        run(cargo().args(["doc", "--workspace", "--no-deps", "--lib", "--release"]).args(excluded))?;
+        let mut document = cargo();
+        document.args(["doc", "--workspace", "--no-deps", "--lib", "--release"]).args(excluded);
+        progress::step("the crates' documentation", || run(&mut document))?;
         copy(&root().join("target/doc"), &site.join("api"))?;
     }
     let (pages, links) = check_links(&site)?;
     println!(
         "{pages} pages in {SITE}, {links} links checked: `python3 -m http.server -d {SITE}` serves them"
     );
-    if arguments.test { web::in_browser("test/book.test.mjs", &[("TAKT_BOOK", &site)]) } else { Ok(()) }
+    if arguments.test { test(&site) } else { Ok(()) }
+}
+
+/// Opens a site in a headless browser, below a folder of its host.
+pub(crate) fn test(site: &Path) -> Result<()> {
+    web::in_browser("test/book.test.mjs", &[("TAKT_BOOK", site)])
 }
 
 /// Inputs of the documentation check.
@@ -120,10 +135,11 @@ fn mdbook() -> Result<PathBuf> {
             return Ok(program);
         }
     }
-    eprintln!("mdbook {MDBOOK} is missing: installing it into {TOOLS}");
     // A debug build: mdbook runs for only a second, so compile time dominates.
     let install = ["install", "mdbook", "--version", MDBOOK, "--locked", "--debug", "--root", TOOLS];
-    run(cargo().args(install).args(["--no-default-features", "--features", "search"]))?;
+    progress::step(&format!("installing mdbook {MDBOOK} into {TOOLS}, as it is missing"), || {
+        run(cargo().args(install).args(["--no-default-features", "--features", "search"]))
+    })?;
     Ok(own)
 }
 
@@ -244,7 +260,21 @@ fn chapter(name: &str, text: &str, folder: &Path) -> Result<String> {
         rest = &rest[fence..];
     }
     out.push_str(rest);
-    outside(name, &out, folder)
+    outside(name, &uncommented(&out), folder)
+}
+
+/// Drops comments, which are for those who write the documents.
+fn uncommented(text: &str) -> String {
+    let mut parts = text.split("<!--");
+    let mut out = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        let rest = part.split_once("-->").map_or(part, |(_, rest)| rest);
+        // A comment on lines of its own leaves none.
+        let is_alone = out.is_empty() || out.ends_with('\n');
+        let rest = if is_alone { rest.strip_prefix('\n').unwrap_or(rest) } else { rest };
+        out.push_str(rest);
+    }
+    out
 }
 
 /// Replaces file names in link texts, as in `[glossary.md](glossary.md)`, by titles.
@@ -318,7 +348,7 @@ fn normal(path: &Path) -> PathBuf {
     out
 }
 
-fn copy(from: &Path, to: &Path) -> Result<()> {
+pub(crate) fn copy(from: &Path, to: &Path) -> Result<()> {
     std::fs::create_dir_all(to)?;
     for entry in std::fs::read_dir(from).with_context(|| format!("cannot read {}", from.display()))? {
         let path = entry?.path();
@@ -338,37 +368,57 @@ fn attributes<'p>(page: &'p str, name: &str) -> Vec<&'p str> {
     page.split(pattern.as_str()).skip(1).filter_map(|rest| rest.split('"').next()).collect()
 }
 
-/// Checks every link of the book's own pages, including the anchor. Returns the numbers of pages and links.
-fn check_links(site: &Path) -> Result<(usize, usize)> {
+/// Follows every link from `index.html` on, and checks that it is relative and leads to a file, and to a place in it if it names one.
+/// Returns the numbers of pages and links. The crates' documentation is not followed.
+pub(crate) fn check_links(site: &Path) -> Result<(usize, usize)> {
+    let [api, playground] = ["api", "playground"].map(|part| site.join(part));
+    let left_out: Vec<&PathBuf> = [&api, &playground].into_iter().filter(|part| !part.exists()).collect();
     let mut pages = BTreeMap::new();
-    for entry in std::fs::read_dir(site)? {
-        let path = entry?.path();
-        if path.extension().is_some_and(|extension| extension == "html") {
-            pages.insert(path.clone(), std::fs::read_to_string(&path)?);
+    let mut places = Vec::new();
+    let (mut left, mut broken, mut count) = (vec![site.join("index.html")], Vec::new(), 0);
+    while let Some(path) = left.pop() {
+        if pages.contains_key(&path) || path.starts_with(&api) {
+            continue;
         }
-    }
-    let left_out: Vec<PathBuf> =
-        ["api", "playground"].map(|part| site.join(part)).into_iter().filter(|part| !part.exists()).collect();
-    let (mut broken, mut count) = (Vec::new(), 0);
-    for (path, page) in &pages {
-        let page_name = path.file_name().unwrap_or_default().to_string_lossy();
-        let links = attributes(page, "href").into_iter().chain(attributes(page, "src"));
-        for link in links.filter(|link| !link.contains(':') && !link.starts_with("//") && !link.is_empty()) {
+        let page =
+            std::fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()))?;
+        let name = path.strip_prefix(site).unwrap_or(&path).display().to_string();
+        let folder = path.parent().unwrap_or(site);
+        let of = |attribute| attributes(&page, attribute).into_iter().map(move |link| (attribute, link));
+        for (attribute, link) in of("href").chain(of("src")).filter(|(_, link)| !link.is_empty()) {
             let link = link.replace("&amp;", "&");
+            if link.starts_with('/') || attribute == "src" && link.contains("://") {
+                broken.push(format!("{name}: {link} is not relative"));
+                continue;
+            }
+            if link.contains(':') {
+                continue;
+            }
             let (file, place) = link.split_once('#').unwrap_or((&link, ""));
-            let target =
-                if file.is_empty() { path.clone() } else { normal(&site.join(file.trim_start_matches('/'))) };
+            let mut target = if file.is_empty() { path.clone() } else { normal(&folder.join(file)) };
             if left_out.iter().any(|part| target.starts_with(part)) {
                 continue;
             }
             count += 1;
-            if !target.exists() {
-                broken.push(format!("{page_name}: {link}: there is no such file"));
-            } else if let Some(other) = pages.get(&target).filter(|_| !place.is_empty())
-                && !attributes(other, "id").contains(&place)
-            {
-                broken.push(format!("{page_name}: {link}: there is no such place"));
+            if target.is_dir() {
+                target.push("index.html");
             }
+            if !target.exists() {
+                broken.push(format!("{name}: {link}: there is no such file"));
+            } else if target.extension().is_some_and(|extension| extension == "html") {
+                places.extend(
+                    (!place.is_empty())
+                        .then(|| (target.clone(), place.to_owned(), format!("{name}: {link}"))),
+                );
+                left.push(target);
+            }
+        }
+        pages.insert(path, page);
+    }
+    // The playground's fragments are programs.
+    for (page, place, link) in places.iter().filter(|(page, ..)| !page.starts_with(&playground)) {
+        if pages.get(page).is_some_and(|page| !attributes(page, "id").contains(&place.as_str())) {
+            broken.push(format!("{link}: there is no such place"));
         }
     }
     if !broken.is_empty() {
@@ -390,7 +440,7 @@ mod tests {
             before.contains("<pre><code class=\"language-takt nohighlight hljs\">a\n</code></pre>\n"),
             "{before}"
         );
-        assert!(before.contains("-->") && !before.contains("```"), "{before}");
+        assert!(!before.contains("-->") && !before.contains("```"), "{before}");
         assert!(link.ends_with("\">Open in the playground</a>\n\nend\n"), "{link}");
     }
 
@@ -427,6 +477,38 @@ mod tests {
         }
         std::fs::remove_dir_all(&folder).expect("it can be emptied");
         assert!(broken.is_empty() && count > 300, "{count} links, of which lead nowhere: {broken:#?}");
+    }
+
+    #[test]
+    fn comments_stay_out_of_the_book() {
+        let text = "# T\n\n<!-- Generated; do not edit. -->\n\n1<!-- =n --> µs\n<!-- a\nb -->\nend\n";
+        assert_eq!(uncommented(text), "# T\n\n\n1 µs\nend\n");
+    }
+
+    /// Each broken link is found, whatever the page that has it.
+    #[test]
+    fn links_are_followed_from_the_first_page() {
+        let site = std::env::temp_dir().join(format!("takt-site-{}", std::process::id()));
+        std::fs::create_dir_all(site.join("a")).expect("it can be made");
+        let write =
+            |name: &str, text: &str| std::fs::write(site.join(name), text).expect("it can be written");
+        write("index.html", "<a href=\"a/x.html#p\">");
+        write(
+            "a/x.html",
+            "<b id=\"p\"><a href=\"..\"><a href=\"https://example.org\"><a href=\"../api/y.html\">",
+        );
+        assert_eq!(check_links(&site).expect("all lead somewhere"), (2, 2));
+        for (link, says) in [
+            ("href=\"/index.html\"", "is not relative"),
+            ("src=\"https://example.org/x.js\"", "is not relative"),
+            ("href=\"z.html\"", "there is no such file"),
+            ("href=\"x.html#q\"", "there is no such place"),
+        ] {
+            write("a/x.html", &format!("<b id=\"p\"><a {link}>"));
+            let error = check_links(&site).expect_err(link).to_string();
+            assert!(error.contains("a/x.html: ") && error.contains(says), "{error}");
+        }
+        std::fs::remove_dir_all(&site).expect("it can be emptied");
     }
 
     #[test]

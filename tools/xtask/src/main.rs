@@ -7,6 +7,7 @@ mod changes;
 mod dist;
 mod docs;
 mod figures;
+mod pages;
 mod python;
 mod reach;
 mod release;
@@ -61,6 +62,9 @@ enum Task {
     Book(book::Arguments),
     /// Build the playground, a page for any file server, in target/playground (installs missing tools); --test opens it in a browser.
     Web(web::Arguments),
+    /// Write the folder that a static host serves, target/pages: the book, the playground and the examples, with relative links, all of
+    /// which are followed; --test opens it in a browser.
+    Pages(pages::Arguments),
     /// Build the Python package's wheel, for every Python from 3.10 on (installs maturin in .venv).
     Wheel(python::Arguments),
     /// Build the extension for VS Code, editors/vscode/dist/takt.vsix, with its tests (installs with npm what it lacks).
@@ -137,6 +141,7 @@ fn task(task: Task) -> Result<()> {
         Task::Docs { check } => docs(check),
         Task::Book(arguments) => book::book(&arguments),
         Task::Web(arguments) => web::web(&arguments),
+        Task::Pages(arguments) => pages::pages(&arguments),
         Task::Wheel(arguments) => python::wheel(&arguments),
         Task::Extension { workbench, screenshots } => {
             extension()?;

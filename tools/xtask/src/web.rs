@@ -7,6 +7,7 @@ use clap::Args;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use takt_automation::command::{apt_install, cargo, root, run, works};
+use takt_automation::progress;
 
 /// The steps beyond building the page.
 #[derive(Args)]
@@ -57,11 +58,13 @@ pub(crate) fn build() -> Result<()> {
     for small in SMALL {
         compile.args(["--config", small]);
     }
-    run(&mut compile)?;
+    // Link-time optimisation is a minute or more without a line of cargo's.
+    progress::step("compiling the playground", || run(&mut compile))?;
     let page = packages()?;
     let mut bundle = Command::new("node");
     let compiled = root().join(format!("{TARGET}/{WASM}/release/takt_web.wasm"));
-    run(bundle.arg("build.mjs").arg(compiled).arg(root().join(PAGE)).current_dir(page))?;
+    bundle.arg("build.mjs").arg(compiled).arg(root().join(PAGE)).current_dir(page);
+    progress::step("bundling the playground", || run(&mut bundle))?;
     eprintln!(
         "the playground is in {PAGE}: `python3 -m http.server -d {PAGE}` serves it on http://localhost:8000"
     );
@@ -77,7 +80,9 @@ fn packages() -> Result<PathBuf> {
     let lock = |path: &Path| std::fs::metadata(path).and_then(|about| about.modified()).ok();
     let installed = lock(&page.join("node_modules/.package-lock.json"));
     if installed.is_none() || installed < lock(&page.join("package-lock.json")) {
-        run(Command::new("npm").args(["ci", "--no-audit", "--no-fund"]).current_dir(&page))?;
+        let mut install = Command::new("npm");
+        install.args(["ci", "--no-audit", "--no-fund"]).current_dir(&page);
+        progress::step("npm's packages of the playground", || run(&mut install))?;
     }
     Ok(page)
 }

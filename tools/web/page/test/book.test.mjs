@@ -8,6 +8,8 @@ import { chromium } from "playwright-core";
 
 const SITE = process.env.TAKT_BOOK;
 const TYPES = { ".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml" };
+/** Folder of the host in which the site lies: its links must be relative. */
+const PLACE = "/some/where/";
 /** Time limit in a browser on a busy machine; ms. */
 const PATIENCE = 120_000;
 
@@ -17,13 +19,14 @@ const failed = [];
 before(async () => {
   assert.ok(SITE, "TAKT_BOOK says where the book is: `cargo xtask book --test` sets it");
   server = createServer((request, response) => {
-    const file = join(SITE, normalize(decodeURIComponent(new URL(request.url, "http://x").pathname)).replace(/\/$/, "/index.html"));
-    if (!existsSync(file)) return response.writeHead(404).end();
+    const path = normalize(decodeURIComponent(new URL(request.url, "http://x").pathname)).replace(/\/$/, "/index.html");
+    const file = join(SITE, path.slice(PLACE.length));
+    if (!path.startsWith(PLACE) || !existsSync(file)) return response.writeHead(404).end();
     response.writeHead(200, { "content-type": TYPES[extname(file)] ?? "application/octet-stream" });
     createReadStream(file).pipe(response);
   });
   await new Promise((resolve) => server.listen(0, "127.0.0.1", resolve));
-  address = `http://127.0.0.1:${server.address().port}/`;
+  address = `http://127.0.0.1:${server.address().port}${PLACE}`;
   browser = await chromium.launch({ executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", args: ["--no-sandbox"] });
   page = await browser.newPage({ viewport: { width: 1300, height: 900 } });
   page.setDefaultTimeout(PATIENCE);
@@ -72,7 +75,7 @@ test("every listing opens in the playground by a click, and assembles there", li
   page.setDefaultTimeout(PATIENCE);
   page.on("pageerror", (error) => failed.push(error.message));
   await page.waitForSelector("body[data-ready]");
-  assert.equal(new URL(book.url()).pathname, `/${listings[0].name}`, "the book stays open");
+  assert.equal(new URL(book.url()).pathname, `${PLACE}${listings[0].name}`, "the book stays open");
   for (const { name, hash } of listings) {
     await page.evaluate((hash) => {
       if (location.hash === hash) return;
