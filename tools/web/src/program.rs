@@ -2,29 +2,34 @@
 //! Assembly of the page's program.
 
 use crate::plant::PlantRequest;
-use crate::run::ZERO_PERIODS;
+use crate::run::{ZERO_PERIODS, prepare};
 use crate::{CYCLES, PERIODS, Playground, SOURCE_BYTES, constants, examples, plant, ports, view};
 use serde::Deserialize;
 use serde_json::{Value, json};
+use std::collections::{BTreeMap, HashMap};
 use std::io::Cursor;
 use std::num::NonZeroU64;
 use std::sync::Arc;
 use takt_analysis::SectionBounds;
-use takt_asm::schedule::BlockReport;
 use takt_asm::units;
 use takt_asm::{AssembledProgram, MemoryLoader, Options, Search};
 use takt_debug::console::Console;
 use takt_debug::inputs::{self, Table};
 use takt_debug::session::{self, Session};
-use takt_emu::Rows;
-use takt_isa::Machine;
+use takt_emu::{Emulator, Rows};
 use takt_isa::program::Port;
 use takt_isa::timing::{Cycle, Span};
+use takt_isa::{BundleAddress, Flow, Machine, Program, Type};
+use takt_programs::plants::bits;
 
 /// The loaded program with its inputs.
 pub(crate) struct LoadedProgram {
     pub(crate) name: String,
+    /// Text and machine from which it was assembled.
+    origin: (String, String),
     pub(crate) assembled: AssembledProgram,
+    /// Bits of the parameters in the source, in their order.
+    defaults: Vec<Option<u32>>,
     /// Recorded inputs; `None`: all ports are 0.
     pub(crate) rows: Option<Arc<Rows>>,
     pub(crate) tick: Option<NonZeroU64>,
@@ -36,6 +41,9 @@ pub(crate) struct AssembleRequest {
     name: String,
     source: String,
     machine: String,
+    /// Values of parameters (`.param`) that differ from the source's.
+    #[serde(default)]
+    parameters: BTreeMap<String, f64>,
     /// Input table in CSV with a column for each input port. If it is blank or made for other ports, all ports are 0.
     #[serde(default)]
     inputs: String,
@@ -65,22 +73,39 @@ impl Playground {
     /// Assembles a source, bounds its cycles, and opens a debug session.
     pub(crate) fn assemble(&mut self, wanted: AssembleRequest) -> Result<Value, String> {
         let machine = machine(&wanted.machine)?;
-        (self.loaded, self.console, self.run, self.track) = (None, None, None, None);
+        let before = self.loaded.take();
+        (self.console, self.run, self.track) = (None, None, None);
         if wanted.source.len() > SOURCE_BYTES {
             return Err(format!("the source has more than {} MiB", SOURCE_BYTES >> 20));
         }
         let name = if wanted.name.is_empty() { "main.s".to_owned() } else { wanted.name };
-        let loader =
-            Search::new(MemoryLoader::new(examples::includable_sources())).library(takt_programs::LIBRARY);
-        let options = Options { machine, ..Options::default() };
-        let assembled = match takt_asm::assemble_bytes(&name, wanted.source.into_bytes(), &loader, &options) {
-            Ok(assembled) => assembled,
-            Err(mistakes) => {
-                return Ok(json!({
-                    "assembled": false, "messages": mistakes.messages(), "text": mistakes.render(false),
-                }));
+        let origin = (wanted.source, wanted.machine);
+        // Inputs, plants and parameters leave the schedule as it is.
+        let before = before.filter(|before| before.name == name && before.origin == origin);
+        let (mut assembled, defaults) = match before {
+            Some(LoadedProgram { assembled, defaults, .. }) => (assembled, defaults),
+            None => {
+                let loader = Search::new(MemoryLoader::new(examples::includable_sources()))
+                    .library(takt_programs::LIBRARY);
+                let options = Options { machine, ..Options::default() };
+                let source = origin.0.clone().into_bytes();
+                let assembled = match takt_asm::assemble_bytes(&name, source, &loader, &options) {
+                    Ok(assembled) => assembled,
+                    Err(mistakes) => {
+                        return Ok(json!({
+                            "assembled": false, "messages": mistakes.messages(), "text": mistakes.render(false),
+                        }));
+                    }
+                };
+                let parameters = assembled.program.parameters.iter();
+                let defaults = parameters.map(|port| assembled.program.initial(port.register)).collect();
+                (assembled, defaults)
             }
         };
+        let parameter_error = set_parameters(&mut assembled.program, &defaults, &wanted.parameters).err();
+        if parameter_error.is_some() {
+            set_parameters(&mut assembled.program, &defaults, &BTreeMap::new())?;
+        }
         let program = &assembled.program;
         let empty = program.bundles() == 0;
         let table = wanted.inputs.as_bytes();
@@ -108,10 +133,12 @@ impl Playground {
             Some((Err(error), _)) => (rows, None, Some(error)),
             None => (rows, None, None),
         };
-        let loaded = LoadedProgram { name, assembled, rows, tick: NonZeroU64::new(wanted.tick) };
+        let tick = NonZeroU64::new(wanted.tick);
+        let loaded = LoadedProgram { name, origin, assembled, defaults, rows, tick };
         let mut told = facts(&loaded);
         told["plant"] = json!(plant.map(|plant| json!({ "name": plant.name })));
         told["plant_error"] = json!(plant_error);
+        told["parameter_error"] = json!(parameter_error);
         told["inputs_error"] = json!(inputs_error);
         told["inputs_of_others"] = json!(others);
         if !empty && inputs_error.is_none() {
@@ -123,6 +150,43 @@ impl Playground {
         self.loaded = Some(loaded);
         Ok(told)
     }
+}
+
+/// Gives each parameter its value in the source, or the one that is wanted.
+fn set_parameters(
+    program: &mut Program,
+    defaults: &[Option<u32>],
+    wanted: &BTreeMap<String, f64>,
+) -> Result<(), String> {
+    let ports = program.parameters.clone();
+    for (port, default) in ports.iter().zip(defaults) {
+        if let Some(bits) = default {
+            program.set_parameter(&port.name, *bits).map_err(|error| error.to_string())?;
+        }
+    }
+    for (name, value) in wanted {
+        let ty = program.parameter(name).map_err(|error| error.to_string())?.ty;
+        program.set_parameter(name, bits(ty, *value)).map_err(|error| error.to_string())?;
+    }
+    Ok(())
+}
+
+/// Parameters of the program with their values, for sliders.
+fn parameters(program: &Program, sources: &[(String, String)]) -> Vec<Value> {
+    let one = |port: &Port| {
+        let bits = program.initial(port.register)?;
+        let value = match port.ty {
+            Type::F => f64::from(f32::from_bits(bits)),
+            Type::I | Type::B => f64::from(bits.cast_signed()),
+        };
+        let (low, high) = program.range(port.register).map(|range| range.ends()).unzip();
+        let whole = port.ty != Type::F;
+        Some(json!({
+            "name": port.name, "value": value, "unit": units::unit(sources, ".param", &port.name), "integer": true,
+            "whole": whole, "low": low, "high": high,
+        }))
+    };
+    program.parameters.iter().filter_map(one).collect()
 }
 
 impl LoadedProgram {
@@ -144,6 +208,29 @@ impl LoadedProgram {
     }
 }
 
+/// First bundle of a period, and the cycles that no schedule of the blocks and loops on its path falls below; `None` if the path depends on
+/// data, or does not end.
+fn least_of_path(assembled: &AssembledProgram) -> Option<(BundleAddress, Cycle)> {
+    let program = &assembled.program;
+    let mut emulator = Emulator::new(program).ok()?;
+    prepare(&mut emulator, None, 0).ok()?;
+    takt_analysis::trace(&mut emulator).ok()?;
+    prepare(&mut emulator, None, 0).ok()?;
+    let issues = takt_analysis::trace(&mut emulator).ok()?.issues;
+    let blocks = assembled.blocks.iter().map(|block| (block.address, block.bound.cycles()));
+    let kernels = assembled.loops.iter().map(|one| (one.address, one.bound.cycles()));
+    let bounds: HashMap<BundleAddress, u32> = kernels.chain(blocks).collect();
+    let mut least = 0;
+    for issue in &issues {
+        let bundle = program.bundle(issue.address)?.ok()?;
+        if bundle.iter().any(|one| matches!(one.flow(), Flow::Branch { .. })) {
+            return None;
+        }
+        least += bounds.get(&issue.address).copied().map_or(0, Cycle::from);
+    }
+    Some((issues.first()?.address, least))
+}
+
 /// Facts about the assembled program, for the page.
 fn facts(loaded: &LoadedProgram) -> Value {
     let LoadedProgram { assembled, name, .. } = loaded;
@@ -158,13 +245,14 @@ fn facts(loaded: &LoadedProgram) -> Value {
     };
     let ports = |ports: &[Port], what: &str| ports.iter().map(|one| port(one, what)).collect::<Vec<_>>();
     let span = |span: Span| json!({ "best": span.best, "worst": span.worst });
+    let path = least_of_path(assembled);
     let section = |section: &SectionBounds| {
         let cycles = if section.once { section.cycles } else { section.in_time };
-        // Only of a section that is a single block, the block's bound is the section's.
-        let is_whole = |block: &&BlockReport| {
-            block.address == section.address && Cycle::from(block.cycles) == section.cycles.worst
+        // A period of one path takes the same cycles always; its first bundle may have waited for the tick.
+        let is_one_path = |(address, _): &(BundleAddress, Cycle)| {
+            *address == section.address && section.cycles.best == section.cycles.worst && !section.once
         };
-        let least = assembled.blocks.iter().find(is_whole).map(|block| block.bound.cycles());
+        let least = path.filter(is_one_path).map(|(_, least)| least);
         json!({ "name": section.name, "once": section.once, "cycles": span(cycles), "least": least })
     };
     let (bounds, no_bound) = match takt_analysis::bound(program) {
@@ -180,6 +268,7 @@ fn facts(loaded: &LoadedProgram) -> Value {
         "bundles": program.bundles(),
         "words": program.code.len(),
         "settable": constants::settable(assembled),
+        "parameters": parameters(program, &sources),
         "sampling_period": units::sampling_period(&sources, &assembled.constants),
         "data_words": program.data.len(),
         "inputs": ports(&program.inputs, ".input"),

@@ -28,17 +28,20 @@ pub(crate) const PAGE: &str = "target/playground";
 /// Build folder of the page.
 const TARGET: &str = "target/web";
 
-/// Cargo settings for a small download: optimisation for size, and link-time optimisation.
-const SMALL: [&str; 9] = [
+/// Cargo settings for a small download: optimisation for size, most of all of what runs rarely, and link-time optimisation.
+const SMALL: [&str; 12] = [
     "profile.release.opt-level=\"s\"",
     "profile.release.lto=\"fat\"",
     "profile.release.codegen-units=1",
-    "profile.release.package.takt-programs.opt-level=\"s\"",
-    "profile.release.package.takt-system.opt-level=\"s\"",
-    "profile.release.package.takt-robot.opt-level=\"s\"",
-    "profile.release.package.takt-rtl.opt-level=\"s\"",
     "profile.release.package.takt-syntax.opt-level=\"s\"",
-    "profile.release.package.toml.opt-level=\"s\"",
+    "profile.release.package.takt-editor.opt-level=\"z\"",
+    "profile.release.package.takt-programs.opt-level=\"z\"",
+    "profile.release.package.takt-system.opt-level=\"z\"",
+    "profile.release.package.takt-robot.opt-level=\"z\"",
+    "profile.release.package.takt-rtl.opt-level=\"z\"",
+    "profile.release.package.toml.opt-level=\"z\"",
+    "profile.release.package.serde_json.opt-level=\"z\"",
+    "profile.release.package.lsp-types.opt-level=\"z\"",
 ];
 
 pub(crate) fn web(arguments: &Arguments) -> Result<()> {

@@ -43,13 +43,16 @@ export async function unpack(fragment) {
   const program = JSON.parse(new TextDecoder("utf-8", { fatal: true }).decode(bytes));
   if (typeof program?.source !== "string") throw new Error("it holds no source");
   const word = (value) => (typeof value === "string" ? value : "");
-  return { name: word(program.name), machine: word(program.machine), inputs: word(program.inputs), source: program.source, ...(Number.isInteger(program.periods) && { periods: program.periods }), ...(program.plant && { plant: plantOf(program.plant) }) };
+  return { name: word(program.name), machine: word(program.machine), inputs: word(program.inputs), source: program.source, ...(Number.isInteger(program.periods) && { periods: program.periods }), ...(program.plant && { plant: plantOf(program.plant) }), parameters: numbers(program.parameters) };
 }
 
 /** The plant in a link: a name, and numbers for parameters. */
 function plantOf({ name, parameters }) {
-  return typeof name === "string" ? { name, parameters: Object.fromEntries(Object.entries(parameters ?? {}).filter(([, value]) => Number.isFinite(value))) } : null;
+  return typeof name === "string" ? { name, parameters: numbers(parameters) } : null;
 }
+
+/** Numbers by name, of what is in a link. */
+const numbers = (all) => Object.fromEntries(Object.entries(all ?? {}).filter(([, value]) => Number.isFinite(value)));
 
 async function unpackBounded(packed) {
   const reader = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate")).getReader();

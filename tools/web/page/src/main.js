@@ -1,5 +1,6 @@
 import { Pipeline } from "../../../../emu/analysis/src/pipeline.js";
 import "../../../../emu/analysis/src/pipeline.css";
+import { PERIODS, collect } from "./collect.js";
 import { Documents } from "./documents.js";
 import { Drive } from "./drive.js";
 import { Editor, reader } from "./editor.js";
@@ -7,7 +8,7 @@ import { LINK_CHARACTERS, pack, unpack } from "./link.js";
 import { Plots } from "./plot.js";
 import { save } from "./parts.js";
 import { taker } from "./take.js";
-import { Stopped, Thread, load } from "./thread.js";
+import { Stopped, Thread, fetched, load } from "./thread.js";
 import { Tuning } from "./tuning.js";
 import "./style.css";
 
@@ -18,14 +19,11 @@ const plural = (count, noun) => `${count.toLocaleString("en")} ${noun}${count ==
 const PAUSE = 400, SOON = 1000;
 /** Delay after which a slider's result that is still to come dims the result before; ms. */
 const LATE = 400;
-/** Default number of periods of a program without inputs. */
-const PERIODS = 20;
-
 /** Reason given for stopping a worker when another program is opened. */
 const REPLACED = "another program was opened";
 
 const state = { works: 0, breaks: [], name: "main.s", about: null, program: null, stale: true, run: null, took: 0, document: null };
-let machine, editor, plots, pipeline, drive, documents, tuning, plant;
+let machine, editor, plots, pipeline, drive, documents, tuning, parameters, plant;
 
 /** Shows an error; with `act` (text and action of a button), a notice. */
 function notice(message, act) {
@@ -121,7 +119,7 @@ function changed(event) {
   if (state.tuning) state.dims = setTimeout(dim, LATE);
   else {
     dim();
-    tuning.enabled = plant.enabled = false;
+    tuning.enabled = parameters.enabled = plant.enabled = false;
     plots.before = null;
   }
   // A reported mistake also belongs to the previous text.
@@ -169,7 +167,7 @@ function keep() {
   // Do not overwrite another page's changes with a document that is merely displayed here.
   if (!state.document || !state.dirty) return;
   state.dirty = false;
-  Object.assign(state.document, { name: state.name, machine: el("machine").value, source: editor.text, inputs: table(), periods: periods(), plant: state.plant });
+  Object.assign(state.document, { name: state.name, machine: el("machine").value, source: editor.text, inputs: table(), periods: periods(), plant: state.plant, parameters: state.parameters });
   documents.write(state.document);
   showDocuments();
 }
@@ -224,12 +222,13 @@ function useMachine() {
   return assemble();
 }
 
-async function open({ name, source, inputs, periods, plant, machine: wanted }) {
+async function open({ name, source, inputs, periods, plant, parameters, machine: wanted }) {
   if (machine.busy) machine.stop(REPLACED);
   clearTimeout(state.soon);
   state.opening = true;
   state.name = name || "main.s";
   state.plant = plant ?? null;
+  state.parameters = parameters ?? {};
   if (wanted?.includes("\n")) offer(wanted);
   else if ([...el("machine").options].some((option) => option.value === wanted)) el("machine").value = wanted;
   el("table").value = inputs ?? "";
@@ -247,9 +246,11 @@ async function open({ name, source, inputs, periods, plant, machine: wanted }) {
 function empty() {
   const known = seconds(), why = `Assembling ${state.name}${known ? `, about ${known} s` : ""} …`;
   state.shown = state.program = state.run = state.drawn = null;
+  state.ahead = false;
   document.body.classList.remove("stale");
   drive.clear();
   tuning.clear();
+  parameters.clear();
   plant.clear();
   el("loop").hidden = true;
   plots.clear(why);
@@ -316,6 +317,7 @@ function showCycles() {
   for (const section of periods) put(` · ${section.name} takes ${range(section.cycles)} whatever the inputs`);
   if (once) put(` · once ${range(once.cycles)}`);
   if (program.no_bound) put(` · no bound: ${program.no_bound}`);
+  if (program.parameter_error) put(` · parameters as in the source: ${program.parameter_error}`, "em");
   if (program.plant_error) put(` · the loop is open: ${program.plant_error}`, "em");
   if (program.inputs_of_others) put(` · all inputs are 0: ${program.inputs_of_others}`, "em");
 }
@@ -333,12 +335,13 @@ function showProgram(program) {
   document.body.classList.toggle("stale", !whole && state.shown !== null);
   if (whole) {
     tuning.show(program.settable);
+    parameters.show(program.parameters);
     showPlants();
   }
   if (whole || state.shown === null) {
     const why = program.assembled ? wrong && `The inputs cannot be read: ${wrong}` : "The program does not assemble: see Messages.";
     // The curves before stay until those of a slider's new value are there.
-    if (!state.tuning) {
+    if (!state.tuning && !(state.ahead && whole)) {
       state.run = null;
       el("fault").textContent = "";
       el("ran").textContent = "";
@@ -359,7 +362,10 @@ function showProgram(program) {
   if (!whole || !state.tuning) showCycles();
 }
 
-const asked = () => ({ name: state.name, source: editor.text, machine: el("machine").value, inputs: table(), tick: Number(el("tick").value) || 0, plant: state.plant, periods: periods() });
+const asked = () => ({ name: state.name, source: editor.text, machine: el("machine").value, inputs: table(), tick: Number(el("tick").value) || 0, plant: state.plant, parameters: state.parameters, periods: periods() });
+
+/** Text of a program's parameter. */
+const parameterOf = (name) => String(state.parameters[name] ?? state.program?.parameters?.find((one) => one.name === name)?.value);
 
 /** Shows the plants that the program's ports fit, and the parameters of the one that closes the loop. */
 function showPlants() {
@@ -382,11 +388,32 @@ function usePlant(plant, event) {
   changed(event);
 }
 
+/**
+ * Shows the curves of a shipped example that takes long to assemble, from the build's run of it, which gives the same; all else waits for
+ * the machine.
+ */
+async function showAhead(wanted, isOver) {
+  const { works } = state, example = state.about.examples.find(({ name, seconds }) => seconds && name === wanted.name);
+  if (state.shown !== null || !example) return;
+  try {
+    const ahead = JSON.parse(new TextDecoder().decode(await fetched(`ahead/${example.name}.json.gz`)));
+    if (isOver() || works !== state.works || state.stale || JSON.stringify(ahead.asked) !== JSON.stringify(wanted)) return;
+    Object.assign(state, { program: { ...ahead.program, blank: !wanted.inputs.trim() }, run: ahead.run, ahead: true });
+    plots.show(ahead.run, state.program);
+    showCycles();
+    el("cycles").append(` · assembling it here, to step through it …`);
+  } catch {
+    // The page's folder lacks the file: the results come with the assembled program.
+  }
+}
+
 /** Assembles the program, and restores the breakpoints. */
 async function begin() {
   const { version } = editor;
-  const wanted = asked();
-  state.program = Object.assign(await machine.call("assemble", wanted), { blank: !wanted.inputs.trim() });
+  const wanted = asked(), answer = machine.call("assemble", wanted);
+  let over = false;
+  showAhead(wanted, () => over);
+  state.program = Object.assign(await answer.finally(() => (over = true)), { blank: !wanted.inputs.trim() });
   if (state.program.settable) editor.know(state.program.settable, version);
   await setStops();
   showProgram(state.program);
@@ -442,20 +469,13 @@ async function current() {
 }
 
 async function run() {
-  const whole = { cycles: [], inputs: {}, outputs: {} };
-  for (let begin = true, over = false; !over; begin = false) {
-    const part = await machine.call("run", { begin, periods: periods() });
-    whole.cycles.push(...part.cycles);
-    for (const kind of ["inputs", "outputs"]) for (const [name, values] of Object.entries(part[kind])) (whole[kind][name] ??= []).push(...values);
-    Object.assign(whole, { missed: part.missed, total: part.total, operations: part.operations });
-    over = part.over;
+  const whole = await collect((method, params) => machine.call(method, params), periods(), (part) => {
     el("ran").textContent = `${plural(part.done, "period")}${part.all > part.done ? ` of ${part.all.toLocaleString("en")}` : ""}, ${plural(part.total, "cycle")}, ${plural(part.operations, "operation")}; flags: ${part.flags}${part.halted ? "; halted" : ""}${part.nan_writes ? `; ${plural(part.nan_writes, "NaN")} written to ports` : ""}`;
     el("fault").textContent = text(part.fault);
     if (part.fault) select("plot");
-  }
-  whole.shortest = whole.cycles.reduce((a, b) => Math.min(a, b), Infinity);
-  whole.longest = whole.cycles.reduce((a, b) => Math.max(a, b), 0);
+  });
   state.run = whole;
+  state.ahead = false;
   el("which").value = Math.min(state.which ?? 2, whole.cycles.length);
   plots.show(whole, state.program);
   showCycles();
@@ -586,7 +606,7 @@ async function reveal(operation) {
 
 async function link() {
   try {
-    const fragment = await pack({ name: state.name, machine: el("machine").value, source: editor.text, inputs: table(), periods: periods(), plant: state.plant });
+    const fragment = await pack({ name: state.name, machine: el("machine").value, source: editor.text, inputs: table(), periods: periods(), plant: state.plant, parameters: state.parameters });
     history.replaceState(null, "", `#${fragment}`);
     // A reload shows this document again.
     state.document.key = fragment;
@@ -659,6 +679,13 @@ async function start() {
   plant = new Tuning(el("plant"), {
     begins: (differs) => plots.keep(differs), textOf: (name) => valueOf(name),
     sets: (texts) => usePlant({ ...state.plant, parameters: { ...state.plant.parameters, ...Object.fromEntries([...texts].map(([name, text]) => [name, Number(text)])) } }, "tune"),
+  });
+  parameters = new Tuning(el("parameters"), {
+    begins: (differs) => plots.keep(differs), textOf: parameterOf,
+    sets: (texts) => {
+      state.parameters = { ...state.parameters, ...Object.fromEntries([...texts].map(([name, text]) => [name, Number(text)])) };
+      changed("tune");
+    },
   });
   plots = new Plots(el("charts"), el("choice"), { axis: el("axis"), length: el("length"), together: el("together") });
   pipeline = new Pipeline(el("pipeline-picture"), reveal);

@@ -1,7 +1,7 @@
 // Worker whose answers are promises, and which can be stopped and restarted.
 
-/** Loads the compiled WebAssembly, which is fetched once and shared by the workers. */
-export async function load(url) {
+/** Bytes of a file that may be compressed. */
+export async function fetched(url) {
   const answer = await fetch(url);
   if (!answer.ok) throw new Error(`${url} cannot be had: ${answer.status} ${answer.statusText}`);
   let bytes = await answer.arrayBuffer();
@@ -11,8 +11,11 @@ export async function load(url) {
     const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
     bytes = await new Response(stream).arrayBuffer();
   }
-  return WebAssembly.compile(bytes);
+  return bytes;
 }
+
+/** Loads the compiled WebAssembly, which is fetched once and shared by the workers. */
+export const load = async (url) => WebAssembly.compile(await fetched(url));
 
 export class Stopped extends Error {}
 

@@ -1,4 +1,4 @@
-// Sliders for the constants of the text, and for the parameters of a plant. A constant's slider writes its value into the text, so that
+// Sliders for the constants of the text, and for the parameters of a program and of a plant. A constant's slider writes its value into the text, so that
 // text, plots, links and exports agree.
 
 import { initial, isNumber, node, short } from "./parts.js";
@@ -56,7 +56,8 @@ export class Tuning {
   }
 
   row(constant) {
-    const { name, unit, text, whole, value } = constant, [low, high] = initial(value);
+    const { name, unit, text, whole, value } = constant, usual = initial(value);
+    const low = constant.low ?? usual[0], high = constant.high ?? usual[1];
     const number = (what, of, className) => node("input", { inputMode: "decimal", value: short(of), className, ariaLabel: `${what} of ${name}` });
     const slider = node("input", { type: "range", ariaLabel: `${name}, slider` });
     const least = number("Least value", low, "end"), most = number("Largest value", high, "end"), field = number("Value", value, "field");
