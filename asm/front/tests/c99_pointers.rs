@@ -169,6 +169,34 @@ int step(unsigned n, int m)
 "#,
     );
     check(
+        "lists_and_arrays_with_pointers",
+        r#"
+typedef struct { float ki, limit; } cfg;
+static const cfg slow = { 0.5f, 5 }, fast = { 2, 12 };
+typedef struct axis { float sum, out; const cfg *of; struct axis *next; unsigned char fault; short last[2]; } axis;
+static axis axes[3] = { { 0, 0, &slow, &axes[1] }, { 0, 0, &slow, &axes[2] }, { 0, 0, &slow, 0 } };
+static axis *worst(void)
+{
+    axis *w = 0;
+    for (axis *a = axes; a; a = a->next) if (!w || a->out > w->out) w = a;
+    return w;
+}
+float step(unsigned n, int m, float x)
+{
+    for (axis *a = axes; a; a = a->next) { a->sum += a->of->ki*x; a->out = a->sum > a->of->limit ? a->of->limit : a->sum - x; x *= -0.5f; }
+    axis *w = worst(), *b = &axes[n % 3];
+    b->last[m & 1] += 3; b->fault++;
+    struct { int k; const cfg *of; } rows[3] = { { 1, &slow }, { 2, &fast }, { m, &slow } };
+    rows[m & 1].of = m & 4 ? &fast : &slow; rows[n & 1].k += m;
+    const cfg *c = rows[(n >> 1) & 1].of;
+    w->sum += c->ki*(float)rows[n % 3].k;
+    axes[n & 1].sum *= 0.5f;
+    w->sum -= w->of->limit;
+    return w->out + (float)(w - axes) + axes[0].last[0] + axes[1].last[1]*3 + (float)b->fault + (float)axes[(m & 3) % 3].last[1];
+}
+"#,
+    );
+    check(
         "copies_between_chosen_objects",
         r#"
 #include <string.h>

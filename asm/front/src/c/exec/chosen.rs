@@ -6,11 +6,12 @@ use super::Exec;
 use super::paths::{Ran, Side};
 use crate::Error;
 use crate::c::ir::{Id, Node, Op};
+use crate::c::types::{Leaf, Type};
 use crate::c::value::{Choice, Condition, Memory, Outcome, Pointer, Value};
 use std::cell::RefCell;
 use std::rc::Rc;
 
-/// Maximum number of pointers in a table that data index.
+/// Maximum number of elements of an array with pointers that data index.
 const MAX_ENTRIES: usize = 64;
 
 /// Conditions that are known, with their values.
@@ -36,40 +37,92 @@ impl<'a> Exec<'a> {
         Ok(self.chosen_by(condition, yes, no))
     }
 
-    /// The entry of a table of pointers that data index.
-    pub(super) fn entry_of(&mut self, pointer: &Pointer, dynamic: Id) -> Result<Value, Error> {
-        let (first, like) = self.known_scalar(pointer)?;
-        let first = self.nodes.int(first as i32);
-        let index = self.op(Op::IntAdd, &[dynamic, first])?;
-        let (low, high) = self.nodes.range(index);
+    /// The place is one of several that data choose, in an object with pointers: it cannot lie in data memory.
+    pub(super) fn is_among_pointers(&self, pointer: &Pointer) -> bool {
         let object = &self.objects[pointer.object];
         let range = pointer.part.unwrap_or(object.whole()).range();
-        let is_entry = |leaf: &usize| {
-            object.leaves[*leaf].ty == object.leaves[like].ty && (low..=high).contains(&(*leaf as i64))
-        };
-        let entries: Vec<usize> = range.filter(is_entry).collect();
-        if entries.len() > MAX_ENTRIES {
-            return self.fail(format!(
-                "data index a table of more than {MAX_ENTRIES} pointers: use an index into one array"
-            ));
+        let is_number = |leaf: &Leaf| matches!(leaf.ty, Type::Int(_) | Type::Float);
+        pointer.dynamic.is_some() && !object.leaves[range].iter().all(is_number)
+    }
+
+    /// The scalars among which data choose this place, and the index of the chosen one.
+    fn places_of(&mut self, pointer: &Pointer) -> Result<(Vec<usize>, Id), Error> {
+        let (first, like) = self.known_scalar(pointer)?;
+        let mut index = self.nodes.int(first as i32);
+        if let Some(dynamic) = pointer.dynamic {
+            index = self.op(Op::IntAdd, &[dynamic, index])?;
         }
-        let mut chosen = None;
-        for leaf in entries.into_iter().rev() {
-            let name = self.objects[pointer.object].leaf_name(leaf);
-            let entry = self.present(&self.memory.get(pointer.object, leaf).clone(), &name)?;
-            chosen = Some(match chosen {
-                None => entry,
+        let (low, high) = self.nodes.range(index);
+        let object = &self.objects[pointer.object];
+        let like = &object.leaves[like];
+        let is_one = |leaf: &usize| {
+            let own = &object.leaves[*leaf];
+            own.ty == like.ty && own.name == like.name && (low..=high).contains(&(*leaf as i64))
+        };
+        let places: Vec<usize> = pointer.part.unwrap_or(object.whole()).range().filter(is_one).collect();
+        match places.len() {
+            0 => self.fail("this index is outside of its array"),
+            1..=MAX_ENTRIES => Ok((places, index)),
+            _ => self.fail(format!(
+                "data index an array with pointers in it, of more than {MAX_ENTRIES} elements: keep numbers and pointers in arrays of their own"
+            )),
+        }
+    }
+
+    /// One of two scalars.
+    fn scalar_of(&mut self, condition: Id, ty: &Type, yes: Value, no: Value) -> Result<Value, Error> {
+        if matches!(ty, Type::Pointer(_)) {
+            return self.pointer_of(condition, yes, no);
+        }
+        match (self.register(&yes, ty), self.register(&no, ty)) {
+            (Some(yes), Some(no)) => Ok(Value::Node(self.select(condition, yes, no)?)),
+            _ => self.fail("no register holds this value"),
+        }
+    }
+
+    /// Reads a scalar of an array with pointers, by an index that data decide.
+    pub(super) fn read_among(&mut self, pointer: &Pointer) -> Result<Value, Error> {
+        let (places, index) = self.places_of(pointer)?;
+        let mut found = None;
+        for leaf in places.into_iter().rev() {
+            let (name, ty) = (self.objects[pointer.object].leaf_name(leaf), self.scalar_type(pointer, leaf));
+            let own = self.present(&self.memory.get(pointer.object, leaf).clone(), &name)?;
+            found = Some(match found {
+                None => own,
                 Some(others) => {
-                    let number = self.nodes.int(leaf as i32);
-                    let here = self.op(Op::IntEqual, &[index, number])?;
-                    self.pointer_of(here, entry, others)?
+                    let here = self.is_at(index, leaf)?;
+                    self.scalar_of(here, &ty, own, others)?
                 }
             });
         }
-        match chosen {
-            Some(chosen) => Ok(chosen),
-            None => self.fail("this index is outside of the table of pointers"),
+        found.map_or_else(|| self.fail("this index is outside of its array"), Ok)
+    }
+
+    /// Writes a scalar of such an array: the chosen one changes.
+    pub(super) fn write_among(&mut self, pointer: &Pointer, value: &Value) -> Result<(), Error> {
+        let (places, index) = self.places_of(pointer)?;
+        for leaf in places {
+            let ty = self.scalar_type(pointer, leaf);
+            let new = match self.memory.get(pointer.object, leaf).clone() {
+                Value::Unset => value.clone(),
+                old => {
+                    let here = self.is_at(index, leaf)?;
+                    self.scalar_of(here, &ty, value.clone(), old)?
+                }
+            };
+            self.changes(pointer.object, leaf);
+            self.memory.set(pointer.object, leaf, new);
         }
+        Ok(())
+    }
+
+    fn scalar_type(&self, pointer: &Pointer, leaf: usize) -> Type {
+        self.objects[pointer.object].leaves[leaf].ty.clone()
+    }
+
+    fn is_at(&mut self, index: Id, leaf: usize) -> Result<Id, Error> {
+        let number = self.nodes.int(leaf as i32);
+        self.op(Op::IntEqual, &[index, number])
     }
 
     pub(super) fn chosen_by(&mut self, when: Id, yes: Value, no: Value) -> Value {

@@ -376,8 +376,11 @@ impl Exec<'_> {
             };
             return self.punned(value, &own, ty);
         }
-        if let (Type::Pointer(_), Some(dynamic)) = (ty, pointer.dynamic) {
-            return self.entry_of(pointer, dynamic);
+        if self.is_among_pointers(pointer) {
+            self.restored(object);
+            let own = self.word_type(pointer)?;
+            let value = self.read_among(pointer)?;
+            return self.punned(value, &own, ty);
         }
         let Some(held) = self.holding(pointer, leaf) else {
             self.demand(object, pointer.part);
@@ -493,6 +496,12 @@ impl Exec<'_> {
             self.memory.set(object, leaf, value);
             return Ok(());
         }
+        if self.is_among_pointers(pointer) {
+            self.restored(object);
+            let own = self.word_type(pointer)?;
+            let value = self.punned(value, ty, &own)?;
+            return self.write_among(pointer, &value);
+        }
         let Some(held) = self.holding(pointer, leaf) else {
             self.demand(object, pointer.part);
             self.changes_all(object, pointer.part);
@@ -510,7 +519,7 @@ impl Exec<'_> {
     }
 
     /// Records that the step writes a scalar that outlives it.
-    fn changes(&mut self, object: usize, leaf: usize) {
+    pub(super) fn changes(&mut self, object: usize, leaf: usize) {
         let found = &self.objects[object];
         if self.stepping && !matches!(found.origin, Origin::Local | Origin::Parameter) {
             let fact = (found.key.clone(), leaf);
