@@ -82,6 +82,7 @@ enum Command {
 impl Command {
     /// The results are tables and sentences, which are folded to the terminal's width. Other commands print sources, or are interactive.
     fn is_for_people(&self) -> bool {
+        #[cfg(feature = "board")]
         if let Command::Board(board) = self {
             return commands::board::is_for_people(board);
         }
