@@ -21,9 +21,6 @@ const FED: [(&str, &[&str]); 7] = [
     ("digital-in", &["level"]),
 ];
 
-/// Pins of the data lines of `spi`, in the order of [`RECEIVED`].
-const LINES: [&str; 8] = ["in", "in2", "in3", "in4", "in5", "in6", "in7", "in8"];
-
 /// A device at pins of a peripheral. Pins have their names in the kind's table.
 pub trait Device: std::fmt::Debug + Send {
     /// Output pins of the board whose edges the device needs, and input pins that it drives.
@@ -139,7 +136,7 @@ pub fn of(peripheral: &Peripheral, register: &str, value: f64) -> Result<Box<dyn
             range: range(peripheral).unwrap_or_default(),
             left: VecDeque::new(),
             level: [true],
-            pin: RECEIVED.iter().zip(LINES).find(|(own, _)| **own == register).map_or("in", |(_, pin)| pin),
+            pin: kind.reads.iter().find(|own| own.name == register).and_then(|own| own.pin).unwrap_or("in"),
         }),
         "sinc3" => Box::new(Modulator {
             full: f64::from(parameter("osr")).powi(3),

@@ -169,7 +169,7 @@ impl Page {
         self.wait(|message| message["type"] == kind)
     }
 
-    /// Asks for something; returns the error of the answer, empty if there is none.
+    /// Sends a request; returns the error of the answer, empty if there is none.
     #[track_caller]
     fn ask(&mut self, wish: Value) -> String {
         let answer = self.answer(wish);
@@ -311,7 +311,7 @@ fn one_page_has_control() {
     assert_eq!(second.ask(json!({ "do": "claim" })), "another page has control");
     second.value(limit, "2.5");
 
-    // What is no wish, or none that can be fulfilled, says so; the pages go on.
+    // Malformed requests, and requests that cannot be fulfilled, get an error; the pages go on.
     for (wish, says) in [
         (json!({ "do": "input", "name": "limit", "value": "fast" }), "`fast` is not a value of `limit`"),
         (json!({ "do": "input", "name": "none", "value": "1" }), "none"),

@@ -208,7 +208,7 @@ impl<'a> Exec<'a> {
         }
         let inside = self.memory.clone();
         let mut ran = self.side(run)?;
-        // What the side leaves as it is remains a choice.
+        // A pointer that the side leaves as it is remains a choice.
         let outcomes = ran.outcomes.iter_mut().map(|outcome| &mut outcome.memory);
         for memory in outcomes.chain([&mut ran.memory]) {
             for object in 0..before.0.len() {

@@ -365,9 +365,8 @@ impl<'a> Exec<'a> {
                 continue;
             }
             for leaf in 0..memory.0[object].len() {
-                let name = self.objects[object].leaf_name(leaf);
                 let old = memory.get(object, leaf).clone();
-                let new = self.taken_out(exported, side, old.clone(), &name)?;
+                let new = self.taken_out(exported, side, old.clone(), (object, leaf))?;
                 if new != old {
                     memory.set(object, leaf, new);
                 }
@@ -376,32 +375,36 @@ impl<'a> Exec<'a> {
         Ok(memory)
     }
 
-    /// A value of one side, with variables for the nodes that the side computes.
+    /// The value of a scalar in one side, with variables for the nodes that the side computes.
     fn taken_out(
         &mut self,
         exported: &mut Exported,
         side: usize,
         value: Value,
-        name: &str,
+        scalar: (usize, usize),
     ) -> Result<Value, Error> {
-        let mut out = |exec: &mut Self, id: Id, name: &str| {
+        // Without a name, the variable has the scalar's.
+        let mut out = |exec: &mut Self, id: Id, name: Option<&str>| {
             if !exec.is_inside(exported.first, id) {
                 return Ok(id);
             }
             let mut ids = [None, None];
             ids[side] = Some(id);
-            exec.exported(exported, ids, name)
+            match name {
+                Some(name) => exec.exported(exported, ids, name),
+                None => exec.exported(exported, ids, &exec.objects[scalar.0].leaf_name(scalar.1)),
+            }
         };
         Ok(match value {
-            Value::Node(id) => Value::Node(out(self, id, name)?),
+            Value::Node(id) => Value::Node(out(self, id, None)?),
             Value::Pointer(Pointer { dynamic: Some(id), object, offset, part }) => {
-                let dynamic = Some(out(self, id, "at")?);
+                let dynamic = Some(out(self, id, Some("at"))?);
                 Value::Pointer(Pointer { dynamic, object, offset, part })
             }
             Value::Choice(choice) => {
-                let when = out(self, choice.when, "chosen")?;
-                let yes = self.taken_out(exported, side, choice.yes.clone(), name)?;
-                let no = self.taken_out(exported, side, choice.no.clone(), name)?;
+                let when = out(self, choice.when, Some("chosen"))?;
+                let yes = self.taken_out(exported, side, choice.yes.clone(), scalar)?;
+                let no = self.taken_out(exported, side, choice.no.clone(), scalar)?;
                 Value::Choice(Rc::new(Choice { when, yes, no }))
             }
             other => other,
@@ -446,36 +449,36 @@ impl<'a> Exec<'a> {
         &mut self,
         exported: &mut Exported,
         condition: Id,
-        (object, leaf): (usize, usize),
+        scalar @ (object, leaf): (usize, usize),
         a: Value,
         b: Value,
     ) -> Result<Value, Error> {
-        let name = self.objects[object].leaf_name(leaf);
         match (a, b) {
-            (a, b) if a == b && self.taken_out(exported, 0, a.clone(), &name)? == a => Ok(a),
-            (Value::Unset, other) => self.taken_out(exported, 1, other, &name),
-            (other, Value::Unset) => self.taken_out(exported, 0, other, &name),
+            (a, b) if a == b && self.taken_out(exported, 0, a.clone(), scalar)? == a => Ok(a),
+            (Value::Unset, other) => self.taken_out(exported, 1, other, scalar),
+            (other, Value::Unset) => self.taken_out(exported, 0, other, scalar),
             (a @ Value::Mixed(_), _) | (_, a @ Value::Mixed(_)) => Ok(a),
             (Value::Pointer(a), Value::Pointer(b)) if a.object == b.object && a.offset == b.offset => {
                 let part = a.part.filter(|_| a.part == b.part);
                 let zero = self.nodes.int(0);
                 let ids = [Some(a.dynamic.unwrap_or(zero)), Some(b.dynamic.unwrap_or(zero))];
-                let dynamic = match a.dynamic == b.dynamic && a.dynamic.is_none() {
-                    true => None,
-                    false => Some(self.exported(exported, ids, "at")?),
+                let dynamic = match (a.dynamic, b.dynamic) {
+                    (None, None) => None,
+                    _ => Some(self.exported(exported, ids, "at")?),
                 };
                 Ok(Value::Pointer(Pointer { dynamic, part, ..a }))
             }
             (a, b) => {
                 let ty = self.objects[object].leaves[leaf].ty.clone();
                 if matches!(ty, Type::Pointer(_)) {
-                    let yes = self.taken_out(exported, 0, a, &name)?;
-                    let no = self.taken_out(exported, 1, b, &name)?;
+                    let yes = self.taken_out(exported, 0, a, scalar)?;
+                    let no = self.taken_out(exported, 1, b, scalar)?;
                     return Ok(self.chosen_by(condition, yes, no));
                 }
                 let (Some(a), Some(b)) = (self.register(&a, &ty), self.register(&b, &ty)) else {
                     return Ok(mixed(&ty));
                 };
+                let name = self.objects[object].leaf_name(leaf);
                 Ok(Value::Node(self.exported(exported, [Some(a), Some(b)], &name)?))
             }
         }

@@ -28,9 +28,9 @@ pub(super) enum ToPage<'a> {
         /// Names that may be channels.
         channels: &'a [String],
     },
-    /// Whether the page may set and control, whether any page does, and the number of pages.
+    /// Role of the page: it may set and control, or another page does, or none; and the number of pages.
     Role { writer: bool, free: bool, pages: usize },
-    /// Whether the board answers, or the reason why it does not; cycles from tick to tick, and the scope.
+    /// State of the line: the board answers, or the reason for its silence; cycles from tick to tick, and the scope.
     Link { connected: bool, text: &'a str, cycles: u32, scope: Option<ScopeSize> },
     /// State, and values of parameters, inputs and outputs in the order of `Hello`; without values, the reason.
     State { report: &'a Report, values: &'a [String], busy: Option<&'a str> },
@@ -57,7 +57,7 @@ impl ToPage<'_> {
     }
 }
 
-/// What the scope of the board has.
+/// Size of the board's scope.
 #[derive(Clone, Copy, Serialize)]
 pub(super) struct ScopeSize {
     pub(super) channels: u32,
@@ -131,7 +131,7 @@ pub(super) struct FromPage {
     pub(super) wish: Wish,
 }
 
-/// What a page asks for.
+/// Request of a page.
 #[derive(Deserialize)]
 #[serde(tag = "do", rename_all = "lowercase")]
 pub(super) enum Wish {

@@ -23,12 +23,12 @@ pub(super) struct Recorder {
     /// The scope of the board; `None` if its circuit has none.
     scope: Option<Scope>,
     armed: Option<Armed>,
-    /// What pages asked for last.
+    /// The last request of a page.
     request: Option<Request>,
     recording: Option<Recording>,
     /// Message with the last recording.
     message: Option<Arc<str>>,
-    /// Why the last recording failed.
+    /// Reason for which the last recording failed.
     failure: Option<String>,
 }
 

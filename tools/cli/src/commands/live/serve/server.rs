@@ -291,7 +291,7 @@ impl<'a> Server<'a> {
         self.tell_all(&state.text());
         let cycles = f64::from(self.cycles);
         let seconds = self.target.wiring.map(|wiring| cycles / (wiring.clock * 1e6));
-        // What pages do comes before the rest of a long recording.
+        // Requests of pages come before the rest of a long recording.
         let Server { board: Ok(host), recorder, target, events, pending, pages, .. } = self else {
             return Ok(());
         };
