@@ -149,7 +149,7 @@ impl Sources<'_> {
     /// Builds the program in a folder, or finds an earlier build there.
     ///
     /// # Errors
-    /// If Verilator, make or a C++ compiler is missing or fails.
+    /// If Verilator or a C++ compiler is missing or fails.
     pub fn build(&self, folder: &Path) -> Result<PathBuf, VerilatorError> {
         let version = run("verilator", "verilator", verilator().arg("--version"))?;
         let mut hasher = DefaultHasher::new();
@@ -177,40 +177,49 @@ impl Sources<'_> {
         command.args(self.trace.then_some("--trace")).args(&self.arguments);
         command.args(self.files.iter().map(|(name, _)| name).filter(|name| name.ends_with(".v")));
         run("verilator", "verilator", &mut command)?;
-        let (objects, library) = (work.join("obj"), format!("{}__ALL.a", self.prefix));
-        let mut make = Command::new("make");
-        make.current_dir(&objects).args(["-s", "-j2", "-f", &format!("{}.mk", self.prefix), &library]);
-        make.args([format!("OPT_FAST={}", self.optimise), "OPT_SLOW=-O0".to_owned()]);
-        run("make", "make", make.env_remove("MAKEFLAGS"))?;
-
         let root = run("verilator", "verilator", verilator().args(["--getenv", "VERILATOR_ROOT"]))?;
         let include = Path::new(root.trim()).join("include");
         let options = options(&include, self.optimise, self.trace);
-        let classes = objects.join(format!("{}_classes.mk", self.prefix));
+        let classes = work.join("obj").join(format!("{}_classes.mk", self.prefix));
         let classes = fs::read_to_string(&classes).map_err(file_error(&classes))?;
-        let mut compiler = Command::new("c++");
-        compiler.current_dir(work).args(&options).args(&self.defines).args(["-I.", "-Iobj"]);
-        compiler.args(self.trace.then_some("-DTRACE")).args(["driver.cpp", &format!("obj/{library}")]);
-        for part in globals(&classes) {
-            compiler.arg(runtime(folder, version, &include, part, &options)?);
+
+        // Each file that Verilator has written reads headers for longer than its own text, so two units take half of the time.
+        let unit = |suffix: &str, last: &str| -> String {
+            let own = ["CLASSES", "SUPPORT"].map(|kind| format!("VM_{kind}_{suffix}"));
+            let parts = own.iter().flat_map(|name| listed(&classes, name));
+            parts.map(|part| format!("#include \"obj/{part}.cpp\"\n")).chain([last.to_owned()]).collect()
+        };
+        write("fast.cpp", &unit("FAST", "#include \"driver.cpp\"\n"))?;
+        write("slow.cpp", &unit("SLOW", ""))?;
+        let compile = |unit: &str, optimise: &str| {
+            let mut compiler = Command::new("c++");
+            compiler.current_dir(work).args(&options).arg(optimise).args(&self.defines);
+            compiler.args(["-I.", "-Iobj"]).args(self.trace.then_some("-DTRACE"));
+            run("c++", "g++", compiler.args(["-c", &format!("{unit}.cpp"), "-o", &format!("{unit}.o")]))
+        };
+        std::thread::scope(|scope| {
+            let slow = scope.spawn(|| compile("slow", "-O0"));
+            let fast = compile("fast", self.optimise);
+            let slow = slow.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+            fast.and(slow)
+        })?;
+        let mut linker = Command::new("c++");
+        linker.current_dir(work).args(&options).args(&self.defines).args(["fast.o", "slow.o"]);
+        for part in ["VM_GLOBAL_FAST", "VM_GLOBAL_SLOW"].iter().flat_map(|name| listed(&classes, name)) {
+            linker.arg(runtime(folder, version, &include, part, &options)?);
         }
-        run("c++", "g++", compiler.args(["-o", "made"]))?;
+        run("c++", "g++", linker.args(["-o", "made"]))?;
         Ok(())
     }
 }
 
-/// Parts of the run-time library that a program needs, as Verilator's makefile lists them.
-fn globals(classes: &str) -> impl Iterator<Item = &str> {
-    let mut listed = false;
-    classes.lines().filter_map(move |line| {
-        let line = line.trim();
-        if let Some((name, _)) = line.split_once("+=") {
-            listed = name.trim().starts_with("VM_GLOBAL_");
-            return None;
-        }
-        let part = line.trim_end_matches('\\').trim();
-        (listed && !part.is_empty() && !part.starts_with('#')).then_some(part)
-    })
+/// Files of a list in the makefile that Verilator has written.
+fn listed<'a>(classes: &'a str, name: &str) -> impl Iterator<Item = &'a str> {
+    let lines = classes.lines().map(str::trim);
+    let list =
+        lines.skip_while(move |line| !line.strip_prefix(name).is_some_and(|rest| rest.starts_with(" +=")));
+    let files = list.skip(1).map(|line| line.trim_end_matches('\\').trim());
+    files.take_while(|file| !file.is_empty() && !file.starts_with('#'))
 }
 
 /// Compiles a part of the run-time library, once.
@@ -268,16 +277,18 @@ pub fn plant(files: &mut [crate::export::DesignFile], top: &str, faults: &[Fault
 
 #[cfg(test)]
 mod tests {
-    use super::{globals, once};
+    use super::{listed, once};
     use std::cell::Cell;
     use std::fs;
     use std::path::Path;
 
     #[test]
-    fn parts_of_the_library_are_listed() {
+    fn files_of_a_makefile_are_listed() {
         let text = "VM_CLASSES_FAST += \\\n\tVtop \\\n\nVM_GLOBAL_FAST += \\\n\tverilated \\\n\tverilated_threads \\\n\n\
                     # Generated\nVM_GLOBAL_SLOW += \\\n\n";
-        assert_eq!(globals(text).collect::<Vec<_>>(), ["verilated", "verilated_threads"]);
+        assert_eq!(listed(text, "VM_CLASSES_FAST").collect::<Vec<_>>(), ["Vtop"]);
+        assert_eq!(listed(text, "VM_GLOBAL_FAST").collect::<Vec<_>>(), ["verilated", "verilated_threads"]);
+        assert_eq!(listed(text, "VM_GLOBAL_SLOW").next(), None);
     }
 
     #[test]

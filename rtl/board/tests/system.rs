@@ -570,7 +570,7 @@ fn compare(description: &Description, sim: Simulation, ticks: u32) {
 #[test]
 fn circuit_and_emulator_have_the_same_words() {
     let description = unchanged();
-    compare(&description, board(&description, "system-words"), 60);
+    compare(&description, board(&description, "system-words"), 20);
 }
 
 /// Faults in the module around the system, planted one at a time, are noticed.
@@ -594,7 +594,7 @@ fn planted_faults_are_noticed() {
     for fault in 0..=faults.len() {
         let sim = Simulation::with_fault(&files, &ulx3s(), &wiring, &folder, fault);
         let sim = sim.unwrap_or_else(|error| panic!("{error}"));
-        let noticed = std::panic::catch_unwind(AssertUnwindSafe(|| compare(&description, sim, 60)));
+        let noticed = std::panic::catch_unwind(AssertUnwindSafe(|| compare(&description, sim, 36)));
         assert_eq!(noticed.is_err(), fault > 0, "{:?}", fault.checked_sub(1).map(|fault| faults[fault]));
     }
 }

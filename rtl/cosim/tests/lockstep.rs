@@ -406,11 +406,10 @@ fn ports_of_program_and_circuit_must_agree() {
     }
 }
 
-/// Runs a tracking program in closed loop with the robot for some periods.
-fn tracking(machine: &'static Machine, source: &str, latched: bool, periods: usize) {
-    let program = Program { latched, ..assemble(machine, source) };
-    let model = latched_model(machine, program.latched_inputs());
-    track(&program, model.start(&[]).unwrap_or_else(|error| panic!("{error}")), periods);
+/// Runs a tracking program in closed loop with the robot for some periods, on the circuit with its latched ports.
+fn tracking(program: &Program, periods: usize) {
+    let model = latched_model(program.machine, program.latched_inputs());
+    track(program, model.start(&[]).unwrap_or_else(|error| panic!("{error}")), periods);
 }
 
 /// Runs a tracking program on a given circuit, in closed loop.
@@ -429,9 +428,10 @@ pub(crate) fn track(program: &Program, simulation: Simulation, periods: usize) {
 #[test]
 fn tracking_programs() {
     for machine in MACHINES {
-        tracking(machine, "hybrid/tracking.s", false, 100);
-        tracking(machine, "hybrid/tracking_literal.s", false, 20);
-        tracking(machine, "hybrid/tracking.s", true, 20);
+        let program = assemble(machine, "hybrid/tracking.s");
+        tracking(&program, 100);
+        tracking(&Program { latched: true, ..program }, 20);
+        tracking(&assemble(machine, "hybrid/tracking_literal.s"), 20);
     }
 }
 

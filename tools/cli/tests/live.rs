@@ -279,6 +279,18 @@ fn a_scope_records_around_a_trigger() {
 
     // What leads to a fault, armed by one command and read by another.
     live(&["scope", "count", "sum", "-t", "fault", "--before", "9", "--arm"]).ok();
+    let periods = || -> u32 {
+        live(&["read", "count"])
+            .ok()
+            .trim()
+            .rsplit(' ')
+            .next()
+            .and_then(|count| count.parse().ok())
+            .expect("a count")
+    };
+    // A stop triggers whether or not the samples before it are there.
+    let armed = periods();
+    (0..1000).find(|_| periods() > armed + 9).expect("the program runs on");
     live(&["set", "bad=1000000"]).ok();
     let read = ["scope", "count", "sum", "-t", "fault", "--read", "--csv", "-"];
     let done = (0..100).map(|_| live(&read)).find(|done| done.status == Some(0)).expect("it stops");
