@@ -6,9 +6,10 @@
 //! give Rust's values.
 
 use std::path::PathBuf;
+use std::sync::OnceLock;
 use takt_asm::{AssembledProgram, MemoryLoader, Options, Search, diag::Diagnostics};
 use takt_emu::Emulator;
-use takt_isa::Machine;
+use takt_isa::{Machine, Op, Slot, T1, T3, T4, Unit};
 
 /// The folder of the library.
 fn library() -> PathBuf {
@@ -145,12 +146,25 @@ fn takes(parameter: &Parameter, kind: &str) -> bool {
     }
 }
 
+/// t4 with large memories and without the units that macros of the library replace, which are defined only where a unit is missing.
+fn machine() -> &'static Machine {
+    static MACHINE: OnceLock<Machine> = OnceLock::new();
+    MACHINE.get_or_init(|| {
+        let replaced = ["fsin", "fatan2", "facos"];
+        let replaced = replaced.map(|name| Op::from_mnemonic(name).expect("an instruction").row().function);
+        let slots = T4.slots.iter().map(|slot| {
+            let stays = |unit: &&Unit| !unit.functions.iter().any(|function| replaced.contains(function));
+            Slot { units: Vec::leak(slot.units.iter().filter(stays).copied().collect()), ..*slot }
+        });
+        Machine { slots: Vec::leak(slots.collect()), code_depth: 4096, data_depth: 65536, ..T4 }
+    })
+}
+
 /// A program with these lines in its period, and names for every kind of argument.
 fn program(file: &str, lines: &str) -> Result<AssembledProgram, Diagnostics> {
-    let machine = Machine::from_name("t4").expect("there is one");
+    let machine = machine();
     let text = format!(
-        ".machine t4 code=4096 data=65536
-.include <math.s>
+        ".include <math.s>
 .include <{file}>
 .const  C = 2.5
 .const  N = 3
@@ -407,4 +421,41 @@ fn results_go_to_floats_only() {
         let text = format!("        k = ftoi({}({arguments}))", one.name);
         assert!(program(&one.file, &text).is_ok(), "{text}");
     }
+}
+
+/// An instruction of a unit that the machine lacks: the error names the file whose macro an equation uses, and with the file the equation
+/// is right; where the machine has the unit, the name of the function is no statement.
+#[test]
+fn a_missing_unit_is_replaced_by_the_library() {
+    let of = |text: &str, machine: &'static Machine| {
+        let library = [("math.s", include_str!("../../programs/library/math.s"))];
+        let loader = Search::new(MemoryLoader::of("test.s", text)).library(&library);
+        takt_asm::assemble("test.s", &loader, &Options { machine, ..Options::default() })
+    };
+    let text = ".input y, x\n.output d\n.once\n wait p\n.period\np: d = atan2(y, x)\n wait p\n";
+    for text in [text, &text.replace("d = atan2(y, x)", "fatan2 d, y, x")] {
+        let report = of(text, &T1).expect_err("t1 has no arctangent").render(false);
+        assert!(
+            report.contains("with `.include <math.s>`, `atan2` in an equation is computed by other units"),
+            "{report}"
+        );
+        of(text, &T3).unwrap_or_else(|report| panic!("{}", report.render(false)));
+    }
+    let with = format!(".include <math.s>\n{text}");
+    let [small, fast] = [&T1, &T3].map(|machine| {
+        let assembled = of(&with, machine).unwrap_or_else(|report| panic!("{}", report.render(false)));
+        let mut emulator = Emulator::new(&assembled.program).expect("it fits");
+        for (port, value) in assembled.program.inputs.iter().zip([1.5_f32, -0.75]) {
+            emulator.set_input_bits(port.register, value.to_bits()).expect("it is an input");
+        }
+        (0..2).for_each(|_| drop(emulator.run_period(&[]).expect("it runs")));
+        emulator
+            .output_bits(assembled.program.outputs[0].register)
+            .map(f32::from_bits)
+            .expect("it is written")
+    });
+    assert!(small == 1.5_f32.atan2(-0.75) && (small - fast).abs() <= 2.4e-7, "{small} {fast}");
+    let report =
+        of(&with.replace("d = atan2(y, x)", "atan2 d, y, x"), &T3).expect_err("no macro").render(false);
+    assert!(report.contains("did you mean `fatan2`?"), "{report}");
 }

@@ -20,6 +20,8 @@
 .const math.pi2c  = 0x1.0b4611a626331p-34
 .const math.pi2h  = 0x1.921fb6p0        ; π/2, nearest binary32
 .const math.pi2l  = -0x1.777a5cp-25     ; and the rest
+.const math.pih   = 0x1.921fb6p1        ; π, likewise
+.const math.pil   = -0x1.777a5cp-24
 
 ; ---- Rounding to integers ------------------------------------------------------------------------------------------------------
 
@@ -271,8 +273,8 @@
 ; d = sin x / cos x, |x| ≤ 2π·64, at most 2.16531 ulp.
 .macro tan_quick d:float, x:float
 .reg    s c
-        fsin    s, x
-        fcos    c, x
+        s = sin(x)
+        c = cos(x)
         fdiv    d, s, c
 .endm
 
@@ -451,6 +453,224 @@
         math.atan d, x
         .endif
 .endm
+
+; ---- Instructions of units that a machine may lack: where it has the unit, equations use the instruction ---------------------
+
+.if !has.fsin
+; x = n·π/2 + r - rl, n in the lowest bits of t; r is NaN where |x| > 2π·64.
+.macro math.reduce r:float, rl:float, t:bits, x:float
+.reg    a:int in:int xs:bits q n y1 y2 v w g0 u g1 l0
+        iand    a, x, 0x7fffffff
+        ilt     in, a, 0x43c90fdb       ; as in `tan`
+        sel     xs, in, x, inf
+        fmul    q, xs, 2/pi
+        fadd    t, q, math.shift
+        fsub    n, t, math.shift
+        fmul    w, n, math.pi2a         ; exact
+        fsub    y1, xs, w               ; exact
+        fmul    v, n, math.pi2b         ; exact
+        fsub    y2, y1, v
+        fsub    g0, y1, y2
+        fsub    g0, g0, v               ; what y2 has lost
+        fmul    u, n, math.pi2c
+        fsub    r, y2, u
+        fsub    g1, y2, r
+        fsub    l0, u, g1
+        fsub    rl, l0, g0
+.endm
+
+; d = sine of k quarter turns and r - rl, by both functions of the rest: base - corr.
+.macro math.turned d:float, r:float, rl:float, k:int
+.reg    z z2 hz h e f s0 s1 s2 sp sq c0 c1 c2 cp cq q m n odd:int base:bits corr:bits sum:bits sg:bits
+        fmul    z, r, r
+        fmul    z2, z, z
+        fmul    s0, z, 0x1.110776p-7
+        fsub    s1, 0x1.555546p-3, s0
+        fmul    s2, z2, 0x1.9952fap-13
+        fadd    sp, s1, s2
+        fmul    sq, z, sp
+        fmul    q, r, sq
+        fadd    q, q, rl                ; the sine is r - q: -0 at -0
+        fmul    hz, z, 0.5
+        fsub    h, 1.0, hz
+        fsub    e, 1.0, h
+        fsub    f, hz, e                ; what h has lost
+        fmul    c0, z, 0x1.6c0c28p-10
+        fsub    c1, 0x1.55554ap-5, c0
+        fmul    c2, z2, 0x1.99e80cp-16
+        fadd    cp, c1, c2
+        fmul    cq, z2, cp
+        fsub    m, f, cq
+        fmul    n, r, rl
+        fsub    m, m, n
+        iand    odd, k, 1
+        sel     base, odd, h, r
+        sel     corr, odd, m, q
+        fsub    sum, base, corr
+        ishl    sg, k, 30
+        iand    sg, sg, math.sign
+        ixor    d, sum, sg
+.endm
+
+; d = sine of x, |x| ≤ 2π·64, at most 0.99 ulp.
+.macro sin d:float, x:float
+.reg    r rl t:bits
+        math.reduce r, rl, t, x
+        math.turned d, r, rl, t
+.endm
+
+; d = cosine of x, |x| ≤ 2π·64, at most 0.99 ulp.
+.macro cos d:float, x:float
+.reg    r rl t:bits k:int
+        math.reduce r, rl, t, x
+        iadd    k, t, 1
+        math.turned d, r, rl, k
+.endm
+.endif
+
+.if !has.facos
+; d = arccosine of x, at most 0.99 ulp.
+.macro acos d:float, x:float
+.reg    a0:bits a:bits big:int sg:bits neg:int not:int y y2 zb zs z S Sh:bits dd den sl:bits bS:bits sS:bits lS:bits b s e
+.reg    c cl c0:bits l0:bits z2 p0 p1 p s0 s1 s2 s3 h l l1 q u
+        fabs    a0, x
+        fmin    a, a0, 2.0              ; what overflows nowhere, and has no arccosine either
+        ilt     not, math.inf, a0
+        sel     a, not, 2.0, a          ; a NaN
+        ilt     big, 0x3f000000, a
+        iand    sg, x, math.sign
+        ilt     neg, sg, 0
+        ixor    sg, sg, math.sign
+        fsub    y, 1.0, a
+        fadd    y2, y, y
+        fmul    zb, y, 0.5
+        fmul    zs, a, a
+        sel     z, big, zb, zs
+        fsqrt   S, y2
+        iand    Sh, S, math.top
+        fmul    dd, Sh, Sh
+        fsub    dd, y2, dd
+        fadd    den, S, Sh
+        fmax    den, den, 0x1p-30       ; not zero over zero at 1
+        fdiv    sl, dd, den
+        ixor    bS, Sh, sg
+        ixor    sS, S, sg
+        ixor    lS, sl, sg
+        sel     b, big, bS, x
+        sel     s, big, sS, x
+        sel     e, big, lS, zero
+        sel     c0, neg, math.pih, zero
+        sel     l0, neg, math.pil, zero
+        sel     c, big, c0, math.pi2h
+        sel     cl, big, l0, math.pi2l
+        fmul    z2, z, z                ; as in `asin`
+        fmul    s0, z, 0x1.330204p-4
+        fadd    p0, s0, 0x1.5555c8p-3
+        fmul    s1, z, 0x1.8c3e54p-6
+        fadd    p1, s1, 0x1.747bb8p-5
+        fmul    s2, z2, 0x1.595c58p-5
+        fadd    p1, p1, s2
+        fmul    s3, z2, p1
+        fadd    p0, p0, s3
+        fmul    p, p0, z
+        ; π/2 - x - x³·P(x²), or 0 or π, and ±(S + …)
+        fsub    h, c, b
+        fsub    l, c, h
+        fsub    l, l, b
+        fadd    l, l, cl
+        fsub    l1, l, e
+        fmul    q, s, p
+        fsub    u, l1, q
+        fadd    d, h, u
+.endm
+.endif
+
+.if !has.fatan2
+; d = angle of the point (x, y), at most 1.5 ulp: the arctangent of |y|/|x| as in `atan`, in the quadrant of both signs.
+.macro atan2 d:float, y:float, x:float
+.reg    ay:bits ax:bits ny:int nx:int not:int m:bits iy:int ix:int at:int oy:bits ox:bits fy:bits fx:bits M:bits large:int
+.reg    small:int k1:bits k:bits num:bits den:bits t1 t2 t3 t4 b1:int b2:int b3:int b4:int c:bits c1:bits c2:bits h1:bits
+.reg    h2:bits h3:bits hi:bits nc n cn dd n4 nn:bits d0:bits t z z2 e0 e1 e2 e3 e4 p1 p2 p Q u:bits side:bits left:int hx P:bits
+.reg    PL:bits H L ux r:bits sy:bits
+        fabs    ay, y
+        fabs    ax, x
+        ilt     ny, math.inf, ay
+        ilt     nx, math.inf, ax
+        ior     not, ny, nx             ; one is a NaN
+        fmax    m, ay, ax
+        ; infinities become 1 beside 0, other operands numbers whose products neither overflow nor lose digits
+        ieq     iy, ay, math.inf
+        ieq     ix, ax, math.inf
+        ior     at, iy, ix
+        sel     oy, iy, 1.0, zero
+        sel     ox, ix, 1.0, zero
+        sel     fy, at, oy, ay
+        sel     fx, at, ox, ax
+        sel     M, at, 1.0, m
+        ilt     large, 0x7e000000, M
+        ilt     small, M, 0x20000000
+        sel     k1, small, 0x1p64, 1.0
+        sel     k, large, 0x1p-4, k1
+        fmul    num, fy, k
+        fmul    den, fx, k
+        fmax    den, den, 0x1p-126      ; not zero over zero
+        fmul    t1, den, 7/16
+        fmul    t2, den, 11/16
+        fmul    t3, den, 19/16
+        fmul    t4, den, 39/16
+        flt     b1, t1, num
+        flt     b2, t2, num
+        flt     b3, t3, num
+        flt     b4, t4, num
+        sel     c1, b1, 0x1.ffdf30p-2, zero
+        sel     c2, b3, 0x1.7fb424p0, 0x1.ff2f5cp-1
+        sel     c, b2, c2, c1
+        sel     h1, b1, 0x1.daac30p-2, zero
+        sel     h2, b3, 0x1.f70208p-1, 0x1.91b74ep-1
+        sel     h3, b2, h2, h1
+        sel     hi, b4, math.pi2h, h3
+        fmul    nc, den, c
+        fsub    n, num, nc
+        fmul    cn, num, c
+        fadd    dd, den, cn
+        fmul    n4, num, math.pi2l
+        fsub    n4, n4, den
+        sel     nn, b4, n4, n
+        sel     d0, b4, num, dd
+        sel     nn, not, zero, nn
+        sel     d0, not, zero, d0       ; NaN and invalid
+        fdiv    t, nn, d0
+        fmul    z, t, t
+        fmul    z2, z, z
+        fmul    e0, z, -0x1.555542p-2
+        fmul    e1, z, -0x1.236f16p-3
+        fadd    p1, e1, 0x1.998df8p-3
+        fmul    e2, z, -0x1.dd3c64p-5
+        fadd    p2, e2, 0x1.add6b2p-4
+        fmul    e3, z2, p2
+        fadd    p1, p1, e3
+        fmul    e4, z2, p1
+        fadd    p, e0, e4
+        fmul    Q, t, p
+        fadd    u, t, Q
+        ; on the left, π less the angle, in two words
+        iand    side, x, math.sign
+        ilt     left, side, 0
+        sel     P, left, math.pih, zero
+        sel     PL, left, math.pil, zero
+        ixor    hx, hi, side
+        ixor    ux, u, side
+        fadd    H, P, hx
+        fsub    L, P, H
+        fadd    L, L, hx
+        fadd    L, L, PL
+        fadd    L, L, ux
+        fadd    r, H, L
+        iand    sy, y, math.sign
+        sel     sy, not, zero, sy
+        ixor    d, r, sy
+.endm
+.endif
 
 ; ---- Hyperbolic tangent --------------------------------------------------------------------------------------------------------
 

@@ -11,7 +11,7 @@ found again each time, so that they make up for the rounding.
 
 import struct
 
-from mpmath import atan, asin, atanh, chop, cos, erf, exp, expm1, findroot, linspace, log, log1p, lu_solve, matrix, mp, mpf, pi, sqrt, tan, tanh
+from mpmath import atan, asin, atanh, chop, cos, erf, exp, expm1, findroot, linspace, log, log1p, lu_solve, matrix, mp, mpf, pi, sin, sqrt, tan, tanh
 
 mp.prec = 120
 GRID = 400
@@ -138,6 +138,11 @@ if __name__ == "__main__":
     w = series(lambda x: abs(x**3 / log1p(x)), lambda x: x * x)
     for n in (8, 9):
         rounded("log", f, w, mpf(-1) / 3, mpf(1) / 3, range(n))
+    # sin r = r + r³·S(r²), cos r = 1 - r²/2 + r⁴·C(r²), |r| ≤ π/4
+    f = sum_of(lambda k: mpf(-1) ** (k + 1) / factorial(2 * k + 3))
+    rounded("sin", f, series(lambda z: sqrt(z) ** 3 / sin(sqrt(z)), lambda z: z, mpf("1e-5")), 0, (pi / 4) ** 2 * 1.001, range(3))
+    f = sum_of(lambda k: mpf(-1) ** k / factorial(2 * k + 4))
+    rounded("cos", f, lambda z: z * z / cos(sqrt(z)), 0, (pi / 4) ** 2 * 1.001, range(3))
     # tan: 2·tan(r/2) = r + r³·P(r²), |r| ≤ π/4
     def over(g):
         return lambda z: g(sqrt(z))

@@ -4,11 +4,11 @@
 
 use crate::context::{AstPlace, ErrorReported};
 use crate::expand::load::Loader;
-use crate::resolve::Resolver;
+use crate::resolve::{Host, Resolver};
 use takt_diagnostics::diag::Diagnostic;
 use takt_diagnostics::nearest;
 use takt_diagnostics::source::{Span, line_feeds};
-use takt_isa::{Effect, ROWS, Row};
+use takt_isa::{Effect, Op, ROWS, Row};
 use takt_syntax::ast::*;
 use takt_syntax::foreign;
 use takt_syntax::name::NameId;
@@ -77,20 +77,26 @@ impl Resolver<'_> {
         );
         let rest = Span::new(span.end, written.span.end);
         let rest = self.context.reports.sources.text(rest);
+        let lower = text.to_ascii_lowercase();
+        // The name of a function with an instruction, which the library has for other machines.
+        let own = alias(&lower).filter(|name| {
+            Op::from_mnemonic(name).is_some_and(|op| !matches!(self.slots[op as usize], Host::None))
+        });
         let error = if let Some(help) = foreign::statement(&text, rest) {
             error.help(help)
+        } else if own.is_some() {
+            error.did_you_mean(own.map(str::to_owned))
         } else if Directive::ALL.iter().any(|known| known.name() == directive) {
             error.did_you_mean(Some(directive))
         } else if let Some(file) = self.library_with(&text) {
             from_library(error, &file)
-        } else if let Some(help) = absent(&text.to_ascii_lowercase()) {
+        } else if let Some(help) = absent(&lower) {
             error.help(help)
         } else {
             let macros: Vec<&str> =
                 self.context.scopes.macros.keys().map(|name| self.context.scopes.text(*name)).collect();
             let mut known: Vec<&str> = ROWS.iter().map(|row| row.mnemonic).chain(macros).collect();
             known[ROWS.len()..].sort_unstable();
-            let lower = text.to_ascii_lowercase();
             error.did_you_mean(alias(&lower).map(str::to_owned).or_else(|| nearest(&text, known)))
         };
         self.context.report(at.scope, error)

@@ -96,6 +96,14 @@ impl Resolver<'_> {
                 if let Some(machine) = having {
                     error = error.note(format!("machine {} has one", machine.name));
                 }
+                let macros =
+                    row.forms().find_map(|form| Some((self.library_with(&form.symbol)?, form.symbol)));
+                if let Some((file, name)) = macros {
+                    let line = format!(".include <{file}>");
+                    error = error
+                        .help(format!("with `{line}`, `{name}` in an equation is computed by other units"));
+                    error = error.missing([line]);
+                }
                 Err(self.context.report(at.scope, error))
             }
         }

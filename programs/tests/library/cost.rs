@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Cost of each macro, in `docs/library.md`.
 
-use super::functions::functions;
-use super::pairs::POW_ERROR;
+use super::functions::{bare, functions, replacements};
+use super::pairs::{ANGLE_ERROR, POW_ERROR};
 use super::{assemble, one_use};
 use crate::common::check_table;
 use takt_isa::{MACHINES, Machine};
@@ -62,6 +62,8 @@ fn documented_costs_equal_the_measured_ones() {
     for machine in MACHINES {
         functions(machine).iter().for_each(|function| states(function.name, function.error));
     }
+    replacements(bare()).iter().for_each(|function| states(function.name, function.error));
+    states("atan2", ANGLE_ERROR);
     states("pow", POW_ERROR);
     states("fmod", 0.0);
     let mut table = String::from("| macro | error, ulp |");
@@ -108,4 +110,17 @@ fn documented_costs_equal_the_measured_ones() {
     let whole = one_use_cost("fmod d, x, y");
     table += &format!("| `fmod d, x, y` | exact | {whole} |\n");
     check_table("docs/library.md", "cost", &table);
+
+    let mut table =
+        String::from("| macro | error, ulp | operations | latency | each of 8 |\n|---|---|---|---|---|\n");
+    let replaced =
+        replacements(bare()).into_iter().map(|function| (function.name, "d, x", function.error, 1));
+    for (name, operands, error, count) in replaced.chain([("atan2", "d, y, x", ANGLE_ERROR, 2)]) {
+        let of = |d: &str, x: &str| match count {
+            1 => format!("{name} {d}, {x}"),
+            _ => format!("{name} {d}, {x}, y"),
+        };
+        table += &format!("| `{name} {operands}` | {error} | {} |\n", cost(bare(), &of, count));
+    }
+    check_table("docs/library.md", "replacements", &table);
 }

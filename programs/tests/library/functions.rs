@@ -3,8 +3,9 @@
 
 use super::measure::{ErrorStatistics, check_emulator, every, full};
 use super::one_use;
+use std::sync::OnceLock;
 use takt_isa::fp::Flags;
-use takt_isa::{MACHINES, Machine};
+use takt_isa::{MACHINES, Machine, Op, Slot, T1};
 
 /// Macro of one operand.
 pub(crate) struct Function {
@@ -63,12 +64,46 @@ fn logistic(x: f64) -> f64 {
     1.0 / (1.0 + core_math::exp(-x))
 }
 
-/// All macros of one operand on a machine.
+/// A machine has the unit of an instruction.
+pub(crate) fn has(machine: &Machine, mnemonic: &str) -> bool {
+    Op::from_mnemonic(mnemonic).is_some_and(|op| machine.host(op.row().function).is_some())
+}
+
+/// t1 without its sine: a machine on which the library computes every function.
+pub(crate) fn bare() -> &'static Machine {
+    static BARE: OnceLock<Machine> = OnceLock::new();
+    BARE.get_or_init(|| {
+        let sine = Op::from_mnemonic("fsin").map(|op| op.row().function);
+        let slots = T1.slots.iter().map(|slot| {
+            let units = slot
+                .units
+                .iter()
+                .filter(|unit| sine.is_none_or(|sine| !unit.functions.contains(&sine)))
+                .copied();
+            Slot { units: Vec::leak(units.collect()), ..*slot }
+        });
+        Machine { name: "bare", slots: Vec::leak(slots.collect()), ..T1 }
+    })
+}
+
+/// Macros of one operand in place of instructions, on a machine without the units.
+pub(crate) fn replacements(machine: &Machine) -> Vec<Function> {
+    let of = |mnemonic: &str, function: Function| {
+        (!has(machine, mnemonic)).then_some(Function { passes: Passes::Refused, ..function })
+    };
+    let turned = |function: Function| Function { limit: TURNS, ..function };
+    let all = [
+        of("fsin", turned(smooth("sin", core_math::sinf, core_math::sin, 0.99))),
+        of("fcos", turned(smooth("cos", core_math::cosf, core_math::cos, 0.99))),
+        of("facos", smooth("acos", core_math::acosf, core_math::acos, 0.99)),
+    ];
+    all.into_iter().flatten().collect()
+}
+
+/// Macros of one operand that every machine has.
 pub(crate) fn functions(machine: &Machine) -> Vec<Function> {
-    let has_arctangent =
-        takt_isa::Op::from_mnemonic("fatan2").is_some_and(|op| machine.host(op.row().function).is_some());
     let atan = smooth("atan", core_math::atanf, core_math::atan, 0.88751);
-    let atan = if has_arctangent {
+    let atan = if has(machine, "fatan2") {
         Function { error: takt_isa::fp::ATAN2_MAX_ULP, own: false, passes: Passes::Refused, ..atan }
     } else {
         atan
@@ -160,13 +195,19 @@ impl Function {
 
 fn measure(name: &str) {
     let mut wrong = Vec::new();
-    for machine in MACHINES {
-        let function = functions(machine).into_iter().find(|function| function.name == name);
-        let function = function.expect("it is in the list");
+    // `tan_quick` uses the sine.
+    let all = MACHINES.iter().copied().chain((name != "tan_quick").then(bare));
+    let functions = all.flat_map(|machine| {
+        let all = functions(machine).into_iter().chain(replacements(machine));
+        all.filter(|function| function.name == name).map(move |function| (machine, function))
+    });
+    let functions: Vec<(&Machine, Function)> = functions.collect();
+    let first = functions.first().expect("it is in the list").0.name;
+    for (machine, function) in functions {
         let program = one_use(machine, &format!("{name} d, x"), 1, "clrflags").program;
         check_emulator(&program, 1);
         // Macros compute the same operations on every machine, except `atan`, which depends on the machine's units.
-        if full() && machine.name != MACHINES[0].name && name != "atan" {
+        if full() && machine.name != first && name != "atan" {
             continue;
         }
         let measured =
@@ -187,11 +228,12 @@ macro_rules! tests {
         #[test]
         fn every_function_is_measured() {
             for machine in MACHINES {
-                let names: Vec<&str> = functions(machine).iter().map(|function| function.name).collect();
+                let all = functions(machine).into_iter().chain(replacements(bare()));
+                let names: Vec<&str> = all.map(|function| function.name).collect();
                 assert_eq!(names, [$(stringify!($name)),*]);
             }
         }
     };
 }
 
-tests!(floor ceil trunc round rint exp expm1 log log1p tan tan_quick asin atan tanh tanh_quick erf sigmoid elu);
+tests!(floor ceil trunc round rint exp expm1 log log1p tan tan_quick asin atan tanh tanh_quick erf sigmoid elu sin cos acos);

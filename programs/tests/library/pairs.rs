@@ -2,6 +2,7 @@
 //! Macros of two operands: powers, over random pairs and all pairs of notable operands, and the remainder, which is exact.
 
 use super::batch::{Batch, LANES};
+use super::functions::{bare, has};
 use super::measure::{ErrorStatistics, check_emulator, full, notable, parallel};
 use super::one_use;
 use rand_xoshiro::SplitMix64;
@@ -11,6 +12,8 @@ use takt_isa::{MACHINES, T3};
 
 /// Largest error of `pow`, ulp, over [`FULL_PAIRS`] random pairs and the pairs of notable operands.
 pub(crate) const POW_ERROR: f64 = 0.80832;
+/// Largest error of `atan2` where the machine has no unit for it, ulp, over [`FULL_PAIRS`] random pairs and those of notable operands.
+pub(crate) const ANGLE_ERROR: f64 = 1.5;
 /// Number of random pairs with `TAKT_FULL=1`.
 const FULL_PAIRS: u64 = 100_000_000;
 /// Number of random pairs by default.
@@ -118,6 +121,55 @@ fn powers_are_within_the_documented_error() {
         let count = if full() { FULL_PAIRS } else { PAIRS };
         let measured = measure(&program, count, draw_power, take_power);
         assert_eq!(measured.check(&format!("pow on {}", machine.name), POW_ERROR, true), None);
+    }
+}
+
+/// Operands of an angle, in turn: random bits; any quotient of numbers of like size; quotients near those at which the method changes.
+fn draw_angle(index: u64, random: &mut SplitMix64) -> [u32; 2] {
+    let bits = random.next_u64();
+    let (y, x) = (bits as u32, (bits >> 32) as u32);
+    match index % 3 {
+        0 => [y, x],
+        1 => {
+            let exponent = ((x >> 23 & 255) + (y >> 23) % 9).saturating_sub(4).min(254);
+            [y & 0x807f_ffff | exponent << 23, x]
+        }
+        _ => {
+            let quotient = [7.0, 11.0, 19.0, 39.0][(y & 3) as usize] / 16.0 * (1.0 + (y >> 8) as f32 * 1e-10);
+            [(f32::from_bits(x) * quotient).to_bits(), x ^ y << 31]
+        }
+    }
+}
+
+fn take_angle(measured: &mut ErrorStatistics, [y, x]: [u32; 2], result: u32, flags: Flags) {
+    let [a, b, got] = [y, x, result].map(f32::from_bits);
+    let nearest = core_math::atan2f(a, b);
+    let raised = if nearest.is_nan() { Flags::INVALID } else { Flags::NONE };
+    assert_eq!(flags, raised, "flags of the angle of {y:08x}, {x:08x}, which is {result:08x}");
+    measured.operands += 1;
+    if nearest.is_nan() {
+        assert_eq!(result, CANONICAL_NAN, "the angle of {y:08x}, {x:08x}");
+    } else if result != nearest.to_bits() {
+        assert!(
+            got.is_finite() && got.is_sign_negative() == nearest.is_sign_negative() && nearest != 0.0,
+            "the angle of {y:08x}, {x:08x} is {result:08x}, not {:08x}",
+            nearest.to_bits()
+        );
+        measured.miss([y, x], got, core_math::atan2(f64::from(a), f64::from(b)));
+    }
+}
+
+#[test]
+fn angles_are_within_the_documented_error() {
+    let machines = MACHINES.iter().copied().chain([bare()]).filter(|machine| !has(machine, "fatan2"));
+    for (number, machine) in machines.enumerate() {
+        let program = one_use(machine, "atan2 d, x, y", 2, "clrflags").program;
+        check_emulator(&program, 2);
+        if full() && number > 0 {
+            continue;
+        }
+        let measured = measure(&program, if full() { FULL_PAIRS } else { PAIRS }, draw_angle, take_angle);
+        assert_eq!(measured.check(&format!("atan2 on {}", machine.name), ANGLE_ERROR, true), None);
     }
 }
 

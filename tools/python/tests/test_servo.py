@@ -67,7 +67,7 @@ def closed_loop(machine, periods, **inputs):
     return {name: np.array([row[name] for row in rows], dtype=float) for name in rows[0]}
 
 
-@pytest.mark.parametrize("machine", ["t1", "t3", "t4"])
+@pytest.mark.parametrize("machine", [str(FOLDER / "small.toml"), "t3", "t4"])
 def test_an_axis_goes_to_its_goal_and_holds_it_against_a_load(machine):
     run = closed_loop(machine, 12_000, load=lambda period, _: 0.05 if 7000 <= period < 10_000 else 0.0)
     assert (run["faults"] == 0).all() and (run["mode"][20:] == 2).all()
