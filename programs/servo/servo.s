@@ -24,6 +24,7 @@
 
 .state  turn:int origin:int homed:int bad:int runs:int
 .state  iq w sd sq  rt:int rp v x speed s n[2]
+.state  seen:int at                     ; mode and position of the last motion loop, shown with the next duties
 .array  C[RING+1]                       ; A over a turn: cogging, as measured; none here
 
 .preset turn = 0
@@ -42,6 +43,8 @@
 .preset speed = 0
 .preset s = 0
 .preset n = 0
+.preset seen = 0
+.preset at = 0
 
 .once
         da, db, dc = 0.5, 0.5, 0.5
@@ -57,7 +60,9 @@ period:
         watch   bad, ia, ib, udc, error
         bad = enable ? bad : 0
         runs = enable & (bad == 0)
-        drive, faults = runs, bad
+        drive, faults, mode = runs, bad, seen
+        position, velocity, current = at, speed, iq
+        publish                         ; in every period after the same cycles
         turn = turn + 1
 .reg    due:int
         due = turn == EVERY
@@ -85,8 +90,8 @@ slow:
         iq = runs ? iq : 0
 .reg    mt:int mp
         position mt, mp, here, DIGITS
-        position, velocity, current = itof(mt) + mp, speed, iq
-        mode = bad == 0 ? (runs ? (seeks ? 1 : 2) : 0) : 3
+        at = itof(mt) + mp
+        seen = bad == 0 ? (runs ? (seeks ? 1 : 2) : 0) : 3
         wait    period
 
 ; For `takt accuracy`: a motor of 30 A at 56 V, a drive within 64 turns.
@@ -95,6 +100,8 @@ slow:
 .range  error, enable, home, at_switch, homed, runs = 0, 1
 .range  turn = 0, EVERY
 .range  bad = 0, 15
+.range  seen = 0, 3
+.range  at = -128, 128
 .range  udc = 0, UMAX
 .range  goal = -64, 64
 .range  id_ref, iq = -IMAX, IMAX

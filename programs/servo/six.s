@@ -51,6 +51,7 @@ period:
         faults[i] = bad[i]
         .endr
         drive = runs[1] | (runs[2] << 1) | (runs[3] << 2) | (runs[4] << 3) | (runs[5] << 4) | (runs[6] << 5)
+        publish                         ; in every period after the same cycles
         turn = turn == EVERY ? 1 : turn + 1
 .reg    due:int
         due = turn <= AXES

@@ -18,18 +18,6 @@
 .const  OFF_AXIS = 0.02                 ; m: nearer to joint 1's axis, the wrist's centre is
 .const  FOLDED = 0.002                  ; m²: elbow stretched or folded
 
-.if !has.fatan2                         ; a macro goes before the instruction
-.macro  atan2 d, u, w
-.reg    ratio base away left:int high
-        ratio = u/w
-        atan    base, ratio
-        high = u < 0 ? -pi : pi
-        left = w < 0
-        away = base + high
-        d = left ? away : base
-.endm
-.endif
-
 ; `way` and `way1` to joints, of a pose if `space`. Leaves them in registers, and the frame.
 solve:  call    fetch
         status = 0

@@ -93,9 +93,9 @@ pub(crate) fn replacements(machine: &Machine) -> Vec<Function> {
     };
     let turned = |function: Function| Function { limit: TURNS, ..function };
     let all = [
-        of("fsin", turned(smooth("sin", core_math::sinf, core_math::sin, 0.99))),
-        of("fcos", turned(smooth("cos", core_math::cosf, core_math::cos, 0.99))),
-        of("facos", smooth("acos", core_math::acosf, core_math::acos, 0.99)),
+        of("fsin", turned(smooth("sin", core_math::sinf, core_math::sin, 0.96583))),
+        of("fcos", turned(smooth("cos", core_math::cosf, core_math::cos, 0.93541))),
+        of("facos", smooth("acos", core_math::acosf, core_math::acos, 0.69925)),
     ];
     all.into_iter().flatten().collect()
 }
