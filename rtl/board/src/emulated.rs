@@ -3,13 +3,16 @@
 //! in Verilator. Behaviour is exact at base ticks. Between two base ticks no time passes for the line and the peripherals: requests are
 //! answered at once, and a core's write to an output acts from the tick on.
 
+mod scope;
+
+use self::scope::EmulatedScope;
 use crate::application::Application;
 use crate::endpoints::{Endpoints, Fifo};
 use crate::host::Status;
 use crate::interlock::{Figures, command};
 use crate::kind::Direction;
 use crate::protocol::{
-    self, CORE, DONE, DRIVEN, ENABLE, FIFO_WORDS, FIFOS, HOLD, READ_ONLY, RESTART, RUN, Request, SEEN,
+    self, CORE, DONE, DRIVEN, ENABLE, FIFO_WORDS, FIFOS, HOLD, IMAGE, READ_ONLY, RESTART, RUN, Request, SEEN,
     address,
 };
 use crate::sinks::sinks;
@@ -31,7 +34,7 @@ const STOP: u32 = 1 << (CAUSES + 4);
 const NAN: u32 = 1 << (CAUSES + 5);
 
 /// Registers that only store values: the emulated period is the system's tick, whatever `period` says.
-const KEPT: [&str; 3] = ["period", "lead", "stream"];
+const KEPT: [&str; 4] = ["period", "lead", "stream", "page"];
 
 /// Reason why a board cannot be emulated.
 #[derive(Debug, Error)]
@@ -109,6 +112,8 @@ pub struct EmulatedBoard {
     in_row: u32,
     silent: u32,
     stream: u32,
+    page: u32,
+    scope: Option<EmulatedScope>,
     frames: u8,
     bytes: Vec<u8>,
     errors: u32,
@@ -157,6 +162,7 @@ impl EmulatedBoard {
             }
         });
         let outputs: Vec<Output> = outputs.collect();
+        let scope = EmulatedScope::of(wiring, &application);
         let mut board = EmulatedBoard {
             captured,
             set: BTreeMap::new(),
@@ -181,6 +187,8 @@ impl EmulatedBoard {
             in_row: 0,
             silent: 0,
             stream: 0,
+            page: 0,
+            scope,
             frames: 0,
             bytes: Vec::new(),
             errors: 0,
@@ -239,9 +247,13 @@ impl EmulatedBoard {
         answers
     }
 
-    /// Reports the reason once outputs that drove become safe.
-    fn report_safe_outputs(&self, drove: bool) {
-        let Some(tell) = self.tell.filter(|_| drove && !self.drives()) else { return };
+    /// Shows the scope that outputs that drove have become safe, and reports the reason.
+    fn report_safe_outputs(&mut self, drove: bool) {
+        if !drove || self.drives() {
+            return;
+        }
+        self.scope.iter_mut().for_each(EmulatedScope::became_safe);
+        let Some(tell) = self.tell else { return };
         let figures = Figures {
             misses: self.missed,
             period: u32::try_from(self.description.tick).unwrap_or(u32::MAX),
@@ -267,6 +279,9 @@ impl EmulatedBoard {
         let drove = self.drives();
         let sent = self.run_period();
         self.report_safe_outputs(drove);
+        if let Some(scope) = &mut self.scope {
+            scope.decide(self.system.as_ref());
+        }
         sent
     }
 
@@ -309,7 +324,10 @@ impl EmulatedBoard {
             }
         }
         self.tick = Some(tick + base);
-        system.run_until(tick + base)?;
+        match &mut self.scope {
+            Some(scope) => scope.run(system, tick + base)?,
+            None => system.run_until(tick + base)?,
+        }
         self.ticks += 1;
         Ok(())
     }
@@ -382,7 +400,7 @@ impl EmulatedBoard {
 
     /// Register that only stores its value, by address.
     fn register(&mut self, at: u16) -> Option<&mut u32> {
-        let registers = [&mut self.period, &mut self.lead, &mut self.stream];
+        let registers = [&mut self.period, &mut self.lead, &mut self.stream, &mut self.page];
         KEPT.iter().zip(registers).find(|(name, _)| address(name) == at).map(|(_, register)| register)
     }
 
@@ -392,6 +410,9 @@ impl EmulatedBoard {
         }
         if at == address("step") {
             return self.control & HOLD != 0;
+        }
+        if let Some((scope, at)) = self.scope.as_ref().zip(scope::offset(at)) {
+            return scope.is_writable(at);
         }
         if (DRIVEN..SEEN).contains(&at) {
             let number = usize::from(at - DRIVEN);
@@ -407,6 +428,7 @@ impl EmulatedBoard {
         let starts = word & RUN != 0 && (self.control & RUN == 0 || word & RESTART != 0);
         self.control = word & (RUN | HOLD | ENABLE);
         if starts || word & RUN == 0 {
+            self.scope.iter_mut().for_each(EmulatedScope::reset);
             (self.causes, self.begun, self.tick, self.steps) = (0, false, None, 0);
             self.silent = 0;
             self.set.clear();
@@ -425,6 +447,8 @@ impl EmulatedBoard {
         }
         if at == address("step") {
             self.steps += 1;
+        } else if let Some((scope, at)) = self.scope.as_mut().zip(scope::offset(at)) {
+            scope.write(at, word);
         } else if let Some(register) = self.register(at) {
             *register = word;
         } else if (DRIVEN..SEEN).contains(&at) {
@@ -473,6 +497,9 @@ impl EmulatedBoard {
 
     fn read(&self, at: u16) -> u32 {
         let registers = CORE * self.description.cores.len() as u16;
+        if let Some((scope, at)) = self.scope.as_ref().zip(scope::offset(at)) {
+            return scope.read(at);
+        }
         match at {
             _ if at < registers => self.read_register(usize::from(at / CORE), at % CORE),
             DRIVEN..SEEN => {
@@ -483,6 +510,10 @@ impl EmulatedBoard {
                 let end = self.endpoints.outputs.get(usize::from(at - SEEN));
                 let bits = end.zip(self.system.as_ref());
                 bits.and_then(|(end, system)| system.field_bits(end.link, end.field)).unwrap_or(0)
+            }
+            _ if at >= IMAGE => {
+                let scope = self.scope.as_ref();
+                scope.and_then(|scope| scope.word(self.page, at - IMAGE)).unwrap_or(0)
             }
             _ => self.read_fifo(at),
         }
@@ -510,6 +541,7 @@ impl EmulatedBoard {
             ("period", 0) => self.period,
             ("lead", 0) => self.lead,
             ("stream", 0) => self.stream,
+            ("page", 0) => self.page,
             ("errors", 0) => self.errors,
             ("circuit", 0) => self.circuit,
             _ => 0,

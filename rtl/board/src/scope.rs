@@ -23,15 +23,15 @@ pub const MOST_WORDS: u32 = 1 << 17;
 pub const MOST_EVERY: u32 = (1 << 12) - 1;
 
 /// Bit of `scope_state`, written: arms.
-const ARM: u32 = 1;
+pub(crate) const ARM: u32 = 1;
 /// Bit of `scope_state`, written: triggers.
-const NOW: u32 = 1 << 1;
+pub(crate) const NOW: u32 = 1 << 1;
 /// Bit of `scope_state`, written: ends the recording.
-const END: u32 = 1 << 2;
+pub(crate) const END: u32 = 1 << 2;
 /// Bit of a channel's register: only the bundle in bits 29:16 counts.
 const RESTRICTED: u32 = 1 << 30;
 /// Place of the causes in `scope_state`.
-const CAUSES: u32 = 4;
+pub(crate) const CAUSES: u32 = 4;
 
 /// The scope of a board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -225,7 +225,7 @@ pub enum ScopeError {
 }
 
 /// The key of a value: keys are in the order of values, as integers without sign.
-fn key(ty: Type, bits: u32) -> u32 {
+pub(crate) fn key(ty: Type, bits: u32) -> u32 {
     match ty {
         Type::B => bits,
         Type::I => bits ^ 1 << 31,

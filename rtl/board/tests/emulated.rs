@@ -4,15 +4,18 @@
 
 use crate::system::{self, Names};
 use std::io;
+use std::ops::ControlFlow;
+use std::path::Path;
 use std::sync::Mutex;
 use std::time::Duration;
 use takt_asm::{MemoryLoader, Options, assemble};
 use takt_board::emulated::{EmulatedBoard, EmulatedError};
 use takt_board::endpoints::Endpoints;
 use takt_board::protocol::{ENABLE, HOLD, IMAGE, Line, LinkError, RUN};
+use takt_board::scope::{Recording, ScopeState, Setup};
 use takt_board::simulation::{EncoderMotion, Simulation};
-use takt_board::{Board, Host, Wiring};
-use takt_system::{ProgramError, Request};
+use takt_board::{Application, Board, Host, Wiring};
+use takt_system::{Description, ProgramError, Request};
 
 /// An emulated board on a line. A base tick passes whenever the host listens.
 struct Emulation {
@@ -112,6 +115,99 @@ fn the_emulated_board_has_the_values_of_the_circuit() {
     assert!(circuit.iter().any(|words| words != &circuit[0]), "something happens");
     for (tick, (emulated, circuit)) in emulated.iter().zip(&circuit).enumerate() {
         assert_eq!(emulated, circuit, "after tick {tick}");
+    }
+}
+
+/// Recordings of the same run, with these triggers, on a board whose wiring has a scope for the servo.
+fn recordings<L: Line>(
+    host: &mut Host<L>,
+    description: &Description,
+    mut turn: impl FnMut(&mut L, u32),
+) -> Vec<Recording> {
+    let application = Application::from(description);
+    let scope = host.scope().expect("it has a scope");
+    assert_eq!((scope.depth, scope.channels, scope.core), (32, 4, 1));
+    let mut tick = 0;
+    let mut pass = |host: &mut Host<L>, ticks: u32| {
+        for _ in 0..ticks {
+            turn(&mut host.line, tick);
+            tick += 1;
+            host.set("step", 1).expect("it is held");
+            host.register("periods").expect("a register");
+        }
+    };
+    host.set("control", 0).expect("it stops");
+    host.set("control", RUN | HOLD | ENABLE).expect("it starts, held");
+    host.settle().expect("all cores wait");
+    pass(host, 3);
+    let setups: [(&[&str], &str, u32, u32, u32, u32); 6] = [
+        (&["servo.n", "servo.error"], "", 1, 8, 0, 12),
+        (&["servo.n", "servo.error"], "servo.n >= -9", 1, 10, 4, 30),
+        (&["servo.n"], "servo.n rises -9", 1, 6, 2, 60),
+        (&["servo.error", "servo.n"], "servo.error < 3", 2, 9, 3, 60),
+        (&["servo.n"], "servo.n changes", 3, 5, 0, 40),
+        (&["servo.error", "servo.n"], "safe", 1, 9, 6, 12),
+    ];
+    setups
+        .map(|(names, trigger, every, samples, before, ticks)| {
+            let names: Vec<String> = names.iter().map(|&name| name.to_owned()).collect();
+            let triggers: Vec<String> =
+                (!trigger.is_empty()).then(|| trigger.to_owned()).into_iter().collect();
+            let mut setup = Setup::new(&application, &names, &triggers).expect("a right one");
+            (setup.every, setup.samples, setup.before) = (every, Some(samples), Some(before));
+            host.arm(&application, &scope, &setup).expect("it is armed");
+            if trigger == "safe" {
+                pass(host, 8);
+                host.set("control", RUN | HOLD).expect("it no longer drives");
+            }
+            pass(host, ticks);
+            assert_eq!(host.scope_state().expect("a state"), ScopeState::Done, "{trigger}");
+            host.recording(&scope, &setup, |_, _| ControlFlow::Continue(())).expect("a recording")
+        })
+        .to_vec()
+}
+
+/// A scope of the emulated board records what the circuit's does: the same periods, triggers and causes, and the same values, where the
+/// circuit has one.
+#[test]
+fn the_emulated_scope_records_as_the_circuits_does() {
+    let description = system::unchanged();
+    let wiring = system::wiring_with(&description, "[scope]\ncore = \"servo\"\nchannels = 4\ndepth = 32\n");
+    let counts = |tick: u32| (tick as i32 % 7 - 3) * 3;
+
+    let mut host = connect(EmulatedBoard::new(&wiring, &description).expect("it has a circuit"));
+    let encoder = host.line.board.input("servo.n").expect("the encoder's");
+    let mut count = 0i32;
+    let emulated = recordings(&mut host, &description, |line, tick| {
+        count += counts(tick);
+        line.board.capture(encoder, count.cast_unsigned());
+    });
+
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("emulated-scope");
+    let sim = Simulation::new(&system::ulx3s(), &wiring, &description, &folder);
+    let sim = sim.unwrap_or_else(|error| panic!("{error}"));
+    let pins = ["encoder_a", "encoder_b"].map(|pin| sim.input(pin).expect("a pin"));
+    let mut host = Host::connect(sim, 3).unwrap_or_else(|error| panic!("{error}"));
+    let mut count = 0i32;
+    let circuit = recordings(&mut host, &description, |sim: &mut Simulation, tick| {
+        sim.turns.push(EncoderMotion { pins, from: count, by: counts(tick) });
+        count += counts(tick);
+        sim.run(400, &[]).expect("it runs");
+    });
+    for (number, (emulated, circuit)) in emulated.iter().zip(&circuit).enumerate() {
+        let seen = |recording: &Recording| {
+            let Recording { channels, periods, trigger, causes, is_stopped, .. } = recording.clone();
+            (channels, periods, trigger, causes, is_stopped)
+        };
+        assert_eq!(seen(emulated), seen(circuit), "recording {number}");
+        for (emulated, circuit) in emulated.values.iter().zip(&circuit.values) {
+            let known: Vec<_> =
+                emulated.iter().zip(circuit).filter(|(_, circuit)| circuit.is_some()).collect();
+            assert!(
+                known.len() > 2 && known.iter().all(|(emulated, circuit)| emulated == circuit),
+                "{number}: {known:?}"
+            );
+        }
     }
 }
 

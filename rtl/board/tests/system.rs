@@ -53,12 +53,17 @@ pub(crate) fn unchanged() -> Description {
     system(&|_, source| source.to_owned())
 }
 
-fn ulx3s() -> Board {
+pub(crate) fn ulx3s() -> Board {
     Board::from_name("ulx3s-85f").expect("a board").expect("a right one")
 }
 
 pub(crate) fn wiring(description: &Description) -> Wiring {
-    let text = wiring_text();
+    wiring_with(description, "")
+}
+
+/// The wiring with more tables.
+pub(crate) fn wiring_with(description: &Description, more: &str) -> Wiring {
+    let text = wiring_text() + more;
     let wiring = Wiring::read("wiring.toml", &text, &ulx3s()).expect("a right wiring");
     wiring.check("wiring.toml", &text, description).expect("ports fit");
     wiring

@@ -22,6 +22,7 @@ pub use error::TopError;
 pub use image::{Contents, RECORDS, image};
 pub(crate) use peripherals::{OwnPin, own_pins};
 pub use scope::ScopeSize;
+pub(crate) use scope::recorded;
 pub use wrapper::AROUND;
 
 use crate::VERILOG;

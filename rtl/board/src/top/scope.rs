@@ -34,7 +34,7 @@ pub struct ScopeSize {
 }
 
 /// The core that the scope of a wiring records; `None` without a scope.
-pub(super) fn recorded(wiring: &Wiring, application: &Application<'_>) -> Option<usize> {
+pub(crate) fn recorded(wiring: &Wiring, application: &Application<'_>) -> Option<usize> {
     let request = wiring.scope.as_ref()?;
     let named = request.core.as_deref().and_then(|name| application.description().core_named(name));
     Some(named.unwrap_or(0))
