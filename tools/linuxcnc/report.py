@@ -217,41 +217,50 @@ def fill(file, name, text):
     file.write_text(new)
 
 
-def draw(file, run, cut, event):
-    import matplotlib.pyplot as plt
+#: Magnification of the tool's deviation in the picture.
+MAGNIFIED = 500
 
-    sys.path.insert(0, str(Path(__file__).parents[1] / "python/examples"))
-    import pictures
 
-    magnified = 500
-    figure, (left, top, below) = plt.subplots(3, 1, figsize=(8, 9.5), height_ratios=[1.7, 1, 1], constrained_layout=True)
+def curves(run, cut, event):
+    """Curves of the picture: x and y of each."""
     some = slice(None, None, 40)
     point, off = run.point[some] * 1e3, (run.tool - run.point)[some] * 1e3
-    tool = point + magnified * off
-    cuts = run.cutting[some]
-    left.plot(*np.where(cuts[:, None], point, np.nan)[:, :2].T, color="0.6", lw=3, solid_capstyle="round", label="LinuxCNC's path, where it cuts")
-    left.plot(*point[:, :2].T, color="0.8", lw=0.5)
-    left.plot(*np.where(cuts[:, None], tool, np.nan)[:, :2].T, color="C3", lw=0.8, label=f"the tool, its deviation {magnified} times as large")
-    left.set(aspect="equal", ylim=(-46, 62), xlabel="x, mm", ylabel="y, mm", title="agh.ngc, planned by LinuxCNC, cut by the hybrid robot")
-    left.legend(loc="upper center", ncols=2, fontsize="small")
-    seconds = run.tick * TICK
+    cuts = run.cutting[some][:, None]
     distance = np.linalg.norm((run.tool - run.point)[:, :3], axis=1) * 1e6
     # Plot the largest of every 100 periods, so that no peak is lost.
     whole = len(distance) // 100 * 100
-    peaks = distance[:whole].reshape(-1, 100).max(axis=1)
-    top.plot(seconds[:whole:100], peaks, color="C3", lw=0.5)
-    top.set(xlabel="time on the board, s", ylabel="error, µm", title="tool from LinuxCNC's point of the same instant", xlim=(0, seconds[-1]), ylim=(0, None))
     states = cut.states
     begin = cut.driven[event - 1]
     window = slice(begin - 100, begin + 400)
     position = np.stack([states[axis][window] for axis in "xyz"], axis=1)
     speed = np.linalg.norm(np.diff(position, axis=0), axis=1) / TICK * 1e3
     time = (np.arange(len(speed)) - 100) * TICK * 1e3
+    return {
+        "path": np.where(cuts, point, np.nan)[:, :2].T, "way": point[:, :2].T, "tool": np.where(cuts, point + MAGNIFIED * off, np.nan)[:, :2].T,
+        "error": ((run.tick * TICK)[:whole:100], distance[:whole].reshape(-1, 100).max(axis=1)),
+        "speed": (time, speed), "drive": (time, states["drive"][window][1:] * 10),
+    }
+
+
+def draw(file, curves):
+    sys.path.insert(0, str(Path(__file__).parents[1] / "python/examples"))
+    import pictures
+
+    figure, (left, top, below) = pictures.subplots(3, 7.4, height_ratios=[1.6, 1, 1])
+    left.plot(*curves["path"], color="0.6", lw=3, solid_capstyle="round", label="LinuxCNC's path, where it cuts")
+    left.plot(*curves["way"], color="0.8", lw=0.5)
+    left.plot(*curves["tool"], color="C1", lw=0.8, label=f"the tool, its deviation {MAGNIFIED} times as large")
+    left.set(aspect="equal", ylim=(-46, 86), xlabel="x, mm (y upwards)", title="agh.ngc, planned by LinuxCNC, cut by the hybrid robot")
+    left.legend(loc="upper left")
+    seconds, peaks = curves["error"]
+    top.plot(seconds, peaks, color="C1", lw=0.5)
+    top.set(xlabel="time on the board, s", title="distance of the tool from LinuxCNC's point, µm", xlim=(0, seconds[-1]), ylim=(0, None))
+    time, speed = curves["speed"]
     below.plot(time, speed, color="C0", label="speed of the tool, mm/s")
-    below.step(time, states["drive"][window][1:] * 10, color="C2", label="outputs drive (10) or are safe (0)")
+    below.step(*curves["drive"], color="C2", label="outputs drive (10) or are safe (0)")
     below.axvline(0, color="0.5", ls=":")
-    below.set(xlabel="time after the link was cut, ms", title="the link is cut in mid-cut: the board brakes, and its outputs become safe")
-    below.legend(fontsize="small")
+    below.set(xlabel="time after the link was cut, ms", xlim=(time[0], time[-1]), ylim=(0, 1.6 * speed.max()), title="the link is cut in mid-cut: the board brakes, and is safe")
+    below.legend(loc="upper right")
     pictures.save(figure, file)
 
 
@@ -306,7 +315,7 @@ def main():
         raise SystemExit("\n".join(mistakes))
     if arguments.picture:
         cut = runs["unplugged"]
-        draw(arguments.picture, runs["path"], cut, names["unplugged"]["event"])
+        draw(arguments.picture, curves(runs["path"], cut, names["unplugged"]["event"]))
 
 
 main()

@@ -138,21 +138,18 @@ def picture(result: Swings, file: str) -> None:
 
 
 def plot(results: dict[str, Swings], file: str) -> None:
-    import matplotlib.pyplot as plt
     import pictures
 
-    figure, axes = plt.subplots(2, 1, figsize=(8, 4.8), layout="constrained", sharex=True)
+    figure, axes = pictures.subplots(2, 4.4, sharex=True)
     for name, result in results.items():
         if name == "starts thrice as far off":
             continue  # its first start is at rest as well
         times = PERIOD * np.arange(1, result.distance.shape[1] + 1)
-        axes[0].plot(times, result.distance[0], label=name, linewidth=1)
-        axes[1].plot(times, result.torque[0], linewidth=1)
-    axes[0].set_ylabel("angle from upright, rad")
-    axes[1].set(xlabel="time, s", ylabel="torque, N m")
-    axes[0].legend(fontsize=8)
-    for axis in axes:
-        axis.grid(alpha=0.3)
+        axes[0].plot(times, result.distance[0], label=name)
+        axes[1].plot(times, result.torque[0])
+    axes[0].set(title="angle from upright, rad", xlim=(0, times[-1]))
+    axes[1].set(xlabel="time, s", title="torque, N m")
+    pictures.legend(figure, axes[0], 2)
     pictures.save(figure, file)
 
 

@@ -170,17 +170,15 @@ def picture(model: Any, path: Joints, file: str) -> None:
 
 
 def plot(results: dict[str, Lap], file: str) -> None:
-    import matplotlib.pyplot as plt
     import pictures
 
-    figure, axes = plt.subplots(figsize=(8, 4.2), layout="constrained")
+    figure, axes = pictures.subplots(1, 4.2)
     for name, result in results.items():
         # The picture resolves about a thousand points.
         every = max(1, len(result.tip) // 1000)
-        axes.semilogy(np.linspace(0, LAP, len(result.tip))[::every], 1e6 * result.tip[::every], label=name, linewidth=1)
-    axes.set(xlabel="time, s", ylabel="distance of the tip from its path, µm", ylim=(1e-1, None))
-    axes.legend(fontsize=7, loc="upper left", bbox_to_anchor=(1, 1))
-    axes.grid(alpha=0.3)
+        axes.semilogy(np.linspace(0, LAP, len(result.tip))[::every], 1e6 * result.tip[::every], label=name)
+    axes.set(xlabel="time, s", title="distance of the tip from its path, µm", xlim=(0, LAP), ylim=(1e-1, None))
+    pictures.legend(figure, axes, 1)
     pictures.save(figure, file)
 
 

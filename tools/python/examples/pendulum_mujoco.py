@@ -111,19 +111,16 @@ def picture(result: Swing, file: str) -> None:
 
 
 def plot(results: dict[str, Swing], file: str) -> None:
-    import matplotlib.pyplot as plt
     import pictures
 
-    figure, axes = plt.subplots(2, 1, figsize=(8, 4.8), layout="constrained", sharex=True)
+    figure, axes = pictures.subplots(2, 4.4, sharex=True)
     for name, result in results.items():
         times = PERIOD * np.arange(1, len(result.angle) + 1)
-        axes[0].plot(times, result.distance, label=name, linewidth=1)
-        axes[1].plot(times, result.torque, linewidth=1)
-    axes[0].set_ylabel("angle from upright, rad")
-    axes[1].set(xlabel="time, s", ylabel="torque, of the weight's")
-    axes[0].legend(fontsize=8)
-    for axis in axes:
-        axis.grid(alpha=0.3)
+        axes[0].plot(times, result.distance, label=name)
+        axes[1].plot(times, result.torque)
+    axes[0].set(title="angle from upright, rad", xlim=(0, times[-1]))
+    axes[1].set(xlabel="time, s", title="torque, of the weight's")
+    pictures.legend(figure, axes[0], 2)
     pictures.save(figure, file)
 
 

@@ -12,6 +12,16 @@ import sys
 from pathlib import Path
 from typing import Any
 
+#: Width in inches and size of the type in points: on a telephone, 390 pixels wide, the type keeps seven eighths of its size.
+WIDTH, TYPE = 4.6, 8.5
+#: Style of all figures, with the colours of the playground's plots (`COLOURS` in tools/web/page/src/parts.js).
+STYLE: dict[Any, Any] = {
+    "font.size": TYPE, "axes.titlesize": TYPE, "axes.titlelocation": "left", "legend.fontsize": TYPE, "legend.frameon": False, "legend.handlelength": 1.4,
+    "axes.spines.top": False, "axes.spines.right": False, "axes.edgecolor": "0.6", "axes.grid": True, "grid.color": "0.88", "grid.linewidth": 0.6,
+    "lines.linewidth": 1.2,
+}
+COLOURS = ["#2f6fbf", "#d9534f", "#5aa469", "#b07cd8", "#d98a1f", "#26a0a8", "#a3156b", "#8d6e63"]
+
 #: Decimal places of coordinates, in points: a twentieth of a point is smaller than a pixel.
 DIGITS = 1
 
@@ -42,6 +52,20 @@ def shrink(svg: str) -> str:
     svg = re.sub(r'\b([xy])="([-\d.e]+)"', lambda found: f'{found[1]}="{number(found[2])}"', svg)
     svg = re.sub(r"translate\(([-\d.e]+)[ ,]+([-\d.e]+)\)", lambda found: f"translate({number(found[1])} {number(found[2])})", svg)
     return re.sub(r">\s+<", "><", svg).replace("<g id=", "\n<g id=").strip() + "\n"
+
+
+def subplots(rows: int, height: float, **options: Any) -> tuple[Any, Any]:
+    """A figure with axes below one another, `height` inches tall. Titles say the quantity: beside the axis they would take its width."""
+    import matplotlib.pyplot as plt
+    from cycler import cycler
+
+    plt.rcParams.update({**STYLE, "axes.prop_cycle": cycler("color", COLOURS)})
+    return plt.subplots(rows, 1, figsize=(WIDTH, height), layout="constrained", **options)
+
+
+def legend(figure: Any, axes: Any, columns: int) -> None:
+    """One legend for all axes, below them, where it covers no curve."""
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower left", ncols=columns)
 
 
 def save(figure: Any, file: str | Path) -> None:

@@ -177,19 +177,17 @@ def picture(model: Any, file: str) -> None:
 
 
 def plot(result: Round, file: str) -> None:
-    import matplotlib.pyplot as plt
     import pictures
 
-    figure, axes = plt.subplots(3, 1, figsize=(8, 6.5), layout="constrained", sharex=True)
+    figure, axes = pictures.subplots(3, 6, sharex=True)
     times = PERIOD * np.arange(1, len(result.distance) + 1)
     for values, axis, label in zip((result.distance, result.velocity, 100 * result.torque), axes, ("distance from the pose, rad", "velocity, rad/s", "torque, % of its limit")):
-        axis.plot(times[::3], values[::3], linewidth=1)
-        axis.set_ylabel(label)
-        axis.grid(alpha=0.3)
+        axis.plot(times[::3], values[::3], label=[f"joint {i}" for i in range(1, 7)])
+        axis.set_title(label)
     axes[1].axhline(FASTEST, color="0.4", linestyle="--", linewidth=0.8)
     axes[1].axhline(-FASTEST, color="0.4", linestyle="--", linewidth=0.8)
-    axes[0].legend([f"joint {i}" for i in range(1, 7)], fontsize=7, ncols=6, loc="lower right")
-    axes[2].set_xlabel("time, s")
+    axes[2].set(xlabel="time, s", xlim=(0, times[-1]))
+    pictures.legend(figure, axes[0], 3)
     pictures.save(figure, file)
 
 
