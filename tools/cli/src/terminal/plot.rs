@@ -466,10 +466,11 @@ pub(crate) type Axes =
 pub(crate) fn mesh(chart: &mut ChartContext<'_, SVGBackend<'_>, Axes>, x: &str, y: &str) -> Outcome<()> {
     // A sum with zero has no negative zero.
     let label = |value: &f64| format!("{}", (value * 1e6).round() / 1e6 + 0.0);
-    // In a low chart, as many labels as do not touch.
-    let height = chart.plotting_area().dim_in_pixel().1;
+    // In a low or narrow chart, as many labels as do not touch.
+    let (width, height) = chart.plotting_area().dim_in_pixel();
     chart
         .configure_mesh()
+        .x_labels((width / px(64)).clamp(2, 11) as usize)
         .y_labels((height / px(22)).clamp(2, 11) as usize)
         .light_line_style(TRANSPARENT)
         .bold_line_style(BLACK.mix(0.15).stroke_width(px(1)))
