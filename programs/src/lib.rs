@@ -69,6 +69,7 @@ pub const EXAMPLES: &[(&str, &str)] = &[
     ("foc.csv", include_str!("../examples/foc.csv")),
     ("foc.s", include_str!("../examples/foc.s")),
     ("foc_early.s", include_str!("../examples/foc_early.s")),
+    ("gains.s", include_str!("../examples/gains.s")),
     ("kalman.csv", include_str!("../examples/kalman.csv")),
     ("kalman.s", include_str!("../examples/kalman.s")),
     ("lu.csv", include_str!("../examples/lu.csv")),

@@ -10,7 +10,7 @@ const BEYOND = 3;
  * Colours of units by name: numbers of the style sheet's `--u0` and so on, which also people with deuteranopia or protanopia tell apart.
  * Alternatives, of which a machine has one, share a number. Units of other names take the colours that are left.
  */
-const UNITS = { multiply: 0, add: 1, fused: 2, addmul: 2, alu: 3, alu_late: 3, divroot: 4, recurrence: 4, convert: 5, memory: 6, sequencer: 7, sine: 8, arctangent: 9, arccosine: 10 };
+export const UNITS = { multiply: 0, add: 1, fused: 2, addmul: 2, alu: 3, alu_late: 3, divroot: 4, recurrence: 4, convert: 5, memory: 6, sequencer: 7, sine: 8, arctangent: 9, arccosine: 10 };
 const COLOURS = 11;
 /** Kinds of stalls, and what each means. */
 export const KINDS = {
@@ -100,6 +100,27 @@ export function stalls(data) {
   return { kinds, loops: loops.sort(most), lines, total: Object.values(kinds).reduce((a, b) => a + b, 0) };
 }
 
+/** Sums over the columns from `low` to `high`: bundles and operations that issue there, these by unit, and stalled cycles by cause. */
+export function sums(rows, low, high) {
+  const found = { cycles: high - low + 1, bundles: 0, operations: 0, units: {}, stalled: {} };
+  for (const { bundle, operation, first, column } of rows) {
+    const here = column >= low && column <= high;
+    if (here && operation) {
+      found.operations += 1;
+      found.units[operation.unit] = (found.units[operation.unit] ?? 0) + 1;
+    }
+    if (!first) continue;
+    found.bundles += here ? 1 : 0;
+    let at = column;
+    for (const { cause, cycles } of [...bundle.stalls].reverse()) {
+      at -= cycles;
+      const inside = Math.min(at + cycles - 1, high) - Math.max(at, low) + 1;
+      if (inside > 0) found.stalled[cause] = (found.stalled[cause] ?? 0) + inside;
+    }
+  }
+  return found;
+}
+
 export class Pipeline {
   /**
    * @param parent where it goes
@@ -119,11 +140,12 @@ export class Pipeline {
     this.corner = node("div", { class: "tp-corner", text: "cycle" });
     this.view.append(this.svg, this.axis, this.labels, this.corner);
     this.sizer.append(this.view);
-    this.scroll = node("div", { class: "tp-scroll", tabindex: "0", role: "region", "aria-label": "Pipeline: arrows scroll, plus and minus zoom" }, this.sizer);
+    this.scroll = node("div", { class: "tp-scroll", tabindex: "0", role: "region", "aria-label": "Pipeline: arrows scroll, plus and minus zoom, brackets begin and end a range" }, this.sizer);
     this.tip = node("div", { class: "tp-tip", role: "tooltip" });
     this.stalls = node("details", { class: "tp-stalls" });
+    this.sums = node("div", { class: "tp-sums", role: "status" });
     parent.classList.add("tp");
-    parent.replaceChildren(node("div", { class: "tp-head" }, this.legend, this.tools), this.scroll, this.stalls, this.tip);
+    parent.replaceChildren(node("div", { class: "tp-head" }, this.legend, this.tools), this.sums, this.scroll, this.stalls, this.tip);
     this.listen();
   }
 
@@ -149,6 +171,7 @@ export class Pipeline {
       this.tabStop();
     });
     scroll.addEventListener("click", (event) => this.clicked(event.target));
+    scroll.addEventListener("pointerdown", (event) => this.drag(event));
     scroll.addEventListener("mousemove", (event) => this.point(event));
     scroll.addEventListener("mouseleave", () => (this.tip.style.display = "none"));
     new ResizeObserver(() => this.resize()).observe(scroll);
@@ -156,13 +179,43 @@ export class Pipeline {
 
   key(event) {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
-    const act = { "+": () => this.zoom(1.4), "=": () => this.zoom(1.4), "-": () => this.zoom(1 / 1.4), 0: () => this.fit() }[event.key];
+    const to = this.rows[this.at]?.column ?? 0, [low, high] = this.range ?? [to, to];
+    const act = { "[": () => this.choose(to, Math.max(to, high)), "]": () => this.choose(Math.min(to, low), to), Escape: this.range && (() => this.choose()), "+": () => this.zoom(1.4), "=": () => this.zoom(1.4), "-": () => this.zoom(1 / 1.4), 0: () => this.fit() }[event.key];
     const step = { ArrowDown: 1, ArrowUp: -1 }[event.key], at = Number(event.target.dataset?.row ?? NaN);
     if (act) act();
     else if ((event.key === "Enter" || event.key === " ") && event.target !== this.scroll) this.clicked(event.target);
     else if (step && !Number.isNaN(at)) this.focus(at + step);
     else return;
     event.preventDefault();
+  }
+
+  /** Selects a range of cycles by dragging along the axis, or with the shift key anywhere. */
+  drag(event) {
+    if (event.button || !this.columns || (!event.shiftKey && !this.axis.contains(event.target))) return;
+    event.preventDefault();
+    const { scroll } = this, column = ({ clientX }) => {
+      const x = clientX - scroll.getBoundingClientRect().left - this.labelWidth - GAP + scroll.scrollLeft;
+      return Math.max(0, Math.min(this.columns - 1, Math.floor(x / this.width)));
+    };
+    const from = column(event), move = (event) => this.choose(Math.min(from, column(event)), Math.max(from, column(event)));
+    move(event);
+    scroll.setPointerCapture(event.pointerId);
+    scroll.addEventListener("pointermove", move);
+    scroll.addEventListener("lostpointercapture", () => scroll.removeEventListener("pointermove", move), { once: true });
+  }
+
+  /** Selects the columns from `low` to `high`, or none, and says their sums. */
+  choose(low, high) {
+    this.range = low === undefined ? null : [low, high];
+    const { range, stretches, rows } = this, box = this.sums;
+    box.replaceChildren();
+    if (range) {
+      const { cycles, bundles, operations, units, stalled } = sums(rows, low, high), list = (of) => Object.entries(of).sort((a, b) => b[1] - a[1]).map(([name, count]) => `${name} ${count}`).join(", ");
+      const cycle = (column) => column + 1 - (stretches.findLast(({ start }) => start <= column)?.start ?? 0), lost = Object.values(stalled).reduce((a, b) => a + b, 0);
+      box.append(node("b", { text: `cycles ${cycle(low)} to ${cycle(high)}: ${cycles}` }), ` · ${plural(bundles, "bundle")}, ${plural(operations, "operation")}${operations ? ` (${list(units)})` : ""} · ${plural(lost, "cycle")} stalled${lost ? ` (${list(stalled)})` : ""}`,
+        node("button", { type: "button", text: "×", title: "No range (Escape)", "aria-label": "No range", onclick: () => this.choose() }));
+    } else if (rows.length) box.append(node("span", { class: "tp-how", text: "drag along the cycles to sum a range" }));
+    this.paint();
   }
 
   focus(index) {
@@ -218,6 +271,8 @@ export class Pipeline {
     this.marked = new Set();
     this.showLegend();
     this.showStalls();
+    // A range of another picture is none of this.
+    this.choose();
     if (!before || before.bundles.length !== data?.bundles.length) {
       Object.assign(this.scroll, { scrollLeft: 0, scrollTop: 0 });
       this.follows = true;
@@ -337,6 +392,9 @@ export class Pipeline {
     svg.setAttribute("height", tall);
     axis.setAttribute("width", wide);
     axis.setAttribute("height", AXIS);
+    for (const [one, height] of this.range ? [[svg, tall], [axis, AXIS]] : []) {
+      one.append(shape("rect", { class: "tp-range", x: x(this.range[0]), y: 0, width: (this.range[1] - this.range[0] + 1) * w, height }));
+    }
     this.paintAxis(from, to, low, high, x, y);
     const focused = document.activeElement?.dataset?.row;
     const shown = [];

@@ -19,18 +19,27 @@ impl Reference for Blink {
     }
 }
 
-#[derive(Default)]
 pub(crate) struct Pi {
+    /// In V·s/rad and V/rad.
+    gains: [f64; 2],
     integral: f64,
+}
+
+impl Pi {
+    /// A controller with gains of the error and of its integral.
+    pub(crate) fn new(gains: [f64; 2]) -> Pi {
+        Pi { gains, integral: 0.0 }
+    }
 }
 
 impl Reference for Pi {
     fn period(&mut self, inputs: &[f64]) -> Vec<f64> {
         let [wanted, measured] = inputs else { panic!("two inputs") };
         let error = wanted - measured;
-        let wish = 0.8 * error + self.integral;
+        let [proportional, integral] = self.gains;
+        let wish = proportional * error + self.integral;
         let output = wish.clamp(-24.0, 24.0);
-        self.integral += 1e-3 * (12.0 * error + (output - wish) / 0.05);
+        self.integral += 1e-3 * (integral * error + (output - wish) / 0.05);
         vec![output]
     }
 }

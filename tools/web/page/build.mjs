@@ -1,32 +1,41 @@
 // Bundles the page: `node build.mjs TAKT.WASM OUT`.
 import zopfli from "@gfx/zopfli";
 import { build } from "esbuild";
-import { cpSync, mkdirSync, readFileSync, writeFileSync } from "node:fs";
-import { join, resolve } from "node:path";
+import { cpSync, mkdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { join, relative, resolve } from "node:path";
 import { promisify } from "node:util";
 import { gzipSync } from "node:zlib";
+import { asking } from "./ask.mjs";
 import { PERIODS, collect, shipped } from "./src/collect.js";
 
 const [wasm, out] = process.argv.slice(2).map((path) => resolve(path));
 const page = import.meta.dirname;
 mkdirSync(out, { recursive: true });
-await build({
+rmSync(join(out, "parts"), { recursive: true, force: true });
+const { metafile } = await build({
   entryPoints: [join(page, "src/main.js"), join(page, "src/worker.js")],
   outdir: out, bundle: true, minify: true, format: "esm", target: "es2022", legalComments: "eof", logLevel: "warning",
+  // Panels are imported when they are asked for; what they share with the first screen is a file of its own.
+  splitting: true, chunkNames: "parts/[name]-[hash]", metafile: true,
 });
+/** Files of the bundle by their names, and those of the first screen. */
+const outputs = new Map(Object.entries(metafile.outputs).map(([path, about]) => [relative(out, resolve(path)), about]));
+const first = new Set(["index.html", "main.css", "main.js", "worker.js", "takt.wasm.gz"]);
+for (const name of first) for (const { path, kind } of outputs.get(name)?.imports ?? []) if (kind === "import-statement") first.add(relative(out, resolve(path)));
 cpSync(join(page, "index.html"), join(out, "index.html"));
 // Five percent smaller than gzip's best, for a few seconds; more iterations gain next to nothing.
 writeFileSync(join(out, "takt.wasm.gz"), await promisify(zopfli.gzip)(bare(readFileSync(wasm)), { numiterations: 1 }));
-let total = 0;
-for (const name of ["index.html", "main.css", "main.js", "worker.js", "takt.wasm.gz"]) {
+const weigh = (name) => {
   const bytes = readFileSync(join(out, name)), size = name.endsWith(".gz") ? bytes.length : gzipSync(bytes).length;
-  total += size;
-  console.log(`${name.padEnd(14)} ${String(bytes.length).padStart(9)} bytes, ${String(size).padStart(9)} compressed`);
-}
-console.log(`${"all".padEnd(14)} ${" ".repeat(16)} ${String(total).padStart(9)} compressed`);
+  console.log(`${name.padEnd(26)} ${String(bytes.length).padStart(9)} bytes, ${String(size).padStart(9)} compressed`);
+  return size;
+};
+let total = [...first].reduce((sum, name) => sum + weigh(name), 0);
+console.log(`${"first screen".padEnd(26)} ${" ".repeat(16)} ${String(total).padStart(9)} compressed`);
 /** Bytes of the first screen, and of all that is loaded when asked for. */
 const LIMIT = 2_000_000, ALL = 4_000_000;
 if (total >= LIMIT) fail(`the page has ${total} bytes compressed; it may have ${LIMIT}`);
+total += [...outputs.keys()].filter((name) => !first.has(name)).reduce((sum, name) => sum + weigh(name), 0);
 // Results of the examples that take long to assemble, so that their curves are there at once.
 mkdirSync(join(out, "ahead"), { recursive: true });
 const call = await asking(readFileSync(wasm));
@@ -42,20 +51,6 @@ if (total >= ALL) fail(`the page and all that it loads have ${total} bytes compr
 function fail(message) {
   console.error(message);
   process.exit(1);
-}
-
-/** Function that asks the module, as worker.js does. */
-async function asking(bytes) {
-  const { takt_input, takt_output, takt_call, memory } = (await WebAssembly.instantiate(bytes, {})).instance.exports;
-  return (method, params = null) => {
-    const request = new TextEncoder().encode(`${method}\n${JSON.stringify(params)}`);
-    // The memory may grow, and its buffer be another then.
-    const at = takt_input(request.length);
-    new Uint8Array(memory.buffer, at, request.length).set(request);
-    const length = takt_call(), { ok, error } = JSON.parse(new TextDecoder().decode(new Uint8Array(memory.buffer, takt_output(), length)));
-    if (error !== undefined) throw new Error(`${method}: ${error}`);
-    return ok;
-  };
 }
 
 /** Removes custom sections (number 0) from WebAssembly: they contain names for debuggers. */

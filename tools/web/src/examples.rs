@@ -9,15 +9,15 @@ use takt_isa::MACHINES;
 use takt_programs::{EXAMPLES, SOURCES};
 
 /// Examples from `programs/examples` that come first in the list, in this order; all others follow.
-const FIRST: [&str; 3] = ["pi.s", "foc.s", "blink.s"];
+const FIRST: [&str; 4] = ["pi.s", "gains.s", "foc.s", "blink.s"];
 /// Number of periods after which an example without inputs shows an effect.
 const PERIODS_OF: [(&str, usize); 1] = [("blink.s", 2000)];
 /// Seconds that assembling takes in a browser, for the page to announce until it has measured them.
 const SECONDS_OF: [(&str, u32); 2] = [("tracking.s", 3), ("statespace.s", 2)];
 /// Plants that close the loops of examples: files of [`takt_programs::PLANTS`], without the extension.
-const PLANT_OF: [(&str, &str); 2] = [("foc.s", "pmsm"), ("pi.s", "dc_motor")];
+const PLANT_OF: [(&str, &str); 3] = [("foc.s", "pmsm"), ("gains.s", "dc_motor"), ("pi.s", "dc_motor")];
 /// Tables of inputs that do not have their example's name.
-const INPUTS_OF: [(&str, &str); 1] = [("foc_early.s", "foc.csv")];
+const INPUTS_OF: [(&str, &str); 2] = [("foc_early.s", "foc.csv"), ("gains.s", "pi.csv")];
 /// Program that controls the robot.
 pub(crate) const TRACKING: &str = "hybrid/tracking.s";
 

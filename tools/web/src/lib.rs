@@ -11,14 +11,17 @@
 //! | `lsp`, `lsp.check`, `lsp.schedule` | messages to and from the language server |
 //! | `assemble` | assembles, bounds the cycles, opens a debug session |
 //! | `execute` | executes a command of the debugger's console |
+//! | `activity` | the machine, and what its slots, units and banks do at the debugger's position |
 //! | `run` | runs periods on the emulator, a slice per call |
 //! | `track` | runs periods of the closed loop along the AGH path |
 //! | `source` | text of a file that a program includes |
 //! | `picture` | pipeline diagram as data |
+//! | `bundles` | the program's bundles, each operation with its source line |
 //! | `listing`, `header`, `verilog`, `image` | downloads |
 //!
 //! The crate has no clock and never waits: the caller divides long work into calls.
 
+mod activity;
 mod constants;
 mod examples;
 mod export;
@@ -99,6 +102,8 @@ impl Playground {
             "run" => self.run(parameters(method, params)?),
             "track" => self.track(parameters(method, params)?),
             "source" => examples::source(parameters(method, params)?),
+            "activity" => self.activity(),
+            "bundles" => self.bundles(),
             "picture" => self.picture(parameters(method, params)?),
             "listing" => Ok(Value::from(takt_asm::listing::listing(&self.loaded()?.assembled))),
             "header" => export::header(self.loaded()?, params),

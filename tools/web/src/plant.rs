@@ -3,6 +3,7 @@
 //! show the same periods.
 
 use crate::PERIODS;
+use crate::program::Changes;
 use crate::run::prepare;
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -56,8 +57,19 @@ pub(crate) fn fitting(program: &Program) -> Vec<Value> {
     PLANTS.iter().filter_map(told).collect()
 }
 
+/// Message for a plant that takes or gives other ports than a program has, with the plants that it could have.
+fn misfit(name: &str, program: &Program) -> String {
+    let others = fitting(program);
+    let others: Vec<&str> = others.iter().filter_map(|one| one["name"].as_str()).collect();
+    let instead = match others.is_empty() {
+        true => "no plant has this program's".to_owned(),
+        false => format!("for these there is {}, to be chosen above the plots", others.join(", ")),
+    };
+    format!("the plant {name} is for other ports; {instead}")
+}
+
 /// Inputs of the periods of a closed loop. `recorded` gives all inputs but the plant's, and the number of periods; without it, they are
-/// those of the plant's file, or 0, for `periods`. The loop ends early where a period does not end, or the plant diverges.
+/// those of the plant's file, or 0, for `periods`. `changes` of parameters act from their periods on. The loop ends early where a period does not end, or the plant diverges.
 ///
 /// # Errors
 /// If the plant does not fit the program, or has parameters that make no sense.
@@ -65,6 +77,7 @@ pub(crate) fn close(
     assembled: &AssembledProgram,
     wanted: &PlantRequest,
     recorded: Option<&Rows>,
+    changes: &Changes,
     periods: usize,
 ) -> Result<Rows, String> {
     let program = &assembled.program;
@@ -74,7 +87,8 @@ pub(crate) fn close(
     };
     let mut plant = PlantFile::read(file, text).map_err(|mistakes| mistakes.render(false))?;
     wanted.parameters.iter().try_for_each(|(name, value)| plant.set(name, *value))?;
-    let connection = connect(&plant, program)?;
+    // The plant of a previous program, as a table for other ports. Mistakes of `connect` are about files and options, which the page has not.
+    let connection = connect(&plant, program).map_err(|_| misfit(&wanted.name, program))?;
     let period = units::sampling_period(&assembled.debug_info().sources, &assembled.constants);
     let period = period.ok_or_else(|| {
         format!(
@@ -95,6 +109,7 @@ pub(crate) fn close(
         if closed.begin(&mut row, |register| emulator.output_bits(register)).is_err() {
             break;
         }
+        row.extend(changes.get(&at).into_iter().flatten());
         rows.push(row);
         prepare(&mut emulator, Some(&rows), at as u64)?;
         if emulator.run_period(&[]).is_err() {

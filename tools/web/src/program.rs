@@ -16,7 +16,7 @@ use takt_asm::{AssembledProgram, MemoryLoader, Options, Search};
 use takt_debug::console::Console;
 use takt_debug::inputs::{self, Table};
 use takt_debug::session::{self, Session};
-use takt_emu::{Emulator, Rows};
+use takt_emu::{Emulator, Row, Rows};
 use takt_isa::program::Port;
 use takt_isa::timing::{Cycle, Span};
 use takt_isa::{BundleAddress, Flow, Machine, Program, Type};
@@ -35,6 +35,19 @@ pub(crate) struct LoadedProgram {
     pub(crate) tick: Option<NonZeroU64>,
 }
 
+/// Parameters that change during a run: registers and bits by the period, from 0, from which on they act. A parameter is a register of the
+/// inputs' bank, so that a row of inputs sets it.
+pub(crate) type Changes = BTreeMap<usize, Row>;
+
+/// Change of a parameter during a run.
+#[derive(Deserialize)]
+struct Change {
+    /// Period from which on the value acts, from 1.
+    period: usize,
+    name: String,
+    value: f64,
+}
+
 /// Request to assemble a source.
 #[derive(Deserialize)]
 pub(crate) struct AssembleRequest {
@@ -44,6 +57,9 @@ pub(crate) struct AssembleRequest {
     /// Values of parameters (`.param`) that differ from the source's.
     #[serde(default)]
     parameters: BTreeMap<String, f64>,
+    /// Changes of parameters during the run, as a host makes them between two periods.
+    #[serde(default)]
+    changes: Vec<Change>,
     /// Input table in CSV with a column for each input port. If it is blank or made for other ports, all ports are 0.
     #[serde(default)]
     inputs: String,
@@ -102,10 +118,15 @@ impl Playground {
                 (assembled, defaults)
             }
         };
-        let parameter_error = set_parameters(&mut assembled.program, &defaults, &wanted.parameters).err();
-        if parameter_error.is_some() {
-            set_parameters(&mut assembled.program, &defaults, &BTreeMap::new())?;
-        }
+        let set = set_parameters(&mut assembled.program, &defaults, &wanted.parameters)
+            .and_then(|()| changes(&assembled.program, &wanted.changes));
+        let (changes, parameter_error) = match set {
+            Ok(changes) => (changes, None),
+            Err(error) => {
+                set_parameters(&mut assembled.program, &defaults, &BTreeMap::new())?;
+                (Changes::new(), Some(error))
+            }
+        };
         let program = &assembled.program;
         let empty = program.bundles() == 0;
         let table = wanted.inputs.as_bytes();
@@ -117,22 +138,23 @@ impl Playground {
         let rows = if is_blank || others.is_some() {
             Ok(None)
         } else {
-            let rows = inputs::rows(INPUTS, table, &program.inputs, PERIODS);
-            rows.map(|rows| Some(Arc::new(rows)))
+            inputs::rows(INPUTS, table, &program.inputs, PERIODS).map(Some)
         };
         let (rows, inputs_error) = match rows {
             Ok(rows) => (rows, None),
             Err(error) => (None, Some(error)),
         };
-        let recorded = rows.as_deref();
         let periods = wanted.periods.unwrap_or(ZERO_PERIODS);
         let plant = wanted.plant.filter(|_| inputs_error.is_none());
-        let closed = plant.map(|plant| (plant::close(&assembled, &plant, recorded, periods), plant));
+        let recorded = rows.as_ref();
+        let closed =
+            plant.map(|plant| (plant::close(&assembled, &plant, recorded, &changes, periods), plant));
         let (rows, plant, plant_error) = match closed {
-            Some((Ok(closed), plant)) => (Some(Arc::new(closed)), Some(plant), None),
-            Some((Err(error), _)) => (rows, None, Some(error)),
-            None => (rows, None, None),
+            Some((Ok(closed), plant)) => (Some(closed), Some(plant), None),
+            Some((Err(error), _)) => (with_changes(rows, program, &changes, periods), None, Some(error)),
+            None => (with_changes(rows, program, &changes, periods), None, None),
         };
+        let rows = rows.map(Arc::new);
         let tick = NonZeroU64::new(wanted.tick);
         let loaded = LoadedProgram { name, origin, assembled, defaults, rows, tick };
         let mut told = facts(&loaded);
@@ -169,6 +191,33 @@ fn set_parameters(
         program.set_parameter(name, bits(ty, *value)).map_err(|error| error.to_string())?;
     }
     Ok(())
+}
+
+/// Changes of parameters during a run, by period.
+fn changes(program: &Program, wanted: &[Change]) -> Result<Changes, String> {
+    let mut changes = Changes::new();
+    for Change { period, name, value } in wanted {
+        let port = program.parameter(name).map_err(|error| error.to_string())?;
+        let bits = bits(port.ty, *value);
+        program.check_parameter(port, bits).map_err(|error| error.to_string())?;
+        changes.entry(period.saturating_sub(1)).or_default().push((port.register, bits));
+    }
+    Ok(changes)
+}
+
+/// Rows of a run without a plant, in which parameters change; without recorded rows, all ports are 0.
+fn with_changes(rows: Option<Rows>, program: &Program, changes: &Changes, periods: usize) -> Option<Rows> {
+    if changes.is_empty() {
+        return rows;
+    }
+    let zeros = || program.inputs.iter().map(|port| (port.register, 0)).collect();
+    let mut rows = rows.unwrap_or_else(|| vec![zeros(); periods.min(PERIODS)]);
+    for (period, change) in changes {
+        if let Some(row) = rows.get_mut(*period) {
+            row.extend(change);
+        }
+    }
+    Some(rows)
 }
 
 /// Parameters of the program with their values, for sliders.
@@ -213,10 +262,13 @@ impl LoadedProgram {
 fn least_of_path(assembled: &AssembledProgram) -> Option<(BundleAddress, Cycle)> {
     let program = &assembled.program;
     let mut emulator = Emulator::new(program).ok()?;
-    prepare(&mut emulator, None, 0).ok()?;
-    takt_analysis::trace(&mut emulator).ok()?;
-    prepare(&mut emulator, None, 0).ok()?;
-    let issues = takt_analysis::trace(&mut emulator).ok()?.issues;
+    // What runs once, a first period that may be another section's, and the second period.
+    let mut issues = Vec::new();
+    for _ in 0..3 {
+        prepare(&mut emulator, None, 0).ok()?;
+        let Ok(trace) = takt_analysis::trace(&mut emulator) else { break };
+        issues = trace.issues;
+    }
     let blocks = assembled.blocks.iter().map(|block| (block.address, block.bound.cycles()));
     let kernels = assembled.loops.iter().map(|one| (one.address, one.bound.cycles()));
     let bounds: HashMap<BundleAddress, u32> = kernels.chain(blocks).collect();

@@ -53,6 +53,7 @@ pub(crate) fn view(console: &mut Console) -> Value {
     let displays = panes.displays.iter().map(|(text, value)| json!({ "text": text, "value": value }));
     json!({
         "head": panes.head,
+        "address": session.emulator().next_address(),
         "cycle": session.cycle(),
         "period": session.period(),
         "last": session.report().map(|report| report.cycles),

@@ -45,6 +45,94 @@ fn parameters_are_set() {
     }
 }
 
+/// A parameter that changes during a run acts from its period on: in the plots, the debugger and the loop of a plant.
+#[test]
+fn parameters_change_during_a_run() {
+    let mut playground = Playground::default();
+    let about = call(&mut playground, "about", Value::Null);
+    let example =
+        about["examples"].as_array().and_then(|all| all.iter().find(|one| one["name"] == "gains.s"));
+    let example = example.expect("it has parameters");
+    let mut asked = |inputs: &str, plant: &Value, changes: Value| {
+        let params = json!({
+            "name": "gains.s", "source": example["source"], "machine": "t3", "inputs": inputs, "plant": plant,
+            "changes": changes, "periods": 60,
+        });
+        let told = call(&mut playground, "assemble", params);
+        let ran = call(&mut playground, "run", json!({ "begin": true }));
+        (told, ran["outputs"]["u"].clone(), ran["inputs"]["w"].clone())
+    };
+    let change = |period: u32, value: f64| json!([{ "period": period, "name": "kp", "value": value }]);
+    let (told, u, _) = asked("w_ref,w\n1,0\n1,0\n1,0\n", &Value::Null, change(2, 3.0));
+    assert_eq!(told["parameter_error"], Value::Null);
+    let values: Vec<f64> = u.as_array().into_iter().flatten().filter_map(Value::as_f64).collect();
+    // The integrator adds 0.004 a period.
+    assert!((values[0] - 0.3).abs() < 1e-6 && (values[1] - 3.004).abs() < 1e-6, "{values:?}");
+    assert!((values[2] - 3.008).abs() < 1e-6, "the value stays: {values:?}");
+    // Without a table, the plant's file gives the reference; before the change, the curves are those without it.
+    let closed = &example["plant"];
+    let (told, _, before) = asked("", closed, json!([]));
+    assert_eq!((&told["plant"]["name"], &told["rows"]), (&json!("dc_motor"), &json!(60)));
+    let (_, _, after) = asked("", closed, change(31, 2.0));
+    let same = |period: usize| before[period] == after[period];
+    assert!((0..=30).all(same) && !(31..40).all(same), "period 31 is the first with the new gain");
+    let (told, u, _) = asked("", &Value::Null, change(1, 1.0));
+    assert_eq!((&told["rows"], u.as_array().map(Vec::len)), (&json!(60), Some(60)), "all ports are 0");
+    let (told, _, same) = asked("", closed, change(31, 9.0));
+    let error = told["parameter_error"].as_str().expect("it is out of range");
+    assert!(error.contains("range 0 to 4") && same == before, "{error}");
+    asked("", closed, change(31, 2.0));
+    let at = |playground: &mut Playground, period: u32| {
+        let line = format!("goto period {period}");
+        let shown = call(playground, "execute", json!({ "line": line }))["view"]["inputs"].clone();
+        let named = shown.as_array().and_then(|all| all.iter().find(|one| one["name"] == "kp"));
+        named.expect("the debugger shows parameters")["value"].clone()
+    };
+    // So many periods have passed: the inputs are those of the next.
+    assert_eq!((at(&mut playground, 29), at(&mut playground, 30)), (json!("0.3"), json!("2.0")));
+    assert_eq!(at(&mut playground, 29), json!("0.3"), "and back");
+    // So does the test bench: index of the parameter among the inputs, and 2.0.
+    let told = call(&mut playground, "verilog", Value::Null);
+    let bench = told["files"].as_array().and_then(|all| all.iter().find(|one| one["name"] == "inputs.hex"));
+    let periods = bench.and_then(|one| one["text"].as_str()).expect("it is there").split("2000").nth(30);
+    assert!(periods.is_some_and(|text| text.contains("40000000")), "{periods:?}");
+}
+
+/// The picture of the machine: its row, the operands of the next bundle, and the operations in flight.
+#[test]
+fn the_machine_shows_activity() {
+    let mut playground = Playground::default();
+    assert!(
+        playground.call("activity", Value::Null).is_err() && playground.call("bundles", Value::Null).is_err()
+    );
+    let source = ".input x\n.output y\n.reg a b\n.schedule on\n.period\nstart:\n    fadd a, x, x\n    fmul b, a, x\n    fadd y, b, b\n    wait start\n";
+    assemble(&mut playground, source, "x\n1\n");
+    call(&mut playground, "execute", json!({ "line": "goto cycle 8" }));
+    let first = call(&mut playground, "activity", Value::Null);
+    assert_eq!(first["machine"]["slots"][1]["units"][0]["name"], "add");
+    assert_eq!(first["machine"]["slots"][1]["units"][0]["latency"], 5);
+    assert_eq!(first["flight"][0]["writes"], "a");
+    assert_eq!((&first["flight"][0]["slot"], &first["flight"][0]["bank"]), (&json!(1), &json!(1)));
+    // The product waits for the sum, and takes it from the result bus in the cycle of its writeback.
+    let product = &first["operations"][0];
+    assert_eq!((&product["unit"], &product["writes"]), (&json!(0), &json!("b")), "{first}");
+    let reads = json!([{ "bank": 1, "text": "a", "forwarded": true }, { "bank": 3, "text": "x", "forwarded": false }]);
+    assert_eq!(product["reads"], reads);
+    assert!(first["cause"].as_str().is_some_and(|cause| cause.contains('a')), "{}", first["cause"]);
+    let told = call(&mut playground, "bundles", Value::Null);
+    assert_eq!(told["slots"], json!(["mul", "add", "aux"]));
+    let bundles = told["bundles"].as_array().expect("there are some");
+    assert_eq!(bundles[0]["labels"], json!(["start"]));
+    let operations: Vec<&Value> = bundles
+        .iter()
+        .flat_map(|one| one["operations"].as_array())
+        .flatten()
+        .filter(|one| !one.is_null())
+        .collect();
+    assert_eq!(operations.len(), 4);
+    assert_eq!((&operations[0]["place"], &operations[0]["unit"]), (&json!("a.s:7"), &json!("add")));
+}
+
 #[test]
 fn every_example_assembles_and_runs() {
     let mut playground = Playground::default();
@@ -68,6 +156,8 @@ fn every_example_assembles_and_runs() {
         match example["name"].as_str() {
             Some("statespace.s") => assert_eq!(least, [122 + 5 * 47 + 28 + 12 * 6]),
             Some("pi.s") => assert_eq!(least.last(), Some(&38)),
+            // Its first period is a section of its own.
+            Some("tracking.s") => assert_eq!(least, [108]),
             _ => {}
         }
         assert_eq!(told["tracks"], example["track"], "{}", example["name"]);
@@ -443,7 +533,10 @@ fn a_plant_closes_the_loop() {
     };
     let named = |name: &str| json!({ "name": name });
     assert!(error(&mut playground, named("train"), source).contains("no plant `train`"));
-    assert!(error(&mut playground, named("dc_motor"), DOUBLE).contains("no output port of that name"));
+    assert!(
+        error(&mut playground, named("dc_motor"), DOUBLE)
+            .contains("the plant dc_motor is for other ports; no plant has this program's")
+    );
     let timeless = source.replace("T    = 1e-3  ", "T    = 1e-3 ;");
     assert!(error(&mut playground, named("dc_motor"), &timeless).contains("`.const T = …"), "{timeless}");
     let wild = json!({ "name": "dc_motor", "parameters": { "J": -1.0 } });

@@ -21,24 +21,32 @@ pub(crate) struct Arguments {
     /// Keep pictures of the page in this folder (with --test).
     #[arg(long, value_name = "FOLDER", requires = "test")]
     screenshots: Option<PathBuf>,
+    /// Write the README's moving picture, docs/pictures/loop.svg.
+    #[arg(long)]
+    moving_picture: bool,
 }
 
 /// Folder of the finished page; any file server can serve it.
 pub(crate) const PAGE: &str = "target/playground";
 /// Build folder of the page.
 const TARGET: &str = "target/web";
+/// The compiled module.
+const COMPILED: &str = "target/web/wasm32-unknown-unknown/release/takt_web.wasm";
 
 /// Cargo settings for a small download: optimisation for size, most of all of what runs rarely, and link-time optimisation.
-const SMALL: [&str; 12] = [
+const SMALL: [&str; 15] = [
     "profile.release.opt-level=\"s\"",
     "profile.release.lto=\"fat\"",
     "profile.release.codegen-units=1",
     "profile.release.package.takt-syntax.opt-level=\"s\"",
+    "profile.release.package.takt-debug.opt-level=\"z\"",
+    "profile.release.package.takt-diagnostics.opt-level=\"z\"",
     "profile.release.package.takt-editor.opt-level=\"z\"",
     "profile.release.package.takt-programs.opt-level=\"z\"",
     "profile.release.package.takt-system.opt-level=\"z\"",
     "profile.release.package.takt-robot.opt-level=\"z\"",
     "profile.release.package.takt-rtl.opt-level=\"z\"",
+    "profile.release.package.takt-web.opt-level=\"z\"",
     "profile.release.package.toml.opt-level=\"z\"",
     "profile.release.package.serde_json.opt-level=\"z\"",
     "profile.release.package.lsp-types.opt-level=\"z\"",
@@ -46,6 +54,11 @@ const SMALL: [&str; 12] = [
 
 pub(crate) fn web(arguments: &Arguments) -> Result<()> {
     build()?;
+    if arguments.moving_picture {
+        let mut draw = Command::new("node");
+        draw.arg("moving.mjs").arg(root().join(COMPILED)).arg(root().join("docs/pictures/loop.svg"));
+        run(draw.current_dir(packages()?))?;
+    }
     if arguments.test {
         test(arguments)?;
     }
@@ -65,8 +78,7 @@ pub(crate) fn build() -> Result<()> {
     progress::step("compiling the playground", || run(&mut compile))?;
     let page = packages()?;
     let mut bundle = Command::new("node");
-    let compiled = root().join(format!("{TARGET}/{WASM}/release/takt_web.wasm"));
-    bundle.arg("build.mjs").arg(compiled).arg(root().join(PAGE)).current_dir(page);
+    bundle.arg("build.mjs").arg(root().join(COMPILED)).arg(root().join(PAGE)).current_dir(page);
     progress::step("bundling the playground", || run(&mut bundle))?;
     eprintln!(
         "the playground is in {PAGE}: `python3 -m http.server -d {PAGE}` serves it on http://localhost:8000"

@@ -18,7 +18,7 @@ export async function collect(call, periods, told = () => {}) {
 
 /** Request for an example as it is shipped, on the default machine. */
 export const shipped = ({ name, source, inputs, plant, periods }, usual) => ({
-  name, source, machine: "t3", inputs: inputs ?? "", tick: 0, plant: plant ?? null, parameters: {}, periods: periods ?? usual,
+  name, source, machine: "t3", inputs: inputs ?? "", tick: 0, plant: plant ?? null, parameters: {}, changes: [], periods: periods ?? usual,
 });
 
 /** Default number of periods of a program without inputs. */

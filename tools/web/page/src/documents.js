@@ -74,9 +74,9 @@ export class Documents {
    * Document for a program from a link or an example: an unchanged one from the same origin, otherwise a new one. `from` is `link` or
    * `example`; `key` identifies the origin.
    */
-  open({ name, machine, source, inputs, periods, plant, parameters }, from, key) {
+  open({ name, machine, source, inputs, periods, plant, parameters, changes }, from, key) {
     const known = this.list().find((document) => document.key === key && !document.changed);
-    const document = { id: known?.id ?? `${Date.now()}-${Math.random().toString(36).slice(2)}`, made: known?.made ?? Date.now(), name: name || "main.s", machine: machine || "", source, inputs: inputs ?? "", periods, plant: plant ?? null, parameters: parameters ?? {}, from, key, changed: false };
+    const document = { id: known?.id ?? `${Date.now()}-${Math.random().toString(36).slice(2)}`, made: known?.made ?? Date.now(), name: name || "main.s", machine: machine || "", source, inputs: inputs ?? "", periods, plant: plant ?? null, parameters: parameters ?? {}, changes: changes ?? [], from, key, changed: false };
     this.use(document);
     this.forget(document.id);
     return document;

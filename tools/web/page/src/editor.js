@@ -156,6 +156,19 @@ const place = StateField.define({
   provide: (field) => EditorView.decorations.from(field, (value) => value.lines),
 });
 
+// ---- Colours of lines, as those of the bundles.
+
+const setHues = StateEffect.define();
+const hues = StateField.define({
+  create: () => Decoration.none,
+  update(value, tr) {
+    value = value.map(tr.changes);
+    for (const effect of tr.effects) if (effect.is(setHues)) value = effect.value;
+    return value;
+  },
+  provide: (field) => EditorView.decorations.from(field),
+});
+
 const theme = EditorView.theme({
   "&": { height: "100%", fontSize: "13px", backgroundColor: "var(--bg)", color: "var(--fg)" },
   ".cm-scroller": { fontFamily: "ui-monospace, 'DejaVu Sans Mono', Menlo, Consolas, monospace", lineHeight: "1.5" },
@@ -208,7 +221,7 @@ export class Editor {
       parent,
       state: EditorState.create({
         extensions: [
-          base, lintGutter(), theme, colours, hints, place, stops, folds, folding, follow,
+          base, lintGutter(), theme, colours, hues, hints, place, stops, folds, folding, follow,
           gutter({
             class: "cm-arrow", markers: (view) => [view.state.field(place).markers, view.state.field(stops)], initialSpacer: () => arrow,
             domEventHandlers: { mousedown: (view, line) => (stopped(view.state.doc.lineAt(line.from).number), true) },
@@ -434,6 +447,13 @@ export class Editor {
     const { scrollDOM } = this.view, block = this.view.lineBlockAt(doc.line(line).from), { scrollTop, clientHeight } = scrollDOM;
     if (block.top < scrollTop + MARGIN) scrollDOM.scrollTop = block.top - MARGIN;
     else if (block.bottom > scrollTop + clientHeight - MARGIN) scrollDOM.scrollTop = block.bottom - clientHeight + MARGIN;
+  }
+
+  /** Colours lines: a map from their numbers to hues. */
+  paint(map) {
+    const { doc } = this.view.state, lines = [...map].filter(([line]) => line <= doc.lines);
+    const marks = lines.map(([line, hue]) => Decoration.line({ class: "cm-hue", attributes: { style: `--hue:${hue}` } }).range(doc.line(line).from));
+    this.view.dispatch({ effects: setHues.of(Decoration.set(marks, true)) });
   }
 
   /** Moves the cursor to a line (from 1) and a column (from 0). */

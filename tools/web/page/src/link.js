@@ -43,7 +43,13 @@ export async function unpack(fragment) {
   const program = JSON.parse(new TextDecoder("utf-8", { fatal: true }).decode(bytes));
   if (typeof program?.source !== "string") throw new Error("it holds no source");
   const word = (value) => (typeof value === "string" ? value : "");
-  return { name: word(program.name), machine: word(program.machine), inputs: word(program.inputs), source: program.source, ...(Number.isInteger(program.periods) && { periods: program.periods }), ...(program.plant && { plant: plantOf(program.plant) }), parameters: numbers(program.parameters) };
+  return { name: word(program.name), machine: word(program.machine), inputs: word(program.inputs), source: program.source, ...(Number.isInteger(program.periods) && { periods: program.periods }), ...(program.plant && { plant: plantOf(program.plant) }), parameters: numbers(program.parameters), changes: changesOf(program.changes) };
+}
+
+/** Changes of parameters in a link. */
+function changesOf(all) {
+  const isChange = (one) => Number.isInteger(one?.period) && one.period > 0 && typeof one.name === "string" && Number.isFinite(one.value);
+  return (Array.isArray(all) ? all : []).filter(isChange).map(({ period, name, value }) => ({ period, name, value }));
 }
 
 /** The plant in a link: a name, and numbers for parameters. */

@@ -7,7 +7,6 @@ import { Editor, reader } from "./editor.js";
 import { LINK_CHARACTERS, pack, unpack } from "./link.js";
 import { Plots } from "./plot.js";
 import { save } from "./parts.js";
-import { taker } from "./take.js";
 import { Stopped, Thread, fetched, load } from "./thread.js";
 import { Tuning } from "./tuning.js";
 import "./style.css";
@@ -23,7 +22,9 @@ const LATE = 400;
 const REPLACED = "another program was opened";
 
 const state = { works: 0, breaks: [], name: "main.s", about: null, program: null, stale: true, run: null, took: 0, document: null };
-let machine, editor, plots, pipeline, drive, documents, tuning, parameters, plant;
+let machine, editor, plots, pipeline, drive, documents, tuning, parameters, plant, module;
+/** Panels that are loaded when they are asked for, and the worker of the program that the comparison is with. */
+let code, picture, comparison, other;
 
 /** Shows an error; with `act` (text and action of a button), a notice. */
 function notice(message, act) {
@@ -72,6 +73,8 @@ function select(name, focus) {
     driveFirst();
   }
   if (name === "pipeline") pipelineInStep();
+  if (name === "code") codeInStep();
+  else editor?.paint(new Map());
 }
 
 /** Dims the diagram of an earlier program, but not a text in its place. */
@@ -83,6 +86,35 @@ function dimPipeline() {
 function pipelineInStep() {
   dimPipeline();
   if (state.drawn !== state.program && state.tab === "pipeline" && !state.stale && state.program?.assembled && !state.program.inputs_error) draw();
+}
+
+/** Shows the bundles if their panel is visible, and colours the lines of the text as them. */
+async function codeInStep() {
+  el("code").classList.toggle("old", Boolean(state.coded) && state.coded !== state.program);
+  const { program } = state, isHere = () => state.tab === "code" && !state.stale && program === state.program;
+  if (!isHere() || !program?.assembled) return;
+  const { Code } = await import("./code.js");
+  code ??= new Code(el("code"), { reveal, paint: (hues) => editor.paint(hues) });
+  const bundles = await machine.call("bundles");
+  if (!isHere()) return;
+  code.show(bundles, state.name);
+  state.coded = program;
+  el("code").classList.remove("old");
+  code.mark(editor.line);
+  code.stand(state.address);
+}
+
+/** Lights up the picture of the machine at the debugger's position, if it is open. */
+async function light() {
+  if (!el("machine-box").open || !state.program?.view) return;
+  const { MachinePicture } = await import("./machine.js");
+  picture ??= new MachinePicture(el("machine-picture"));
+  try {
+    const activity = await machine.call("activity");
+    picture.show(activity.machine, activity);
+  } catch (error) {
+    if (!(error instanceof Stopped)) notice(error.message);
+  }
 }
 
 /** Drives the robot if its panel is visible, nothing has been driven yet, and the program can drive it. */
@@ -167,7 +199,7 @@ function keep() {
   // Do not overwrite another page's changes with a document that is merely displayed here.
   if (!state.document || !state.dirty) return;
   state.dirty = false;
-  Object.assign(state.document, { name: state.name, machine: el("machine").value, source: editor.text, inputs: table(), periods: periods(), plant: state.plant, parameters: state.parameters });
+  Object.assign(state.document, { name: state.name, machine: el("machine").value, source: editor.text, inputs: table(), periods: periods(), plant: state.plant, parameters: state.parameters, changes: state.changes });
   documents.write(state.document);
   showDocuments();
 }
@@ -222,13 +254,15 @@ function useMachine() {
   return assemble();
 }
 
-async function open({ name, source, inputs, periods, plant, parameters, machine: wanted }) {
+async function open({ name, source, inputs, periods, plant, parameters, changes, machine: wanted }) {
   if (machine.busy) machine.stop(REPLACED);
   clearTimeout(state.soon);
   state.opening = true;
   state.name = name || "main.s";
   state.plant = plant ?? null;
   state.parameters = parameters ?? {};
+  state.changes = changes ?? [];
+  el("from").value = 1;
   if (wanted?.includes("\n")) offer(wanted);
   else if ([...el("machine").options].some((option) => option.value === wanted)) el("machine").value = wanted;
   el("table").value = inputs ?? "";
@@ -237,6 +271,9 @@ async function open({ name, source, inputs, periods, plant, parameters, machine:
   const opened = editor.open(state.name, source, el("machine").value);
   changed("later");
   state.opening = false;
+  state.opened = asked();
+  state.kept = null;
+  showSides();
   empty();
   await assemble();
   await opened;
@@ -245,7 +282,7 @@ async function open({ name, source, inputs, periods, plant, parameters, machine:
 /** Empties all panels until the result of the opened text is there. */
 function empty() {
   const known = seconds(), why = `Assembling ${state.name}${known ? `, about ${known} s` : ""} …`;
-  state.shown = state.program = state.run = state.drawn = null;
+  state.shown = state.program = state.run = state.drawn = state.coded = null;
   state.ahead = false;
   document.body.classList.remove("stale");
   drive.clear();
@@ -335,7 +372,7 @@ function showProgram(program) {
   document.body.classList.toggle("stale", !whole && state.shown !== null);
   if (whole) {
     tuning.show(program.settable);
-    parameters.show(program.parameters);
+    showParameters();
     showPlants();
   }
   if (whole || state.shown === null) {
@@ -362,10 +399,53 @@ function showProgram(program) {
   if (!whole || !state.tuning) showCycles();
 }
 
-const asked = () => ({ name: state.name, source: editor.text, machine: el("machine").value, inputs: table(), tick: Number(el("tick").value) || 0, plant: state.plant, parameters: state.parameters, periods: periods() });
+const asked = () => ({ name: state.name, source: editor.text, machine: el("machine").value, inputs: table(), tick: Number(el("tick").value) || 0, plant: state.plant, parameters: state.parameters, changes: state.changes, periods: periods() });
 
-/** Text of a program's parameter. */
-const parameterOf = (name) => String(state.parameters[name] ?? state.program?.parameters?.find((one) => one.name === name)?.value);
+// ---- Parameters, for the whole run or from a period on.
+
+const from = () => Math.max(1, Math.round(Number(el("from").value)) || 1);
+
+/** Text of a parameter's value in the period from which on the sliders act. */
+function parameterOf(name) {
+  const last = state.changes.filter((one) => one.name === name && one.period <= from()).at(-1);
+  return String(last?.value ?? state.parameters[name] ?? state.program?.parameters?.find((one) => one.name === name)?.value);
+}
+
+function setParameters(texts) {
+  for (const [name, text] of texts) {
+    const value = Number(text), period = from();
+    if (period === 1) state.parameters = { ...state.parameters, [name]: value };
+    else {
+      const rest = state.changes.filter((one) => one.name !== name || one.period !== period);
+      state.changes = [...rest, { period, name, value }].sort((a, b) => a.period - b.period);
+    }
+  }
+  changed("tune");
+}
+
+/** Shows the sliders with the values of their period, and the changes during the run. */
+function showParameters() {
+  const { changes, program } = state, all = program.parameters;
+  parameters.show(all.map((one) => ({ ...one, value: Number(parameterOf(one.name)) })));
+  const remove = (change) => () => {
+    plots.keep(`${change.name} = ${change.value} from period ${change.period}`);
+    state.changes = state.changes.filter((one) => one !== change);
+    changed("tune");
+  };
+  el("changes").replaceChildren(...changes.flatMap((change) => {
+    const close = Object.assign(document.createElement("button"), { textContent: "×", title: "Remove the change", onclick: remove(change) });
+    const chip = Object.assign(document.createElement("span"), { className: "chip", textContent: `${change.name} = ${change.value} from ${change.period} ` });
+    chip.append(close);
+    return chip;
+  }), ...(changes.length ? [] : ["a click on a curve sets it"]));
+  plots.mark = all.length ? { from: from(), changes, picked: (period) => ((el("from").value = period), act()) } : null;
+}
+
+/** Lets the sliders act from another period on. */
+function act() {
+  showParameters();
+  plots.draw();
+}
 
 /** Shows the plants that the program's ports fit, and the parameters of the one that closes the loop. */
 function showPlants() {
@@ -454,7 +534,7 @@ const assemble = (told = true) => work(async () => {
   if (!program.assembled || program.inputs_error) return told && select("messages");
   await run();
   took(performance.now() - begun);
-}).then(() => (pipelineInStep(), driveFirst()));
+}).then(() => (pipelineInStep(), codeInStep(), driveFirst()));
 
 /** Assembles if the text has changed. */
 async function current() {
@@ -502,6 +582,9 @@ function showView(view) {
   rows("stalls", view.stalls.map((one) => [{ text: one.cycles.toLocaleString("en"), className: "value" }, one.text]));
   const here = view.file === state.name;
   editor.stand(here ? view.line : 0, here ? view.part : []);
+  state.address = view.address;
+  code?.stand(view.address);
+  light();
   state.breaks = view.breaks;
   editor.stops = view.breaks.filter(({ file }) => file === state.name).map(({ line }) => line);
 }
@@ -577,8 +660,38 @@ function draw() {
     state.drawn = program;
     dimPipeline();
     el("drawn").textContent = `${picture.program} on ${picture.machine}, ${period ? `period ${period}` : "what runs once"}: ${plural(cycles, "cycle")}, ${plural(picture.bundles.length, "bundle")}`;
+    await compare();
     markPipeline(editor.line, false);
   });
+}
+
+/** Sides that the program can be compared with: other machines, the text as it was opened, and what was kept. */
+function showSides() {
+  const select = el("against"), before = select.value, on = [...el("machine").options].filter(({ value }) => value !== OWN);
+  const sides = [["", "nothing else"], ["opened", "the text as opened"], ...(state.kept ? [["kept", `kept: ${state.kept.name} on ${state.kept.on}`]] : []), ...on.map(({ value, text }) => [`on ${value}`, `on ${text}`])];
+  select.replaceChildren(...sides.map(([value, text]) => new Option(text, value)));
+  select.value = sides.some(([value]) => value === before) ? before : "";
+}
+
+/** Shows the period's pipeline beside that of the other side. */
+async function compare() {
+  const side = el("against").value, period = Math.max(0, Number(el("which").value) || 0), { program } = state;
+  el("comparison").hidden = !side;
+  el("pipeline-picture").hidden = Boolean(side);
+  if (!side) return;
+  const { Comparison } = await import("./compare.js");
+  comparison ??= new Comparison(el("comparison"), { reveal, goTo: (line) => editor.goTo(line, 0) });
+  other ??= new Thread(module, new URL("worker.js", location.href));
+  const wanted = side === "opened" ? state.opened : side === "kept" ? state.kept : { ...asked(), machine: side.slice(3) }, key = JSON.stringify([wanted, period]);
+  if (comparison.key !== key) {
+    if (other.busy) other.stop(REPLACED);
+    const assembled = await other.call("assemble", wanted);
+    if (!assembled.assembled) throw new Error(`What it is to be compared with does not assemble on this machine: ${assembled.messages[0]?.message ?? "see its text"}`);
+    const { picture } = await other.call("picture", { period });
+    const title = { opened: `as opened, on ${assembled.machine}`, kept: `kept, on ${assembled.machine}` }[side] ?? `on ${assembled.machine}`;
+    Object.assign(comparison, { key, side: { title, name: wanted.name, source: wanted.source, picture } });
+  }
+  if (program === state.program) comparison.show(comparison.side, { title: side.startsWith("on ") ? `on ${program.machine}` : `now, on ${program.machine}`, name: state.name, source: editor.text, picture: pipeline.data });
 }
 
 /** Splits a place such as `pi.s:12` or `pi.s:12:3-9` into file and line. */
@@ -586,7 +699,9 @@ const place = (text) => /^(.*?):(\d+)/.exec(text ?? "")?.slice(1, 3) ?? [null, 0
 
 /** Marks the operations of a source line in the diagram. */
 function markPipeline(line, show) {
+  if (state.tab === "code") code?.mark(line, show);
   if (state.tab !== "pipeline") return;
+  if (!el("comparison").hidden) return comparison?.mark(line);
   pipeline.mark((operation) => {
     const [file, at] = place(operation.place);
     return file === state.name && Number(at) === line;
@@ -606,7 +721,7 @@ async function reveal(operation) {
 
 async function link() {
   try {
-    const fragment = await pack({ name: state.name, machine: el("machine").value, source: editor.text, inputs: table(), periods: periods(), plant: state.plant, parameters: state.parameters });
+    const fragment = await pack({ name: state.name, machine: el("machine").value, source: editor.text, inputs: table(), periods: periods(), plant: state.plant, parameters: state.parameters, changes: state.changes });
     history.replaceState(null, "", `#${fragment}`);
     // A reload shows this document again.
     state.document.key = fragment;
@@ -672,7 +787,7 @@ function pressed(event) {
 }
 
 async function start() {
-  const module = await load("takt.wasm.gz");
+  module = await load("takt.wasm.gz");
   machine = new Thread(module, new URL("worker.js", location.href));
   const language = new Thread(module, new URL("worker.js", location.href));
   documents = new Documents();
@@ -682,8 +797,9 @@ async function start() {
   });
   parameters = new Tuning(el("parameters"), {
     begins: (differs) => plots.keep(differs), textOf: parameterOf,
-    sets: (texts) => {
-      state.parameters = { ...state.parameters, ...Object.fromEntries([...texts].map(([name, text]) => [name, Number(text)])) };
+    sets: setParameters, isChanged: () => state.changes.length > 0 || Object.keys(state.parameters).length > 0,
+    resets: () => {
+      Object.assign(state, { parameters: {}, changes: [] });
       changed("tune");
     },
   });
@@ -722,8 +838,9 @@ async function start() {
   });
   for (const button of document.querySelectorAll("[data-step]")) button.addEventListener("click", () => step(button.dataset.step));
   for (const button of document.querySelectorAll("[data-line]")) button.addEventListener("click", () => execute(button.dataset.line));
-  const take = taker({ machine, work, current, state, editor });
-  for (const button of document.querySelectorAll("[data-export]")) button.addEventListener("click", () => take(button.dataset.export));
+  for (const button of document.querySelectorAll("[data-export]")) {
+    button.addEventListener("click", async () => (await import("./take.js")).taker({ machine, work, current, state, editor })(button.dataset.export));
+  }
   el("console").addEventListener("submit", (event) => {
     event.preventDefault();
     execute(el("command").value);
@@ -734,6 +851,15 @@ async function start() {
     assemble();
   });
   el("draw").addEventListener("click", draw);
+  el("against").addEventListener("change", draw);
+  el("keep").addEventListener("click", () => {
+    state.kept = { ...asked(), on: el("machine").selectedOptions[0].text };
+    showSides();
+    el("against").value = "kept";
+    draw();
+  });
+  el("from").addEventListener("change", act);
+  el("machine-box").addEventListener("toggle", light);
   for (const [id, ending, type] of [["plot-svg", "svg", "image/svg+xml"], ["plot-csv", "csv", "text/csv"]]) {
     el(id).addEventListener("click", () => state.run?.cycles.length && save(state.name.replace(/\.s$/, `.${ending}`), plots[ending](), type));
   }

@@ -36,3 +36,6 @@ export function save(name, content, type) {
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
 }
+
+/** Adds a style sheet to the page. */
+export const styled = (sheet) => document.head.append(node("style", { textContent: sheet }));

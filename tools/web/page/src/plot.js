@@ -102,9 +102,9 @@ function heading(curves, look) {
  * `x`: abscissa values with `name`, `unit`, and optional `label` of the axis. `curves`: each with `name`, `unit`, `values`, optional `limit`
  * and optional values `before`, which are drawn pale; the values `"NaN"`, `"inf"` and `"-inf"` are marked. `lines`: levels with a text.
  * `sync`: key of charts with synchronised cursors. `place` names a point by its index. `picked` is called with the index of a clicked point.
- * With `folds`, a chart of horizontal lines is its heading only.
+ * `moments`: indices of vertical lines. With `folds`, a chart of horizontal lines is its heading only.
  */
-export function chart(parent, { x, name: across, label, unit, curves, lines = [], height = () => 190, sync, picked, place, folds }) {
+export function chart(parent, { x, name: across, label, unit, curves, lines = [], height = () => 190, sync, picked, moments = [], place, folds }) {
   const axis = { stroke: style("--dim"), grid: { stroke: style("--edge"), width: 0.5 }, ticks: { stroke: style("--edge"), width: 0.5 }, labelSize: 17, labelGap: 0, labelFont: "12px system-ui, sans-serif", font: "11px system-ui, sans-serif" };
   const of = curves[0].unit, whole = curves.every((curve) => curve.stepped);
   const levels = [...lines, ...limitsOf(curves)];
@@ -152,9 +152,12 @@ export function chart(parent, { x, name: across, label, unit, curves, lines = []
       label: curve.name, stroke: look[i].colour, width: 1.6, dash: look[i].dash, points: { show: true, filter: () => x.length < 40 ? null : alone(curve.values), size: 4 },
       ...(curve.stepped && { paths: stepped, stepped: true }),
     }))],
-    hooks: { setCursor: [({ cursor: { idx } }) => (at.textContent = idx === null || idx === undefined ? "" : said(idx))], draw: [(plot) => mark(plot.ctx, plot, { x, levels, lost, saturated })] },
+    hooks: { setCursor: [({ cursor: { idx } }) => (at.textContent = idx === null || idx === undefined ? "" : said(idx))], draw: [(plot) => mark(plot.ctx, plot, { x, levels, lost, saturated, moments })] },
   }, [x, ...ghosts.map(({ before }) => column(before)), ...curves.map(({ values }) => column(values))], element);
-  if (picked) plot.over.addEventListener("click", () => plot.cursor.idx !== null && plot.cursor.idx !== undefined && picked(plot.cursor.idx));
+  let down = 0;
+  plot.over.addEventListener("mousedown", (event) => (down = event.clientX));
+  // A click, not the end of a drag, which zooms.
+  if (picked) plot.over.addEventListener("click", (event) => Math.abs(event.clientX - down) < 3 && plot.cursor.idx !== null && plot.cursor.idx !== undefined && picked(plot.cursor.idx));
   const resize = () => parent.clientWidth && plot.setSize({ width: width(), height: height() });
   const observer = new ResizeObserver(resize);
   observer.observe(parent);
@@ -168,13 +171,13 @@ export function chart(parent, { x, name: across, label, unit, curves, lines = []
     draw(pen) {
       pen.axes(plot, axis);
       pen.curves(plot);
-      mark(pen, plot, { x, levels, lost, saturated });
+      mark(pen, plot, { x, levels, lost, saturated, moments });
     },
   };
 }
 
-/** Draws levels as lines, and marks periods with saturated or non-finite values. */
-function mark(ctx, plot, { x, levels, lost, saturated }) {
+/** Draws levels and moments as lines, and marks periods with saturated or non-finite values. */
+function mark(ctx, plot, { x, levels, lost, saturated, moments }) {
   const { left, top, width, height } = plot.bbox, ratio = devicePixelRatio || 1;
   const half = x.length > 1 ? (x[1] - x[0]) / 2 : 0.5;
   const bands = (list, colour, alpha, tall) => {
@@ -192,6 +195,18 @@ function mark(ctx, plot, { x, levels, lost, saturated }) {
   bands(lost, style("--bad"), 0.22);
   bands(lost, style("--bad"), 1, 4 * ratio);
   ctx.globalAlpha = 1;
+  for (const index of moments) {
+    if (!(index < x.length)) continue;
+    const at = plot.valToPos(x[index] - half, "x", true);
+    if (at < left || at > left + width) continue;
+    ctx.lineWidth = 1.2 * ratio;
+    ctx.strokeStyle = style("--accent");
+    ctx.setLineDash([2 * ratio, 3 * ratio]);
+    ctx.beginPath();
+    ctx.moveTo(at, top);
+    ctx.lineTo(at, top + height);
+    ctx.stroke();
+  }
   ctx.font = `${11 * ratio}px system-ui, sans-serif`;
   for (const [i, { at, text }] of levels.entries()) {
     const y = plot.valToPos(at, "y", true);
@@ -221,7 +236,8 @@ function mark(ctx, plot, { x, levels, lost, saturated }) {
 }
 
 export class Plots {
-  /** @param tools controls: `axis` (periods, ms or s), `length` (of a period, in ms), `together` (curves over one axis: by unit, or each alone) */
+  /** `mark`: parameters that change during the run (`changes`), the period from which their sliders act (`from`), and what hears of another (`picked`).
+   * @param tools controls: `axis` (periods, ms or s), `length` (of a period, in ms), `together` (curves over one axis: by unit, or each alone) */
   constructor(parent, choice, tools) {
     Object.assign(this, { parent, choice, tools, charts: [], chosen: new Map() });
     tools.axis.addEventListener("change", () => (this.axis = tools.axis.value));
@@ -333,7 +349,8 @@ export class Plots {
     const all = [...this.groups().map((curves) => ({ curves })), { curves: cycles, lines: this.levels() }];
     const { label, ...common } = this.abscissa(), open = all.filter(({ curves }) => !isFlat(curves)), last = open.at(-1);
     const height = () => this.height(open.length, all.length - open.length);
-    for (const one of all) this.charts.push(chart(this.parent, { ...one, ...common, ...(one === last && { label }), height, sync: "ports", folds: true }));
+    const { from, changes, picked } = this.mark ?? { changes: [] }, moments = [...new Set([...changes.map(({ period }) => period), ...(from > 1 ? [from] : [])])].map((period) => period - 1);
+    for (const one of all) this.charts.push(chart(this.parent, { ...one, ...common, ...(one === last && { label }), height, sync: "ports", folds: true, moments, picked: picked && ((index) => picked(index + 1)) }));
   }
 
   /** What to say if inputs are 0 because nobody gives them. */

@@ -18,9 +18,12 @@ export class Tuning {
    * @param begins called before the first change of a movement, with the constant and the text of its value
    * @param sets called with a map from names to texts
    * @param textOf returns the present text of a constant's value
+   * @param isChanged returns whether there is something to reset; without it, the texts before the changes are remembered
+   * @param resets resets it
    */
-  constructor(box, { begins, sets, textOf }) {
-    Object.assign(this, { box, begins, sets, textOf, rows: new Map(), originals: new Map() });
+  constructor(box, { begins, sets, textOf, isChanged, resets }) {
+    Object.assign(this, { box, begins, sets, textOf, resets, rows: new Map(), originals: new Map() });
+    this.isChanged = isChanged ?? (() => this.originals.size > 0);
     this.list = box.querySelector("fieldset");
     this.back = box.querySelector("button");
     this.back.addEventListener("click", () => this.reset());
@@ -39,7 +42,7 @@ export class Tuning {
       if (!this.moving) row.put(constant.value);
     }
     for (const [name, { last }] of this.originals) if (this.textOf(name) !== last) this.originals.delete(name);
-    this.back.disabled = !this.originals.size;
+    this.back.disabled = !this.isChanged();
     this.enabled = true;
   }
 
@@ -104,13 +107,18 @@ export class Tuning {
     const { name } = constant, text = written(constant, value), original = this.originals.get(name)?.text ?? this.textOf(name);
     if (text === original) this.originals.delete(name);
     else this.originals.set(name, { text: original, last: text });
-    this.back.disabled = !this.originals.size;
     this.sets(new Map([[name, text]]));
+    this.back.disabled = !this.isChanged();
   }
 
   /** Gives all constants the texts that they had before the changes. */
   reset() {
-    if (!this.originals.size) return;
+    if (!this.isChanged()) return;
+    if (this.resets) {
+      this.begins("what was set");
+      this.resets();
+      return;
+    }
     const texts = new Map([...this.originals].map(([name, { text }]) => [name, text]));
     this.begins([...texts.keys()].map((name) => `${name} = ${this.textOf(name)}`).join(", "));
     this.originals.clear();

@@ -168,8 +168,8 @@ test("keyboard only: step on and back, and a command", limit, async () => {
   assert.equal(await page.getAttribute("#tab-step", "aria-selected"), "true", "who steps sees where");
   await page.focus("#tab-step");
   await page.keyboard.press("ArrowLeft");
-  assert.equal(await page.getAttribute("#tab-pipeline", "aria-selected"), "true");
-  assert.equal(await page.evaluate(() => document.activeElement.id), "tab-pipeline");
+  assert.equal(await page.getAttribute("#tab-code", "aria-selected"), "true");
+  assert.equal(await page.evaluate(() => document.activeElement.id), "tab-code");
   await page.keyboard.press("Control+Alt+e");
   assert.ok(await page.evaluate(() => document.activeElement.classList.contains("cm-content")));
   await page.keyboard.press("Control+a");
@@ -430,9 +430,12 @@ test("what no longer holds is dimmed at once, and computed again", limit, async 
   await page.waitForFunction(() => document.getElementById("cycles").classList.contains("now"));
   await page.keyboard.press("Control+a");
   await page.keyboard.insertText(await example("foc.s"));
-  // The inputs belong to another program: the run uses zeros and reports it.
-  await page.waitForFunction(() => /pi\.s on t3: \d.* · all inputs are 0: inputs: no column for the input ports ia/.test(document.getElementById("cycles").textContent) && !document.body.classList.contains("stale"));
+  // Inputs and plant belong to another program: the loop is open, the run uses zeros, and the page reports both.
+  await page.waitForFunction(() => /pi\.s on t3: \d.* · the loop is open: the plant dc_motor is for other ports; for these there is pmsm, to be chosen above the plots · all inputs are 0: inputs: no column for the input ports ia/.test(document.getElementById("cycles").textContent) && !document.body.classList.contains("stale"));
   assert.match(await page.textContent("#text"), /table of inputs is for other ports/);
+  await page.click("#tab-plot");
+  assert.deepEqual(await page.locator("#plant-name").evaluate((one) => [one.value, ...[...one.options].map(({ value }) => value)]), ["", "pmsm", ""]);
+  assert.ok(await page.isHidden("#plant"), "no parameters of a plant that is not there");
   await page.click("#tab-inputs");
   await done(page);
   await page.fill("#table", await example("foc.csv"));
@@ -643,6 +646,153 @@ test("a parameter's slider moves a trace without another assembly, within its ra
   assert.deepEqual(await values(other, "y"), [5, 10, 15]);
   await page.click("#parameters button");
   await page.waitForFunction(() => !takt.state.stale && takt.state.run?.outputs.y[2] === 6);
+  assert.deepEqual(errors, []);
+});
+
+test("a range of the pipeline says its sums", limit, async () => {
+  const { page, errors } = await open();
+  await done(page);
+  await page.click("#tab-pipeline");
+  await page.waitForSelector("#pipeline-picture .tp-label");
+  const sums = () => page.textContent("#pipeline-picture .tp-sums");
+  assert.match(await sums(), /drag along the cycles/);
+  // Columns 5 to 11, counted from 0: cycles 6 to 12 of pi.s.
+  const place = await page.evaluate(() => {
+    const { x, y } = document.querySelector("#pipeline-picture .tp-chart").getBoundingClientRect(), boxes = [...document.querySelectorAll("#pipeline-picture .tp-issue")].map((one) => one.getBoundingClientRect());
+    return { y: y + 8, from: boxes[1].x + boxes[1].width / 2, to: boxes[3].x + 1.5 * boxes[3].width };
+  });
+  await page.mouse.move(place.from, place.y);
+  await page.mouse.down();
+  await page.mouse.move(place.to, place.y);
+  await page.mouse.up();
+  assert.match(await sums(), /^cycles 6 to 12: 7 · 3 bundles, 3 operations \(multiply 2, add 1\) · 4 cycles stalled \(operand 4\)/);
+  assert.ok(await page.locator("#pipeline-picture .tp-range").count());
+  await shot(page, "range");
+  // By keys: the row with the focus begins and ends it.
+  await page.locator("#pipeline-picture .tp-label").nth(4).focus();
+  await page.keyboard.press("]");
+  assert.match(await sums(), /^cycles 6 to 16: 11/);
+  await page.keyboard.press("Escape");
+  assert.match(await sums(), /drag along the cycles/);
+  assert.deepEqual(errors, []);
+});
+
+test("two machines, and a text before and after a change, stand side by side with the differences by line", limit, async () => {
+  const { page, errors } = await open();
+  await done(page);
+  requests = [];
+  await page.click("#tab-pipeline");
+  await page.waitForSelector("#pipeline-picture .tp-label");
+  assert.deepEqual(requests, [], "the comparison is loaded when it is asked for");
+  await page.selectOption("#against", "on t1");
+  await page.waitForFunction(() => /^on t1: 65 → on t3: 38 cycles in the period \(−27, −41\.5 %\)/.test(document.querySelector(".compare-total")?.textContent ?? ""));
+  assert.ok(requests.length > 0 && requests.every((path) => path.startsWith("/parts/") || path === "/worker.js"), `${requests}`);
+  assert.equal(await page.locator(".compare-pipeline .tp-scroll").count(), 2);
+  const row = (text) => page.locator(".compare-lines tbody tr", { hasText: text }).locator("td").allTextContents();
+  assert.deepEqual(await row("fmul p, e, KP"), ["27", "fmul    p, e, KP", "1", "8", "5", "−3"]);
+  const total = () => page.locator(".compare-lines tfoot td").allTextContents();
+  assert.deepEqual((await total()).slice(3), ["65", "38", "−27"], "the lines have the cycles of the period together");
+  await shot(page, "compare-machines");
+  // A line that is changed stands beside the line that it was, and lines that moved are no difference.
+  await page.selectOption("#against", "opened");
+  const changed = (await example("pi.s")).replace("; A PI", "; Another\n; A PI").replace("fmul    back, back, T/TT", "fdiv    back, back, TT");
+  await write(page, changed);
+  await page.keyboard.press("Control+Enter");
+  await page.waitForFunction(() => /^as opened, on t3: 38 → now, on t3: 44 cycles in the period \(\+6, \+15\.8 %\).*stalled by operand 24 → 30$/.test(document.querySelector(".compare-total").textContent));
+  // The sum waits for the quotient.
+  assert.deepEqual(await page.locator(".compare-lines tbody tr").evaluateAll((rows) => rows.map((row) => [...row.cells].map(({ textContent }) => textContent))), [["35 → 36", "fadd    di, di, back", "1", "5", "11", "+6"], ["33 → 34", "fdiv    back, back, TT", "1", "5", "5", "="]]);
+  assert.equal(await page.locator(".compare-lines .was").getAttribute("title"), "before: fmul    back, back, T/TT");
+  await shot(page, "compare-change");
+  // What was kept, with sliders, plant and all.
+  await page.click("#keep");
+  await page.waitForFunction(() => /^kept, on t3: (\d+) → now, on t3: \1 cycles in the period \(=/.test(document.querySelector(".compare-total").textContent));
+  await page.selectOption("#against", "");
+  await page.locator("#pipeline-picture").waitFor();
+  assert.ok(await page.isHidden("#comparison"));
+  assert.deepEqual(errors, []);
+});
+
+test("bundles have the colours of their lines, and follow the debugger", limit, async () => {
+  const { page, errors } = await open();
+  await done(page);
+  await page.click("#tab-code");
+  const cell = page.locator(".code td[data-key]", { hasText: "fmul p, e" }), line = page.locator(".cm-line.cm-hue", { hasText: "fmul    p, e, KP" });
+  await cell.waitFor();
+  const colour = (one) => one.evaluate((element) => getComputedStyle(element).backgroundColor);
+  assert.equal(await colour(cell), await colour(line));
+  const hues = await page.locator(".code td[data-key]").evaluateAll((cells) => cells.map((one) => getComputedStyle(one).backgroundColor));
+  assert.ok(hues.length === 13 && new Set(hues).size === 13 && hues.every((one) => one !== "rgba(0, 0, 0, 0)"), `${hues}`);
+  await cell.click();
+  assert.equal(await page.locator(".cm-activeLineGutter").first().textContent(), "27");
+  assert.match(await page.locator(".code td.on").textContent(), /fmul p, e/);
+  await shot(page, "code");
+  await page.keyboard.press("F10");
+  await page.waitForFunction(() => document.getElementById("head").textContent.includes("bundle 0"));
+  await done(page);
+  await page.keyboard.press("F10");
+  await page.waitForFunction(() => document.getElementById("head").textContent.includes("bundle 1"));
+  await page.click("#tab-code");
+  await page.waitForFunction(() => document.querySelector(".code .next th")?.textContent === "1");
+  assert.ok((await page.locator(".cm-hue").count()) > 5);
+  await page.click("#tab-plot");
+  assert.equal(await page.locator(".cm-hue").count(), 0, "the text has its colours only beside the bundles");
+  assert.deepEqual(errors, []);
+});
+
+test("the picture of the machine lights up while stepping", limit, async () => {
+  const { page, errors } = await open();
+  await done(page);
+  await page.click("#tab-step");
+  await page.click("#machine-box summary");
+  await page.waitForSelector(".machine");
+  assert.equal(await page.locator(".machine .mp-stage").count(), 5 + 5 + 14 + 24 + 30 + 5 + 2 + 11 + 4 + 1, "a cell for each cycle of each unit of t3");
+  await page.fill("#command", "goto cycle 25");
+  await page.keyboard.press("Enter");
+  // The sum takes the product in the cycle of its writeback, and the integrator from its bank.
+  await page.waitForFunction(() => /forwarded in the cycle of issue: p\./.test(document.querySelector(".machine-text").textContent));
+  assert.deepEqual([await page.locator(".mp-forward").count(), await page.locator(".mp-read").count()], [1, 1]);
+  assert.match((await page.locator(".machine .mp-text").allTextContents()).join("; "), /cycle 25: bundle 5 \(pi\.s:28\) issues.*fadd v, p, s/);
+  await shot(page, "machine");
+  await page.fill("#command", "goto cycle 27");
+  await page.keyboard.press("Enter");
+  await page.waitForFunction(() => /cycle 27: bundle 6 .* waits: awaits v/.test(document.querySelector(".machine .mp-stall")?.textContent ?? ""));
+  await page.selectOption("#machine", "t4");
+  await page.waitForFunction(() => document.querySelector(".machine").getAttribute("aria-label") === "The machine t4: 4 slots");
+  assert.deepEqual(errors, []);
+});
+
+test("a parameter that is set in the middle of a run acts on the rest of it", limit, async () => {
+  const { page, errors } = await open("#example=gains.s");
+  await done(page);
+  const before = await values(page, "w");
+  assert.ok(before.length === 400 && Math.abs(before[99] - 100) < 5);
+  // A click on a curve sets the period.
+  const chart = await page.locator("#charts .u-over").first().boundingBox();
+  await page.mouse.click(chart.x + 0.15 * chart.width, chart.y + chart.height / 2);
+  const from = Number(await page.inputValue("#from"));
+  assert.ok(Math.abs(from - 60) < 8, `${from}`);
+  const slider = page.locator("#parameters .constant", { hasText: "ki" }).locator("input[type=range]"), box = await slider.boundingBox();
+  await page.mouse.move(box.x + box.width * 0.1, box.y + box.height / 2);
+  await page.mouse.down();
+  for (const part of [0.3, 0.5, 0.7]) await page.mouse.move(box.x + box.width * part, box.y + box.height / 2);
+  await page.mouse.up();
+  await page.waitForFunction(() => !takt.state.stale && takt.state.changes[0]?.value > 35);
+  await done(page);
+  const after = await values(page, "w"), same = after.findIndex((value, i) => value !== before[i]);
+  // The plant answers one period after the output.
+  assert.ok(same >= from && same <= from + 2, `the curve differs from period ${same + 1} on`);
+  assert.match(await page.textContent(".ghost"), /pale: before, with ki = 4/);
+  assert.match(await page.textContent("#changes"), new RegExp(`ki = \\d+(\\.\\d+)? from ${from}`));
+  await shot(page, "parameter-from");
+  await page.click("#link");
+  await page.waitForFunction(() => location.hash.startsWith("#p1="));
+  const { page: other } = await open(await page.evaluate(() => location.hash));
+  await done(other);
+  assert.deepEqual(await values(other, "w"), after, "links carry it");
+  await page.click("#parameters > button");
+  await page.waitForFunction(() => !takt.state.stale && !takt.state.changes.length);
+  await done(page);
+  assert.deepEqual(await values(page, "w"), before);
   assert.deepEqual(errors, []);
 });
 
@@ -1055,5 +1205,7 @@ test("nothing comes from elsewhere, and it is small", limit, async () => {
   requests = [];
   const { page } = await open();
   await done(page);
-  assert.deepEqual([...new Set(requests)].sort(), ["/index.html", "/main.css", "/main.js", "/takt.wasm.gz", "/worker.js"]);
+  // The panels that are imported when they are asked for are none of it; what they share with it is.
+  const asked = [...new Set(requests)].map((path) => path.replace(/^\/parts\/chunk-\w+\.js$/, "/parts/chunk")).sort();
+  assert.deepEqual([...new Set(asked)], ["/index.html", "/main.css", "/main.js", "/parts/chunk", "/takt.wasm.gz", "/worker.js"]);
 });

@@ -1,0 +1,86 @@
+// Panel of the code: the bundles of the program, a column for each slot, coloured by source line as the lines of the editor are.
+
+import { node, styled } from "./parts.js";
+import sheet from "./code.css" with { type: "text" };
+
+styled(sheet);
+
+/** Golden angle in degrees: the hues of neighbouring lines lie far apart. */
+const ANGLE = 137.508;
+
+/** Splits a place such as `pi.s:12:3-9` into file and line. */
+const place = (text) => {
+  const [, file, line] = /^(?:.* → )?(.*?):(\d+)/.exec(text ?? "") ?? [];
+  return file ? { file, line: Number(line), key: `${file}:${line}` } : null;
+};
+
+export class Code {
+  /**
+   * @param parent where it goes
+   * @param reveal called with the place of a clicked operation
+   * @param paint called with a map from lines of the editor's text to colours
+   */
+  constructor(parent, { reveal, paint }) {
+    Object.assign(this, { parent, paint, cells: [], rows: [] });
+    this.head = node("p", { className: "code-head" });
+    this.table = node("table", { className: "code" });
+    parent.replaceChildren(this.head, node("div", { className: "code-scroll" }, this.table));
+    const cell = (event) => event.target.closest("[data-key]");
+    this.table.addEventListener("click", (event) => cell(event) && reveal({ place: cell(event).dataset.place }));
+    this.table.addEventListener("keydown", (event) => {
+      if (event.key !== "Enter" || !cell(event)) return;
+      event.preventDefault();
+      reveal({ place: cell(event).dataset.place });
+    });
+    this.table.addEventListener("mouseover", (event) => this.light(cell(event)?.dataset.key));
+    this.table.addEventListener("mouseleave", () => this.light(this.line));
+  }
+
+  /** Shows bundles (the answer of `bundles`); `file`: name of the editor's text. */
+  show({ slots, bundles }, file) {
+    const at = bundles.flatMap(({ operations }) => operations.map((one) => place(one?.place)).filter(Boolean));
+    const keys = [...new Map(at.map((one) => [one.key, one])).values()].sort((a, b) => (a.file === b.file ? a.line - b.line : a.file < b.file ? -1 : 1));
+    // The lines of the text come first, so that a change of an included file moves none of their colours.
+    keys.sort((a, b) => (b.file === file) - (a.file === file));
+    const hues = new Map(keys.map(({ key }, i) => [key, Math.round((i * ANGLE) % 360)]));
+    Object.assign(this, { cells: [], rows: [], file });
+    const operation = (one) => {
+      if (!one) return node("td", { className: "empty", textContent: "·" });
+      const from = place(one.place), made = node("td", { textContent: one.text });
+      if (!from) return made;
+      Object.assign(made, { tabIndex: 0, title: `${one.place}: ${one.unit}` });
+      Object.assign(made.dataset, { key: from.key, place: one.place });
+      made.style.setProperty("--hue", hues.get(from.key));
+      made.append(node("small", { textContent: from.file === file ? from.line : from.key }));
+      this.cells.push(made);
+      return made;
+    };
+    const row = ({ address, labels, operations }) => {
+      const made = node("tr", {}, node("th", { textContent: address, scope: "row" }), ...operations.map(operation));
+      this.rows[address] = made;
+      return [...labels.map((label) => node("tr", { className: "label" }, node("td", { colSpan: slots.length + 1, textContent: `${label}:` }))), made];
+    };
+    this.table.replaceChildren(node("thead", {}, node("tr", {}, node("th"), ...slots.map((slot) => node("th", { textContent: slot, scope: "col" })))), node("tbody", {}, ...bundles.flatMap(row)));
+    const count = bundles.reduce((sum, { operations }) => sum + operations.filter(Boolean).length, 0);
+    this.head.textContent = `${bundles.length} bundles with ${count} operations in ${slots.length === 1 ? "one slot" : `${slots.length} slots`}; each has the colour of its line. A click goes to the line.`;
+    this.paint(new Map(keys.filter((one) => one.file === file).map(({ key, line }) => [line, hues.get(key)])));
+    this.light(this.line);
+  }
+
+  /** Marks the operations of a line of the text, and brings the first into sight with `show`. */
+  mark(line, show) {
+    this.line = `${this.file}:${line}`;
+    this.light(this.line);
+    if (show) this.table.querySelector(".on")?.scrollIntoView({ block: "nearest" });
+  }
+
+  light(key) {
+    for (const cell of this.cells) cell.classList.toggle("on", cell.dataset.key === key);
+  }
+
+  /** Marks the bundle that issues next in the debugger. */
+  stand(address) {
+    for (const row of this.table.querySelectorAll(".next")) row.classList.remove("next");
+    this.rows[address]?.classList.add("next");
+  }
+}
