@@ -5,6 +5,7 @@ mod accuracy;
 mod arrays;
 mod assumptions;
 mod bound;
+mod boxes;
 mod dependence;
 mod enclosures;
 mod parameters;

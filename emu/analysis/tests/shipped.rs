@@ -8,7 +8,7 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use takt_analysis::accuracy::{
-    Enclosure, Moment, OutputBound, OutputPlace, Problem, Shadow, StateRange, enclose,
+    Enclosure, Moment, OutputBound, OutputPlace, Problem, Reals, Shadow, StateRange, enclose_in_boxes,
 };
 use takt_asm::{FileLoader, Options, Search};
 use takt_emu::Emulator;
@@ -334,7 +334,7 @@ fn seconds() -> f64 {
 fn row(path: &str) -> (String, f64) {
     let begun = seconds();
     let program = assembled(path);
-    let enclosure = enclose(&program);
+    let enclosure = enclose_in_boxes(&program, &Reals::default());
     let cells = match &enclosure {
         Err(error) => format!("| `{path}` | {} | 0 | {error} | | | |", program.outputs.len()),
         Ok(enclosure) => {

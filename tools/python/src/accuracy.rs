@@ -79,7 +79,9 @@ pub(crate) fn enclose(
 ) -> PyResult<(Vec<OutputBound>, Vec<Hazard>, Vec<StateAssumption>)> {
     let program = &program.program;
     let found = py
-        .detach(|| takt_analysis::accuracy::enclose(program))
+        .detach(|| {
+            takt_analysis::accuracy::enclose_in_boxes(program, &takt_analysis::accuracy::Reals::default())
+        })
         .map_err(|error| NoBoundError::new_err(format!("no bound: {error}")))?;
     let output = |output: &takt_analysis::accuracy::OutputBound| OutputBound {
         name: output.name.clone(),

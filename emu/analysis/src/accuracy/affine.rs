@@ -232,6 +232,10 @@ impl Affine {
         (symbols.iter().map(|symbol| self.coefficient(*symbol)).collect(), rest + rounding)
     }
 
+    pub(super) fn center_and_slack(&self) -> (f64, f64) {
+        (self.center, self.slack)
+    }
+
     /// Symbols with their coefficients.
     pub(super) fn terms(&self) -> impl Iterator<Item = (u32, f64)> + '_ {
         self.terms.iter().copied()

@@ -23,6 +23,11 @@ impl Explorer<'_> {
     pub(super) fn apply(&mut self, made: &Made) -> Rc<Node> {
         let Made { word, instruction, operands } = made;
         let meaning = Meaning::of(instruction);
+        if self.plain && !matches!(meaning, Some(Meaning::Source(_))) {
+            let values = operands.each_ref().map(|operand| operand.value.clone());
+            let (value, _) = self.compute(*word, instruction, &values);
+            return Node::new(value, made.clone());
+        }
         match &meaning {
             Some(Meaning::Source(place)) => return Rc::clone(&operands[*place]),
             Some(Meaning::Choose(of)) => {

@@ -7,6 +7,7 @@
 //! (`refine.rs`).
 
 use super::assume::View;
+use super::certificate::{self, Certificate};
 use super::enclosure::{Enclosure, Hazard, OutputBound, OutputPlace, Relied};
 use super::interval::Interval;
 use super::memory::array_starts;
@@ -33,9 +34,26 @@ const MAX_PARTS: u32 = 1 << 14;
 /// # Errors
 /// If a program cannot be enclosed: a loop without bound, a state or an input without a range, more paths than [`MAX_BUNDLES`].
 pub fn enclose(program: &Program) -> Result<Enclosure, BoundError> {
-    match enclose_within(program, MAX_UNROLLED) {
+    enclose_reals(program, &Reals::default())
+}
+
+/// Numbers of a program that stand for real numbers, so that their rounding to binary32 counts as an error.
+#[derive(Clone, PartialEq, Default, Debug)]
+pub struct Reals {
+    /// Input ports stand for real numbers in their ranges.
+    pub inputs: bool,
+    /// Real numbers that constants stand for. A constant without one is exact.
+    pub constants: Vec<f64>,
+}
+
+/// Encloses the results like [`enclose`], with the rounding of numbers that stand for reals.
+///
+/// # Errors
+/// The errors of [`enclose`].
+pub fn enclose_reals(program: &Program, reals: &Reals) -> Result<Enclosure, BoundError> {
+    match enclosed(program, MAX_UNROLLED, reals) {
         // Loops that call subroutines, and paths that do not meet, may be longer than they seem.
-        Err(BoundError { refusal: Refusal::Limit { .. }, .. }) => enclose_within(program, 0),
+        Err(BoundError { refusal: Refusal::Limit { .. }, .. }) => enclosed(program, 0, reals),
         result => result,
     }
 }
@@ -45,11 +63,15 @@ pub fn enclose(program: &Program) -> Result<Enclosure, BoundError> {
 /// # Errors
 /// The errors of [`enclose`].
 pub fn enclose_within(program: &Program, unrolled: u64) -> Result<Enclosure, BoundError> {
+    enclosed(program, unrolled, &Reals::default())
+}
+
+fn enclosed(program: &Program, unrolled: u64, reals: &Reals) -> Result<Enclosure, BoundError> {
     let mut stored = BTreeSet::new();
     loop {
         // Fixpoint: assume that no store modifies a preloaded word. If a pass finds a store to an assumed word, that word counts as changed
         // in another pass.
-        let mut explorer = explored(program, &stored, unrolled)?;
+        let mut explorer = explored(program, &stored, unrolled, reals, false)?;
         let changed: Vec<u32> =
             explorer.initial_words.intersection(&explorer.changed_words).copied().collect();
         if changed.is_empty() {
@@ -59,17 +81,47 @@ pub fn enclose_within(program: &Program, unrolled: u64) -> Result<Enclosure, Bou
     }
 }
 
+/// Certificate of the bounds of a program whose periods have no branches. With several periods, each gives its own bounds.
+///
+/// # Errors
+/// The errors of [`enclose`]; or the reason why the program has no certificate, as text.
+pub fn certify(program: &Program) -> Result<Result<Certificate, String>, BoundError> {
+    let mut stored = BTreeSet::new();
+    loop {
+        let mut explorer = explored(program, &stored, u64::MAX, &Reals::default(), true)?;
+        let changed: Vec<u32> =
+            explorer.initial_words.intersection(&explorer.changed_words).copied().collect();
+        if !changed.is_empty() {
+            stored.append(&mut explorer.changed_words);
+            continue;
+        }
+        return Ok(match explorer.periods {
+            _ if explorer.branches => Err("a period with branches has no certificate".to_owned()),
+            0 => Err("a program without a period has no certificate".to_owned()),
+            _ => Ok(certificate::derive(&explorer, &explorer.left)),
+        });
+    }
+}
+
 /// Follows all sections, given the data words that the program may change.
 fn explored<'p>(
     program: &'p Program,
     stored: &BTreeSet<u32>,
     unrolled: u64,
+    reals: &Reals,
+    plain: bool,
 ) -> Result<Explorer<'p>, BoundError> {
     let graph = Graph::new(program)?;
     let mut explorer = Explorer {
         program,
         graph,
         unrolled,
+        plain,
+        entered: Vec::new(),
+        left: Vec::new(),
+        branches: false,
+        real_inputs: reals.inputs,
+        real_constants: reals.constants.iter().map(|value| ((*value as f32).to_bits(), *value)).collect(),
         symbols: Vec::new(),
         found: Found::default(),
         once: true,
@@ -190,6 +242,17 @@ pub(super) struct Explorer<'p> {
     pub(super) graph: Graph<'p>,
     /// Size from which loops are summarised.
     unrolled: u64,
+    /// Operations are followed as they are, for a certificate: no case is distinguished, no condition narrows a value.
+    pub(super) plain: bool,
+    /// Symbols of the values that enter a period, for a certificate, and the values that it leaves, with the period's number.
+    pub(super) entered: Vec<(u32, Place)>,
+    left: Vec<(u32, Place, Rc<Node>)>,
+    /// The period has a branch, whose sides a certificate would have to distinguish.
+    branches: bool,
+    /// The rounding of inputs counts as an error.
+    pub(super) real_inputs: bool,
+    /// Real numbers that constants stand for, by the constants' bits.
+    real_constants: HashMap<u32, f64>,
     pub(super) found: Found,
     /// The section from reset is followed, in which data memory holds what the loader put there.
     pub(super) once: bool,
@@ -239,12 +302,21 @@ impl Explorer<'_> {
         BoundError::new(self.program, address, refusal)
     }
 
+    /// Value of a constant: with the rounding error of the real number that it stands for, if there is one.
+    pub(super) fn constant(&self, bits: u32) -> Value {
+        let value = f64::from(f32::from_bits(bits));
+        match self.real_constants.get(&bits) {
+            Some(real) if *real != value => Value::Float(Rc::new(Number::rounded_constant(value, *real))),
+            _ => Value::bits(bits),
+        }
+    }
+
     /// Abstract state at the start of a section.
     fn begin(&mut self, once: bool, address: BundleAddress) -> State {
         let program = self.program;
         // After `.once`, a register that the program writes may no longer hold its preset.
         let constants = if once { preset(program).collect() } else { self.fixed.clone() };
-        let constant = |bits| Node::leaf(Value::bits(bits));
+        let constant = |bits| Node::leaf(self.constant(bits));
         let mut registers: BTreeMap<Register, Rc<Node>> =
             constants.into_iter().map(|(register, bits)| (register, constant(bits))).collect();
         registers.insert(Register::ZERO, constant(0));
@@ -357,6 +429,8 @@ impl Explorer<'_> {
             Flow::Jump(target) => self.go(walk, address, target, true, state)?,
             Flow::Branch { zero, target, .. } => {
                 let Some(condition) = before else { return Ok(()) };
+                self.branches |= !matches!(condition.value, Value::Patterns(_))
+                    || condition.value.tested() == (true, true);
                 for (holds, to, jump) in [(zero, next, false), (!zero, target, true)] {
                     if let Some(state) = self.assumed(&state, &condition, holds) {
                         self.go(walk, address, to, jump, state)?;
@@ -567,6 +641,9 @@ impl Explorer<'_> {
             Type::I | Type::B => (View::Integer, Some(node.value.whole().actual)),
         };
         let promised = Interval::new(low, high);
+        if self.plain {
+            return true;
+        }
         if known.is_none_or(|known| known.within(promised)) {
             return true;
         }
@@ -600,7 +677,7 @@ impl Explorer<'_> {
         self.found.operations += u64::from(instruction.effect() != Effect::Nothing);
         Ok(match instruction.effect() {
             Effect::Compute => Some(self.apply(&Made { word, instruction: *instruction, operands })),
-            Effect::Immediate => Some(Node::leaf(Value::bits(instruction.constant))),
+            Effect::Immediate => Some(Node::leaf(self.constant(instruction.constant))),
             Effect::Load => {
                 let words = self.addresses(word, instruction, &operands[0].value, (address, &state.calls))?;
                 Some(self.load(state, words, address)?)
@@ -620,6 +697,9 @@ impl Explorer<'_> {
 
     /// Ends a period: joins the values of outputs and states into the values over all paths.
     fn end(&mut self, state: &State) {
+        if self.plain {
+            return self.end_plainly(state);
+        }
         for register in numbers(self.program).map(|port| port.register) {
             if let Some(node) = state.registers.get(&register).filter(|node| node.value != Value::Unknown) {
                 self.leaves(Place::Register(register), &Rc::clone(node));
@@ -663,6 +743,30 @@ impl Explorer<'_> {
             }
         }
         self.found.ended = true;
+    }
+
+    /// Ends a period that is followed for a certificate: notes the values that it leaves in outputs and states.
+    fn end_plainly(&mut self, state: &State) {
+        if self.once {
+            for register in &self.kept {
+                let value = state.registers.get(register).map_or(&Value::Unknown, |node| &node.value);
+                join_into(&mut self.left_by_once, *register, value);
+            }
+            return;
+        }
+        let program = self.program;
+        let states = program.ranges.iter().map(|range| range.register);
+        let states = states.filter(|register| !program.machine.is_input(*register));
+        let registers: BTreeSet<Register> =
+            numbers(program).map(|port| port.register).chain(states).collect();
+        let period = self.periods;
+        let registers = registers.into_iter();
+        let left = registers.filter_map(|register| Some((register, state.registers.get(&register)?)));
+        self.left.extend(left.map(|(register, node)| (period, Place::Register(register), Rc::clone(node))));
+        let arrays = program.array_ranges.iter().flat_map(|range| range.span());
+        let words: BTreeSet<u32> = arrays.chain(program.results.iter().flat_map(ArrayResult::span)).collect();
+        let left = words.into_iter().filter_map(|word| Some((word, state.memory.get(&word)?)));
+        self.left.extend(left.map(|(word, node)| (period, Place::Word(word), Rc::clone(node))));
     }
 
     /// Joins the value that a path leaves in an output.

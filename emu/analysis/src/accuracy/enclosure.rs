@@ -131,7 +131,7 @@ pub struct Relied {
 }
 
 /// Statements about every period that begins with inputs and states within their ranges, the states free of error.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Default)]
 pub struct Enclosure {
     /// Bounds of the outputs that carry binary32 or integers and that a period writes, and of the arrays that are results.
     pub outputs: Vec<OutputBound>,

@@ -19,7 +19,7 @@ const MAX_WORDS: usize = 4096;
 impl Explorer<'_> {
     /// Value of a data word that this section has not written. In `.once` the loader's; in a period, that of the array's `.range`.
     pub(super) fn initial_word(&mut self, word: u32) -> Rc<Node> {
-        let loaded = Value::bits(self.program.data.get(word as usize).copied().unwrap_or(0));
+        let loaded = self.constant(self.program.data.get(word as usize).copied().unwrap_or(0));
         if self.once {
             return Node::leaf(loaded);
         }

@@ -8,8 +8,10 @@
 mod affine;
 mod assume;
 mod bits;
+mod boxes;
 #[cfg(test)]
 mod brute_force;
+mod certificate;
 mod compute;
 mod converge;
 mod enclose;
@@ -31,7 +33,9 @@ mod value;
 use std::collections::{BTreeMap, BTreeSet};
 use takt_isa::{BundleAddress, Flow, Instruction, Program, Register};
 
-pub use enclose::{MAX_BUNDLES, MAX_UNROLLED, enclose, enclose_within};
+pub use boxes::enclose_in_boxes;
+pub use certificate::{Certificate, Form, Kept, Open, Promise, Proved, Rounding, Step};
+pub use enclose::{MAX_BUNDLES, MAX_UNROLLED, Reals, certify, enclose, enclose_reals, enclose_within};
 pub use enclosure::{
     Converging, Enclosure, Hazard, Moment, OutputBound, OutputPlace, Relied, StateRange, UnprovedRange,
 };

@@ -62,6 +62,30 @@ impl Number {
         Number { actual: range, exact: range, form: Affine::of(range, symbol), error, grid, relative: None }
     }
 
+    /// Constant that stands for a real number, which binary64 has to within four ulps.
+    pub(super) fn rounded_constant(value: f64, real: f64) -> Number {
+        let slack = real.abs() * (4.0 * f64::EPSILON);
+        let exact = Interval::point(real).widened(slack);
+        let error = Interval::point(value) - exact;
+        Number {
+            actual: Interval::point(value),
+            exact,
+            form: Affine::free(exact),
+            error: Affine::free(error),
+            grid: grid_of(value),
+            relative: Some(Relative { share: 0.0, rest: error.magnitude() }),
+        }
+    }
+
+    /// Number in an interval that stands for the real number that was rounded to it; each symbol is of its own.
+    pub(super) fn rounded(range: Interval, [symbol, rounding]: [u32; 2], grid: Option<i32>) -> Number {
+        let half = 0.5 * super::ulp(range.magnitude());
+        let exact = range.widened(half);
+        let error = Affine::constant(0.0).with(rounding, half);
+        let relative = Some(Relative::EXACT.rounded(0.5));
+        Number { actual: range, exact, form: Affine::of(exact, symbol), error, grid, relative }
+    }
+
     pub(super) fn join(&self, other: &Number) -> Number {
         Number {
             actual: self.actual.hull(other.actual),

@@ -64,6 +64,7 @@ impl Copies {
             // `waist` leaves constants only.
             let bits = match &node.value {
                 Value::Patterns(patterns) => patterns.first().copied().unwrap_or(0),
+                Value::Float(number) => (number.actual.low as f32).to_bits(),
                 _ => 0,
             };
             self.key.push(1 << 40 | u64::from(bits));
@@ -315,8 +316,7 @@ fn waist(node: &Rc<Node>) -> Option<Rc<Node>> {
         }
         steps += 1;
         for operand in &next.made.as_ref()?.operands {
-            let known = matches!(&operand.value, Value::Patterns(patterns) if patterns.len() == 1);
-            if !known {
+            if !is_constant(operand) {
                 open.insert((operand.depth(), Rc::as_ptr(operand)), Rc::clone(operand));
             }
         }
@@ -324,8 +324,18 @@ fn waist(node: &Rc<Node>) -> Option<Rc<Node>> {
     None
 }
 
+/// The node is a constant.
+fn is_constant(node: &Rc<Node>) -> bool {
+    match &node.value {
+        Value::Patterns(patterns) => patterns.len() == 1,
+        // One that stands for a real number.
+        Value::Float(number) => node.made.is_none() && number.actual.low == number.actual.high,
+        _ => false,
+    }
+}
+
 /// Point that divides a range: zero, or in the middle of the exponents, or of the numbers.
-fn middle(range: Interval) -> Option<f64> {
+pub(super) fn middle(range: Interval) -> Option<f64> {
     let Interval { low, high } = range;
     let size = |low: f64, high: f64| {
         if low < high / 16.0 { (low * high).sqrt().max(high / 256.0) } else { low / 2.0 + high / 2.0 }

@@ -64,13 +64,21 @@ pub(super) fn is_word_shown(range: &ArrayRange, value: &Value) -> bool {
 }
 
 impl Explorer<'_> {
-    /// Value within a promised range, without error.
+    /// Value within a promised range, without error unless it is an input that stands for a real number.
     pub(super) fn ranged(&mut self, place: Place, ty: Type, (low, high): (f64, f64)) -> Value {
         let symbol = self.symbol(None);
         self.state_symbols.insert(place, symbol);
+        if self.plain {
+            self.entered.push((symbol, place));
+        }
         let ends = Interval::new(low, high);
         let grid = if ty == Type::F { float_grid(ends) } else { Some(0) };
-        let number = Rc::new(Number::of(ends, symbol, grid));
+        let is_input = matches!(place, Place::Register(register) if self.program.machine.is_input(register));
+        let number = match self.real_inputs && is_input && ty == Type::F {
+            true => Number::rounded(ends, [symbol, self.symbol(None)], grid),
+            false => Number::of(ends, symbol, grid),
+        };
+        let number = Rc::new(number);
         match ty {
             Type::F => Value::Float(number),
             Type::I | Type::B => Value::Integer(number),

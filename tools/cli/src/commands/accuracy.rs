@@ -2,6 +2,7 @@
 //! The command `takt accuracy`: errors of the outputs against binary64, measured by source line or proved as bounds.
 
 mod bound_report;
+mod certificate;
 mod comparison;
 mod lines;
 mod measurement;
@@ -23,7 +24,7 @@ pub(crate) use measurement::MeasurementReport;
 use serde_json::{Map, Value, json};
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use takt_analysis::accuracy::{Shadow, enclose};
+use takt_analysis::accuracy::{Reals, Shadow, enclose_in_boxes};
 use takt_analysis::period::PERIOD_LIMIT;
 use takt_emu::{Emulator, Row};
 use takt_isa::Program;
@@ -61,6 +62,10 @@ pub(crate) struct Accuracy {
     /// begins with exact values, as for bounds.
     #[arg(long, requires = "inputs")]
     bound: bool,
+    /// Write into this folder what other makers' programs check: a goal for Gappa for each operation, and the derivation of the bounds with
+    /// the script that adds it up (`check.py`). It says which bounds it proves.
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["inputs", "json"])]
+    certificate: Option<PathBuf>,
     /// Print the result as JSON.
     #[arg(long)]
     json: bool,
@@ -72,6 +77,7 @@ Examples:
   takt accuracy prog.s --inputs in.csv                errors against binary64, and the lines that they come from
   takt accuracy prog.s --inputs in.csv --each-period  without what states carry from period to period
   takt accuracy prog.s --inputs in.csv --bound        both, and the factor between them
+  takt accuracy prog.s --certificate proof            bounds, and their derivation for `python3 proof/check.py proof`
   takt accuracy system.toml --inputs in.csv           of each core, in a run of the system";
 
 pub(crate) fn run(arguments: &Accuracy, color: bool, out: &mut Out) -> Result<()> {
@@ -106,7 +112,7 @@ fn bounded(arguments: &Accuracy, application: &Application, out: &mut Out) -> Re
         let program = &loaded.program;
         let found = {
             let _waiting = bounding(program);
-            enclose(program)
+            enclose_in_boxes(program, &Reals::default())
         };
         let enclosure = match (found, application.system()) {
             (Ok(enclosure), _) => Ok(enclosure),
@@ -131,6 +137,17 @@ fn bounded(arguments: &Accuracy, application: &Application, out: &mut Out) -> Re
     if arguments.json {
         files::json(&whole_json(arguments, application, cores), out)?;
     }
+    if let Some(folder) = &arguments.certificate {
+        match application {
+            Application::Program(loaded) => certificate::write(&loaded.program, folder, out)?,
+            Application::System(_) => {
+                return Err(Failure::Usage(
+                    "--certificate applies to a program; name the source of one core".to_owned(),
+                )
+                .into());
+            }
+        }
+    }
     if safe { Ok(()) } else { Err(Failure::Reported.into()) }
 }
 
@@ -150,7 +167,10 @@ fn measured(
         let enclosure = match arguments.bound {
             true => {
                 let _waiting = bounding(program);
-                Some(enclose(program).map_err(|error| anyhow!("no bound: {error}"))?)
+                Some(
+                    enclose_in_boxes(program, &Reals::default())
+                        .map_err(|error| anyhow!("no bound: {error}"))?,
+                )
             }
             false => None,
         };
