@@ -133,6 +133,7 @@ fn written(rewrites: Rewrites, make: fn(Expr<'_>, Expr<'_>, Expr<'_>) -> Id) -> 
         outputs,
         input_arrays,
         output_arrays,
+        assumptions: Vec::new(),
         graph,
     };
     let function = function.optimised(&Delays::of(&takt_isa::F3));

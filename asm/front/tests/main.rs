@@ -8,6 +8,7 @@ mod c99_style;
 mod common;
 mod corpora;
 mod expressions;
+mod fpcore;
 mod graph;
 mod law;
 mod mjcf;

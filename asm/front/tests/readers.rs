@@ -2,14 +2,20 @@
 //! Files as found in practice: blemishes in ignored parts, encodings, spreadsheets, Python's JSON; and the tables of docs/readers.md.
 
 use std::path::Path;
+use takt_front::fpcore;
 use takt_front::mpc::{self, penalty};
 use takt_front::robot::{self, dh, mjcf, urdf};
 use takt_front::{Error, no_files};
 use takt_text::readers::{self, Row};
 
 /// Tables of the readers, by the name of their marks in the document.
-const TABLES: [(&str, &[Row]); 4] =
-    [("urdf", urdf::TABLE), ("mjcf", mjcf::TABLE), ("dh", dh::TABLE), ("mpc", mpc::TABLE)];
+const TABLES: [(&str, &[Row]); 5] = [
+    ("fpcore", fpcore::TABLE),
+    ("urdf", urdf::TABLE),
+    ("mjcf", mjcf::TABLE),
+    ("dh", dh::TABLE),
+    ("mpc", mpc::TABLE),
+];
 
 #[test]
 fn the_document_has_the_tables_of_the_readers() {

@@ -27,6 +27,8 @@ struct Use {
     written: Option<(OperationPosition, SlotIndex)>,
     /// An operation of `.once` writes the register.
     once: bool,
+    /// A value written into the register has an assumption, which needs no reader.
+    assumed: bool,
     /// Slots, by bit, that write the register besides the slot of the first write.
     conflicts: u64,
 }
@@ -51,6 +53,7 @@ pub(crate) fn check(context: &mut Context, ir: &Ir, assignment: &BankAssignment)
             let (Some(dest), Some(slot)) = (operation.dest, operation.slot) else { continue };
             let found = &mut uses[dest.index()];
             found.once |= index < ir.period;
+            found.assumed |= operation.assumed.is_some();
             match found.written {
                 None => {
                     found.written = Some(((index, number), slot));
@@ -236,7 +239,7 @@ fn unused(context: &mut Context, register: &VirtualRegister, found: &Use) {
         RegisterKind::Output if !written => format!("output `{name}` is never written"),
         RegisterKind::Parameter if !read => format!("parameter `{name}` is never read"),
         RegisterKind::Input | RegisterKind::Output | RegisterKind::Parameter => return,
-        RegisterKind::Plain | RegisterKind::State => match (read, written) {
+        RegisterKind::Plain | RegisterKind::State => match (read || found.assumed, written) {
             (true, _) => return,
             (false, false) => format!("register `{name}` is never used"),
             (false, true) => format!("register `{name}` is written and never read"),

@@ -108,7 +108,7 @@ impl Argument {
                 (1, _) => (format!("{plain}_{}", j + 1), format!("{}[{j}]", self.name)),
                 _ => (format!("{plain}_{}_{}", i + 1, j + 1), format!("{}[{i}, {j}]", self.name)),
             };
-            Ok(Port { name, text })
+            Ok(Port::new(name, text))
         };
         self.places().into_iter().map(port).collect()
     }
@@ -174,7 +174,16 @@ pub fn read(source: &str, rewrites: Rewrites) -> Result<Function, Error> {
     unique(ports.iter().chain(named.iter().map(|(port, _)| port)))?;
     let from = if file.source.is_empty() { String::new() } else { format!(", from {}", file.source) };
     let title = format!("{}{from}", file.name);
-    Ok(Function { title, notes, inputs: ports, outputs: named, input_arrays, output_arrays, graph })
+    Ok(Function {
+        title,
+        notes,
+        inputs: ports,
+        outputs: named,
+        input_arrays,
+        output_arrays,
+        assumptions: Vec::new(),
+        graph,
+    })
 }
 
 fn unique<'a>(ports: impl Iterator<Item = &'a Port>) -> Result<(), Error> {

@@ -17,7 +17,7 @@ pub struct Operation {
     pub becomes: &'static str,
     /// Comment for the head of the source if the operation is used.
     pub note: Option<&'static str>,
-    pub(super) meaning: Meaning,
+    pub(crate) meaning: Meaning,
 }
 
 const fn row(

@@ -10,6 +10,35 @@ pub struct Port {
     pub name: String,
     /// Meaning and unit, for a comment.
     pub text: String,
+    /// Least and largest value of an input, where its source states them.
+    pub range: Option<(f64, f64)>,
+}
+
+impl Port {
+    /// A port without a range.
+    pub fn new(name: String, text: String) -> Port {
+        Port { name, text, range: None }
+    }
+}
+
+/// Direction of an assumption.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Bound {
+    /// The value is at least the number.
+    AtLeast,
+    /// The value is at most the number.
+    AtMost,
+}
+
+/// Bound of a value that the function's source promises.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Assumption {
+    /// Node of the value.
+    pub node: Id,
+    /// Direction of the bound.
+    pub bound: Bound,
+    /// The least or the largest value.
+    pub value: f64,
 }
 
 /// Inputs or outputs that form one array.
@@ -53,6 +82,8 @@ pub struct Function {
     pub input_arrays: Vec<Array>,
     /// Grouping of the outputs into arrays.
     pub output_arrays: Vec<Array>,
+    /// Promised bounds of values, outputs or not.
+    pub assumptions: Vec<Assumption>,
     /// Expressions of all outputs.
     pub graph: Graph,
 }
@@ -63,14 +94,20 @@ impl Function {
         self.outputs.iter().map(|(_, id)| *id).collect()
     }
 
-    /// Number of operations of all outputs.
+    /// Nodes that the program computes: of the outputs, then of the assumptions.
+    pub fn roots(&self) -> Vec<Id> {
+        let assumed = self.assumptions.iter().map(|assumption| assumption.node);
+        self.outputs.iter().map(|(_, id)| *id).chain(assumed).collect()
+    }
+
+    /// Number of operations of all outputs and assumptions.
     pub fn count(&self) -> Count {
-        Count::of(&self.graph, &self.nodes())
+        Count::of(&self.graph, &self.roots())
     }
 
     /// Length of the critical path, in cycles.
     pub fn depth(&self, delays: &Delays) -> u32 {
-        depth(&self.graph, &self.nodes(), delays)
+        depth(&self.graph, &self.roots(), delays)
     }
 
     /// Values of the outputs in binary64.
@@ -84,8 +121,11 @@ impl Function {
     }
 
     pub(crate) fn improved(self, delays: &Delays, thorough: bool) -> Function {
-        let (graph, nodes) = optimise(&self.graph, &self.nodes(), delays, thorough);
-        let outputs = self.outputs.into_iter().zip(nodes).map(|((port, _), id)| (port, id)).collect();
-        Function { graph, outputs, ..self }
+        let (graph, nodes) = optimise(&self.graph, &self.roots(), delays, thorough);
+        let mut nodes = nodes.into_iter();
+        let outputs = self.outputs.into_iter().zip(&mut nodes).map(|((port, _), id)| (port, id)).collect();
+        let assumptions = self.assumptions.into_iter().zip(nodes);
+        let assumptions = assumptions.map(|(assumption, node)| Assumption { node, ..assumption }).collect();
+        Function { graph, outputs, assumptions, ..self }
     }
 }

@@ -17,7 +17,7 @@ mod simplify;
 
 pub use evaluate::{Count, evaluate};
 pub use expr::Expr;
-pub use function::{Array, Function, Port};
+pub use function::{Array, Assumption, Bound, Function, Port};
 pub use passes::{Delays, depth, optimise};
 
 use std::cell::RefCell;

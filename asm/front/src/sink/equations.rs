@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Writes a function as equations: one statement for each value that has a name or several uses.
 
+use super::terms::number;
 use super::{Head, Layout, Names, Period, Terms, of_library};
-use crate::graph::{Function, Id, Node, Port};
+use crate::graph::{Bound, Function, Id, Node, Port};
 use std::collections::HashMap;
 use std::fmt::Write;
 
@@ -18,7 +19,7 @@ pub fn constants(function: &Function) -> Vec<(&Port, f64)> {
 /// By input: an output depends on it.
 pub fn inputs_read(function: &Function) -> Vec<bool> {
     let graph = &function.graph;
-    let uses = graph.uses(&function.nodes());
+    let uses = graph.uses(&function.roots());
     let mut read = vec![false; function.inputs.len()];
     for (index, uses) in uses.into_iter().enumerate() {
         if let (Node::Input(input), true) = (graph.node_at(index), uses > 0) {
@@ -44,7 +45,7 @@ struct Writer<'a> {
 
 /// Source of a function: a program that computes the outputs every period, or a body for `.include` in another program's period.
 pub fn source(function: &Function, layout: &Layout) -> String {
-    let nodes = function.nodes();
+    let nodes = function.roots();
     let uses = function.graph.uses(&nodes);
     let live = uses.iter().enumerate().filter(|(_, uses)| **uses > 0);
     let mut live = live.map(|(index, _)| function.graph.node_at(index));
@@ -125,7 +126,8 @@ impl Writer<'_> {
             }
             let label = graph.label_of(id);
             let long = || self.length(id) > LONG;
-            if outputs.is_empty() && label.is_none() && self.uses[index] < 2 && !long() {
+            let assumed = function.assumptions.iter().any(|assumption| assumption.node == id);
+            if outputs.is_empty() && label.is_none() && self.uses[index] < 2 && !assumed && !long() {
                 continue;
             }
             let expression = self.terms().operation(id).text;
@@ -139,6 +141,7 @@ impl Writer<'_> {
                 }
             };
             self.statement(&name, &expression, &text);
+            self.assume(id, &name);
             for output in outputs {
                 self.statement(&output, &name, "");
             }
@@ -162,6 +165,14 @@ impl Writer<'_> {
         self.said = comment.to_owned();
         self.statements.push_str(&line);
         self.statements.push('\n');
+    }
+
+    /// Writes what the function assumes of a value, behind the statement that computes it.
+    fn assume(&mut self, id: Id, name: &str) {
+        for assumption in self.function.assumptions.iter().filter(|assumption| assumption.node == id) {
+            let sign = if assumption.bound == Bound::AtLeast { ">=" } else { "<=" };
+            let _ = writeln!(self.statements, ".assume {name} {sign} {}", number(assumption.value));
+        }
     }
 
     /// Estimated length of an expression's text.

@@ -50,6 +50,15 @@ impl Layout {
                 layout.declarations.comment(&format!("{} has no effect{}", port.name, meaning(port)));
             }
         }
+        if function.inputs.iter().any(|port| port.range.is_some()) {
+            // Bounds rest on one value of an input in a period.
+            layout.declarations.latched();
+        }
+        for port in function.inputs.iter().enumerate().filter(|(index, _)| layout.inputs[*index].is_some()) {
+            if let (_, Port { name, range: Some(range), .. }) = port {
+                layout.declarations.range(name, *range)?;
+            }
+        }
         let (inputs, most) = (layout.inputs.iter().flatten().count(), machine.input_count());
         if inputs > usize::from(most) {
             return Err(Error::plain(format!(
@@ -139,6 +148,17 @@ impl Layout {
                             }
                             (&port.text, "")
                         }
+                    };
+                    let range = function
+                        .inputs
+                        .get(index)
+                        .filter(|_| way == Direction::In)
+                        .and_then(|port| port.range);
+                    let text = match range {
+                        Some((low, high)) => {
+                            format!("{text}{} [{low}, {high}]", if text.is_empty() { "in" } else { ", in" })
+                        }
+                        None => text.clone(),
                     };
                     if !text.is_empty() {
                         layout.declarations.comment(&format!("      {place}: {text}{note}"));

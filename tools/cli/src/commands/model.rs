@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The command `takt model`: generates a program in equations from a robot description, expressions of another tool, or a control problem.
 
+mod fpcore;
 mod memory_sizes;
 mod mpc;
 mod policy;
@@ -28,14 +29,14 @@ use takt_isa::timing::Cycle;
 /// Turn a robot's description, expressions of CasADi or SymPy, a learned policy or a control problem into a program.
 ///
 /// FILE is a robot in URDF or MJCF, a table of Denavit-Hartenberg parameters (.csv), a list of instructions (.json) that
-/// the Python module `takt_expressions` writes from CasADi functions and SymPy expressions, a multi-layer perceptron (.onnx), or a linear
+/// the Python module `takt_expressions` writes from CasADi functions and SymPy expressions, kernels in FPCore (.fpcore), a multi-layer perceptron (.onnx), or a linear
 /// system with weights and limits (.json) for model-predictive control.
 /// The operations that it takes are printed, and the cycles on the machine beside the bound that no schedule can beat; of a policy,
 /// its weights, the cycles of each, and the memory.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Model {
-    /// Description; the format is determined by the extension, which must be .urdf, .xml, .csv, .json or .onnx.
+    /// Description; the format is determined by the extension, which must be .urdf, .xml, .csv, .json, .fpcore or .onnx.
     file: PathBuf,
     /// Quantities to compute of a robot: forward-kinematics, jacobian, inverse-dynamics, gravity, mass-matrix, forward-dynamics or
     /// computed-torque.
@@ -65,6 +66,9 @@ pub(crate) struct Model {
     /// Output to compute, for a policy with several outputs.
     #[arg(long, value_name = "NAME")]
     result: Option<String>,
+    /// Core to compute, for an FPCore file with several.
+    #[arg(long, value_name = "NAME")]
+    name: Option<String>,
     /// For a control problem: search its `x_range` for the states of the worst residuals and violation of limits, from so many starts.
     #[arg(long, value_name = "STARTS", value_parser = starts)]
     worst: Option<usize>,
@@ -98,6 +102,7 @@ Examples:
   takt model arm.urdf -f inverse-dynamics --body --prefix id_ -o dynamics.s
                                                   equations for `.include` in a law
   takt model f.json --exact -m t1                 expressions in their order
+  takt model kernels.fpcore --name doppler1       a kernel of FPBench
   takt model policy.onnx -o policy.s              a learned policy
   takt model system.json -o mpc.s --worst 100     model-predictive control";
 
@@ -268,40 +273,60 @@ pub(crate) fn run(arguments: &Model, color: bool, out: &mut Out) -> Result<()> {
         ))
         .into());
     }
-    let machine = arguments.machine.machine;
-    let delays = Delays::of(machine);
-    let told = |error: takt_front::Error| anyhow!("{}: {error}", files::input_name(&arguments.file));
+    if ending(&arguments.file).as_deref() == Some("fpcore") {
+        return fpcore::run(arguments, color, out);
+    }
+    if arguments.name.is_some() {
+        let name = files::input_name(&arguments.file);
+        return Err(Failure::Usage(format!("--name applies to .fpcore files, and {name} is none")).into());
+    }
+    let delays = Delays::of(arguments.machine.machine);
     let waiting =
         DelayedActivity::new(format!("deriving the equations of {}", files::input_name(&arguments.file)));
     let function = function(arguments, &delays)?;
     drop(waiting);
+    match present(arguments, &function, arguments.output.as_deref(), color, out)? {
+        Some(value) => files::json(&value, out),
+        None => Ok(()),
+    }
+}
+
+/// Writes a function's source and its figures. Returns the figures instead of writing them with --json.
+fn present(
+    arguments: &Model,
+    function: &Function,
+    output: Option<&Path>,
+    color: bool,
+    out: &mut Out,
+) -> Result<Option<Value>> {
+    let machine = arguments.machine.machine;
+    let told = |error: takt_front::Error| anyhow!("{}: {error}", files::input_name(&arguments.file));
     let layout = match arguments.body {
         true => {
-            Layout::body(&function, &arguments.prefix).map_err(|error| Failure::Usage(error.to_string()))?
+            Layout::body(function, &arguments.prefix).map_err(|error| Failure::Usage(error.to_string()))?
         }
-        false => Layout::program(&function, machine).map_err(told)?,
+        false => Layout::program(function, machine).map_err(told)?,
     };
-    let source = sink::source(&function, &layout);
-    if let Some(path) = &arguments.output {
+    let source = sink::source(function, &layout);
+    if let Some(path) = output {
         files::write(path, source.as_bytes())?;
     }
-    let alone = arguments.output.as_deref().is_some_and(files::is_dash);
-    let (count, chain) = (function.count(), function.depth(&delays));
+    let alone = output.is_some_and(files::is_dash);
+    let (count, chain) = (function.count(), function.depth(&Delays::of(machine)));
     if !alone && !arguments.json {
-        write_counts(&function, &count, out)?;
+        write_counts(function, &count, out)?;
     }
-    let name = arguments.output.clone().filter(|path| !files::is_dash(path));
-    let name = name.unwrap_or_else(|| PathBuf::from("model.s"));
+    let name = output.filter(|path| !files::is_dash(path)).unwrap_or(Path::new("model.s"));
     let load = Load::new(machine, color);
-    let assembled = |source: String| built(&load.finish(load.assemble(&name, source.into_bytes()))?);
+    let assembled = |source: String| built(&load.finish(load.assemble(name, source.into_bytes()))?);
     // A body takes the cycles of the equivalent program, provided that the machine can run it.
-    let built = match Layout::program(&function, machine) {
-        Ok(alone) if arguments.body => Some(assembled(sink::source(&function, &alone))?),
+    let built = match Layout::program(function, machine) {
+        Ok(alone) if arguments.body => Some(assembled(sink::source(function, &alone))?),
         Err(_) => None,
         Ok(_) => Some(assembled(source)?),
     };
     if arguments.json {
-        return files::json(&result_json(arguments, &function, &layout, &count, chain, built.as_ref()), out);
+        return Ok(Some(result_json(arguments, function, &layout, &count, chain, built.as_ref())));
     }
     if let (false, Some(SourceFigures { cycles, bound, bundles })) = (alone, built) {
         let by_itself = if arguments.body { " by itself" } else { "" };
@@ -311,7 +336,7 @@ pub(crate) fn run(arguments: &Model, color: bool, out: &mut Out) -> Result<()> {
             cycles.on(machine.name)
         )?;
     }
-    Ok(())
+    Ok(None)
 }
 
 /// Reads a file and decodes its text.
@@ -382,7 +407,7 @@ fn function(arguments: &Model, delays: &Delays) -> Result<Function> {
         }
         _ => {
             bail!(
-                "{name}: the format is determined by the extension, which must be .urdf, .xml, .csv, .json or .onnx"
+                "{name}: the format is determined by the extension, which must be .urdf, .xml, .csv, .json, .fpcore or .onnx"
             )
         }
     };

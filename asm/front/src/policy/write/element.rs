@@ -24,7 +24,7 @@ struct Leaves {
 impl Leaves {
     fn leaf<'g>(&mut self, graph: &'g Graph, text: String, heavy: bool) -> Expr<'g> {
         let index = *self.index.entry(text.clone()).or_insert_with(|| {
-            self.ports.push(Port { name: text, text: String::new() });
+            self.ports.push(Port::new(text, String::new()));
             self.heavy.push(heavy);
             self.ports.len() - 1
         });

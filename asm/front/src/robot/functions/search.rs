@@ -285,7 +285,7 @@ impl<'g> Inputs<'g> {
         for (joint, name) in robot.joints.iter().zip(names) {
             inputs.push(self.graph.input(self.ports.len()));
             let text = format!("{text} of {}, {}", joint.name, unit(joint.kind));
-            self.ports.push(Port { name: format!("{what}_{name}"), text });
+            self.ports.push(Port::new(format!("{what}_{name}"), text));
         }
         inputs
     }
@@ -305,7 +305,16 @@ fn write(
         (inputs.ports, inputs.arrays, outputs)
     };
     let Outputs { ports: outputs, arrays: output_arrays } = outputs;
-    Function { title: String::new(), notes: Vec::new(), inputs, outputs, input_arrays, output_arrays, graph }
+    Function {
+        title: String::new(),
+        notes: Vec::new(),
+        inputs,
+        outputs,
+        input_arrays,
+        output_arrays,
+        assumptions: Vec::new(),
+        graph,
+    }
 }
 
 /// Links in the units of an attempt, and gravity.
@@ -347,7 +356,7 @@ fn equations(
         let ports = robot.joints.iter().zip(&names).zip(values);
         let ports = ports.map(|((joint, name), value)| {
             let text = format!("{text} of {}, {}", joint.name, unit(joint.kind));
-            (Port { name: format!("{what}_{name}"), text }, value.id())
+            (Port::new(format!("{what}_{name}"), text), value.id())
         });
         Outputs::array(what, &[count], ports.collect())
     };
@@ -424,7 +433,7 @@ fn mass_ports(graph: &Graph, links: &[Link], matrix: &mass::Matrix<'_>) -> Outpu
     for (row, entries) in matrix.iter().enumerate() {
         for (column, entry) in entries.iter().enumerate() {
             let text = format!("inertia of {} and {}", links[row].name, links[column].name);
-            let port = Port { name: format!("M_{}_{}", row + 1, column + 1), text };
+            let port = Port::new(format!("M_{}_{}", row + 1, column + 1), text);
             elements[row * count + column] = Some(ports.len());
             elements[column * count + row] = Some(ports.len());
             ports.push((port, entry.unwrap_or_else(|| graph.constant(0.0)).id()));
@@ -439,11 +448,11 @@ fn pose_ports(rotation: &[[Expr<'_>; 3]; 3], position: &[Expr<'_>; 3]) -> Output
     for (i, row) in rotation.iter().enumerate() {
         for (j, entry) in row.iter().enumerate() {
             let text = format!("rotation, row {}, column {}", i + 1, j + 1);
-            ports.push((Port { name: format!("R_{}_{}", i + 1, j + 1), text }, entry.id()));
+            ports.push((Port::new(format!("R_{}_{}", i + 1, j + 1), text), entry.id()));
         }
     }
     for (axis, entry) in ["x", "y", "z"].iter().zip(position) {
-        let port = Port { name: format!("p_{axis}"), text: format!("position along {axis}, m") };
+        let port = Port::new(format!("p_{axis}"), format!("position along {axis}, m"));
         ports.push((port, entry.id()));
     }
     Outputs { ports, arrays: vec![Array::new("R", 0, &[3, 3]), Array::new("p", 9, &[3])] }
@@ -519,7 +528,7 @@ fn jacobian_ports<'g>(
             let unit = if row < 3 { "velocity" } else { "angular velocity" };
             let text =
                 format!("{unit} of the tip along {axis} per velocity of {}", robot.joints[column].name);
-            ports.push((Port { name: format!("J_{}_{}", row + 1, column + 1), text }, entry.id()));
+            ports.push((Port::new(format!("J_{}_{}", row + 1, column + 1), text), entry.id()));
         }
     }
     ports
