@@ -119,12 +119,13 @@ const fn check(name: &'static str, command: &'static str, seconds: Option<f64>) 
 }
 
 /// Checks outside cargo's tests.
-pub const CHECKS: [Check; 11] = [
+pub const CHECKS: [Check; 12] = [
     check("formal", "cargo evidence check formal", Some(158.0)),
     check("units", "cargo evidence check units", Some(100.0)),
     check(OPERANDS, "cargo evidence formal --units", Some(900.0)),
     check("clients", "cargo evidence check clients", None),
     check("litex", "cargo evidence check litex", None),
+    check("certificates", "cargo evidence check certificates", Some(30.0)),
     check("routed", "cargo evidence check routed", Some(300.0)),
     check("boards", "cargo evidence check boards", None),
     check("fmu-windows", "cargo evidence check fmu-windows", None),

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The command `cargo evidence check`: evidence that CI collects; each check is repeated only when its inputs change.
 
-use crate::{boards, clients, fmu_windows, formal, linuxcnc, litex, routed};
+use crate::{boards, certificates, clients, fmu_windows, formal, linuxcnc, litex, routed};
 use anyhow::{Result, ensure};
 use takt_automation::check_cache::{self, Inputs, LINUXCNC, OPERANDS};
 use takt_automation::command::install;
@@ -10,7 +10,8 @@ use takt_automation::progress;
 /// The checks to run.
 #[derive(clap::Args)]
 pub(crate) struct Arguments {
-    /// The checks by name, which then run even if they have passed with the same files; without names, formal, units, clients and litex.
+    /// The checks by name, which then run even if they have passed with the same files; without names, formal, units, clients, litex and
+    /// certificates.
     names: Vec<String>,
     /// Run all, those that take longer too: the placed and routed board, a bitstream for each family, FMUs in Wine,
     /// LinuxCNC.
@@ -28,7 +29,7 @@ struct Share {
     run: fn() -> Result<()>,
 }
 
-const SHARES: [Share; 8] = [
+const SHARES: [Share; 9] = [
     Share {
         name: "formal",
         is_short: true,
@@ -38,6 +39,12 @@ const SHARES: [Share; 8] = [
     Share { name: "units", is_short: true, inputs: Some(formal::unit_inputs), run: formal::unit_share },
     Share { name: "clients", is_short: true, inputs: Some(clients::inputs), run: clients::test },
     Share { name: "litex", is_short: true, inputs: Some(litex::inputs), run: litex::test },
+    Share {
+        name: "certificates",
+        is_short: true,
+        inputs: Some(certificates::inputs),
+        run: certificates::check,
+    },
     Share { name: "routed", is_short: false, inputs: Some(routed::inputs), run: routed::test },
     // The tools may change unnoticed, so this check never counts as passed.
     Share { name: "boards", is_short: false, inputs: None, run: boards::one_of_each },

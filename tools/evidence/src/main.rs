@@ -6,11 +6,13 @@
 mod boards;
 mod c;
 mod campaign;
+mod certificates;
 mod check;
 mod clients;
 mod documents;
 mod fmu_windows;
 mod formal;
+mod fpbench;
 mod linuxcnc;
 mod litex;
 mod mutants;
@@ -69,6 +71,9 @@ enum Task {
     /// Count the functions of C projects that `takt cc` translates, each as the step, in checkouts at the commits of tools/evidence/c.toml,
     /// and write the table into docs/c.md (clones what it lacks from GitHub).
     C(c::Arguments),
+    /// Bound the errors of FPBench's kernels beside Gappa, which runs on the same operations, and beside published figures of FPTaylor and
+    /// Daisy, and write the table into docs/accuracy.md (installs Gappa if it lacks).
+    Fpbench(fpbench::Arguments),
     /// Measure how fast emulator, assembler and lockstep are beside native code, GNU `as` and one another; print it and write
     /// docs/speed.md (a few minutes on an idle machine). The emulator is compared with the last release's, too, which is built in
     /// target/releases the first time.
@@ -103,6 +108,7 @@ fn task(task: Task) -> Result<()> {
         Task::Boards(arguments) => boards::boards(&arguments),
         Task::Netlist(arguments) => netlist::lockstep(&arguments),
         Task::Linuxcnc(arguments) => linuxcnc::linuxcnc(&arguments),
+        Task::Fpbench(arguments) => fpbench::compare(&arguments),
         Task::C(arguments) => c::count(&arguments),
         Task::Others => other_processors::compare(),
         Task::Speed(arguments) => speed::speed(arguments),
