@@ -122,7 +122,7 @@ proptest! {
 fn written(rewrites: Rewrites, make: fn(Expr<'_>, Expr<'_>, Expr<'_>) -> Id) -> String {
     let graph = Graph::new(rewrites);
     let id = make(graph.input(0), graph.input(1), graph.input(2));
-    let port = |name: &str| Port { name: name.to_owned(), text: String::new() };
+    let port = |name: &str| Port { name: name.to_owned(), text: String::new(), range: None };
     let inputs = vec![port("x"), port("y"), port("z")];
     let outputs = vec![(port("out"), id)];
     let (input_arrays, output_arrays) = (Vec::new(), Vec::new());
