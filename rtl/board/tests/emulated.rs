@@ -118,6 +118,9 @@ fn the_emulated_board_has_the_values_of_the_circuit() {
     }
 }
 
+/// Channels, trigger, and periods to a sample, samples, samples before the trigger's, base ticks.
+type Asked<'a> = (&'a [&'a str], &'a str, [u32; 4]);
+
 /// Recordings of the same run, with these triggers, on a board whose wiring has a scope for the servo.
 fn recordings<L: Line>(
     host: &mut Host<L>,
@@ -140,16 +143,16 @@ fn recordings<L: Line>(
     host.set("control", RUN | HOLD | ENABLE).expect("it starts, held");
     host.settle().expect("all cores wait");
     pass(host, 3);
-    let setups: [(&[&str], &str, u32, u32, u32, u32); 6] = [
-        (&["servo.n", "servo.error"], "", 1, 8, 0, 12),
-        (&["servo.n", "servo.error"], "servo.n >= -9", 1, 10, 4, 30),
-        (&["servo.n"], "servo.n rises -9", 1, 6, 2, 60),
-        (&["servo.error", "servo.n"], "servo.error < 3", 2, 9, 3, 60),
-        (&["servo.n"], "servo.n changes", 3, 5, 0, 40),
-        (&["servo.error", "servo.n"], "safe", 1, 9, 6, 12),
+    let setups: [Asked<'_>; 6] = [
+        (&["servo.n", "servo.error"], "", [1, 8, 0, 12]),
+        (&["servo.n", "servo.error"], "servo.n >= -9", [1, 10, 4, 30]),
+        (&["servo.n"], "servo.n rises -9", [1, 6, 2, 60]),
+        (&["servo.error", "servo.n"], "servo.error < 3", [2, 9, 3, 60]),
+        (&["servo.n"], "servo.n changes", [3, 5, 0, 40]),
+        (&["servo.error", "servo.n"], "safe", [1, 9, 6, 12]),
     ];
     setups
-        .map(|(names, trigger, every, samples, before, ticks)| {
+        .map(|(names, trigger, [every, samples, before, ticks])| {
             let names: Vec<String> = names.iter().map(|&name| name.to_owned()).collect();
             let triggers: Vec<String> =
                 (!trigger.is_empty()).then(|| trigger.to_owned()).into_iter().collect();

@@ -132,8 +132,8 @@ pub(super) fn parse(source: &str) -> Result<Vec<Node<'_>>, Error> {
     // Lists that are not closed yet, each with its line; the first is the file.
     let mut open: Vec<(usize, Vec<Node<'_>>)> = vec![(0, Vec::new())];
     let mut line = 1;
-    let mut tokens = Token::lexer(source).spanned();
-    while let Some((token, span)) = tokens.next() {
+    let tokens = Token::lexer(source).spanned();
+    for (token, span) in tokens {
         let text = &source[span];
         let data = match token {
             Ok(Token::Newline) => {
