@@ -154,7 +154,10 @@ const MISTAKES: [Mistake; 20] = [
         root.error.terms.iter_mut().for_each(|term| term.1 *= 0.5);
     }),
     ("a product counts as a sum", |c, _| first(c, "mul", true).rule = "add"),
-    ("a step refers to a later one", |c, _| first(c, "add", false).of[0] = 100_000),
+    ("a step refers to a later one", |c, _| {
+        let last = c.steps.len() - 1;
+        first(c, "add", false).of[0] = last;
+    }),
     ("a goal is missing", |_, goals| _ = goals.pop()),
     ("a goal of Gappa states something else", |_, goals| {
         let (_, text) = goals.last_mut().expect("a goal");
