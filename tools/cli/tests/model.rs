@@ -319,7 +319,7 @@ fn mistakes_have_one_message() {
         (
             "model robot.txt -f gravity",
             1,
-            "robot.txt: the format is determined by the extension, which must be .urdf, .xml, .csv, .json or .onnx",
+            "robot.txt: the format is determined by the extension, which must be .urdf, .xml, .csv, .json, .fpcore or .onnx",
         ),
         ("model none.urdf -f gravity", 1, "cannot open none.urdf"),
         (
