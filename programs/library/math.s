@@ -268,6 +268,30 @@
         sel     d, null, x, s           ; keeps the sign of zero
 .endm
 
+; ---- Angles -----------------------------------------------------------------------------------------------------------------
+
+; x = n·π/2 + r - rl, n in the lowest bits of t; r is NaN where |x| > 2π·64.
+.macro math.reduce r:float, rl:float, t:bits, x:float
+.reg    a:int in:int xs:bits q n y1 y2 v w g0 u g1 l0
+        iand    a, x, 0x7fffffff
+        ilt     in, a, 0x43c90fdb       ; beyond 2π·64 (and for a NaN) the operand becomes an infinity, the rest is invalid
+        sel     xs, in, x, inf
+        fmul    q, xs, 2/pi
+        fadd    t, q, math.shift
+        fsub    n, t, math.shift
+        fmul    w, n, math.pi2a         ; exact
+        fsub    y1, xs, w               ; exact
+        fmul    v, n, math.pi2b         ; exact
+        fsub    y2, y1, v
+        fsub    g0, y1, y2
+        fsub    g0, g0, v               ; what y2 has lost
+        fmul    u, n, math.pi2c
+        fsub    r, y2, u
+        fsub    g1, y2, r
+        fsub    l0, u, g1
+        fsub    rl, l0, g0
+.endm
+
 ; ---- Tangent -------------------------------------------------------------------------------------------------------------------
 
 ; d = sin x / cos x, |x| ≤ 2π·64, at most 2.16531 ulp.
@@ -282,26 +306,10 @@
 ;
 ; 2·tan(r/2) = w, then w/(1 - w²/4) or, beside an odd multiple of π/2, its inverse's opposite; all in two words each.
 .macro tan d:float, x:float
-.reg    a:int in:int xs:bits t:bits n odd:int y1 y2 w1 v u g0 g1 r nl z z2 p0 p1 p s0 s1 s2 q wh wl:bits g wz:bits wq
+.reg    t:bits odd:int r nl z z2 p0 p1 p s0 s1 s2 q wh wl:bits g wz:bits wq
 .reg    w3 dw w2 w2h k2 V:bits vl v1 mu:bits ml:bits nh:bits nlo:bits dh:bits dl:bits inv m ta:bits zt:bits vt k e k1
-        iand    a, x, 0x7fffffff
-        ilt     in, a, 0x43c90fdb       ; beyond 2π·64 (and for a NaN) the operand becomes an infinity, the rest is invalid
-        sel     xs, in, x, inf
-        fmul    t, xs, 2/pi
-        fadd    t, t, math.shift
-        fsub    n, t, math.shift
+        math.reduce r, nl, t, x
         iand    odd, t, 1
-        fmul    w1, n, math.pi2a        ; exact
-        fsub    y1, xs, w1              ; exact
-        fmul    v, n, math.pi2b         ; exact
-        fsub    y2, y1, v
-        fsub    g0, y1, y2
-        fsub    g0, g0, v               ; what y2 has lost
-        fmul    u, n, math.pi2c
-        fsub    r, y2, u
-        fsub    g1, y2, r
-        fsub    nl, u, g1
-        fsub    nl, nl, g0              ; the opposite of what r has lost: +0 at -0
         fmul    z, r, r
         fmul    z2, z, z
         fmul    s0, z, 0x1.111e7ap-7
@@ -354,14 +362,10 @@
 
 ; ---- Arcsine and arctangent ----------------------------------------------------------------------------------------------------
 
-; d = arcsine of x, at most 0.72224 ulp.
-.macro asin d:float, x:float
-.reg    h l l1 q u hx:bits lx:bits base:bits corr:bits a0:bits a:bits big:int sg:bits y y2 zb zs z S S0:bits Sh:bits
-.reg    dd den sl s:bits z2 p0 p1 p s0 s1 s2 s3
-        fabs    a0, x
-        fmin    a, a0, 2.0              ; what overflows nowhere, and has no arcsine either
+; Of a = |x|, at most 2: `big` if it is above 1/2; there S = √(2 - 2a), in two words Sh + sl, and p = P(z) of z = (1 - a)/2; below, z = a².
+.macro math.arc big:int, S:bits, Sh:bits, sl:bits, p:float, a:bits
+.reg    y y2 zb zs z dd den z2 p0 p1 s0 s1 s2 s3
         ilt     big, 0x3f000000, a
-        iand    sg, x, math.sign
         fsub    y, 1.0, a
         fadd    y2, y, y
         fmul    zb, y, 0.5
@@ -374,8 +378,6 @@
         fadd    den, S, Sh
         fmax    den, den, 0x1p-30       ; not zero over zero at 1
         fdiv    sl, dd, den
-        ixor    S0, S, sg
-        sel     s, big, S0, x
         fmul    z2, z, z
         fmul    s0, z, 0x1.330204p-4
         fadd    p0, s0, 0x1.5555c8p-3
@@ -386,6 +388,17 @@
         fmul    s3, z2, p1
         fadd    p0, p0, s3
         fmul    p, p0, z
+.endm
+
+; d = arcsine of x, at most 0.72224 ulp.
+.macro asin d:float, x:float
+.reg    h l l1 q u hx:bits lx:bits base:bits corr:bits a0:bits a:bits big:int sg:bits S:bits S0:bits Sh:bits sl:bits s:bits p
+        fabs    a0, x
+        fmin    a, a0, 2.0              ; what overflows nowhere, and has no arcsine either
+        iand    sg, x, math.sign
+        math.arc big, S, Sh, sl, p, a
+        ixor    S0, S, sg
+        sel     s, big, S0, x
         ; ±(π/2 - S - …), or x + x³·P(x²)
         fsub    h, math.pi2h, Sh
         fsub    l, math.pi2h, h
@@ -401,17 +414,9 @@
         fadd    d, base, corr
 .endm
 
-; The arctangent where the machine has none: atan(c) + atan((x - c)/(1 + c·x)).
-.macro math.atan d:float, x:float
-.reg    a:bits sg:bits A b1:int b2:int b3:int b4:int c:bits c1:bits c2:bits h1:bits h2:bits h3:bits hi:bits num num4
-.reg    n0:bits ca den d0:bits t z z2 e0 e1 e2 e3 e4 p1 p2 p Q u
-        fabs    a, x
-        iand    sg, x, math.sign
-        fmin    A, a, 0x1p30
-        ilt     b1, bits(7/16), a
-        ilt     b2, bits(11/16), a
-        ilt     b3, bits(19/16), a
-        ilt     b4, bits(39/16), a
+; c and its arctangent hi for a quotient above 7/16 (b1), 11/16 (b2), 19/16 (b3), 39/16 (b4, where hi is π/2).
+.macro math.tangent c:bits, hi:bits, b1:int, b2:int, b3:int, b4:int
+.reg    c1:bits c2:bits h1:bits h2:bits h3:bits
         sel     c1, b1, 0x1.ffdf30p-2, zero
         sel     c2, b3, 0x1.7fb424p0, 0x1.ff2f5cp-1
         sel     c, b2, c2, c1
@@ -419,16 +424,11 @@
         sel     h2, b3, 0x1.f70208p-1, 0x1.91b74ep-1
         sel     h3, b2, h2, h1
         sel     hi, b4, math.pi2h, h3
-        ixor    hi, hi, sg
-        fsub    num, A, c
-        fmul    num4, A, math.pi2l
-        fsub    num4, num4, 1.0
-        sel     n0, b4, num4, num
-        ixor    n0, n0, sg
-        fmul    ca, A, c
-        fadd    den, ca, 1.0
-        sel     d0, b4, A, den
-        fdiv    t, n0, d0
+.endm
+
+; u = arctangent of t, |t| ≤ 7/16.
+.macro math.atan_tail u:bits, t:float
+.reg    z z2 e0 e1 e2 e3 e4 p1 p2 p Q
         fmul    z, t, t
         fmul    z2, z, z
         fmul    e0, z, -0x1.555542p-2
@@ -442,6 +442,30 @@
         fadd    p, e0, e4               ; +0 at 0
         fmul    Q, t, p
         fadd    u, t, Q
+.endm
+
+; The arctangent where the machine has none: atan(c) + atan((x - c)/(1 + c·x)).
+.macro math.atan d:float, x:float
+.reg    a:bits sg:bits A b1:int b2:int b3:int b4:int c:bits hi:bits num num4 n0:bits ca den d0:bits t u
+        fabs    a, x
+        iand    sg, x, math.sign
+        fmin    A, a, 0x1p30
+        ilt     b1, bits(7/16), a
+        ilt     b2, bits(11/16), a
+        ilt     b3, bits(19/16), a
+        ilt     b4, bits(39/16), a
+        math.tangent c, hi, b1, b2, b3, b4
+        ixor    hi, hi, sg
+        fsub    num, A, c
+        fmul    num4, A, math.pi2l
+        fsub    num4, num4, 1.0
+        sel     n0, b4, num4, num
+        ixor    n0, n0, sg
+        fmul    ca, A, c
+        fadd    den, ca, 1.0
+        sel     d0, b4, A, den
+        fdiv    t, n0, d0
+        math.atan_tail u, t
         fadd    d, hi, u
 .endm
 
@@ -457,28 +481,6 @@
 ; ---- Instructions of units that a machine may lack: where it has the unit, equations use the instruction ---------------------
 
 .if !has.fsin
-; x = n·π/2 + r - rl, n in the lowest bits of t; r is NaN where |x| > 2π·64.
-.macro math.reduce r:float, rl:float, t:bits, x:float
-.reg    a:int in:int xs:bits q n y1 y2 v w g0 u g1 l0
-        iand    a, x, 0x7fffffff
-        ilt     in, a, 0x43c90fdb       ; as in `tan`
-        sel     xs, in, x, inf
-        fmul    q, xs, 2/pi
-        fadd    t, q, math.shift
-        fsub    n, t, math.shift
-        fmul    w, n, math.pi2a         ; exact
-        fsub    y1, xs, w               ; exact
-        fmul    v, n, math.pi2b         ; exact
-        fsub    y2, y1, v
-        fsub    g0, y1, y2
-        fsub    g0, g0, v               ; what y2 has lost
-        fmul    u, n, math.pi2c
-        fsub    r, y2, u
-        fsub    g1, y2, r
-        fsub    l0, u, g1
-        fsub    rl, l0, g0
-.endm
-
 ; d = sine of k quarter turns and r - rl, by both functions of the rest: base - corr.
 .macro math.turned d:float, r:float, rl:float, k:int
 .reg    z z2 hz h e f s0 s1 s2 sp sq c0 c1 c2 cp cq q m n odd:int base:bits corr:bits sum:bits sg:bits
@@ -531,28 +533,16 @@
 .if !has.facos
 ; d = arccosine of x, at most 0.69925 ulp.
 .macro acos d:float, x:float
-.reg    a0:bits a:bits big:int sg:bits neg:int not:int y y2 zb zs z S Sh:bits dd den sl:bits bS:bits sS:bits lS:bits b s e
-.reg    c cl c0:bits l0:bits z2 p0 p1 p s0 s1 s2 s3 h l l1 q u
+.reg    a0:bits a1:bits a:bits big:int sg:bits neg:int not:int S:bits Sh:bits sl:bits bS:bits sS:bits lS:bits b s e
+.reg    c cl c0:bits l0:bits p h l l1 q u
         fabs    a0, x
-        fmin    a, a0, 2.0              ; what overflows nowhere, and has no arccosine either
+        fmin    a1, a0, 2.0             ; what overflows nowhere, and has no arccosine either
         ilt     not, math.inf, a0
-        sel     a, not, 2.0, a          ; a NaN
-        ilt     big, 0x3f000000, a
+        sel     a, not, 2.0, a1         ; a NaN
         iand    sg, x, math.sign
         ilt     neg, sg, 0
         ixor    sg, sg, math.sign
-        fsub    y, 1.0, a
-        fadd    y2, y, y
-        fmul    zb, y, 0.5
-        fmul    zs, a, a
-        sel     z, big, zb, zs
-        fsqrt   S, y2
-        iand    Sh, S, math.top
-        fmul    dd, Sh, Sh
-        fsub    dd, y2, dd
-        fadd    den, S, Sh
-        fmax    den, den, 0x1p-30       ; not zero over zero at 1
-        fdiv    sl, dd, den
+        math.arc big, S, Sh, sl, p, a
         ixor    bS, Sh, sg
         ixor    sS, S, sg
         ixor    lS, sl, sg
@@ -563,16 +553,6 @@
         sel     l0, neg, math.pil, zero
         sel     c, big, c0, math.pi2h
         sel     cl, big, l0, math.pi2l
-        fmul    z2, z, z                ; as in `asin`
-        fmul    s0, z, 0x1.330204p-4
-        fadd    p0, s0, 0x1.5555c8p-3
-        fmul    s1, z, 0x1.8c3e54p-6
-        fadd    p1, s1, 0x1.747bb8p-5
-        fmul    s2, z2, 0x1.595c58p-5
-        fadd    p1, p1, s2
-        fmul    s3, z2, p1
-        fadd    p0, p0, s3
-        fmul    p, p0, z
         ; π/2 - x - x³·P(x²), or 0 or π, and ±(S + …)
         fsub    h, c, b
         fsub    l, c, h
@@ -589,9 +569,8 @@
 ; d = angle of the point (x, y), at most 1.52 ulp: the arctangent of |y|/|x| as in `atan`, in the quadrant of both signs.
 .macro atan2 d:float, y:float, x:float
 .reg    ay:bits ax:bits ny:int nx:int not:int m:bits iy:int ix:int at:int oy:bits ox:bits fy:bits fx:bits M:bits large:int
-.reg    small:int k1:bits k:bits num:bits den:bits t1 t2 t3 t4 b1:int b2:int b3:int b4:int c:bits c1:bits c2:bits h1:bits
-.reg    h2:bits h3:bits hi:bits nc n cn dd n4 nn:bits d0:bits t z z2 e0 e1 e2 e3 e4 p1 p2 p Q u:bits side:bits left:int hx P:bits
-.reg    PL:bits H L ux r:bits sy:bits
+.reg    small:int k1:bits k:bits num:bits den:bits t1 t2 t3 t4 b1:int b2:int b3:int b4:int c:bits hi:bits nc n cn dd n4
+.reg    nn:bits d0:bits t u:bits side:bits left:int hx P:bits PL:bits H L ux r:bits sy:bits
         fabs    ay, y
         fabs    ax, x
         ilt     ny, math.inf, ay
@@ -622,13 +601,7 @@
         flt     b2, t2, num
         flt     b3, t3, num
         flt     b4, t4, num
-        sel     c1, b1, 0x1.ffdf30p-2, zero
-        sel     c2, b3, 0x1.7fb424p0, 0x1.ff2f5cp-1
-        sel     c, b2, c2, c1
-        sel     h1, b1, 0x1.daac30p-2, zero
-        sel     h2, b3, 0x1.f70208p-1, 0x1.91b74ep-1
-        sel     h3, b2, h2, h1
-        sel     hi, b4, math.pi2h, h3
+        math.tangent c, hi, b1, b2, b3, b4
         fmul    nc, den, c
         fsub    n, num, nc
         fmul    cn, num, c
@@ -640,19 +613,7 @@
         sel     nn, not, zero, nn
         sel     d0, not, zero, d0       ; NaN and invalid
         fdiv    t, nn, d0
-        fmul    z, t, t
-        fmul    z2, z, z
-        fmul    e0, z, -0x1.555542p-2
-        fmul    e1, z, -0x1.236f16p-3
-        fadd    p1, e1, 0x1.998df8p-3
-        fmul    e2, z, -0x1.dd3c64p-5
-        fadd    p2, e2, 0x1.add6b2p-4
-        fmul    e3, z2, p2
-        fadd    p1, p1, e3
-        fmul    e4, z2, p1
-        fadd    p, e0, e4
-        fmul    Q, t, p
-        fadd    u, t, Q
+        math.atan_tail u, t
         ; on the left, π less the angle, in two words
         iand    side, x, math.sign
         ilt     left, side, 0
