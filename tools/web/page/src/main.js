@@ -93,6 +93,11 @@ async function codeInStep() {
   el("code").classList.toggle("old", Boolean(state.coded) && state.coded !== state.program);
   const { program } = state, isHere = () => state.tab === "code" && !state.stale && program === state.program;
   if (!isHere() || !program?.assembled) return;
+  if (state.coded === program) {
+    code.colour();
+    code.mark(editor.line);
+    return;
+  }
   const { Code } = await import("./code.js");
   code ??= new Code(el("code"), { reveal, paint: (hues) => editor.paint(hues) });
   const bundles = await machine.call("bundles");
