@@ -3,14 +3,14 @@
 //!
 //! `cargo xtask test` installs them; TAKT_VENV names another environment that has them.
 
+use crate::common::assembled;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use takt_asm::{MemoryLoader, Options, Search};
 use takt_emu::{Emulator, Number};
 use takt_front::expressions::{FORMAT, OPERATIONS, REFUSED, read};
 use takt_front::graph::{Delays, Function, Rewrites};
-use takt_front::sink::{self, Layout};
+use takt_front::sink;
 
 fn written() -> PathBuf {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
@@ -90,12 +90,7 @@ impl RunningProgram {
         if !sink::constants(function).is_empty() {
             return None;
         }
-        let layout = Layout::program(function, &takt_isa::T3).expect("it fits");
-        let text = sink::source(function, &layout);
-        let loader = Search::new(MemoryLoader::default()).library(takt_programs::LIBRARY);
-        let options = Options { machine: &takt_isa::T3, effort: 0, ..Options::default() };
-        let assembled = takt_asm::assemble_bytes("f.s", text.clone().into_bytes(), &loader, &options);
-        let assembled = assembled.unwrap_or_else(|errors| panic!("{text}{}", errors.render(false)));
+        let assembled = assembled(function);
         let inputs = assembled.program.inputs.iter().map(|port| port.name.clone()).collect();
         Some(RunningProgram(Emulator::new(&assembled.program).expect("it fits"), inputs))
     }

@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! FPCore: the kernels of FPBench beside an evaluator of another maker, preconditions, and files with mistakes.
 
+use crate::common;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use takt_analysis::accuracy::{Reals, enclose_reals};
-use takt_asm::{MemoryLoader, Options, Search};
 use takt_emu::testing::Random;
 use takt_emu::{Emulator, Number};
 use takt_front::fpcore::{Core, MAX_DEPTH, read};
 use takt_front::graph::{Bound, Delays, Function, Node, Rewrites};
-use takt_front::sink::{self, Layout};
 use takt_isa::Program;
 
 fn kernels() -> PathBuf {
@@ -17,13 +16,8 @@ fn kernels() -> PathBuf {
 }
 
 fn assembled(function: &Function) -> Program {
-    let layout = Layout::program(function, &takt_isa::T3).expect("it fits");
-    let text = sink::source(function, &layout);
-    let loader = Search::new(MemoryLoader::default()).library(takt_programs::LIBRARY);
-    let options = Options { machine: &takt_isa::T3, effort: 0, ..Options::default() };
-    let assembled = takt_asm::assemble_bytes("f.s", text.clone().into_bytes(), &loader, &options);
-    let assembled = assembled.unwrap_or_else(|errors| panic!("{text}{}", errors.render(false)));
-    assert!(assembled.warnings.is_empty(), "{text}{}", assembled.warnings.render(false));
+    let assembled = common::assembled(function);
+    assert!(assembled.warnings.is_empty(), "{}", assembled.warnings.render(false));
     assembled.program
 }
 

@@ -122,20 +122,9 @@ proptest! {
 fn written(rewrites: Rewrites, make: fn(Expr<'_>, Expr<'_>, Expr<'_>) -> Id) -> String {
     let graph = Graph::new(rewrites);
     let id = make(graph.input(0), graph.input(1), graph.input(2));
-    let port = |name: &str| Port { name: name.to_owned(), text: String::new(), range: None };
+    let port = |name: &str| Port::new(name.to_owned(), String::new());
     let inputs = vec![port("x"), port("y"), port("z")];
-    let outputs = vec![(port("out"), id)];
-    let (input_arrays, output_arrays) = (Vec::new(), Vec::new());
-    let function = Function {
-        title: String::new(),
-        notes: Vec::new(),
-        inputs,
-        outputs,
-        input_arrays,
-        output_arrays,
-        assumptions: Vec::new(),
-        graph,
-    };
+    let function = Function::new(graph, inputs, vec![(port("out"), id)]);
     let function = function.optimised(&Delays::of(&takt_isa::F3));
     let layout = Layout::program(&function, &takt_isa::F3).expect("ports");
     let source = takt_front::sink::source(&function, &layout);

@@ -174,16 +174,7 @@ pub fn read(source: &str, rewrites: Rewrites) -> Result<Function, Error> {
     unique(ports.iter().chain(named.iter().map(|(port, _)| port)))?;
     let from = if file.source.is_empty() { String::new() } else { format!(", from {}", file.source) };
     let title = format!("{}{from}", file.name);
-    Ok(Function {
-        title,
-        notes,
-        inputs: ports,
-        outputs: named,
-        input_arrays,
-        output_arrays,
-        assumptions: Vec::new(),
-        graph,
-    })
+    Ok(Function { title, notes, input_arrays, output_arrays, ..Function::new(graph, ports, named) })
 }
 
 fn unique<'a>(ports: impl Iterator<Item = &'a Port>) -> Result<(), Error> {

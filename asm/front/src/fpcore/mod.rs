@@ -28,7 +28,7 @@ pub const MAX_ARGUMENTS: usize = 4096;
 
 /// A core of a file.
 pub struct Core {
-    /// Its `:name`, or the symbol by which other cores call it, or its place in the file.
+    /// The core's `:name`, or the symbol by which other cores call it, or its place in the file.
     pub name: String,
     /// Line on which it begins, from 1.
     pub line: usize,
@@ -184,8 +184,8 @@ impl<'a, 't> Definition<'a, 't> {
         let input_arrays = input_arrays.collect();
         let output_arrays = vec![Array::new(&output.name, 0, &[])];
         let title = format!("{name}, from FPCore");
-        let outputs = vec![(output, result)];
-        Ok(Function { title, notes, inputs, outputs, input_arrays, output_arrays, assumptions, graph })
+        let function = Function::new(graph, inputs, vec![(output, result)]);
+        Ok(Function { title, notes, input_arrays, output_arrays, assumptions, ..function })
     }
 }
 

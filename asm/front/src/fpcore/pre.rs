@@ -9,7 +9,7 @@ use crate::graph::{Assumption, Binary, Bound, Expr, Node, Port, Unary};
 use crate::sink::expression;
 use std::rc::Rc;
 
-/// What a precondition says.
+/// Ranges and assumptions that a precondition states.
 #[derive(Default)]
 pub(super) struct Precondition {
     /// Range of each argument, in the core's order.

@@ -56,27 +56,26 @@ impl<'g> Truth<'g> {
         }
     }
 
-    pub(super) fn all(mut of: Vec<Rc<Truth<'g>>>) -> Rc<Truth<'g>> {
-        if let Some(known) = of.iter().find(|truth| matches!(***truth, Truth::Known(false))) {
-            return Rc::clone(known);
-        }
-        of.retain(|truth| !matches!(**truth, Truth::Known(_)));
-        match of.len() {
-            0 => Rc::new(Truth::Known(true)),
-            1 => of.remove(0),
-            _ => Rc::new(Truth::All(List::new(of))),
-        }
+    /// Conditions that must all hold.
+    pub(super) fn all(of: Vec<Rc<Truth<'g>>>) -> Rc<Truth<'g>> {
+        Truth::joined(of, false, Truth::All)
     }
 
-    pub(super) fn any(mut of: Vec<Rc<Truth<'g>>>) -> Rc<Truth<'g>> {
-        if let Some(known) = of.iter().find(|truth| matches!(***truth, Truth::Known(true))) {
-            return Rc::clone(known);
+    /// Conditions of which one must hold.
+    pub(super) fn any(of: Vec<Rc<Truth<'g>>>) -> Rc<Truth<'g>> {
+        Truth::joined(of, true, Truth::Any)
+    }
+
+    /// Conditions without those that are known: a known one that is `decisive` decides about all.
+    fn joined(mut of: Vec<Rc<Truth<'g>>>, decisive: bool, join: fn(List<'g>) -> Truth<'g>) -> Rc<Truth<'g>> {
+        if of.iter().any(|truth| matches!(**truth, Truth::Known(known) if known == decisive)) {
+            return Rc::new(Truth::Known(decisive));
         }
         of.retain(|truth| !matches!(**truth, Truth::Known(_)));
         match of.len() {
-            0 => Rc::new(Truth::Known(false)),
+            0 => Rc::new(Truth::Known(!decisive)),
             1 => of.remove(0),
-            _ => Rc::new(Truth::Any(List::new(of))),
+            _ => Rc::new(join(List::new(of))),
         }
     }
 

@@ -89,6 +89,20 @@ pub struct Function {
 }
 
 impl Function {
+    /// Function without title, notes, arrays and assumptions.
+    pub fn new(graph: Graph, inputs: Vec<Port>, outputs: Vec<(Port, Id)>) -> Function {
+        Function {
+            title: String::new(),
+            notes: Vec::new(),
+            inputs,
+            outputs,
+            input_arrays: Vec::new(),
+            output_arrays: Vec::new(),
+            assumptions: Vec::new(),
+            graph,
+        }
+    }
+
     /// Nodes of the outputs, in order.
     pub fn nodes(&self) -> Vec<Id> {
         self.outputs.iter().map(|(_, id)| *id).collect()

@@ -14,7 +14,10 @@ use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use takt_asm::{AssembledProgram, MemoryLoader, Options, Search};
+use takt_front::graph::Function;
 use takt_front::robot::{Robot, urdf};
+use takt_front::sink::{self, Layout};
 
 /// Process of a reference tool, which answers on its standard output.
 pub(crate) struct Reference {
@@ -63,6 +66,16 @@ impl Drop for Reference {
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
+}
+
+/// Assembles a function's source for t3, without a search for its schedule.
+pub(crate) fn assembled(function: &Function) -> AssembledProgram {
+    let layout = Layout::program(function, &takt_isa::T3).expect("it fits");
+    let text = sink::source(function, &layout);
+    let loader = Search::new(MemoryLoader::default()).library(takt_programs::LIBRARY);
+    let options = Options { machine: &takt_isa::T3, effort: 0, ..Options::default() };
+    let assembled = takt_asm::assemble_bytes("f.s", text.clone().into_bytes(), &loader, &options);
+    assembled.unwrap_or_else(|errors| panic!("{text}{}", errors.render(false)))
 }
 
 pub(crate) fn numbers(value: &Value) -> Vec<f64> {

@@ -305,16 +305,7 @@ fn write(
         (inputs.ports, inputs.arrays, outputs)
     };
     let Outputs { ports: outputs, arrays: output_arrays } = outputs;
-    Function {
-        title: String::new(),
-        notes: Vec::new(),
-        inputs,
-        outputs,
-        input_arrays,
-        output_arrays,
-        assumptions: Vec::new(),
-        graph,
-    }
+    Function { input_arrays, output_arrays, ..Function::new(graph, inputs, outputs) }
 }
 
 /// Links in the units of an attempt, and gravity.
