@@ -11,7 +11,7 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use takt_analysis::accuracy::{Reals, enclose_in_boxes};
+use takt_analysis::accuracy::{Reals, enclose_in_boxes, in_gappa};
 use takt_asm::{MemoryLoader, Options, Search};
 use takt_automation::command::{apt_install, root, works};
 use takt_front::fpcore::read;
@@ -141,14 +141,6 @@ fn row(name: String, function: &Function, figures: &Figures) -> Result<Row> {
     })
 }
 
-/// A binary64 as Gappa spells it, exactly.
-fn exact(value: f64) -> String {
-    let (bits, sign) = (value.abs().to_bits(), if value < 0.0 { "-" } else { "" });
-    let (exponent, fraction) = ((bits >> 52) as i32, bits & ((1 << 52) - 1));
-    let digits = if exponent == 0 { fraction } else { fraction | 1 << 52 };
-    format!("{sign}{digits}b{}", exponent.max(1) - 1075)
-}
-
 /// Text of an operation, given the choice between an operand's names in the run and in exact arithmetic.
 type Expression = dyn Fn(&dyn Fn(&(String, String)) -> String) -> String;
 
@@ -164,7 +156,7 @@ fn script(function: &Function) -> Option<(String, Vec<String>)> {
         let of = |id| names.get(&id).cloned().unwrap_or_else(|| (String::new(), String::new()));
         let expression: Box<Expression> = match graph.node_at(index) {
             Node::Constant(bits) => {
-                let value = exact(f64::from(f64::from_bits(bits) as f32));
+                let value = in_gappa(f64::from(f64::from_bits(bits) as f32));
                 names.insert(id, (format!("({value})"), format!("({value})")));
                 continue;
             }
@@ -172,7 +164,7 @@ fn script(function: &Function) -> Option<(String, Vec<String>)> {
                 let (low, high) = function.inputs[input as usize].range?;
                 let name = format!("x{input}");
                 let _ = writeln!(text, "{name} = rnd({name}_);");
-                given.push(format!("{name} in [{}, {}]", exact(low), exact(high)));
+                given.push(format!("{name} in [{}, {}]", in_gappa(low), in_gappa(high)));
                 inputs.push(name.clone());
                 names.insert(id, (name.clone(), name));
                 continue;

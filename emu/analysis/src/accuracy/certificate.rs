@@ -23,7 +23,7 @@ const CHECK: &str = include_str!("check.py");
 /// Derivation of the bounds of a period's outputs.
 #[derive(Serialize, Debug, PartialEq)]
 pub struct Certificate {
-    /// What the source promises of inputs and states: the bounds hold for runs that keep it.
+    /// Promised ranges of inputs and states: the bounds hold for runs that keep them.
     pub promises: Vec<Promise>,
     /// Operations in order; each refers to earlier ones by their places.
     pub steps: Vec<Step>,
@@ -198,8 +198,8 @@ impl Certificate {
     }
 }
 
-/// A binary64 as Gappa spells it: an integer times a power of two that is not positive.
-fn exact(value: f64) -> String {
+/// A binary64 as Gappa spells it: an integer times a power of two that is not positive, exactly.
+pub fn exact(value: f64) -> String {
     let (bits, sign) = (value.abs().to_bits(), if value < 0.0 { "-" } else { "" });
     let exponent = (bits >> 52) as i32;
     let fraction = bits & ((1 << 52) - 1);

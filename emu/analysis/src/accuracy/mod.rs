@@ -34,7 +34,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use takt_isa::{BundleAddress, Flow, Instruction, Program, Register};
 
 pub use boxes::enclose_in_boxes;
-pub use certificate::{Certificate, Form, Kept, Open, Promise, Proved, Rounding, Step};
+pub use certificate::{Certificate, Form, Kept, Open, Promise, Proved, Rounding, Step, exact as in_gappa};
 pub use enclose::{MAX_BUNDLES, MAX_UNROLLED, Reals, certify, enclose, enclose_reals, enclose_within};
 pub use enclosure::{
     Converging, Enclosure, Hazard, Moment, OutputBound, OutputPlace, Relied, StateRange, UnprovedRange,

@@ -328,7 +328,7 @@ fn waist(node: &Rc<Node>) -> Option<Rc<Node>> {
 fn is_constant(node: &Rc<Node>) -> bool {
     match &node.value {
         Value::Patterns(patterns) => patterns.len() == 1,
-        // One that stands for a real number.
+        // A constant that stands for a real number.
         Value::Float(number) => node.made.is_none() && number.actual.low == number.actual.high,
         _ => false,
     }
