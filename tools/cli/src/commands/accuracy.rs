@@ -106,6 +106,10 @@ fn bounding(program: &Program) -> DelayedActivity {
 
 /// Prints proved error bounds of each core, from the ranges in its source.
 fn bounded(arguments: &Accuracy, application: &Application, out: &mut Out) -> Result<()> {
+    if arguments.certificate.is_some() && application.system().is_some() {
+        let text = "--certificate applies to a program; name the source of one core";
+        return Err(Failure::Usage(text.to_owned()).into());
+    }
     let mut safe = true;
     let mut cores = Vec::new();
     for (core, loaded) in application.programs().iter().enumerate() {
@@ -137,16 +141,8 @@ fn bounded(arguments: &Accuracy, application: &Application, out: &mut Out) -> Re
     if arguments.json {
         files::json(&whole_json(arguments, application, cores), out)?;
     }
-    if let Some(folder) = &arguments.certificate {
-        match application {
-            Application::Program(loaded) => certificate::write(&loaded.program, folder, out)?,
-            Application::System(_) => {
-                return Err(Failure::Usage(
-                    "--certificate applies to a program; name the source of one core".to_owned(),
-                )
-                .into());
-            }
-        }
+    if let (Some(folder), Application::Program(loaded)) = (&arguments.certificate, application) {
+        certificate::write(&loaded.program, folder, out)?;
     }
     if safe { Ok(()) } else { Err(Failure::Reported.into()) }
 }
