@@ -262,7 +262,7 @@ impl LoadedProgram {
 fn least_of_path(assembled: &AssembledProgram) -> Option<(BundleAddress, Cycle)> {
     let program = &assembled.program;
     let mut emulator = Emulator::new(program).ok()?;
-    // What runs once, a first period that may be another section's, and the second period.
+    // The section from reset, a first period that may be another section's, and the second period.
     let mut issues = Vec::new();
     for _ in 0..3 {
         prepare(&mut emulator, None, 0).ok()?;

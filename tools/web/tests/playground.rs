@@ -88,7 +88,7 @@ fn parameters_change_during_a_run() {
         let named = shown.as_array().and_then(|all| all.iter().find(|one| one["name"] == "kp"));
         named.expect("the debugger shows parameters")["value"].clone()
     };
-    // So many periods have passed: the inputs are those of the next.
+    // After `goto period n`, n periods have passed, and the inputs are those of the next.
     assert_eq!((at(&mut playground, 29), at(&mut playground, 30)), (json!("0.3"), json!("2.0")));
     assert_eq!(at(&mut playground, 29), json!("0.3"), "and back");
     // So does the test bench: index of the parameter among the inputs, and 2.0.
@@ -156,7 +156,7 @@ fn every_example_assembles_and_runs() {
         match example["name"].as_str() {
             Some("statespace.s") => assert_eq!(least, [122 + 5 * 47 + 28 + 12 * 6]),
             Some("pi.s") => assert_eq!(least.last(), Some(&38)),
-            // Its first period is a section of its own.
+            // The first period of tracking.s is a section of its own.
             Some("tracking.s") => assert_eq!(least, [108]),
             _ => {}
         }

@@ -367,7 +367,7 @@ impl EmulatedScope {
     }
 }
 
-/// Offset of an address among those of the scope.
+/// Offset of an address from the scope's first one; `None` outside the scope's addresses.
 pub(super) fn offset(at: u16) -> Option<u16> {
     at.checked_sub(SCOPE).filter(|offset| *offset < CHANNELS + CHANNEL * MOST_CHANNELS as u16)
 }
