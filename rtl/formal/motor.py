@@ -14,8 +14,8 @@ BOARD = FORMAL.parent / "board" / "verilog"
 MODULES = ["takt_pwm_phase", "takt_pwm3", "takt_trip", "takt_filter"]
 # Half a carrier's period, dead time, least time; mutants are tried with the last.
 PHASES = [(1250, 0, 0), (60, 1, 7), (65535, 1023, 1023), (1250, 25, 50)]
-# Filter, dead time, level while tripped; the same.
-TRIPS = [(0, 2, 1), (1, 0, 0), (5, 3, 2)]
+# Filter, dead time, level while tripped, direct or not; mutants are tried with the last two.
+TRIPS = [(0, 2, 1, 0), (1, 0, 0, 0), (0, 0, 2, 1), (5, 3, 2, 0), (0, 3, 1, 1)]
 # Strengthens the induction: a filter's count is below its end.
 COUNTS = """
     reg f_begun = 1'b0;
@@ -31,7 +31,7 @@ PHASE_MUTANTS = [
     ("takt_pwm_phase", "target != switches & ~stays", "target != switches & since >= STAYS"),
     ("takt_pwm_phase", "runs ? {pulse, ~pulse} : rest", "{pulse, ~pulse}"),
     ("takt_pwm_phase", "{pulse, ~pulse} :", "{pulse, ~was} :"),
-    ("takt_pwm_phase", "since    <= 10'd1;\n        end\n        if (rst)", "since    <= 10'd2;\n        end\n        if (rst)"),
+    ("takt_pwm_phase", "target : 2'b00;\n                since    <= 10'd1;", "target : 2'b00;\n                since    <= 10'd2;"),
     ("takt_pwm_phase", "(first | was) & place < falls", "place < falls"),
     ("takt_pwm_phase", "(~first & was)", "1'b0"),
 ]
@@ -43,6 +43,10 @@ TRIP_MUTANTS = [
     ("takt_pwm3", "enable & ~trip", "enable"),
     ("takt_pwm3", "trip ? BREAK : REST", "REST"),
     ("takt_pwm3", "high ^ {3{INVERT_HIGH != 0}}", "high"),
+    ("takt_trip", "at_once & ~held", "at_once"),
+    ("takt_trip", "if (pin) {p2, p1, p0} <= 3'b111;", "if (pin) {p2, p1, p0} <= 3'b011;"),
+    ("takt_trip", "assign at_once = p2;", "assign at_once = pin;"),
+    ("takt_pwm_phase", "if (off) begin\n            switches <= 2'b00;", "if (off) begin\n            switches <= switches;"),
     ("takt_filter", "rst | held == LAST[BITS-1:0]", "rst"),
 ]
 
@@ -92,7 +96,7 @@ def trip(folder, setting, mutant=None):
     files = texts(mutant) | {"takt_tripped": (FORMAL / "trip.v").read_text()}
     files["takt_trip"] = joined(files["takt_trip"], (FORMAL / "held.v").read_text())
     files["takt_filter"] = joined(files["takt_filter"], COUNTS)
-    parameters = dict(zip(("FILTER", "DEAD", "TRIPPED"), setting))
+    parameters = dict(zip(("FILTER", "DEAD", "TRIPPED", "DIRECT"), setting))
     return proved(folder, files, "takt_tripped", parameters, setting[0] + setting[1] + 8)
 
 
@@ -102,19 +106,22 @@ def main():
     folder, started = Path(parser.parse_args().folder), time.monotonic()
     survivors, tried = [], 0
     try:
-        for name, prove, settings, mutants in [("phase", phase, PHASES, PHASE_MUTANTS), ("trip", trip, TRIPS, TRIP_MUTANTS)]:
+        for name, prove, settings, tries, mutants in [
+            ("phase", phase, PHASES, 1, PHASE_MUTANTS),
+            ("trip", trip, TRIPS, 2, TRIP_MUTANTS),
+        ]:
             for setting in settings:
                 if not prove(folder / f"{name}{'_'.join(map(str, setting))}", setting):
                     sys.exit(f"error: motor: {name} with {setting}: not proved")
             for mutant in mutants:
                 tried += 1
-                if prove(folder / f"{name}_mutant", settings[-1], mutant):
+                if all(prove(folder / f"{name}_mutant", setting, mutant) for setting in settings[-tries:]):
                     survivors.append(mutant)
     except Failure as failure:
         sys.exit(f"error: {failure}")
     print(
         f"motor: the switches of a half bridge are never on together, dead times and least times hold, and a trip is safe n + 3 cycles "
-        f"after its pin and held until it is cleared: proved for any number of cycles; {time.monotonic() - started:.0f} s",
+        f"after its pin, at once if it is direct, and held until it is cleared: proved for any number of cycles; {time.monotonic() - started:.0f} s",
         flush=True,
     )
     for module, old, new in survivors:

@@ -25,6 +25,8 @@
         assume (f_begun | rst);
         assume (rest != 2'b11);
         if (f_begun) begin
+            // Without a clock, both are off.
+            if (off) assert (~high & ~low);
             // Never both.
             assert (~(high & low));
             // Dead time: a switch goes on after the other has been off for DEAD cycles.
@@ -34,9 +36,9 @@
             if (f_reset) assert (~high & ~low);
             if (~f_reset & ~f_ran & ~f_rest[1]) assert (~high);
             if (~f_reset & ~f_ran & ~f_rest[0]) assert (~low);
-            // While it runs, a switch stays on for MINIMUM cycles.
-            if (f_ran & ~f_reset & f_was_high & ~high) assert (f_high_on >= MINIMUM);
-            if (f_ran & ~f_reset & f_was_low & ~low) assert (f_low_on >= MINIMUM);
+            // While it runs, and is not taken off without a clock, a switch stays on for MINIMUM cycles.
+            if (f_ran & ~f_reset & ~off & f_was_high & ~high) assert (f_high_on >= MINIMUM);
+            if (f_ran & ~f_reset & ~off & f_was_low & ~low) assert (f_low_on >= MINIMUM);
             // Within a half the pulse changes in one direction.
             if (~first & back) assert (~pulse | was);
             if (~first & ~back) assert (pulse | ~was);

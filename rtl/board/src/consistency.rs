@@ -74,6 +74,7 @@ impl Wiring {
             match peripheral.kind.name {
                 "pwm" => fit.pwm(peripheral),
                 "pwm3" => fit.bridges(peripheral, busy),
+                "trip" => fit.direct(peripheral),
                 _ => {}
             }
         }

@@ -109,6 +109,9 @@ int main(int argc, char **argv) {
         std::vector<uint32_t> edges((watched.size() + 31) / 32);
         uint32_t cycle = 0, has_tick = 0;
         for (bool ends = false; cycle < cycles && !ends; cycle++) {
+            // An edge that waits for no clock comes before the clock's.
+            uint8_t before[OUTPUTS + 1];
+            for (const auto &pin : watched) before[pin.first] = *outputs[pin.first];
             for (const Encoder &e : encoders) {
                 uint32_t at = e.count + uint32_t(int64_t(e.difference) * (int64_t(cycle) + 1) / int64_t(cycles));
                 *inputs[e.a] = (at + 1) >> 1 & 1;
@@ -161,8 +164,6 @@ int main(int argc, char **argv) {
             }
             has_tick = ticks(&top);
             ends = tick_ends & has_tick;
-            uint8_t before[OUTPUTS + 1];
-            for (const auto &pin : watched) before[pin.first] = *outputs[pin.first];
             top.clk_in = 1;
             top.eval();
             for (std::size_t i = 0; i < watched.size(); i++) {

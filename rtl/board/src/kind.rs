@@ -56,6 +56,9 @@ pub struct Parameter {
     pub is_half_bit: bool,
 }
 
+/// Parameter of a trip that takes effect without a clock.
+pub const DIRECT: &str = "direct";
+
 /// Key of a wiring for the highest rate of bits, in MHz, in place of half a bit in cycles.
 pub const RATE: &str = "rate";
 
@@ -64,7 +67,7 @@ pub const RATE: &str = "rate";
 pub struct Strobes {
     /// Input `enable`: the outputs may drive.
     pub enable: bool,
-    /// Input `trip`: the outputs are at their tripped level. Other kinds with `enable` are disabled by a trip.
+    /// Inputs `trip` and `off`: the outputs are at their tripped level. Other kinds with `enable` are disabled by a trip.
     pub trip: bool,
     /// Input `start`: a conversion begins.
     pub start: bool,
@@ -74,6 +77,8 @@ pub struct Strobes {
     pub carrier: bool,
     /// Input `clear` and output `trip`: the module trips other peripherals, until it is cleared.
     pub trips: bool,
+    /// Output `off`: with the parameter [`DIRECT`] a trip takes effect without a clock.
+    pub direct: bool,
 }
 
 /// Port of a module: name and width.
@@ -163,8 +168,15 @@ const TURNS: Register = register("turns", "the bits above them, 0 without any");
 const LOST: Register =
     register("lost", "starts that came during a frame or the rest after it and were dropped");
 
-const PLAIN: Strobes =
-    Strobes { enable: false, trip: false, start: false, window: false, carrier: false, trips: false };
+const PLAIN: Strobes = Strobes {
+    enable: false,
+    trip: false,
+    start: false,
+    window: false,
+    carrier: false,
+    trips: false,
+    direct: false,
+};
 const ENABLED: Strobes = Strobes { enable: true, ..PLAIN };
 const STARTED: Strobes = Strobes { start: true, ..PLAIN };
 const MODULATED: Strobes = Strobes { trip: true, carrier: true, ..ENABLED };
@@ -294,8 +306,15 @@ pub const KINDS: &[Kind] = &[
         parameters: &[
             parameter("filter", 0, 255, 3, "cycles for which a level must stand before it counts; 0: none"),
             parameter("invert", 0, 1, 0, "1: the pin is active low"),
+            parameter(
+                DIRECT,
+                0,
+                1,
+                0,
+                "1: half bridges of a `pwm3` go off without a clock, and without a filter",
+            ),
         ],
-        strobes: TRIPPING,
+        strobes: Strobes { direct: true, ..TRIPPING },
     },
     Kind {
         name: "sigma-delta",
@@ -491,6 +510,7 @@ impl Kind {
         let strobe = |name: &str, there: bool| there.then(|| (name.to_owned(), 1));
         takes.extend(strobe("enable", self.strobes.enable));
         takes.extend(strobe("trip", self.strobes.trip));
+        takes.extend(strobe("off", self.strobes.trip));
         takes.extend(strobe("clear", self.strobes.trips));
         takes.extend(strobe("start", self.strobes.start));
         if self.strobes.carrier {
@@ -505,7 +525,7 @@ impl Kind {
         takes.extend(pins(Direction::Input));
         takes.extend(self.writes.iter().map(|register| (format!("w_{}", register.name), 32)));
         let reads = self.reads.iter().map(|register| (format!("r_{}", register.name), 32));
-        let trip = strobe("trip", self.strobes.trips);
+        let trip = strobe("trip", self.strobes.trips).into_iter().chain(strobe("off", self.strobes.direct));
         (takes, pins(Direction::Output).chain(trip).chain(reads).collect())
     }
 }

@@ -9,7 +9,7 @@ use crate::application::Application;
 use crate::boards::Board;
 use crate::carrier::{self, Carrier, CarrierTick, Carriers, Instant};
 use crate::document::{Document, Located, Mistake, Table};
-use crate::kind::{Direction, KINDS, Kind};
+use crate::kind::{DIRECT, Direction, KINDS, Kind};
 use crate::scope::{LEAST_DEPTH, MOST_CHANNELS, MOST_DEPTH, MOST_WORDS};
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -143,6 +143,11 @@ impl Peripheral {
     pub fn parameter(&self, name: &str) -> u32 {
         let at = self.kind.parameters.iter().position(|parameter| parameter.name == name);
         at.and_then(|at| self.parameters.get(at)).copied().unwrap_or(0)
+    }
+
+    /// A trip of this peripheral's takes half bridges off without a clock.
+    pub(crate) fn is_direct(&self) -> bool {
+        self.parameter(DIRECT) != 0
     }
 }
 

@@ -160,6 +160,16 @@ fn the_shipped_wirings_fit() {
     assert_eq!(findings(text, source), Findings::default());
 }
 
+#[test]
+fn a_direct_trip_is_for_half_bridges() {
+    let text = WIRING.replace("dead = 25", "dead = 25\ntrips = [\"comparator\"]")
+        + "[peripheral.comparator]\nkind = \"trip\"\npins = { in = \"gp5\" }\nfilter = 0\ndirect = 1\n";
+    let found = findings(&text.replace("lead = 10", "lead = 2.66"), &source(10));
+    let expected = "w.toml:34:1: `direct` acts on half bridges of a `pwm3`: `motor` is safe 3 cycles after the pin's edge";
+    assert_eq!(lines(&found.warnings), [expected]);
+    assert!(found.mistakes.is_empty() && found.late.is_empty(), "{found:?}");
+}
+
 /// The example of a drive, and replacements in its wiring, each with the error that it makes.
 #[test]
 fn what_does_not_fit_a_carrier_is_an_error() {
@@ -182,6 +192,11 @@ fn what_does_not_fit_a_carrier_is_an_error() {
             "dead = 30               # cycles: 0.5 µs\nminimum = 30",
             "dead = 800\nminimum = 701",
             "22:1: no pulse is left: `dead` and `minimum` leave out all below 1501 cycles",
+        ),
+        (
+            "filter = 6",
+            "filter = 6\ndirect = 1",
+            "55:1: `overcurrent` takes switches off without a clock, so no filter of 6 cycles: `filter = 0`, or no `direct`",
         ),
         (
             "scale = { a = 2048",

@@ -4,7 +4,7 @@
 use std::path::Path;
 use takt_asm::{MemoryLoader, Options, assemble};
 use takt_board::latency::{Part, PinPath, Sample, Until, undivided, ways};
-use takt_board::protocol::{HOLD, INPUTS};
+use takt_board::protocol::{ENABLE, HOLD, INPUTS, RESTART, RUN};
 use takt_board::simulation::Simulation;
 use takt_board::{Application, Board, Host, Kind, Wiring, model};
 use takt_isa::timing::Span;
@@ -63,6 +63,8 @@ kind = "pwm3"
 carrier = "second"
 pins = { high_a = "gp8", low_a = "gn8", high_b = "gp9", low_b = "gn9", high_c = "gp10", low_c = "gn10" }
 update = "peak"
+tripped = "low"
+trips = ["short"]
 ports = { a = "c" }
 
 [peripheral.fault]
@@ -70,6 +72,12 @@ kind = "trip"
 pins = { in = "gp11" }
 filter = 4
 ports = { state = "tripped", clear = "clear" }
+
+[peripheral.short]
+kind = "trip"
+pins = { in = "gn13" }
+filter = 0
+direct = 1
 
 [peripheral.switch]
 kind = "digital-in"
@@ -287,6 +295,39 @@ fn trips_hold_until_they_are_cleared() {
 }
 
 #[test]
+fn direct_trips_need_no_clock() {
+    // A pin that stays, and a pulse that is gone before the trip is held.
+    for (i, stays) in [true, false].into_iter().enumerate() {
+        let mut host = started(&format!("drive-direct-{i}"), &[]);
+        for (side, ends) in [("later_high_a", false), ("later_low_a", false), ("later_high_a", true)] {
+            set(&mut host, "dc", 300);
+            let sim = &mut host.line;
+            run_to(sim, side, true);
+            sim.run(if ends { 20 } else { 1 }, &[]).expect("it runs");
+            assert!(level(sim, side));
+            sim.set("short_in", true);
+            step(sim);
+            assert_eq!(phase(sim, "later"), [false; 2], "the same cycle");
+            sim.set("short_in", stays);
+            // Both are off until the trip is held, then the low one is on.
+            for cycle in 2..=5 {
+                step(sim);
+                assert!(cycle == 5 || !level(sim, "later_high_a"), "cycle {cycle}");
+            }
+            assert_eq!(phase(sim, "later"), [false, true]);
+            sim.set("short_in", false);
+            sim.run(2 * PERIOD, &[]).expect("it runs");
+            assert_eq!(phase(sim, "later"), [false, true], "held");
+            let text = host.tripped(Some(&wiring().1)).expect("it answers");
+            assert_eq!(text, ["the trip `short` is held: `later` is safe"]);
+            host.set("control", RUN | ENABLE | RESTART).expect("it answers");
+            host.line.run(4 * PERIOD, &[]).expect("it runs");
+            assert_eq!(host.tripped(None).expect("it answers"), Vec::<String>::new(), "a start clears it");
+        }
+    }
+}
+
+#[test]
 fn carriers_keep_their_phase() {
     let mut host = started("drive-phase", &[("da", 300), ("dc", 300)]);
     let period = u64::from(PERIOD);
@@ -345,7 +386,7 @@ fn shows(parameters: &[u32], half: u32, at: u32) -> (u64, u64) {
         let clock = |cycle: u32| {
             let duty = if cycle < put { old } else { new };
             let is_put = u32::from(cycle == 0 || cycle == put);
-            model.clock(&[0, 1, 0, cycle % half, cycle / half % 2, is_put, duty, 0, 0]);
+            model.clock(&[0, 1, 0, 0, cycle % half, cycle / half % 2, is_put, duty, 0, 0]);
             model.outputs()
         };
         (0..put + 6 * half).map(clock).collect()

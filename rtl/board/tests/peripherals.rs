@@ -60,7 +60,7 @@ fn variants(kind: &Kind) -> Vec<Vec<u32>> {
             vec![0, 5, 2, 1, 1, 1, 0, 1, 15],
             vec![5, 0, 3, 0, 0, 0, 2, 0, 11],
         ],
-        "trip" => vec![vec![0, 0], vec![1, 1], vec![7, 0]],
+        "trip" => vec![vec![0, 0, 0], vec![1, 1, 0], vec![7, 0, 0], vec![0, 0, 1], vec![0, 1, 1]],
         "sigma-delta" => vec![vec![0], vec![1]],
         "spi" => vec![
             vec![3, 1, 0, 0, 0, 1],
@@ -136,6 +136,7 @@ fn stimulus(kind: &'static Kind, parameters: &[u32], seed: u64) -> Box<dyn FnMut
             "start" => random.one_in(if cycle % 4096 < 1024 { 20 } else { 400 }).into(),
             // The trip outlasts the time without enable.
             "trip" => u32::from(cycle < disabled + 5 && disabled.is_multiple_of(2)),
+            "off" => random.one_in(500).into(),
             "clear" => random.one_in(50).into(),
             "place" => cycle % half.expect("a carrier"),
             "back" => cycle / half.expect("a carrier") % 2,

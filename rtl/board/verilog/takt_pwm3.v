@@ -7,6 +7,7 @@
 //   The switches follow their pulses from the first valley on with enable at 1 and trip at 0, as long as this is so. Before, and from
 //   the cycle after on, they are at rest: TRIPPED while trip is 1, else SAFE: 0 both off, 1 the low ones on, 2 the high ones on.
 //   Pins are 1 while their switch is on, or, with INVERT_HIGH or INVERT_LOW, 0.
+//   off: all switches are off, without a clock; trip is 1 before it ends.
 //   rst: all switches are off.
 
 module takt_pwm3 #(
@@ -24,6 +25,7 @@ module takt_pwm3 #(
     input  wire        rst,
     input  wire        enable,
     input  wire        trip,
+    input  wire        off,
     input  wire [15:0] place,
     input  wire        back,
     input  wire        put,
@@ -57,15 +59,15 @@ module takt_pwm3 #(
     end
 
     takt_pwm_phase #(.HALF(HALF), .DEAD(DEAD), .MINIMUM(MINIMUM), .SIGNED(SIGNED)) phase_a (
-        .clk(clk), .rst(rst), .put(put), .w_duty(w_a), .loads(loads), .place(place), .back(back), .runs(runs), .rest(rest),
+        .clk(clk), .rst(rst), .put(put), .w_duty(w_a), .loads(loads), .place(place), .back(back), .runs(runs), .rest(rest), .off(off),
         .high(high[0]), .low(low[0])
     );
     takt_pwm_phase #(.HALF(HALF), .DEAD(DEAD), .MINIMUM(MINIMUM), .SIGNED(SIGNED)) phase_b (
-        .clk(clk), .rst(rst), .put(put), .w_duty(w_b), .loads(loads), .place(place), .back(back), .runs(runs), .rest(rest),
+        .clk(clk), .rst(rst), .put(put), .w_duty(w_b), .loads(loads), .place(place), .back(back), .runs(runs), .rest(rest), .off(off),
         .high(high[1]), .low(low[1])
     );
     takt_pwm_phase #(.HALF(HALF), .DEAD(DEAD), .MINIMUM(MINIMUM), .SIGNED(SIGNED)) phase_c (
-        .clk(clk), .rst(rst), .put(put), .w_duty(w_c), .loads(loads), .place(place), .back(back), .runs(runs), .rest(rest),
+        .clk(clk), .rst(rst), .put(put), .w_duty(w_c), .loads(loads), .place(place), .back(back), .runs(runs), .rest(rest), .off(off),
         .high(high[2]), .low(low[2])
     );
     assign {pin_high_c, pin_high_b, pin_high_a} = high ^ {3{INVERT_HIGH != 0}};

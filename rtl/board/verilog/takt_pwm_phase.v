@@ -11,6 +11,7 @@
 //   runs: the switches follow the pulse; otherwise they are at rest: 2'b00 both off, 2'b01 low on, 2'b10 high on. A switch goes off a
 //   cycle later, the other one goes on when both have been off for DEAD cycles. While runs is 1, a switch that is on stays on for
 //   MINIMUM cycles.
+//   off: both are off, without a clock.
 //   rst: both are off, and the duty is 0.
 
 module takt_pwm_phase #(
@@ -28,6 +29,7 @@ module takt_pwm_phase #(
     input  wire        back,
     input  wire        runs,
     input  wire [1:0]  rest,
+    input  wire        off,
     output wire        high,
     output wire        low
 );
@@ -76,16 +78,20 @@ module takt_pwm_phase #(
     wire [1:0]  target = runs ? {pulse, ~pulse} : rest;
     wire        stays  = runs & since < STAYS;
 
-    always @(posedge clk) begin
-        since <= &since ? since : since + 10'd1;
-        if (switches == 2'b00 ? since >= LATE & target != 2'b00 : target != switches & ~stays) begin
-            switches <= switches == 2'b00 | DEAD == 0 ? target : 2'b00;
-            since    <= 10'd1;
-        end
-        if (rst) begin
+    always @(posedge clk or posedge off)
+        if (off) begin
             switches <= 2'b00;
             since    <= 10'd1;
+        end else begin
+            since <= &since ? since : since + 10'd1;
+            if (switches == 2'b00 ? since >= LATE & target != 2'b00 : target != switches & ~stays) begin
+                switches <= switches == 2'b00 | DEAD == 0 ? target : 2'b00;
+                since    <= 10'd1;
+            end
+            if (rst) begin
+                switches <= 2'b00;
+                since    <= 10'd1;
+            end
         end
-    end
 
 endmodule

@@ -4,7 +4,7 @@
 use super::{Fit, PeriodCycles};
 use crate::carrier::Carrier;
 use crate::document::Table;
-use crate::kind::UPDATES;
+use crate::kind::{DIRECT, UPDATES};
 use crate::latency;
 use crate::wiring::Peripheral;
 use std::ops::Range;
@@ -69,6 +69,29 @@ impl Fit<'_> {
                 );
                 return self.mistakes.mistake(&self.place(peripheral, None, &["latch"]), text);
             }
+        }
+    }
+
+    /// Compares a trip that waits for no clock with its filter, and with the peripherals that it trips.
+    pub(super) fn direct(&self, peripheral: &Peripheral) {
+        if !peripheral.is_direct() {
+            return;
+        }
+        let filter = peripheral.parameter("filter");
+        if filter != 0 {
+            let text = format!(
+                "`{}` takes switches off without a clock, so no filter of {filter} cycles: `filter = 0`, or no `{DIRECT}`",
+                peripheral.name
+            );
+            self.mistakes.mistake(&self.place(peripheral, None, &["filter", DIRECT]), text);
+        }
+        let waits = self.wiring.peripherals.iter().filter(|other| other.trips.contains(&peripheral.name));
+        for other in waits.filter(|other| !other.kind.strobes.trip) {
+            let text = format!(
+                "`{DIRECT}` acts on half bridges of a `pwm3`: `{}` is safe 3 cycles after the pin's edge",
+                other.name
+            );
+            self.warnings.mistake(&self.place(peripheral, None, &[DIRECT]), text);
         }
     }
 

@@ -6,6 +6,9 @@ pub trait Model {
     /// The values on the model's outputs, in the order of [`Kind::ports`](crate::Kind::ports).
     fn outputs(&self) -> Vec<u32>;
 
+    /// Takes the effects of inputs that wait for no clock, given as for [`clock`](Model::clock). Few models have such inputs.
+    fn settle(&mut self, _inputs: &[u32]) {}
+
     /// Takes the clock's edge, with the values on the model's inputs, in the order of [`Kind::ports`](crate::Kind::ports).
     fn clock(&mut self, inputs: &[u32]);
 }

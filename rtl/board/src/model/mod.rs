@@ -46,7 +46,7 @@ pub fn of(kind: &Kind, parameters: &[u32]) -> Option<Box<dyn Model>> {
             invert: [value(4) != 0, value(5) != 0],
             rests: [value(6), value(7)],
         })),
-        "trip" => Box::new(Trip::new(value(0), value(1) != 0)),
+        "trip" => Box::new(Trip::new(value(0), value(1) != 0, value(2) != 0)),
         "sigma-delta" => Box::new(SigmaDelta::new(value(0) != 0)),
         "spi" => {
             Box::new(Spi::new(value(0), value(1), value(2) != 0, value(3) != 0, value(4) != 0, value(5)))

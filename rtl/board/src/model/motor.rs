@@ -62,6 +62,13 @@ struct Phase {
     lasts: u32,
 }
 
+impl Phase {
+    /// Takes both switches off.
+    fn clear(&mut self) {
+        (self.on, self.lasts) = (0, 1);
+    }
+}
+
 /// Model of the circuit `takt_pwm3`.
 #[derive(Clone, Debug)]
 pub struct Pwm3 {
@@ -99,13 +106,19 @@ impl Model for Pwm3 {
         self.phases.iter().flat_map(pins).map(u32::from).collect()
     }
 
+    fn settle(&mut self, inputs: &[u32]) {
+        if high(inputs, 3) {
+            self.phases.iter_mut().for_each(Phase::clear);
+        }
+    }
+
     fn clock(&mut self, inputs: &[u32]) {
-        let [rst, enable, trip, back, put] = [0, 1, 2, 4, 5].map(|i| high(inputs, i));
+        let [rst, enable, trip, off, back, put] = [0, 1, 2, 3, 5, 6].map(|i| high(inputs, i));
         if rst {
             *self = Pwm3::new(self.of);
             return;
         }
-        let (place, may) = (word(inputs, 3), enable && !trip);
+        let (place, may) = (word(inputs, 4), enable && !trip);
         let is_last = place + 1 == self.of.half;
         let loads = match self.of.update {
             0 => true,
@@ -126,7 +139,9 @@ impl Model for Pwm3 {
                 on => target != on && !(runs && phase.lasts < self.of.minimum),
             };
             phase.lasts += 1;
-            if changes {
+            if off {
+                phase.clear();
+            } else if changes {
                 phase.on = if phase.on == 0 || self.of.dead == 0 { target } else { 0 };
                 phase.lasts = 1;
             }
@@ -134,7 +149,7 @@ impl Model for Pwm3 {
                 phase.parts = [phase.taken.div_ceil(2), phase.taken / 2];
             }
             if put {
-                phase.taken = self.of.pulse(word(inputs, 6 + i));
+                phase.taken = self.of.pulse(word(inputs, 7 + i));
             }
         }
         self.begun = may && (self.begun || is_last && back);
@@ -146,6 +161,8 @@ impl Model for Pwm3 {
 pub struct Trip {
     pin: Option<Filter>,
     synchroniser: [bool; 2],
+    /// Flip-flops that a direct pin sets; the last one takes switches off.
+    set: Option<[bool; 3]>,
     invert: bool,
     held: bool,
     was: bool,
@@ -154,11 +171,12 @@ pub struct Trip {
 }
 
 impl Trip {
-    /// Trip that responds to a level once it has been stable for `filter` cycles.
-    pub fn new(filter: u32, invert: bool) -> Trip {
+    /// Trip that responds to a level once it has been stable for `filter` cycles, or, `direct`, without a clock.
+    pub fn new(filter: u32, invert: bool, direct: bool) -> Trip {
         Trip {
-            pin: (filter > 0).then(|| Filter::new(filter)),
+            pin: (filter > 0 && !direct).then(|| Filter::new(filter)),
             synchroniser: [false; 2],
+            set: direct.then_some([false; 3]),
             invert,
             held: false,
             was: false,
@@ -175,7 +193,14 @@ impl Trip {
 impl Model for Trip {
     fn outputs(&self) -> Vec<u32> {
         let trip = self.asks() || self.held;
-        [trip.into()].into_iter().chain(self.taken).collect()
+        let off = self.set.is_some_and(|[.., last]| last) && !self.held;
+        [trip.into(), off.into()].into_iter().chain(self.taken).collect()
+    }
+
+    fn settle(&mut self, inputs: &[u32]) {
+        if high(inputs, 4) != self.invert {
+            self.set = self.set.map(|_| [true; 3]);
+        }
     }
 
     fn clock(&mut self, inputs: &[u32]) {
@@ -192,7 +217,8 @@ impl Model for Trip {
         if rst {
             (self.held, self.was, self.trips, self.taken) = (false, false, 0, [0; 2]);
         }
-        self.synchroniser = [pin, self.synchroniser[0]];
+        self.synchroniser = [self.set.map_or(pin, |[.., last]| last), self.synchroniser[0]];
+        self.set = self.set.map(|[first, second, _]| if pin { [true; 3] } else { [false, first, second] });
         if let Some(filter) = &mut self.pin {
             filter.clock(rst, pin);
         }

@@ -81,7 +81,7 @@ impl Sinc3 {
             fast_ends: 0,
             pending: Vec::new(),
             over: false,
-            trip: Trip::new(0, false),
+            trip: Trip::new(0, false, false),
             now: [0; 2],
             taken: [0; 2],
         }
@@ -118,7 +118,7 @@ impl Sinc3 {
 impl Model for Sinc3 {
     fn outputs(&self) -> Vec<u32> {
         let trip = self.trip.outputs();
-        [self.clock.into(), trip[0]].into_iter().chain(self.taken).chain(trip[1..].iter().copied()).collect()
+        [self.clock.into(), trip[0]].into_iter().chain(self.taken).chain(trip[2..].iter().copied()).collect()
     }
 
     fn clock(&mut self, inputs: &[u32]) {

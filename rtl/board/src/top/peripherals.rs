@@ -53,6 +53,11 @@ pub(super) fn net(peripheral: &Peripheral, register: &str) -> String {
     format!("{}_{}_{register}", if reads { "r" } else { "w" }, peripheral.name)
 }
 
+/// The net by which a direct trip takes switches off.
+fn off_net(name: &str) -> String {
+    format!("off_{name}")
+}
+
 /// The net of a trip.
 pub(super) fn trip_net(name: &str) -> String {
     format!("trip_{name}")
@@ -141,6 +146,9 @@ impl<'a> PeripheralConnections<'a> {
         }
         for trip in wiring.peripherals.iter().filter(|peripheral| peripheral.kind.strobes.trips) {
             let _ = writeln!(nets, "    wire {};", trip_net(&trip.name));
+            if trip.is_direct() {
+                let _ = writeln!(nets, "    wire {};", off_net(&trip.name));
+            }
         }
         for peripheral in &wiring.peripherals {
             instances += &self.instance(wiring, peripheral);
@@ -170,11 +178,18 @@ impl<'a> PeripheralConnections<'a> {
             ports.push(format!(".enable(drive{trips})"));
         }
         if kind.strobes.trip {
-            let trips = if trips.is_empty() { "1'b0".to_owned() } else { trips.join(" | ") };
-            ports.push(format!(".trip({trips})"));
+            let any = |nets: &[String]| if nets.is_empty() { "1'b0".to_owned() } else { nets.join(" | ") };
+            let direct =
+                wiring.trips().filter(|trip| trip.is_direct() && peripheral.trips.contains(&trip.name));
+            let direct: Vec<String> = direct.map(|trip| off_net(&trip.name)).collect();
+            ports.push(format!(".trip({}), .off({})", any(&trips), any(&direct)));
         }
         if kind.strobes.trips {
             ports.push(format!(".clear(core_rst), .trip({})", trip_net(name)));
+        }
+        if kind.strobes.direct {
+            let net = if peripheral.is_direct() { off_net(name) } else { String::new() };
+            ports.push(format!(".off({net})"));
         }
         if kind.strobes.start {
             let start = match peripheral.starts {

@@ -159,6 +159,7 @@ pub(crate) fn run(
         for ((part, inputs), difference) in parts.iter_mut().zip(inputs).zip(&mut differences) {
             let circuit: Vec<u32> = words.by_ref().take(part.drives.len()).collect();
             assert_eq!(circuit.len(), part.drives.len(), "the simulation ended early");
+            part.model.settle(inputs);
             let model = part.model.outputs();
             if cycle >= RESET as usize && model != circuit && difference.is_none() {
                 let names: Vec<_> = part.drives.iter().map(|(name, _)| name.as_str()).collect();
