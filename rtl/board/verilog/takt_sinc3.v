@@ -116,16 +116,17 @@ module takt_sinc3 #(
     reg  [W-1:0]  before1, before2, before3, difference1, difference2;
     reg  [16:0]   fast1, fast2, fast3, quick1, quick2;
     reg  [1:0]    differences, quicks;
-    reg           is_kept, is_fresh, over;
+    reg  [1:0]    is_kept;         // with the differences
+    reg           is_fresh, over;
     reg  [31:0]   value, values;
     wire [W-1:0]  whole  = difference2 - before3;
     wire signed [16:0] quick = quick2 - fast3;
 
     always @(posedge clk) begin
         differences <= {differences[0], ends[2]};
+        is_kept     <= {is_kept[0], marks[2] & ~anew[2]};
         if (ends[2]) begin
             marks       <= anew[2] ? 3'b001 : {marks[1:0], keeps};
-            is_kept     <= marks[2] & ~anew[2];
             difference1 <= sum3 - before1;
             before1     <= sum3;
         end
@@ -135,7 +136,7 @@ module takt_sinc3 #(
         end
         if (differences[1]) begin
             before3 <= difference2;
-            if (is_kept) begin
+            if (is_kept[1]) begin
                 value  <= {{(32-W){whole[W-1]}}, whole};
                 values <= values + 32'd1;
             end
@@ -164,7 +165,7 @@ module takt_sinc3 #(
 
     takt_trip #(.FILTER(0)) overcurrent (
         .clk(clk), .rst(rst), .clear(clear), .take(take), .put(put), .pin_in(over), .w_clear(w_clear),
-        .trip(trip), .r_state(r_state), .r_trips(r_trips)
+        .trip(trip), .off(), .r_state(r_state), .r_trips(r_trips)
     );
 
 endmodule
