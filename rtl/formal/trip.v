@@ -10,7 +10,7 @@ module takt_tripped #(
 ) (
     input wire        clk, rst, clear, put, pin_in, enable, back,
     input wire [15:0] place,
-    input wire [31:0] duty, w_clear
+    input wire [31:0] duty, stop, w_clear
 );
 
     wire trip, off, high_a, low_a, high_b, low_b, high_c, low_c;
@@ -19,7 +19,7 @@ module takt_tripped #(
     );
     // Pins that are active low, the high ones, so that a polarity is part of what is proved.
     takt_pwm3 #(.HALF(20), .DEAD(DEAD), .INVERT_HIGH(1), .TRIPPED(TRIPPED)) bridges (
-        .clk(clk), .rst(rst), .enable(enable), .trip(trip), .off(off), .place(place), .back(back), .put(put), .w_a(duty), .w_b(duty), .w_c(duty),
+        .clk(clk), .rst(rst), .enable(enable), .trip(trip), .off(off), .place(place), .back(back), .put(put), .w_a(duty), .w_b(duty), .w_c(duty), .w_stop(stop),
         .pin_high_a(high_a), .pin_low_a(low_a), .pin_high_b(high_b), .pin_low_b(low_b), .pin_high_c(high_c), .pin_low_c(low_c)
     );
 

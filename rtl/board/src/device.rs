@@ -584,12 +584,15 @@ impl Actuator {
         let of = |name: &str| peripheral.parameter(name);
         let (names, shape): (&[&str], Shape) = match kind.name {
             "pwm" => (&["high", "low"], Shape::Bridge([false; 2], 2.0 * f64::from(of("half")))),
+            "pwm3" if register >= 3 => {
+                return Err(format!("the register `stop` of `{name}` is no duty; there are `a`, `b`, `c`"));
+            }
             "pwm3" => {
                 let invert = ["invert_high", "invert_low"].map(|name| of(name) == 1);
                 let carrier = peripheral.carrier.and_then(|carrier| wiring.carriers.get(carrier));
                 let cycles = carrier.map_or(1.0, |carrier| f64::from(carrier.period()));
                 let names: &[&str] =
-                    [&["high_a", "low_a"], &["high_b", "low_b"], &["high_c", "low_c"]][register.min(2)];
+                    [&["high_a", "low_a"], &["high_b", "low_b"], &["high_c", "low_c"]][register];
                 (names, Shape::Bridge(invert, cycles))
             }
             "sigma-delta" => (&["out"], Shape::Stream),

@@ -259,6 +259,7 @@ pub const KINDS: &[Kind] = &[
             ),
             scaled("b", "the same of phase b"),
             scaled("c", "the same of phase c"),
+            register("stop", "not 0: the switches are at rest, as without drive"),
         ],
         parameters: &[
             parameter("dead", 0, 1023, 0, "dead time in cycles"),

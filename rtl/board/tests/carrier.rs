@@ -175,7 +175,7 @@ fn part(number: usize, setting: Setting, inputs: Vec<Inputs>) -> Part {
         ("UPDATE", setting.update),
         ("TRIPPED", 1),
     ];
-    let takes = ["rst", "enable", "trip", "off", "place", "back", "put", "w_a", "w_b", "w_c"];
+    let takes = ["rst", "enable", "trip", "off", "place", "back", "put", "w_a", "w_b", "w_c", "w_stop"];
     let width = |name: &str| {
         if name == "place" {
             16
@@ -199,7 +199,7 @@ fn part(number: usize, setting: Setting, inputs: Vec<Inputs>) -> Part {
             let Inputs { disabled, trip, duties } = now.unwrap_or(before);
             let [a, b, c] = duties.unwrap_or_default();
             let enable = u32::from(!disabled);
-            vec![enable, trip.into(), 0, cycle % HALF, cycle / HALF % 2, duties.is_some().into(), a, b, c]
+            vec![enable, trip.into(), 0, cycle % HALF, cycle / HALF % 2, duties.is_some().into(), a, b, c, 0]
         }),
     }
 }

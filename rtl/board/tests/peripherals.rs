@@ -134,13 +134,14 @@ fn stimulus(kind: &'static Kind, parameters: &[u32], seed: u64) -> Box<dyn FnMut
         let mut value = |i: usize, name: &str| match name {
             "enable" => u32::from(cycle >= disabled),
             "start" => random.one_in(if cycle % 4096 < 1024 { 20 } else { 400 }).into(),
-            // The trip outlasts the time without enable.
-            "trip" => u32::from(cycle < disabled + 5 && disabled.is_multiple_of(2)),
+            // The trip outlasts the time without enable, and comes alone.
+            "trip" => u32::from(cycle < disabled + 5 && disabled.is_multiple_of(2) || random.one_in(300)),
             "off" => random.one_in(500).into(),
             "clear" => random.one_in(50).into(),
             "place" => cycle % half.expect("a carrier"),
             "back" => cycle / half.expect("a carrier") % 2,
             "w_clear" => random.bits() % 2,
+            "w_stop" => random.one_in(4).into(),
             "take" => random.one_in(11).into(),
             "put" => random.one_in(if cycle % 4096 < 1024 { 5 } else { 150 }).into(),
             // A third of a turn between the pins of Hall sensors; a jump of the place makes a forbidden state now and then.
@@ -412,7 +413,7 @@ const FAULTS: &[&[(&str, &str, &str)]] = &[
         ("takt_uart_receive.v", "DIVIDE / 2 - 1", "DIVIDE / 2 - 2"),
         ("takt_uart_send.v", "{1'b1, shift[9:1]}", "{1'b0, shift[9:1]}"),
     ],
-    &[("takt_filter.v", "rst | s1 == level", "rst"), ("takt_pwm3.v", "enable & ~trip;", "enable;")],
+    &[("takt_filter.v", "rst | s1 == level", "rst"), ("takt_pwm3.v", "enable & ~trip", "enable")],
     &[
         (
             "takt_quadrature.v",
@@ -422,6 +423,7 @@ const FAULTS: &[&[(&str, &str, &str)]] = &[
         ("takt_pwm.v", "wanted[33] ? 17'd0 :", ""),
         ("takt_pwm_phase.v", "is_all ? MOST : ", ""),
         ("takt_trip.v", "clear | (put & |w_clear)", "clear | put"),
+        ("takt_pwm3.v", "if (put) stopped <= |w_stop", "stopped <= |w_stop"),
         // A bit of more than 256 cycles.
         ("takt_uart_receive.v", "left <= LAST;", "left <= {8'd0, LAST[7:0]};"),
         ("takt_uart_send.v", "left  <= LAST;", "left  <= {8'd0, LAST[7:0]};"),

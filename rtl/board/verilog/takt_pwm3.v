@@ -4,8 +4,8 @@
 // Contract
 //   place, back: of a takt_carrier with the same HALF. Each phase: see takt_pwm_phase; all take a duty, and load it, together.
 //   UPDATE says when duties load: 0 in every cycle, 1 so that they act from a valley on, 2 from a peak on, 3 from either on.
-//   The switches follow their pulses from the first valley on with enable at 1 and trip at 0, as long as this is so. Before, and from
-//   the cycle after on, they are at rest: TRIPPED while trip is 1, else SAFE: 0 both off, 1 the low ones on, 2 the high ones on.
+//   The switches follow their pulses from the first valley on with enable at 1, trip at 0, and 0 in w_stop as last put, as long as this is
+//   so. Before, and from the cycle after on, they are at rest: TRIPPED while trip is 1, else SAFE: 0 both off, 1 the low ones on, 2 the high ones on.
 //   Pins are 1 while their switch is on, or, with INVERT_HIGH or INVERT_LOW, 0.
 //   off: all switches are off, without a clock; trip is 1 before it ends.
 //   rst: all switches are off.
@@ -32,6 +32,7 @@ module takt_pwm3 #(
     input  wire [31:0] w_a,
     input  wire [31:0] w_b,
     input  wire [31:0] w_c,
+    input  wire [31:0] w_stop,
     output wire        pin_high_a,
     output wire        pin_low_a,
     output wire        pin_high_b,
@@ -45,9 +46,9 @@ module takt_pwm3 #(
     localparam [1:0]  REST  = SAFE;
     localparam [1:0]  BREAK = TRIPPED;
 
-    reg        begun;
+    reg        begun, stopped;
     wire       last  = place == TOP;
-    wire       may   = enable & ~trip;
+    wire       may   = enable & ~trip & ~stopped;
     wire       loads = WHEN == 2'd0 | (last & (back ? WHEN[0] : WHEN[1]));
     wire       runs  = begun & may;
     wire [1:0] rest  = trip ? BREAK : REST;
@@ -55,7 +56,8 @@ module takt_pwm3 #(
 
     always @(posedge clk) begin
         begun <= may & (begun | (last & back));
-        if (rst) begun <= 1'b0;
+        if (put) stopped <= |w_stop;
+        if (rst) {begun, stopped} <= 2'b00;
     end
 
     takt_pwm_phase #(.HALF(HALF), .DEAD(DEAD), .MINIMUM(MINIMUM), .SIGNED(SIGNED)) phase_a (

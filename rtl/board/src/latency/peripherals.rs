@@ -225,6 +225,7 @@ pub(crate) fn update(
 fn answer(
     wiring: &Wiring,
     peripheral: &Peripheral,
+    register: &str,
     busy: Option<[u64; 2]>,
 ) -> Option<(Vec<Part>, Answer, Option<[u64; 2]>)> {
     let edge = |parts| Some((parts, Answer::Edge, None));
@@ -247,6 +248,8 @@ fn answer(
         }
         // A duty that differs by one cycle moves an edge of one half alone, which may just be past. A switch goes off at once; without the
         // low switches' pins an edge is seen after the dead time.
+        // Switches that are on go off; what was stopped goes on at a valley.
+        "pwm3" if register == "stop" => edge(vec![Part::new("until the switches go off", 2, 2)]),
         "pwm3" => {
             let half = peripheral.carrier.map_or(0, |carrier| u64::from(wiring.carriers[carrier].half));
             let has_low = [1, 3, 5].iter().all(|pin| peripheral.pins[*pin].is_some());
@@ -293,18 +296,21 @@ pub(super) fn outputs<'a>(
     peripheral: &'a Peripheral,
     busy: Option<[u64; 2]>,
 ) -> impl Iterator<Item = (&'a str, Option<End>)> {
-    peripheral.writes.iter().flatten().map(move |write| {
-        let end = answer(wiring, peripheral, busy).map(|(parts, answer, update)| End {
-            peripheral: peripheral.name.clone(),
-            port: write.port.clone(),
-            parts,
-            answer,
-            until: Part::sum("", []),
-            sample: None,
-            update,
-        });
-        (write.port.as_str(), end)
-    })
+    let registers = peripheral.kind.writes.iter().zip(&peripheral.writes);
+    registers.filter_map(|(register, write)| Some((register.name, write.as_ref()?))).map(
+        move |(name, write)| {
+            let end = answer(wiring, peripheral, name, busy).map(|(parts, answer, update)| End {
+                peripheral: peripheral.name.clone(),
+                port: write.port.clone(),
+                parts,
+                answer,
+                until: Part::sum("", []),
+                sample: None,
+                update,
+            });
+            (write.port.as_str(), end)
+        },
+    )
 }
 
 /// Peripherals of a wiring without a port at an end of a path.

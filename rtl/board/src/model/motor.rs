@@ -74,6 +74,7 @@ impl Phase {
 pub struct Pwm3 {
     of: Bridges,
     begun: bool,
+    stopped: bool,
     phases: [Phase; 3],
 }
 
@@ -83,7 +84,7 @@ impl Pwm3 {
         let zero = if of.signed { of.half } else { 0 };
         let parts = [zero.div_ceil(2), zero / 2];
         let phase = Phase { taken: zero, parts, pulse: false, on: 0, lasts: 1 };
-        Pwm3 { of, begun: false, phases: [phase; 3] }
+        Pwm3 { of, begun: false, stopped: false, phases: [phase; 3] }
     }
 }
 
@@ -118,7 +119,7 @@ impl Model for Pwm3 {
             *self = Pwm3::new(self.of);
             return;
         }
-        let (place, may) = (word(inputs, 4), enable && !trip);
+        let (place, may) = (word(inputs, 4), enable && !trip && !self.stopped);
         let is_last = place + 1 == self.of.half;
         let loads = match self.of.update {
             0 => true,
@@ -153,6 +154,9 @@ impl Model for Pwm3 {
             }
         }
         self.begun = may && (self.begun || is_last && back);
+        if put {
+            self.stopped = word(inputs, 10) != 0;
+        }
     }
 }
 
