@@ -5,11 +5,11 @@ use takt_isa::program::Port;
 use takt_isa::{Register, Type};
 use takt_programs::PLANTS;
 use takt_programs::plants::models::MODELS;
-use takt_programs::plants::{ClosedLoop, Interface, Leg, LoopError, Plant, PlantFile, Quantity, Simulation};
+use takt_programs::plants::{ClosedLoop, Copies, Interface, Leg, LoopError, Plant, PlantFile, Quantity};
 
 const PERIOD: f64 = 1e-3;
 
-fn plant(text: &str, period: f64) -> Simulation {
+fn plant(text: &str, period: f64) -> Copies {
     let file =
         PlantFile::read("p.toml", text).unwrap_or_else(|mistakes| panic!("{}", mistakes.render(false)));
     file.simulation(period).unwrap().0
@@ -367,7 +367,7 @@ fn settings_replace_numbers_of_a_file() {
 }
 
 /// Connects a file's plant with ports.
-fn connect(text: &str, options: &[(&str, &str)]) -> Result<ClosedLoop<Simulation>, String> {
+fn connect(text: &str, options: &[(&str, &str)]) -> Result<ClosedLoop<Copies>, String> {
     let file = PlantFile::read("p.toml", text).map_err(|mistakes| mistakes.render(false))?;
     let (plant, interface) = file.simulation(PERIOD).map_err(|error| error.to_string())?;
     let inputs = [port("w_ref", 768, Type::F), port("w", 769, Type::F), port("n", 770, Type::I)];
@@ -418,6 +418,49 @@ fn ports_are_matched_by_names_maps_and_options() {
     assert!(expected < -1000 && value(&row, 770) == Some(expected.cast_unsigned()), "{expected}");
     // An option replaces the file's port, and keeps its scale.
     assert!(connect(&text.replace("\nw = 0", ""), &[("w", "w"), ("angle", "n")]).is_ok());
+}
+
+/// Copies of a plant belong to the elements of arrays of ports; an entry for one copy comes before the one for all.
+#[test]
+fn copies_belong_to_arrays_of_ports() {
+    let text = "model = \"dc_motor\"\ncopies = 2\n[ports]\nu = { port = \"u\", scale = 2 }\n[disturbance]\nload = 0.1\n\"load[2]\" = 0\n[inputs]\n\
+                ref = 7\n\"ref[2]\" = 8";
+    let file = PlantFile::read("p.toml", text).unwrap();
+    let (plant, interface) = file.simulation(PERIOD).unwrap();
+    assert_eq!(interface.inputs[2..], [("u[2]".to_owned(), false), ("load[2]".to_owned(), true)]);
+    assert_eq!(interface.sensors_named("w"), [0, 3]);
+    assert_eq!((file.is_leg(0), interface.states[3].as_str()), (false, "i[2]"));
+    let array = |name: &str, first: usize| {
+        [1_usize, 2].map(|i| port(&format!("{name}[{i}]"), first + i - 1, Type::F))
+    };
+    let inputs = [array("w", 768), array("ref", 770)].concat();
+    let connection = file.connect(&interface, &inputs, &array("u", 0), &[]).unwrap();
+    let mut closed = ClosedLoop::new(plant, interface.clone(), connection, PERIOD);
+    for _ in 0..4000 {
+        closed.advance(|register| Some((6.0 + register.index() as f32).to_bits())).unwrap();
+    }
+    let mut row = Vec::new();
+    closed.set_inputs(&mut row);
+    let (r, k, b) = (1.0, 0.08, 1e-4);
+    for (at, (voltage, load)) in [(12.0, 0.1), (14.0, 0.0)].into_iter().enumerate() {
+        near(closed.plant().sensors()[3 * at], (k * voltage - r * load) / (k * k + r * b), 1e-9);
+    }
+    let values: Vec<(usize, f32)> = row.iter().map(|(r, bits)| (r.index(), f32::from_bits(*bits))).collect();
+    assert_eq!(values[2..], [(770, 7.0), (771, 8.0)]);
+    for (text, expected) in [
+        (text.replace("copies = 2", "copies = 17"), "`copies` must be a whole number from 1 to 16"),
+        (text.replace("model = \"dc_motor\"", "fmu = \"a.fmu\""), "an FMU is one plant"),
+        (text.replace("load[2]", "load[3]"), "no input `load[3]`"),
+        (text.replace("copies = 2\n", ""), "no input `load[2]`"),
+        (text.replace("port = \"u\"", "port = \"v\""), "no output port `v[1]` for the plant's `u[1]`"),
+    ] {
+        let message = PlantFile::read("p.toml", &text)
+            .and_then(|file| {
+                file.connect(&file.interface().unwrap(), &inputs, &array("u", 0), &[]).map(|_| ())
+            })
+            .unwrap_err();
+        assert!(message.render(false).contains(expected), "{}", message.render(false));
+    }
 }
 
 #[test]

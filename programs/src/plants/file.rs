@@ -2,7 +2,7 @@
 //! A plant's file in TOML (docs/plant.md): every mistake with its place.
 
 use super::models::MODELS;
-use super::{Interface, MOST_STEPS, Model, Quantity, Simulation, SimulationError};
+use super::{Copies, Interface, MOST_STEPS, Model, Quantity, Simulation, SimulationError, indexed_parts};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -16,6 +16,8 @@ use toml::de::{DeTable, DeValue};
 pub const TEXT_BYTES: usize = 1 << 20;
 /// Seconds that an FMU may take for a step, unless its file says otherwise.
 pub const STEP_LIMIT: f64 = 10.0;
+/// Most copies of a plant.
+const MOST_COPIES: u32 = 16;
 /// Code of all mistakes.
 pub(super) const CODE: &str = "plant";
 
@@ -108,6 +110,12 @@ pub(super) struct Entry<T> {
     pub(super) value: T,
 }
 
+/// Entry of a signal: its own, or, of a copy's signal, the one for all copies.
+pub(super) fn entry_of<'e, T>(list: &'e [Entry<T>], signal: &str) -> Option<&'e Entry<T>> {
+    let named = |name: &str| list.iter().find(|entry| entry.name == name);
+    named(signal).or_else(|| named(indexed_parts(signal)?.0))
+}
+
 /// The plant that a file names.
 #[derive(Clone, Debug)]
 pub enum Kind {
@@ -152,6 +160,8 @@ pub struct PlantFile {
     pub kind: Kind,
     /// Steps of the plant in a period, at least.
     pub steps: u32,
+    /// Copies of a small plant, each with signals of its own, `w[1]` and so on; 1: one plant, whose signals have no index.
+    pub copies: u32,
     pub(super) ports: Vec<Entry<PortOf>>,
     pub(super) disturbances: Vec<Entry<Course>>,
     pub(super) inputs: Vec<Entry<Course>>,
@@ -193,6 +203,7 @@ impl PlantFile {
             sources: Arc::default(),
             kind: Kind::Fmu { path: path.to_owned(), start: Vec::new(), limit: STEP_LIMIT },
             steps: 1,
+            copies: 1,
             ports: Vec::new(),
             disturbances: Vec::new(),
             inputs: Vec::new(),
@@ -213,7 +224,7 @@ impl PlantFile {
 
     /// A mistake about a signal, at its entry under `[ports]` if it has one.
     pub fn mistake_of(&self, signal: &str, message: String) -> Diagnostics {
-        let entry = self.ports.iter().find(|entry| entry.name == signal);
+        let entry = entry_of(&self.ports, signal);
         let mistake = match entry {
             Some(entry) => Diagnostic::error(CODE, entry.place, message),
             None => Diagnostic::placeless(CODE, message),
@@ -297,16 +308,31 @@ impl PlantFile {
         }
     }
 
+    fn interface_of(&self, model: &Model) -> Interface {
+        let interface = model.interface();
+        if self.copies > 1 { interface.of_copies(self.copies) } else { interface }
+    }
+
+    /// Signals of the small plant; `None` for an FMU.
+    pub fn interface(&self) -> Option<Interface> {
+        self.model().map(|model| self.interface_of(model))
+    }
+
+    /// The input of this index is the duty of a half bridge whose switches the model has.
+    pub fn is_leg(&self, input: usize) -> bool {
+        self.model().is_some_and(|model| input % model.inputs.len().max(1) < model.legs())
+    }
+
     /// The small plant in motion, with its signals. `period` is in seconds.
     ///
     /// # Errors
     /// If the plant is an FMU, or too fast for the period.
-    pub fn simulation(&self, period: f64) -> Result<(Simulation, Interface), SimulationError> {
+    pub fn simulation(&self, period: f64) -> Result<(Copies, Interface), SimulationError> {
         let Kind::Model { model, parameters, initial } = &self.kind else {
             return Err(SimulationError::Fmu);
         };
         let simulation = Simulation::new(model, parameters.clone(), initial, period, self.steps)?;
-        Ok((simulation, model.interface()))
+        Ok((Copies(vec![simulation; self.copies as usize]), self.interface_of(model)))
     }
 }
 
@@ -395,9 +421,10 @@ impl Reader {
     }
 
     fn file(&mut self, table: &DeTable<'_>) -> Option<PlantFile> {
-        const KEYS: [&str; 10] = [
+        const KEYS: [&str; 11] = [
             "model",
             "fmu",
+            "copies",
             "steps",
             "limit",
             "parameters",
@@ -414,6 +441,7 @@ impl Reader {
         }
         let get = |key: &str| table.get(key);
         let steps = get("steps").map_or(Some(1), |value| self.whole("steps", value, 1, MOST_STEPS));
+        let copies = get("copies").map_or(Some(1), |value| self.whole("copies", value, 1, MOST_COPIES));
         let kind = self.kind(table);
         let ports = self.table(get("ports"), "ports", |reader, _, value| reader.port(value));
         let inputs = self.table(get("inputs"), "inputs", |reader, _, value| reader.course(value, None));
@@ -424,13 +452,15 @@ impl Reader {
         };
         let disturbances = self.table(get("disturbance"), "disturbance", |reader, (name, _), value| {
             let unit = model.and_then(|model| {
+                let name = indexed_parts(name).map_or(name, |(name, _)| name);
                 let known = model.inputs.iter().find(|one| one.quantity.name == name);
                 known.map(|one| one.quantity.unit)
             });
             reader.course(value, unit)
         });
         let sources = Arc::clone(&self.sources);
-        Some(PlantFile { sources, kind: kind?, steps: steps?, ports, disturbances, inputs, pins })
+        let (steps, copies) = (steps?, copies?);
+        Some(PlantFile { sources, kind: kind?, steps, copies, ports, disturbances, inputs, pins })
     }
 
     fn kind(&mut self, table: &DeTable<'_>) -> Option<Kind> {
@@ -477,6 +507,10 @@ impl Reader {
             }
             (None, Some(path)) => {
                 let path = self.text("fmu", path)?.to_owned();
+                if let Some(copies) = get("copies") {
+                    let text = "`copies` is for a model; an FMU is one plant";
+                    let _ = self.mistake(span(copies.span()), text);
+                }
                 if let Some(initial) = get("initial") {
                     let text = "`initial` is for the states of a model; variables of an FMU start as [parameters] says";
                     let _ = self.mistake(span(initial.span()), text);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! A plant between the output and the input ports of a program.
 
-use super::file::{self, CODE, Course, Entry, PlantFile, PortOf, UNLIMITED, listed};
-use super::{Interface, Plant};
+use super::file::{self, CODE, Course, Entry, PlantFile, PortOf, UNLIMITED, entry_of, listed};
+use super::{Interface, Plant, indexed_parts};
 use std::sync::Arc;
 use takt_diagnostics::diag::{Diagnostic, Diagnostics};
 use takt_diagnostics::nearest;
@@ -163,10 +163,12 @@ impl Connector<'_> {
     /// Port of a signal, with its entry: of the map, or of equal name. Reports a mapped one that does not exist.
     fn port_of(&mut self, signal: &str, ports: &[Port], kind: &str) -> Option<(Port, PortOf)> {
         let find = |name: &str| ports.iter().find(|port| port.name == name).cloned();
-        let Some(entry) = self.ports.iter().find(|entry| entry.name == signal).cloned() else {
+        let Some(entry) = entry_of(&self.ports, signal).cloned() else {
             return find(signal).map(|port| (port, PortOf::named(signal)));
         };
-        let PortOf { port, .. } = &entry.value;
+        // What is for all copies names an array of ports.
+        let index = indexed_parts(signal).filter(|_| entry.name != signal).map_or("", |(_, index)| index);
+        let port = &format!("{}{index}", entry.value.port);
         let found = find(port);
         if found.is_none() {
             let near = nearest(port, ports.iter().map(|port| port.name.as_str()));
@@ -181,8 +183,12 @@ impl Connector<'_> {
     fn connect(&mut self, inputs: &[Port], outputs: &[Port]) -> Connection {
         let Interface { name: plant, inputs: takes, sensors: gives, .. } = self.interface;
         let names = || takes.iter().map(|(name, _)| name.as_str()).chain(gives.iter().map(String::as_str));
+        let copies = self.file.copies;
+        let is_signal = |name: &str, entry: &str| {
+            name == entry || copies > 1 && indexed_parts(name).is_some_and(|(of, _)| of == entry)
+        };
         for entry in self.ports.clone() {
-            if !names().any(|name| name == entry.name) {
+            if !names().any(|name| is_signal(name, &entry.name)) {
                 let near = nearest(&entry.name, names());
                 let text = format!("the plant `{plant}` has no signal `{}`", entry.name);
                 let mistake = self.mistake(entry.place, text);
@@ -190,7 +196,7 @@ impl Connector<'_> {
             }
         }
         for entry in &self.file.disturbances {
-            if !takes.iter().any(|(name, _)| *name == entry.name) {
+            if !takes.iter().any(|(name, _)| is_signal(name, &entry.name)) {
                 let known = || takes.iter().map(|(name, _)| name.as_str());
                 let near = nearest(&entry.name, known());
                 let text = format!("the plant `{plant}` has no input `{}`", entry.name);
@@ -199,8 +205,8 @@ impl Connector<'_> {
             }
         }
         let sources = takes.iter().map(|(signal, is_disturbance)| {
-            let course = self.file.disturbances.iter().find(|entry| entry.name == *signal);
-            let mapped = self.ports.iter().find(|entry| entry.name == *signal).map(|entry| entry.place);
+            let course = entry_of(&self.file.disturbances, signal);
+            let mapped = entry_of(&self.ports, signal).map(|entry| entry.place);
             if let (Some(course), Some(_)) = (course, mapped) {
                 let text = format!("`{signal}` has a port, and a course under [disturbance]: one must go");
                 let _ = self.mistake(course.place, text);
@@ -236,7 +242,7 @@ impl Connector<'_> {
             };
             if let Some(other) = sensors.iter().find(|other| other.port.register == port.register) {
                 let other = &gives[other.index];
-                let place = self.ports.iter().find(|entry| entry.name == *signal || entry.name == *other);
+                let place = entry_of(&self.ports, signal).or_else(|| entry_of(&self.ports, other));
                 let place = place.map_or(Default::default(), |entry| entry.place);
                 let text =
                     format!("the input port `{}` gets `{other}` and `{signal}`: one must go", port.name);
@@ -246,7 +252,11 @@ impl Connector<'_> {
         }
         let mut courses = Vec::new();
         for entry in &self.file.inputs {
-            let Some(port) = inputs.iter().find(|port| port.name == entry.name) else {
+            let own = |port: &&Port| {
+                entry_of(&self.file.inputs, &port.name).is_some_and(|own| own.name == entry.name)
+            };
+            let named: Vec<&Port> = inputs.iter().filter(own).collect();
+            if named.is_empty() {
                 let known = || inputs.iter().map(|port| port.name.as_str());
                 let near = nearest(&entry.name, known());
                 let text = format!("the program has no input port `{}`", entry.name);
@@ -254,16 +264,18 @@ impl Connector<'_> {
                 *mistake =
                     mistake.clone().help(format!("input ports: {}", listed(known()))).did_you_mean(near);
                 continue;
-            };
-            if let Some(sensor) = sensors.iter().find(|sensor| sensor.port.register == port.register) {
-                let signal = &gives[sensor.index];
-                let text = format!(
-                    "the input port `{}` gets the plant's `{signal}`, and a course here: one must go",
-                    port.name
-                );
-                let _ = self.mistake(entry.place, text);
             }
-            courses.push((port.clone(), entry.value.clone()));
+            for port in named {
+                if let Some(sensor) = sensors.iter().find(|sensor| sensor.port.register == port.register) {
+                    let signal = &gives[sensor.index];
+                    let text = format!(
+                        "the input port `{}` gets the plant's `{signal}`, and a course here: one must go",
+                        port.name
+                    );
+                    let _ = self.mistake(entry.place, text);
+                }
+                courses.push((port.clone(), entry.value.clone()));
+            }
         }
         if sensors.is_empty() && self.mistakes.is_empty() {
             let text = format!(

@@ -135,6 +135,16 @@ impl Model {
     }
 }
 
+/// Name of a signal of a copy of a plant, from 1 on.
+fn indexed(name: &str, copy: u32) -> String {
+    format!("{name}[{copy}]")
+}
+
+/// Name and index, in brackets, of a signal that belongs to a copy.
+fn indexed_parts(name: &str) -> Option<(&str, &str)> {
+    name.ends_with(']').then(|| name.find('[').map(|at| name.split_at(at)))?
+}
+
 /// Names of a plant's signals.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct Interface {
@@ -146,6 +156,31 @@ pub struct Interface {
     pub sensors: Vec<String>,
     /// Variables to be recorded in each period.
     pub states: Vec<String>,
+}
+
+impl Interface {
+    /// Interface of copies of a plant, with signals from `w[1]` on.
+    fn of_copies(self, copies: u32) -> Interface {
+        let each = |names: &[String]| {
+            (1..=copies).flat_map(|copy| names.iter().map(move |name| indexed(name, copy))).collect()
+        };
+        let inputs = |copy: u32| {
+            self.inputs.iter().map(move |(name, is_disturbance)| (indexed(name, copy), *is_disturbance))
+        };
+        Interface {
+            inputs: (1..=copies).flat_map(inputs).collect(),
+            sensors: each(&self.sensors),
+            states: each(&self.states),
+            name: self.name,
+        }
+    }
+
+    /// Indices of the sensors that a name stands for: the one of this name, or those of all copies.
+    pub fn sensors_named(&self, name: &str) -> Vec<usize> {
+        let is_one =
+            |sensor: &String| sensor == name || indexed_parts(sensor).is_some_and(|(of, _)| of == name);
+        self.sensors.iter().enumerate().filter(|(_, sensor)| is_one(sensor)).map(|(index, _)| index).collect()
+    }
 }
 
 /// A plant in motion.
@@ -187,6 +222,37 @@ pub struct Simulation {
     /// Longest step of integration, s.
     longest: f64,
     state: State,
+}
+
+/// Copies of a small plant in motion, one after the other in inputs, sensors and states.
+#[derive(Clone, Debug)]
+pub struct Copies(Vec<Simulation>);
+
+impl Copies {
+    /// Moves for a time in s under switches, as [`Simulation::advance_switched`] does.
+    pub fn advance_switched(&mut self, duration: f64, legs: &[Leg], inputs: &[f64]) {
+        let copies = self.0.len().max(1);
+        let legs = legs.chunks((legs.len() / copies).max(1)).chain(std::iter::repeat(&[][..]));
+        let inputs = inputs.chunks((inputs.len() / copies).max(1));
+        for ((plant, legs), inputs) in self.0.iter_mut().zip(legs).zip(inputs) {
+            plant.advance_switched(duration, legs, inputs);
+        }
+    }
+}
+
+impl Plant for Copies {
+    fn advance(&mut self, inputs: &[f64]) -> Result<(), String> {
+        let each = (inputs.len() / self.0.len().max(1)).max(1);
+        self.0.iter_mut().zip(inputs.chunks(each)).try_for_each(|(plant, inputs)| plant.advance(inputs))
+    }
+
+    fn sensors(&self) -> Vec<f64> {
+        self.0.iter().flat_map(Plant::sensors).collect()
+    }
+
+    fn states(&self) -> Vec<f64> {
+        self.0.iter().flat_map(Plant::states).collect()
+    }
 }
 
 /// Reason why there is no small plant in motion.

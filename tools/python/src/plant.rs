@@ -10,7 +10,7 @@ use takt_asm::units;
 use takt_diagnostics::diag::Diagnostics;
 use takt_isa::program::Port;
 use takt_programs::plants::file::{TEXT_BYTES, is_fmu};
-use takt_programs::plants::{ClosedLoop, Connection, Interface, Model, PlantFile};
+use takt_programs::plants::{ClosedLoop, Connection, Interface, PlantFile};
 
 import_exception!(takt._errors, PlantError);
 
@@ -62,8 +62,7 @@ fn interface(file: &PlantFile, path: &Path) -> PyResult<Interface> {
     if let Some(fmu) = file.fmu(path) {
         return Ok(takt_fmu_plant::Fmu::open(&fmu).map_err(unfit)?.interface());
     }
-    let model = file.model().map(Model::interface);
-    model.ok_or_else(|| unfit(format!("{}: FMUs run on Linux and macOS only", path.display())))
+    file.interface().ok_or_else(|| unfit(format!("{}: FMUs run on Linux and macOS only", path.display())))
 }
 
 impl Plant {

@@ -13,7 +13,7 @@ use takt_asm::units;
 use takt_emu::{Emulator, Rows};
 use takt_isa::Program;
 use takt_programs::PLANTS;
-use takt_programs::plants::{ClosedLoop, Connection, Model, PlantFile, Simulation};
+use takt_programs::plants::{ClosedLoop, Connection, Copies, PlantFile};
 
 /// Request for a plant.
 #[derive(Clone, Deserialize)]
@@ -32,7 +32,7 @@ fn name(file: &str) -> &str {
 
 /// Connects a plant to a program.
 fn connect(file: &PlantFile, program: &Program) -> Result<Connection, String> {
-    let interface = file.model().map(Model::interface).unwrap_or_default();
+    let interface = file.interface().unwrap_or_default();
     let connection = file.connect(&interface, &program.inputs, &program.outputs, &[]);
     connection.map_err(|mistakes| mistakes.render(false).trim().to_owned())
 }
@@ -98,7 +98,7 @@ pub(crate) fn close(
     })?;
     let (simulation, interface) = plant.simulation(period).map_err(|error| error.to_string())?;
     let rest = connection.rest.iter().map(|port| (port.register, 0)).collect::<Vec<_>>();
-    let mut closed: ClosedLoop<Simulation> = ClosedLoop::new(simulation, interface, connection, period);
+    let mut closed: ClosedLoop<Copies> = ClosedLoop::new(simulation, interface, connection, period);
     let mut emulator = Emulator::new(program).map_err(|error| error.to_string())?;
     let mut rows = Rows::new();
     for at in 0..recorded.map_or(periods, Vec::len).min(PERIODS) {

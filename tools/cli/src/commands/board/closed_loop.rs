@@ -42,7 +42,7 @@ const SCALE: f64 = 1e-4;
 /// A plant in motion.
 enum Motion {
     /// Under switches.
-    Switched(plants::Simulation),
+    Switched(plants::Copies),
     /// Under the mean values of a period.
     Averaged(Box<dyn Plant>),
 }
@@ -130,8 +130,7 @@ impl<'a> PlantAtPins<'a> {
         let file = plant::read(path, color)?;
         let options = plant::connections(connect)?;
         let period = f64::from(wiring.period) / (wiring.clock * 1e6);
-        let legs = file.model().map_or(0, |model| model.legs());
-        let (motion, interface) = if legs > 0 {
+        let (motion, interface) = if file.is_leg(0) {
             let (plant, interface) = file.simulation(period)?;
             (Motion::Switched(plant), interface)
         } else {
@@ -146,21 +145,21 @@ impl<'a> PlantAtPins<'a> {
             .map_err(|text| Failure::Usage(text.replace(", or give columns with --inputs", "")))?;
         let drives = connection.sources.iter().zip(&interface.inputs).enumerate();
         let drives = drives
-            .map(|(i, (source, (signal, _)))| drive(&file, signal, source, wiring, i < legs))
+            .map(|(i, (source, (signal, _)))| drive(&file, signal, source, wiring, file.is_leg(i)))
             .collect::<Result<Vec<Drive>, Diagnostics>>()
             .map_err(failure(color))?;
         let signals = motion.plant().sensors();
         let mut measurements: Vec<Measurement> = Vec::new();
-        let mut fed: Vec<(&str, &str)> = Vec::new();
         for sensor in &connection.sensors {
             let signal = &interface.sensors[sensor.index];
-            let (measurement, name) =
-                measurement(&file, signal, sensor, wiring, &signals).map_err(failure(color))?;
-            if let Some((other, _)) = fed.iter().find(|(_, peripheral)| *peripheral == name) {
-                let text = format!("`{other}` and `{signal}` feed the same device, `{name}`: one must go");
+            let measurement = measurement(&file, signal, sensor, wiring, &signals).map_err(failure(color))?;
+            let shares =
+                |other: &&Measurement| other.driven.iter().any(|pin| measurement.driven.contains(pin));
+            if let Some(other) = measurements.iter().find(shares) {
+                let other = &interface.sensors[other.sensor.index];
+                let text = format!("`{other}` and `{signal}` feed the same pins: one must go");
                 return Err(failure(color)(file.mistake_of(signal, text)));
             }
-            fed.push((signal, name));
             measurements.push(measurement);
         }
         let pins = file_pins(&file, &interface, pins).map_err(failure(color))?;
@@ -232,14 +231,14 @@ fn drive(
     Ok(Drive::Leg { actuator, is_mirrored })
 }
 
-/// Finds the device behind a sensor, and its peripheral's name.
-fn measurement<'w>(
+/// Finds the device behind a sensor.
+fn measurement(
     file: &PlantFile,
     signal: &str,
     sensor: &Sensor,
-    wiring: &'w Wiring,
+    wiring: &Wiring,
     signals: &[f64],
-) -> Result<(Measurement, &'w str), Diagnostics> {
+) -> Result<Measurement, Diagnostics> {
     let port = &sensor.port.name;
     let mistake = |text: String| file.mistake_of(signal, text);
     let Some((peripheral, register)) = device::reader(wiring, port) else {
@@ -260,13 +259,12 @@ fn measurement<'w>(
     let device = device.map_err(|text| mistake(format!("`{signal}` at port `{port}`: {text}")))?;
     let pins = device.pins();
     let circuit = |pin: &str| format!("{}_{pin}", peripheral.name);
-    let measurement = Measurement {
+    Ok(Measurement {
         sensor: sensor.clone(),
         device,
         needed: pins.needed.iter().map(|(pin, edge)| (circuit(pin), *edge)).collect(),
         driven: pins.driven.iter().map(|pin| circuit(pin)).collect(),
-    };
-    Ok((measurement, &peripheral.name))
+    })
 }
 
 /// Input pins under `[pins]`.
@@ -278,13 +276,14 @@ fn file_pins(file: &PlantFile, interface: &Interface, pins: &Pins) -> Result<Vec
         if let PinCourse::Comparator { signals: names, .. } = course {
             for name in names {
                 let all = || interface.sensors.iter().map(String::as_str);
-                let Some(index) = all().position(|sensor| sensor == name) else {
+                let named = interface.sensors_named(name);
+                if named.is_empty() {
                     let near = nearest(name, all());
                     let near = near.map_or_else(String::new, |near| format!("; did you mean `{near}`?"));
                     let text = format!("the plant `{}` has no sensor `{name}`{near}", interface.name);
                     return Err(file.mistake(place, text));
-                };
-                signals.push(index);
+                }
+                signals.extend(named);
             }
         }
         found.push(FilePin { circuit, course: course.clone(), signals });
@@ -714,7 +713,14 @@ impl Rows {
             ports::write_row(out, titles.iter().cloned())?;
         }
         let period = f64::from(plant.wiring.period) / (plant.wiring.clock * 1e6);
-        let curves = draws.then(|| Curves::new(titles, Some(period)));
+        // Pins of a peripheral share a chart.
+        let grouped = |title: String| match title.split_once('.') {
+            Some((name, pin)) if plant.wiring.peripherals.iter().any(|of| of.name == name) => {
+                format!("{name}[{pin}]")
+            }
+            _ => title,
+        };
+        let curves = draws.then(|| Curves::new(titles.into_iter().map(grouped).collect(), Some(period)));
         Ok(Rows { outputs, curves, most, written: 0 })
     }
 }
