@@ -13,11 +13,23 @@ const TITLE: u32 = 40;
 const CHARTS: usize = 40;
 /// Characters beside a chart.
 const NAME: usize = 18;
+/// Width of a character in a chart's labels, in pixels.
+const LABEL: u32 = 8;
 /// Characters of a line of constants, and its height in pixels.
 const LINE: usize = 110;
 const LINE_HEIGHT: u32 = 22;
-/// Color of a reference, below the signal that follows it.
-const REFERENCE: RGBColor = RGBColor(0xd5, 0x5e, 0x00);
+/// Colors of a chart's curves: a signal's, and the reference's below it, or an array's elements'; told apart by the colour-blind, too
+/// (Okabe and Ito).
+const COLORS: [RGBColor; 8] = [
+    CUT,
+    RGBColor(0xd5, 0x5e, 0x00),
+    RGBColor(0x00, 0x9e, 0x73),
+    RGBColor(0xcc, 0x79, 0xa7),
+    RGBColor(0xe6, 0x9f, 0x00),
+    RGBColor(0x56, 0xb4, 0xe9),
+    RGBColor(0x55, 0x55, 0x55),
+    RGBColor(0xb5, 0xa8, 0x00),
+];
 
 /// Least and largest value of each column in a stretch of periods.
 #[derive(Clone)]
@@ -34,6 +46,11 @@ pub(crate) struct Curves {
     every: u64,
     rows: u64,
     stretches: Vec<Stretch>,
+}
+
+/// Name of the array of which a name such as `motor.ia[2]` is an element.
+fn array(name: &str) -> Option<&str> {
+    name.strip_suffix(']')?.rsplit_once('[').map(|(of, _)| of)
 }
 
 impl Curves {
@@ -82,9 +99,11 @@ impl Curves {
         all.reduce(|(low, high), (a, b)| (low.min(a), high.max(b)))
     }
 
-    /// Columns of each chart: one, or a signal with the reference that it follows (`id`, or a plant's `motor.id`, and `id_ref`).
+    /// Columns of each chart: one, an array's elements, or a signal with the reference that it follows (`id`, or a plant's `motor.id`, and
+    /// `id_ref`).
     fn charts(&self) -> Vec<Vec<usize>> {
         let mut charts: Vec<Vec<usize>> = Vec::new();
+        let arrays: Vec<Option<&str>> = self.titles.iter().map(|name| array(name)).collect();
         let follows = |name: &str, reference: &str| {
             let signal = name.rsplit('.').next().unwrap_or(name);
             reference.rsplit('.').next().and_then(|text| text.strip_suffix("_ref")) == Some(signal)
@@ -92,6 +111,13 @@ impl Curves {
         let signal_of = |reference: &str| self.titles.iter().position(|name| follows(name, reference));
         for (column, name) in self.titles.iter().enumerate() {
             if signal_of(name).is_some() {
+                continue;
+            }
+            if let Some(of) = arrays[column] {
+                let elements: Vec<usize> = (0..arrays.len()).filter(|at| arrays[*at] == Some(of)).collect();
+                if elements[0] == column {
+                    charts.extend(elements.chunks(COLORS.len()).map(<[usize]>::to_vec));
+                }
                 continue;
             }
             let reference = self.titles.iter().position(|other| signal_of(other) == Some(column));
@@ -114,6 +140,10 @@ impl Curves {
 
     /// Name beside a chart: that of the column, without its plant or peripheral if the chart is too low for it.
     fn name(&self, columns: &[usize]) -> String {
+        if let Some(of) = self.array(columns) {
+            let whole = of.chars().count() > NAME;
+            return if whole { of.rsplit('.').next().unwrap_or(of) } else { of }.to_owned();
+        }
         let joined = |short: bool| {
             let names = columns.iter().map(|column| self.titles[*column].as_str());
             let last = |name| if short { str::rsplit(name, '.').next().unwrap_or(name) } else { name };
@@ -121,6 +151,12 @@ impl Curves {
         };
         let whole = joined(false);
         if whole.chars().count() > NAME { joined(true) } else { whole }
+    }
+
+    /// Name of the array whose elements a chart has.
+    fn array(&self, columns: &[usize]) -> Option<&str> {
+        let of = array(&self.titles[*columns.first()?])?;
+        columns.iter().all(|column| array(&self.titles[*column]) == Some(of)).then_some(of)
     }
 
     /// The picture.
@@ -171,7 +207,7 @@ impl Curves {
             let mut chart = chart(&area).build_cartesian_2d(0.0..end, low - margin..high + margin)?;
             mesh(&mut chart, if number + 1 == charts.len() { label } else { "" }, &self.name(columns))?;
             // The reference lies below.
-            for (column, color) in columns.iter().zip([CUT, REFERENCE]).rev() {
+            for (column, color) in columns.iter().zip(COLORS).rev() {
                 // Steps, as the values are held; a stretch of many periods has both of its ends.
                 let points = self.stretches.iter().enumerate().filter_map(|(index, stretch)| {
                     let (low, high) = stretch.ranges.get(*column).copied().flatten()?;
@@ -179,6 +215,16 @@ impl Curves {
                     Some([(from, low), (from, high), (to, high)])
                 });
                 chart.draw_series(LineSeries::new(points.flatten(), color.stroke_width(px(1))))?;
+            }
+            if self.array(columns).is_some() {
+                let mut right = SIZE - LABEL;
+                for (column, color) in columns.iter().zip(COLORS).rev() {
+                    let index =
+                        self.titles[*column].rsplit('[').next().unwrap_or_default().trim_end_matches(']');
+                    right = right.saturating_sub(LABEL * index.chars().count() as u32 + 2 * LABEL);
+                    let style = font(13).with_color(color).into_text_style(&area);
+                    area.draw_text(index, &style, (px(right) as i32, 0))?;
+                }
             }
         }
         root.present()?;
@@ -221,6 +267,20 @@ mod tests {
         assert_eq!(curves.parted(), (vec![vec![1, 0], vec![4, 3]], vec!["tripped = 1".to_owned()]));
         let svg = curves.draw("loop").unwrap();
         assert!(["id over id_ref", "w over w_ref", "tripped = 1"].iter().all(|text| svg.contains(text)));
+    }
+
+    /// Elements of an array share a chart, each in its colour, with its index.
+    #[test]
+    fn arrays_share_a_chart() {
+        let titles = ["i[1]", "u", "i[2]", "m.w[1]", "m.w[2]"].map(str::to_owned);
+        let mut curves = Curves::new(titles.to_vec(), Some(1e-3));
+        for row in 0..10 {
+            curves.add(&[&row.to_string(), "3", "4", "5", "5"].map(str::to_owned));
+        }
+        let still = ["u = 3", "m.w[1] = 5", "m.w[2] = 5"].map(str::to_owned).to_vec();
+        assert_eq!(curves.parted(), (vec![vec![0, 2]], still));
+        let svg = curves.draw("loop").unwrap();
+        assert!(svg.contains("\ni\n") && svg.contains("\n1\n") && svg.contains("\n2\n"), "{svg}");
     }
 
     #[test]
