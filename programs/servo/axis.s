@@ -1,6 +1,7 @@
 ; SPDX-License-Identifier: MIT OR Apache-2.0
 ; An axis of a servo drive: `current_loop` in every period, `motion` every tenth. `servo.s` has one axis, `six.s` six on one core.
 ;
+; The program that includes this states `FULL`, the output for a duty of 1.
 ; The motor is that of `examples/foc.s`: four pole pairs, 48 V, encoder of 17 bits with turns. Positions are in turns, speeds in turns/s.
 .include <motor.s>
 
@@ -65,7 +66,11 @@
         dead_time b, ib, LOSS, BAND
         al = -(ia + ib)
         dead_time c, al, LOSS, BAND
+        .if FULL == 1
         da, db, dc = a, b, c
+        .else
+        da, db, dc = a*FULL, b*FULL, c*FULL
+        .endif
 .endm
 
 ; The faults of one period, added to those latched.

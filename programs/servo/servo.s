@@ -1,5 +1,6 @@
 ; SPDX-License-Identifier: MIT OR Apache-2.0
 ; A servo axis: current loop at 100 kHz, profile, position and speed at 10 kHz, homing, latched faults.
+.const  FULL  = 1                       ; duties are parts of the carrier
 .include "axis.s"
 .schedule on
 

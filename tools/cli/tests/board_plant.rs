@@ -99,6 +99,45 @@ fn a_motor_at_pins_moves_as_without_them() {
     assert!(trip.column("bridge.low_b")[at + 2..].iter().all(|part| *part == 1.0));
 }
 
+/// Six axes on one core at their pins: each moves as its goal says; a cable that is pulled stops its own axis; a comparator stops all without a clock.
+#[test]
+fn six_axes_at_pins_move_and_stop_alone() {
+    let folder = Folder::new();
+    let shipped = |name: &str| {
+        let path = format!("{}/../../programs/servo/{name}", env!("CARGO_MANIFEST_DIR"));
+        std::fs::read_to_string(path).unwrap()
+    };
+    for name in ["axis.s", "six_axes.s", "six_pins.s", "six_pins.toml"] {
+        folder.write(name, shipped(name));
+    }
+    let text = shipped("six_plant.toml");
+    let (begin, end) = (text.find("\"goal[1]\"").unwrap(), text.find("[pins]").unwrap());
+    let goals = "goal = 0\n\"goal[1]\" = 0.002\n\"goal[2]\" = -0.002\n\n";
+    let pins = text[end..].replace("[[0.022, 0]]", "[[0.004, 0]]");
+    let (pins, _) = pins.split_once("overcurrent").unwrap();
+    folder.write(
+        "plant.toml",
+        text[..begin].to_owned() + goals + pins + "overcurrent = [[0, 0], [0.005, 1], [0.00501, 0]]\n",
+    );
+    let files = "--wiring six_pins.toml --program six_pins.s --plant plant.toml";
+    let done = sim(&folder, &format!("{files} --periods 520 --outputs six.csv --plot six.svg"));
+    assert_eq!(done.status, Some(0), "{done:?}");
+    assert!(done.stderr.contains("the trip `overcurrent` is held: `bridge1`, `bridge2`"), "{done:?}");
+    let table = Table::of(&folder, "six.csv");
+    let turns = |axis: u32, period: usize| {
+        table.column(&format!("pmsm_switched.angle[{axis}]"))[period] / std::f64::consts::TAU
+    };
+    assert!(turns(1, 490) > 2e-3 && (turns(1, 490) + turns(2, 490)).abs() < 1e-4, "{}", turns(2, 490));
+    assert!([3, 6].iter().all(|axis| turns(*axis, 490).abs() < 1e-4), "the others stay");
+    // The cable is pulled in period 400; the others go on until the comparator trips.
+    let high = |axis: u32, period: usize| table.column(&format!("bridge{axis}.high_a"))[period];
+    let drives = |period: usize| (1..=6).filter(|axis| high(*axis, period) > 0.0).collect::<Vec<_>>();
+    assert_eq!(drives(399), [1, 2, 3, 4, 5, 6]);
+    assert_eq!(drives(402), [1, 2, 3, 4, 6]);
+    assert_eq!(drives(502), [0_u32; 0]);
+    assert!(folder.read_text("six.svg").contains("\nca\n"));
+}
+
 const WIRING: &str = r#"board = "ulx3s-85f"
 clock = 60
 baud = 1_000_000
