@@ -265,7 +265,9 @@ function build() {
     for (const row of made) rows.set(row.name, row);
     order.push(...made);
     section.hidden = !made.length;
-    section.querySelector(".rows").replaceChildren(...made.map(({ element }) => element));
+    // What the host sets comes first.
+    const shown = [...made.filter(({ output }) => !output), ...made.filter(({ output }) => output)];
+    section.querySelector(".rows").replaceChildren(...shown.map(({ element }) => element));
   }
   el("names").replaceChildren(...hello.channels.map((value) => node("option", { value })));
   if (!scopeNames.length) scopeNames = stored("scope", hello.outputs.slice(0, 2).map(({ name }) => name)).filter((name) => typeof name === "string");
