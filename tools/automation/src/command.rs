@@ -5,6 +5,7 @@ use anyhow::{Context, Result, bail};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::sync::{Mutex, PoisonError};
 
 /// Root folder of the project.
 pub fn root() -> PathBuf {
@@ -103,6 +104,9 @@ pub fn install() -> Result<()> {
 /// # Errors
 /// If apt-get fails.
 pub fn apt_install(packages: &[&str]) -> Result<()> {
+    // apt-get refuses to run twice at once.
+    static BUSY: Mutex<()> = Mutex::new(());
+    let _one = BUSY.lock().unwrap_or_else(PoisonError::into_inner);
     eprintln!("installing {} with apt-get", packages.join(" "));
     run(Command::new("apt-get").args(["update", "-qq"]))?;
     let mut install = Command::new("apt-get");

@@ -6,6 +6,7 @@ use crate::command::{apt_install, root};
 use anyhow::Result;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::{Mutex, PoisonError};
 use takt_board::tools::{self, ToolError};
 
 pub use takt_board::tools::YOSYS;
@@ -39,6 +40,9 @@ impl Venv {
     /// Opens an environment with these packages; creates it and installs missing packages.
     pub fn with(packages: &[&str]) -> Result<Venv> {
         let folder = std::env::var_os("TAKT_VENV").map_or_else(|| root().join(".venv"), PathBuf::from);
+        // pip installs for one at a time.
+        static BUSY: Mutex<()> = Mutex::new(());
+        let _one = BUSY.lock().unwrap_or_else(PoisonError::into_inner);
         eprintln!("installing {} in {}", packages.join(", "), folder.display());
         let with = || tools::Venv::with(&folder, packages);
         let venv = match with() {

@@ -3,6 +3,9 @@
 
 use crate::{boards, certificates, clients, fmu_windows, formal, linuxcnc, litex, routed};
 use anyhow::{Result, ensure};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
+use std::thread;
 use takt_automation::check_cache::{self, Inputs, LINUXCNC, OPERANDS};
 use takt_automation::command::install;
 use takt_automation::progress;
@@ -66,22 +69,48 @@ pub(crate) fn check(arguments: &Arguments) -> Result<()> {
         ensure!(names.contains(&name.as_str()), "there is no check `{name}`; there are {}", names.join(", "));
     }
     install()?;
+    let mut due = Vec::new();
     for share in &SHARES {
         let is_named = arguments.names.iter().any(|name| name == share.name);
         if is_named || arguments.all || arguments.names.is_empty() && share.is_short {
-            match share.inputs {
-                Some(inputs) => check_cache::once(share.name, &inputs()?, is_named, share.run)?,
-                None => progress::step(share.name, share.run)?,
-            }
+            due.push((share, is_named));
         } else if arguments.names.is_empty() {
             check_cache::leave_out(share.name, "takes longer");
         }
     }
+    at_once(&due)?;
     if arguments.names.is_empty() {
         check_cache::leave_out(OPERANDS, "takes longer");
     }
     print!("{}", check_cache::left_out());
     Ok(())
+}
+
+/// Runs checks, those that were named even if they have passed: one on each core, since their solvers have one thread.
+fn at_once(due: &[(&Share, bool)]) -> Result<()> {
+    let run = |(share, is_named): &(&Share, bool)| match share.inputs {
+        Some(inputs) => check_cache::once(share.name, &inputs()?, *is_named, share.run),
+        None => progress::step(share.name, share.run),
+    };
+    let (next, failed) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
+    let cores = thread::available_parallelism().map_or(1, usize::from);
+    thread::scope(|scope| {
+        for _ in 0..cores.min(due.len()) {
+            scope.spawn(|| {
+                while let Some(share) = due.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    if let Err(error) = run(share) {
+                        failed.lock().unwrap_or_else(PoisonError::into_inner).push((share.0.name, error));
+                    }
+                }
+            });
+        }
+    });
+    let mut failed = failed.into_inner().unwrap_or_else(PoisonError::into_inner).into_iter();
+    let Some((name, error)) = failed.next() else { return Ok(()) };
+    for (name, error) in failed {
+        eprintln!("error: {name}: {error:#}");
+    }
+    Err(error.context(format!("the check `{name}` failed")))
 }
 
 #[cfg(test)]
