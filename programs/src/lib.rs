@@ -74,6 +74,8 @@ pub const EXAMPLES: &[(&str, &str)] = &[
     ("kalman.s", include_str!("../examples/kalman.s")),
     ("lu.csv", include_str!("../examples/lu.csv")),
     ("lu.s", include_str!("../examples/lu.s")),
+    ("pendulum.csv", include_str!("../examples/pendulum.csv")),
+    ("pendulum.s", include_str!("../examples/pendulum.s")),
     ("pi.csv", include_str!("../examples/pi.csv")),
     ("pi.s", include_str!("../examples/pi.s")),
     ("statespace.csv", include_str!("../examples/statespace.csv")),
@@ -138,6 +140,15 @@ pub const LIBRARY: &[(&str, &str)] = &[
     ("motor.s", include_str!("../library/motor.s")),
     ("signal.s", include_str!("../library/signal.s")),
 ];
+
+/// Title of a program: the first sentence of its first comment, up to a colon.
+#[must_use]
+pub fn title(source: &str) -> String {
+    let lines = source.lines().map_while(|line| line.strip_prefix(';')).map(str::trim);
+    let text = lines.take_while(|line| !line.is_empty()).collect::<Vec<_>>().join(" ");
+    let end = [". ", ": ", "; "].iter().filter_map(|mark| text.find(mark)).min().unwrap_or(text.len());
+    text[..end].trim_end_matches('.').to_owned()
+}
 
 #[cfg(test)]
 mod tests {

@@ -32,6 +32,7 @@ const CASES: &[Case] = &[
     Case { periods: 2600, ..case("blink", || Box::<reference::Blink>::default(), 0.0) },
     case("pi", || Box::new(reference::Pi::new([0.8, 12.0])), 1e-5),
     Case { inputs: "pi", ..case("gains", || Box::new(reference::Pi::new([0.3, 4.0])), 1e-5) },
+    case("pendulum", || Box::<reference::Pendulum>::default(), 2e-6),
     case("foc", || Box::<reference::Foc>::default(), 2e-6),
     Case { inputs: "foc", ..case("foc_early", || Box::<reference::FocEarly>::default(), 5e-6) },
     case("biquads", || Box::<reference::Biquads>::default(), 1e-5),

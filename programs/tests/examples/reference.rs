@@ -44,6 +44,19 @@ impl Reference for Pi {
     }
 }
 
+/// Feedback of the state, with the integral of the position's error.
+#[derive(Default)]
+pub(crate) struct Pendulum(f64);
+
+impl Reference for Pendulum {
+    fn period(&mut self, inputs: &[f64]) -> Vec<f64> {
+        let [angle, rate, x, v, wanted] = inputs else { panic!("five inputs") };
+        let force = 6.32 * (x - wanted) + 5.65 * v + 29.18 * angle + 4.87 * rate + self.0;
+        self.0 += 2e-3 * (x - wanted);
+        vec![force.clamp(-20.0, 20.0)]
+    }
+}
+
 #[derive(Default)]
 pub(crate) struct Foc {
     integral: [f64; 2],

@@ -243,12 +243,21 @@ fn standard_output_has_rows_only() {
 fn loops_have_the_bits_of_the_playground() {
     let folder = Folder::new();
     let programs = concat!(env!("CARGO_MANIFEST_DIR"), "/../../programs");
-    for (name, plant) in [("pi", "dc_motor"), ("foc", "pmsm")] {
-        let (program, inputs) =
-            (format!("{programs}/examples/{name}.s"), format!("{programs}/examples/{name}.csv"));
+    let loops = [
+        ("pi", "dc_motor", Some("pi")),
+        ("foc", "pmsm", Some("foc")),
+        ("foc_early", "pmsm", Some("foc")),
+        ("pendulum", "cart_pendulum", None),
+    ];
+    for (name, plant, table) in loops {
+        let program = format!("{programs}/examples/{name}.s");
         let plant = format!("{programs}/examples/plant/{plant}.toml");
+        // Without a table, the other inputs are those of the plant's file.
+        let inputs = table.map_or(["--periods".to_owned(), "400".to_owned()], |table| {
+            ["--inputs".to_owned(), format!("{programs}/examples/{table}.csv")]
+        });
         let told =
-            folder.takt(&["run", &program, "--plant", &plant, "--inputs", &inputs, "--outputs", "-"]).ok();
+            folder.takt(&["run", &program, "--plant", &plant, &inputs[0], &inputs[1], "--outputs", "-"]).ok();
         let rows: Vec<Vec<&str>> = told.lines().map(|line| line.split(',').collect()).collect();
         let keep = |title: &&str| !title.contains('.') && *title != "cycles";
         let kept: Vec<usize> = (0..rows[0].len()).filter(|at| keep(&rows[0][*at])).collect();

@@ -64,7 +64,7 @@ def test_a_dc_motor_moves_as_scipy_says():
 
 
 def test_a_pendulum_stays_upright_as_scipy_says():
-    columns = table(PLANTS / "pendulum.s", "--plant", PLANTS / "cart_pendulum.toml", "--periods", 2500)
+    columns = table(EXAMPLES / "pendulum.s", "--plant", PLANTS / "cart_pendulum.toml", "--periods", 2500)
     M, m, l, b, c, g = 0.5, 0.2, 0.3, 0.1, 1e-3, 9.80665
 
     def pendulum(time, x, force):
@@ -140,7 +140,7 @@ def test_a_synchronous_motor_moves_as_motulator_s(tmp_path, model):
 
 
 @pytest.mark.parametrize(("program", "plant", "periods"), [
-    ("pi.s", "dc_motor", 400), ("foc.s", "pmsm", 400), ("pi.s", "tank", 600), ("plant/servo.s", "servo", 600), ("plant/pendulum.s", "cart_pendulum", 500),
+    ("pi.s", "dc_motor", 400), ("foc.s", "pmsm", 400), ("pi.s", "tank", 600), ("plant/servo.s", "servo", 600), ("pendulum.s", "cart_pendulum", 500),
 ])
 def test_a_table_fed_back_gives_the_same_outputs(tmp_path, program, plant, periods):
     """The plant sees only outputs: its table, as recorded inputs, gives them again; the loop is the same a second time."""
@@ -412,7 +412,7 @@ def in_python(run, columns, plant):
 
 
 @pytest.mark.parametrize(("program", "file", "periods"), [
-    ("pi.s", "dc_motor", 400), ("foc.s", "pmsm", 400), ("pi.s", "tank", 300), ("plant/servo.s", "servo", 600), ("plant/pendulum.s", "cart_pendulum", 2100),
+    ("pi.s", "dc_motor", 400), ("foc.s", "pmsm", 400), ("pi.s", "tank", 300), ("plant/servo.s", "servo", 600), ("pendulum.s", "cart_pendulum", 2100),
 ])
 def test_python_s_loops_are_those_of_the_command(program, file, periods):
     plant, law = package.Plant(PLANTS / f"{file}.toml"), package.load(EXAMPLES / program, effort=20)

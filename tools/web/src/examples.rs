@@ -6,18 +6,25 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 use std::sync::OnceLock;
 use takt_isa::MACHINES;
-use takt_programs::{EXAMPLES, SOURCES};
+use takt_programs::{EXAMPLES, SOURCES, title};
 
 /// Examples from `programs/examples` that come first in the list, in this order; all others follow.
-const FIRST: [&str; 4] = ["pi.s", "gains.s", "foc.s", "blink.s"];
+const FIRST: [&str; 5] = ["pi.s", "gains.s", "pendulum.s", "foc.s", "blink.s"];
 /// Number of periods after which an example without inputs shows an effect.
-const PERIODS_OF: [(&str, usize); 1] = [("blink.s", 2000)];
+const PERIODS_OF: [(&str, usize); 2] = [("blink.s", 2000), ("pendulum.s", 6000)];
 /// Seconds that assembling takes in a browser, for the page to announce until it has measured them.
 const SECONDS_OF: [(&str, u32); 2] = [("tracking.s", 3), ("statespace.s", 2)];
 /// Plants that close the loops of examples: files of [`takt_programs::PLANTS`], without the extension.
-const PLANT_OF: [(&str, &str); 3] = [("foc.s", "pmsm"), ("gains.s", "dc_motor"), ("pi.s", "dc_motor")];
-/// Tables of inputs that do not have their example's name.
-const INPUTS_OF: [(&str, &str); 2] = [("foc_early.s", "foc.csv"), ("gains.s", "pi.csv")];
+const PLANT_OF: [(&str, &str); 5] = [
+    ("foc.s", "pmsm"),
+    ("foc_early.s", "pmsm"),
+    ("gains.s", "dc_motor"),
+    ("pendulum.s", "cart_pendulum"),
+    ("pi.s", "dc_motor"),
+];
+/// Tables of inputs that do not have their example's name; without a table, the plant's file has the inputs that the plant leaves.
+const INPUTS_OF: [(&str, Option<&str>); 3] =
+    [("foc_early.s", Some("foc.csv")), ("gains.s", Some("pi.csv")), ("pendulum.s", None)];
 /// Program that controls the robot.
 pub(crate) const TRACKING: &str = "hybrid/tracking.s";
 
@@ -46,11 +53,6 @@ pub(crate) fn source(wanted: Source) -> Result<Value, String> {
     text.ok_or_else(|| format!("there is no file `{name}` to be shown"))
 }
 
-/// Description of an example: the first comment.
-fn title(source: &str) -> &str {
-    source.lines().find_map(|line| line.strip_prefix(';')).map_or("", str::trim)
-}
-
 /// Data that the page needs at its start.
 pub(crate) fn about() -> Value {
     let text = |name: &str| EXAMPLES.iter().find(|(known, _)| *known == name).map(|(_, text)| *text);
@@ -64,7 +66,7 @@ pub(crate) fn about() -> Value {
     let example = |name: &str| {
         let source = text(name)?;
         let table = INPUTS_OF.iter().find(|(known, _)| *known == name).map(|(_, table)| *table);
-        let inputs = text(table.unwrap_or(&name.replace(".s", ".csv")));
+        let inputs = table.unwrap_or(Some(&name.replace(".s", ".csv"))).and_then(text);
         let periods = PERIODS_OF.iter().find(|(known, _)| *known == name).map(|(_, periods)| periods);
         Some(
             json!({ "name": name, "title": title(source), "source": source, "inputs": inputs, "periods": periods, "seconds": seconds(name), "plant": plant(name), "track": false }),

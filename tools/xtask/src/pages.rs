@@ -8,7 +8,7 @@ use clap::Args;
 use std::fmt::Write;
 use std::path::Path;
 use takt_automation::command::root;
-use takt_programs::EXAMPLES;
+use takt_programs::{EXAMPLES, title};
 
 /// What is done beyond writing the folder.
 #[derive(Args)]
@@ -49,11 +49,10 @@ fn examples(folder: &Path) -> Result<()> {
         if !name.ends_with(".s") {
             continue;
         }
-        let title = text.lines().find_map(|line| line.strip_prefix(';')).map_or("", str::trim);
         let _ = writeln!(
             list,
             "<li><a href=\"../playground/index.html#example={name}\">{name}</a>: {} (<a href=\"{name}.txt\">source</a>)</li>",
-            title.replace('&', "&amp;").replace('<', "&lt;")
+            title(text).replace('&', "&amp;").replace('<', "&lt;")
         );
     }
     let page = format!(

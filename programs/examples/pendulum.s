@@ -11,8 +11,8 @@
 .const  KI   = 2                        ; N/(m·s)
 .const  FMAX = 20                       ; N
 
-.input  x, v                            ; m, m/s: the cart
 .input  angle, rate                     ; rad, rad/s: the pendulum; 0 is upright
+.input  x, v                            ; m, m/s: the cart
 .input  x_ref                           ; m
 .output force                           ; N
 
