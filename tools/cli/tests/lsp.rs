@@ -642,11 +642,32 @@ fn completion_offers_valid_operands() {
         &["p2", "x", "K", "sqrt", "pi"],
         &["i", "period", "tmp", "fadd"],
     );
+    // An instruction that there is not may be a macro yet to be written.
+    has(&labels("fadd    F, p1, p2\n", "fadx    F, p\n"), &["p1", "p2", "x", "K", "sqrt"], &["fadd"]);
     has(&labels("p{i}, 2\n", "p{i}, \n"), &["i", "p2", "K"], &["fadd"]);
     has(&labels("wait    period\n", "wait    pe\n"), &["period"], &["p1", "K"]);
     has(&labels("n:int\n", "n:i\n"), &["int", "float", "bits"], &["p1"]);
     has(&labels(".schedule on\n", ".schedule o\n"), &["on", "off"], &["p1"]);
     has(&labels(".include \"part.s\"\n", ".include <\n"), &["math.s"], &["part.s"]);
+    session.end();
+}
+
+/// Names are known in the operands of an instruction that there is not.
+#[test]
+fn operands_of_an_unknown_instruction_are_followed() {
+    let mut session = Session::new(&[("main.s", MAIN), ("part.s", PART)]);
+    session.open("main.s", MAIN);
+    let text = session.edit("main.s", MAIN, "fadd    F, p1, p2\n", "fadx    F, p1, p2\n");
+    session.told("main.s");
+    let mut place = session.at("main.s", &text, "fadx    F");
+    place["position"]["character"] = (place["position"]["character"].as_u64().unwrap() + 8).into();
+    let hover = session.ask("textDocument/hover", place.clone());
+    assert!(hover["contents"]["value"].as_str().unwrap().starts_with("**F**: output port"), "{hover}");
+    let definition = session.ask("textDocument/definition", place.clone());
+    assert_eq!(definition[0]["range"]["start"], position(&text, ".output F", 8), "{definition}");
+    // The unknown instruction itself is no name.
+    let mnemonic = session.at("main.s", &text, "fadx");
+    assert_eq!(session.ask("textDocument/hover", mnemonic), Value::Null);
     session.end();
 }
 

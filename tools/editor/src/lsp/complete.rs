@@ -2,7 +2,7 @@
 //! Completion at a position.
 
 use crate::lsp::program::{File, Front};
-use crate::lsp::{Settings, hover};
+use crate::lsp::{Settings, hover, names};
 use lsp_types::{
     CompletionItem, CompletionItemKind, CompletionTextEdit, Documentation, InsertTextFormat, MarkupContent,
     MarkupKind, Range, TextEdit,
@@ -11,7 +11,6 @@ use std::collections::BTreeMap;
 use takt_asm::Directive;
 use takt_asm::expr::{BUILTINS, Function};
 use takt_asm::index::SymbolKind;
-use takt_asm::source::Span;
 use takt_asm::tokens::{self, Token, TokenKind};
 use takt_isa::{Machine, Op, Operand, ROWS, Row, Type};
 
@@ -267,33 +266,6 @@ fn beginnings(wanted: &CompletionOptions<'_>, front: &Front) -> Vec<CompletionIt
     items
 }
 
-/// First and last line, from 0, of the macro that contains a byte of a file.
-fn macro_around(front: &Front, file: &File, byte: usize) -> Option<(usize, usize)> {
-    let line = file.text.line_of(byte);
-    front.index.blocks.iter().filter(|block| block.directive == Directive::Macro).find_map(|block| {
-        let (number, bytes) = front.files.place(block.open)?;
-        let (first, last) = (file.text.line_of(bytes.start), block.last_line as usize - 1);
-        (std::ptr::eq(&front.files.0[number], file) && (first..=last).contains(&line))
-            .then_some((first, last))
-    })
-}
-
-/// The byte lies in the repetition whose index is declared at `span`.
-fn repeats(front: &Front, file: &File, byte: usize, span: Span) -> bool {
-    let line = file.text.line_of(byte);
-    let mut counting = front.index.blocks.iter().filter(|block| {
-        matches!(block.directive, Directive::Rep | Directive::For)
-            && (block.open.start..block.open.end).contains(&span.start)
-    });
-    counting.any(|block| {
-        let open = front.files.place(block.open);
-        open.is_some_and(|(number, bytes)| {
-            let lines = file.text.line_of(bytes.start)..block.last_line as usize;
-            std::ptr::eq(&front.files.0[number], file) && lines.contains(&line)
-        })
-    })
-}
-
 /// Names of the given kinds that are visible at a place.
 fn named(
     wanted: &CompletionOptions<'_>,
@@ -302,21 +274,11 @@ fn named(
     byte: usize,
     kinds: &[SymbolKind],
 ) -> Vec<CompletionItem> {
-    let around = macro_around(front, file, byte);
     let mut items: BTreeMap<String, CompletionItem> = BTreeMap::new();
-    for symbol in front.index.symbols.iter().filter(|symbol| kinds.contains(&symbol.kind)) {
-        let Some((number, bytes)) = front.files.place(symbol.span) else { continue };
-        let of = &front.files.0[number];
-        let within = macro_around(front, of, bytes.start);
-        if symbol.kind == SymbolKind::Count && !repeats(front, file, byte, symbol.span) {
+    for (_, symbol, name) in names::visible(front, file, byte) {
+        if !kinds.contains(&symbol.kind) {
             continue;
         }
-        // Names in a macro are visible only within its body.
-        if within.is_some() && (within != around || !std::ptr::eq(of, file)) {
-            continue;
-        }
-        let name =
-            if within.is_some() { front.files.text(symbol.span).to_owned() } else { symbol.name.clone() };
         let kind = match symbol.kind {
             SymbolKind::Constant | SymbolKind::Count => CompletionItemKind::CONSTANT,
             SymbolKind::Code | SymbolKind::Data => CompletionItemKind::REFERENCE,
@@ -325,7 +287,8 @@ fn named(
         };
         let ty = symbol.ty.map_or(String::new(), |ty| format!(":{}", ty.name()));
         let detail = format!("{}{ty}", symbol.kind.text());
-        items.entry(name.clone()).or_insert_with(|| wanted.item(&name, kind, detail, name.clone()));
+        let item = wanted.item(name, kind, detail, name.to_owned());
+        items.entry(name.to_owned()).or_insert(item);
     }
     items.into_values().collect()
 }

@@ -2,7 +2,7 @@
 //! Hover texts in Markdown for the item under the cursor. Texts for instructions, directives and functions are taken from the tables.
 
 use crate::lsp::program::{CountedProgram, File, Front};
-use crate::lsp::{plural, timing};
+use crate::lsp::{names, plural, timing};
 use std::fmt::Write as _;
 use takt_asm::Directive;
 use takt_asm::expr::{BUILTINS, Function, Value};
@@ -23,7 +23,7 @@ pub(crate) fn hover(
     file: &File,
     byte: usize,
 ) -> Option<(std::ops::Range<usize>, String)> {
-    if let Some((span, symbols)) = front.at(file.base + byte as u32) {
+    if let Some((span, symbols)) = names::at(front, file, byte) {
         let mut text = String::new();
         for (number, symbol) in symbols.iter().map(|symbol| front.symbol(*symbol)).enumerate().take(TOLD) {
             if number > 0 {

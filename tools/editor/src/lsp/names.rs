@@ -2,15 +2,15 @@
 //! Definitions and references of names, and renames.
 
 use crate::lsp::Settings;
-use crate::lsp::program::{self, Front};
+use crate::lsp::program::{self, File, Front};
 use crate::lsp::text::Encoding;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use takt_asm::Open;
-use takt_asm::index::SymbolKind;
+use takt_asm::index::{Symbol, SymbolKind};
 use takt_asm::source::Span;
 use takt_asm::tokens::{self, TokenKind};
+use takt_asm::{Directive, Open};
 use takt_isa::Op;
 
 /// Edits by file: byte ranges with their replacements.
@@ -32,6 +32,78 @@ fn renamed(reference: &str, old: &str, new: &str) -> Option<String> {
         return None;
     }
     Some(format!("{new}{}", reference.strip_prefix(old)?))
+}
+
+/// First and last line, from 0, of the macro that contains a byte of a file.
+fn macro_around(front: &Front, file: &File, byte: usize) -> Option<(usize, usize)> {
+    let line = file.text.line_of(byte);
+    front.index.blocks.iter().filter(|block| block.directive == Directive::Macro).find_map(|block| {
+        let (number, bytes) = front.files.place(block.open)?;
+        let (first, last) = (file.text.line_of(bytes.start), block.last_line as usize - 1);
+        (std::ptr::eq(&front.files.0[number], file) && (first..=last).contains(&line))
+            .then_some((first, last))
+    })
+}
+
+/// The byte lies in the repetition whose index is declared at `span`.
+fn repeats(front: &Front, file: &File, byte: usize, span: Span) -> bool {
+    let line = file.text.line_of(byte);
+    let mut counting = front.index.blocks.iter().filter(|block| {
+        matches!(block.directive, Directive::Rep | Directive::For)
+            && (block.open.start..block.open.end).contains(&span.start)
+    });
+    counting.any(|block| {
+        let open = front.files.place(block.open);
+        open.is_some_and(|(number, bytes)| {
+            let lines = file.text.line_of(bytes.start)..block.last_line as usize;
+            std::ptr::eq(&front.files.0[number], file) && lines.contains(&line)
+        })
+    })
+}
+
+/// Symbols that can be named at a byte of a file: number, symbol, and name as it is written there.
+pub(crate) fn visible<'a>(
+    front: &'a Front,
+    file: &'a File,
+    byte: usize,
+) -> impl Iterator<Item = (u32, &'a Symbol, &'a str)> {
+    let around = macro_around(front, file, byte);
+    (0..).zip(&front.index.symbols).filter_map(move |(number, symbol)| {
+        let (place, bytes) = front.files.place(symbol.span)?;
+        let of = &front.files.0[place];
+        if symbol.kind == SymbolKind::Count && !repeats(front, file, byte, symbol.span) {
+            return None;
+        }
+        // Names in a macro are visible only within its body.
+        let Some(within) = macro_around(front, of, bytes.start) else {
+            return Some((number, symbol, symbol.name.as_str()));
+        };
+        let is_here = Some(within) == around && std::ptr::eq(of, file);
+        is_here.then(|| (number, symbol, front.files.text(symbol.span)))
+    })
+}
+
+/// Symbols that the name at a byte of a file stands for, with the span of the name. Operands of an unknown instruction stand for what
+/// is visible there.
+pub(crate) fn at(front: &Front, file: &File, byte: usize) -> Option<(Span, Vec<u32>)> {
+    if let Some(found) = front.at(file.base + byte as u32) {
+        return Some(found);
+    }
+    let line = file.text.line(file.text.line_of(byte))?;
+    let code = &file.text.text[line.clone()];
+    let lines = tokens::lines(code);
+    let (head, operands) = lines.first()?.split_first()?;
+    let head = (head.kind == TokenKind::Name).then(|| &code[head.range.clone()])?;
+    let here = |token: &&tokens::Token| (token.range.start..=token.range.end).contains(&(byte - line.start));
+    let token = operands.iter().find(|token| token.kind == TokenKind::Name && here(token))?;
+    let word = &code[token.range.clone()];
+    if Op::from_mnemonic(head).is_some() || Op::from_mnemonic(word).is_some() {
+        return None;
+    }
+    let found: Vec<u32> =
+        visible(front, file, byte).filter(|one| one.2 == word).map(|(number, ..)| number).collect();
+    let span = file.span(line.start + token.range.start..line.start + token.range.end);
+    (!found.is_empty()).then_some((span, found))
 }
 
 /// Name at a place, as spelled in its declaration: start of a rename.

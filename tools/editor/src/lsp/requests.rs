@@ -245,7 +245,7 @@ impl Server {
             let start = here.front.files.0.get(*file).map_or(0, |file| file.base);
             return Ok(self.location(here.front, Span::new(start, start)).into_iter().collect());
         }
-        let Some((_, symbols)) = here.front.at(offset) else { return Ok(Vec::new()) };
+        let Some((_, symbols)) = names::at(here.front, here.file, byte) else { return Ok(Vec::new()) };
         let mut spans: Vec<Span> = symbols.iter().map(|symbol| here.front.symbol(*symbol).span).collect();
         spans.dedup();
         Ok(spans.into_iter().filter_map(|span| self.location(here.front, span)).collect())
@@ -313,7 +313,7 @@ impl Server {
         for (_, front) in self.fronts(&path) {
             let Some(file) = front.files.of(&path) else { continue };
             let byte = file.text.byte(at.position, self.client.encoding);
-            let Some((_, symbols)) = front.at(file.base + byte as u32) else { continue };
+            let Some((_, symbols)) = names::at(front, file, byte) else { continue };
             for reference in front.references(&symbols) {
                 let declares = front.symbol(reference.symbol).span == reference.span;
                 if (params.context.include_declaration || !declares)
@@ -330,7 +330,7 @@ impl Server {
     fn highlights(&self, params: &TextDocumentPositionParams) -> Result<Vec<DocumentHighlight>, Failed> {
         let encoding = self.client.encoding;
         let (here, byte) = self.at(params)?;
-        let Some((_, symbols)) = here.front.at(here.file.base + byte as u32) else { return Ok(Vec::new()) };
+        let Some((_, symbols)) = names::at(here.front, here.file, byte) else { return Ok(Vec::new()) };
         let places = here.front.references(&symbols).into_iter().filter_map(|reference| {
             let (file, range) = here.front.files.range(reference.span, encoding)?;
             std::ptr::eq(file, here.file).then_some(DocumentHighlight { range, kind: None })
