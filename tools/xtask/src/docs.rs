@@ -36,6 +36,7 @@ fn generated() -> [(&'static str, String); 7] {
 pub(crate) fn run(root: &Path, check: bool) -> Result<()> {
     let generated = generated().into_iter().map(|(path, contents)| (PathBuf::from(path), contents));
     let mut generated: BTreeMap<PathBuf, String> = generated.collect();
+    generated.insert(PathBuf::from("README.md"), crate::release::readme(root)?);
     // Generated documents contain figures as well.
     generated.extend(crate::figures::documents(root, &generated)?);
     let stale = documents::update(generated, check)?;

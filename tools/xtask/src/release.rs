@@ -27,6 +27,13 @@ const FMU_WINDOWS: &str = "x86_64-pc-windows-gnu";
 /// Linker for Windows, from Debian's package `gcc-mingw-w64-x86-64`.
 const MINGW: &str = "x86_64-w64-mingw32-gcc";
 const VERSION: &str = env!("CARGO_PKG_VERSION");
+/// Address of the folder that serves a release's files; none is published yet. The README's installation is written from it.
+const ADDRESS: Option<&str> = None;
+/// Begin and end of the installation in the README.
+const INSTALL: [&str; 2] = [
+    "<!-- install: from `ADDRESS` in tools/xtask/src/release.rs, by `cargo xtask docs` -->\n",
+    "<!-- installed -->",
+];
 
 /// The contents of a release.
 #[derive(clap::Args)]
@@ -60,6 +67,40 @@ const PARTS: [Artefact; 7] = [
     ("circuit", circuit),
     ("crates", crates),
 ];
+
+/// The README with the installation from a release's files.
+pub(crate) fn readme(root: &Path) -> Result<String> {
+    let text = fs::read_to_string(root.join("README.md")).context("cannot read README.md")?;
+    let parts = text.split_once(INSTALL[0]).and_then(|(before, rest)| {
+        let (_, after) = rest.split_once(INSTALL[1])?;
+        Some((before, after))
+    });
+    let (before, after) = parts.with_context(|| format!("README.md has no `{}`", INSTALL[0].trim()))?;
+    Ok(format!("{before}{}{}{}{after}", INSTALL[0], installation(ADDRESS), INSTALL[1]))
+}
+
+/// How to install a release that is at an address, or that is yet to be built.
+fn installation(address: Option<&str>) -> String {
+    let [x86, aarch] = TARGETS;
+    let (from, fetch) = match address {
+        Some(address) => (
+            format!("A release is at <{address}>:"),
+            format!("curl -LO {address}/takt-{VERSION}-{x86}.tar.gz\n"),
+        ),
+        None => (
+            "No release is published yet; `cargo xtask release` writes its files into `target/release-files`:"
+                .to_owned(),
+            String::new(),
+        ),
+    };
+    format!(
+        "{from}\n`takt` for Linux on x86-64 and aarch64 as one file that needs nothing else, the wheel for Python, the extension for VS Code,\n\
+         configurations for other editors, the playground and the book.\n\n\
+         ```sh\n{fetch}tar xzf takt-{VERSION}-{x86}.tar.gz        # or -{aarch}\n\
+         sudo install takt-{VERSION}-{x86}/takt /usr/local/bin\n\
+         takt track\n```\n"
+    )
+}
 
 /// Entry of `cargo xtask release`.
 pub(crate) fn release(arguments: &Arguments) -> Result<()> {
@@ -209,4 +250,27 @@ fn sums(out: &Path) -> Result<()> {
     fs::write(out.join("SHA256SUMS"), &sums.stdout)?;
     print!("{}", String::from_utf8_lossy(&sums.stdout));
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn installation_downloads_from_the_address() {
+        let text = installation(Some("https://example.org/takt"));
+        let file = format!("takt-{VERSION}-{}.tar.gz", TARGETS[0]);
+        assert!(
+            text.contains(&format!("curl -LO https://example.org/takt/{file}\ntar xzf {file}")),
+            "{text}"
+        );
+        let text = installation(None);
+        assert!(text.contains("cargo xtask release") && !text.contains("curl"), "{text}");
+    }
+
+    #[test]
+    fn the_readme_keeps_its_installation() {
+        let text = fs::read_to_string(root().join("README.md")).expect("it is there");
+        assert_eq!(readme(&root()).expect("it has the place"), text, "`cargo xtask docs` writes it");
+    }
 }
