@@ -21,9 +21,9 @@ pub(crate) struct Arguments {
     /// Keep pictures of the page in this folder (with --test).
     #[arg(long, value_name = "FOLDER", requires = "test")]
     screenshots: Option<PathBuf>,
-    /// Write the README's moving picture, docs/pictures/loop.svg.
+    /// Write the documents' pictures of it: docs/pictures/loop.svg, which moves, and docs/pictures/playground.png.
     #[arg(long)]
-    moving_picture: bool,
+    pictures: bool,
 }
 
 /// Folder of the finished page; any file server can serve it.
@@ -54,10 +54,8 @@ const SMALL: [&str; 15] = [
 
 pub(crate) fn web(arguments: &Arguments) -> Result<()> {
     build()?;
-    if arguments.moving_picture {
-        let mut draw = Command::new("node");
-        draw.arg("moving.mjs").arg(root().join(COMPILED)).arg(root().join("docs/pictures/loop.svg"));
-        run(draw.current_dir(packages()?))?;
+    if arguments.pictures {
+        pictures()?;
     }
     if arguments.test {
         test(arguments)?;
@@ -84,6 +82,24 @@ pub(crate) fn build() -> Result<()> {
         "the playground is in {PAGE}: `python3 -m http.server -d {PAGE}` serves it on http://localhost:8000"
     );
     Ok(())
+}
+
+/// Draws the pictures of the documents.
+fn pictures() -> Result<()> {
+    chromium()?;
+    for (script, from, to) in
+        [("moving.mjs", COMPILED, "loop.svg"), ("photograph.mjs", PAGE, "playground.png")]
+    {
+        let mut draw = Command::new("node");
+        draw.arg(script).arg(root().join(from)).arg(root().join("docs/pictures").join(to));
+        run(draw.current_dir(packages()?))?;
+    }
+    Ok(())
+}
+
+/// Installs the browser, if it is missing.
+fn chromium() -> Result<()> {
+    if works("chromium", "--version") { Ok(()) } else { apt_install(&["chromium"]) }
 }
 
 /// Folder of the page, with npm packages in pinned versions.
@@ -123,9 +139,7 @@ fn test(arguments: &Arguments) -> Result<()> {
 
 /// Runs a test of the page's folder in a headless browser.
 pub(crate) fn in_browser(test: &str, environment: &[(&str, &Path)]) -> Result<()> {
-    if !works("chromium", "--version") {
-        apt_install(&["chromium"])?;
-    }
+    chromium()?;
     let mut tests = Command::new("node");
     tests.args(["--test", "--test-reporter=spec", test]).current_dir(packages()?);
     run(tests.envs(environment.iter().copied()))

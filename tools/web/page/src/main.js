@@ -6,7 +6,7 @@ import { Drive } from "./drive.js";
 import { Editor, reader } from "./editor.js";
 import { LINK_CHARACTERS, pack, unpack } from "./link.js";
 import { Plots } from "./plot.js";
-import { save } from "./parts.js";
+import { save, short } from "./parts.js";
 import { Stopped, Thread, fetched, load } from "./thread.js";
 import { Tuning } from "./tuning.js";
 import "./style.css";
@@ -18,6 +18,8 @@ const plural = (count, noun) => `${count.toLocaleString("en")} ${noun}${count ==
 const PAUSE = 400, SOON = 1000;
 /** Delay after which a slider's result that is still to come dims the result before; ms. */
 const LATE = 400;
+/** Clock in MHz at which times are stated, as everywhere in Takt's documents. */
+const CLOCK = 125;
 /** Reason given for stopping a worker when another program is opened. */
 const REPLACED = "another program was opened";
 
@@ -67,6 +69,8 @@ function select(name, focus) {
     if (on && focus) tab.focus();
   }
   state.tab = name;
+  // Until somebody steps, the debugger's position is nothing to look at.
+  if (name === "step" || name === "code") document.body.classList.add("steps");
   if (name === "plot") plots.draw();
   if (name === "robot") {
     drive.draw();
@@ -273,6 +277,10 @@ async function open({ name, source, inputs, periods, plant, parameters, changes,
   el("table").value = inputs ?? "";
   el("periods").value = periods ?? PERIODS;
   editor.stops = [];
+  document.body.classList.toggle("steps", ["step", "code"].includes(state.tab));
+  // The menu says which example is open, and offers it again.
+  const example = state.about.examples.find((one) => one.name === state.name && one.source === source);
+  el("example").options[0].textContent = example ? `${example.name}: ${example.title}` : "open one …";
   const opened = editor.open(state.name, source, el("machine").value);
   changed("later");
   state.opening = false;
@@ -337,7 +345,7 @@ function showCycles() {
   const { program, run } = state, out = el("cycles");
   out.replaceChildren();
   out.classList.toggle("now", Boolean(program) && (!program.assembled || Boolean(program.inputs_error)));
-  const put = (content, tag) => out.append(Object.assign(document.createElement(tag ?? "span"), { textContent: content }));
+  const put = (content, tag) => out.appendChild(Object.assign(document.createElement(tag ?? "span"), { textContent: content }));
   if (!program) return put("no program");
   if (!program.assembled) {
     const [first] = program.messages ?? [], at = first?.places?.[0];
@@ -358,6 +366,7 @@ function showCycles() {
   if (least > 0) put(` · no schedule takes fewer than ${least}`);
   for (const section of periods) put(` · ${section.name} takes ${range(section.cycles)} whatever the inputs`);
   if (once) put(` · once ${range(once.cycles)}`);
+  if (run?.cycles.length) put(` · ${run.longest.toLocaleString("en")} cycles are ${short(Number((run.longest / CLOCK).toPrecision(3)))} µs at ${CLOCK} MHz`).className = "clock";
   if (program.no_bound) put(` · no bound: ${program.no_bound}`);
   if (program.parameter_error) put(` · parameters as in the source: ${program.parameter_error}`, "em");
   if (program.plant_error) put(` · the loop is open: ${program.plant_error}`, "em");
@@ -866,7 +875,7 @@ async function start() {
   el("from").addEventListener("change", act);
   el("machine-box").addEventListener("toggle", light);
   for (const [id, ending, type] of [["plot-svg", "svg", "image/svg+xml"], ["plot-csv", "csv", "text/csv"]]) {
-    el(id).addEventListener("click", () => state.run?.cycles.length && save(state.name.replace(/\.s$/, `.${ending}`), plots[ending](), type));
+    el(id).addEventListener("click", () => state.run?.cycles.length && save(state.name.replace(/\.(s|tks)$/, `.${ending}`), plots[ending](), type));
   }
   el("which").addEventListener("change", () => {
     state.which = Math.max(0, Math.round(Number(el("which").value)) || 0);

@@ -16,8 +16,8 @@ const BRIEF = 2;
 const FOLDED = 27;
 /** Minimum and maximum height of a chart in pixels. */
 const LOW = 120, HIGH = 420;
-/** Maximum height of a chart as a fraction of its width. */
-const TALL = 0.6;
+/** Maximum height of a chart as a fraction of its width: on a telephone, sliders are to be seen below the charts. */
+const TALL = 0.6, TALL_NARROW = 0.46, NARROW = 480;
 /** A limit is drawn if a value reaches this fraction of it. */
 const NEAR = 0.4;
 /** Tick distances of an integer axis. */
@@ -148,7 +148,7 @@ export function chart(parent, { x, name: across, label, unit, curves, lines = []
     width: width(), height: height(), padding: [6, 18, 0, 0], scales: { x: { time: false }, y: { range } },
     axes: [{ ...axis, ...(label && { label: unit ? `${label}, ${unit}` : label }), size: 26 }, { ...axis, label: of ?? " ", size, space: 22, ...(whole && { incrs: WHOLE }) }],
     legend: { show: false }, cursor: { ...(sync && { sync: { key: sync } }), points: { size: 7 }, drag: { x: true, y: false } },
-    series: [{}, ...ghosts.map(({ i, ...curve }) => ({ stroke: `${look[i].colour}66`, width: 1.6, points: { show: false }, ...(curve.stepped && { paths: stepped, stepped: true }) })), ...curves.map((curve, i) => ({
+    series: [{}, ...ghosts.map(({ i, ...curve }) => ({ stroke: `${look[i].colour}${style("--pale")}`, width: 1.6, points: { show: false }, ...(curve.stepped && { paths: stepped, stepped: true }) })), ...curves.map((curve, i) => ({
       label: curve.name, stroke: look[i].colour, width: 1.6, dash: look[i].dash, points: { show: true, filter: () => x.length < 40 ? null : alone(curve.values), size: 4 },
       ...(curve.stepped && { paths: stepped, stepped: true }),
     }))],
@@ -277,14 +277,17 @@ export class Plots {
     this.draw();
   }
 
-  /** Curves that are shown initially: some outputs, and every port with its reference (`w` and `w_ref`). */
+  /** Curves that are shown initially: some outputs, every port with its reference (`w` and `w_ref`), and what a plant gives first. */
   initial() {
     const keys = [...this.facts.keys()], outputs = keys.filter((key) => key.startsWith("out "));
     const paired = keys.filter((key) => {
       const name = this.facts.get(key).name, is = (other) => keys.some((key) => this.facts.get(key).name === other);
       return isReference(name) ? is(name.slice(0, -4)) : is(`${name}_ref`);
     });
-    return new Set([...outputs.slice(0, SHOWN), ...paired]);
+    const { plants, plant } = this.program ?? {}, gives = plants?.find(({ name }) => name === plant?.name)?.gives ?? [];
+    const shown = new Set([...outputs.slice(0, SHOWN), ...paired]);
+    for (const key of keys.filter((key) => key.startsWith("in ") && gives.includes(this.facts.get(key).name))) if (shown.size < SHOWN) shown.add(key);
+    return shown;
   }
 
   /** Height of a chart: the charts fill the panel, unless there are too many. */
@@ -292,7 +295,8 @@ export class Plots {
     const panel = this.parent.parentElement, above = this.parent.offsetTop - panel.offsetTop;
     // Space for a chart's title, and the gap below it.
     const room = (panel.clientHeight - above - 16 - folded * FOLDED) / Math.max(1, count) - 32;
-    return Math.round(Math.min(HIGH, TALL * panel.clientWidth, Math.max(LOW, room)));
+    const tall = panel.clientWidth < NARROW ? TALL_NARROW : TALL;
+    return Math.round(Math.min(HIGH, tall * panel.clientWidth, Math.max(LOW, room)));
   }
 
   size() {

@@ -4,7 +4,7 @@ import { save } from "./parts.js";
 
 /** Creates the function that saves a download by name; main.js describes the arguments. */
 export function taker({ machine, work, current, state, editor }) {
-  const stem = () => state.name.replace(/\.s$/, "");
+  const stem = () => state.name.replace(/\.(s|tks)$/, "");
   return (what) => {
     document.getElementById("export").open = false;
     return work(async () => {

@@ -1,16 +1,14 @@
 // The playground in a real browser: `cargo xtask web --test`.
 import assert from "node:assert/strict";
-import { createReadStream, existsSync } from "node:fs";
 import { readFile } from "node:fs/promises";
-import { createServer } from "node:http";
-import { extname, join, normalize } from "node:path";
+import { join } from "node:path";
 import { after, afterEach, before, test } from "node:test";
 import { deflateSync } from "node:zlib";
 import { chromium } from "playwright-core";
+import { serve } from "../serve.mjs";
 import { VISIONS, ciede2000, distance } from "./colours.mjs";
 
 const FOLDER = process.env.TAKT_PAGE;
-const TYPES = { ".html": "text/html", ".js": "text/javascript", ".css": "text/css" };
 const PROGRAMS = join(import.meta.dirname, "../../../../programs");
 /** Time limit in a browser on a busy machine; ms. */
 const PATIENCE = 120_000;
@@ -19,17 +17,7 @@ let server, browser, address, requests = [];
 
 before(async () => {
   assert.ok(FOLDER, "TAKT_PAGE says where the page is: `cargo xtask web --test` sets it");
-  // A plain file server that supports neither WebAssembly types nor compression.
-  server = createServer((request, response) => {
-    const path = normalize(new URL(request.url, "http://x").pathname).replace(/^\/$/, "/index.html");
-    const file = join(FOLDER, path);
-    requests.push(path);
-    if (!existsSync(file)) return response.writeHead(404).end();
-    response.writeHead(200, { "content-type": TYPES[extname(file)] ?? "application/octet-stream" });
-    createReadStream(file).pipe(response);
-  });
-  await new Promise((resolve) => server.listen(0, "127.0.0.1", resolve));
-  address = `http://127.0.0.1:${server.address().port}/`;
+  ({ server, address } = await serve(FOLDER, (path) => requests.push(path)));
   browser = await chromium.launch({ executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", args: ["--no-sandbox"] });
 }, { timeout: PATIENCE });
 
