@@ -63,4 +63,4 @@ const parts = [
   put("path", { d: curves[0], class: "c", stroke: "#2f6fbf", "stroke-width": 2, "clip-path": "url(#c)" }, animate("d", steps, along((i) => curves[i]))),
 ];
 const style = "text{font:12px system-ui,sans-serif;fill:#1c2330}.b{font-weight:600}.d{fill:#5d687b}.m{font:12.5px ui-monospace,'DejaVu Sans Mono',monospace}.c{fill:none}";
-writeFileSync(out, `<!-- Written by \`cargo xtask web --pictures\` -->\n<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 ${WIDTH} ${HEIGHT}" width="${WIDTH}" height="${HEIGHT}"><style>${style}</style>\n${parts.join("\n")}\n</svg>\n`);
+writeFileSync(out, `<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 ${WIDTH} ${HEIGHT}" width="${WIDTH}" height="${HEIGHT}"><desc>Written by \`cargo xtask web --pictures\`</desc><style>${style}</style>\n${parts.join("\n")}\n</svg>\n`);

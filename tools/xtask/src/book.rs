@@ -431,6 +431,21 @@ pub(crate) fn check_links(site: &Path) -> Result<(usize, usize)> {
 mod tests {
     use super::*;
 
+    /// A browser draws a picture only if the file is well-formed; a comment with two hyphens is not.
+    #[test]
+    fn drawings_are_well_formed() {
+        let folder = std::fs::read_dir(root().join("docs/pictures")).expect("it is there");
+        let drawings = folder.map(|entry| entry.expect("it can be read").path());
+        let drawings: Vec<PathBuf> =
+            drawings.filter(|path| path.extension().is_some_and(|e| e == "svg")).collect();
+        assert!(drawings.len() > 5, "{drawings:?}");
+        for path in drawings {
+            let text = std::fs::read_to_string(&path).expect("it is a text");
+            let read = roxmltree::Document::parse(&text).map(|_| ());
+            assert_eq!(read, Ok(()), "{}", path.display());
+        }
+    }
+
     #[test]
     fn listings_get_a_link() {
         let text = "# T\n\n<!-- around:\n.period\n...\n-->\n```asm\na\n```\n\nend\n";
