@@ -9,8 +9,8 @@
 .const  FC = 400                        ; Hz, corner
 .const  N  = 4                          ; sections
 
-.input  x
-.output y
+.input  x                               ; V, measured
+.output y                               ; V, filtered
 
 ; Bilinear transform, prewarped; the pole pairs of a Butterworth filter of order 2N lie at angles of (2i - 1)·90°/2N.
 .const  w0 = 2*pi*FC/FS

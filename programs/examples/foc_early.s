@@ -7,7 +7,7 @@
 .const  T   = 50e-6                     ; s, one PWM period (20 kHz)
 .const  R   = 0.35                      ; Ω, of a phase
 .const  Ld  = 0.9e-3                    ; H
-.const  Lq  = 1.1e-3
+.const  Lq  = 1.1e-3                    ; H
 .const  psi = 0.012                     ; V·s, flux of the magnets
 .const  wc  = 2*pi*800                  ; rad/s, bandwidth of the current loops
 .const  KPd = wc*Ld                     ; V/A: the plant's pole is cancelled

@@ -8,8 +8,8 @@ import { Pen, drawing } from "./svg.js";
 const DASHES = [[], [], [7, 4], [9, 3, 2, 3]], REFERENCE = [2, 3];
 /** Maximum number of curves over one axis. */
 const TOGETHER = COLOURS.length;
-/** Number of outputs that are shown initially. */
-const SHOWN = 4;
+/** Number of outputs that are shown initially, and most inputs that are. */
+const SHOWN = 4, FEW = 2;
 /** Time axis in ms up to this duration in s. */
 const BRIEF = 2;
 /** Height of a folded chart in pixels. */
@@ -141,19 +141,20 @@ export function chart(parent, { x, name: across, label, unit, curves, lines = []
   };
   // Axes of one width, where the values permit it: the times of all charts stand below one another.
   const size = (_, values) => Math.ceil(Math.max(30, ...(values ?? []).map(widthOf))) + 12;
-  const ghosts = curves.map((curve, i) => ({ ...curve, i })).filter(({ before }) => before);
+  // The first curve on top: an output over the inputs and references that follow it.
+  const drawn = curves.map((curve, i) => ({ ...curve, i })).reverse(), ghosts = drawn.filter(({ before }) => before);
   const stepped = uPlot.paths.stepped({ align: 1 });
   const column = (values) => x.map((_, i) => (isNumber(values[i]) ? values[i] : null));
   const plot = new uPlot({
     width: width(), height: height(), padding: [6, 18, 0, 0], scales: { x: { time: false }, y: { range } },
     axes: [{ ...axis, ...(label && { label: unit ? `${label}, ${unit}` : label }), size: 26 }, { ...axis, label: of ?? " ", size, space: 22, ...(whole && { incrs: WHOLE }) }],
     legend: { show: false }, cursor: { ...(sync && { sync: { key: sync } }), points: { size: 7 }, drag: { x: true, y: false } },
-    series: [{}, ...ghosts.map(({ i, ...curve }) => ({ stroke: `${look[i].colour}${style("--pale")}`, width: 1.6, points: { show: false }, ...(curve.stepped && { paths: stepped, stepped: true }) })), ...curves.map((curve, i) => ({
+    series: [{}, ...ghosts.map(({ i, ...curve }) => ({ stroke: `${look[i].colour}${style("--pale")}`, width: 1.6, points: { show: false }, ...(curve.stepped && { paths: stepped, stepped: true }) })), ...drawn.map(({ i, ...curve }) => ({
       label: curve.name, stroke: look[i].colour, width: 1.6, dash: look[i].dash, points: { show: true, filter: () => x.length < 40 ? null : alone(curve.values), size: 4 },
       ...(curve.stepped && { paths: stepped, stepped: true }),
     }))],
     hooks: { setCursor: [({ cursor: { idx } }) => (at.textContent = idx === null || idx === undefined ? "" : said(idx))], draw: [(plot) => mark(plot.ctx, plot, { x, levels, lost, saturated, moments })] },
-  }, [x, ...ghosts.map(({ before }) => column(before)), ...curves.map(({ values }) => column(values))], element);
+  }, [x, ...ghosts.map(({ before }) => column(before)), ...drawn.map(({ values }) => column(values))], element);
   let down = 0;
   plot.over.addEventListener("mousedown", (event) => (down = event.clientX));
   // A click, not the end of a drag, which zooms.
@@ -277,7 +278,7 @@ export class Plots {
     this.draw();
   }
 
-  /** Curves that are shown initially: some outputs, every port with its reference (`w` and `w_ref`), and what a plant gives first. */
+  /** Curves that are shown initially: some outputs, every port with its reference (`w` and `w_ref`), what a plant gives first, and inputs that are few. */
   initial() {
     const keys = [...this.facts.keys()], outputs = keys.filter((key) => key.startsWith("out "));
     const paired = keys.filter((key) => {
@@ -287,6 +288,8 @@ export class Plots {
     const { plants, plant } = this.program ?? {}, gives = plants?.find(({ name }) => name === plant?.name)?.gives ?? [];
     const shown = new Set([...outputs.slice(0, SHOWN), ...paired]);
     for (const key of keys.filter((key) => key.startsWith("in ") && gives.includes(this.facts.get(key).name))) if (shown.size < SHOWN) shown.add(key);
+    const inputs = keys.filter((key) => key.startsWith("in "));
+    if (inputs.length <= FEW) for (const key of inputs) shown.add(key);
     return shown;
   }
 
