@@ -84,11 +84,11 @@ fn installation(address: Option<&str>) -> String {
     let [x86, aarch] = TARGETS;
     let (from, fetch) = match address {
         Some(address) => (
-            format!("A release is at <{address}>:"),
+            format!("A release is at <{address}>; [from source](#from-source), it takes two commands. The files:"),
             format!("curl -LO {address}/takt-{VERSION}-{x86}.tar.gz\n"),
         ),
         None => (
-            "No release is published yet; `cargo xtask release` writes its files into `target/release-files`:"
+            "No release is published yet: two commands run Takt [from source](#from-source), and `cargo xtask release` writes the files:"
                 .to_owned(),
             String::new(),
         ),
