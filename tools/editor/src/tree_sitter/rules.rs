@@ -422,6 +422,8 @@ fn tokens(add: &mut impl FnMut(&str, Rule)) {
     add("comment", pattern(";[^\\r\\n]*"));
     add("text", pattern("\"([^\"\\\\\\r\\n]|\\\\[^\\r\\n])*\""));
     add("directive_name", pattern("\\.[A-Za-z_][A-Za-z0-9_]*"));
+    // The start of a parameter's range up to `..`, a number or a name, and what is behind it; before `identifier`, which matches as much.
+    add("range_ends", pattern("[0-9A-Za-z_.]+\\.\\.[0-9A-Za-z_.]*"));
     add("identifier", pattern("[A-Za-z_][A-Za-z0-9_.]*"));
     add("template_begin", pattern("([A-Za-z_][A-Za-z0-9_.]*)?\\{"));
     add("template_middle", pattern("\\}[A-Za-z0-9_.]*\\{"));
@@ -444,8 +446,6 @@ fn tokens(add: &mut impl FnMut(&str, Rule)) {
             .join("|"),
         ),
     );
-    // The start of a parameter's range up to `..`, and the number behind it.
-    add("range_ends", pattern("[0-9.][0-9A-Za-z_.]*\\.\\.[0-9A-Za-z_.]*"));
     // Declared after `number`, which takes precedence if lengths are equal.
     add("_no_number", pattern("[0-9][0-9A-Za-z_.]*"));
     add(NEVER, seq([symbol("_no_number"), immediate(pattern("[0-9]"))]));
